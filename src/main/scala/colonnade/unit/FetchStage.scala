@@ -60,7 +60,7 @@ final class FetchStage(config: TraversalConfig) extends Module {
   when(io.ray.valid) { rays.write(io.ray.bits.context, io.ray.bits.ray) }
 
   // Join the record with the ray of its context
-  private val response = recordFetch.io.response.bits
+  private val response              = recordFetch.io.response.bits
   private val (boxRay, triangleRay) = rays.read(recordFetch.io.grantNext, recordFetch.io.grantsNodeNext)
   io.nodes.valid        := isFor(RecordKind.node)
   io.nodes.bits.context := response.context

@@ -8,12 +8,14 @@ import colonnade.formats.{Banks, RecordBroadcast}
 
 /** Fill: a broadcast goes to the buffer that was reserved for it. With snooping it goes to an available buffer otherwise,
   * if a context waits for it that finds it in no buffer. Every context that waits takes it from there; without snooping
-  * only the one that requested it. An extra slice registers broadcasts, and the comparison of their addresses.
+  * only the one that requested it. An extra slice registers broadcasts, and the comparison of their addresses; then no
+  * record is snooped for a context whose lookup has no result yet.
   *
   * @param row         of this unit
   * @param incoming    by bank
   * @param hits        by context and buffer: the lookup finds the record in the buffer
   * @param isNew       by context: its fetch came in the cycle before
+  * @param isSettling  by context: its lookup gives its result in this cycle or later
   * @param isAvailable by buffer: no context needs its record
   */
 private[unit] final class RecordFill(
@@ -24,6 +26,7 @@ private[unit] final class RecordFill(
     buffers:      Seq[RecordBuffer],
     hits:         Seq[Seq[Bool]],
     isNew:        Seq[Bool],
+    isSettling:   Seq[Bool],
     isAvailable:  Seq[Bool]
 ) {
   private val slice    = TimingSlice.extra(config)
@@ -43,44 +46,64 @@ private[unit] final class RecordFill(
     banks.map(isBank => slice(isBank && isAddress))
   }
 
+  private val brought = fetches.map(fetch => brings(fetch.address))
+
   /** By broadcast and context: the context waits for it. The slice compares a new fetch too late. */
-  val waiters: Seq[Seq[Bool]] = fetches.zip(isNew).map { case (fetch, isNew) =>
+  val waiters: Seq[Seq[Bool]] = fetches.zip(brought).zip(isNew).map { case ((fetch, brought), isNew) =>
     val waits = if (slice.isEnabled) fetch.isPending && !isNew else fetch.isPending
-    brings(fetch.address).map(_ && waits)
+    brought.map(_ && waits)
   }.transpose
+
+  /** By broadcast and context: it may be snooped for the context. */
+  private val snoopers: Seq[Seq[Bool]] =
+    if (slice.isEnabled)
+      fetches.zip(brought).zip(isSettling).map { case ((fetch, brought), isSettling) =>
+        brought.map(_ && fetch.isPending && !isSettling)
+      }.transpose
+    else waiters
 
   /** By broadcast and buffer: the buffer is reserved for it. */
   val awaiting: Seq[Seq[Bool]] =
     buffers.map(buffer => brings(buffer.address).map(_ && buffer.state === BufferState.reserved)).transpose
 
-  /** The buffers that are available after the fills; by broadcast and buffer: the buffer takes the record; it would if a context
-    * missed it.
+  /** The buffers that are available after the fills; by broadcast and buffer: the buffer takes the record; it is reserved for
+    * it; it would take it if a context missed it.
     */
-  val (stillAvailable, fills, candidates) =
-    broadcasts.zip(waiters.zip(awaiting)).foldLeft((isAvailable, Seq.empty[Seq[Bool]], Seq.empty[Seq[Bool]])) {
-      case ((available, fills, candidates), (broadcast, (waits, awaits))) =>
-        val isRecord   = broadcast.valid && !broadcast.bits.isLater.getOrElse(false.B)
-        val isReserved = awaits.map(_ && (snooping || broadcast.bits.row === row))
-        val isFree     = snooping && !isReserved.reduce(_ || _)
-        val isMissing  = waits.zip(isHit).map { case (waits, isHit) => waits && !isHit }.reduce(_ || _)
-        val reservedOH = PriorityEncoderOH(isReserved).map(_ && isRecord)
-        val freeOH     = PriorityEncoderOH(available).map(_ && isFree && isRecord)
-        val snoopedOH  = freeOH.map(_ && isMissing)
-        (
-          available.zip(snoopedOH).map { case (isFree, isTaken) => isFree && !isTaken },
-          fills :+ snoopedOH.zip(reservedOH).map { case (snooped, reserved) => snooped || reserved },
-          candidates :+ freeOH.zip(reservedOH).map { case (free, reserved) => free || reserved }
-        )
+  val (stillAvailable, fills, reserved, free) =
+    broadcasts.zip(snoopers.zip(awaiting)).foldLeft(
+      (isAvailable, Seq.empty[Seq[Bool]], Seq.empty[Seq[Bool]], Seq.empty[Seq[Bool]])
+    ) { case ((available, fills, reserved, free), (broadcast, (snoops, awaits))) =>
+      val isRecord   = broadcast.valid && !broadcast.bits.isLater.getOrElse(false.B)
+      val isReserved = awaits.map(_ && (snooping || broadcast.bits.row === row))
+      val isFree     = snooping && !isReserved.reduce(_ || _)
+      // With the slice, a lookup that has settled has no hit
+      val isMissing  = snoops.zip(isHit).map { case (snoops, isHit) => snoops && (slice.isEnabled.B || !isHit) }
+      val reservedOH = PriorityEncoderOH(isReserved).map(_ && isRecord)
+      val freeOH     = PriorityEncoderOH(available).map(_ && isFree && isRecord)
+      val snoopedOH  = freeOH.map(_ && isMissing.reduce(_ || _))
+      (
+        available.zip(snoopedOH).map { case (isFree, isTaken) => isFree && !isTaken },
+        fills :+ snoopedOH.zip(reservedOH).map { case (snooped, reserved) => snooped || reserved },
+        reserved :+ reservedOH,
+        free :+ freeOH
+      )
     }
 
   /** By buffer. */
   val isFilled: Seq[Bool] = fills.transpose.map(_.reduce(_ || _))
 
+  private val candidates = free.zip(reserved).map { case (free, reserved) =>
+    free.zip(reserved).map { case (free, reserved) => free || reserved }
+  }
+
   /** By context and broadcast: the context takes the record as it comes, if it does not find it in a buffer. */
-  private val arrives = fetches.zip(waiters.transpose).map { case (fetch, waits) =>
-    waits.zip(candidates).map { case (waits, candidates) =>
+  private val arrives = fetches.zip(waiters.transpose.zip(snoopers.transpose)).map { case (fetch, (waits, snoops)) =>
+    val comes = waits.zip(reserved).zip(snoops.zip(free)).map { case ((waits, reserved), (snoops, free)) =>
+      waits && reserved.reduce(_ || _) || snoops && free.reduce(_ || _)
+    }
+    comes.zip(candidates).map { case (comes, candidates) =>
       val isOwnRead = fetch.isPending && fetch.isIssued && Mux1H(fetch.bufferOH, candidates)
-      Mux(snooping, waits && candidates.reduce(_ || _), isOwnRead)
+      Mux(snooping, comes, isOwnRead)
     }
   }
 

@@ -19,9 +19,12 @@ final class RecordLookupIO(config: PartConfig) extends Bundle {
   /** By context and buffer, in one cycle after a fetch: the buffer has its address. */
   val matches = Output(Vec(contexts, Vec(buffers, Bool())))
 
-  /** By context: its fetch came in the cycle before; the matches of its fetch are still to come. */
+  /** By context: its fetch came in the cycle before; the matches of its fetch are still to come; they come or are to
+    * come.
+    */
   val isNew      = Output(Vec(contexts, Bool()))
   val isUnderWay = Output(Vec(contexts, Bool()))
+  val isSettling = Output(Vec(contexts, Bool()))
 }
 
 /** Lookup: compares the address of a new fetch with those of all buffers, once. Later only a fill or a new reservation
@@ -35,8 +38,8 @@ final class RecordLookup(config: PartConfig) extends Module {
   private val slice = TimingSlice.extra(config)
 
   // By context and port
-  private val cameFrom = Seq.tabulate(config.contexts) { context =>
-    VecInit(io.fetches.map(port => RegNext(port.valid && port.bits.context === context.U, false.B)))
+  private val comesFrom = Seq.tabulate(config.contexts) { context =>
+    VecInit(io.fetches.map(port => port.valid && port.bits.context === context.U))
   }
 
   // By port and buffer
@@ -45,11 +48,14 @@ final class RecordLookup(config: PartConfig) extends Module {
     passed(io.addresses.map(_ === address))
   }
 
-  for ((from, context) <- cameFrom.zipWithIndex) {
-    val isNew = from.asUInt.orR
-    val port  = slice(from)
+  for ((from, context) <- comesFrom.zipWithIndex) {
+    val comes      = from.asUInt.orR
+    val isNew      = RegNext(comes, false.B)
+    val isUnderWay = isNew || RegNext(isNew, false.B)
+    val port       = slice(RegNext(from, VecInit.fill(from.size)(false.B)))
     io.isNew(context)      := isNew
-    io.isUnderWay(context) := (if (slice.isEnabled) isNew || RegNext(isNew, false.B) else false.B)
+    io.isUnderWay(context) := isUnderWay && slice.isEnabled.B
+    io.isSettling(context) := (if (slice.isEnabled) RegNext(comes || isUnderWay, false.B) else isNew)
     io.matches(context)    := VecInit(passed(portMatches.transpose.map(Mux1H(port, _))))
   }
 

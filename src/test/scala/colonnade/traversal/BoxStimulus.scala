@@ -33,7 +33,7 @@ final case class BoxCase(
 
   /** The fields of [[BoxCandidate]] by name. Half of the origins are the unit below, and round up. */
   def fields(tMaxUnits: BigInt): Map[String, BigInt] = {
-    val roundsUp = boxOrigin.map(value => BigInt(if (value.testBit(1)) 1 else 0))
+    val roundsUp                                  = boxOrigin.map(value => BigInt(if (value.testBit(1)) 1 else 0))
     def vector(name: String, values: Seq[BigInt]) = Seq("x", "y", "z").zip(values).map { case (axis, value) =>
       s"$name.$axis" -> value
     }

@@ -39,6 +39,7 @@ class RecordLookupSpec extends AnyFlatSpec with ChiselScalatestTester {
             val age = fetches.get(context).map(_._1)
             dut.io.isNew(context).expect(age.contains(1))
             dut.io.isUnderWay(context).expect(age.exists(_ < latency))
+            dut.io.isSettling(context).expect(age.exists(_ <= latency))
           }
           for ((context, (age, address, matches)) <- fetches if age == latency) {
             for (buffer <- 0 until buffers) dut.io.matches(context)(buffer).expect(matches(buffer))
