@@ -77,8 +77,7 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
   units.positions :<>= walker.io.positions
 
   // Tiles of the environment
-  walker.io.leaving    := units.leaving
-  walker.io.marchWaits := units.marches.map(port => port.march.valid && !port.march.ready).getOrElse(false.B)
+  walker.io.environmentLeaves := units.environmentLeaves
   private val environmentWalker = io.tiles.ofEnvironment.map { tiles =>
     val walker = Module(new EnvironmentWalker(config)).io
     walker.frame  := io.registers.frame

@@ -6,7 +6,7 @@ import chisel3.experimental.noPrefix
 import chisel3.util.{Decoupled, Valid}
 import colonnade.config.{ColonnadeConfig, PathConfig, TraversalConfig}
 import colonnade.environment.MarchPort
-import colonnade.formats.{FrameRegisters, LeavingPixels, Pixel, RecordBroadcast, RecordRequest, UnitPosition}
+import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitPosition}
 import colonnade.shading.TexturePort
 import colonnade.unit.{AttributeFetch, FetchEvents, PathEvents, PathHits, PathUnit, TraversalEvents, TraversalUnit}
 
@@ -35,9 +35,10 @@ final class PathTracerIO(config: ColonnadeConfig) extends Bundle {
   val marches = Option.when(config.hasEnvironment)(new MarchPort(PathConfig(config)))
   val texture = config.geometry.texture.map(_ => new TexturePort(PathConfig(config)))
 
-  val leaving = Output(new LeavingPixels)
-  val isIdle  = Output(Bool()) // no pixel is in flight, and no request waits
-  val events  = Output(new PathTracerEvents(config))
+  /** A pixel of a tile of the environment leaves; no pixel is in flight, and no request waits. */
+  val environmentLeaves = Output(Bool())
+  val isIdle            = Output(Bool())
+  val events            = Output(new PathTracerEvents(config))
 }
 
 /** A module with the ports of a path tracer: [[PathTracer]], or what specs put in its place. */
@@ -64,7 +65,7 @@ final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config)
   io.pixels :<>= paths.pixels
   io.marches.zip(paths.marches).foreach { case (port, marches) => port :<>= marches }
   io.texture.zip(paths.texture).foreach { case (port, texture) => port :<>= texture }
-  io.leaving := paths.leaving
+  io.environmentLeaves := paths.environmentLeaves
 
   // Rays and their results
   hits.trace :<>= paths.trace

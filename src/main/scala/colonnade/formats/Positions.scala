@@ -16,9 +16,3 @@ final class UnitPosition(config: ColonnadeConfig) extends PixelPosition(config) 
   val meetsObject  = if (config.hasEnvironment) Some(Bool()) else None
   val inObjectTile = if (config.hasEnvironment) Some(Bool()) else None
 }
-
-/** By the kind of tile: one of its pixels leaves. */
-final class LeavingPixels extends Bundle {
-  val ofObject      = Bool()
-  val ofEnvironment = Bool()
-}

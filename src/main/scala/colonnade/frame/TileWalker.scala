@@ -4,17 +4,15 @@ import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable}
 import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{FrameSettings, LeavingPixels, PixelPosition, UnitPosition}
+import colonnade.formats.{FrameSettings, PixelPosition, UnitPosition}
 
 final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val frame = Input(new FrameSettings(config.numbers))
   val tiles = Flipped(Decoupled(new ObjectTile(config)))
 
-  /** Pixels of another tile, which shows the environment only. */
-  val environment = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
-
-  val leaving    = Input(new LeavingPixels) // from the column
-  val marchWaits = Input(Bool())            // a ray waits for a march
+  /** Pixels of another tile, which shows the environment only; one of them has left the column. */
+  val environment       = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
+  val environmentLeaves = Input(Bool())
 
   /** Pixels to render, those of the window included. */
   val positions = Decoupled(new UnitPosition(config))
@@ -63,12 +61,10 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
   io.others :<>= others.deq
 
   private val positions = io.environment.fold(taken) { environment =>
-    val mixer =
-      Module(new PixelMixer(config, TileWalker.maxEnvironment(config), TileWalker.maxMarching(config))).io
+    val mixer = Module(new PixelMixer(config, TileWalker.maxEnvironment(config))).io
     mixer.objects :<>= taken
     mixer.environment :<>= environment
-    mixer.leaving    := io.leaving
-    mixer.marchWaits := io.marchWaits
+    mixer.leaves := io.environmentLeaves
     mixer.positions
   }
 
@@ -81,7 +77,4 @@ object TileWalker {
 
   /** Pixels of a tile of the environment that are in flight at most: about those that the pipelines of the marches hold. */
   def maxEnvironment(config: ColonnadeConfig): Int = (config.units.pathContexts * 3 / 8).max(1)
-
-  /** Pixels of the object that are in flight at most while rays wait for marches. */
-  def maxMarching(config: ColonnadeConfig): Int = 4 * config.units.marches
 }

@@ -5,7 +5,7 @@ import chisel3.util.{Arbiter, Decoupled, Valid}
 import colonnade.common.TimingSlice
 import colonnade.config.PathConfig
 import colonnade.environment.MarchPort
-import colonnade.formats.{FrameRegisters, LeavingPixels, Pixel, UnitPosition}
+import colonnade.formats.{FrameRegisters, Pixel, UnitPosition}
 import colonnade.ray.{RayRequest, RaySetup}
 import colonnade.shading.{ColourUnit, LitSurface, Shader, ShadowRays, TexturePort}
 
@@ -20,9 +20,10 @@ final class PathUnitIO(config: PathConfig) extends Bundle {
   val marches = Option.when(config.hasEnvironment)(new MarchPort(config))
   val texture = config.geometry.texture.map(_ => new TexturePort(config))
 
-  val leaving = Output(new LeavingPixels)
-  val isIdle  = Output(Bool()) // no pixel is in flight
-  val events  = Output(new PathEvents(config))
+  /** A pixel of a tile of the environment leaves; no pixel is in flight. */
+  val environmentLeaves = Output(Bool())
+  val isIdle            = Output(Bool())
+  val events            = Output(new PathEvents(config))
 }
 
 /** Follows the path of each pixel in flight, one per context: docs/path-tracer.md. Pixels leave in any order; their order
@@ -85,7 +86,7 @@ final class PathUnit(config: PathConfig) extends Module {
   assembler.surfaceHit := trace.surfaceHit
   assembler.colour     := colourUnit.colour
   io.pixels :<>= assembler.pixels
-  io.leaving := assembler.leaving
+  io.environmentLeaves := assembler.environmentLeaves
 
   // Control: the state of every context
   controller.allocation :<>= primaryRays.control

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.formats.{FrameRegisters, LeavingPixels, Pixel, PixelHit, Rgb, UnitPosition}
+import colonnade.formats.{FrameRegisters, Pixel, PixelHit, Rgb, UnitPosition}
 import colonnade.shading.PathColour
 
 final class PixelAssemblerIO(config: PathConfig) extends Bundle {
@@ -18,9 +18,9 @@ final class PixelAssemblerIO(config: PathConfig) extends Bundle {
   val control    = new PixelControl(config)
   val pixels     = Decoupled(new Pixel(config))
 
-  /** The pixels of contexts that retire; no pixel waits here. */
-  val leaving = Output(new LeavingPixels)
-  val isIdle  = Output(Bool())
+  /** The pixel of a context that retires is of a tile of the environment; no pixel waits here. */
+  val environmentLeaves = Output(Bool())
+  val isIdle            = Output(Bool())
 }
 
 /** Keeps what each context knows of its pixel, and assembles the pixel when it is done. A context retires when its tables
@@ -53,17 +53,15 @@ final class PixelAssembler(config: PathConfig) extends Module {
   io.isIdle := !finished.valid && !io.pixels.valid
 
   // Assemble its pixel
-  private val pixel        = pixels.read(done.bits, retires)
-  private val colour       = colours.read(done.bits, retires)
-  private val hasColour    = RegEnable(io.control.hasColour, retires)
-  private val inObjectTile = pixel.inObjectTile.getOrElse(true.B)
-  io.leaving.ofObject      := finished.valid && inObjectTile
-  io.leaving.ofEnvironment := finished.valid && !inObjectTile
-  finished.valid           := RegNext(retires, false.B)
-  finished.bits.x          := pixel.x
-  finished.bits.y          := pixel.y
-  finished.bits.colour     := Mux(hasColour, colour.colour, io.background)
-  finished.bits.isObject   := RegEnable(isObject(done.bits), retires)
+  private val pixel     = pixels.read(done.bits, retires)
+  private val colour    = colours.read(done.bits, retires)
+  private val hasColour = RegEnable(io.control.hasColour, retires)
+  io.environmentLeaves   := finished.valid && !pixel.inObjectTile.getOrElse(true.B)
+  finished.valid         := RegNext(retires, false.B)
+  finished.bits.x        := pixel.x
+  finished.bits.y        := pixel.y
+  finished.bits.colour   := Mux(hasColour, colour.colour, io.background)
+  finished.bits.isObject := RegEnable(isObject(done.bits), retires)
   for (ratio <- finished.bits.ratio; shadow <- colour.ratio; channel <- 0 until 3)
     ratio.channels(channel) := Mux(hasColour && !finished.bits.isObject, shadow.channels(channel), FrameRegisters.one)
 

@@ -21,7 +21,7 @@ final class FakePathTracer(config: ColonnadeConfig) extends PathTracerModule(con
   io.texture.foreach(_.req.bits := DontCare)
   io.requests.last.valid := false.B
   io.requests.last.bits  := DontCare
-  io.leaving             := 0.U.asTypeOf(io.leaving)
+  io.environmentLeaves   := false.B
   io.events              := 0.U.asTypeOf(io.events)
 
   private val dispatch = Module(new Dispatcher(new UnitPosition(config), rows.size)).io
