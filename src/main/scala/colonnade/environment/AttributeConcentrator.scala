@@ -10,8 +10,11 @@ final class AttributeConcentratorIO(config: ColonnadeConfig, requesters: Int, ta
   val joined = new AttributePort(layout, AttributeArbiter.tagBits(requesters, tagBits))
 }
 
-/** Joins several ports into one, with an [[AttributeArbiter]] for each channel. */
-final class AttributeConcentrator(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Module {
+/** Joins several ports into one, with an [[AttributeArbiter]] for each channel. Of a column's ports the last one goes first,
+  * that of directly seen pixels: it asks in every fourth cycle at most, and all pixels wait for it.
+  */
+final class AttributeConcentrator(config: ColonnadeConfig, requesters: Int, tagBits: Int, ofColumn: Boolean)
+    extends Module {
   val io = IO(new AttributeConcentratorIO(config, requesters, tagBits))
 
   join(_.albedo)
@@ -26,7 +29,8 @@ final class AttributeConcentrator(config: ColonnadeConfig, requesters: Int, tagB
         chiselTypeOf(joined.req.bits.content),
         chiselTypeOf(joined.resp.bits.content),
         requesters,
-        tagBits
+        tagBits,
+        lastFirst = ofColumn
       )
     )
     arbiter.io.requesters.zip(io.ports).foreach { case (requester, port) => requester <> channel(port) }

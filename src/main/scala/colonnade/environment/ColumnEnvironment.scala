@@ -22,12 +22,12 @@ final class ColumnEnvironment(config: ColonnadeConfig) extends Module {
 
   io.shared match {
     case Some(shared) =>
-      val units = Module(new AttributeConcentrator(config, config.mapRequesters, tagBits = 0))
+      val units = Module(new AttributeConcentrator(config, config.mapRequesters, tagBits = 0, ofColumn = true))
       units.io.ports <> io.ports
       shared <> units.io.joined
       io.events := shared.events
     case None =>
-      val maps = Module(new PhysicalAttributeMemory(config, config.mapRequesters, tagBits = 0))
+      val maps = Module(new PhysicalAttributeMemory(config, config.mapRequesters, tagBits = 0, ofColumn = true))
       maps.io.ports <> io.ports
       maps.io.load := io.load
       io.events    := maps.io.events

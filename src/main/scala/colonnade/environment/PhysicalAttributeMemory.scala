@@ -16,12 +16,17 @@ final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, 
   *
   * Latency: that of the map and two cycles.
   */
-final class PhysicalAttributeMemory(config: ColonnadeConfig, requesters: Int, tagBits: Int) extends Module {
+final class PhysicalAttributeMemory(
+    config:     ColonnadeConfig,
+    requesters: Int,
+    tagBits:    Int,
+    ofColumn:   Boolean = false
+) extends Module {
   val io = IO(new PhysicalAttributeMemoryIO(config, requesters, tagBits))
 
   private val layout     = AttributeLayout.of(config)
   private val joinedBits = AttributeArbiter.tagBits(requesters, tagBits)
-  private val joined     = Module(new AttributeConcentrator(config, requesters, tagBits))
+  private val joined     = Module(new AttributeConcentrator(config, requesters, tagBits, ofColumn))
   private val albedo     = Module(new TwoLevelMap(config, layout, "albedo", new AlbedoEntry, joinedBits))
   private val normals    = Module(new TwoLevelMap(config, layout, "normals", new NormalEntry, joinedBits))
   private val planes     = Module(new PlaneMap(config, joinedBits))
