@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{Decoupled, DecoupledIO, Mux1H, Queue, RegEnable, Valid}
+import chisel3.util.{Decoupled, DecoupledIO, Mux1H, Queue, RegEnable, UIntToOH, Valid}
 import colonnade.common.{Context, ContextTable, First}
 import colonnade.config.PathConfig
 import colonnade.shading.EnvironmentSurface
@@ -70,14 +70,14 @@ final class EnvironmentRays(config: PathConfig) extends Module {
   private val chosen    = Reg(Context(config))
   private val isOffered = RegNext(!isTaken && isChosen && !io.surface.fire, false.B)
   when(answer.fire && answer.bits.isHit) { hasPoint(answer.bits.surface.context) := true.B }
-  when(!isChosen) {
-    isChosen := hasPoint.asUInt.orR
-    chosen   := First(hasPoint).bits
+  private val others = VecInit(hasPoint.zip(UIntToOH(chosen, config.contexts).asBools).map { case (has, isLast) =>
+    has && !(isChosen && isLast)
+  })
+  when(!isChosen || io.surface.fire) {
+    isChosen := others.asUInt.orR
+    chosen   := First(others).bits
   }
-  when(io.surface.fire) {
-    isChosen         := false.B
-    hasPoint(chosen) := false.B
-  }
+  when(io.surface.fire)(hasPoint(chosen) := false.B)
 
   private val entry = table.read(Mux(isTaken, taken.context, chosen), isTaken || isChosen)
   column.order.ray := entry(rayType.getWidth - 1, 0).asTypeOf(rayType)

@@ -12,7 +12,7 @@ final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, 
 }
 
 /** The environment's maps, with a port for each requester: render units, or columns that share one memory. Each of the
-  * four channels accepts one request a cycle, by round-robin. A reset drops requests in flight, but keeps the maps.
+  * four channels accepts one request a cycle, see [[AttributeConcentrator]]. A reset drops requests in flight, but keeps the maps.
   *
   * Latency: that of the map and two cycles.
   */
