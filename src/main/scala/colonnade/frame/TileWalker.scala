@@ -76,5 +76,5 @@ object TileWalker {
   val maxOthers: Int = 64 // pixels outside the object that wait for the background walker
 
   /** Pixels of a tile of the environment that are in flight at most: about those that the pipelines of the marches hold. */
-  def maxEnvironment(config: ColonnadeConfig): Int = (config.units.pathContexts * 3 / 8).max(1)
+  def maxEnvironment(config: ColonnadeConfig): Int = (config.units.pathContexts / 2).max(1)
 }
