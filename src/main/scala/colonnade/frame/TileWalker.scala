@@ -75,6 +75,6 @@ final class TileWalker(config: ColonnadeConfig) extends Module {
 object TileWalker {
   val maxOthers: Int = 64 // pixels outside the object that wait for the background walker
 
-  /** Pixels of a tile of the environment that are in flight at most: about those that the pipelines of the marches hold. */
+  /** Pixels of a tile of the environment that are in flight at most: one enters in four cycles, and leaves after about 300. */
   def maxEnvironment(config: ColonnadeConfig): Int = (config.units.pathContexts / 2).max(1)
 }
