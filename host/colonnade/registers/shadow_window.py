@@ -53,8 +53,9 @@ def shadow_window(view: View, environment: Environment, depth: Floats, extent: E
     return x0, y0, min(view.width, int(columns[-1]) + 2), min(view.height, int(rows[-1]) + 2)
 
 
+@np.errstate(invalid="ignore")
 def surface_points(view: View, environment: Environment, depth: Floats) -> Floats:
-    """The points where the device takes the room's surface, mesh space, float64 [rows, columns, 3].
+    """The points where the device takes the room's surface, mesh space, float64 [rows, columns, 3]; NaN at infinite depth.
 
     Those of the frame's pixels, with the depth of a pixel's centre, also where its ray is shifted; for a camera that is
     not that of the maps, those of the maps' pixels.
