@@ -38,17 +38,7 @@ final class RecordFetch(config: PartConfig) extends Module {
     buffer.state === BufferState.empty || (buffer.state === BufferState.full && !isUsed)
   }
 
-  private val fill = new RecordFill(
-    config,
-    io.row,
-    io.broadcasts,
-    fetches,
-    buffers,
-    hits,
-    lookup.isNew,
-    lookup.isSettling,
-    isAvailable
-  )
+  private val fill = new RecordFill(config, io.row, io.broadcasts, fetches, buffers, hits, lookup, isAvailable)
   private val miss =
     new RecordMiss(config, io.requests, fetches, buffers, matches, lookup.isUnderWay, fill, isAvailable)
   new LaterRecords(fetches, buffers, fill)

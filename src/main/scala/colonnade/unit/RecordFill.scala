@@ -14,8 +14,6 @@ import colonnade.formats.{Banks, RecordBroadcast}
   * @param row         of this unit
   * @param incoming    by bank
   * @param hits        by context and buffer: the lookup finds the record in the buffer
-  * @param isNew       by context: its fetch came in the cycle before
-  * @param isSettling  by context: its lookup gives its result in this cycle or later
   * @param isAvailable by buffer: no context needs its record
   */
 private[unit] final class RecordFill(
@@ -25,8 +23,7 @@ private[unit] final class RecordFill(
     fetches:      Seq[ContextFetch],
     buffers:      Seq[RecordBuffer],
     hits:         Seq[Seq[Bool]],
-    isNew:        Seq[Bool],
-    isSettling:   Seq[Bool],
+    lookup:       RecordLookupIO,
     isAvailable:  Seq[Bool]
 ) {
   private val slice    = TimingSlice.extra(config)
@@ -49,7 +46,7 @@ private[unit] final class RecordFill(
   private val brought = fetches.map(fetch => brings(fetch.address))
 
   /** By broadcast and context: the context waits for it. The slice compares a new fetch too late. */
-  val waiters: Seq[Seq[Bool]] = fetches.zip(brought).zip(isNew).map { case ((fetch, brought), isNew) =>
+  val waiters: Seq[Seq[Bool]] = fetches.zip(brought).zip(lookup.isNew).map { case ((fetch, brought), isNew) =>
     val waits = if (slice.isEnabled) fetch.isPending && !isNew else fetch.isPending
     brought.map(_ && waits)
   }.transpose
@@ -57,7 +54,7 @@ private[unit] final class RecordFill(
   /** By broadcast and context: it may be snooped for the context. */
   private val snoopers: Seq[Seq[Bool]] =
     if (slice.isEnabled)
-      fetches.zip(brought).zip(isSettling).map { case ((fetch, brought), isSettling) =>
+      fetches.zip(brought).zip(lookup.isSettling).map { case ((fetch, brought), isSettling) =>
         brought.map(_ && fetch.isPending && !isSettling)
       }.transpose
     else waiters
