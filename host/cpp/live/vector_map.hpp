@@ -152,11 +152,15 @@ private:
         Entries own = entries(tile, mode);
         std::uint16_t words[33] = {};
         if (mode < 4) {
-            taken_.assign(sums.cells(level), sums.sum(level).data(), palette_[own.at[0]], palette_[own.at[1]]);
+            const Point &a = palette_[own.at[0]], &b = palette_[own.at[1]];
+            taken_.assign(sums.cells(level), sums.sum(level).data(), a, b);
             // The first cell takes entry 0, so that equal patterns are equal words
             const std::int16_t flip = taken_.mask[0];
-            if (flip) std::swap(own.at[0], own.at[1]);
-            for (int i = 0; i < cells; ++i) words[i >> 4] |= static_cast<std::uint16_t>((taken_.mask[i] ^ flip) & 1) << (i & 15);
+            Pattern pattern{};
+            for (int i = 0; i < cells; ++i) pattern.bits[i >> 6] |= static_cast<std::uint64_t>((taken_.mask[i] ^ flip) & 1) << (i & 63);
+            const bool isSwapped = mode > 0 && share(sums, level, a, b, pattern);
+            if ((flip != 0) != isSwapped) std::swap(own.at[0], own.at[1]);
+            for (int i = 0; i < std::max(1, cells / 16); ++i) words[i] = static_cast<std::uint16_t>(pattern.bits[i >> 2] >> (16 * i & 48));
         } else {
             std::uint8_t rank[4], order[4] = {0, 1, 2, 3}, which[maxCells];
             std::stable_sort(order, order + 4, [&](int a, int b) { return own.at[a] < own.at[b]; });
@@ -176,6 +180,35 @@ private:
         if (pointer < 0) return false;
         descriptor = static_cast<std::uint32_t>(mode) | static_cast<std::uint32_t>(pointer) << 3 | static_cast<std::uint32_t>(own.at[0]) << 16 | static_cast<std::uint32_t>(own.at[1]) << 24;
         return true;
+    }
+
+    /// Replaces a pattern by a stored one, or by its complement, if that costs less than its words. True for a complement.
+    bool share(const TileSums& sums, int level, const Point& a, const Point& b, Pattern& pattern) {
+        const int cells = cellsOf(level), words = vectorWords[level];
+        const std::int64_t most = budget_.price() * words;
+        std::int32_t losses[maxCells]; // of a cell that takes the other entry, 1/256 squared code
+        const std::int32_t lengths = static_cast<std::int32_t>(product(b, b) - product(a, a));
+        const Point way{{b.at[0] - a.at[0], b.at[1] - a.at[1], b.at[2] - a.at[2]}};
+        for (int i = 0; i < cells; ++i) losses[i] = std::abs(lengths - 2 * static_cast<std::int32_t>(product(sums.point(level, i), way)));
+        Pattern best = pattern;
+        bool isComplement = false;
+        std::int64_t least = (most << costShift) / sums.weight() / sums.pixelsOf(level);
+        for (const Pattern& stored : heap_.patterns(words)) {
+            for (const bool complement : {false, true}) {
+                std::int64_t loss = 0;
+                for (int part = 0; 64 * part < cells && loss < least; ++part) {
+                    const std::uint64_t all = cells < 64 ? (std::uint64_t{1} << cells) - 1 : ~std::uint64_t{0};
+                    for (std::uint64_t other = (pattern.bits[part] ^ stored.bits[part] ^ (complement ? all : 0)); other != 0 && loss < least; other &= other - 1)
+                        loss += losses[64 * part + __builtin_ctzll(other)];
+                }
+                if (loss >= least) continue;
+                least = loss;
+                best = stored;
+                isComplement = complement;
+            }
+        }
+        pattern = best;
+        return isComplement;
     }
 
     void updatePalette() {

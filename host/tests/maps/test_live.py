@@ -240,6 +240,13 @@ def test_textures_of_all_tile_sizes(tile: int) -> None:
     assert np.array_equal(colour_codes(np.array([0.0, 1.0])), [0, 255])
 
 
+def test_tiles_with_nearly_equal_patterns_share_words() -> None:
+    room = generated_room(100).environment
+    layout = AttributeLayout(room.width, room.height)
+    found = encode_colours(room.albedo, layout)
+    assert np.array([mode.words for mode in MODES])[found.descriptors & 7].sum() > 1.1 * layout.heap_words
+
+
 def test_other_layouts_and_sizes_are_refused() -> None:
     for layout in (replace(LAYOUT, tile_size=8), replace(LAYOUT, encoding="slic", map_bytes=9000)):
         with pytest.raises(UserError, match="live encoder writes twoLevel maps with tiles of 16"):
