@@ -16,7 +16,7 @@ from colonnade.lab.ppa.summary import LIBRARIES, MAX_FO4, TITLES
 Report = Mapping[str, Any]
 
 #: Smallest memory of the table, kbit in the array.
-MIN_KBIT = 50
+MIN_KBIT = 100
 
 #: Smallest unit of the table, kGE.
 MIN_KGE = 1.0
@@ -27,14 +27,14 @@ def units(data: Data) -> str:
     reports = _edge(data)
     first, *others = reports.values()
     titles = ["unit", "instances", "kGE", "flip-flops"]
-    titles += [f"FO4, {LIBRARIES[library]}" for library in reports] + ["pJ a ray, without glitches", "with"]
+    titles += [f"FO4, {', '.join(LIBRARIES[library] for library in reports)}", "pJ a ray, without glitches", "with"]
     rows: list[list[str]] = []
     for level in LEVEL_NAMES:
         rows.append([f"**{TITLES[level]}**", *[""] * (len(titles) - 1)])
         for name, unit in first["units"].items():
             if unit["level"] == level and unit["kge"] >= MIN_KGE:
                 row = [name, str(unit["count"]), f"{unit['kge']:.1f}", f"{unit['flops']:,}"]
-                row += [_fo4(report["units"].get(name)) for report in (first, *others)]
+                row.append(", ".join(_fo4(report["units"].get(name)) for report in (first, *others)))
                 rows.append([*row, *_energies(unit)])
     return markdown(titles, rows)
 

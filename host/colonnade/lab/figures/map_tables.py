@@ -75,13 +75,11 @@ def captures(data: Data) -> str:
             name,
             "–" if report["noise"] is None else f"{report['estimated']:.2%}",
             f"{report['degrees']:.1f}°",
-            *(f"{100 * report[march]:.1f} %" for march in ("depth", "planes", "device")),
-            f"{report['rays']:,}",
+            ", ".join(f"{100 * report[march]:.1f}" for march in ("depth", "planes", "device")),
         ]
         for name, report in data.result("captures").items()
     ]
-    titles = ["room", "noise found", "normals off by", "mirror rays right: depth map", "planes", "device", "rays"]
-    return markdown(titles, rows)
+    return markdown(["room", "noise found", "normals off by", "mirror rays right, %: depth map, planes, device"], rows)
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {

@@ -74,9 +74,9 @@ def equality(data: Data) -> str:
     """Frames in which the RTL was compared with the model."""
     rows = []
     meshes = data.result("equality-small")["meshes"]
-    for key, title in (("pixels", "pixels"), ("triangles", "hit triangles and distances"), ("counters", "counters")):
-        wrong = sum(mesh["rtl"][key] for mesh in meshes.values())
-        rows.append([f"{title} of {len(meshes)} meshes on `small`", f"{wrong}", _command("equality-small")])
+    wrong = sum(sum(mesh["rtl"].values()) for mesh in meshes.values())
+    compared = f"pixels, hits and counters of {len(meshes)} meshes on `small`"
+    rows.append([compared, f"{wrong}", _command("equality-small")])
     rooms = data.result("rooms")
     wrong = sum(frame["differing_pixels"] for frame in rooms["frames"])
     size = "×".join(map(str, rooms["size"]))
@@ -182,10 +182,9 @@ def measuring(data: Data) -> str:
         if content is not None:
             total += content["seconds"]
             commit = f"{content['commit'][:8]}{', modified' if content['is_modified'] else ''}"
-            row = [f"`{name}`", _minutes(content["seconds"]), f"{content['processors']}"]
-            rows.append([*row, content["date"], commit])
-    rows.append(["all", _minutes(total), "", "", ""])
-    return markdown(["part", "minutes", "processors", "day", "commit"], rows)
+            rows.append([f"`{name}`", _minutes(content["seconds"]), content["date"], commit])
+    rows.append(["all", _minutes(total), "", ""])
+    return markdown(["part", "minutes", "day", "commit"], rows)
 
 
 def _minutes(seconds: float) -> str:

@@ -56,13 +56,6 @@ def savings(data: Data) -> str:
     return markdown(["", "design", "energy per ray saved", "power saved", "area saved", "DISTS loss of a frame"], rows)
 
 
-def ranking(data: Data) -> str:
-    """The three best precisions by each choice of Norm, and the last."""
-    choices = data.result("mixed-precision")["render_index"]["sensitivity"]
-    rows = [[each["choice"], *each["ranking"][:3], each["ranking"][-1]] for each in choices]
-    return markdown(["Norm(loss), or all norms", "best", "second", "third", "last"], rows)
-
-
 def energy_area(data: Data) -> str:
     """Each design of the study of energy and area; bold: on the front."""
     study = data.result("energy-area")
@@ -101,6 +94,5 @@ def number(value: float | None, form: str, scale: float = 1.0) -> str:
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "precision": precision,
     "savings": savings,
-    "ranking": ranking,
     "energy-area": energy_area,
 }
