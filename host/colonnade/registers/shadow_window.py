@@ -55,7 +55,7 @@ def shadow_window(view: View, environment: Environment, depth: Floats, extent: E
 
 @np.errstate(invalid="ignore")
 def surface_points(view: View, environment: Environment, depth: Floats) -> Floats:
-    """The points where the device takes the room's surface, mesh space, float64 [rows, columns, 3]; NaN at infinite depth.
+    """Points where the device takes the room's surface, mesh space, float64 [rows, columns, 3]; NaN at infinite depth.
 
     Those of the frame's pixels, with the depth of a pixel's centre, also where its ray is shifted; for a camera that is
     not that of the maps, those of the maps' pixels.

@@ -28,11 +28,11 @@ final class BouncePipeline(config: PathConfig) extends Module {
 
   // A result is chosen, and offered until it is taken; the next one is another unit's
   private val chosen = RegInit(VecInit.fill(units.size)(false.B))
-  private val others = units.zip(chosen).map { case (unit, chosen) => unit.result.valid && !chosen }
+  private val others = units.zip(chosen).map { case (unit, isLast) => unit.result.valid && !isLast }
   when(!io.result.valid || io.result.ready) { chosen := VecInit(PriorityEncoderOH(others)) }
   io.result.valid                                             := chosen.reduce(_ || _)
   io.result.bits                                              := Mux1H(chosen, units.map(_.result.bits))
-  for ((unit, chosen) <- units.zip(chosen)) unit.result.ready := chosen && io.result.ready
+  for ((unit, isNext) <- units.zip(chosen)) unit.result.ready := isNext && io.result.ready
 }
 
 object BouncePipeline {
