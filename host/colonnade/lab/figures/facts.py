@@ -79,7 +79,8 @@ def _energies(area: Mapping[str, Any]) -> dict[str, float]:
 #: How a figure of `facts` is written in a text.
 FORMATS = {
     **dict.fromkeys(("raysPerCycle", "fewest", "most", "mirrorRaysPerCycle", "mm2", "nj", "njGlitches"), ".2f"),
-    **dict.fromkeys(("timesChip", "equalArea"), ".1f"),
+    "timesChip": ".1f",
+    "equalArea": ".2f",
     **dict.fromkeys(("kge", "mhz", "mrays", "mraysAtClock", "framesPerSecond", "framesPerJoule"), ",.0f"),
     **dict.fromkeys(("fo4", "mraysPerMm2", "mraysPerMm2AtClock"), ".0f"),
 }

@@ -26,7 +26,7 @@ def area() -> dict[str, Any]:
     """A report of an array of two columns of three rows; its slowest path takes 0.7 ns, and it has twice the chip."""
     unit = {"count": 1, "kge": 30.0, "share": 1.0, "flops": 7, "paths": {"register_to_register": PATH}}
     level = {"logic_kge": 40.0, "logic_um2": 5e6, "memory_bits": 9000, "logic_mm2_28nm": 0.5, "mm2_28nm": 11.06}
-    memory = {"unit": "BoxUnit", "count": 2, "depth": 64, "width": 80, "bits": 10_240, "um2": {"28 nm": 1e3}}
+    memory = {"unit": "BoxUnit", "count": 2, "depth": 128, "width": 80, "bits": 20_480, "um2": {"28 nm": 1e3}}
     return {
         "technology": {
             "liberty": ["cells"],
@@ -208,13 +208,13 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| rows (render units per column) | 4 | 2.00 | 2.00 | 2.00 |" in table(docs, "scaling")
     assert "| bunny | 12 | 1.000 | 1.250 |" in table(docs, "ablation")
     # 5.53 mm² for 11.06: half of 1 / 0.208; 50 FO4 of 14 ps: 1,429 MHz
-    assert "| `edge` | 40 | 11.06 | 50 | 1,429 | 2.00 | 2.00 | 2.4 |" in table(docs, "presets-cost")
+    assert "| `edge` | 40 | 11.06 | 50 | 1,429 | 2.00 | 2.00 | 2.40 |" in table(docs, "presets-cost")
     assert "| `edge`, 200 MHz | 200 | 11.06 | 18 |" in table(docs, "designs")
-    assert "| `words` | BoxUnit | render unit | 2 × 64 × 80 | 61 | 0.006 |" in table(docs, "memories")
+    assert "| `words` | BoxUnit | render unit | 2 × 128 × 80 | 123 | 0.006 |" in table(docs, "memories")
     assert "`few`" not in table(docs, "memories")
     assert "43,000 LUTs | – | 50 MHz, routed" in table(docs, "presets")
     assert "| mean | 2,000 frames per second at 200 MHz | 100,000 |" in table(docs, "rooms")
-    assert "| hit triangles and distances of 2 meshes on `small` | 2 |" in table(docs, "equality")
+    assert "| pixels, hits and counters of 2 meshes on `small` | 2 |" in table(docs, "equality")
     assert "| **8** | 1.1 | 1.10 |" in table(docs, "energy-area")
     assert "**32b32s64d**" in table(docs, "precision")
     assert "| all | 28.5 |" in table(docs, "measuring")
