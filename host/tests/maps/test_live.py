@@ -247,6 +247,19 @@ def test_tiles_with_nearly_equal_patterns_share_words() -> None:
     assert np.array([mode.words for mode in MODES])[found.descriptors & 7].sum() > 1.1 * layout.heap_words
 
 
+def test_shared_patterns_keep_their_sides() -> None:
+    """Tiles of one pattern but for some cells, and often for the first one, whose words begin with the other entry."""
+    random = np.random.default_rng(5)
+    pattern = random.random((8, 8)) < 0.5
+    flips = random.random((15, 20, 8, 8)) < 0.022
+    flips[:, ::2, 0, 0] = True
+    cells = (pattern ^ flips).transpose(0, 2, 1, 3).reshape(120, 160)
+    shade = np.where(cells, 0.6, 0.2).repeat(2, axis=0).repeat(2, axis=1)
+    layout = AttributeLayout(320, 240, map_bytes=3000, palette_size=64)
+    found = encode_colours(np.repeat(shade[..., None], 3, axis=2), layout).decoded(layout, AlbedoSpace(12))
+    assert (np.abs(found[..., 0] - shade) > 0.2).mean() < 0.2
+
+
 def test_other_layouts_and_sizes_are_refused() -> None:
     for layout in (replace(LAYOUT, tile_size=8), replace(LAYOUT, encoding="slic", map_bytes=9000)):
         with pytest.raises(UserError, match="live encoder writes twoLevel maps with tiles of 16"):
