@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+import view_places
 from colonnade.common.framebuffer_formats import framebuffer_bytes
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
@@ -99,9 +100,10 @@ def main() -> None:
             fail(f"the {name} in memory has changed")
 
     target = TargetView(view, manifest)
-    centre = list(struct.unpack_from("<3q", view, 4 * 44))
+    centre = list(struct.unpack_from("<3q", view, 4 * view_places.OBJECT))
     seen = dict(re.findall(rb"frame (\d+): crc32 ([0-9a-f]{8})", console.read_bytes()))
-    start = [*struct.unpack_from("<3q9i4q2I", view, 4 * 59), *struct.unpack_from("<3q3IQ", view, 4 * 84)]
+    start = [*struct.unpack_from("<3q9i4q2I", view, 4 * view_places.CAMERA)]
+    start += struct.unpack_from("<3q3IQ", view, 4 * view_places.LIGHT)
     different, frames = 0, []
     for index in range(layout["frames"]):
         poses, words = record(memory, index)

@@ -18,6 +18,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import view_places
 from colonnade_litex import Colonnade
 from litex.build.generic_platform import Pins, Subsignal
 from litex.build.io import CRG
@@ -113,7 +114,7 @@ class ProgramBuilder(Builder):  # type: ignore[misc]
 
 def memory_layout(files: dict[str, bytes]) -> dict[str, int]:
     """Addresses and sizes; every part has an untouched page behind it."""
-    width, height = struct.unpack_from("<2I", files["view"], 4 * 78)
+    width, height = struct.unpack_from("<2I", files["view"], 4 * view_places.WIDTH)
     stride = -(-width // 16) * 16 * 4
     layout = {"frames": FRAMES, "width": width, "height": height, "stride": stride}
     layout |= {"record_bytes": RECORD_BYTES, "frame_bytes": stride * height}

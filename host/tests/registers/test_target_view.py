@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import runpy
+import struct
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from target_views import LENS, ONE, PIXEL, POSES, UNIT, Design, Poses, both, random_poses
+from target_views import HEIGHT, LENS, ONE, PIXEL, POSES, ROOT, UNIT, WIDTH, Design, Poses, both, random_poses
 
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.registers.target_view import TargetView, rotation_of
-from colonnade.registers.view_file import camera_names, light_names
+from colonnade.registers.view_file import camera_names, light_names, rotation_values
 
 
 def test_the_scene_of_the_file_is_that_of_the_host(design: Design) -> None:
@@ -24,6 +26,21 @@ def test_the_scene_of_the_file_is_that_of_the_host(design: Design) -> None:
     moved = {*camera_names(), *light_names(len(design.view.lights))}
     same = [name for name in found if name not in moved and "objectOutline" not in name]
     assert {name: found[name] for name in same} == {name: design.registers[name] for name in same}
+
+
+def test_the_soc_finds_the_poses_of_the_file(design: Design) -> None:
+    """Camera and light as its scripts read them are those of the file: setting them changes nothing."""
+    places = runpy.run_path(str(ROOT / "software" / "litex" / "view_places.py"))
+    camera = struct.unpack_from("<3q9i4q2I", design.file, 4 * places["CAMERA"])
+    light = struct.unpack_from("<3q3IQ", design.file, 4 * places["LIGHT"])
+    target = design.target()
+    target.set_object(
+        struct.unpack_from("<3q", design.file, 4 * places["OBJECT"]), rotation_values(design.placed.pose.rotation)
+    )
+    target.set_camera(camera[0:3], camera[3:12], camera[12:16], (camera[16], camera[17]))
+    target.set_light(0, light[0:3], light[3:6], light[6])
+    assert struct.unpack_from("<2I", design.file, 4 * places["WIDTH"]) == (WIDTH, HEIGHT)
+    assert target.writes() == design.target().writes()
 
 
 #: precision.mac, geometry.triangleBits, geometry.vertexBits.
