@@ -34,7 +34,7 @@ final class DirectProjectionIO(config: PathConfig) extends Bundle {
 
   val hasSpace = Input(Bool()) // the cycle after this one takes a place
 
-  /** In the fourth cycle after the ray, or later; the direction is scaled to f bits. */
+  /** In the fourth cycle after the ray, or later, with the ray's direction. */
   val place = Valid(new DirectPlace(config))
   val dir   = Output(Vec(3, SInt((formats.f + 1).W)))
 
@@ -64,15 +64,7 @@ final class DirectProjection(config: PathConfig) extends Module {
   // One cycle before the ray leaves, its space is certain: only this unit takes it
   io.isReady := !isHeld || (at(1) && io.hasSpace)
 
-  // The direction, shifted to the length of its largest component
-  private val dirBits    = config.numbers.directionBits.max(f + 1)
-  private val components = VecInit(ray.dir.axes.map(_.pad(dirBits)))
-  private val lengths    = components.map(c => Mux(c < 0.S, ~c, c).asUInt(dirBits - 2, 0)).reduce(_ | _)
-  private val shift      = latch((dirBits - 1).U - Normalise.bitLength(lengths), at === 0.U)
-  private val component  = VecInit(components.head +: components)(at)
-  private val scaled     = (component.asUInt << shift)(dirBits - 1, dirBits - 1 - f).asSInt
-  private val dir        = Seq.tabulate(2)(axis => latch(scaled, at === (axis + 1).U))
-  io.dir := VecInit(dir :+ scaled)
+  io.dir := VecInit(ray.dir.axes)
 
   // The pixel: (2 · pixel + 1) · step
   private val halfPixels  = Mux(at(0), ray.pixel.y, ray.pixel.x) ## 1.U(1.W)

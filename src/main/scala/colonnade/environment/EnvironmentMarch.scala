@@ -58,7 +58,6 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
     when(program.now)(isBusy := io.request.valid)
     program.await(io.request.valid, "request")
   }
-  projection.describeScaling()
   projection.describe()
   dda.describe()
   tiles.describe()

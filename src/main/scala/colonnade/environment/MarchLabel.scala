@@ -9,7 +9,6 @@ object MarchLabel {
   case object Idle extends MarchLabel // waits for a ray
 
   // RayProjection: scales the direction, then projects origin and direction, one matrix row at a time
-  case object ScaleDir      extends MarchLabel
   case object ProjectOrigin extends MarchLabel
   case object OriginDepth   extends MarchLabel
   case object ProjectDir    extends MarchLabel

@@ -13,7 +13,6 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val program = new Microprogram[MarchLabel](StepEncoding.OneHot)
 
   // The ray
-  val dir:          Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))    // its direction, scaled to f bits
   val uvwOrigin:    Vec[SInt] = Reg(Vec(3, SInt(originBits.W))) // projected; then u and v from the map's centre
   val projectedDir: Vec[SInt] = Reg(Vec(3, SInt((f + 1).W)))    // the direction's projection
 

@@ -8,12 +8,12 @@ import colonnade.formats.{AlbedoEntry, EnvironmentView, PixelPosition, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
-/** A ray that misses the object. */
+/** A ray that misses the object. Its direction is scaled: the largest component fills `f` bits. */
 final class EnvironmentRay(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val origin = Vec3(new Fixed(new RayFormats(numbers).scene)) // grid steps
-  val dir    = Vec3(SInt(numbers.directionBits.W))            // of any length
+  val dir    = Vec3(SInt((new MarchFormats(config).f + 1).W))
   val pixel  = new PixelPosition(config)                      // the pixel of a ray from the camera
 }
 

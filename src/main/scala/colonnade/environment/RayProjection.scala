@@ -26,19 +26,6 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
   private val origin       = request.ray.origin.axes.map(_.integer)
   private val inverseDepth = m.quotient.zext
 
-  /** Steps that scale the direction. */
-  def describeScaling(): Unit = {
-    label(ScaleDir)
-    overlap { at =>
-      for ((component, axis) <- request.ray.dir.axes.zipWithIndex) {
-        at(2 * axis)(m.load(component))
-        normalise(at, m.dir, m.projectedDirExponent, axis, begin = 2 * axis + 1)
-      }
-      align(at, m.dir, m.projectedDirExponent, begin = 7)
-      at(10)(selectRow(0.U))
-    }
-  }
-
   /** In a step: selects an axis, and its row of matrix and offset. */
   def selectRow(axis: UInt): Unit = {
     set(m.axis, axis)
@@ -67,7 +54,7 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
       m.startDivision(m.one, m.mantissa)
       branch(UvwRay.when(request.isFromCamera, "from a camera"))
     }
-    matrixProduct(ProjectDir, m.projectedDir, m.projectedDirExponent)(terms(m.dir)) {
+    matrixProduct(ProjectDir, m.projectedDir, m.projectedDirExponent)(terms(request.ray.dir.axes)) {
       NearPlane.when(request.isFromCamera, "from a camera")
     }
     label(UvwRay)
@@ -109,10 +96,11 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
     normalise(at, m.uvwDir, m.uvwDirExponent, axis, begin + 3)
   }
 
-  /** In a step before `ProjectOrigin`: the least exponent of the origin's block, which for a camera also holds the depth of
+  /** In a step before `ProjectOrigin`: its first row, and the least exponent of the origin's block, which for a camera also holds the depth of
     * the near plane.
     */
   def clear(): Unit = {
+    selectRow(0.U)
     val most = ((BigInt(1) << exponentBits) - 1).U
     val next = (view.exponent +& 1.S(2.W)).asUInt
     val some = if (view.exponent.getWidth > exponentBits) Mux(next > most, most, next) else next

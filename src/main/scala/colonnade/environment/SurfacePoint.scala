@@ -87,7 +87,7 @@ final class SurfacePoint(
 
   /** Six cycles. */
   private def hitPoint(at: Overlap[MarchLabel], axis: Int, begin: Int): Unit = {
-    at(begin)(m.multiply(distance, m.dir(axis)))
+    at(begin)(m.multiply(distance, request.ray.dir.axes(axis)))
     at(begin + 1)(m.load(m.product))
     at(begin + 2) {
       m.latchExponent()

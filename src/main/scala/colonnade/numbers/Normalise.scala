@@ -34,6 +34,15 @@ object Normalise {
     result
   }
 
+  /** Numbers of one width, shifted together until the largest fills `bits` and a sign, and floored; all are 0 if they are. */
+  def together(numbers: Seq[SInt], bits: Int): Seq[SInt] = {
+    val width   = numbers.head.getWidth.max(bits + 1)
+    val padded  = numbers.map(_.pad(width))
+    val lengths = padded.map(x => Mux(x < 0.S, ~x, x).asUInt(width - 2, 0)).reduce(_ | _)
+    val zeros   = countLeadingZeros(lengths)._2
+    padded.map(x => shiftLeft(x.asUInt, zeros)(width - 1, width - 1 - bits).asSInt)
+  }
+
   /** As wide as the number: the most negative one has its magnitude there. */
   def magnitude(x: SInt): UInt = Mux(x < 0.S, 0.S -% x, x).asUInt
 

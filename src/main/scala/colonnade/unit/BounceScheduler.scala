@@ -4,7 +4,6 @@ import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.environment.StoredRay
 import colonnade.formats.Shading
 import colonnade.ray.RayRequest
 import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay}
@@ -18,7 +17,7 @@ final class DeferredBounceIO(config: PathConfig) extends Bundle {
   val resume            = Flipped(Decoupled(new ResumedBounce(config)))
 
   /** The Fresnel reflection, or the ray with which a path continues. */
-  val ray = Valid(new StoredRay(config))
+  val ray = Valid(new RayRequest(config))
 }
 
 final class BounceSchedulerIO(config: PathConfig) extends Bundle {
@@ -109,12 +108,12 @@ final class BounceScheduler(config: PathConfig) extends Module {
       bounce.bits.update.hasSurface.get := !resumedBy.isBackground
     }
 
-    environment.ray.valid        := bounce.fire || environment.fresnelReflection.valid
-    environment.ray.bits.context := Mux(bounce.fire, bounce.bits.update.context, result.context)
-    val ray = environment.ray.bits.ray
-    ray.pixel  := DontCare
-    ray.origin := Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get)
-    ray.dir    := bounce.bits.dir
+    environment.ray.valid := bounce.fire || environment.fresnelReflection.valid
+    val ray = environment.ray.bits
+    ray.context  := Mux(bounce.fire, bounce.bits.update.context, result.context)
+    ray.isShadow := false.B
+    ray.origin   := Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get)
+    ray.dir      := bounce.bits.dir
     when(!bounce.fire) { ray.dir.axes.zip(result.reflection.axes).foreach { case (to, from) => to := from } }
   }
 }

@@ -3,8 +3,9 @@ package colonnade.unit
 import chisel3._
 import chisel3.util.Decoupled
 import colonnade.config.PathConfig
-import colonnade.environment.{EnvironmentRays, HitDistance, MarchPort}
+import colonnade.environment.{EnvironmentRays, HitDistance, MarchFormats, MarchPort}
 import colonnade.formats.{EnvironmentView, PixelPosition}
+import colonnade.numbers.Normalise
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
 
@@ -64,11 +65,12 @@ final class EnvironmentPort(config: PathConfig) extends Module {
   private val primary   = io.primary.bits
   private val bounceRay = io.bounces.map(_.ray)
   private val isBounce  = bounceRay.map(_.valid).getOrElse(false.B)
+  private val ray       = bounceRay.fold(primary)(bounce => Mux(bounce.valid, bounce.bits, primary))
+  private val dir       = Normalise.together(ray.dir.axes, new MarchFormats(config).f)
   stage.ray.valid           := io.view.enabled && (isBounce || io.primary.fire)
-  stage.ray.bits.context    := primary.context
-  stage.ray.bits.ray.origin := primary.origin
-  stage.ray.bits.ray.dir    := primary.dir
-  for (ray <- bounceRay) when(ray.valid) { stage.ray.bits := ray.bits }
+  stage.ray.bits.context    := ray.context
+  stage.ray.bits.ray.origin := ray.origin
+  stage.ray.bits.ray.dir.axes.zip(dir).foreach { case (to, from) => to := from }
   stage.ray.bits.ray.pixel := io.pixel
 
   // Trace primary rays that may hit the object

@@ -107,7 +107,7 @@ class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
       val sends = mayOrder && sent < rays.size && (willing == 1 || random.nextInt(4) > 0)
       dut.order.valid.poke(sends)
       if (sends) {
-        dut.order.bits.poke(order.pack(rays(sent).fields - "context" - "isDirectView" ++ Map(
+        dut.order.bits.poke(order.pack(rays(sent).fields(config.numbers.shadeBits) - "context" - "isDirectView" ++ Map(
           "request.context"             -> BigInt(rays(sent).context),
           "request.isDirectView"        -> BigInt(1),
           "request.isFresnelReflection" -> BigInt(sent % 2),

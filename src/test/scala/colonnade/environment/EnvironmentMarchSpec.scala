@@ -49,7 +49,10 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     unit.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
     val inputs = rays.map { ray =>
-      request.pack(ray.fields - "isDirectView" + ("isFromCamera" -> BigInt(if (ray.isDirectView) 1 else 0)))
+      request.pack(ray.fields(config.numbers.shadeBits) - "isDirectView" + ("isFromCamera" -> BigInt(if (
+        ray.isDirectView
+      ) 1
+      else 0)))
     }
     val found = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),

@@ -87,7 +87,8 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
         nextRay().copy(context = free(random.nextInt(free.size)))
       }
       port.ray.valid.poke(next.nonEmpty)
-      for (ray <- next) port.ray.bits.poke(stored.pack(ray.fields - "isDirectView" - "hitDistance"))
+      for (ray <- next)
+        port.ray.bits.poke(stored.pack(ray.fields(config.numbers.shadeBits) - "isDirectView" - "hitDistance"))
       val ready = free.filter(context => rays.contains(context) && !next.exists(_.context == context))
       if (offered.isEmpty && ready.nonEmpty && random.nextInt(4) == 0)
         offered = Some(Request(rays(ready(random.nextInt(ready.size))), random.nextBoolean(), random.nextBoolean()))

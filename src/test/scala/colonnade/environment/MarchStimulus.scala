@@ -19,10 +19,11 @@ final case class MarchCase(
 ) {
   def words: Seq[BigInt] = (BigInt(if (isDirectView) 1 else 0) +: pixel :+ hitDistance) ++ origin ++ dir
 
-  def fields: Map[String, BigInt] = {
+  /** As the march has it: the direction is scaled to so many bits. */
+  def fields(shadeBits: Int): Map[String, BigInt] = {
     val axes = Seq("x", "y", "z")
     axes.zip(origin).map { case (axis, value) => s"ray.origin.$axis" -> value }.toMap ++
-      axes.zip(dir).map { case (axis, value) => s"ray.dir.$axis" -> value } ++
+      axes.zip(MarchCase.scaled(dir, shadeBits)).map { case (axis, value) => s"ray.dir.$axis" -> value } ++
       axes.zip(pixel).map { case (axis, value) => s"ray.pixel.$axis" -> value } +
       ("context"     -> BigInt(context)) + ("isDirectView" -> BigInt(if (isDirectView) 1 else 0)) +
       ("hitDistance" -> hitDistance)
@@ -30,6 +31,12 @@ final case class MarchCase(
 }
 
 object MarchCase {
+
+  /** Numbers shifted together until the largest has so many bits, and floored. */
+  def scaled(numbers: Seq[BigInt], bits: Int): Seq[BigInt] = {
+    val drop = numbers.map(_.bitLength).max - bits
+    numbers.map(number => if (drop < 0) number << -drop else number >> drop)
+  }
 
   /** Fields of the model's answer, in order. */
   val answer: Seq[String] =

@@ -4,7 +4,6 @@ import chisel3._
 import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.StoredRay
 import colonnade.ray.RayRequest
 import colonnade.shading.{BounceUpdate, BouncedRay}
 import colonnade.{Packed, TestConfigs}
@@ -50,7 +49,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private val bounced = new Packed(new BouncedRay(config))
   private val update  = new Packed(new BounceUpdate(config))
   private val ray     = new Packed(new RayRequest(config))
-  private val stored  = new Packed(new StoredRay(config))
+  private val stored  = new Packed(new RayRequest(config))
   private val most    = 2
 
   /** Bounces to issue, by context; those whose reflection is resolved, and whether that shows a surface. */
@@ -168,7 +167,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private def checkStored(port: UInt, context: Int, expected: Fields): Unit = {
     val found = stored.unpack(port.peekInt())
     assert(found("context") == context)
-    for ((name, value) <- expected) assert(found(s"ray.$name") == value, name)
+    for ((name, value) <- expected) assert(found(name) == value, name)
   }
 
   private def way(bounce: Fields, origin: String, dir: String): Fields = Seq("x", "y", "z").flatMap { axis =>

@@ -4,7 +4,7 @@ import chisel3._
 import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.{EnvironmentRay, StoredRay}
+import colonnade.environment.{EnvironmentRay, MarchCase}
 import colonnade.ray.RayRequest
 import colonnade.{Packed, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -17,10 +17,16 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private val config = TestConfigs.withEnvironment(TestConfigs.environment)
 
+  /** A ray without its context; its direction is scaled. */
+  private def asStored(ray: Map[String, BigInt]): Map[String, BigInt] = {
+    val names = Seq("x", "y", "z").map(axis => s"dir.$axis")
+    ray - "context" - "isShadow" ++ names.zip(MarchCase.scaled(names.map(ray), config.numbers.shadeBits))
+  }
+
   it should "route each primary ray once, and store the last ray of each context" in
     test(new EnvironmentPortHarness(config)) { dut =>
       val random               = new Random(4)
-      val (primary, bounce)    = (new Packed(new RayRequest(config)), new Packed(new StoredRay(config)))
+      val rays                 = new Packed(new RayRequest(config))
       val contexts             = config.units.pathContexts
       val port                 = dut.io
       var stored               = Map.empty[Int, Map[String, BigInt]]
@@ -30,22 +36,29 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
       port.view.isMapCamera.poke(true)
       port.surfaces.ready.poke(false)
 
+      def anyRay(): Map[String, BigInt] = {
+        val shift = random.nextInt(config.numbers.directionBits)
+        rays.unpack(BigInt(rays.width, random)).map {
+          case (name, value) if name.startsWith("dir.") => name -> (value >> shift)
+          case other                                    => other
+        }
+      }
       var offered = Option.empty[Map[String, BigInt]]
       for (_ <- 0 until 600) {
         if (offered.isEmpty && random.nextBoolean()) {
           offered =
-            Some(primary.unpack(BigInt(primary.width, random)) + ("context" -> BigInt(random.nextInt(contexts))))
+            Some(anyRay() + ("context" -> BigInt(random.nextInt(contexts))))
           port.meetsObject.poke(random.nextBoolean())
           port.pixel.x.poke(random.nextInt(600))
-          dut.primary.poke(primary.pack(offered.get))
+          dut.primary.poke(rays.pack(offered.get))
         }
         port.primary.valid.poke(offered.nonEmpty)
         val bounced = Option.when(random.nextInt(3) == 0) {
           val context = random.shuffle((0 until contexts).filterNot(c => offered.exists(_("context") == c)).toList).head
-          bounce.unpack(BigInt(bounce.width, random)) + ("context" -> BigInt(context))
+          anyRay() + ("context" -> BigInt(context))
         }
         port.bounces.get.ray.valid.poke(bounced.nonEmpty)
-        bounced.foreach(fields => dut.bounce.poke(bounce.pack(fields)))
+        bounced.foreach(fields => dut.bounce.poke(rays.pack(fields)))
         port.objectRays.ready.poke(random.nextBoolean())
 
         val isTaken = offered.nonEmpty && port.primary.ready.peekBoolean()
@@ -53,14 +66,11 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
         assert(!(isTaken && bounced.nonEmpty), "one ray is stored in a cycle")
         assert((port.objectRays.valid.peekBoolean() && port.objectRays.ready.peekBoolean()) == (isTaken && meets))
         port.control.bypass.valid.expect(isTaken && !meets)
-        for (fields <- bounced)
-          stored += fields("context").toInt -> fields.collect {
-            case (name, value) if name.startsWith("ray.") && !name.startsWith("ray.pixel") => name.drop(4) -> value
-          }
+        for (fields <- bounced) stored += fields("context").toInt -> asStored(fields)
         for (fields <- offered if isTaken) {
           port.objectRays.bits.context.expect(fields("context"))
           port.control.bypass.bits.expect(fields("context"))
-          stored += fields("context").toInt -> (fields - "context" - "isShadow" + ("pixel.x" -> port.pixel.x.peekInt()))
+          stored += fields("context").toInt -> (asStored(fields) + ("pixel.x" -> port.pixel.x.peekInt()))
           if (meets) objects += 1 else bypassing += 1
           offered = None
         }
