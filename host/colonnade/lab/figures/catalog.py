@@ -126,7 +126,12 @@ def catalog() -> dict[str, Entry]:
                 "generated": ("colonnade", "study", "--live", "--rooms", _SEEDS, "--json", REPORT),
             },
         ),
-        Entry("live-paths", "small", _colonnade("study", "--live", "--path", "--rooms", _SEEDS)),
+        Entry("live-paths", "small", _colonnade("study", "--live", "--path", "--rooms", _MOVED)),
+        Entry(
+            "moved-rooms",
+            "edge",
+            {"": ("tools/room-frames", "edge", "160x120", "--moved", "--compare", f"--json={REPORT}")},
+        ),
         Entry("moving-frames", "small", _colonnade("study", "--views", "--frames", "--rooms", _MOVED)),
         Entry("captures", "small", _colonnade("study", "--capture", *_ROOMS, _ATTIC)),
         _samples(),

@@ -35,10 +35,12 @@ def live_paths(data: Data) -> str:
             name,
             *(f"{scale * report[key][0]:.2f}, {scale * report[key][1]:.2f}" for key, scale in _PATH),
             f"{report['psnr'][1] - report['psnr'][0]:+.2f} dB, {report['degrees'][1] - report['degrees'][0]:+.2f}°",
+            f"{-report['lost'][0]:+.2f} dB, {report['lost'][1]:+.2f}°",
         ]
         for name, report in data.result("live-paths").items()
     ]
     titles = ["path", "albedo, dB: mean, worst", "normals, °", "planes off by 5 cm, %", "worst against mean"]
+    titles.append("worst against the same view as a still")
     return markdown(titles, rows)
 
 

@@ -141,6 +141,16 @@ def rooms(data: Data) -> str:
     return markdown(["room", "object", "cycles"], rows)
 
 
+def moved_rooms(data: Data) -> str:
+    """Cycles of frames of a camera that has moved, by the pixels that march."""
+    found = data.result("moved-rooms")
+    rows: dict[str, dict[str, str]] = {}
+    for frame in found["frames"]:
+        rows.setdefault(frame["room"], {})[f"{100 * frame['marched']:.0f} %"] = f"{frame['cycles']:,}"
+    shares = next(iter(rows.values()))
+    return markdown(["pixels that march", *shares], [[room, *cells.values()] for room, cells in rows.items()])
+
+
 def environments(data: Data) -> str:
     """Size and accuracy of the rooms' maps, and of the device's march."""
     found = data.result("environments")
@@ -203,6 +213,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     "rates-of-presets": rates_of_presets,
     "board": board,
     "rooms": rooms,
+    "moved-rooms": moved_rooms,
     "environments": environments,
     "samples": samples,
     "measuring": measuring,

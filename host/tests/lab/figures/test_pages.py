@@ -135,6 +135,13 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "frames": [{"room": "r", "object": "o", "cycles": 100_000, "differing_pixels": 0}],
             "mean_cycles": 1e5,
         },
+        "moved-rooms": {
+            "size": [64, 48],
+            "frames": [
+                {"room": "r", "object": "o", "cycles": cycles, "marched": share, "differing_pixels": 0}
+                for share, cycles in ((0.0, 10_000), (0.947, 200_000))
+            ],
+        },
         "environments": {
             "accuracy": {"Room, device": {"mirror": {"ok": 0.97}, "mean_steps": 18.0}},
             "living": room("Room"),
@@ -143,7 +150,9 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "rooms": {"r": {"offline": maps(0.05), "live": maps(0.06), "first": 30.0, "milliseconds": 15.0}},
             "generated": {"seed 1": {"offline": maps(None), "live": maps(None)}},
         },
-        "live-paths": {"seed 1": {"psnr": [30.0, 29.5], "degrees": [2.0, 2.25], "off": [0.02, 0.03]}},
+        "live-paths": {
+            "seed 1": {"psnr": [30.0, 29.5], "degrees": [2.0, 2.25], "off": [0.02, 0.03], "lost": [0.125, -0.01]}
+        },
         "moving-frames": {
             "0.1 m, 3.3°": {
                 way: {"frame": 40.0, "object": 30.25, "shadow": None, "displacement": 1.5, "dists": 0.01}
@@ -217,11 +226,14 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| pixels, hits and counters of 2 meshes on `small` | 2 |" in table(docs, "equality")
     assert "| **8** | 1.1 | 1.10 |" in table(docs, "energy-area")
     assert "**32b32s64d**" in table(docs, "precision")
-    assert "| all | 28.5 |" in table(docs, "measuring")
+    assert "| all | 30.0 |" in table(docs, "measuring")
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 (×1.20) | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
     assert "| seed 1 | –, – |" in live and "15.0" not in live
-    assert "| seed 1 | 30.00, 29.50 | 2.00, 2.25 | 2.00, 3.00 | -0.50 dB, +0.25° |" in table(docs, "live-paths")
+    path = "| seed 1 | 30.00, 29.50 | 2.00, 2.25 | 2.00, 3.00 | -0.50 dB, +0.25° | -0.12 dB, -0.01° |"
+    assert path in table(docs, "live-paths")
+    marched = "| pixels that march | 0 % | 95 % |\n| --- | ---: | ---: |\n| r | 10,000 | 200,000 |"
+    assert marched in table(docs, "moved-rooms")
     moved = "| 0.1 m, 3.3° | 40.0, 40.0, 40.0 | 30.2, 30.2, 30.2 | –, –, – | 1.5, 1.5, 1.5 |"
     assert moved in table(docs, "moving-frames")
     assert "| r, own maps | – | 7.8° | 90.0, 95.0, 94.0 |" in table(docs, "captures")

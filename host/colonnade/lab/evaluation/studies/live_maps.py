@@ -81,6 +81,7 @@ class PathQuality:
 
     Attributes:
         psnr, degrees, off: Mean and worst of the views, as in `MapQuality`.
+        lost: What the worst view has lost against the same view encoded as a still: dB, degrees.
         milliseconds: CPU time: mean and worst of the views after the first.
         first: CPU milliseconds of the first view.
     """
@@ -88,6 +89,7 @@ class PathQuality:
     psnr: tuple[float, float]
     degrees: tuple[float, float]
     off: tuple[float, float]
+    lost: tuple[float, float]
     milliseconds: tuple[float, float]
     first: float
 
@@ -136,20 +138,28 @@ def measure(environment: Environment, with_dists: bool = True) -> LiveQuality:
 def walk(views: Iterable[Environment]) -> PathQuality:
     """The live encoder along views of one room."""
     encoder: LiveEncoder | None = None
-    found, times = [], []
+    found, stills, times = [], [], []
     for environment in views:
-        encoder = encoder or LiveEncoder(AttributeLayout(environment.width, environment.height))
+        layout = AttributeLayout(environment.width, environment.height)
+        encoder = encoder or LiveEncoder(layout)
         frame = LiveFrame.of(environment)
         begun = time.thread_time()
         image = encoder.encode(frame).image
         times.append(1e3 * (time.thread_time() - begun))
         found.append(quality(environment, image, with_dists=False))
+        alone = LiveEncoder(layout)
+        still = [alone.encode(frame).image for _ in range(STILL_ROUNDS)][-1]
+        stills.append(quality(environment, still, with_dists=False))
     columns = [[getattr(one, name) for one in found] for name in ("psnr", "degrees", "off")]
     later = times[1:] or times
     return PathQuality(
         (float(np.mean(columns[0])), min(columns[0])),
         (float(np.mean(columns[1])), max(columns[1])),
         (float(np.mean(columns[2])), max(columns[2])),
+        (
+            max(still.psnr - one.psnr for still, one in zip(stills, found, strict=True)),
+            max(one.degrees - still.degrees for still, one in zip(stills, found, strict=True)),
+        ),
         (float(np.mean(later)), max(later)),
         times[0],
     )
@@ -227,7 +237,7 @@ def table(reports: Mapping[str, LiveQuality]) -> str:
 
 def path_table(reports: Mapping[str, PathQuality]) -> str:
     """The paths as a Markdown table: mean and worst view."""
-    header = ("path", "ms a frame, mean, worst (first)", "albedo dB", "normals °", "planes off by 5 cm, %")
+    header = ("path", "ms a frame, mean, worst (first)", "albedo dB", "normals °", "planes off by 5 cm, %", "lost")
     rows = [
         (
             name,
@@ -235,6 +245,7 @@ def path_table(reports: Mapping[str, PathQuality]) -> str:
             f"{report.psnr[0]:.2f}, {report.psnr[1]:.2f}",
             f"{report.degrees[0]:.2f}, {report.degrees[1]:.2f}",
             f"{100 * report.off[0]:.2f}, {100 * report.off[1]:.2f}",
+            f"{report.lost[0]:.2f} dB, {report.lost[1]:.2f}°",
         )
         for name, report in reports.items()
     ]
