@@ -185,16 +185,16 @@ def samples(data: Data) -> str:
 
 
 def measuring(data: Data) -> str:
-    """The time that each part of `tools/figures` takes, its day and commit."""
+    """The time that each part of `tools/figures` takes, and its commit."""
     rows, total = [], 0.0
     for name in catalog():
         content = data.get(name)
         if content is not None:
             total += content["seconds"]
             commit = f"{content['commit'][:8]}{', modified' if content['is_modified'] else ''}"
-            rows.append([f"`{name}`", _minutes(content["seconds"]), content["date"], commit])
-    rows.append(["all", _minutes(total), "", ""])
-    return markdown(["part", "minutes", "day", "commit"], rows)
+            rows.append([f"`{name}`", _minutes(content["seconds"]), commit])
+    rows.append(["all", _minutes(total), ""])
+    return markdown(["part", "minutes", "commit"], rows)
 
 
 def _minutes(seconds: float) -> str:
