@@ -31,8 +31,9 @@ final class DramReaderIO(config: ColonnadeConfig) extends Bundle {
 
 /** Reads lines from DRAM over AXI4: one INCR burst for a line, with its bank as the id.
   *
-  * A line begins at a multiple of `SceneLines.pitch`, so no burst crosses 4 KB. A bank's line waits where it was gathered;
-  * until it is taken, further data for the bank have to wait, and those of other banks behind them.
+  * A line begins at a multiple of `SceneLines.pitch`, so no burst crosses 4 KB. A bank gathers one line while
+  * another one waits to be taken; until then, further data for the bank have to wait, and those of other banks behind them.
+  * Over a narrow bus a line comes so slowly that it waits where it was gathered.
   */
 final class DramReader(config: ColonnadeConfig) extends Module {
   private val busBytes = config.columnBvhMemory.cache.get.busBytes
@@ -44,12 +45,13 @@ final class DramReader(config: ColonnadeConfig) extends Module {
 
   // Data
   private val data    = io.axi.r.bits
-  private val accepts = for ((line, index) <- io.lines.zipWithIndex) yield {
+  private val accepts = for ((port, index) <- io.lines.zipWithIndex) yield {
     val isFor    = data.id === index.U
     val isFull   = RegInit(false.B)
     val isError  = Reg(Bool())
     val beat     = RegInit(0.U(log2Ceil(beats.max(2)).W))
     val gathered = Reg(Vec(beats, UInt((8 * busBytes).W)))
+    val line     = Wire(Decoupled(new ReadLine(config)))
     val ready    = !isFull || line.ready
     val takes    = io.axi.r.valid && isFor && ready
     when(takes) {
@@ -63,6 +65,7 @@ final class DramReader(config: ColonnadeConfig) extends Module {
     line.bits.records := gathered.asUInt(Lines.records * new RecordFormats(config).recordBits - 1, 0)
       .asTypeOf(Vec(Lines.records, new RecordFormats(config).record))
       .map(Lines.withParity(config, _))
+    port :<>= (if (beats > DramReader.maxBeats) line else Queue(line, 1, pipe = true))
     isFor && ready
   }
   io.axi.r.ready := accepts.reduce(_ || _)
@@ -94,4 +97,5 @@ private object DramReader {
     val busBytes = config.columnBvhMemory.cache.get.busBytes
     (SceneLines.bytes(config) + busBytes - 1) / busBytes
   }
+  val maxBeats: Int = 16 // beats of a line that waits beside the next one
 }

@@ -30,9 +30,9 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** One bank of the cache that all columns share, behind the same bank of every [[ColumnCache]]: docs/scene-cache.md. {{{
-  * cycle    d−1     d                     d+1        d+2 … d+5         d+4 … d+7
-  * request  accept  tags, awaited lines   announced  records read      records on the bus
-  * line             victim                announced  records written   records on the bus; taken from DRAM in d+6
+  * cycle    d−1     d                     d+1        d+2             d+3              d+4 … d+7
+  * request  accept  tags, awaited lines   announced  line read                        records on the bus
+  * line             victim                announced  line written    taken from DRAM  records on the bus
   * }}}
   * Reads from DRAM are announced in their order. They precede requests that hit, which keep their place and are looked up
   * again.
@@ -49,7 +49,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
 
   private val slice   = TimingSlice.extra(config)
   private val tags    = new TagStore(sets, ways, lineBits, inMemory = slice.isEnabled)
-  private val lines   = Seq.fill(Lines.records)(SyncReadMem(sets * ways, Lines.stored(config)))
+  private val lines   = SyncReadMem(sets * ways, Vec(Lines.records, Lines.stored(config)))
   private val awaited = Module(new AwaitedLines(config, cache.sharedMisses / banks))
 
   /** By bus: whether a condition holds for any of its columns. */
@@ -57,9 +57,6 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
     ofColumns.zipWithIndex.collect { case (holds, column) if SharedCache.busOf(config, column) == bus => holds }
       .reduce(_ || _)
   }
-
-  /** The condition for each record of a line: a cycle later for each. */
-  private def inTurn(condition: Bool): Seq[Bool] = Seq.iterate(condition, Lines.records)(RegNext(_, false.B))
 
   // Each bus is free every four cycles
   private val starts = Wire(UInt(buses.W)) // announcements
@@ -143,23 +140,24 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
     port.announced.bits  := lineNow
   }
 
-  // From cycle d + 2: read record after record, or write those from DRAM, which are stable until the last one is taken
-  private val place     = Mux(fills, tags.place(filled.line, victim), tags.place(line, hitWay))
-  private val isRead    = inTurn(RegNext(RegNext(delivers, false.B), false.B))
-  private val isWritten = inTurn(RegNext(RegNext(keeps, false.B), false.B))
-  private val isTaken   = inTurn(ShiftRegister(fills, 3, false.B, true.B))
-  private val places    = Seq.iterate(ShiftRegister(place, 2), Lines.records)(RegNext(_))
-  private val records   = for (n <- 0 until Lines.records) yield {
-    val other = io.data.bits.records(n)
-    val held  = lines(n).readWrite(places(n), other, isRead(n) || isWritten(n), isWritten(n))
-    Mux(isTaken(n), Mux(io.data.bits.isError, 0.U, other), held)
-  }
-  io.data.ready := isTaken.last
+  // Cycle d + 2: read the line, or write that from DRAM, which is stable until it is taken a cycle later
+  private val place   = ShiftRegister(Mux(fills, tags.place(filled.line, victim), tags.place(line, hitWay)), 2)
+  private val isFill  = RegNext(RegNext(fills, false.B), false.B)
+  private val isKept  = RegNext(RegNext(keeps, false.B), false.B)
+  private val isRead  = RegNext(RegNext(delivers, false.B), false.B)
+  private val held    = lines.readWrite(place, io.data.bits.records, isRead || isKept, isKept)
+  private val isTaken = RegNext(isFill, false.B)
+  io.data.ready := isTaken
 
-  // Cycles d + 4 to d + 7: the records on the bus; those of a failed read are zeros
+  // Cycles d + 4 to d + 7: the records on the bus; those of a failed read become zeros there, and nobody reads them later
+  private val ready = VecInit(held.zip(io.data.bits.records).map { case (record, other) =>
+    Mux(isTaken, other, record)
+  })
   for ((port, isOn) <- io.lines.zip(isAnnounced)) {
-    val turns = inTurn(ShiftRegister(isOn, 2, false.B, true.B))
-    port.record := RegEnable(Mux1H(turns, records), VecInit(turns).asUInt.orR)
+    val begins = ShiftRegister(isOn, 2, false.B, true.B)
+    val rest   = Reg(Vec(Lines.records, Lines.stored(config)))
+    rest        := Mux(begins, ready, VecInit(rest.tail :+ rest.last))
+    port.record := Mux(RegEnable(isTaken && io.data.bits.isError, begins), 0.U.asTypeOf(rest.head), rest.head)
   }
 
   io.reads :<>= awaited.io.reads
