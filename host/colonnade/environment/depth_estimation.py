@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from colonnade.common.errors import UserError
 from colonnade.environment.model import EnvironmentCamera
@@ -173,6 +171,9 @@ def _solve(
     neighbour = np.concatenate([side.neighbour for side in sides])
     slope, weight = np.concatenate([side.slope for side in sides]), np.concatenate(weights)
     diagonal = target_weight + np.bincount(pixel, weight, unknowns) + np.bincount(neighbour, weight, unknowns)
+    from scipy import sparse
+    from scipy.sparse.linalg import splu
+
     off_diagonal = sparse.coo_matrix((-weight, (pixel, neighbour)), (unknowns, unknowns))
     matrix = sparse.diags(diagonal) + off_diagonal + off_diagonal.T
     right_side = np.bincount(neighbour, weight * slope, unknowns) - np.bincount(pixel, weight * slope, unknowns)

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from colonnade.common import fixed_order
 from colonnade.common.types import Floats
@@ -83,6 +82,8 @@ def normals_of_depth(depth: Floats, holes: NDArray[np.bool_], camera: Environmen
     chosen = np.where((on_plane >= 0)[..., np.newaxis], np.array([*planes, np.ones(3)])[on_plane], local)
     unknown = ~is_seen & (on_plane < 0)
     if unknown.any() and not unknown.all():
+        from scipy import ndimage
+
         nearest = ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
         chosen = chosen[tuple(nearest)]
     normals = -chosen / np.sqrt(fixed_order.dot(chosen, chosen))[..., np.newaxis]

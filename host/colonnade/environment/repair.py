@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
@@ -92,6 +91,8 @@ def holes_of(depth: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def filled(values: NDArray[np.float64], holes: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Copy ``values`` [height, width, ...] with each hole replaced by the nearest other pixel."""
+    from scipy import ndimage
+
     nearest = ndimage.distance_transform_edt(holes, return_distances=False, return_indices=True)
     filled: NDArray[np.float64] = values[tuple(nearest)]
     return filled
