@@ -140,7 +140,7 @@ def presets_cost(data: Data) -> str:
 def designs(data: Data) -> str:
     """Rays per second and area of the 10×8 arrays, beside published designs."""
     rows = [["the paper's chip, 200 MHz", f"{PAPER_MRAYS:g}", f"{CHIP_MM2:g}", f"{PAPER_MRAYS / CHIP_MM2:.1f}"]]
-    for preset in ("edge", "lean", "diffuse"):
+    for preset in ("edge", "diffuse"):
         own = facts(data, preset)
         at_200 = (text(own, key) for key in ("mrays", "mm2", "mraysPerMm2"))
         rows.append([f"`{preset}`, {MEGAHERTZ:g} MHz", *at_200])
