@@ -166,14 +166,14 @@ def _solve(
     target_weight: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Solve weighted least squares of the differences, and of ``target`` with the weights ``target_weight``."""
+    from scipy import sparse
+    from scipy.sparse.linalg import splu
+
     unknowns = target.size
     pixel = np.concatenate([side.pixel for side in sides])
     neighbour = np.concatenate([side.neighbour for side in sides])
     slope, weight = np.concatenate([side.slope for side in sides]), np.concatenate(weights)
     diagonal = target_weight + np.bincount(pixel, weight, unknowns) + np.bincount(neighbour, weight, unknowns)
-    from scipy import sparse
-    from scipy.sparse.linalg import splu
-
     off_diagonal = sparse.coo_matrix((-weight, (pixel, neighbour)), (unknowns, unknowns))
     matrix = sparse.diags(diagonal) + off_diagonal + off_diagonal.T
     right_side = np.bincount(neighbour, weight * slope, unknowns) - np.bincount(pixel, weight * slope, unknowns)

@@ -49,10 +49,8 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     unit.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
     val inputs = rays.map { ray =>
-      request.pack(ray.fields(config.numbers.shadeBits) - "isDirectView" + ("isFromCamera" -> BigInt(if (
-        ray.isDirectView
-      ) 1
-      else 0)))
+      val fields = ray.fields(config.numbers.shadeBits)
+      request.pack(fields - "isDirectView" + ("isFromCamera" -> fields("isDirectView")))
     }
     val found = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),

@@ -49,7 +49,6 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private val bounced = new Packed(new BouncedRay(config))
   private val update  = new Packed(new BounceUpdate(config))
   private val ray     = new Packed(new RayRequest(config))
-  private val stored  = new Packed(new RayRequest(config))
   private val most    = 2
 
   /** Bounces to issue, by context; those whose reflection is resolved, and whether that shows a surface. */
@@ -165,7 +164,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private def hasReflection(bounce: Fields): Boolean = enabled && bounce("bounce.fresnel") != 0
 
   private def checkStored(port: UInt, context: Int, expected: Fields): Unit = {
-    val found = stored.unpack(port.peekInt())
+    val found = ray.unpack(port.peekInt())
     assert(found("context") == context)
     for ((name, value) <- expected) assert(found(name) == value, name)
   }

@@ -46,8 +46,7 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
       var offered = Option.empty[Map[String, BigInt]]
       for (_ <- 0 until 600) {
         if (offered.isEmpty && random.nextBoolean()) {
-          offered =
-            Some(anyRay() + ("context" -> BigInt(random.nextInt(contexts))))
+          offered = Some(anyRay() + ("context" -> BigInt(random.nextInt(contexts))))
           port.meetsObject.poke(random.nextBoolean())
           port.pixel.x.poke(random.nextInt(600))
           dut.primary.poke(rays.pack(offered.get))
