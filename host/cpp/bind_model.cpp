@@ -37,8 +37,13 @@ public:
         texture_->load(memory, words.data(), words.shape(0), words.shape(1));
     }
 
+    void loadCube(const Records& words) { device_.loadCube(words.data(), words.shape(0), words.shape(1)); }
+
     /// Loads the registers and clears counters and errors.
-    void start(const Values& registers) { device_.start(registers); }
+    void start(const Values& registers) {
+        gathers_ = registers.count("gather.bounces") != 0;
+        device_.start(registers);
+    }
 
     nb::dict rows(std::int64_t first, std::int64_t last) {
         const std::int64_t width = device_.frame().width;
@@ -127,6 +132,7 @@ public:
                 {"nodeReads", value(c.nodeReads)},     {"boxTests", value(c.boxTests)},     {"triangleTests", value(c.triangleTests)},
                 {"hits", value(c.hits)},               {"deepestStack", value(c.deepestStack)}};
         if (environment_) values.merge(Values{{"raysEnvironment", value(c.raysEnvironment)}, {"marchSteps", value(c.marchSteps)}, {"albedoReads", value(c.albedoReads)}, {"normalReads", value(c.albedoReads)}});
+        if (gathers_) values["raysGather"] = value(c.raysGather);
         return values;
     }
 
@@ -150,6 +156,7 @@ private:
     Device device_;
     std::unique_ptr<AttributeImage> environment_;
     std::unique_ptr<TextureImage> texture_;
+    bool gathers_ = false;
 };
 
 } // namespace
@@ -163,6 +170,7 @@ void bind_model(nb::module_& module) {
         .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a, "Loads one of its memories, by its name in the manifest: uint8 [words, bytes], low byte first.")
         .def("add_texture", &Model::addTexture, "sizes"_a, "layouts"_a, "Adds a texture memory with the manifest's texture sizes and layouts.")
         .def("load_texture", &Model::loadTexture, "memory"_a, "words"_a, "As load_environment, for a memory of the textures.")
+        .def("load_cube", &Model::loadCube, "words"_a, "Loads the light cube: uint8 [words, bytes], low byte first.")
         .def("start", &Model::start, "registers"_a, "Starts a frame: loads the registers (name -> value); clears counters and errors.")
         .def("rows", &Model::rows, "first"_a, "last"_a,
              "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")

@@ -175,6 +175,11 @@ class Manifest:
         return bool(self.config["frame"]["emission"])
 
     @property
+    def gathers(self) -> bool:
+        """Whether diffuse surfaces gather light."""
+        return bool(self.config["frame"].get("gather", False))
+
+    @property
     def format_words(self) -> list[int]:
         """The format hash as eight words of 32 bits; the first has its first eight digits."""
         return [int(self.format_hash[start : start + 8], 16) for start in range(0, 64, 8)]

@@ -49,7 +49,7 @@ def load_environment(model: Any, image: SceneImage, manifest: Manifest) -> None:
     assert manifest.attributes is not None
     model.add_environment(dict(manifest.attributes.sizes), field_places(manifest.attributes.layouts))
     for section in image.attributes:
-        if not section.memory.startswith("texture."):
+        if not section.memory.startswith(("texture.", "light.")):
             model.load_environment(section.memory, section.words)
 
 
@@ -80,6 +80,9 @@ def loaded_model(manifest: Manifest, image: SceneImage) -> Any:
         load_environment(model, image, manifest)
     if manifest.texture is not None:
         load_textures(model, image, manifest)
+    for section in image.attributes:
+        if section.memory == "light.cube":
+            model.load_cube(section.words)
     return model
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.progress import QUIET, Progress
+from colonnade.device.gathered_light import scene_cube, with_cube
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import frame_registers
@@ -92,6 +93,9 @@ class DeviceScene:
         image = pack(mesh, manifest, materials, lit.scene.headroom, encoder)
         if maps is not None:
             image = with_environment(image, maps, manifest)
+        if manifest.gathers:
+            held = None if maps is None else maps.image
+            image = with_cube(image, scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, progress))
         return cls(lit.scene, manifest, image, maps, photo)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:

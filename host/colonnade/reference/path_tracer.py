@@ -14,6 +14,7 @@ from colonnade.environment.lights import MAX_FALLOFF
 from colonnade.reference.bounce import bounce
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints, SurfaceHits
 from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, PlacedObject
+from colonnade.reference.scatter import Bytes, cosine_directions, sphere_points
 
 if TYPE_CHECKING:
     from colonnade.scene.view import View
@@ -22,6 +23,8 @@ Points = TypeVar("Points", ObjectPoints, BackdropPoints)
 
 #: A surface of the room hides a hit if it is nearer by more than this fraction of the hit's distance to the camera.
 OCCLUSION_TOLERANCE = 0.005
+#: In place of a face: a ray hits none, or a path ends without a ray.
+_MISS, _END = -1, -2
 
 
 @dataclass(frozen=True)
@@ -43,20 +46,32 @@ class TracedPaths:
     outside: NDArray[np.bool_]
 
 
+@dataclass(frozen=True)
+class _PathState:
+    """Of all paths: throughput and radiance, float64 [n, 3]; rays gathered so far, int64 [n]."""
+
+    weight: Floats
+    radiance: Floats
+    gathered: Indices
+
+
 class PathTracer:
     """Traces paths through the object and its background, and counts rays by kind in `rays`."""
 
     def __init__(self, target: PlacedObject, view: View, backdrop: Backdrop | None) -> None:
         self._object, self._view, self._backdrop = target, view, backdrop
         self.rays = {"primary": 0, "shadow": 0, "reflection": 0, "refraction": 0, "in_box": 0}
+        if view.gather is not None:
+            self.rays["gather"] = 0
 
-    def trace(self, origins: Floats, directions: Floats, pixels: Floats) -> TracedPaths:
+    def trace(self, origins: Floats, directions: Floats, pixels: Floats, words: Bytes) -> TracedPaths:
         """Trace paths from primary rays.
 
         Args:
             origins: Mesh space, float64 [n, 3].
             directions: Mesh space, of any length, float64 [n, 3].
             pixels: Position (u, v) of each ray in the room's maps, float64 [n, 2]; unused without a room.
+            words: Sample point of each ray's pixel (`colonnade.reference.scatter.pixel_words`), uint8 [n, 2].
         """
         count = len(directions)
         self.rays["primary"] += count
@@ -73,32 +88,77 @@ class PathTracer:
             seen = missed[known]
             colours[seen], ratio[seen] = self._shade_background(_select(points, known))
 
-        # Active paths: their index, the ray that hit the object, and the face it hit.
+        # Active paths: their index, the ray that hit the object, the face it hit, and their reflections and refractions
         path = np.flatnonzero(is_object)
         ray_origins, ray_directions, hit_faces = origins[path], directions[path], faces[path]
-        weight, radiance = np.ones((count, 3)), np.zeros((count, 3))
-        for bounces_done in range(self._view.bounces + 1):
+        bounces = np.zeros(len(path), dtype=np.int64)
+        state = _PathState(np.ones((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=np.int64))
+        t[path] = self._object.points(hit_faces, ray_origins, ray_directions).t
+        while len(path):
             hits = self._object.points(hit_faces, ray_origins, ray_directions)
-            if bounces_done == 0:
-                t[path] = hits.t
             is_diffuse = self._object.kinds[hit_faces] == DIFFUSE
-            colours[path[is_diffuse]] = self._shade_object(_select(hits, is_diffuse))
-            specular = np.flatnonzero(~is_diffuse)
-            path, hit_faces, hits = path[specular], hit_faces[specular], _select(hits, specular)
-            if len(path) == 0:
-                break
-            ray_origins, ray_directions, hit_faces = self._next_rays(
-                path, hit_faces, hits, unit_vectors(ray_directions[specular]), weight, radiance, outside, bounces_done
+            diffuse, specular = np.flatnonzero(is_diffuse), np.flatnonzero(~is_diffuse)
+            gathered = self._gathered_rays(path[diffuse], _select(hits, diffuse), words, state)
+            reflected = self._next_rays(
+                path[specular],
+                hit_faces[specular],
+                _select(hits, specular),
+                unit_vectors(ray_directions[specular]),
+                state,
+                outside,
+                bounces[specular],
             )
-            leaving = np.flatnonzero(hit_faces < 0)
-            colours[path[leaving]], is_outside = self._trace_background(
-                ray_origins[leaving], ray_directions[leaving], shadows=True
+            path, bounces = (
+                np.concatenate([path[diffuse], path[specular]]),
+                np.concatenate([bounces[diffuse], bounces[specular] + 1]),
             )
+            ray_origins, ray_directions, hit_faces = (
+                np.concatenate(both) for both in zip(gathered, reflected, strict=True)
+            )
+            has_gathered = state.gathered[path] > 0
+            self._add_cube(
+                path[has_gathered & (hit_faces == _MISS)], ray_directions[has_gathered & (hit_faces == _MISS)], state
+            )
+            leaving = np.flatnonzero(~has_gathered & (hit_faces == _MISS))
+            colour, is_outside = self._trace_background(ray_origins[leaving], ray_directions[leaving], shadows=True)
+            state.radiance[path[leaving]] += state.weight[path[leaving]] * colour
             outside[path[leaving]] |= is_outside
             active = np.flatnonzero(hit_faces >= 0)
-            path, hit_faces = path[active], hit_faces[active]
+            path, hit_faces, bounces = path[active], hit_faces[active], bounces[active]
             ray_origins, ray_directions = ray_origins[active], ray_directions[active]
-        return TracedPaths((radiance + weight * colours).clip(max=1.0), faces, t, ratio, outside)
+        colours[is_object] = state.radiance[is_object].clip(max=1.0)
+        return TracedPaths(colours, faces, t, ratio, outside)
+
+    def _add_cube(self, path: Indices, directions: Floats, state: _PathState) -> None:
+        """Add the light of the cube to paths that have gathered and leave the object."""
+        if len(path):
+            assert self._view.gather is not None and self._view.gather.cube is not None
+            state.radiance[path] += state.weight[path] * self._view.gather.cube.radiance(directions)
+
+    def _gathered_rays(
+        self, path: Indices, points: ObjectPoints, words: Bytes, state: _PathState
+    ) -> tuple[Floats, Floats, Indices]:
+        """Add the light of diffuse surfaces; origins, directions and first faces of gathered rays, `_END` for none."""
+        gather = self._view.gather
+        goes_on = np.zeros(len(path), dtype=np.bool_) if gather is None else state.gathered[path] < gather.bounces
+        # Shadow rays start slightly above the visible side of the surface.
+        origins = points.position + self._object.tracer.offset * points.facing
+        irradiance, _ = self._irradiance(origins, points.normals, self._view.shadows)
+        irradiance -= goes_on[:, None] * self._view.ambient
+        state.radiance[path] += state.weight[path] * (points.albedo * irradiance + points.emission).clip(max=1.0)
+        directions, faces = np.zeros_like(origins), np.full(len(path), _END, dtype=np.int64)
+        rows = np.flatnonzero(goes_on)
+        if gather is not None and len(rows):
+            going = path[rows]
+            sphere = sphere_points(words[going] ^ np.array(gather.points, np.uint8)[state.gathered[going]])
+            found = cosine_directions(points.normals[rows], sphere)
+            is_below = np.einsum("ni,ni->n", found, points.facing[rows]) < 0
+            directions[rows] = np.where(is_below[:, None], -found, found)
+            state.weight[going] *= points.albedo[rows]
+            state.gathered[going] += 1
+            self.rays["gather"] += len(rows)
+            faces[rows] = self._first_hits(origins[rows], directions[rows])
+        return origins, directions, faces
 
     def _next_rays(
         self,
@@ -106,40 +166,40 @@ class PathTracer:
         faces: Indices,
         points: ObjectPoints,
         directions: Floats,
-        weight: Floats,
-        radiance: Floats,
+        state: _PathState,
         outside: NDArray[np.bool_],
-        bounces_done: int,
+        bounces_done: Indices,
     ) -> tuple[Floats, Floats, Indices]:
-        """Origins, directions and first faces (-1: none) of the rays that leave mirrors and glass.
+        """Origins, directions and first faces (`_MISS`: none) of the rays that leave mirrors and glass.
 
-        Updates `weight`, `radiance` and `outside` of the paths. Fresnel reflections at glass see only the background.
+        Updates `state` and `outside` of the paths. Fresnel reflections at glass see only the background.
         """
         kinds = self._object.kinds[faces]
         scattered = bounce(
             directions, points.normals, points.facing, points.front, kinds == GLASS, self._object.ior[faces]
         )
         is_tinted = (kinds == MIRROR) | points.front
-        weight[path] *= np.where(is_tinted[:, None], points.albedo, 1.0)
+        state.weight[path] *= np.where(is_tinted[:, None], points.albedo, 1.0)
         offset = self._object.tracer.offset * points.facing
         split = np.flatnonzero(scattered.fresnel_weights > 0)
         if len(split):
             origins = points.position[split] + offset[split]
             colour, is_outside = self._trace_background(origins, scattered.fresnel_directions[split], shadows=False)
-            fresnel = weight[path[split]] * scattered.fresnel_weights[split, None]
-            radiance[path[split]] += fresnel * colour
-            weight[path[split]] -= fresnel
+            fresnel = state.weight[path[split]] * scattered.fresnel_weights[split, None]
+            state.radiance[path[split]] += fresnel * colour
+            state.weight[path[split]] -= fresnel
             outside[path[split]] |= is_outside
         origins = points.position + np.where(scattered.refracted[:, None], -offset, offset)
-        if bounces_done == self._view.bounces:
-            return origins, scattered.directions, np.full(len(path), -1, dtype=np.int64)
-        self.rays["refraction"] += int(np.count_nonzero(scattered.refracted))
-        self.rays["reflection"] += int(np.count_nonzero(~scattered.refracted))
-        hit_faces = self._first_hits(origins, scattered.directions)
-        is_outside_glass = scattered.refracted != is_tinted
-        hit_faces[is_outside_glass] = self._visible_hits(
-            hit_faces[is_outside_glass], origins[is_outside_glass], scattered.directions[is_outside_glass]
-        )
+        hit_faces = np.full(len(path), _MISS, dtype=np.int64)
+        going = np.flatnonzero(bounces_done < self._view.bounces)
+        refracted = scattered.refracted[going]
+        self.rays["refraction"] += int(np.count_nonzero(refracted))
+        self.rays["reflection"] += int(np.count_nonzero(~refracted))
+        faces = self._first_hits(origins[going], scattered.directions[going])
+        may_be_hidden = np.flatnonzero((refracted != is_tinted[going]) & (state.gathered[path[going]] == 0))
+        outer = going[may_be_hidden]
+        faces[may_be_hidden] = self._visible_hits(faces[may_be_hidden], origins[outer], scattered.directions[outer])
+        hit_faces[going] = faces
         return origins, scattered.directions, hit_faces
 
     def _visible_hits(
@@ -179,13 +239,6 @@ class PathTracer:
     def _first_hits(self, origins: Floats, directions: Floats) -> Indices:
         self.rays["in_box"] += int(np.count_nonzero(self._object.tracer.enters_box(origins, directions)[0]))
         return self._object.tracer.first_hits(origins, directions)
-
-    def _shade_object(self, points: ObjectPoints) -> Floats:
-        """Colours of diffuse surfaces, float64 [n, 3]."""
-        # The shadow ray starts slightly above the visible side of the surface.
-        origins = points.position + self._object.tracer.offset * points.facing
-        irradiance, _ = self._irradiance(origins, points.normals, self._view.shadows)
-        return np.asarray((points.albedo * irradiance + points.emission).clip(max=1.0), dtype=np.float64)
 
     def _shade_background(self, points: BackdropPoints, shadows: bool = True) -> tuple[Floats, Floats]:
         """Colours and shadow ratios of background surfaces, float64 [n, 3] each."""

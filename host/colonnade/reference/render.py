@@ -12,6 +12,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.reference.object import PlacedObject
 from colonnade.reference.path_tracer import PathTracer, TracedPaths
+from colonnade.reference.scatter import Bytes, pixel_words
 
 if TYPE_CHECKING:
     from colonnade.mesh.mesh import Mesh
@@ -67,7 +68,9 @@ def render_reference(
             rows = slice(first, min(first + batch_rows, view.height))
             directions = primary_directions(view, rows)
             origins = np.broadcast_to(view.origin, directions.shape)
-            batches.append(tracer.trace(origins, directions, _map_pixels(view, rows, backdrop)))
+            batches.append(
+                tracer.trace(origins, directions, _map_pixels(view, rows, backdrop), _pixel_words(view, rows))
+            )
             report(rows.stop / view.height)
 
     def frame(name: str, *channels: int) -> NDArray[np.generic]:
@@ -90,6 +93,12 @@ def primary_directions(view: View, rows: slice) -> Floats:
     x = np.arange(view.width, dtype=np.float64)[None, :, None]
     y = np.arange(rows.start, rows.stop, dtype=np.float64)[:, None, None]
     return np.asarray(view.direction + x * view.step_x + y * view.step_y).reshape(-1, 3)
+
+
+def _pixel_words(view: View, rows: slice) -> Bytes:
+    """Sample points of the pixels of some rows, uint8 [rows * width, 2]."""
+    y, x = np.mgrid[rows, : view.width]
+    return pixel_words(x.ravel(), y.ravel())
 
 
 def _map_pixels(view: View, rows: slice, backdrop: Backdrop | None) -> Floats:

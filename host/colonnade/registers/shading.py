@@ -35,6 +35,8 @@ def check_surfaces(view: View, manifest: Manifest) -> None:
                 f"the scene has {count} {what}, the hardware supports {frame[setting]}:"
                 f" leave some out or raise frame.{setting}"
             )
+    if view.gather is not None and not manifest.gathers:
+        raise UserError("paths.gather asks for gathered light, which this hardware lacks: set frame.gather=true")
     maximum = int(frame["maxBounces"])
     shiny = [material for material in view.materials if material.kind != "diffuse"]
     if shiny and maximum == 0:
@@ -79,6 +81,12 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
         if manifest.emission:
             emission = np.array(material.emission) * (material.kind == "diffuse")
             result |= _colour(f"materials[{index}].emission", emission * white, white)
+    if manifest.gathers:
+        points = () if view.gather is None else view.gather.points
+        result["gather.bounces"] = 0 if view.gather is None else view.gather.bounces
+        result |= {
+            f"gather.points[{i}].{axis}": point[a] for i, point in enumerate(points) for a, axis in enumerate("uv")
+        }
     if int(manifest.config["frame"]["maxBounces"]) > 0:
         result["shading.bounces"] = min(view.bounces, int(manifest.config["frame"]["maxBounces"]))
         result["shading.shadowTransmittance"] = int(np.rint(view.shadow_transmittance * one))

@@ -93,6 +93,8 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
             f"nothing moves in these {request.frames} frames, since several objects stand still: give motion.light, or"
             " motion.turn or motion.translate, which move all of them"
         )
+    if scene.paths.gather and request.frames > 1 and scene.motion.turn != 0.0:
+        raise UserError("paths.gather is for an object that does not turn: give motion.turn = 0 for several frames")
     if request.waveform is not None:
         _check_waveform(request, size)
     if request.truth is not None and request.backend != "reference":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,8 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
+from colonnade.device.gathered_light import scene_cube
+from colonnade.environment.light_cube import LightCube
 from colonnade.maps.cache import encoded_environment
 from colonnade.maps.encoded import layout_of
 from colonnade.maps.layout import AttributeLayout
@@ -126,10 +128,13 @@ def traced_frames(
     photo = view_photo(poses[0], maps, size)
     room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)
     backdrop = room_backdrop(room, layout, options.truth, progress)
+    cube = _light_cube(room, mesh, layout, options.relit, progress)
     for pose in poses:
         begun = time.perf_counter()
         passes = room.scene.at(pose.motion_progress).passes(options.exposure)
         views = [make_view(one, mesh.extent, *size, mesh.materials, room.environment) for one in passes]
+        if cube is not None:
+            views = [replace(view, gather=replace(view.gather, cube=cube)) for view in views if view.gather is not None]
         first = render_reference(mesh, views[0], progress, backdrop)
         sums, rays = _accumulated(first), first.rays
         for view in views[1:]:
@@ -144,6 +149,23 @@ def _accumulated(frame: ReferenceResult) -> Accumulation:
     return Accumulation.of_pixels(frame.image, frame.object_mask, frame.shadow_ratio)
 
 
+def _light_cube(
+    room: LitRoom, mesh: Mesh, layout: AttributeLayout | None, relit: bool, progress: Progress
+) -> LightCube | None:
+    environment = room.environment
+    image = None
+    if room.scene.paths.gather and environment is not None:
+        image = encoded_environment(environment, _layout_for(environment, layout))
+    return scene_cube(room.scene, mesh.extent, environment, image, relit, progress)
+
+
+def _layout_for(environment: Environment, layout: AttributeLayout | None) -> AttributeLayout:
+    """The layout, or else the default one of the room's size."""
+    if layout is None or (layout.width, layout.height) != (environment.width, environment.height):
+        return AttributeLayout(environment.width, environment.height)
+    return layout
+
+
 def room_backdrop(
     room: LitRoom, layout: AttributeLayout | None, truth: Path | None = None, progress: Progress = QUIET
 ) -> Backdrop | None:
@@ -153,10 +175,8 @@ def room_backdrop(
         if truth is not None:
             raise UserError("--truth is the real geometry of a room, but the scene has none: set background.room")
         return None
-    if layout is None or (layout.width, layout.height) != (environment.width, environment.height):
-        layout = AttributeLayout(environment.width, environment.height)
     with progress.step("finding the bounding planes"):
-        bounding = BoundingPlanes(environment, encoded_environment(environment, layout))
+        bounding = BoundingPlanes(environment, encoded_environment(environment, _layout_for(environment, layout)))
     if truth is not None:
         assert room.albedo is not None
         return true_room(truth, environment, room.albedo.albedo, 1.0 / room.scene.headroom, bounding)

@@ -120,7 +120,8 @@ def lit_room(
                 else "where its maps show nothing, background.photo has no shadow of the object"
             )
         )
-    colours = _photo_colours(scene, room, extent, relit)
+    # Gathered light has the photo's own scale
+    colours = _photo_colours(scene, room, extent, relit, 1.0 if scene.paths.gather else None)
     if colours is None:
         return LitRoom(scene, room, room)
     if colours.clamped > _REPORTED_CLAMPED:

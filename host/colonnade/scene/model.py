@@ -20,7 +20,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.limits import MAX_COORDINATE, MAX_SAMPLES
 from colonnade.environment.model import EnvironmentCamera
 from colonnade.mesh.materials import Kind
-from colonnade.scene.samples import CENTRE, Sample, samples_of_frame
+from colonnade.scene.samples import CENTRE, MAX_GATHERED, Sample, samples_of_frame
 
 _STRICT = ConfigDict(extra="forbid")
 
@@ -299,10 +299,13 @@ class Paths:
     Attributes:
         bounces: Traced reflections and refractions of a path; the ray after them sees the background only.
         shadow_transmittance: Fraction of light that a glass occluder transmits.
+        gather: Rays that a path gathers at diffuse surfaces of the object, one after the other, each with the light
+            that it meets; 0: every surface has the ambient light.
     """
 
     bounces: Annotated[int, Strict(), Interval(ge=0, le=MAX_BOUNCES)] = 4
     shadow_transmittance: _Fraction = 0.6
+    gather: Annotated[int, Strict(), Interval(ge=0, le=MAX_GATHERED)] = 0
 
 
 @dataclass(frozen=True, config=_STRICT)

@@ -12,6 +12,9 @@ from colonnade.common.types import Floats
 #: A point of a disc of radius 1, or a shift in pixels: right and down.
 Point = tuple[float, float]
 
+#: The most gathered rays of a path.
+MAX_GATHERED = 4
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -22,12 +25,14 @@ class Sample:
         time: Fraction of the shutter's opening, 0 to 1.
         lens: Point of the lens, a disc of radius 1.
         lights: Point of each light's disc of radius 1; missing ones are the centre.
+        gather: Sample point of each gathered ray of a path, two bytes (docs/gather.md).
     """
 
     pixel: Point = (0.0, 0.0)
     time: float = 0.5
     lens: Point = (0.0, 0.0)
     lights: tuple[Point, ...] = ()
+    gather: tuple[tuple[int, int], ...] = ((128, 128),) * MAX_GATHERED
 
     def light(self, index: int) -> Point:
         """The point of a light's disc."""
@@ -47,13 +52,15 @@ def samples_of_frame(count: int, lights: int) -> list[Sample]:
         count: Number of samples, from 1.
         lights: Number of lights.
     """
-    pixel, time, lens, *on_lights = (square_points(count, dimension) for dimension in range(3 + lights))
+    pixel, time, lens, *others = (square_points(count, dimension) for dimension in range(3 + lights + MAX_GATHERED))
+    on_lights, gather = others[:lights], [(points * 256).astype(np.int64) for points in others[lights:]]
     return [
         Sample(
             pixel=(float(pixel[index, 0] - 0.5), float(pixel[index, 1] - 0.5)),
             time=float(time[index, 0]),
             lens=disc_point(*lens[index]),
             lights=tuple(disc_point(*points[index]) for points in on_lights),
+            gather=tuple((int(points[index, 0]), int(points[index, 1])) for points in gather),
         )
         for index in range(count)
     ]

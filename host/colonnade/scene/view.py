@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.types import Floats
+from colonnade.environment.light_cube import LightCube
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Extent
 from colonnade.scene.cameras import (
@@ -48,6 +49,21 @@ class PlacedLight:
 
 
 @dataclass(frozen=True)
+class Gather:
+    """Gathered rays of a frame (docs/gather.md).
+
+    Attributes:
+        bounces: Gathered rays of a path, one after the other.
+        points: The frame's sample point of each of them, two bytes.
+        cube: The light that they meet, by directions of mesh space; only the reference needs it.
+    """
+
+    bounces: int
+    points: tuple[tuple[int, int], ...]
+    cube: LightCube | None = None
+
+
+@dataclass(frozen=True)
 class View:
     """The view of one frame, in mesh space.
 
@@ -70,6 +86,7 @@ class View:
         shift: Where the rays cross the picture, from the pixels' centres: pixels right and down.
         occlusion: The room hides the object where it is nearer.
         is_map_camera: In a room: the camera is that of its maps.
+        gather: Gathered rays; None: the ambient light is that of every surface.
     """
 
     width: int
@@ -91,6 +108,7 @@ class View:
     shift: tuple[float, float] = (0.0, 0.0)
     occlusion: bool = True
     is_map_camera: bool = True
+    gather: Gather | None = None
 
     @property
     def light(self) -> Floats:
@@ -192,6 +210,7 @@ def make_view(
         shift=scene.sample.pixel,
         occlusion=scene.background.occlusion,
         is_map_camera=not scene.places_camera,
+        gather=Gather(scene.paths.gather, scene.sample.gather) if scene.paths.gather > 0 else None,
     )
 
 

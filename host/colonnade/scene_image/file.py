@@ -151,7 +151,7 @@ def _check_memories_fit(header: ImageHeader, manifest: Manifest, file: Path) -> 
     shapes = {
         name: shape
         for name, shape in manifest.memories.items()
-        if name != "columnBvh" and (header.room is not None or name.startswith("texture."))
+        if name not in ("columnBvh", "light.cube") and (header.room is not None or name.startswith("texture."))
     }
     needed = {name: (int(shape["depth"]), -(-int(shape["bits"]) // 8)) for name, shape in shapes.items()}
     for name in sorted(available.keys() | needed.keys()):

@@ -16,12 +16,14 @@ struct Pixel {
     Wide distance;
 };
 
-/// State of a path: throughput (12 fraction bits per channel), accumulated radiance, number of traced secondary rays, and whether its ray is
-/// inside glass.
+/// State of a path: throughput (12 fraction bits per channel), accumulated radiance, number of traced reflections and refractions, whether its ray is
+/// inside glass, number of gathered rays, and the direction of its last traced ray.
 struct Path {
     Colour throughput, radiance;
     int bounces;
     bool isInside;
+    int gathered;
+    WideVector direction;
 };
 
 class Device : public Tracer {
@@ -38,6 +40,9 @@ public:
 
     /// Uses the contents of the texture memory, which must outlive the device.
     void load(const TextureImage& image) { texture_ = &image; }
+
+    /// Loads the light cube: `count` words of `stride` bytes.
+    void loadCube(const std::uint8_t* words, std::size_t count, std::size_t stride) { cube_.load(words, count, stride); }
 
     /// Starts a frame: loads the registers, and clears counters and errors.
     void start(const Registers& registers) {
@@ -65,12 +70,13 @@ public:
         ++counters.raysPrimary;
         RayRequest request = primaryRay(x, y);
         if (!frame_.maySeeObject(x, y)) return directView(pixel, x, y, request);
-        Path path{{one, one, one}, {0, 0, 0}, 0, false};
+        Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, {}};
         for (bool isPrimary = true;; isPrimary = false) {
+            path.direction = request.direction;
             const Ray ray = prepareRay(request, frame_.bounds, numbers_);
             const Hit hit = trace(ray);
             if (!hit.found && isPrimary) return directView(pixel, x, y, request);
-            if (!hit.found) return finish(pixel, path, missRadiance(request));
+            if (!hit.found) return finish(pixel, path, lightBehind(path, request));
             const Wide distance = floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t;
             if (mayBeHidden(path)) {
                 const EnvironmentHit found = isPrimary ? findDirectView(x, y, request) : findHit(request);
@@ -86,13 +92,27 @@ public:
             const Face* const face = memory_.faceOf(hit.id);
             if (!face) {
                 errors.illegalRecord = true;
-                return finish(pixel, path, frame_.lighting.background);
+                return finish(pixel, path, path.gathered > 0 ? cube_.texel(path.direction) : frame_.lighting.background);
             }
             const Surface surface = surfaceOf(ray, hit, *face, numbers_);
             const Material& material = frame_.lighting.materialOf(*face);
             const Colour albedo = albedoOf(material, hit, *face);
-            if (material.kind == MaterialKind::diffuse) return finish(pixel, path, emitted(material, light(surface, albedo)));
-            if (!continuePath(surface, material, albedo, path, request)) return finish(pixel, path, missRadiance(request));
+            if (material.kind != MaterialKind::diffuse) {
+                if (!continuePath(surface, material, albedo, path, request)) return finish(pixel, path, lightBehind(path, request));
+                continue;
+            }
+            const bool gathers = path.gathered < frame_.gather.bounces;
+            const Colour colour = emitted(material, light(surface, albedo, !gathers));
+            if (!gathers) return finish(pixel, path, colour);
+            for (int channel = 0; channel < 3; ++channel) {
+                std::int64_t& throughput = path.throughput[channel];
+                path.radiance[channel] = std::min(white(), path.radiance[channel] + ((throughput * colour[channel]) >> numbers_.lightFraction));
+                throughput = (throughput * tintOf(albedo[channel])) >> numbers_.lightFraction;
+            }
+            const Vector direction = gatherDirection(shadingNormal(surface, frame_.lighting.flat), surface.faceForwardNormal, frame_.gather.points[path.gathered] ^ pixelPoint(x, y), numbers_);
+            request = {offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_), {direction[0], direction[1], direction[2]}, numbers_.unlimited(), ~std::uint64_t(0)};
+            ++path.gathered;
+            ++counters.raysGather;
         }
     }
 
@@ -116,14 +136,21 @@ private:
 
     std::int64_t white() const { return (std::int64_t(1) << numbers_.colourBits) - 1; }
 
+    /// A value of all ones is 1.0.
+    std::int64_t tintOf(std::int64_t albedo) const { return albedo + (albedo >> (numbers_.colourBits - 1)); }
+
+    /// The light behind the object: of the light cube for a path that has gathered.
+    Colour lightBehind(const Path& path, const RayRequest& ray) { return path.gathered > 0 ? cube_.texel(path.direction) : missRadiance(ray); }
+
     /// Incoming light at a surface whose shadow rays start at `origin`: without occlusion, and with it.
     struct Incoming {
         Colour unoccluded, visible;
     };
 
-    Incoming incoming(const WideVector& origin, const WideVector& normal, bool shadows) {
+    Incoming incoming(const WideVector& origin, const WideVector& normal, bool shadows, bool isAmbient = true) {
         const Lighting& lighting = frame_.lighting;
-        Incoming result{lighting.ambient, lighting.ambient};
+        const Colour ambient = isAmbient ? lighting.ambient : Colour{};
+        Incoming result{ambient, ambient};
         for (const Light& source : lighting.lights) {
             const Illumination illumination = illuminate(origin, normal, source, lighting.shadows && shadows, numbers_);
             Occlusion occluder = Occlusion::none;
@@ -153,9 +180,9 @@ private:
         return colour;
     }
 
-    Colour light(const Surface& surface, const Colour& albedo) {
+    Colour light(const Surface& surface, const Colour& albedo, bool isAmbient) {
         const WideVector origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
-        return reflectedBy(albedo, incoming(origin, shadingNormal(surface, frame_.lighting.flat), true).visible);
+        return reflectedBy(albedo, incoming(origin, shadingNormal(surface, frame_.lighting.flat), true, isAmbient).visible);
     }
 
     /// Incoming light at a point of the environment; `normal` has 11 fraction bits.
@@ -196,8 +223,8 @@ private:
 
     bool hasEnvironment() const { return frame_.hasEnvironment && march_.has_value(); }
 
-    /// Whether the environment may hide the hit of a path's ray: there is none of it inside glass.
-    bool mayBeHidden(const Path& path) const { return hasEnvironment() && frame_.environment.occlusion && !path.isInside; }
+    /// Whether the environment may hide the hit of a path's ray: there is none of it inside glass, and none for a path that has gathered.
+    bool mayBeHidden(const Path& path) const { return hasEnvironment() && frame_.environment.occlusion && !path.isInside && path.gathered == 0; }
 
     Incoming lightAt(const RayRequest& ray, const EnvironmentHit& found, bool shadows) {
         return environmentLight(march_->hitPosition(ray.origin, found.direction, found.point), found.texel.normal, shadows);
@@ -247,9 +274,7 @@ private:
         path.isInside = next.isRefraction == isTinted;
         for (int channel = 0; channel < 3; ++channel) {
             std::int64_t& throughput = path.throughput[channel];
-            // A value of all ones is 1.0
-            const std::int64_t tint = albedo[channel] + (albedo[channel] >> (numbers_.colourBits - 1));
-            if (isTinted) throughput = (throughput * tint) >> numbers_.lightFraction;
+            if (isTinted) throughput = (throughput * tintOf(albedo[channel])) >> numbers_.lightFraction;
             const std::int64_t reflected = (throughput * next.fresnelWeight) >> numbers_.lightFraction;
             path.radiance[channel] = std::min(white(), path.radiance[channel] + ((reflected * reflectionColour[channel]) >> numbers_.lightFraction));
             throughput -= reflected;
@@ -264,6 +289,7 @@ private:
     Registers limits_;
     std::optional<EnvironmentMarch> march_;
     const TextureImage* texture_ = nullptr;
+    LightCube cube_;
 };
 
 } // namespace colonnade

@@ -1,7 +1,8 @@
 // The decoded frame registers, which the host writes before a frame.
 #pragma once
-#include "environment_view.hpp"
 #include "bounce.hpp"
+#include "environment_view.hpp"
+#include "gather.hpp"
 
 namespace colonnade {
 
@@ -27,6 +28,7 @@ struct Frame {
     std::uint64_t watchdogCycles;
     bool hasEnvironment;
     EnvironmentView environment;
+    Gather gather;
 
     Frame() = default;
     Frame(const Registers& registers, const Numbers& n) {
@@ -84,6 +86,11 @@ struct Frame {
         attributeBase = std::min(recordCount, static_cast<std::size_t>(take("scene.attributeBase")));
         triangleBase = std::min(attributeBase, static_cast<std::size_t>(take("scene.triangleBase")));
         watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
+        gather.bounces = static_cast<int>(takeIfThere("gather.bounces"));
+        for (std::size_t i = 0; i < gather.points.size(); ++i) {
+            const std::string name = entry("gather.points", static_cast<int>(i));
+            gather.points[i] = {static_cast<std::uint8_t>(takeIfThere(name + "u")), static_cast<std::uint8_t>(takeIfThere(name + "v"))};
+        }
         hasEnvironment = takeIfThere("environment.enabled") != 0;
         if (!hasEnvironment) return;
         for (int row = 0; row < 3; ++row) {

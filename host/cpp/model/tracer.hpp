@@ -10,6 +10,7 @@ struct Counters {
     std::uint64_t raysPrimary, raysShadow, raysReflection, raysRefraction, raysInBox, nodeReads, boxTests, triangleTests, hits, deepestStack;
     /// Environment lookups, march steps (tiles and cells), and hits in the maps.
     std::uint64_t raysEnvironment, marchSteps, albedoReads;
+    std::uint64_t raysGather;
 };
 
 struct Errors {

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.types import Floats
+from colonnade.maps.decoded_planes import DecodedPlanes
 from colonnade.maps.planes import SLOPE_PIXELS, PlaneProjection, unpack_planes
 from colonnade.reference.environment.depth_mesh import DepthMesh
 from colonnade.reference.environment.ray_march import MarchedGeometry, PlaneMarch, RayMarch
@@ -25,27 +26,12 @@ class BoundingPlanes:
 
     def __init__(self, environment: Environment, image: AttributeImage) -> None:
         """Decode the bounding planes of an attribute image."""
-        words = image.planes.bounding[image.planes.bounding.any(axis=1)]
-        vector_bits = 3 * image.layout.field_bits
-        high = [int(low) | int(top) << 64 for low, top in words[:, 1:]]
-        albedos = np.array([entry & ((1 << vector_bits) - 1) for entry in high], dtype=np.uint64)
-        projection = PlaneProjection.of(environment, image.depth_unit)
-        planes = unpack_planes(words[:, 0])
-        self._albedo = image.albedo_space.vectors(albedos)
-        self._dual_vectors = projection.dual_vectors(planes)
-        self._normals = projection.normals(planes)
+        self._planes = DecodedPlanes.of(environment, image)
 
     def intersect(self, origins: Floats, directions: Floats) -> BackdropPoints:
         """Points where rays of view space, float64 [n, 3] each, hit the planes."""
-        approach = directions @ self._dual_vectors.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = (1 - origins @ self._dual_vectors.T) / approach
-        t = np.where((approach > 0) & (t > 0), t, np.inf)
-        nearest = t.argmin(axis=1)
-        t_hit = t[np.arange(len(t)), nearest]
-        outside = ~np.isfinite(t_hit)
-        position = origins + np.where(outside, 0.0, t_hit)[:, None] * directions
-        return BackdropPoints(position, self._normals[nearest], self._albedo[nearest], outside)
+        hits = self._planes.intersect(origins, directions)
+        return BackdropPoints(hits.position, hits.normals, hits.albedo, hits.outside)
 
 
 def float_plane_march(environment: Environment, image: AttributeImage) -> PlaneMarch:

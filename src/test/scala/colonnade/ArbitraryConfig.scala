@@ -131,7 +131,18 @@ object ArbitraryConfig {
     maxBounces <- Gen.chooseNum(0, 15)
     hits       <- flag
     emission   <- flag
-  } yield FrameConfig(maxWidth, maxHeight, tileSize, materials, lights, maxBounces, hits, emission)
+    gather     <- flag
+  } yield FrameConfig(
+    maxWidth,
+    maxHeight,
+    tileSize,
+    materials,
+    lights,
+    maxBounces,
+    hits,
+    emission,
+    gather && maxBounces > 0
+  )
 
   val legal: Gen[ColonnadeConfig] = for {
     array     <- array
@@ -141,5 +152,8 @@ object ArbitraryConfig {
     memory    <- memory
     maps      <- Gen.option(physicalAttributeMemory)
     frame     <- frame
-  } yield ColonnadeConfig(array, precision, geometry, units, memory, maps, frame)
+  } yield {
+    val gathers = frame.gather && units.shadeInterval < UnitsConfig.sequentialShadeInterval
+    ColonnadeConfig(array, precision, geometry, units, memory, maps, frame.copy(gather = gathers))
+  }
 }

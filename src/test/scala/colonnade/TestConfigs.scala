@@ -65,6 +65,12 @@ object TestConfigs {
     columnsPerCopy = 1
   )
 
+  /** Surfaces gather light. */
+  def gathering(config: ColonnadeConfig): ColonnadeConfig = config.copy(
+    units = config.units.copy(shadeInterval = UnitsConfig.shadeIntervals.min),
+    frame = config.frame.copy(gather = true)
+  )
+
   def withEnvironment(environment: PhysicalAttributeMemoryConfig): ColonnadeConfig =
     tiny.copy(physicalAttributeMemory = Some(environment))
 

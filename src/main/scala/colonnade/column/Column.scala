@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{Decoupled, Valid}
 import colonnade.config.{ColonnadeConfig, PathConfig}
-import colonnade.environment.{AttributePort, ColumnEnvironment, EnvironmentMarches, TextureMemory}
+import colonnade.environment.{AttributePort, AttributeStore, ColumnEnvironment, EnvironmentMarches, TextureMemory}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{
   BackgroundWalker,
@@ -135,6 +135,13 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
     val memory = Module(new TextureMemory(PathConfig(config))).io
     memory.load := io.load
     memory.port :<>= port
+  }
+
+  // The light cube
+  for (port <- units.cube) {
+    val store = AttributeStore(config, "light.cube", io.load)
+    store.read := port.read
+    port.word  := store.word.asTypeOf(port.word)
   }
 
   // Collect finished pixels

@@ -7,7 +7,7 @@ import chisel3.util.{Decoupled, Valid}
 import colonnade.config.{ColonnadeConfig, PathConfig, TraversalConfig}
 import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitPosition}
-import colonnade.shading.TexturePort
+import colonnade.shading.{CubePort, TexturePort}
 import colonnade.unit.{AttributeFetch, FetchEvents, PathEvents, PathHits, PathUnit, TraversalEvents, TraversalUnit}
 
 /** Events of a [[PathTracer]] in one cycle. */
@@ -34,6 +34,9 @@ final class PathTracerIO(config: ColonnadeConfig) extends Bundle {
   /** To the marches of the environment, and to the textures. */
   val marches = Option.when(config.hasEnvironment)(new MarchPort(PathConfig(config)))
   val texture = config.geometry.texture.map(_ => new TexturePort(PathConfig(config)))
+
+  /** To the light cube. */
+  val cube = Option.when(config.frame.gather)(new CubePort)
 
   /** A pixel of a tile of the environment leaves; no pixel is in flight, and no request waits. */
   val environmentLeaves = Output(Bool())
@@ -65,6 +68,7 @@ final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config)
   io.pixels :<>= paths.pixels
   io.marches.zip(paths.marches).foreach { case (port, marches) => port :<>= marches }
   io.texture.zip(paths.texture).foreach { case (port, texture) => port :<>= texture }
+  io.cube.zip(paths.cube).foreach { case (port, cube) => port :<>= cube }
   io.environmentLeaves := paths.environmentLeaves
 
   // Rays and their results

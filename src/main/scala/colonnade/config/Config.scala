@@ -165,6 +165,7 @@ final case class ColumnBvhMemoryConfig(
   * @param maxBounces reflections and refractions of a path that are traced; 0: every material is diffuse
   * @param hits       the pixel stream also carries the hit triangle and its distance
   * @param emission   materials have a colour that diffuse surfaces emit
+  * @param gather     diffuse surfaces gather light: docs/gather.md
   */
 final case class FrameConfig(
     maxWidth:   Int = 1920,
@@ -174,7 +175,8 @@ final case class FrameConfig(
     lights:     Int = 1,
     maxBounces: Int = 0,
     hits:       Boolean = true,
-    emission:   Boolean = false
+    emission:   Boolean = false,
+    gather:     Boolean = false
 ) {
   Require.within("frame.maxWidth", maxWidth, 8, 4096)
   Require.within("frame.maxHeight", maxHeight, 8, 4096)
@@ -182,6 +184,7 @@ final case class FrameConfig(
   Require.within("frame.materials", materials, 1, 256)
   Require.within("frame.lights", lights, 1, 8)
   Require.within("frame.maxBounces", maxBounces, 0, 15)
+  Require("frame.gather", !gather || maxBounces > 0, "needs frame.maxBounces of at least 1")
 
   /** The device supports mirrors and glass. */
   val hasBounces: Boolean = maxBounces > 0
@@ -202,6 +205,11 @@ final case class ColonnadeConfig(
     frame:                   FrameConfig = FrameConfig()
 ) {
   Require.oneOf("units.boxLanes", units.boxLanes, Seq(1, 2, 4).filter(_ <= geometry.arity))
+  Require(
+    "frame.gather",
+    !frame.gather || units.shadeInterval < UnitsConfig.sequentialShadeInterval,
+    s"needs units.shadeInterval below ${UnitsConfig.sequentialShadeInterval}"
+  )
 
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
@@ -226,6 +234,8 @@ object ColonnadeConfig {
   /** The defaults, with every optional part. */
   val complete: ColonnadeConfig = ColonnadeConfig(
     columnBvhMemory = ColumnBvhMemoryConfig(cache = Some(SceneCacheConfig())),
-    physicalAttributeMemory = Some(PhysicalAttributeMemoryConfig())
+    physicalAttributeMemory = Some(PhysicalAttributeMemoryConfig()),
+    units = UnitsConfig(shadeInterval = UnitsConfig.shadeIntervals.min),
+    frame = FrameConfig(maxBounces = 1, gather = true)
   )
 }

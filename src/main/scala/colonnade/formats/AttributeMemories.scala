@@ -2,6 +2,7 @@ package colonnade.formats
 
 import chisel3.Bundle
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.numbers.Fixed
 
 /** One memory of the environment's maps.
   *
@@ -12,13 +13,14 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
   */
 final case class AttributeMemory(name: String, depth: Int, bits: Int, target: Int)
 
-/** All memories of the environment's maps, and those of the textures. */
+/** The memories for loads beside that of the records: of the environment's maps, of the textures, of gathered light. */
 object AttributeMemories {
 
-  /** Those of the environment, if there is one, then those of the textures, if there are any. */
+  /** Those of the environment, if there is one, then those of the textures, if there are any, then the light cube. */
   def apply(config: ColonnadeConfig): Seq[AttributeMemory] =
-    (environment(config) ++ textures(config)).zipWithIndex.map { case ((name, depth, bits), index) =>
-      AttributeMemory(name, depth, bits, LoadTarget.firstAttributes + index)
+    (environment(config) ++ textures(config) ++ lightCube(config)).zipWithIndex.map {
+      case ((name, depth, bits), index) =>
+        AttributeMemory(name, depth, bits, LoadTarget.firstAttributes + index)
     }
 
   private def environment(config: ColonnadeConfig): Seq[(String, Int, Int)] =
@@ -37,6 +39,15 @@ object AttributeMemories {
     config.geometry.texture.toSeq.flatMap(layout =>
       twoLevel("texture", layout.tiles, layout.paletteSize, layout.heapWords)
     )
+
+  /** Texels of a face of the light cube along an edge. */
+  val cubeLog: Int = 3
+
+  /** A texel of the light cube: linear radiance, as the intensity of a light. */
+  def cubeTexel: Rgb[Fixed] = Rgb(FrameRegisters.intensity)
+
+  private def lightCube(config: ColonnadeConfig): Seq[(String, Int, Int)] =
+    if (config.frame.gather) Seq(("light.cube", 6 << (2 * cubeLog), cubeTexel.getWidth)) else Nil
 
   /** Types of the words of the texture memory, as [[layouts]]. */
   def textureLayouts: Seq[(String, () => Bundle)] =

@@ -137,6 +137,7 @@ final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
   val scene       = new SceneMap(RecordFormats.idBits(config))
   val environment = config.physicalAttributeMemory.map(_ => new EnvironmentView(numbers))
   val dram        = config.columnBvhMemory.cache.map(_ => new SceneInDram)
+  val gather      = Option.when(config.frame.gather)(new Gather)
 }
 
 object FrameRegisters {
@@ -239,6 +240,9 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
   val normalReads = environmentCounter
   val cellReads   = environmentCounter
   val planeReads  = environmentCounter
+
+  /** Rays that diffuse surfaces gather. */
+  val raysGather = Option.when(config.frame.gather)(counter)
 }
 
 object Counters {

@@ -23,7 +23,8 @@ object RegisterLimits {
       "camera.stepShift"            -> BigInt(numbers.coordinateBits),
       "shading.lights"              -> BigInt(config.frame.lights),
       "shading.bounces"             -> BigInt(config.frame.maxBounces),
-      "shading.shadowTransmittance" -> one
+      "shading.shadowTransmittance" -> one,
+      "gather.bounces"              -> BigInt(Gather.maxBounces)
     ) ++ materials ++ records
     val max = Layout.of(new FrameRegisters(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
     limits.filter { case (name, limit) => max.get(name).exists(limit < _) }.toMap

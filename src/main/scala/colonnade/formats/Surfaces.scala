@@ -34,6 +34,31 @@ final class Shading(config: ColonnadeConfig) extends Bundle {
   val shadowTransmittance = ifBounces(FrameRegisters.weight)
 }
 
+/** A sample point of a scattered ray: docs/gather.md. */
+final class SamplePoint extends Bundle {
+  val u = UInt(SamplePoint.bits.W)
+  val v = UInt(SamplePoint.bits.W)
+}
+
+object SamplePoint {
+  val bits: Int = 8
+}
+
+/** Light that diffuse surfaces gather. */
+final class Gather extends Bundle {
+
+  /** Rays that a path gathers, one after the other; 0: none, and the ambient light is that of every surface. */
+  val bounces = UInt(Gather.countBits.W)
+
+  /** The sample point of each of them in this frame, before that of the pixel. */
+  val points = Vec(Gather.maxBounces, new SamplePoint)
+}
+
+object Gather {
+  val maxBounces: Int = 4
+  val countBits:  Int = NumberFormats.bitLength(maxBounces)
+}
+
 /** The interaction of a ray with a surface. */
 object MaterialKind {
   val bits = 2

@@ -68,6 +68,9 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val cellReads   = ifEnvironment(perColumn)
   val planeReads  = ifEnvironment(perColumn)
 
+  /** With gathered light. */
+  val raysGather = Option.when(config.frame.gather)(perColumn)
+
   /** A level, not an event: the maximum of all units. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
 

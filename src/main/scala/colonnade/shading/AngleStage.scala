@@ -28,6 +28,8 @@ final class AngleStageIO(config: PathConfig) extends Bundle {
   /** In cycles 17 to 19, but the product of the lengths and their exponent in cycle 21, and the falloff in cycle 17. */
   val angle   = Output(new Angle(formats))
   val falloff = Output(new FalloffRequest(numbers))
+
+  val squaredNormal = Output(UInt(formats.dotBits.W)) // in cycle 16: n·n
 }
 
 /** The vector from a point to a light, and its angle to the normal: docs/numbers.md, 5.4 to 5.6 and the product of 5.7. An
@@ -78,6 +80,8 @@ final class AngleStage(config: PathConfig) extends Module {
   }
   private val normProduct = multiply(ofNormal._1, ofLight._1, 17)
   private val exponent    = latch(19)(ofNormal._2.at(19) +& ofLight._2.at(19))
+
+  io.squaredNormal := nn.at(16).asUInt(formats.dotBits - 1, 0)
 
   io.angle.isAcute     := latch(16)(nl.at(16) > 0.S).at(17)
   io.angle.dot         := latch(16)(nl.at(16).asUInt(formats.dotBits - 1, 0)).at(17)

@@ -1,6 +1,7 @@
 package colonnade.shading
 
 import chisel3._
+import chisel3.util.Valid
 import colonnade.common.Context
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.FrameRegisters
@@ -17,6 +18,10 @@ final private[shading] class ColourOperation(config: PathConfig) extends Bundle 
   /** Of a bounce: what the path lets through, and the weight of the Fresnel reflection. */
   val tint    = Option.when(config.frame.hasBounces)(Vec(3, FrameRegisters.weight))
   val fresnel = Option.when(config.frame.hasBounces)(FrameRegisters.weight)
+
+  /** Of an end: the path goes on with a gathered ray; it ends in the light cube. */
+  val gathers   = Option.when(config.frame.gather)(Bool())
+  val showsCube = Option.when(config.frame.gather)(Bool())
 }
 
 /** A channel and a light of an operation in the stages of [[ColourUnit]]. */
@@ -42,4 +47,8 @@ final private[shading] class ColourSlot(config: PathConfig) extends Bundle {
   val radiance = UInt(bits.W)
   val weight   = UInt((NumberFormats.lightFraction + 1).W)
   val emission = Option.when(config.frame.emission)(UInt(bits.W))
+
+  /** The path gathers; the light of the cube where it ends there. */
+  val gathers = Option.when(config.frame.gather)(Bool())
+  val cube    = Option.when(config.frame.gather)(Valid(UInt(NumberFormats.lightBits.W)))
 }

@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, MuxLookup, Valid}
-import colonnade.common.ContextTable
+import colonnade.common.{Context, ContextTable}
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
 import colonnade.numbers.{Fixed, Rounding}
@@ -15,6 +15,10 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   val bounce     = if (config.frame.hasBounces) Some(Flipped(Decoupled(new BounceUpdate(config)))) else None
   val end        = Flipped(Decoupled(new PathTermination(config)))
   val colour     = Valid(new PathColour(config))
+
+  /** A path whose surface's light is added, and which goes on; the light cube. */
+  val continued = Option.when(config.frame.gather)(Valid(Context(config)))
+  val cube      = Option.when(config.frame.gather)(new LightPort(config))
 }
 
 /** Colours of paths: docs/numbers.md, 5.9 and 6. A path has a radiance so far, and a throughput that weights what it still
@@ -25,6 +29,7 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   * }}}
   * An end takes 3 · lights cycles, with the lights that are on, at least one; in the background 3. A bounce takes 3, and
   * 3 · lights more if its reflection shows a surface; none if it is the path's first and has no Fresnel reflection.
+  * An end whose surface gathers light takes 3 cycles more, and gives no colour: the path goes on.
   * Colours come in any order; the throughput and radiance of every path are in a table.
   *
   * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights · transmittance))
@@ -51,7 +56,9 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val ofSurface = Reg(Bool())
   private val channel   = Reg(UInt(2.W))
   private val light     = Reg(UInt(log2Ceil(lights.max(2)).W))
-  private val lastPass  = !(isBounce && ofSurface)
+  private val gathers   = operation.gathers.getOrElse(false.B)
+  private val hasPasses = isBounce || gathers // first of its surface, then of its path
+  private val lastPass  = !(hasPasses && ofSurface)
 
   private def isLastLight(light: UInt): Bool = !ofSurface || light +& 1.U >= io.shading.lights // off, it adds nothing
 
@@ -88,6 +95,9 @@ final class ColourUnit(config: PathConfig) extends Module {
     next.hasSurface := showsSurface
     next.needsRatio := !bounces && showsSurface && io.end.bits.isDirectView.getOrElse(false.B) &&
       io.end.bits.occlusions.map(_ =/= Occlusion.none).reduce(_ || _)
+    for (to <- next.gathers; from <- io.end.bits.gathers) to      := !bounces && from
+    for (to <- next.showsCube; end <- io.end.bits.isScattered) to := !bounces && io.end.bits.isBackground && end
+    next.fresnel.foreach(_.raw := 0.U)
     for (bounce <- io.bounce) when(bounces) {
       next.fresnel.get := bounce.bits.fresnel
       next.tint.get.zip(tints.get).foreach { case (to, tint) => to := Fixed(to.format, tint) }
@@ -106,7 +116,7 @@ final class ColourUnit(config: PathConfig) extends Module {
   when(isIssuing) {
     light   := lightThen
     channel := channelThen
-    when(lastLight && channel === 2.U && isBounce) { ofSurface := false.B }
+    when(lastLight && channel === 2.U && hasPasses) { ofSurface := false.B }
   }
   when(starts) {
     isIssuing := true.B
@@ -147,7 +157,10 @@ final class ColourUnit(config: PathConfig) extends Module {
   private def of[T <: Data](channels: Seq[T], channel: UInt = channel): T =
     MuxLookup(channel, channels(2))(Seq(0.U -> channels(0), 1.U -> channels(1)))
 
-  private def background(slot: ColourSlot): UInt = of(io.background.channels, slot.channel)
+  private def background(slot: ColourSlot): UInt = {
+    val register = of(io.background.channels, slot.channel)
+    slot.cube.fold(register)(cube => Mux(cube.valid, cube.bits, register))
+  }
 
   private def at[T <: Data](entries: Vec[T]): T = if (lights == 1) entries.head else entries(light)
 
@@ -167,8 +180,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   slot.isValid      := isIssuing
   slot.context      := operation.context
   slot.isLast       := isLast
-  slot.isPath       := lastPass
-  slot.isBounce     := isBounce
+  slot.isPath       := lastPass || gathers
+  slot.isBounce     := isBounce || (gathers && !ofSurface)
   slot.hasSurface   := hasSurface
   slot.needsRatio   := needsRatio
   slot.channel      := channel
@@ -180,7 +193,16 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val shadowTransmittance = io.shading.shadowTransmittance.map(_.natural).getOrElse(one)
   private val transmittance       =
     MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> one, Occlusion.transmissive -> shadowTransmittance))
-  private val tint     = operation.tint.map(tint => of(tint.map(_.natural))).getOrElse(one)
+  for (cube <- slot.cube; port <- io.cube) {
+    port.read.valid := io.end.fire && io.end.bits.isBackground
+    port.read.bits  := io.end.bits.context
+    cube.valid      := operation.showsCube.get
+    cube.bits       := of(port.light.channels.map(_.natural))
+  }
+  slot.gathers.foreach(_ := gathers)
+  private val tint = operation.tint
+    .map(tint => Mux(gathers, of(albedo) +& of(albedo)(colourBits - 1), of(tint.map(_.natural))))
+    .getOrElse(one)
   private val fresnel  = operation.fresnel.map(_.natural).getOrElse(0.U(weightBits.W))
   private val direct   = of(at(directLight))
   private val arriving = Reg(UInt(NumberFormats.lightBits.W))
@@ -191,7 +213,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val arrival = after(slot)()
   private val lit     = Reg(UInt(sumBits.W))
   private val all     = Reg(UInt(sumBits.W))
-  private val ambient = of(io.ambient.channels, arrival.channel).natural
+  private val ambient =
+    Mux(arrival.gathers.getOrElse(false.B), 0.U, of(io.ambient.channels, arrival.channel).natural)
   lit := Mux(arrival.isBounce && arrival.isPath, 0.U, Mux(arrival.isFirstLight, ambient, lit)) + arriving
   all := Mux(arrival.isFirstLight, ambient, all) + RegNext(direct)
 
@@ -213,7 +236,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val colour  = Rounding.saturate(reflected, colourBits)
   private val shown   =
     leaving.emission.map(emission => Rounding.saturate(colour +& emission, colourBits)).getOrElse(colour)
-  private val seen = Reg(UInt(weightBits.W))
+  private val seenBits = if (config.frame.gather) NumberFormats.lightBits else weightBits
+  private val seen     = Reg(UInt(seenBits.W))
   seen := Mux(
     leaving.isBounce && leaving.isPath,
     Rounding.narrow(reflected, weightBits),
@@ -232,15 +256,18 @@ final class ColourUnit(config: PathConfig) extends Module {
         weighed.weight
       )
     else weighed.weight
-  private val part = Reg(UInt(weightBits.W))
-  part := drop(seen * weight, weightBits)
+  private val part = Reg(UInt(seenBits.W))
+  part := drop(seen * weight, seenBits)
 
   // The path's colour so far
-  private val added   = after(weighed)(slot => slot.weight := weighed.weight - seen)
+  private val added   = after(weighed)(slot => slot.weight := weighed.weight - seen(weightBits - 1, 0))
   private val colours = Reg(Vec(3, UInt(colourBits.W)))
   private val weights = Reg(Vec(3, UInt(weightBits.W)))
   when(added.isValid) {
-    shiftIn(colours, Rounding.saturate(added.radiance +& part, colourBits))
+    // The second pass of a path that gathers leaves the colour alone
+    when(!(added.isBounce && added.gathers.getOrElse(false.B))) {
+      shiftIn(colours, Rounding.saturate(added.radiance +& part, colourBits))
+    }
     shiftIn(weights, added.weight)
   }
 
@@ -265,6 +292,10 @@ final class ColourUnit(config: PathConfig) extends Module {
 
   // A bounce's path enters the table; a read in the same cycle does not count
   isWriting := done.isValid && done.isBounce
+  for (continued <- io.continued) {
+    continued.valid := isWriting && done.gathers.get
+    continued.bits  := done.context
+  }
   for (table <- paths; bounce <- io.bounce) when(isWriting || (bounce.fire && isDirect)) {
     val path = Wire(new PathState)
     for ((to, (weight, tint)) <- path.throughput.zip(weights.zip(tints.get)))

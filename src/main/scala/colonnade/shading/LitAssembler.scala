@@ -32,6 +32,10 @@ final class LitAssemblerIO(config: PathConfig) extends Bundle {
   val label  = Flipped(Valid(new SurfaceLabel(config)))
   val origin = Vec(3, Flipped(Valid(SInt(ShaderFormats.originBits(config).W))))
   val light  = Flipped(Valid(new LightOnSurface(config)))
+
+  /** The components of the gathered ray's direction. */
+  val scatter = Option.when(config.frame.gather)(Vec(3, Flipped(Valid(ScatterStage.component))))
+
   val albedo = Flipped(new AlbedoSources(config))
 
   val isTaken = Output(Bool()) // a light has left
@@ -46,14 +50,10 @@ final class LitAssemblerIO(config: PathConfig) extends Bundle {
 final class LitAssembler(config: PathConfig, places: Int) extends Module {
   val io = IO(new LitAssemblerIO(config))
 
-  private val labels  = Module(new ReservedQueue(new SurfaceLabel(config), places)).io
-  private val lights  = Module(new ReservedQueue(new LightOnSurface(config), places)).io
-  private val origins = io.origin.map { component =>
-    val queue = Module(new ReservedQueue(component.bits.cloneType, places)).io
-    queue.in          := component
-    queue.mayTakeNext := lights.validNext
-    queue.out
-  }
+  private val labels   = Module(new ReservedQueue(new SurfaceLabel(config), places)).io
+  private val lights   = Module(new ReservedQueue(new LightOnSurface(config), places)).io
+  private val origins  = io.origin.map(queue(_))
+  private val scatters = io.scatter.toSeq.flatten.map(queue(_))
   labels.in          := io.label
   labels.mayTakeNext := lights.validNext
   lights.in          := io.light
@@ -65,11 +65,12 @@ final class LitAssembler(config: PathConfig, places: Int) extends Module {
   private val isEnvironment = label.environment.map(_.valid).getOrElse(false.B)
   private val material      = ShadingPipeline.material(config, io.materials, label.material)
   private val albedo        = new ObjectAlbedo(config, io.albedo, material, !isEnvironment, io.lit.fire, places)
-  io.lit.valid                                     := lights.out.valid && light.isLast && albedo.isKnown
-  lights.out.ready                                 := (io.lit.ready && albedo.isKnown) || !light.isLast
-  io.isTaken                                       := lights.out.fire
-  for (queue <- labels.out +: origins) queue.ready := io.lit.fire
-  assert(!io.lit.valid || (labels.out.valid && origins.map(_.valid).reduce(_ && _)), "a light without a surface")
+  io.lit.valid     := lights.out.valid && light.isLast && albedo.isKnown
+  lights.out.ready := (io.lit.ready && albedo.isKnown) || !light.isLast
+  io.isTaken       := lights.out.fire
+  private val parts = labels.out +: (origins ++ scatters)
+  for (queue <- parts) queue.ready := io.lit.fire
+  assert(!io.lit.valid || parts.map(_.valid).reduce(_ && _), "a light without a surface")
 
   // The lights before the last one
   private val direct = Reg(chiselTypeOf(lit.directLight))
@@ -95,4 +96,13 @@ final class LitAssembler(config: PathConfig, places: Int) extends Module {
   for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
     channel                                           := Mux(isEnvironment, 0.U, value)
   for ((to, from) <- lit.origin.axes.zip(origins)) to := Fixed(new RayFormats(config.numbers).scene, from.bits)
+  for (scatter <- lit.scatter; (to, from) <- scatter.axes.zip(scatters)) to := from.bits
+
+  /** A queue of what is known before the last light. */
+  private def queue[T <: Data](component: Valid[T]) = {
+    val queue = Module(new ReservedQueue(component.bits.cloneType, places)).io
+    queue.in          := component
+    queue.mayTakeNext := lights.validNext
+    queue.out
+  }
 }

@@ -14,6 +14,10 @@ final class PathTermination(config: PathConfig) extends Bundle {
 
   /** The camera sees the environment's surface directly: the shadow ratio is needed as well. */
   val isDirectView = if (config.hasEnvironment) Some(Bool()) else None
+
+  /** The surface gathers light: the path goes on, without ambient light; without a surface it ends in the light cube. */
+  val gathers     = Option.when(config.frame.gather)(Bool())
+  val isScattered = Option.when(config.frame.gather)(Bool())
 }
 
 /** The change of a path's throughput at a mirror or glass. */

@@ -24,6 +24,9 @@ final class ShaderIO(config: PathConfig) extends Bundle {
   val texture        = config.geometry.texture.map(_ => new TexturePort(config))
   val isIllegalTexel = config.geometry.texture.map(_ => Output(Bool()))
 
+  /** A hit on a diffuse surface asks for its sample point. */
+  val sample = Option.when(config.frame.gather)(new SamplePort(config))
+
   val lit     = Decoupled(new LitSurface(config))                                       // hits on diffuse surfaces
   val bounced = Option.when(config.frame.hasBounces)(Decoupled(new BouncedRay(config))) // hits on mirrors and glass
   val busy = Output(Bool()) // the entry holds a hit: a cycle of the narrowest stage

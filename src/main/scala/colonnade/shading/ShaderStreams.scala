@@ -36,6 +36,7 @@ final class LitSurface(config: PathConfig) extends Bundle {
   val needsShadowRays = Vec(config.frame.lights, Bool())
 
   val emission = Option.when(config.frame.emission)(Rgb(FrameRegisters.colour)) // the light that the surface adds
+  val scatter  = Option.when(config.frame.gather)(ScatterStage.dir)             // of the ray that gathers light there
 }
 
 /** A ray that leaves a mirror or glass. */

@@ -95,6 +95,19 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   bright.angle.isAcute := faces
   bright.falloff       := angle.falloff
 
+  // The rays that gather light
+  private val scatter = io.sample.map { sample =>
+    sample.read.valid := (io.request.fire || takesPoint) && !entering.isBounce
+    sample.read.bits  := entering.context
+    val stage = Module(new ScatterStage(config)).io
+    stage.phase             := phase
+    stage.point             := sample.point
+    stage.faceForwardNormal := surface.faceForwardNormal
+    stage.normal            := surface.normal
+    stage.squaredNormal     := angle.squaredNormal
+    stage.dir
+  }
+
   // Lit surfaces
   private val assembler = Module(new LitAssembler(config, queued)).io
   private val label     = assembler.label.bits
@@ -110,6 +123,13 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     component.valid := isAt(cycle) && lightAt6.at(cycle) && at6.at(cycle).light === 0.U
     component.bits  := surface.origin
   }
+  private val isFirst =
+    carryFlag(arriving(isActive && !hit.isBounce && light === 0.U, 0, interval - 1), ScatterStage.dir0)
+  for (components <- assembler.scatter; (component, cycle) <- components.zip(xyz(ScatterStage.dir0))) {
+    component.valid := isAt(cycle) && isFirst.at(cycle)
+    component.bits  := scatter.get
+  }
+  require(cycles.direct > xyz(ScatterStage.dir0).last, "lights come before the direction that gathers")
   private val facing = latch(17) {
     val now = WireInit(at17.at(17))
     now.shadows := at17.at(17).shadows && faces

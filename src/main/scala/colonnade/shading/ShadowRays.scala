@@ -12,6 +12,9 @@ import colonnade.ray.{RayFormats, RayRequest}
 final class ShadowRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
   val light   = UInt(log2Ceil(config.frame.lights.max(2)).W)
+
+  /** The ray is the one that gathers light at the surface instead. */
+  val isGathered = Option.when(config.frame.gather)(Bool())
 }
 
 final class ShadowRaysIO(config: PathConfig) extends Bundle {
@@ -24,7 +27,7 @@ final class ShadowRaysIO(config: PathConfig) extends Bundle {
   val ray     = Decoupled(new RayRequest(config))
 }
 
-/** Makes shadow rays, from a context's surface to a light: docs/shading.md. Two rays in three cycles; all axes at a time,
+/** Makes shadow rays, from a context's surface to a light, and the rays that gather light there: docs/shading.md. Two rays in three cycles; all axes at a time,
   * one shifter and subtractor for each.
   *
   * A ray is offered two cycles after its request, in the order of the requests. A request that waits for the ray before it
@@ -35,8 +38,12 @@ final class ShadowRays(config: PathConfig) extends Module {
 
   val io = IO(new ShadowRaysIO(config))
 
-  private val origins = ContextTable(config, Vec3(new Fixed(scene)))
-  when(io.surface.valid) { origins.write(io.surface.bits.context, io.surface.bits.origin) }
+  private val origins  = ContextTable(config, Vec3(new Fixed(scene)))
+  private val scatters = io.surface.bits.scatter.map(scatter => ContextTable(config, chiselTypeOf(scatter)))
+  when(io.surface.valid) {
+    origins.write(io.surface.bits.context, io.surface.bits.origin)
+    scatters.zip(io.surface.bits.scatter).foreach { case (table, dir) => table.write(io.surface.bits.context, dir) }
+  }
 
   // A request whose origin was read in the cycle before
   private val isHeld  = RegInit(false.B)
@@ -44,7 +51,10 @@ final class ShadowRays(config: PathConfig) extends Module {
   private val hasRay  = RegInit(false.B)
   private val moves   = isHeld && (!hasRay || io.ray.ready)
   private val repeats = isHeld && !moves
-  private val origin  = origins.read(Mux(repeats, request.context, io.req.bits.context), repeats || io.req.fire)
+  private val reads   = repeats || io.req.fire
+  private val reader  = Mux(repeats, request.context, io.req.bits.context)
+  private val origin  = origins.read(reader, reads)
+  private val scatter = scatters.map(_.read(reader, reads))
 
   // Ready without a look at the ray's way out
   io.req.ready := !isHeld || !hasRay
@@ -57,15 +67,18 @@ final class ShadowRays(config: PathConfig) extends Module {
   private val ray   = Reg(chiselTypeOf(io.ray.bits))
   private val light = if (config.frame.lights == 1) io.lights.head else io.lights(request.light)
   when(moves) {
-    ray.context := request.context
-    ray.origin  := origin
+    ray.context  := request.context
+    ray.isShadow := !request.isGathered.getOrElse(false.B)
+    ray.origin   := origin
     for (((dir, position), from) <- ray.dir.axes.zip(light.position.axes).zip(origin.axes)) {
       val shifted = Rounding.narrow((position.pad(scene.width) << io.unitShift).asSInt, scene.width)
       dir := shifted -& from.integer
     }
+    for (scatter <- scatter; isGathered <- request.isGathered) when(isGathered) {
+      ray.dir.axes.zip(scatter.axes).foreach { case (to, from) => to := from }
+    }
   }
   when(moves) { hasRay := true.B }.elsewhen(io.ray.ready) { hasRay := false.B }
-  io.ray.valid         := hasRay
-  io.ray.bits          := ray
-  io.ray.bits.isShadow := true.B
+  io.ray.valid := hasRay
+  io.ray.bits  := ray
 }

@@ -24,6 +24,9 @@ final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val shading = Input(new Shading(config))
   val start   = Flipped(Valid(Context(config))) // a context gets a new pixel
 
+  /** A context gathers light: its path has a throughput before its first bounce. */
+  val gathers = Option.when(config.frame.gather)(Flipped(Valid(Context(config))))
+
   /** From the shader; to the colour unit and to ray set-up. */
   val in     = Flipped(Decoupled(new BouncedRay(config)))
   val update = Decoupled(new BounceUpdate(config))
@@ -68,11 +71,17 @@ final class BounceScheduler(config: PathConfig) extends Module {
   private val isTraced = counts(context) =/= io.shading.bounces.get
   when(bounce.fire && isTraced) { counts(context) := counts(context) + 1.U }
   when(io.start.valid) { counts(io.start.bits) := 0.U }
+  private val hasGathered = io.gathers.map { gathers =>
+    val flags = Reg(Vec(config.contexts, Bool()))
+    when(gathers.valid) { flags(gathers.bits) := true.B }
+    when(io.start.valid) { flags(io.start.bits) := false.B }
+    flags(context)
+  }.getOrElse(false.B)
 
   bounce.ready             := io.update.ready && (!isTraced || io.ray.ready)
   io.update.valid          := bounce.valid && (!isTraced || io.ray.ready)
   io.update.bits           := bounce.bits.update
-  io.update.bits.isFirst   := counts(context) === 0.U
+  io.update.bits.isFirst   := counts(context) === 0.U && !hasGathered
   io.ray.valid             := bounce.valid && isTraced && io.update.ready
   io.ray.bits.context      := context
   io.ray.bits.isShadow     := false.B

@@ -5,6 +5,7 @@ import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.Context
 import colonnade.config.PathConfig
 import colonnade.environment.{EnvironmentAccepts, EnvironmentRequest}
+import colonnade.formats.Gather
 import colonnade.shading.{Occlusion, PathTermination, ShadowRequest}
 
 /** The state of a context. */
@@ -25,8 +26,9 @@ object ContextState extends ChiselEnum {
   /** Its path has ended; its colour waits to be accumulated, or is being accumulated. */
   val accumulatePending, accumulating = Value
 
-  val done = Value // the colour of its pixel is complete
-  val lit  = Value // its surface and all shadow rays are known; the path ends, or the surface's bounce resumes
+  val done          = Value // the colour of its pixel is complete
+  val lit           = Value // its surface and all shadow rays are known; the path ends, or the surface's bounce resumes
+  val gatherPending = Value // the light of its surface is added; the ray that gathers there waits
 }
 
 /** A context whose hit has been shaded. */
@@ -117,6 +119,14 @@ final class PixelControl(config: PathConfig) extends Bundle {
   val retire    = Output(Bool())
 }
 
+/** Control of gathered rays. */
+final class GatherControl(config: PathConfig) extends Bundle {
+  val bounces   = Input(UInt(Gather.countBits.W))                        // the register
+  val continued = Flipped(Valid(Context(config)))                        // the light of a surface that gathers is added
+  val gathers   = Valid(Context(config))                                 // its ray leaves
+  val counts    = Output(Vec(config.contexts, UInt(Gather.countBits.W))) // gathered rays of each path
+}
+
 final class RtControllerIO(config: PathConfig) extends Bundle {
   private def contextCount = Output(UInt(log2Ceil(config.contexts + 1).W))
 
@@ -135,6 +145,7 @@ final class RtControllerIO(config: PathConfig) extends Bundle {
   val end         = Decoupled(new PathTermination(config))
   val accumulated = Flipped(Valid(Context(config)))
   val pixel       = Flipped(new PixelControl(config))
+  val gather      = Option.when(config.frame.gather)(new GatherControl(config))
 
   /** Numbers of contexts that are idle, in ray set-up, and waiting for the environment march or in it. */
   val idleCount        = contextCount

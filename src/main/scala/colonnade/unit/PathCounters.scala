@@ -30,6 +30,7 @@ final class PathEvents(config: PathConfig) extends Bundle {
   val contextsShading     = contexts
   val raysEnvironment     = Option.when(config.hasEnvironment)(Bool())
   val contextsEnvironment = Option.when(config.hasEnvironment)(contexts)
+  val raysGather          = Option.when(config.frame.gather)(Bool())
   val illegalRecord       = Bool() // an illegal texel
 }
 
@@ -47,7 +48,7 @@ object PathCounters {
     val events = Wire(new PathEvents(config))
 
     def anyBounce(event: BounceSchedulerIO => Bool): Bool = bounces.map(event).getOrElse(false.B)
-    events.raysShadow     := shadowRays.ray.fire
+    events.raysShadow     := shadowRays.ray.fire && shadowRays.ray.bits.isShadow
     events.raysReflection := anyBounce(bounce => bounce.ray.fire && !bounce.isRefraction)
     events.raysRefraction := anyBounce(bounce => bounce.ray.fire && bounce.isRefraction)
     events.hits           := trace.surfaceHit.valid && trace.surfaceHit.bits.isPrimary
@@ -62,6 +63,7 @@ object PathCounters {
       shader.lit.fire +: shader.bounced.map(_.fire).toSeq
     )
 
+    events.raysGather.foreach(_ := shadowRays.ray.fire && !shadowRays.ray.bits.isShadow)
     events.raysEnvironment.foreach(_ := controller.environment.get.req.fire)
     events.contextsEnvironment.foreach(_ := controller.environmentCount.get)
     events.illegalRecord := shader.isIllegalTexel.getOrElse(false.B)

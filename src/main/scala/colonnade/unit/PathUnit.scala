@@ -7,7 +7,7 @@ import colonnade.config.PathConfig
 import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, UnitPosition}
 import colonnade.ray.{RayRequest, RaySetup}
-import colonnade.shading.{ColourUnit, LitSurface, Shader, ShadowRays, TexturePort}
+import colonnade.shading.{ColourUnit, CubePort, LightCube, LitSurface, SamplePoints, Shader, ShadowRays, TexturePort}
 
 /** `registers` is constant while a frame runs. */
 final class PathUnitIO(config: PathConfig) extends Bundle {
@@ -19,6 +19,9 @@ final class PathUnitIO(config: PathConfig) extends Bundle {
   /** To the marches of the environment, and to the textures. */
   val marches = Option.when(config.hasEnvironment)(new MarchPort(config))
   val texture = config.geometry.texture.map(_ => new TexturePort(config))
+
+  /** To the light cube. */
+  val cube = Option.when(config.frame.gather)(new CubePort)
 
   /** A pixel of a tile of the environment leaves; no pixel is in flight. */
   val environmentLeaves = Output(Bool())
@@ -87,6 +90,26 @@ final class PathUnit(config: PathConfig) extends Module {
   assembler.colour     := colourUnit.colour
   io.pixels :<>= assembler.pixels
   io.environmentLeaves := assembler.environmentLeaves
+
+  // Gathered rays: their sample points, and the light that they meet
+  for (cube <- io.cube; gathers <- controller.gather; registers <- io.registers.gather) {
+    val points = Module(new SamplePoints(config)).io
+    points.gather             := registers
+    points.pixel.valid        := primaryRays.allocated.valid
+    points.pixel.bits.context := primaryRays.allocated.bits.context
+    points.pixel.bits.pixel.x := primaryRays.allocated.bits.pixel.x
+    points.pixel.bits.pixel.y := primaryRays.allocated.bits.pixel.y
+    points.counts             := gathers.counts
+    points.port :<>= shader.sample.get
+    gathers.bounces   := registers.bounces
+    gathers.continued := colourUnit.continued.get
+    bounces.foreach(_.gathers.get := gathers.gathers)
+    val light = Module(new LightCube(config)).io
+    light.ray.valid := rayArbiter.out.fire
+    light.ray.bits  := rayArbiter.out.bits
+    light.port :<>= colourUnit.cube.get
+    cube :<>= light.memory
+  }
 
   // Control: the state of every context
   controller.allocation :<>= primaryRays.control

@@ -4,6 +4,7 @@ import chisel3._
 import chisel3.util.{Mux1H, PopCount}
 import colonnade.common.{Choice, First}
 import colonnade.config.PathConfig
+import colonnade.formats.Gather
 
 import scala.collection.mutable
 
@@ -43,6 +44,14 @@ final class RtController(config: PathConfig) extends Module {
     if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
   private val hasOcclusion = io.environment.map(_.occlusion).getOrElse(false.B) && hasEnvironment
 
+  /** Rays that the path has gathered. After the first one it meets the light cube, not the environment. */
+  private val gathered    = io.gather.map(_ => Reg(Vec(contexts, UInt(Gather.countBits.W))))
+  private val isScattered = gathered.fold(VecInit.fill(contexts)(false.B))(counts => VecInit(counts.map(_ =/= 0.U)))
+
+  /** The surface is of the environment. */
+  private val isOfEnvironment =
+    if (config.frame.gather) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+
   private val shadows = new ShadowProgress(config)
   io.idleCount     := count(isAt(ContextState.idle), atReset = contexts)
   io.raySetupCount := count(isAt(ContextState.raySetup))
@@ -55,6 +64,8 @@ final class RtController(config: PathConfig) extends Module {
     isShadow(free.bits)  := false.B
     isPrimary(free.bits) := true.B
     hasColour(free.bits) := false.B
+    gathered.foreach(_(free.bits) := 0.U)
+    if (config.frame.gather) isOfEnvironment(free.bits) := false.B
     if (config.hasEnvironment) {
       isFresnelReflection(free.bits) := false.B
       isDirectView(free.bits)        := false.B
@@ -76,10 +87,11 @@ final class RtController(config: PathConfig) extends Module {
   io.trace.startsShading := ended.now.valid && !isShadow(resolved) && hasVisible
   io.trace.isPrimary     := isPrimary(resolved)
   io.trace.readsDistance := 0.U.asTypeOf(io.trace.readsDistance)
-  private val afterTrace = Mux(hasEnvironment, ContextState.environmentPending, afterMiss(resolved))
+  private val afterTrace = afterObject(resolved, afterMiss(resolved))
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
   private val lightsLeft = shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusion)
   move(ended.now.valid, resolved, Mux(isShadow(resolved), afterLights(lightsLeft), afterHit))
+  if (config.frame.gather) when(io.trace.startsShading) { isOfEnvironment(resolved) := false.B }
   if (config.hasEnvironment) when(ended.now.valid) {
     mayBeHidden(resolved)     := false.B
     isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit && mayBeHidden(resolved)
@@ -89,11 +101,13 @@ final class RtController(config: PathConfig) extends Module {
   private val needs = io.shaded.bits.needsShadowRays.asUInt
   move(io.shaded.valid, io.shaded.bits.context, afterLights(needs.orR))
   shadows.begin(io.shaded.valid, io.shaded.bits.context, needs)
-  private val untraced = Mux(hasEnvironment, ContextState.environmentPending, ContextState.accumulatePending)
-  move(io.bounced.valid, io.bounced.bits.context, Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced))
+  private val bounced  = io.bounced.bits.context
+  private val untraced = afterObject(bounced, ContextState.accumulatePending)
+  move(io.bounced.valid, bounced, Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced))
   when(io.bounced.valid) {
-    isPrimary(io.bounced.bits.context)                              := false.B
-    if (config.hasEnvironment) mayBeHidden(io.bounced.bits.context) := hasOcclusion && !io.bounced.bits.isInside
+    isPrimary(bounced) := false.B
+    if (config.hasEnvironment)
+      mayBeHidden(bounced) := hasOcclusion && !io.bounced.bits.isInside && !isScattered(bounced)
   }
   move(io.fetchFailed.valid, io.fetchFailed.bits, ContextState.accumulatePending)
 
@@ -103,9 +117,31 @@ final class RtController(config: PathConfig) extends Module {
   io.shadow.valid        := shadow.valid
   io.shadow.bits.context := shadow.bits
   io.shadow.bits.light   := shadows.next(tested, isFirst = !isShadow(shadow.bits))
-  shadows.trace(io.shadow.fire, shadow.bits, io.shadow.bits.light)
-  move(io.shadow.fire, shadow.bits, ContextState.raySetup)
-  when(io.shadow.fire) { isShadow(shadow.bits) := true.B }
+  shadows.trace(io.shadow.ready && shadow.valid, shadow.bits, io.shadow.bits.light)
+  private val issuesShadow = io.shadow.ready && shadow.valid
+  move(issuesShadow, shadow.bits, ContextState.raySetup)
+  when(issuesShadow) { isShadow(shadow.bits) := true.B }
+
+  // Issue rays that gather light, while there is no shadow ray to issue
+  for (gather <- io.gather) {
+    val waiting = choose(isAt(ContextState.gatherPending), io.shadow.ready && !shadow.valid).now
+    val issues  = io.shadow.ready && !shadow.valid && waiting.valid
+    io.shadow.bits.isGathered.get := !shadow.valid
+    when(!shadow.valid) {
+      io.shadow.valid        := waiting.valid
+      io.shadow.bits.context := waiting.bits
+    }
+    gather.gathers.valid := issues
+    gather.gathers.bits  := waiting.bits
+    move(issues, waiting.bits, ContextState.raySetup)
+    when(issues) {
+      isShadow(waiting.bits)     := false.B
+      isPrimary(waiting.bits)    := false.B
+      gathered.get(waiting.bits) := gathered.get(waiting.bits) + 1.U
+    }
+    move(gather.continued.valid, gather.continued.bits, ContextState.gatherPending)
+    gather.counts := gathered.get
+  }
 
   // End paths: all shadow rays of the surface are traced, or the path meets the background
   private val isEnding = state.zip(isFresnelReflection).map { case (at, reflection) =>
@@ -119,6 +155,11 @@ final class RtController(config: PathConfig) extends Module {
   io.end.bits.isStraight.foreach(_ := isPrimary(ending.bits))
   io.end.bits.occlusions := VecInit(shadows.occlusions(last))
   io.end.bits.isDirectView.foreach(_ := isDirectView(ending.bits))
+  for (gather <- io.gather) {
+    val surfaceGathers = !isOfEnvironment(ending.bits) && gathered.get(ending.bits) < gather.bounces
+    io.end.bits.gathers.get     := surfaceGathers && !io.end.bits.isBackground
+    io.end.bits.isScattered.get := isScattered(ending.bits)
+  }
   move(io.end.fire, ending.bits, ContextState.accumulating)
   move(io.accumulated.valid, io.accumulated.bits, ContextState.done)
   when(io.accumulated.valid) { hasColour(io.accumulated.bits) := true.B }
@@ -169,7 +210,10 @@ final class RtController(config: PathConfig) extends Module {
     }
     move(environment.hit.valid, environment.hit.bits, ContextState.shading)
     move(environment.visible.valid, environment.visible.bits, ContextState.resolve)
-    when(environment.hit.valid) { isOcclusionTest(environment.hit.bits) := false.B }
+    when(environment.hit.valid) {
+      isOcclusionTest(environment.hit.bits)                          := false.B
+      if (config.frame.gather) isOfEnvironment(environment.hit.bits) := true.B
+    }
     when(environment.visible.valid) {
       isDirectView(environment.visible.bits)    := false.B
       isOcclusionTest(environment.visible.bits) := false.B
@@ -200,6 +244,10 @@ final class RtController(config: PathConfig) extends Module {
   /** The next state of a ray that hits nothing; a primary ray's pixel has the background's colour. */
   private def afterMiss(context: UInt): ContextState.Type =
     Mux(isPrimary(context), ContextState.done, ContextState.accumulatePending)
+
+  /** The next state of a ray that leaves the object, and otherwise has the state `alone`. */
+  private def afterObject(context: UInt, alone: ContextState.Type): ContextState.Type =
+    Mux(hasEnvironment && !isScattered(context), ContextState.environmentPending, alone)
 
   private def afterLights(isLeft: Bool): ContextState.Type = Mux(isLeft, ContextState.shadowTest, ContextState.lit)
 

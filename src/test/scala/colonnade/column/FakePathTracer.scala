@@ -19,6 +19,8 @@ final class FakePathTracer(config: ColonnadeConfig) extends PathTracerModule(con
   io.marches.foreach(_.tieOff())
   io.texture.foreach(_.req.valid := false.B)
   io.texture.foreach(_.req.bits := DontCare)
+  io.cube.foreach(_.read.valid := false.B)
+  io.cube.foreach(_.read.bits := DontCare)
   io.requests.last.valid := false.B
   io.requests.last.bits  := DontCare
   io.environmentLeaves   := false.B

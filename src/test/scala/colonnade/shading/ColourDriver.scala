@@ -20,6 +20,10 @@ object ColourEvent {
 
   /** @param occlusions by light, 0: none, 1: transmissive, 2: opaque */
   final case class End(isBackground: Boolean, occlusions: Seq[Int], isDirectView: Boolean) extends ColourEvent
+
+  /** A surface that gathers light; the path ends in light of the cube. */
+  final case class Gather(occlusions: Seq[Int]) extends ColourEvent
+  final case class EndInCube(light: Seq[Int])   extends ColourEvent
 }
 
 /** A surface: albedo, direct light of each light, emission. */
@@ -62,8 +66,14 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
 
   def path(): Seq[ColourEvent] = {
     val bounces = if (config.frame.hasBounces) random.nextInt(4) else 0
-    Start +: Seq.fill(bounces)(bounce()).flatten ++: end()
+    if (!config.frame.gather || random.nextInt(3) == 0) Start +: Seq.fill(bounces)(bounce()).flatten ++: end()
+    else {
+      val steps = Seq.fill(bounces)(if (random.nextBoolean()) bounce() else gather()) :+ gather()
+      Start +: steps.flatten ++: (if (random.nextBoolean()) Seq(EndInCube(intensity())) else end())
+    }
   }
+
+  private def gather(): Seq[ColourEvent] = Seq(Remember(surface()), Gather(occlusions()))
 
   private def bounce(): Seq[ColourEvent] = {
     val hasSurface = config.hasEnvironment && random.nextBoolean()
@@ -71,9 +81,13 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
     Seq(Remember(surface())).filter(_ => hasSurface) :+ Bounce(colour(), random.nextBoolean(), fresnel, hasSurface)
   }
 
+  private def occlusions(): Seq[Int] = {
+    val kinds = if (config.frame.hasBounces) 3 else 2
+    Seq.fill(config.frame.lights)(if (random.nextBoolean()) 0 else 2 - random.nextInt(kinds - 1))
+  }
+
   private def end(): Seq[ColourEvent] = {
-    val kinds      = if (config.frame.hasBounces) 3 else 2
-    val occlusions = Seq.fill(config.frame.lights)(if (random.nextBoolean()) 0 else 2 - random.nextInt(kinds - 1))
+    val occlusions = this.occlusions()
     if (random.nextInt(4) == 0) Seq(End(isBackground = true, occlusions, random.nextBoolean()))
     else Seq(Remember(surface()), End(isBackground = false, occlusions, random.nextBoolean()))
   }
@@ -85,7 +99,10 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
 
   private val contexts = config.units.pathContexts
   private val todo     = Seq.fill(contexts)(mutable.Queue.empty[ColourEvent])
-  private val waits    = Array.fill(contexts)(Option.empty[End])
+  private val waits    = Array.fill(contexts)(Option.empty[ColourEvent])
+
+  /** The light of the cube on its way to the unit: two cycles after its request. */
+  private var requested = Seq.fill(2)(Option.empty[Seq[Int]])
 
   /** By context, whether its path has not bounced. */
   private val isStraight = Array.fill(contexts)(true)
@@ -116,7 +133,11 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
     val start    = next { case Start => Start }
     val remember = next { case it: Remember => it }
     val bounce   = next { case it: Bounce => it }
-    val end      = next { case it: End => it }
+    val end      = next {
+      case it: End       => it
+      case it: Gather    => it
+      case it: EndInCube => it
+    }
 
     start.foreach { case (context, _) => isStraight(context) = true }
     io.surface.valid.poke(remember.nonEmpty)
@@ -138,22 +159,47 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       }
     }
     io.end.valid.poke(end.nonEmpty)
-    for ((context, End(isBackground, occlusions, isDirectView)) <- end) {
+    for ((context, event) <- end) {
+      val (isBackground, occlusions, isDirectView) = event match {
+        case End(isBackground, occlusions, isDirectView) => (isBackground, occlusions, isDirectView)
+        case Gather(occlusions)                          => (false, occlusions, false)
+        case _                                           => (true, Seq.fill(config.frame.lights)(0), false)
+      }
       io.end.bits.context.poke(context)
       io.end.bits.isBackground.poke(isBackground)
       io.end.bits.isStraight.foreach(_.poke(isStraight(context)))
       io.end.bits.isDirectView.foreach(_.poke(isDirectView))
       io.end.bits.occlusions.zip(occlusions).foreach { case (port, what) => port.poke(Occlusion.all(what)) }
+      io.end.bits.gathers.foreach(_.poke(event.isInstanceOf[Gather]))
+      io.end.bits.isScattered.foreach(_.poke(event.isInstanceOf[EndInCube]))
+    }
+    // The light stays until the next one comes
+    for (cube <- io.cube) {
+      requested.last.foreach(light => poke(cube.light, light))
+      val light = end.collect { case (_, EndInCube(light)) => light }
+      requested =
+        Option.when(cube.read.valid.peekBoolean())(light.getOrElse(Seq.fill(3)(random.nextInt(65536)))) +: requested.init
     }
 
     // What was taken
     if (io.colour.valid.peekBoolean()) {
       val context = io.colour.bits.context.peekInt().toInt
       val ended   = waits(context).getOrElse(throw new AssertionError(s"context $context has not ended"))
-      val ratio   = io.colour.bits.ratio.filter(_ => ended.isDirectView && !ended.isBackground)
+      val ratio   = io.colour.bits.ratio.filter { _ =>
+        ended match {
+          case End(isBackground, _, isDirectView) => isDirectView && !isBackground
+          case _                                  => false
+        }
+      }
       colours(context) +=
         (io.colour.bits.colour.channels.map(_.peekInt().toInt) -> ratio.map(_.channels.map(_.peekRaw().toInt)))
       waits(context) = None
+    }
+    for (continued <- io.continued if continued.valid.peekBoolean()) {
+      val context = continued.bits.peekInt().toInt
+      assert(waits(context).exists(_.isInstanceOf[Gather]), s"context $context does not gather")
+      waits(context) = None
+      isStraight(context) = false
     }
     (start ++ remember).foreach { case (context, _) => todo(context).dequeue() }
     for ((context, _) <- bounce if io.bounce.get.ready.peekBoolean()) {

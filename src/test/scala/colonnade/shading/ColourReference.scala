@@ -24,7 +24,9 @@ final class ColourReference(
     var throughput, radiance           = Seq.empty[Int]
     var surface                        = Option.empty[LitColours]
     def add(part: Xyz, seen: Xyz): Xyz =
-      Seq(radiance, part, seen).transpose.map { case Seq(sure, part, seen) => white.min(sure + (part * seen >> 12)) }
+      Seq(radiance, part, seen).transpose.map { case Seq(sure, part, seen) =>
+        white.min(sure + (part.toLong * seen >> 12).toInt)
+      }
     events.flatMap {
       case Start =>
         throughput = Seq.fill(3)(one)
@@ -38,16 +40,23 @@ final class ColourReference(
           if (isTinted) weight * (tint + (tint >> 11)) >> 12 else weight
         }
         val parts = tinted.map(_ * fresnel >> 12)
-        radiance = add(parts, if (hasSurface) shown(surface.get, unshadowed(surface.get)) else background)
+        radiance = add(parts, if (hasSurface) leaving(surface.get, unshadowed(surface.get)) else background)
         throughput = tinted.zip(parts).map { case (weight, part) => weight - part }
         None
+      case Gather(occlusions) =>
+        val what  = surface.get
+        val light = visible(what, occlusions).zip(ambient).map { case (all, ambient) => all - ambient }
+        radiance = add(throughput, leaving(what, light))
+        throughput = throughput.zip(what.albedo).map { case (weight, tint) => weight * (tint + (tint >> 11)) >> 12 }
+        None
+      case EndInCube(light)                     => Some(add(throughput, light) -> None)
       case End(true, _, _)                      => Some(add(throughput, background) -> None)
       case End(false, occlusions, isDirectView) =>
         val (light, all) = (visible(surface.get, occlusions), unshadowed(surface.get))
         val ratio        = light.zip(all).map { case (part, all) =>
           if (part == all) one else (part.toLong * one / all).toInt
         }
-        Some(add(throughput, shown(surface.get, light)) -> Option.when(config.hasEnvironment && isDirectView)(ratio))
+        Some(add(throughput, leaving(surface.get, light)) -> Option.when(config.hasEnvironment && isDirectView)(ratio))
     }
   }
 
@@ -61,7 +70,7 @@ final class ColourReference(
   }
 
   /** What a surface reflects of the light, and emits. */
-  private def shown(surface: LitColours, light: Xyz): Xyz =
+  private def leaving(surface: LitColours, light: Xyz): Xyz =
     Seq(surface.albedo, light, surface.emission).transpose.map { case Seq(albedo, light, emission) =>
       val reflected = (albedo.toLong * light >> 12).min(white).toInt
       if (config.frame.emission) (reflected + emission).min(white) else reflected

@@ -15,13 +15,15 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for {
     (lights, maxBounces, hasEnvironment) <- Seq((1, 2, true), (3, 15, true), (1, 2, false), (2, 0, true))
+    gather                               <- if (lights == 3 || !hasEnvironment) Seq(true) else Seq(false)
   } {
-    val base   = if (hasEnvironment) TestConfigs.withEnvironment(TestConfigs.environment) else TestConfigs.tiny
-    val config = base.copy(
+    val base  = if (hasEnvironment) TestConfigs.withEnvironment(TestConfigs.environment) else TestConfigs.tiny
+    val sized = base.copy(
       units = base.units.copy(pathContexts = 16),
       frame = base.frame.copy(lights = lights, maxBounces = maxBounces, emission = lights == 3)
     )
-    val where = if (hasEnvironment) " in an environment" else ""
+    val config = if (gather) TestConfigs.gathering(sized) else sized
+    val where  = (if (gather) " that gather" else "") + (if (hasEnvironment) " in an environment" else "")
     it should s"colour paths with $lights lights and $maxBounces bounces$where" taggedAs Always.unless(
       maxBounces == 0 || !hasEnvironment
     ) in

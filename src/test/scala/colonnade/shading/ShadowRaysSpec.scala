@@ -16,10 +16,10 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private val configs = Seq(TestConfigs.tiny, TestConfigs.withPrecision(16, 16, 32)).map(config =>
     config.copy(units = config.units.copy(pathContexts = 16))
-  ) :+ TestConfigs.withPrecision(64, 64, 64)
+  ) :+ TestConfigs.withPrecision(64, 64, 64) :+ TestConfigs.gathering(TestConfigs.tiny)
 
   for (config <- configs)
-    it should s"send rays from remembered surfaces at ${config.precision} with ${config.units.pathContexts} contexts" taggedAs Always.unless(
+    it should s"send rays from remembered surfaces at ${config.precision} with ${config.units.pathContexts} contexts, gather ${config.frame.gather}" taggedAs Always.unless(
       config == configs(1)
     ) in
       test(new ShadowRays(config)) { dut =>
@@ -35,19 +35,27 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
 
         for (stalls <- Seq(0.0, 0.5, 0.5, 0.8)) {
           val surfaces = Seq.fill(config.units.pathContexts)(Seq.fill(3)(signed(numbers.sceneBits)))
+          val scatters = surfaces.map(_ => Seq.fill(3)(signed(ScatterStage.componentBits)))
           for ((surface, context) <- surfaces.zipWithIndex) {
+            for (port <- dut.io.surface.bits.scatter)
+              port.axes.zip(scatters(context)).foreach { case (axis, value) => axis.poke(value) }
             dut.io.surface.valid.poke(true)
             dut.io.surface.bits.context.poke(context)
             dut.io.surface.bits.origin.axes.zip(surface).foreach { case (axis, value) => axis.pokeRaw(value) }
             dut.clock.step()
           }
           dut.io.surface.valid.poke(false)
-          val all  = for (c <- 0 until config.units.pathContexts; l <- 0 until config.frame.lights) yield (c, l)
-          val asks = Seq.fill(4)(random.shuffle(all)).flatten
+          // A light beyond the last one stands for the gathered ray
+          val last           = if (config.frame.gather) config.frame.lights else config.frame.lights - 1
+          val all            = for (c <- 0 until config.units.pathContexts; l <- 0 to last) yield (c, l)
+          val asks           = Seq.fill(4)(random.shuffle(all)).flatten
           val (rays, cycles) = exchange(dut, asks, random, stalls)
           assert(rays == asks.map { case (context, light) =>
-            val (from, to) = (surfaces(context), lights(light).map(_ << shift))
-            Seq[BigInt](context, 1) ++ from ++ to.zip(from).map { case (to, from) => to - from }
+            val from = surfaces(context)
+            if (light == config.frame.lights) Seq[BigInt](context, 0) ++ from ++ scatters(context)
+            else Seq[BigInt](context, 1) ++ from ++ lights(light).zip(from).map { case (to, from) =>
+              (to << shift) - from
+            }
           })
           if (stalls == 0) {
             info(f"${cycles.toDouble / asks.size}%.2f cycles a ray")
@@ -67,7 +75,9 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
       request.valid.poke(offers)
       if (offers) {
         request.bits.context.poke(asks(sent)._1)
-        request.bits.light.poke(asks(sent)._2)
+        val light = asks(sent)._2
+        request.bits.isGathered.foreach(_.poke(light == dut.io.lights.size))
+        request.bits.light.poke(light % dut.io.lights.size)
       }
       val takes = random.nextDouble() >= stalls
       dut.io.ray.ready.poke(takes)

@@ -17,8 +17,15 @@ import scala.util.Random
 class BounceSchedulerSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "BounceScheduler"
 
-  private val room = TestConfigs.withEnvironment(TestConfigs.environment)
-  for ((config, where) <- Seq(TestConfigs.tiny -> "", room -> ", with an environment"))
+  private val environment      = TestConfigs.withEnvironment(TestConfigs.environment)
+  private val gathering = TestConfigs.gathering(environment)
+  for (
+    (config, where) <- Seq(
+      TestConfigs.tiny -> "",
+      environment             -> ", with an environment",
+      gathering        -> ", of paths that gather"
+    )
+  )
     it should s"issue every bounce once$where" in
       test(new BounceSchedulerHarness(config)) { dut =>
         dut.clock.setTimeout(0)
@@ -57,6 +64,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private var resumed  = Map.empty[Int, Boolean]
   private var offered  = Option.empty[Int]
   private val counts   = Array.fill(config.units.pathContexts)(0)
+  private val gathered = Array.fill(config.units.pathContexts)(false)
   private var issued   = 0
   private var untraced = 0
 
@@ -79,6 +87,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     for (context <- start) {
       dut.io.start.bits.poke(context)
       counts(context) = 0
+      gathered(context) = false
     }
     val idle = counts.indices.filterNot(context => waiting.contains(context) || start.contains(context))
     if (offers && offered.isEmpty && idle.nonEmpty && isWilling) {
@@ -88,6 +97,16 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
       waiting += context -> fields
       offered = Some(context)
       dut.in.poke(bounced.pack(fields))
+    }
+    // A context whose path gathers has no bounce under way
+    for (port <- dut.io.gathers) {
+      val gathers = counts.indices.filterNot(context => waiting.contains(context) || start.contains(context)).headOption
+        .filter(_ => random.nextInt(6) == 0)
+      port.valid.poke(gathers.nonEmpty)
+      gathers.foreach { context =>
+        port.bits.poke(context)
+        gathered(context) = true
+      }
     }
     dut.io.in.valid.poke(offered.nonEmpty)
     val (takesUpdate, takesRay) = (isWilling, isWilling)
@@ -128,7 +147,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     for (name <- Seq("isTinted") ++ Seq("r", "g", "b").map(channel => s"albedo.$channel"))
       assert(fields(name) == bounce(name), name)
     assert(fields("fresnel") == bounce("bounce.fresnel"))
-    assert(fields("isFirst") == (if (counts(context) == 0) 1 else 0))
+    assert(fields("isFirst") == (if (counts(context) == 0 && !gathered(context)) 1 else 0))
     for (hasSurface <- fields.get("hasSurface")) assert(hasSurface == (if (resumed.getOrElse(context, false)) 1 else 0))
 
     val isTraced     = counts(context) < most

@@ -10,6 +10,7 @@ import scala.util.Random
   *
   * @param hasEnvironment the frame has an environment, if the configuration has one
   * @param occlusion      it may hide the object
+  * @param gathers        rays that a path gathers, if the configuration can
   * @param isLate         contexts are chosen one cycle early, so that a choice may come a cycle late
   */
 private class ControllerDriver(
@@ -18,13 +19,19 @@ private class ControllerDriver(
     seed:           Int,
     hasEnvironment: Boolean = false,
     occlusion:      Boolean = false,
+    gathers:        Int = 0,
     isLate:         Boolean = false
 ) {
   private val random   = new Random(seed)
   private val lights   = dut.io.shaded.bits.needsShadowRays.size
   private val contexts = Seq.fill(count)(new ContextModel(lights))
   private var started  = 0
-  private var retired  = 0
+  dut.io.gather.foreach(_.bounces.poke(gathers))
+
+  /** Gathered rays of all paths. */
+  var gathered = 0
+
+  private var retired = 0
 
   /** Results of the environment march: of a Fresnel reflection or not, with a hit or without. */
   var outcomes = Set.empty[(Boolean, Boolean)]
@@ -77,7 +84,8 @@ private class ControllerDriver(
         if (random.nextBoolean()) events.environmentHit = Some(context)
         else if (contexts(context).isOcclusionTest) events.visible = Some(context)
         else events.environmentMiss = Some(context)
-      for (context <- one(at(ContextState.accumulating)) if happens) events.accumulated = Some(context)
+      for (context <- one(at(ContextState.accumulating)) if happens)
+        if (contexts(context).gathers) events.continued = Some(context) else events.accumulated = Some(context)
     }
     assert(started == pixels && at(ContextState.idle).size == count, "every pixel has retired")
   }
@@ -100,8 +108,13 @@ private class ControllerDriver(
     val free     = shown(dut.io.allocation.free.valid, dut.io.allocation.free.bits, at(ContextState.idle))
     val resolved = shown(dut.io.trace.query.valid, dut.io.trace.query.bits, at(ContextState.resolve))
     val done     = shown(dut.io.pixel.done.valid, dut.io.pixel.done.bits, at(ContextState.done))
-    val shadowed = shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow)
-    val ended    = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
+    // A gathered ray leaves while there is no shadow ray
+    val isGathered = dut.io.shadow.bits.isGathered.exists(_.peekBoolean())
+    if (!isLate) assert(!isGathered || needsShadow.isEmpty)
+    val waiting               = if (isGathered) at(ContextState.gatherPending) else needsShadow
+    val (scattered, shadowed) =
+      shown(dut.io.shadow.valid, dut.io.shadow.bits.context, waiting).partition(_ => isGathered)
+    val ended = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
     for (index <- resolved) {
       dut.io.trace.hasHit.poke(contexts(index).hasHit)
       dut.io.trace.occlusion.poke(contexts(index).occlusion)
@@ -139,11 +152,14 @@ private class ControllerDriver(
       assert(context.waited < 2000, s"context $index is stuck in ${context.state}")
     }
     for (index <- done) dut.io.pixel.hasColour.expect(contexts(index).hasColour)
-    for (index <- shadowed) assert(contexts(index).shadowPending.contains(dut.io.shadow.bits.light.peekInt().toInt))
+    for (index <- shadowed.headOption)
+      assert(contexts(index).shadowPending.contains(dut.io.shadow.bits.light.peekInt().toInt))
     for (index <- ended) {
       dut.io.end.bits.isBackground.expect(contexts(index).isBackground)
       dut.io.end.bits.isStraight.foreach(_.expect(contexts(index).isPrimary))
       dut.io.end.bits.isDirectView.foreach(_.expect(contexts(index).isDirectView))
+      dut.io.end.bits.gathers.foreach(_.expect(isGathering(contexts(index))))
+      dut.io.end.bits.isScattered.foreach(_.expect(contexts(index).gathered > 0))
       if (!contexts(index).isBackground)
         dut.io.end.bits.occlusions.zip(contexts(index).occlusions).foreach { case (port, occlusion) =>
           port.expect(occlusion)
@@ -181,6 +197,8 @@ private class ControllerDriver(
       context.mayBeHidden = hasEnvironment && occlusion
       context.isOcclusionTest = false
       context.bypasses = hasEnvironment && random.nextInt(3) == 0
+      context.gathered = 0
+      context.isOfEnvironment = false
       started += 1
     }
     change(events.entered)(_.state = ContextState.traversing)
@@ -199,22 +217,34 @@ private class ControllerDriver(
     }
     for ((index, isTraced) <- events.bounced) change(Some(index)) { context =>
       context.state = if (isTraced) ContextState.raySetup
-      else if (hasEnvironment) ContextState.environmentPending else ContextState.accumulatePending
+      else if (hasEnvironment && context.gathered == 0) ContextState.environmentPending
+      else ContextState.accumulatePending
       context.isPrimary = false
       context.isBackground = true
-      context.mayBeHidden = hasEnvironment && occlusion && !events.isInside
+      context.mayBeHidden = hasEnvironment && occlusion && !events.isInside && context.gathered == 0
     }
     change(events.fetchFailed) { context =>
       context.state = ContextState.accumulatePending
       context.isBackground = true
     }
-    change(shadowed.filter(_ => events.shadow)) { context =>
+    change(shadowed.headOption.filter(_ => events.shadow)) { context =>
       context.state = ContextState.raySetup
       context.isShadow = true
       context.shadowLight = light
       context.shadowPending = context.shadowPending.filter(_ != light)
     }
-    change(ended.filter(_ => events.end))(_.state = ContextState.accumulating)
+    change(scattered.headOption.filter(_ => events.shadow)) { context =>
+      context.state = ContextState.raySetup
+      context.isShadow = false
+      context.isPrimary = false
+      context.gathered += 1
+      gathered += 1
+    }
+    change(ended.filter(_ => events.end)) { context =>
+      context.gathers = isGathering(context)
+      context.state = ContextState.accumulating
+    }
+    change(events.continued)(_.state = ContextState.gatherPending)
     change(events.accumulated) { context =>
       context.state = ContextState.done
       context.hasColour = true
@@ -236,6 +266,7 @@ private class ControllerDriver(
     change(events.environmentHit) { context =>
       context.state = ContextState.shading
       context.willBounce = Some(false)
+      context.isOfEnvironment = true
       outcomes += ((context.isFresnelReflection, true))
       if (context.isOcclusionTest) tests += ((context.isPrimary, true))
       context.isOcclusionTest = false
@@ -273,13 +304,19 @@ private class ControllerDriver(
       context.isOcclusionTest = true
       context.isBackground = false
     } else if (context.hasHit) {
+      context.isOfEnvironment = false
       context.isBackground = false
       context.state = ContextState.shading
       context.willBounce = None
     } else {
-      context.state = if (hasEnvironment) ContextState.environmentPending else afterMiss(context)
+      context.state =
+        if (hasEnvironment && context.gathered == 0) ContextState.environmentPending else afterMiss(context)
       context.isBackground = true
     }
+
+  /** The surface at which its path ends gathers light. */
+  private def isGathering(context: ContextModel): Boolean =
+    !context.isBackground && !context.isOfEnvironment && context.gathered < gathers
 
   private def afterLights(context: ContextModel): ContextState.Type =
     if (context.shadowPending.nonEmpty) ContextState.shadowTest else ContextState.lit

@@ -19,6 +19,8 @@ private class ControllerEvents {
   var end         = false
   var accumulated = Option.empty[Int]
 
+  var continued = Option.empty[Int]
+
   // With an environment
   var bypasses          = Option.empty[Int]
   var fresnelReflection = Option.empty[Int]
@@ -54,6 +56,7 @@ private class ControllerEvents {
     }
     name(dut.io.fetchFailed, fetchFailed)
     name(dut.io.accumulated, accumulated)
+    dut.io.gather.foreach(gather => name(gather.continued, continued))
     for (environment <- dut.io.environment) {
       environment.enabled.poke(hasEnvironment)
       environment.req.ready.poke(march)

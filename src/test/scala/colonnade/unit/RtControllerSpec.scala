@@ -42,6 +42,20 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
           assert(outcomes.last.isEmpty)
         }
 
+  for ((contexts, hasEnvironment, extraSlices) <- Seq((3, false, false), (16, true, false), (4, false, true)))
+    it should s"follow $contexts contexts that gather, with an environment $hasEnvironment, extra slices $extraSlices" in {
+      val scene = if (hasEnvironment) TestConfigs.withEnvironment(TestConfigs.environment) else TestConfigs.tiny
+      val base = TestConfigs.gathering(if (extraSlices) TestConfigs.withExtraSlices(scene) else scene)
+      test(new RtController(config(contexts, base))).withAnnotations(Simulation.verilator) { dut =>
+        for ((eagerness, gathers, seed) <- Seq((0.9, 4, 7), (0.2, 1, 8), (0.7, 0, 9))) {
+          val rounds =
+            new ControllerDriver(dut, contexts, seed, hasEnvironment, hasEnvironment, gathers, isLate = extraSlices)
+          rounds.run(pixels = 150, eagerness)
+          assert((rounds.gathered > 5) == (gathers > 0), s"${rounds.gathered} gathered rays")
+        }
+      }
+    }
+
   it should "resolve one ended ray and retire one pixel per cycle" in
     test(new RtController(config(contexts = 4))) { dut =>
       val rounds = new ControllerDriver(dut, count = 4, seed = 1)

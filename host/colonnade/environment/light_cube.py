@@ -1,0 +1,83 @@
+"""Light by direction around an object: a cube map of radiance, which gathered rays meet (docs/gather.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common import fixed_order
+from colonnade.common.types import Floats
+
+#: Texels of the device's cube along the edge of a face.
+FACE = 8
+#: Directions averaged along each edge of a texel.
+_SUBSAMPLES = 8
+#: The value 1.0 in the device's cube, and its largest value.
+_ONE, _MOST = 1 << 12, (1 << 16) - 1
+
+
+@dataclass(frozen=True)
+class LightCube:
+    """Radiance by direction.
+
+    Attributes:
+        texels: Linear, float64 [6, n, n, 3]. Face 2 a + s is that of directions whose largest component is a, 0 to 2,
+            with sign s, 1 for a negative one. Rows part the slope of the next axis, columns that of the one after it,
+            from -1 to 1.
+    """
+
+    texels: Floats
+
+    @staticmethod
+    def of(radiance: Callable[[Floats], Floats], size: int = FACE) -> LightCube:
+        """The cube of a function from unit directions to radiance, float64 [n, 3] each; ``size`` texels along an edge.
+
+        A texel has the mean over its solid angle.
+        """
+        directions, weights = face_directions(size * _SUBSAMPLES)
+        light = radiance(directions.reshape(-1, 3)).reshape(directions.shape)
+        parts = weights.reshape(size, _SUBSAMPLES, size, _SUBSAMPLES, 1)
+        sums = (light.reshape(6, size, _SUBSAMPLES, size, _SUBSAMPLES, 3) * parts).sum(axis=(2, 4))
+        return LightCube(sums / parts.sum(axis=(1, 3)))
+
+    def texel_of(self, directions: Floats) -> NDArray[np.intp]:
+        """Index in ``texels.reshape(-1, 3)`` of the texel that directions of any length, float64 [n, 3], meet."""
+        size, rows = self.texels.shape[1], np.arange(len(directions))
+        axis = np.abs(directions).argmax(axis=1)
+        major = directions[rows, axis]
+        index = 2 * axis + (major < 0)
+        for turn in (1, 2):
+            slope = directions[rows, (axis + turn) % 3] / np.abs(major)
+            index = index * size + np.clip(np.floor((slope + 1) * (size / 2)), 0, size - 1).astype(np.intp)
+        return np.asarray(index, dtype=np.intp)
+
+    def radiance(self, directions: Floats) -> Floats:
+        """Radiance from directions of any length, float64 [n, 3] each."""
+        return np.asarray(self.texels.reshape(-1, 3)[self.texel_of(directions)])
+
+    def turned(self, rotation: Floats) -> LightCube:
+        """The device's cube of another space: a direction d of it is ``rotation @ d`` of this one, float64 [3, 3]."""
+        turn = rotation.T
+        return LightCube.of(lambda directions: self.radiance(fixed_order.product(directions, turn)))
+
+    def words(self) -> NDArray[np.uint8]:
+        """The words of the device's memory, uint8 [texels, 6]: blue, green, red, 16 bits each, low byte first."""
+        fixed = np.rint(self.texels.reshape(-1, 3) * _ONE).clip(0, _MOST).astype("<u2")
+        return np.ascontiguousarray(fixed[:, ::-1]).view(np.uint8)
+
+
+def face_directions(size: int) -> tuple[Floats, Floats]:
+    """Unit directions through the texels of a cube, float64 [6, size, size, 3], and their weights, [size, size]."""
+    slopes = (np.arange(size) + 0.5) * (2 / size) - 1
+    squares = 1 + slopes[:, None] ** 2 + slopes**2
+    lengths = np.sqrt(squares)
+    directions = np.empty((6, size, size, 3))
+    for face in range(6):
+        axis = face // 2
+        directions[face, :, :, axis] = (1 - 2 * (face % 2)) / lengths
+        directions[face, :, :, (axis + 1) % 3] = slopes[:, None] / lengths
+        directions[face, :, :, (axis + 2) % 3] = slopes / lengths
+    return directions, 1 / (squares * lengths)

@@ -1,0 +1,78 @@
+"""Directions of scattered rays, by the sample points that the device draws (docs/gather.md).
+
+A sample point is a word of two bytes, that of the pass XOR that of the pixel. It stands for a point of the unit
+sphere.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common.types import Floats
+
+Bytes = NDArray[np.uint8]
+
+#: Bits of a pixel's coordinates that count.
+COORDINATE_BITS = 10
+#: Primitive polynomials and first direction numbers of the third and the fourth dimension of Sobol's sequence
+#: (Joe and Kuo 2008).
+_SOBOL = ((2, 1, (1, 3)), (3, 1, (1, 3, 1)))
+
+
+@functools.cache
+def pixel_matrix() -> Bytes:
+    """The bytes of each bit of a pixel's Morton code (x in the even bits, low ones first), uint8 [20, 2].
+
+    The bytes of a pixel are the XOR of those of its bits that are set: its point of a Sobol sequence in Morton order.
+    """
+    columns = []
+    for degree, coefficients, first in _SOBOL:
+        m = list(first)
+        for k in range(degree, 2 * COORDINATE_BITS):
+            value = m[k - degree] ^ (m[k - degree] << degree)
+            for i in range(1, degree):
+                value ^= (coefficients >> (degree - 1 - i) & 1) * (m[k - i] << i)
+            m.append(value)
+        # m[k] / 2^(k + 1) is a fraction: its highest 8 bits
+        columns.append([(value << 8) >> (k + 1) for k, value in enumerate(m)])
+    return np.array(columns, dtype=np.uint8).T
+
+
+def pixel_words(x: NDArray[np.int64], y: NDArray[np.int64]) -> Bytes:
+    """The bytes of pixels, uint8 [n, 2], from their coordinates, int64 [n]."""
+    words = np.zeros((len(x), 2), np.uint8)
+    for bit in range(COORDINATE_BITS):
+        for coordinate, row in ((x, 2 * bit), (y, 2 * bit + 1)):
+            is_set = (coordinate >> bit & 1).astype(bool)
+            words[is_set] ^= pixel_matrix()[row]
+    return words
+
+
+def sphere_points(words: Bytes) -> Floats:
+    """The points of the unit sphere that words, uint8 [n, 2], stand for: multiples of 1/256, float64 [n, 3].
+
+    The first byte gives z at the middles of 256 equal intervals, the second the angle about z. All points have equal
+    weight.
+    """
+    z = (255 - 2 * words[:, 0].astype(np.int64)) / 256
+    radius = np.rint(256 * np.sqrt(1 - z * z)) / 256
+    angle = (words[:, 1] + 0.5) * (np.pi / 128)
+    across = [np.rint(256 * radius * np.rint(256 * part) / 256) / 256 for part in (np.cos(angle), np.sin(angle))]
+    return np.stack([*across, z], axis=1)
+
+
+def cosine_directions(normals: Floats, points: Floats) -> Floats:
+    """Directions whose density is the cosine to a normal: the normal plus a point of the unit sphere.
+
+    Args:
+        normals: Unit, float64 [n, 3].
+        points: `sphere_points`, float64 [n, 3].
+
+    Returns:
+        Of any length, float64 [n, 3]; the normal where the sum is 0.
+    """
+    directions = normals + points
+    return np.where(np.abs(directions).max(axis=1, keepdims=True) < 1e-9, normals, directions)

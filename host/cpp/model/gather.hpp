@@ -1,0 +1,131 @@
+// Gathered rays: their sample points and directions, and the light that they meet (docs/gather.md).
+#pragma once
+#include <cmath>
+
+#include "shading.hpp"
+
+namespace colonnade {
+
+/// A sample point of a scattered ray, one byte for each dimension.
+struct SamplePoint {
+    std::uint8_t u, v;
+
+    SamplePoint operator^(const SamplePoint& other) const { return {static_cast<std::uint8_t>(u ^ other.u), static_cast<std::uint8_t>(v ^ other.v)}; }
+};
+
+/// Registers of gathered rays. `bounces`: gathered rays of a path, 0 for none; `points`: the frame's sample point of each of them.
+struct Gather {
+    int bounces;
+    std::array<SamplePoint, 4> points;
+};
+
+/// Low bits of a pixel's coordinates that count.
+constexpr int coordinateBits = 10;
+
+/// What each bit of a pixel's Morton code (x in the even bits, low ones first) adds to its point: the third and the fourth dimension of Sobol's
+/// sequence (Joe and Kuo 2008).
+inline const std::array<SamplePoint, 2 * coordinateBits>& pixelMatrix() {
+    static const auto matrix = [] {
+        std::array<SamplePoint, 2 * coordinateBits> columns{};
+        struct Dimension {
+            int degree, coefficients;
+            std::array<std::uint64_t, 3> first;
+            std::uint8_t SamplePoint::*byte;
+        };
+        for (const auto& [degree, coefficients, first, byte] : {Dimension{2, 1, {1, 3, 0}, &SamplePoint::u}, Dimension{3, 1, {1, 3, 1}, &SamplePoint::v}}) {
+            std::vector<std::uint64_t> m(first.begin(), first.begin() + degree);
+            for (int k = degree; k < 2 * coordinateBits; ++k) {
+                std::uint64_t value = m[k - degree] ^ (m[k - degree] << degree);
+                for (int i = 1; i < degree; ++i) value ^= static_cast<std::uint64_t>(coefficients >> (degree - 1 - i) & 1) * (m[k - i] << i);
+                m.push_back(value);
+            }
+            // m / 2^(k + 1) is a fraction: its highest eight bits
+            for (int k = 0; k < 2 * coordinateBits; ++k) columns[k].*byte = static_cast<std::uint8_t>((m[k] << 8) >> (k + 1));
+        }
+        return columns;
+    }();
+    return matrix;
+}
+
+inline SamplePoint pixelPoint(std::int64_t x, std::int64_t y) {
+    SamplePoint point{0, 0};
+    for (int bit = 0; bit < coordinateBits; ++bit) {
+        if (x >> bit & 1) point = point ^ pixelMatrix()[2 * bit];
+        if (y >> bit & 1) point = point ^ pixelMatrix()[2 * bit + 1];
+    }
+    return point;
+}
+
+/// The point of the unit sphere that a sample point stands for; 8 fraction bits.
+inline Vector spherePoint(const SamplePoint& point) {
+    const auto rounded = [](double x) { return static_cast<std::int64_t>(std::nearbyint(256 * x)); };
+    const std::int64_t z = 255 - 2 * point.u;
+    const std::int64_t radius = rounded(std::sqrt(1.0 - static_cast<double>(z * z) / 65536.0));
+    const int quarter = point.v >> 6, angle = point.v & 63;
+    Vector result{0, 0, z};
+    for (int axis = 0; axis < 2; ++axis) {
+        const bool isTurned = ((quarter & 1) != 0) != (axis == 1);
+        const int index = isTurned ? 63 - angle : angle;
+        const std::int64_t across = (radius * rounded(std::cos((index + 0.5) * 3.14159265358979323846 / 128)) + 128) >> 8;
+        const bool isMinus = axis == 0 ? quarter == 1 || quarter == 2 : quarter >= 2;
+        result[axis] = isMinus ? -across : across;
+    }
+    return result;
+}
+
+/// The direction of the ray that gathers light at a surface: n + |n| · s, for a normal of any length; turned around if it points below the surface.
+/// It is never zero.
+inline Vector gatherDirection(const WideVector& about, const Vector& faceForwardNormal, const SamplePoint& point, const Numbers& n) {
+    Vector normal;
+    blockNormalise(about, n.shadeBits, normal);
+    const Vector sphere = spherePoint(point);
+    const auto length = static_cast<std::int64_t>(squareRoot(static_cast<std::uint64_t>(floorShift(dot(normal, normal), 2 * n.shadeBits + 2 - 24))));
+    Vector direction;
+    Wide side = 0;
+    for (int a = 0; a < 3; ++a) {
+        direction[a] = floorShift(length * sphere[a] + (floorShift(normal[a], n.shadeBits - 12) << 7), 4);
+        side += floorShift(direction[a], 8) * floorShift(faceForwardNormal[a], 4);
+    }
+    if (side < 0)
+        for (std::int64_t& component : direction) component = -component;
+    direction[2] |= 1;
+    return direction;
+}
+
+/// The light cube: linear radiance by direction, 12 fraction bits; faces of 8 × 8 texels.
+class LightCube {
+public:
+    static constexpr int faceLog = 3, texels = 6 << (2 * faceLog);
+
+    /// Loads texels from address 0; words of `stride` bytes, low byte first.
+    void load(const std::uint8_t* words, std::size_t count, std::size_t stride) {
+        for (std::size_t i = 0; i < std::min(count, texels_.size()); ++i)
+            for (std::size_t channel = 0; channel < 3; ++channel) {
+                const std::uint8_t* const low = words + i * stride + 2 * (2 - channel);
+                texels_[i][channel] = low[0] | low[1] << 8;
+            }
+    }
+
+    const Colour& texel(const WideVector& direction) const {
+        Vector scaled;
+        blockNormalise(direction, 8, scaled);
+        std::array<std::int64_t, 3> size;
+        for (int a = 0; a < 3; ++a) size[a] = scaled[a] < 0 ? -scaled[a] : scaled[a];
+        const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
+        std::size_t address = static_cast<std::size_t>(2 * axis + (scaled[axis] < 0));
+        for (int turn = 1; turn < 3; ++turn) {
+            std::int64_t left = scaled[(axis + turn) % 3] + size[axis];
+            for (int digit = 0; digit < faceLog; ++digit) {
+                const bool fits = left >= size[axis];
+                address = 2 * address + fits;
+                left = 2 * (fits ? left - size[axis] : left);
+            }
+        }
+        return texels_[address];
+    }
+
+private:
+    std::array<Colour, texels> texels_{};
+};
+
+} // namespace colonnade

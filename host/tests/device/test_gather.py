@@ -1,0 +1,94 @@
+"""Gathered light: the RTL against the model, bit for bit."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colonnade.design.generator import design_for
+from colonnade.device.bit_exact import render_model
+from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.maps.encoded import EncodedEnvironment
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.model import Background, Camera, Colour, Light, Material, MeshSource, Paths, Placement, Scene
+from colonnade.scene.view import with_overrides
+from colonnade.scene_image.environment import with_environment
+from colonnade.scene_image.file import LoadSection, SceneImage
+from colonnade.scene_image.packer import pack
+
+ROOMS = Path(__file__).parents[3] / "scenes" / "rooms"
+GATHERS = ("units.shadeInterval=3", "frame.gather=true")
+SCENE = Scene(
+    MeshSource(name="teapot:4"),
+    camera=Camera(direction=(0.5, 0.6, 1.0)),
+    light=Light(falloff=3.0),
+    more_lights=(Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3)),),
+    ambient=Colour((0.3, 0.2, 0.3)),
+    background=Background((0.1, 0.3, 0.5)),
+)
+
+
+def with_cube(image: SceneImage, seed: int) -> SceneImage:
+    """The image with random light, up to 2.0."""
+    words = np.random.default_rng(seed).integers(0, 8192, (384, 3)).astype("<u2").view(np.uint8)
+    return replace(image, attributes=(*image.attributes, LoadSection("light.cube", words)))
+
+
+def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, int]:
+    """Registers with random sample points."""
+    drawn = np.random.default_rng(seed).integers(0, 256, (4, 2))
+    points = {f"gather.points[{i}].{axis}": int(drawn[i, a]) for i in range(4) for a, axis in enumerate("uv")}
+    return registers | points | {"gather.bounces": bounces}
+
+
+@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.parametrize(
+    ("options", "in_room"),
+    [
+        (("physicalAttributeMemory=null", "array.columns=1", "geometry.arity=2", "frame.emission=true"), False),
+        ((), True),
+    ],
+    ids=["one column", "in a room"],
+)
+def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_room: bool) -> None:
+    """All kinds of materials; no, one and four gathered rays; a stalled sink."""
+    design = design_for("small", (*GATHERS, *options))
+    mesh = load_mesh("teapot:4")
+    placed = replace(SCENE, placement=Placement((322.0, 306.0), 0.58), background=Background(room=ROOMS / "living"))
+    scene, held = (placed, EncodedEnvironment.load(ROOMS / "living", design.manifest)) if in_room else (SCENE, None)
+    # Faces of three materials beside each other, so that rays go from one to the other
+    parts = np.arange(len(mesh.faces)) % 3
+    mesh = replace(mesh, face_materials=parts.astype(mesh.face_materials.dtype), materials=3 * mesh.materials[:1])
+    kinds = [Material(kind="diffuse", albedo=(1.0, 0.7, 0.4)), Material(kind="mirror"), Material(kind="glass")]
+    materials = tuple(with_overrides(mesh.materials[:1], kind)[0] for kind in kinds)
+    image = with_cube(pack(replace(mesh, materials=materials), design.manifest, materials), 5)
+    if held is not None:
+        image = with_environment(image, held, design.manifest)
+    size = (48, 36)
+    still = frame_registers(scene, image.header, design.manifest, *size, held)
+    mirrors = frame_registers(replace(scene, paths=Paths(bounces=1)), image.header, design.manifest, *size, held)
+    registers = [gathering(still, bounces, bounces) for bounces in (0, 1, 4)] + [gathering(mirrors, 2, 9)]
+    simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
+    for frame, settings in zip(simulated.frames, registers, strict=True):
+        model = render_model(design.manifest, image, settings)
+        assert frame.errors == model.errors == []
+        np.testing.assert_array_equal(frame.triangle, model.triangle)
+        np.testing.assert_array_equal(frame.colour, model.colour)
+        if held is not None:
+            np.testing.assert_array_equal(frame.ratio, model.ratio)
+        assert {name: frame.counters[name] for name in model.counters} == model.counters
+    # Off, it takes no cycle
+    plain = design_for("small", (GATHERS[0], *options))
+    others = {name: value for name, value in registers[0].items() if not name.startswith("gather.")}
+    maps = tuple(section for section in image.attributes if section.memory != "light.cube")
+    (without,) = render_rtl(plain, replace(image, attributes=maps), [others], Stalls(20, 5)).frames
+    none, one, four, _ = simulated.frames
+    assert without.counters == {name: count for name, count in none.counters.items() if name != "raysGather"}
+    np.testing.assert_array_equal(without.colour, none.colour)
+    assert none.counters["raysGather"] == 0 < one.counters["raysGather"] < four.counters["raysGather"]
+    assert (one.colour != none.colour).any(axis=2)[one.is_object].mean() > 0.3

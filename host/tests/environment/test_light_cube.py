@@ -1,0 +1,70 @@
+"""The light cube: texels, words, and the light of a room."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colonnade.common.vectors import unit_vectors
+from colonnade.environment.light_cube import FACE, LightCube, face_directions
+from colonnade.environment.lights import RoomLights
+from colonnade.environment.load import load_environment
+from colonnade.maps.cache import encoded_environment
+from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.room_light import room_light
+
+ROOMS = Path(__file__).parents[3] / "scenes" / "rooms"
+DIRECTION = st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: max(map(abs, v)) > 0.01)
+
+
+def test_a_texel_lies_in_its_directions() -> None:
+    cube = LightCube(np.arange(6 * FACE * FACE * 3, dtype=np.float64).reshape(6, FACE, FACE, 3))
+    directions, weights = face_directions(FACE)
+    np.testing.assert_array_equal(cube.texel_of(directions.reshape(-1, 3)), np.arange(6 * FACE * FACE))
+    assert abs(6 * weights.sum() * (2 / FACE) ** 2 - 4 * np.pi) < 0.05, "they fill the sphere"
+
+
+@settings(max_examples=50, deadline=None)
+@given(DIRECTION, st.floats(0.1, 100))
+def test_length_does_not_matter(direction: list[float], length: float) -> None:
+    cube = LightCube(np.random.default_rng(1).random((6, FACE, FACE, 3)))
+    once = np.array([direction])
+    np.testing.assert_array_equal(cube.radiance(once), cube.radiance(2.0 ** round(np.log2(length)) * once))
+
+
+def test_a_smooth_light_survives_the_cube_and_a_turn() -> None:
+    light = lambda d: 1 + 0.5 * d  # noqa: E731
+    angle = 0.7
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    cube = LightCube.of(light, 32)
+    directions = unit_vectors(np.random.default_rng(2).normal(size=(500, 3)))
+    assert np.abs(cube.radiance(directions) - light(directions)).max() < 0.05
+    turned = cube.turned(turn)
+    assert np.abs(turned.radiance(directions) - light(directions @ turn.T)).max() < 0.12
+
+
+def test_words_hold_light_above_one_and_saturate() -> None:
+    texels = np.zeros((6, FACE, FACE, 3))
+    texels[0, 0, 1] = (0.5, 2.0, 99.0)
+    words = LightCube(texels).words()
+    assert words.shape == (384, 6)
+    assert list(words[1].view("<u2")) == [65535, 8192, 2048], "blue, green, red"
+
+
+@pytest.mark.parametrize("name", ["living", "attic"])
+def test_the_light_of_a_room_is_that_of_its_photo(name: str) -> None:
+    """In the directions of its pixels it is their colour; the planes have their albedo under the lights."""
+    room = load_environment(ROOMS / name)
+    image = encoded_environment(room, AttributeLayout(room.width, room.height))
+    middle = room.camera_to_world @ np.append(room.points()[room.height // 2, room.width // 2] * 0.6, 1.0)
+    found = room_light(room, image, RoomLights(np.full(3, 0.5)), middle, from_photo=False)
+    assert 0.1 < found.seen < 0.7
+    assert found.cube.texels.min() >= 0 and found.cube.texels.max() <= 1
+    forward = room.camera_to_world[:, 2]
+    assert np.abs(found.cube.radiance(forward[None])).max() > 0
+    dark = room_light(room, image, RoomLights(np.zeros(3)), middle, from_photo=False)
+    assert dark.cube.texels.max() == 0

@@ -1,0 +1,43 @@
+"""Directions of gathered rays: the reference against the device's model, and their density."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colonnade.common.vectors import unit_vectors
+from colonnade.reference.scatter import COORDINATE_BITS, cosine_directions, pixel_words, sphere_points
+
+EVERY = np.stack(np.meshgrid(np.arange(256), np.arange(256)), axis=-1).reshape(-1, 2).astype(np.uint8)
+
+
+def test_points_lie_on_the_sphere_and_are_spread_evenly() -> None:
+    points = sphere_points(EVERY)
+    assert np.abs(np.linalg.norm(points, axis=1) - 1).max() < 0.006
+    assert np.abs(points.mean(axis=0)).max() < 1e-9
+    assert np.abs(points.T @ points / len(points) - np.eye(3) / 3).max() < 0.001
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: max(map(abs, v)) > 0.1))
+def test_directions_have_the_cosine_as_their_density(normal: list[float]) -> None:
+    unit = unit_vectors(np.array([normal]))
+    directions = unit_vectors(cosine_directions(np.repeat(unit, len(EVERY), axis=0), sphere_points(EVERY)))
+    cosine = directions @ unit[0]
+    assert cosine.min() > -0.1
+    assert abs(cosine.mean() - 2 / 3) < 0.001
+    assert abs((cosine**2).mean() - 1 / 2) < 0.001
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 120), st.integers(0, 120), st.sampled_from([4, 8]))
+def test_pixels_of_a_square_have_points_far_apart(column: int, row: int, edge: int) -> None:
+    y, x = np.mgrid[row * edge : (row + 1) * edge, column * edge : (column + 1) * edge]
+    cells = pixel_words(x.ravel(), y.ravel()).astype(int) * edge // 256
+    assert len({tuple(cell) for cell in cells}) == edge * edge
+
+
+def test_points_repeat_beyond_the_coordinates_that_count() -> None:
+    x, y = np.array([5, 5 + (1 << COORDINATE_BITS)]), np.array([77, 77])
+    assert (pixel_words(x, y)[0] == pixel_words(x, y)[1]).all()

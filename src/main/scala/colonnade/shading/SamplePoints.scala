@@ -1,0 +1,73 @@
+package colonnade.shading
+
+import chisel3._
+import chisel3.util.{log2Ceil, RegEnable, Valid}
+import colonnade.common.{Context, ContextTable}
+import colonnade.config.PathConfig
+import colonnade.formats.{Gather, PixelPosition, SamplePoint}
+
+/** Asks for the sample point of a context, which comes in the next cycle. */
+final class SamplePort(config: PathConfig) extends Bundle {
+  val read  = Valid(Context(config))
+  val point = Input(new SamplePoint)
+}
+
+/** A context and its pixel. */
+final class PixelOfContext(config: PathConfig) extends Bundle {
+  val context = Context(config)
+  val pixel   = new PixelPosition(config)
+}
+
+final class SamplePointsIO(config: PathConfig) extends Bundle {
+  val gather = Input(new Gather)
+  val pixel  = Flipped(Valid(new PixelOfContext(config)))            // a context that gets a pixel
+  val counts = Input(Vec(config.contexts, UInt(Gather.countBits.W))) // of the rays that each path has gathered
+  val port   = Flipped(new SamplePort(config))
+}
+
+/** The sample points of gathered rays: that of the frame for the path's next ray, xor that of the pixel: docs/gather.md. */
+final class SamplePoints(config: PathConfig) extends Module {
+  val io = IO(new SamplePointsIO(config))
+
+  private val points = ContextTable(config, new SamplePoint)
+  private val start  = io.pixel.bits
+  when(io.pixel.valid) { points.write(start.context, SamplePoints.ofPixel(start.pixel)) }
+
+  private val read  = io.port.read
+  private val index = RegEnable(io.counts(read.bits)(log2Ceil(Gather.maxBounces) - 1, 0), read.valid)
+  private val pixel = points.read(read.bits, read.valid)
+  io.port.point.u := io.gather.points(index).u ^ pixel.u
+  io.port.point.v := io.gather.points(index).v ^ pixel.v
+}
+
+object SamplePoints {
+  val coordinateBits: Int = 10 // low bits of a pixel's coordinates that count
+
+  /** Degree and coefficients of a primitive polynomial, and first direction numbers: the third and the fourth dimension of
+    * Sobol's sequence (Joe and Kuo 2008).
+    */
+  private val sobol = Seq((2, 1, Seq(1, 3)), (3, 1, Seq(1, 3, 1)))
+
+  /** For each byte of a point, what each bit of a pixel's Morton code adds to it; x is in the even bits, low ones first. */
+  val matrix: Seq[Seq[Int]] = sobol.map { case (degree, coefficients, first) =>
+    val numbers = (degree until 2 * coordinateBits).foldLeft(first) { (m, k) =>
+      val middle = (1 until degree).map(i => (coefficients >> (degree - 1 - i) & 1) * (m(k - i) << i))
+      m :+ middle.foldLeft(m(k - degree) ^ (m(k - degree) << degree))(_ ^ _)
+    }
+    numbers.zipWithIndex.map { case (m, k) => ((m.toLong << SamplePoint.bits) >> (k + 1)).toInt }
+  }
+
+  /** The point of a pixel: one of a Sobol sequence in Morton order. */
+  def ofPixel(pixel: PixelPosition): SamplePoint = {
+    val bits = (0 until 2 * coordinateBits).map { bit =>
+      val coordinate = if (bit % 2 == 0) pixel.x else pixel.y
+      if (bit / 2 < coordinate.getWidth) coordinate(bit / 2) else false.B
+    }
+    val point = Wire(new SamplePoint)
+    for ((to, columns) <- Seq(point.u, point.v).zip(matrix))
+      to := VecInit.tabulate(SamplePoint.bits) { row =>
+        bits.zip(columns).collect { case (bit, column) if (column >> row & 1) == 1 => bit }.reduce(_ ^ _)
+      }.asUInt
+    point
+  }
+}
