@@ -19,6 +19,9 @@ from colonnade.lab.figures.catalog import REPORT, Entry, catalog
 #: Lists the entries that nobody has measured on today's hardware yet. It is absent if there are none.
 UNMEASURED = "unmeasured.txt"
 
+#: The preset whose values a configuration has for keys that it lacks.
+_DEFAULTS = "tiny"
+
 #: What the figures depend on, as arguments of git.
 SOURCES = (
     *("build.sbt", "configs", "host", "project", "scenes", "software", "src", "tools/room-frames", "tools/soc-fpga"),
@@ -114,10 +117,18 @@ def problem_of(entry: Entry, content: Mapping[str, Any]) -> str | None:
         config = manifest_for(entry.config, entry.overrides).manifest.config
     except UserError as error:
         return f"the generator refuses its configuration: {error}"
-    if content.get("config") != config:
-        keys = sorted(dict(_leaves(config)).items() ^ dict(_leaves(content.get("config") or {})).items())
+    measured = _completed(content.get("config"), manifest_for(_DEFAULTS).manifest.config)
+    if measured != config:
+        keys = sorted(dict(_leaves(config)).items() ^ dict(_leaves(measured or {})).items())
         return f"it is of another configuration than {entry.config} ({', '.join(dict.fromkeys(k for k, _ in keys))})"
     return None
+
+
+def _completed(config: Any, defaults: Any) -> Any:
+    """A configuration with the values of the keys that are younger than it (docs/compatibility.md)."""
+    if not isinstance(config, Mapping) or not isinstance(defaults, Mapping):
+        return config
+    return {**defaults, **{key: _completed(value, defaults.get(key)) for key, value in config.items()}}
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, str]]:

@@ -14,7 +14,7 @@ PRESETS = {
     "edge": ("AR: rooms, mirrors, glass", "`make verify`, six rooms"),
     "lean": ("as `edge`, narrower arithmetic, finer vertices", "`make verify`"),
     "diffuse": ("as `edge`, diffuse objects only", "`make verify`"),
-    "textured": ("textures, colours at corners, emission", "`make test`, by feature"),
+    "textured": ("textures, colours at corners, emission, gathered light", "`make test`, by feature"),
     "small": ("the simulator: rooms, mirrors, glass", "`make test`"),
     "tiny": ("tests, the smallest array", "`make test`"),
     "fpga": ("an ECP5 board", "`make verify`"),

@@ -178,7 +178,9 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       requested.last.foreach(light => poke(cube.light, light))
       val light = end.collect { case (_, EndInCube(light)) => light }
       requested =
-        Option.when(cube.read.valid.peekBoolean())(light.getOrElse(Seq.fill(3)(random.nextInt(65536)))) +: requested.init
+        Option.when(
+          cube.read.valid.peekBoolean()
+        )(light.getOrElse(Seq.fill(3)(random.nextInt(65536)))) +: requested.init
     }
 
     // What was taken

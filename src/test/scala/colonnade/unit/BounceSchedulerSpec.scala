@@ -17,12 +17,12 @@ import scala.util.Random
 class BounceSchedulerSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "BounceScheduler"
 
-  private val environment      = TestConfigs.withEnvironment(TestConfigs.environment)
-  private val gathering = TestConfigs.gathering(environment)
+  private val environment = TestConfigs.withEnvironment(TestConfigs.environment)
+  private val gathering   = TestConfigs.gathering(environment)
   for (
     (config, where) <- Seq(
       TestConfigs.tiny -> "",
-      environment             -> ", with an environment",
+      environment      -> ", with an environment",
       gathering        -> ", of paths that gather"
     )
   )

@@ -45,7 +45,7 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
   for ((contexts, hasEnvironment, extraSlices) <- Seq((3, false, false), (16, true, false), (4, false, true)))
     it should s"follow $contexts contexts that gather, with an environment $hasEnvironment, extra slices $extraSlices" in {
       val scene = if (hasEnvironment) TestConfigs.withEnvironment(TestConfigs.environment) else TestConfigs.tiny
-      val base = TestConfigs.gathering(if (extraSlices) TestConfigs.withExtraSlices(scene) else scene)
+      val base  = TestConfigs.gathering(if (extraSlices) TestConfigs.withExtraSlices(scene) else scene)
       test(new RtController(config(contexts, base))).withAnnotations(Simulation.verilator) { dut =>
         for ((eagerness, gathers, seed) <- Seq((0.9, 4, 7), (0.2, 1, 8), (0.7, 0, 9))) {
           val rounds =
