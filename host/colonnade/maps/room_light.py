@@ -84,7 +84,7 @@ def _seen(
     distance = np.sqrt(fixed_order.dot(towards, towards))
     nearest = np.full(count, np.inf)
     np.minimum.at(nearest, texel, distance)
-    shown = distance <= _BEHIND * nearest[texel]
-    pixels = np.bincount(texel[shown], minlength=count)
-    sums = np.stack([np.bincount(texel[shown], colours[shown, channel], count) for channel in range(3)], axis=1)
+    is_near = distance <= _BEHIND * nearest[texel]
+    pixels = np.bincount(texel[is_near], minlength=count)
+    sums = np.stack([np.bincount(texel[is_near], colours[is_near, channel], count) for channel in range(3)], axis=1)
     return sums / np.maximum(pixels, 1)[:, None], pixels > 0

@@ -64,8 +64,8 @@ inline Vector spherePoint(const SamplePoint& point) {
     const int quarter = point.v >> 6, angle = point.v & 63;
     Vector result{0, 0, z};
     for (int axis = 0; axis < 2; ++axis) {
-        const bool isTurned = ((quarter & 1) != 0) != (axis == 1);
-        const int index = isTurned ? 63 - angle : angle;
+        const bool isBackwards = ((quarter & 1) != 0) != (axis == 1);
+        const int index = isBackwards ? 63 - angle : angle;
         const std::int64_t across = (radius * rounded(std::cos((index + 0.5) * 3.14159265358979323846 / 128)) + 128) >> 8;
         const bool isMinus = axis == 0 ? quarter == 1 || quarter == 2 : quarter >= 2;
         result[axis] = isMinus ? -across : across;
@@ -73,7 +73,7 @@ inline Vector spherePoint(const SamplePoint& point) {
     return result;
 }
 
-/// The direction of the ray that gathers light at a surface: n + |n| · s, for a normal of any length; turned around if it points below the surface.
+/// The direction of the ray that gathers light at a surface: n + |n| · s, for a normal of any length; negated if it points below the surface.
 /// It is never zero.
 inline Vector gatherDirection(const WideVector& about, const Vector& faceForwardNormal, const SamplePoint& point, const Numbers& n) {
     Vector normal;
@@ -113,8 +113,8 @@ public:
         for (int a = 0; a < 3; ++a) size[a] = scaled[a] < 0 ? -scaled[a] : scaled[a];
         const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
         std::size_t address = static_cast<std::size_t>(2 * axis + (scaled[axis] < 0));
-        for (int turn = 1; turn < 3; ++turn) {
-            std::int64_t left = scaled[(axis + turn) % 3] + size[axis];
+        for (int next = 1; next < 3; ++next) {
+            std::int64_t left = scaled[(axis + next) % 3] + size[axis];
             for (int digit = 0; digit < faceLog; ++digit) {
                 const bool fits = left >= size[axis];
                 address = 2 * address + fits;

@@ -67,10 +67,10 @@ object LightCube {
     val isX          = x >= y && x >= z
     val isY          = !isX && y >= z
 
-    def turned(axis: Int): SInt = Mux(isX, dir(axis), Mux(isY, dir((axis + 1) % 3), dir((axis + 2) % 3)))
-    val major                   = Mux(isX, x, Mux(isY, y, z))
-    val axis                    = Mux(isX, 0.U(2.W), Mux(isY, 1.U, 2.U))
-    Cat(axis, turned(0) < 0.S, slope(turned(1), major), slope(turned(2), major))
+    def permuted(axis: Int): SInt = Mux(isX, dir(axis), Mux(isY, dir((axis + 1) % 3), dir((axis + 2) % 3)))
+    val major                     = Mux(isX, x, Mux(isY, y, z))
+    val axis                      = Mux(isX, 0.U(2.W), Mux(isY, 1.U, 2.U))
+    Cat(axis, permuted(0) < 0.S, slope(permuted(1), major), slope(permuted(2), major))
   }
 
   /** Which of the 2^faceLog parts of the range from -major to major holds a component. */

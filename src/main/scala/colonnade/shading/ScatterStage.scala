@@ -38,19 +38,19 @@ final class ScatterStage(config: PathConfig) extends Module {
   import schedule._
 
   // The point of the sphere: z is linear in u, v is the angle about z
-  private val early    = carry(latch(0)(io.point), 18)
-  private val late     = carry(early, 21)
-  private val quarter  = early.at(17).v(SamplePoint.bits - 1, SamplePoint.bits - 2)
-  private val angle    = early.at(17).v(SamplePoint.bits - 3, 0)
-  private val radius   = latch(17)(VecInit(radii.map(_.U(unitBits.W)))(early.at(17).u))
-  private val isTurned = quarter(0)
-  private val cosine   = Seq(isTurned, !isTurned).map(turned => Mux(turned, ~angle, angle))
-  private val across   = latch(Seq(17, 18))(VecInit(cosines.map(_.U(unitBits.W)))(select(Seq(17, 18))(cosine(_))))
-  private val product  = latch(Seq(18, 19))(radius.at(Seq(18, 19)) * across.at(Seq(18, 19)))
-  private val rounded  = ((product.at(Seq(19, 20)) +& (1 << (unit - 1)).U) >> unit)(unitBits - 1, 0).zext
-  private val quarters = late.at(19).v(SamplePoint.bits - 1, SamplePoint.bits - 2)
-  private val isMinus  = Seq(quarters.xorR, quarters(1))
-  private val ofSphere = latch(Seq(19, 20, 21)) {
+  private val early       = carry(latch(0)(io.point), 18)
+  private val late        = carry(early, 21)
+  private val quarter     = early.at(17).v(SamplePoint.bits - 1, SamplePoint.bits - 2)
+  private val angle       = early.at(17).v(SamplePoint.bits - 3, 0)
+  private val radius      = latch(17)(VecInit(radii.map(_.U(unitBits.W)))(early.at(17).u))
+  private val isBackwards = quarter(0)
+  private val cosine      = Seq(isBackwards, !isBackwards).map(isBackwards => Mux(isBackwards, ~angle, angle))
+  private val across      = latch(Seq(17, 18))(VecInit(cosines.map(_.U(unitBits.W)))(select(Seq(17, 18))(cosine(_))))
+  private val product     = latch(Seq(18, 19))(radius.at(Seq(18, 19)) * across.at(Seq(18, 19)))
+  private val rounded     = ((product.at(Seq(19, 20)) +& (1 << (unit - 1)).U) >> unit)(unitBits - 1, 0).zext
+  private val quarters    = late.at(19).v(SamplePoint.bits - 1, SamplePoint.bits - 2)
+  private val isMinus     = Seq(quarters.xorR, quarters(1))
+  private val ofSphere    = latch(Seq(19, 20, 21)) {
     val signed = Seq(0, 1).map(axis => Mux(isMinus(axis), -rounded, rounded).pad(unitBits + 1))
     val z      = (((1 << unit) - 1).S((unitBits + 2).W) - Cat(late.at(21).u, 0.U(1.W)).zext)(unitBits, 0).asSInt
     select(Seq(19, 20, 21))(axis => if (axis < 2) signed(axis) else z)
@@ -70,7 +70,7 @@ final class ScatterStage(config: PathConfig) extends Module {
   }
   private val dir = Rounding.narrow(Rounding.floor(sum.at(xyz(25)), dropped), componentBits)
 
-  // It turns around if it points below the surface
+  // It is negated if it points below the surface
   private val geometric = delay(
     arriving(Rounding.floor(io.faceForwardNormal, NumberFormats.normalBits - sideBits), xyz(1)),
     xyz(1),
@@ -80,8 +80,8 @@ final class ScatterStage(config: PathConfig) extends Module {
   private val side    = accumulate(xyz(26), sides.at(xyz(26)).pad(2 * sideBits + 6))(_ + _)
   private val isBelow = latch(29)(side.at(29) < 0.S)
   private val last    = delay(arriving(dir, xyz(25)), xyz(25), 5).at(xyz(dir0))
-  private val turned  = Mux(isBelow.at(xyz(dir0)), -last, last)
-  io.dir := Mux(isAt(xyz(dir0).last), (turned.asUInt | 1.U).asSInt, turned)
+  private val upwards = Mux(isBelow.at(xyz(dir0)), -last, last)
+  io.dir := Mux(isAt(xyz(dir0).last), (upwards.asUInt | 1.U).asSInt, upwards)
 }
 
 object ScatterStage {
@@ -112,7 +112,7 @@ object ScatterStage {
     math.rint(256 * math.sqrt(1 - z * z)).toInt
   }
 
-  /** By the index of a quarter of a turn: the cosine in the middle of its interval. */
+  /** By the index of a quarter circle: the cosine in the middle of its interval. */
   val cosines: Seq[Int] = Seq.tabulate(1 << (SamplePoint.bits - 2)) { index =>
     math.rint(256 * math.cos((index + 0.5) * math.Pi / 128)).toInt
   }
