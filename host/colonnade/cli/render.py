@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene; if it names none, 4 in"
     " the photo of a room, otherwise 1]",
 )
+@click.option("--denoise", is_flag=True, help="Filter the noise of gathered light; with --backend rtl or model.")
 @click.option(
     "--output", type=FILE, metavar="FILE", help="Write a PNG picture, or of several frames a .webp animation."
 )
@@ -108,6 +109,7 @@ def render(
     sequence_file: Path | None,
     keyframes: int | None,
     samples: int | None,
+    denoise: bool,
     output: Path | None,
     video_file: Path | None,
     hits_file: Path | None,
@@ -176,6 +178,7 @@ def render(
         relit=relit,
         truth=truth,
         waveform=waveform,
+        denoise=denoise,
     )
     results = render_frames(request, progress)
     is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"

@@ -13,6 +13,9 @@ from colonnade.common.framebuffer import Frame
 #: The device's numbers for the colour 1.0, the shadow ratio 1.0, and the photo's colour 1.0.
 WHITE, UNSHADOWED, PHOTO_WHITE = 4095, 4096, 65535
 
+#: Weights of red, green and blue in the luminance (Rec. 709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
 #: A counter that is a level: the passes' maximum and not their sum.
 _LEVEL = "deepestStack"
 
@@ -133,15 +136,19 @@ class FramePasses:
         sums: Sums over all passes.
         counters: Sums over all passes; of a level the maximum.
         errors: Error bits of any pass.
+        squares: Sums over the squared luminance of the samples that show the object, of 1.0, float64 [height, width].
     """
 
     first: Frame | None = None
     counters: dict[str, int] = field(default_factory=dict)
     errors: list[str] = field(default_factory=list)
+    squares: npt.NDArray[np.float64] | None = None
     _sums: Accumulation | None = None
 
     def add(self, frame: Frame) -> None:
         """Add the frame of the next pass."""
+        squares = (frame.colour @ LUMINANCE / WHITE) ** 2 * frame.is_object
+        self.squares = squares if self.squares is None else self.squares + squares
         if self.first is None:
             self.first, self.counters, self.errors = frame, dict(frame.counters), list(frame.errors)
             return
@@ -156,6 +163,20 @@ class FramePasses:
         """Sums over all passes; those of a single one are made when they are needed."""
         assert self.first is not None
         return self._sums or Accumulation.of_frame(self.first)
+
+    def object_variance(self) -> npt.NDArray[np.float64] | None:
+        """The variance of the mean luminance of the object, float64 [height, width]; None of a single pass.
+
+        A pixel with one sample of the object has the largest variance of all pixels.
+        """
+        assert self.squares is not None
+        sums = self.sums
+        if sums.samples == 1:
+            return None
+        count = np.maximum(sums.coverage, 1)
+        mean = sums.objects @ LUMINANCE / WHITE / count
+        variance = (self.squares / count - mean**2).clip(min=0.0) / np.maximum(count - 1, 1)
+        return np.asarray(np.where(sums.coverage == 1, variance.max(), variance))
 
     @property
     def frame(self) -> Frame:

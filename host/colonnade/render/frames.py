@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from colonnade.common.accumulation import FramePasses
+from colonnade.common.accumulation import WHITE, FramePasses
 from colonnade.common.errors import UserError
 from colonnade.common.extras import require_extra
 from colonnade.common.framebuffer import Frame
@@ -97,6 +97,8 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
         raise UserError("paths.gather is for an object that does not turn: give motion.turn = 0 for several frames")
     if request.waveform is not None:
         _check_waveform(request, size)
+    if request.denoise:
+        _check_denoise(request, scene, manifest)
     if request.truth is not None and request.backend != "reference":
         raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
     if request.encoder == "live" and request.backend == "reference":
@@ -105,6 +107,16 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
         from colonnade.device.verilator import require_hits
 
         require_hits(manifest)
+
+
+def _check_denoise(request: RenderRequest, scene: Scene, manifest: Manifest) -> None:
+    """Raise a `UserError` if there is no noise to filter, or no depth to guide the filter."""
+    if scene.paths.gather == 0:
+        raise UserError("--denoise filters the noise of gathered light: the scene has none, set paths.gather = 1")
+    if request.backend == "reference":
+        raise UserError("--denoise is for the rtl and the model backend: give the reference more --samples")
+    if not manifest.config["frame"]["hits"]:
+        raise UserError("--denoise needs the depth of pixels, which this hardware lacks: set frame.hits=true")
 
 
 def _check_sequence(request: RenderRequest, sequence: Sequence, scene: Scene) -> None:
@@ -279,7 +291,10 @@ def _rendered(
             bytes=None if prepared.maps is None else prepared.maps.image.byte_counts(),
             samples=len(of_frame),
         )
-        result = _result(rendered_passes, prepared.image, prepared.view(size, of_frame[0]), report)
+        view = prepared.view(size, of_frame[0])
+        result = _result(rendered_passes, prepared.image, view, report)
+        if request.denoise:
+            result = _denoised(result, rendered_passes, view)
         yield result if request.relit else _composited(result, prepared)
 
 
@@ -394,6 +409,21 @@ def render_model(scene: Scene, mesh: Mesh, manifest: Manifest, size: Size, progr
 def _composited(result: RenderResult, prepared: DeviceScene) -> RenderResult:
     """The result in the photo of its room; as it is without a room."""
     return result if prepared.environment is None else replace(result, image=composited(result.sums, prepared.photo))
+
+
+def _denoised(result: RenderResult, passes: FramePasses, view: View) -> RenderResult:
+    """The result with filtered colours of the object; `view` is that of the first pass."""
+    from colonnade.render.denoise import Guide, denoised
+
+    x, y = np.arange(view.width)[None, :, None], np.arange(view.height)[:, None, None]
+    position = view.origin + result.t[..., None] * (view.direction + x * view.step_x + y * view.step_y)
+    count = result.sums.coverage[..., None]
+    colours = result.sums.objects / np.maximum(count, 1)
+    filtered = denoised(
+        colours / WHITE, passes.object_variance(), Guide.of(position, result.object_mask & (count[..., 0] > 0))
+    )
+    sums = replace(result.sums, objects=filtered * WHITE * count)
+    return replace(result, sums=sums, image=sums.image())
 
 
 def require_no_errors(frame: Frame) -> None:

@@ -35,6 +35,7 @@ class RenderRequest:
         truth: Mesh file of the room's real geometry, in its world space; for the reference.
         waveform: VCD file for the signals of one small RTL frame.
         encoder: Of the room's maps and of textures.
+        denoise: Filter the noise of gathered light; of the model and the RTL.
     """
 
     scene: Path
@@ -53,3 +54,4 @@ class RenderRequest:
     truth: Path | None = None
     waveform: Path | None = None
     encoder: Encoder = "offline"
+    denoise: bool = False

@@ -1,0 +1,106 @@
+"""The filter of gathered light: what it smooths, and what it leaves alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from colonnade.cli.main import cli
+from colonnade.common.image_io import read_picture
+from colonnade.render.denoise import Guide, denoised
+
+HEIGHT, WIDTH = 40, 60
+
+
+def wall(depth: np.ndarray | float = 5.0) -> Guide:
+    """A guide of a wall before the camera; the border of the picture shows no object."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    mask = np.zeros((HEIGHT, WIDTH), dtype=bool)
+    mask[4:-4, 4:-4] = True
+    return Guide.of(np.stack([x * 0.1, y * 0.1, np.broadcast_to(depth, (HEIGHT, WIDTH))], axis=2), mask)
+
+
+def noisy(mean: np.ndarray, deviation: float, seed: int = 1) -> np.ndarray:
+    return np.asarray(mean + np.random.default_rng(seed).normal(size=mean.shape) * deviation)
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_noise_on_a_plane_is_averaged(is_known: bool) -> None:
+    guide, flat = wall(), np.full((HEIGHT, WIDTH, 3), 0.5)
+    variance = np.full((HEIGHT, WIDTH), 0.1**2 * (0.2126**2 + 0.7152**2 + 0.0722**2)) if is_known else None
+    found = denoised(noisy(flat, 0.1), variance, guide)
+    assert (found[guide.mask] - 0.5).std() < 0.1 / 4
+    assert abs(found[guide.mask].mean() - 0.5) < 0.01
+
+
+def test_what_shows_no_object_stays() -> None:
+    guide, picture = wall(), noisy(np.full((HEIGHT, WIDTH, 3), 0.5), 0.1)
+    found = denoised(picture, None, guide)
+    np.testing.assert_array_equal(found[~guide.mask], picture[~guide.mask])
+    nothing = Guide(guide.position, guide.normals, np.zeros_like(guide.mask))
+    np.testing.assert_array_equal(denoised(picture, None, nothing), picture)
+
+
+def test_surfaces_at_a_distance_and_at_an_angle_do_not_mix() -> None:
+    x = np.arange(WIDTH)[None, :]
+    left = np.broadcast_to(x < WIDTH // 2, (HEIGHT, WIDTH))
+    colour = np.where(left[..., None], 0.2, 0.8) * np.ones(3)
+    step = wall(np.where(left, 5.0, 9.0))
+    edge = wall(np.where(left, 5.0, 5.0 + 0.2 * (x - WIDTH // 2)))
+    for guide in (step, edge):
+        found = denoised(noisy(colour, 0.05), np.full((HEIGHT, WIDTH), 1.0), guide)
+        # The pixel of the ridge lies on both sides
+        inner = guide.mask & (np.abs(x - WIDTH // 2) > 1)
+        assert np.abs(found - colour)[inner].max() < 0.12
+
+
+def test_a_pattern_without_noise_stays() -> None:
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    pattern = ((x // 3 + y // 3) % 2 * 0.6 + 0.2)[..., None] * np.ones(3)
+    found = denoised(pattern, np.full((HEIGHT, WIDTH), 1e-8), wall())
+    assert np.abs(found - pattern).max() < 1e-3
+
+
+SCENE = """
+[mesh]
+name = "teapot:4"
+[paths]
+gather = {}
+"""
+
+
+def run(folder: Path, gather: int, *options: str) -> tuple[int, str]:
+    (folder / "scene.toml").write_text(SCENE.format(gather))
+    arguments = ["render", str(folder / "scene.toml"), "--config", "textured", "--size", "64x48", *options]
+    done = CliRunner().invoke(cli, arguments)
+    return done.exit_code, done.output
+
+
+def test_the_command_filters_the_object(tmp_path: Path) -> None:
+    pictures = {}
+    for name, options in (("raw", ()), ("filtered", ("--denoise",)), ("truth", ("--samples", "256"))):
+        status, output = run(tmp_path, 1, "--backend", "model", "--output", str(tmp_path / f"{name}.png"), *options)
+        assert status == 0, output
+        # Without the outline, where samples of the background count
+        pictures[name] = read_picture(tmp_path / f"{name}.png")[20:32, 24:40].astype(float)
+    error = {name: ((picture - pictures["truth"]) ** 2).mean() for name, picture in pictures.items()}
+    assert error["filtered"] < 0.7 * error["raw"]
+
+
+@pytest.mark.parametrize(
+    ("gather", "options", "message"),
+    [
+        (0, ("--backend", "model"), "set paths.gather = 1"),
+        (1, ("--backend", "reference"), "give the reference more --samples"),
+        (1, ("--backend", "model", "--set", "frame.hits=false"), "set frame.hits=true"),
+    ],
+)
+def test_what_cannot_be_filtered_is_refused(
+    tmp_path: Path, gather: int, options: tuple[str, ...], message: str
+) -> None:
+    status, output = run(tmp_path, gather, "--denoise", *options)
+    assert status == 2
+    assert message in output
