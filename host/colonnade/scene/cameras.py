@@ -70,7 +70,8 @@ def moved_camera(
         start: The camera of the start.
         centre: Centre of the object's cube at the start, world space; its depth is that of the start's target if the
             scene names none.
-        width, height: Size of the frame, pixels.
+        width: Width of the frame, pixels.
+        height: Height of the frame, pixels.
         environment: The room of the scene.
 
     Raises:

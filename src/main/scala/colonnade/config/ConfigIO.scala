@@ -6,7 +6,7 @@ import java.nio.file.{Files, InvalidPathException, Paths}
 
 /** Configurations as JSON, for which [[ColonnadeConfig]] has the names, types and defaults of all keys; `precision` may also
   * be written in the paper's notation, as in `"32b32s64d"`. No other key is accepted. Files of older versions are
-  * migrated, see [[ConfigMigration]]. All failures are [[ConfigError]]s.
+  * migrated, see `ConfigMigration`. All failures are [[ConfigError]]s.
   */
 object ConfigIO {
 
