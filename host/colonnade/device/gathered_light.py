@@ -13,12 +13,17 @@ from colonnade.maps.room_light import room_light
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.room_lights import lights_of
 from colonnade.scene_image.file import LoadSection, SceneImage
+from colonnade.scene_image.header import LoadedMemory
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.maps.image import AttributeImage
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.model import Scene
+
+
+#: The device's memory of the light cube.
+MEMORY = "light.cube"
 
 
 def scene_cube(
@@ -56,7 +61,7 @@ def scene_cube(
 
 def with_cube(image: SceneImage, cube: LightCube | None) -> SceneImage:
     """A scene image with a light cube in place of its own."""
-    others = tuple(section for section in image.attributes if section.memory != "light.cube")
-    if cube is None:
-        return replace(image, attributes=others)
-    return replace(image, attributes=(*others, LoadSection("light.cube", cube.words())))
+    others = tuple(section for section in image.attributes if section.memory != MEMORY)
+    words = () if cube is None else (LoadSection(MEMORY, cube.words()),)
+    light = tuple(LoadedMemory(section.memory, *section.words.shape) for section in words)
+    return replace(image, header=replace(image.header, light=light), attributes=(*others, *words))

@@ -51,7 +51,7 @@ class SceneImage:
         header: Description of the content.
         records: uint8 [record_count, record_bits / 8], little-endian.
         source_faces: int32 [triangles], index in the mesh file of each packed id's face.
-        attributes: A room's maps and textures in the order of `ImageHeader.memories`.
+        attributes: A room's maps, textures and light cube in the order of `ImageHeader.memories`.
     """
 
     header: ImageHeader
@@ -151,7 +151,9 @@ def _check_memories_fit(header: ImageHeader, manifest: Manifest, file: Path) -> 
     shapes = {
         name: shape
         for name, shape in manifest.memories.items()
-        if name not in ("columnBvh", "light.cube") and (header.room is not None or name.startswith("texture."))
+        if name.startswith("texture.")
+        or (name.startswith("light.") and header.light)
+        or (name.startswith(("albedo.", "normals.", "planes.")) and header.room is not None)
     }
     needed = {name: (int(shape["depth"]), -(-int(shape["bits"]) // 8)) for name, shape in shapes.items()}
     for name in sorted(available.keys() | needed.keys()):

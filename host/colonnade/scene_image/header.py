@@ -97,6 +97,7 @@ class ImageHeader:
         room: The room; None without a room's maps.
         parts: The objects of a scene with several, by their source faces.
         texture: The textures; None for hardware without.
+        light: The memory of the light cube, after all others; empty without gathered light.
     """
 
     format_hash: str
@@ -118,11 +119,13 @@ class ImageHeader:
     room: EnvironmentHeader | None = None
     parts: tuple[MeshPart, ...] = ()
     texture: TextureHeader | None = None
+    light: tuple[LoadedMemory, ...] = ()
 
     @property
     def memories(self) -> tuple[LoadedMemory, ...]:
-        """Memories of a room and of the textures, in the file's order."""
-        return (*(self.room.memories if self.room else ()), *(self.texture.memories if self.texture else ()))
+        """Memories of a room, of the textures and of the light cube, in the file's order."""
+        maps, textures = (part.memories if part else () for part in (self.room, self.texture))
+        return (*maps, *textures, *self.light)
 
     def to_json(self) -> dict[str, Any]:
         """Convert to a JSON object; floats keep their exact values."""
@@ -152,4 +155,6 @@ class ImageHeader:
         if texture := values["texture"]:
             memories = tuple(LoadedMemory(**memory) for memory in texture["memories"])
             values["texture"] = TextureHeader(**{**texture, "memories": memories})
+        # Files that are older than gathered light lack the key
+        values["light"] = tuple(LoadedMemory(**memory) for memory in values.get("light", ()))
         return ImageHeader(**values)

@@ -63,6 +63,7 @@ def check_header(header: Any) -> None:
     _check_tree(header["tree"])
     _check_environment(header["room"])
     _check_texture(header["texture"])
+    _check_memories(header.get("light", []))
 
 
 def _check_tree(tree: Any) -> None:

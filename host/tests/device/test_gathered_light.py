@@ -1,0 +1,96 @@
+"""Scenes with gathered light: their light cube, image, registers and errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.design.generator import manifest_for
+from colonnade.device.bit_exact import render_model
+from colonnade.device.scene import DeviceScene
+from colonnade.render.frames import render_frames
+from colonnade.render.request import RenderRequest
+from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene
+from colonnade.scene.samples import samples_of_frame
+from colonnade.scene_image.device_image import device_image
+from colonnade.scene_image.file import SceneImage
+
+ROOM = Path(__file__).parents[3] / "scenes" / "rooms" / "living"
+SCENE = Scene(
+    MeshSource(name="teapot:4"), light=Light(falloff=2.0), ambient=Colour((0.4, 0.2, 0.1)), paths=Paths(gather=2)
+)
+IN_ROOM = replace(SCENE, placement=Placement((322.0, 306.0), 0.5), background=Background(room=ROOM))
+
+
+def test_without_a_room_every_texel_is_the_ambient_light() -> None:
+    prepared = DeviceScene.of(SCENE, manifest_for("textured").manifest)
+    (cube,) = (section for section in prepared.image.attributes if section.memory == "light.cube")
+    assert cube.words.shape == (384, 6)
+    assert (cube.words.view("<u2") == np.rint(np.array([0.1, 0.2, 0.4]) * 4096)).all()
+
+
+@pytest.mark.parametrize("scene", [SCENE, IN_ROOM], ids=["alone", "in a room"])
+def test_an_image_keeps_its_light_in_a_file(scene: Scene, tmp_path: Path) -> None:
+    manifest = manifest_for("textured").manifest
+    image = DeviceScene.of(scene, manifest).image
+    again = SceneImage.load(image.save(tmp_path / "scene.image"), manifest)
+    assert again.header.to_json() == image.header.to_json()
+    assert [section.memory for section in again.attributes] == [section.memory for section in image.attributes]
+    assert image.attributes[-1].memory == "light.cube"
+    for one, other in zip(again.attributes, image.attributes, strict=True):
+        np.testing.assert_array_equal(one.words, other.words)
+    assert image.attributes[-1].words.tobytes()[:6] in device_image(image, manifest)
+
+
+def test_a_room_lights_the_object_from_its_picture() -> None:
+    """Another place has another light; a scene that gathers nothing has no cube."""
+    manifest = manifest_for("textured").manifest
+    moved = replace(IN_ROOM, placement=Placement((150.0, 380.0), 0.5))
+    words = [DeviceScene.of(scene, manifest).image.attributes[-1].words for scene in (IN_ROOM, moved)]
+    assert (words[0] != words[1]).any()
+    still = DeviceScene.of(replace(IN_ROOM, paths=Paths()), manifest).image
+    assert all(section.memory != "light.cube" for section in still.attributes)
+    assert still.header.light == ()
+
+
+def test_each_pass_has_points_of_its_own() -> None:
+    manifest = manifest_for("textured").manifest
+    prepared = DeviceScene.of(SCENE, manifest)
+    passes = prepared.scene.with_samples(16).passes()
+    registers = [prepared.registers((32, 24), one) for one in passes]
+    assert {values["gather.bounces"] for values in registers} == {2}
+    for index in range(4):
+        points = [tuple(values[f"gather.points[{index}].{axis}"] // 16 for axis in "uv") for values in registers]
+        assert sorted(u for u, _ in points) == sorted(v for _, v in points) == list(range(16)), "evenly spread"
+    assert samples_of_frame(16, 1)[3].gather != samples_of_frame(16, 1)[4].gather
+
+
+def test_what_cannot_gather_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"set frame\.gather=true"):
+        DeviceScene.of(SCENE, manifest_for("small").manifest).registers((32, 24))
+    (tmp_path / "scene.toml").write_text('[mesh]\nname = "teapot:4"\n[paths]\ngather = 1\n')
+    request = RenderRequest(tmp_path / "scene.toml", "textured", backend="model", size=(16, 12), frames=3)
+    with pytest.raises(UserError, match=r"give motion\.turn = 0 for several frames"):
+        list(render_frames(request))
+    with pytest.raises(UserError, match=r"frame\.gather"):
+        manifest_for("textured", ("units.shadeInterval=128",))
+    with pytest.raises(UserError, match=r"frame\.gather"):
+        manifest_for("textured", ("frame.maxBounces=0",))
+
+
+def test_a_surface_in_a_dome_of_light_is_as_bright_as_under_ambient_light() -> None:
+    """A convex object sees the whole dome: its albedo times the light."""
+    manifest = manifest_for("textured").manifest
+    frames = []
+    for gather in (0, 1):
+        dark = replace(SCENE, mesh=MeshSource(name="sphere"), light=Light(colour=(0.0, 0.0, 0.0)))
+        scene = replace(dark, paths=Paths(gather=gather), material=Material(albedo=(0.5, 0.5, 0.5)))
+        prepared = DeviceScene.of(scene, manifest)
+        frames.append(render_model(manifest, prepared.image, prepared.registers((48, 36))))
+    shows = frames[0].is_object
+    means = [frame.colour[shows].mean(axis=0) / 4095 for frame in frames]
+    assert np.abs(means[0] - means[1]).max() < 0.003
