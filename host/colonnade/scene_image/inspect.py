@@ -42,6 +42,7 @@ def describe(image: SceneImage) -> dict[str, Any]:
         "tree": asdict(header.tree) if header.tree is not None else None,
         "room": _environment(image),
         "texture": None if header.texture is None else asdict(header.texture),
+        "light": [asdict(memory) for memory in header.light],
         "format_hash": header.format_hash,
     }
 
@@ -115,7 +116,11 @@ def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[
     lines.append(f"memory      {used} ({header.record_count * header.record_bits // 8:,} bytes per column)")
     lines += [f"  {name:<10}{count:>9,} records from {first:,}" for name, first, count in sections(header) if count]
     return (
-        lines + _tree_lines(header, manifest) + _environment_lines(header, manifest) + _texture_lines(header, manifest)
+        lines
+        + _tree_lines(header, manifest)
+        + _environment_lines(header, manifest)
+        + _texture_lines(header, manifest)
+        + _light_lines(header, manifest)
     )
 
 
@@ -151,6 +156,14 @@ def _environment_lines(header: ImageHeader, manifest: Manifest | None) -> list[s
     for memory in header.room.memories:
         target = "" if manifest is None else f", load target {manifest.memories[memory.memory]['target']}"
         lines.append(f"  {one_line(memory.memory):<19}{memory.words:>6,} words of {memory.word_bytes} bytes{target}")
+    return lines
+
+
+def _light_lines(header: ImageHeader, manifest: Manifest | None) -> list[str]:
+    lines = []
+    for memory in header.light:
+        target = "" if manifest is None else f", load target {manifest.memories[memory.memory]['target']}"
+        lines.append(f"light       a cube of {memory.words} texels, {memory.bytes:,} bytes{target}")
     return lines
 
 

@@ -18,6 +18,7 @@ from colonnade.scene.model import Background, Colour, Light, Material, MeshSourc
 from colonnade.scene.samples import samples_of_frame
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.inspect import describe
 
 ROOM = Path(__file__).parents[3] / "scenes" / "rooms" / "living"
 SCENE = Scene(
@@ -41,6 +42,7 @@ def test_an_image_keeps_its_light_in_a_file(scene: Scene, tmp_path: Path) -> Non
     assert again.header.to_json() == image.header.to_json()
     assert [section.memory for section in again.attributes] == [section.memory for section in image.attributes]
     assert image.attributes[-1].memory == "light.cube"
+    assert describe(again)["light"] == [{"memory": "light.cube", "words": 384, "word_bytes": 6}]
     for one, other in zip(again.attributes, image.attributes, strict=True):
         np.testing.assert_array_equal(one.words, other.words)
     assert image.attributes[-1].words.tobytes()[:6] in device_image(image, manifest)

@@ -96,6 +96,25 @@ def _samples() -> Entry:
     return Entry("samples", "small", commands)
 
 
+def _gather() -> Entry:
+    """Gathered light on `edge`: its area, a pass of the RTL, and pictures of the model against the reference."""
+    override, scene = "frame.gather=true", "scenes/gathered.toml"
+
+    def render(backend: str, *options: str) -> tuple[str, ...]:
+        hardware = ("--config", "edge", "--set", override, "--backend", backend)
+        return ("colonnade", "render", scene, *hardware, *options, "--json", REPORT)
+
+    pictures = {backend: f"out/gathered-{backend}.png" for backend in ("reference", "model")}
+    small = ("--size", "320x240", "--samples", "16", "--output")
+    commands = {
+        "area": ("colonnade", "ppa", "--config", "edge", "--set", override, "--liberty", "ASAP7", "--json", REPORT),
+        "pass": render("rtl", "--samples", "1"),
+        **{f"-{backend}": render(backend, *small, picture) for backend, picture in pictures.items()},
+        "compare": ("colonnade", "compare", "--no-dists", *pictures.values(), "--json", REPORT),
+    }
+    return Entry("gather", "edge", commands, (override,), libraries=("ASAP7",))
+
+
 def catalog() -> dict[str, Entry]:
     """All entries by name. Those that the pages need most come first."""
     entries = (
@@ -135,6 +154,7 @@ def catalog() -> dict[str, Entry]:
         Entry("moving-frames", "small", _colonnade("study", "--views", "--frames", "--rooms", _MOVED)),
         Entry("captures", "small", _colonnade("study", "--capture", *_ROOMS, _ATTIC)),
         _samples(),
+        _gather(),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),

@@ -153,6 +153,24 @@ def moved_rooms(data: Data) -> str:
     )
 
 
+def gather(data: Data) -> str:
+    """What gathered light costs `edge`, and how near the model is to the reference."""
+    found, without = data.result("gather"), data.result("area-edge-asap7")
+    kge, before = (report["levels"]["column"]["kge"] for report in (found["area"], without))
+    fo4 = [report["slowest_path"]["fo4"] for report in (without, found["area"])]
+    counters = found["pass"]["counters"]
+    rows = [
+        ["a column of `edge`", f"{before:,.0f} kGE; with it {kge:,.0f}, + {100 * (kge / before - 1):.1f} %"],
+        ["slowest path", f"{fo4[0]:.1f} FO4; with it {fo4[1]:.1f}"],
+        [
+            "a pass of the scene above, 640×480",
+            f"{counters['cycles']:,} cycles, {counters['raysGather']:,} gathered rays",
+        ],
+        ["model against reference, 16 samples, 320×240", f"{found['compare']['psnr']:.1f} dB"],
+    ]
+    return markdown(["gathered light", ""], rows)
+
+
 def environments(data: Data) -> str:
     """Size and accuracy of the rooms' maps, and of the device's march."""
     found = data.result("environments")
@@ -216,6 +234,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     "board": board,
     "rooms": rooms,
     "moved-rooms": moved_rooms,
+    "gather": gather,
     "environments": environments,
     "samples": samples,
     "measuring": measuring,
