@@ -111,6 +111,8 @@ class DeviceScene:
         scene = replace(fixed_in_world(self.scene, extent, self.environment), frame_camera=None)
         maps = EncodedEnvironment.of(next_view(scene, extent, room, relit), self.manifest, encode)
         image = with_environment(self.image, maps, self.manifest)
+        if self.manifest.gathers:
+            image = with_cube(image, scene_cube(scene, extent, maps.environment, maps.image, relit))
         return replace(self, scene=scene, image=image, maps=maps, photo=room.photo)
 
     def seen_by(self, camera: EnvironmentCamera, photo: NDArray[np.uint8] | None) -> DeviceScene:

@@ -79,12 +79,12 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, 
     still = replace(scene, more_lights=(), paths=Paths(bounces=0))
     views = [(scene, True), (scene, False), (still, False), (beside, False)]
     registers: list[dict[str, int]] = [
-        frame_registers(view, image.header, design.manifest, 64, 48, held, relit) for view, relit in views
+        frame_registers(view, image.header, design.manifest, 80, 60, held, relit) for view, relit in views
     ]
     # A large offset shows on which side of the surface a ray starts
     registers.append(registers[1] | {"shading.offset": 64 * registers[1]["shading.offset"]})
     # An object that is half below the table's surface
-    sunk = frame_registers(sunken(scene, held, image.header.extent), image.header, design.manifest, 64, 48, held, False)
+    sunk = frame_registers(sunken(scene, held, image.header.extent), image.header, design.manifest, 80, 60, held, False)
     assert sunk["environment.occlusion"] == 1
     registers += [sunk, sunk | {"environment.occlusionTolerance": 0}, sunk | {"environment.occlusion": 0}]
     simulated = render_rtl(design, image, list(registers), Stalls(20, 5))

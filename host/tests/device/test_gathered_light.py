@@ -12,6 +12,7 @@ from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
+from colonnade.environment.load import load_environment
 from colonnade.render.frames import render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene
@@ -57,6 +58,19 @@ def test_a_room_lights_the_object_from_its_picture() -> None:
     still = DeviceScene.of(replace(IN_ROOM, paths=Paths()), manifest).image
     assert all(section.memory != "light.cube" for section in still.attributes)
     assert still.header.light == ()
+
+
+def test_a_new_view_of_the_room_brings_its_light() -> None:
+    prepared = DeviceScene.of(IN_ROOM, manifest_for("textured").manifest)
+    assert prepared.maps is not None
+    room, image = load_environment(ROOM), prepared.maps.image
+    assert room.photo is not None
+    darker = replace(room, photo=(room.photo // 2).astype(np.uint8))
+    words = [
+        prepared.seen_in(view, lambda _: image).image.attributes[-1].words.view("<u2").astype(int)
+        for view in (room, darker)
+    ]
+    assert words[1].sum() < 0.8 * words[0].sum()
 
 
 def test_each_pass_has_points_of_its_own() -> None:

@@ -25,7 +25,14 @@ POWER = dict.fromkeys((f"{kind}_mw" for kind in ("dynamic", "clock", "leakage", 
 def area() -> dict[str, Any]:
     """A report of an array of two columns of three rows; its slowest path takes 0.7 ns, and it has twice the chip."""
     unit = {"count": 1, "kge": 30.0, "share": 1.0, "flops": 7, "paths": {"register_to_register": PATH}}
-    level = {"logic_kge": 40.0, "logic_um2": 5e6, "memory_bits": 9000, "logic_mm2_28nm": 0.5, "mm2_28nm": 11.06}
+    level = {
+        "kge": 60.0,
+        "logic_kge": 40.0,
+        "logic_um2": 5e6,
+        "memory_bits": 9000,
+        "logic_mm2_28nm": 0.5,
+        "mm2_28nm": 11.06,
+    }
     memory = {"unit": "BoxUnit", "count": 2, "depth": 128, "width": 80, "bits": 20_480, "um2": {"28 nm": 1e3}}
     return {
         "technology": {
@@ -142,6 +149,11 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
                 for share, cycles in ((0.0, 10_000), (0.947, 200_000))
             ],
         },
+        "gather": {
+            "area": area() | {"levels": {"column": {"kge": 63.0}}},
+            "pass": {"counters": {"cycles": 50_000, "raysGather": 900}},
+            "compare": {"psnr": 48.0},
+        },
         "environments": {
             "accuracy": {"Room, device": {"mirror": {"ok": 0.97}, "mean_steps": 18.0}},
             "living": room("Room"),
@@ -226,12 +238,14 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| pixels, hits and counters of 2 meshes on `small` | 2 |" in table(docs, "equality")
     assert "| **8** | 1.1 | 1.10 |" in table(docs, "energy-area")
     assert "**32b32s64d**" in table(docs, "precision")
-    assert "| all | 30.0 |" in table(docs, "measuring")
+    assert "| all | 31.5 |" in table(docs, "measuring")
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 (×1.20) | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
     assert "| seed 1 | –, – |" in live and "15.0" not in live
     path = "| seed 1 | 30.00, 29.50 | 2.00, 2.25 | 2.00, 3.00 | -0.50 dB, +0.25° | -0.12 dB, -0.01° |"
     assert path in table(docs, "live-paths")
+    assert "60 kGE; with it 63, + 5.0 %" in table(docs, "gather")
+    assert "50,000 cycles, 900 gathered rays" in table(docs, "gather")
     marched = "| pixels that march | 0 % | 95 % |\n| --- | ---: | ---: |\n| r | 10,000 | 200,000 |"
     assert marched in table(docs, "moved-rooms")
     moved = "| 0.1 m, 3.3° | 40.0, 40.0, 40.0 | 30.2, 30.2, 30.2 | –, –, – | 1.5, 1.5, 1.5 |"
