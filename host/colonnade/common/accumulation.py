@@ -136,19 +136,22 @@ class FramePasses:
         sums: Sums over all passes.
         counters: Sums over all passes; of a level the maximum.
         errors: Error bits of any pass.
+        has_squares: Keep `squares`, for `object_variance`.
         squares: Sums over the squared luminance of the samples that show the object, of 1.0, float64 [height, width].
     """
 
     first: Frame | None = None
     counters: dict[str, int] = field(default_factory=dict)
     errors: list[str] = field(default_factory=list)
+    has_squares: bool = False
     squares: npt.NDArray[np.float64] | None = None
     _sums: Accumulation | None = None
 
     def add(self, frame: Frame) -> None:
         """Add the frame of the next pass."""
-        squares = (frame.colour @ LUMINANCE / WHITE) ** 2 * frame.is_object
-        self.squares = squares if self.squares is None else self.squares + squares
+        if self.has_squares:
+            squares = (frame.colour @ LUMINANCE / WHITE) ** 2 * frame.is_object
+            self.squares = squares if self.squares is None else self.squares + squares
         if self.first is None:
             self.first, self.counters, self.errors = frame, dict(frame.counters), list(frame.errors)
             return

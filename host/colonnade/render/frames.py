@@ -279,9 +279,9 @@ def _rendered(
     """Render the passes of each frame with the model or the RTL."""
     if request.backend == "rtl":
         design = design_for(request.config, request.overrides, progress)
-        rendered = _rtl_frames(design, prepared.image, registers, progress, request.waveform)
+        rendered = _rtl_frames(design, prepared.image, registers, progress, request.waveform, request.denoise)
     else:
-        rendered = _model_frames(prepared.manifest, prepared.image, registers, progress)
+        rendered = _model_frames(prepared.manifest, prepared.image, registers, progress, request.denoise)
     for of_frame, (rendered_passes, seconds, rate) in zip(passes, rendered, strict=True):
         require_no_errors(rendered_passes.frame)
         report = replace(
@@ -351,6 +351,7 @@ def _rtl_frames(
     registers: list[list[dict[str, int]]],
     progress: Progress,
     waveform: Path | None = None,
+    has_squares: bool = False,
 ) -> Iterator[Rendered]:
     """Render all passes of all frames in one run of the simulator. Each frame reports an equal part of the run time."""
     from colonnade.device.simulator_build import build_simulator
@@ -359,7 +360,7 @@ def _rtl_frames(
     begun = time.perf_counter()
     build_simulator(design, progress, waveform=waveform is not None)
     built = time.perf_counter()
-    frames = [FramePasses() for _ in registers]
+    frames = [FramePasses(has_squares=has_squares) for _ in registers]
     places = iter([frame for frame, of_frame in zip(frames, registers, strict=True) for _ in of_frame])
     every = [one for of_frame in registers for one in of_frame]
     rate = simulate(
@@ -371,7 +372,11 @@ def _rtl_frames(
 
 
 def _model_frames(
-    manifest: Manifest, image: SceneImage, registers: list[list[dict[str, int]]], progress: Progress
+    manifest: Manifest,
+    image: SceneImage,
+    registers: list[list[dict[str, int]]],
+    progress: Progress,
+    has_squares: bool = False,
 ) -> Iterator[Rendered]:
     """Render pass by pass with a model that is loaded once."""
     from colonnade.device.bit_exact import loaded_model, model_frame
@@ -380,7 +385,7 @@ def _model_frames(
 
     def one(of_frame: list[dict[str, int]]) -> Rendered:
         begun = time.perf_counter()
-        passes = FramePasses()
+        passes = FramePasses(has_squares=has_squares)
         with progress.step("rendering in the model") as report:
             for index, values in enumerate(of_frame):
 

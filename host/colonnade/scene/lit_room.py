@@ -127,7 +127,12 @@ def lit_room(
     if colours.clamped > _REPORTED_CLAMPED:
         progress.note(
             f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
-            " photo in reflections: raise the ambient light, or leave out all lights so that they are fitted"
+            " photo in reflections: "
+            + (
+                "with paths.gather the lights are not scaled up"
+                if scene.paths.gather
+                else "raise the ambient light, or leave out all lights so that they are fitted"
+            )
         )
     return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours)
 

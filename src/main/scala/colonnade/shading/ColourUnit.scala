@@ -29,7 +29,7 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   * }}}
   * An end takes 3 · lights cycles, with the lights that are on, at least one; in the background 3. A bounce takes 3, and
   * 3 · lights more if its reflection shows a surface; none if it is the path's first and has no Fresnel reflection.
-  * An end whose surface gathers light takes 3 cycles more, and gives no colour: the path goes on.
+  * An end whose surface gathers light needs 3 cycles more, and gives no colour: the path goes on.
   * Colours come in any order; the throughput and radiance of every path are in a table.
   *
   * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights · transmittance))

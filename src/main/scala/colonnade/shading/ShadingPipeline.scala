@@ -47,21 +47,21 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   private val isReady    = isFree && hasPlace && mayBounce
   private val isEnd      = isAt(interval - 1)
   private val takesPoint = io.environment.map(_.fire).getOrElse(false.B)
-  private val takes      = io.request.fire || takesPoint
+  private val enters     = io.request.fire || takesPoint
   private val entering   = entered(takesPoint)
   io.request.ready := isEnd && isReady
   io.environment.foreach(_.ready := isEnd && isReady && !io.request.valid)
   io.readyNext := isAt(interval - 2) && isReady
   when(isEnd) {
-    isHeld   := takes || !isFree
-    isActive := takes || (!isFree && hasPlace)
-    light    := Mux(takes, 0.U, light + isActive)
+    isHeld   := enters || !isFree
+    isActive := enters || (!isFree && hasPlace)
+    light    := Mux(enters, 0.U, light + isActive)
   }
-  when(takes) {
+  when(enters) {
     hit     := entering
     shadows := io.shading.shadows && io.environment.map(port => !takesPoint || port.bits.shadows).getOrElse(true.B)
   }
-  private val isCounted = isEnd && Mux(takes, !entering.isBounce, !isFree && hasPlace)
+  private val isCounted = isEnd && Mux(enters, !entering.isBounce, !isFree && hasPlace)
 
   // Stages
   private val slot = Wire(new LightSlot(config))
@@ -97,7 +97,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
 
   // The rays that gather light
   private val scatter = io.sample.map { sample =>
-    sample.read.valid := (io.request.fire || takesPoint) && !entering.isBounce
+    sample.read.valid := enters && !entering.isBounce
     sample.read.bits  := entering.context
     val stage = Module(new ScatterStage(config)).io
     stage.phase             := phase
@@ -117,7 +117,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   label.material        := hit.material
   for (environment <- label.environment; port <- io.environment) {
     environment.valid := hit.isEnvironment
-    environment.bits  := RegEnable(port.bits.albedo, takes)
+    environment.bits  := RegEnable(port.bits.albedo, enters)
   }
   for ((component, cycle) <- assembler.origin.zip(xyz(6))) {
     component.valid := isAt(cycle) && lightAt6.at(cycle) && at6.at(cycle).light === 0.U
@@ -175,7 +175,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     pool.request :<>= queue.request
     queue.result :<>= pool.result
     bounced :<>= queue.bounced
-    count     := count + (takes && entering.isBounce) - queue.request.fire
+    count     := count + (enters && entering.isBounce) - queue.request.fire
     mayBounce := count =/= bouncePlaces.U
     queue
   }

@@ -27,8 +27,8 @@ final class ShadowRaysIO(config: PathConfig) extends Bundle {
   val ray     = Decoupled(new RayRequest(config))
 }
 
-/** Makes shadow rays, from a context's surface to a light, and the rays that gather light there: docs/shading.md. Two rays in three cycles; all axes at a time,
-  * one shifter and subtractor for each.
+/** Makes shadow rays, from a context's surface to a light, and the rays that gather light there: docs/shading.md. Two
+  * rays in three cycles; all axes at a time, one shifter and subtractor for each.
   *
   * A ray is offered two cycles after its request, in the order of the requests. A request that waits for the ray before it
   * reads its origin again, so no register holds the origin.
