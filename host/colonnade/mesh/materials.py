@@ -3,13 +3,14 @@
 | | glTF | MTL |
 |---|---|---|
 | albedo | base colour factor, linear | `Kd`, sRGB but of Blender; for glass `Tf` if given |
-| mirror | metallic factor of at least ½, without a texture | `Pm` of at least ½, or `illum` 3 or 5 |
+| mirror | metallic factor of at least ½, without a metallic-roughness texture | `Pm` of at least ½, or `illum` 3 or 5 |
+| roughness of a mirror | roughness factor | `Pr` |
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
 | index of refraction | `KHR_materials_ior` | `Ni` |
 | emission of a diffuse surface | emissive factor times `KHR_materials_emissive_strength`, at most 1 | `Ke`, as `Kd` |
 
-Metal rougher than `MIRROR_ROUGHNESS` is diffuse. The readers add base-colour textures.
+`as_rendered` says what a rough mirror becomes. The readers add base-colour textures.
 What a material holds beyond this is counted as lost.
 """
 
@@ -17,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, get_args
 
@@ -34,9 +35,11 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 GLASS_IOR = 1.5
 
 #: Roughness up to which a mirror or glass counts as smooth, and below which a diffuse surface counts as glossy.
-_SMOOTH, _GLOSSY = 0.1, 0.5
+SMOOTH_ROUGHNESS, _GLOSSY = 0.1, 0.5
 #: Roughness up to which a metal is nearer to a mirror than to a diffuse surface of its colour (docs/shading.md).
 MIRROR_ROUGHNESS = 0.35
+#: Roughness up to which a metal is a mirror where light is gathered; beyond, reflections are spread (docs/gather.md).
+SHARP_ROUGHNESS = 0.25
 #: Extensions of glTF materials that are used.
 _USED_EXTENSIONS = (
     "KHR_materials_transmission",
@@ -71,9 +74,10 @@ class MeshMaterial:
         kind: diffuse, mirror or glass.
         albedo: Linear, 0 to 1: diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
+        roughness: Of a mirror, 0 to 1: 0 reflects sharply, more is rough metal.
         has_corner_colours: The surface has the colours of `colonnade.mesh.mesh.Mesh.corner_colours`, times `albedo`.
         texture: The surface has the colours of this one of `colonnade.mesh.mesh.Mesh.textures`, times `albedo`.
-        emission: Linear, 0 to 1: the light that a diffuse surface emits towards the eye.
+        emission: Linear, 0 to 1: the light that a diffuse surface or rough metal emits towards the eye.
         alpha: Transparency of the file's material; a loaded mesh has none.
     """
 
@@ -84,10 +88,25 @@ class MeshMaterial:
     texture: int | None = None
     emission: Vector = (0.0, 0.0, 0.0)
     alpha: Alpha | None = None
+    roughness: float = 0.0
 
 
 #: Material of meshes without one.
 PLAIN = MeshMaterial()
+
+
+def as_rendered(material: MeshMaterial, gathers: bool) -> MeshMaterial:
+    """A material as the device shows it: a mirror with a roughness left has spread reflections.
+
+    Args:
+        material: Of a mesh, or of a scene.
+        gathers: The scene gathers light. Otherwise rough metal is a smooth mirror or a diffuse surface.
+    """
+    if material.kind != "mirror":
+        return replace(material, roughness=0.0)
+    if material.roughness <= (SHARP_ROUGHNESS if gathers else MIRROR_ROUGHNESS):
+        return replace(material, roughness=0.0)
+    return material if gathers else replace(material, kind="diffuse", roughness=0.0)
 
 
 def gltf_surface(material: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -114,8 +133,9 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
         share = alpha.factor if alpha is not None and alpha.blends else 1.0
         red, green, blue = (1.0 - share + share * value for value in colour)
         return MeshMaterial("glass", (red, green, blue), _ior(ior))
-    if metallic >= 0.5 and roughness <= MIRROR_ROUGHNESS:
-        return MeshMaterial("mirror", colour, alpha=alpha)
+    if metallic >= 0.5:
+        emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else _DARK
+        return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
     return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha)
 
 
@@ -146,8 +166,10 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
         return MeshMaterial("glass", _colour(entries.get("tf"), colour), _ior(first("ni", GLASS_IOR)))
     alpha = Alpha(min(first("d", 1.0), 1.0 - first("tr", 0.0))) if "map_d" in entries else None
     is_metal = first("pm", 0.0) >= 0.5 or model in (3.0, 5.0)
-    if is_metal and first("pr", 0.0) <= MIRROR_ROUGHNESS:
-        return MeshMaterial("mirror", colour, alpha=alpha)
+    if is_metal:
+        roughness = _share(first("pr", 0.0))
+        emission = _colour(entries.get("ke"), _DARK) if roughness > MIRROR_ROUGHNESS else _DARK
+        return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=roughness)
     return MeshMaterial("diffuse", colour, emission=_colour(entries.get("ke"), _DARK), alpha=alpha)
 
 
@@ -167,7 +189,7 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     found = [
         (lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in ("baseColorTexture", "diffuseTexture")
     ]
-    if any(_colour(material.get("emissiveFactor"), _DARK)) and kind != "diffuse":
+    if any(_colour(material.get("emissiveFactor"), _DARK)) and not _is_lit(from_gltf(material)):
         found.append((lost.EMISSION, 1))
     transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
     metallic, roughness = _number(surface.get("metallicFactor"), 1.0), _number(surface.get("roughnessFactor"), 1.0)
@@ -175,8 +197,7 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         found.append((lost.PARTLY_GLASS, 1))
     elif 0.0 < metallic < 1.0:
         found.append((lost.PARTLY_METAL, 1))
-    is_metal = metallic >= 0.5 and "metallicRoughnessTexture" not in surface and transmission <= 0.5
-    return [*found, *_roughness_losses(kind, roughness, is_metal)]
+    return [*found, *_roughness_losses(kind, roughness)]
 
 
 def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
@@ -192,7 +213,7 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         or key in ("bump", "disp", "decal", "refl", "norm")
     ]
     found = [(lost.TEXTURE_OBJ, len(maps))]
-    if any(_colour(entries.get("ke"), _DARK)) and kind != "diffuse":
+    if any(_colour(entries.get("ke"), _DARK)) and not _is_lit(from_mtl(entries)):
         found.append((lost.EMISSION, 1))
     opacity = min(first("d", 1.0), 1.0 - first("tr", 0.0))
     if 0.0 < opacity < 1.0 and "tf" not in entries:
@@ -200,19 +221,20 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     if kind == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
         found.append((lost.HIGHLIGHTS, 1))
     if "pr" in entries:
-        is_metal = first("pm", 0.0) >= 0.5 or first("illum", 2.0) in (3.0, 5.0)
-        found += _roughness_losses(kind, first("pr", 0.0), is_metal)
+        found += _roughness_losses(kind, first("pr", 0.0))
     return found
 
 
-def _roughness_losses(kind: str, roughness: float, is_metal: bool) -> list[tuple[Loss, int]]:
-    if kind == "diffuse" and is_metal:
-        return [(lost.ROUGH_METAL, 1)]
+def _is_lit(material: MeshMaterial) -> bool:
+    """Whether the lights are seen on a surface, and its emission with them."""
+    return material.kind == "diffuse" or material.roughness > MIRROR_ROUGHNESS
+
+
+def _roughness_losses(kind: str, roughness: float) -> list[tuple[Loss, int]]:
+    """Without those of mirrors, which depend on the scene: `colonnade.mesh.palette.with_rendered_metal`."""
     if kind == "diffuse":
         return [(lost.HIGHLIGHTS, 1)] if roughness < _GLOSSY else []
-    if roughness <= _SMOOTH:
-        return []
-    return [(lost.ROUGH_MIRROR if kind == "mirror" else lost.ROUGH_GLASS, 1)]
+    return [(lost.ROUGH_GLASS, 1)] if kind == "glass" and roughness > SMOOTH_ROUGHNESS else []
 
 
 def unused_extensions(material: Mapping[str, Any]) -> list[str]:
@@ -223,6 +245,10 @@ def unused_extensions(material: Mapping[str, Any]) -> list[str]:
 def _ior(value: float) -> float:
     """Replace values up to 1, which exporters write for an unknown index, by the default."""
     return min(value, 4.0) if value > 1.0 else GLASS_IOR
+
+
+def _share(value: float) -> float:
+    return min(max(value, 0.0), 1.0)
 
 
 def _number(value: Any, default: float) -> float:

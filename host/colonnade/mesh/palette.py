@@ -13,7 +13,7 @@ from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.materials import SMOOTH_ROUGHNESS, MeshMaterial, as_rendered
 from colonnade.mesh.mesh import Mesh
 
 #: Limit of the 8-bit material index of a face.
@@ -153,6 +153,19 @@ def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:
         return material
     red, green, blue = (mesh.textures[material.texture].mean * material.albedo).tolist()
     return replace(material, albedo=(red, green, blue), texture=None)
+
+
+def with_rendered_metal(mesh: Mesh, gathers: bool) -> tuple[Mesh, tuple[str, ...]]:
+    """A mesh whose rough metal is as the device shows it (`as_rendered`), and lines on what that leaves out."""
+    found = Losses()
+    for material in mesh.materials:
+        rendered = as_rendered(material, gathers)
+        if rendered.kind != material.kind:
+            found.add(lost.ROUGH_METAL)
+        elif rendered.roughness == 0.0 and material.roughness > SMOOTH_ROUGHNESS:
+            found.add(lost.ROUGH_MIRROR)
+    materials = tuple(as_rendered(material, gathers) for material in mesh.materials)
+    return replace(mesh, materials=materials), found.lines(f"mesh {mesh.name}")
 
 
 def without_emission(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:

@@ -53,7 +53,7 @@ def bounce(
     cosine = -_dot(normals, directions)
     at_normal = ((ior - 1) / (ior + 1)) ** 2
     schlick = at_normal + (1 - at_normal) * (1 - cosine.clip(0, 1)) ** 5
-    return Bounces(scattered, refracted, _reflect(normals, directions), np.where(refracted & front, schlick, 0.0))
+    return Bounces(scattered, refracted, reflect(normals, directions), np.where(refracted & front, schlick, 0.0))
 
 
 def _scatter(
@@ -65,10 +65,11 @@ def _scatter(
     refracted = glass & (discriminant >= 0) & (cosine > 0)
     normal_scale = eta * cosine - np.sqrt(discriminant.clip(min=0))
     transmitted = unit_vectors(eta[:, None] * directions + normal_scale[:, None] * normals)
-    return np.where(refracted[:, None], transmitted, _reflect(normals, directions)), refracted
+    return np.where(refracted[:, None], transmitted, reflect(normals, directions)), refracted
 
 
-def _reflect(normals: Floats, directions: Floats) -> Floats:
+def reflect(normals: Floats, directions: Floats) -> Floats:
+    """Directions of mirrored rays, unit, float64 [n, 3]; unit normals and directions."""
     return unit_vectors(directions - 2 * _dot(normals, directions)[:, None] * normals)
 
 

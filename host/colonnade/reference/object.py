@@ -46,7 +46,14 @@ class ObjectPoints:
 
 
 class PlacedObject:
-    """A mesh with the materials of a view."""
+    """A mesh with the materials of a view.
+
+    Attributes:
+        tracer: Of its triangles.
+        kinds: Of each face: `DIFFUSE` (also rough metal), `MIRROR` or `GLASS`, int64 [faces].
+        alpha: Of each face of rough metal the square of its roughness, else 0, float64 [faces].
+        ior: Of each face, float64 [faces].
+    """
 
     def __init__(self, mesh: Mesh, view: View) -> None:
         self._mesh, self._flat = mesh, view.flat
@@ -58,6 +65,8 @@ class PlacedObject:
         self._has_colours = np.array([material.has_corner_colours for material in view.materials])[index]
         textures = [-1 if material.texture is None else material.texture for material in view.materials]
         self._textures = np.array(textures)[index]
+        self.alpha: Floats = np.array([material.roughness**2 for material in view.materials])[index]
+        self.kinds = np.where(self.alpha > 0, DIFFUSE, self.kinds)
         self.ior: Floats = np.array([material.ior for material in view.materials])[index]
         is_glass = self.kinds == GLASS
         self._transmittance = view.shadow_transmittance

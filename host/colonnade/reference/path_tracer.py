@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.environment.lights import MAX_FALLOFF
-from colonnade.reference.bounce import bounce
+from colonnade.reference.bounce import bounce, reflect
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints, SurfaceHits
 from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, PlacedObject
-from colonnade.reference.scatter import Bytes, cosine_directions, sphere_points
+from colonnade.reference.scatter import Bytes, gathered_directions, lobe_shares, sphere_points
 
 if TYPE_CHECKING:
     from colonnade.scene.view import View
@@ -98,7 +98,9 @@ class PathTracer:
             hits = self._object.points(hit_faces, ray_origins, ray_directions)
             is_diffuse = self._object.kinds[hit_faces] == DIFFUSE
             diffuse, specular = np.flatnonzero(is_diffuse), np.flatnonzero(~is_diffuse)
-            gathered = self._gathered_rays(path[diffuse], _select(hits, diffuse), words, state)
+            gathered = self._gathered_rays(
+                path[diffuse], hit_faces[diffuse], _select(hits, diffuse), ray_directions[diffuse], words, state
+            )
             reflected = self._next_rays(
                 path[specular],
                 hit_faces[specular],
@@ -136,29 +138,40 @@ class PathTracer:
             state.radiance[path] += state.weight[path] * self._view.gather.cube.radiance(directions)
 
     def _gathered_rays(
-        self, path: Indices, points: ObjectPoints, words: Bytes, state: _PathState
+        self, path: Indices, faces: Indices, points: ObjectPoints, rays: Floats, words: Bytes, state: _PathState
     ) -> tuple[Floats, Floats, Indices]:
-        """Add the light of diffuse surfaces; origins, directions and first faces of gathered rays, `_END` for none."""
+        """Add the light of diffuse surfaces and rough metal; origins, directions and first faces of gathered rays.
+
+        The face is `_END` where there is none.
+
+        Args:
+            path: Index of each path, int64 [n].
+            faces: That the paths have hit, int64 [n].
+            points: Of the hits.
+            rays: Directions in which the paths came, of any length, float64 [n, 3].
+            words: As in `trace`.
+            state: Of all paths; changed.
+        """
         gather = self._view.gather
         goes_on = np.zeros(len(path), dtype=np.bool_) if gather is None else state.gathered[path] < gather.bounces
+        alpha = np.where(goes_on, self._object.alpha[faces], 0.0)
+        axes = np.where((alpha > 0)[:, None], reflect(points.normals, unit_vectors(rays)), points.normals)
         # Shadow rays start slightly above the visible side of the surface.
         origins = points.position + self._object.tracer.offset * points.facing
-        irradiance, _ = self._irradiance(origins, points.normals, self._view.shadows)
+        irradiance, _ = self._irradiance(origins, axes, self._view.shadows, alpha)
         irradiance -= goes_on[:, None] * self._view.ambient
         state.radiance[path] += state.weight[path] * (points.albedo * irradiance + points.emission).clip(max=1.0)
-        directions, faces = np.zeros_like(origins), np.full(len(path), _END, dtype=np.int64)
+        directions, hit_faces = np.zeros_like(origins), np.full(len(path), _END, dtype=np.int64)
         rows = np.flatnonzero(goes_on)
         if gather is not None and len(rows):
             going = path[rows]
             sphere = sphere_points(words[going] ^ np.array(gather.points, np.uint8)[state.gathered[going]])
-            found = cosine_directions(points.normals[rows], sphere)
-            is_below = np.einsum("ni,ni->n", found, points.facing[rows]) < 0
-            directions[rows] = np.where(is_below[:, None], -found, found)
+            directions[rows] = gathered_directions(axes[rows], points.facing[rows], sphere, alpha[rows])
             state.weight[going] *= points.albedo[rows]
             state.gathered[going] += 1
             self.rays["gather"] += len(rows)
-            faces[rows] = self._first_hits(origins[rows], directions[rows])
-        return origins, directions, faces
+            hit_faces[rows] = self._first_hits(origins[rows], directions[rows])
+        return origins, directions, hit_faces
 
     def _next_rays(
         self,
@@ -259,13 +272,24 @@ class PathTracer:
         colours[known], _ = self._shade_background(_select(points, known), shadows)
         return colours, points.outside
 
-    def _irradiance(self, origins: Floats, normals: Floats, shadows: bool) -> tuple[Floats, Floats]:
-        """Irradiance of surfaces with and without the object's shadow, float64 [n, 3] each."""
+    def _irradiance(
+        self, origins: Floats, axes: Floats, shadows: bool, alpha: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Irradiance of surfaces with and without the object's shadow, float64 [n, 3] each.
+
+        Args:
+            origins: Of shadow rays, float64 [n, 3].
+            axes: Unit normals; for rough metal the directions in which a smooth mirror reflects, float64 [n, 3].
+            shadows: Trace shadow rays.
+            alpha: Of rough metal the square of its roughness, else 0, float64 [n]; None: of none.
+        """
+        alpha = np.zeros(len(origins)) if alpha is None else alpha
+        is_rough = alpha > 0
         shadowed = np.tile(self._view.ambient, (len(origins), 1))
         unshadowed = shadowed.copy()
         for light in self._view.lights:
             to_light = light.position - origins
-            cosine = np.einsum("ni,ni->n", normals, unit_vectors(to_light)).clip(min=0.0)
+            cosine = np.einsum("ni,ni->n", axes, unit_vectors(to_light)).clip(min=0.0)
             transmittance = np.ones(len(origins))
             if shadows:
                 lit = np.flatnonzero(cosine > 0)
@@ -273,6 +297,8 @@ class PathTracer:
                 enters, _ = self._object.tracer.enters_box(origins[lit], to_light[lit], t_max=1.0)
                 self.rays["in_box"] += int(np.count_nonzero(enters))
                 transmittance[lit] = self._object.light_transmittance(origins[lit], to_light[lit])
+            if is_rough.any():
+                cosine = np.where(is_rough, lobe_shares(cosine, alpha), cosine)
             if light.reach is not None:
                 squared = np.einsum("ni,ni->n", to_light, to_light)
                 falloff = np.divide(light.reach**2, squared, out=np.full(len(squared), MAX_FALLOFF), where=squared > 0)

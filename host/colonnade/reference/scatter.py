@@ -64,15 +64,34 @@ def sphere_points(words: Bytes) -> Floats:
     return np.stack([*across, z], axis=1)
 
 
-def cosine_directions(normals: Floats, points: Floats) -> Floats:
-    """Directions whose density is the cosine to a normal: the normal plus a point of the unit sphere.
+def gathered_directions(axes: Floats, facing: Floats, points: Floats, alpha: Floats) -> Floats:
+    """Directions of rays that gather light, of any length, float64 [n, 3].
+
+    At a diffuse surface their density is the cosine to the normal: the normal plus a point of the unit sphere. At rough
+    metal half their angle to the axis has the distribution of microfacets (Trowbridge and Reitz, GGX).
 
     Args:
-        normals: Unit, float64 [n, 3].
+        axes: Unit, float64 [n, 3]: shading normals of diffuse surfaces; directions that smooth mirrors reflect.
+        facing: Unit geometric normals that face the ray, float64 [n, 3]. A direction below is
+            negated, or lies on the other side of the lobe's axis.
         points: `sphere_points`, float64 [n, 3].
-
-    Returns:
-        Of any length, float64 [n, 3]; the normal where the sum is 0.
+        alpha: Of rough metal the square of its roughness, else 0, float64 [n].
     """
-    directions = normals + points
-    return np.where(np.abs(directions).max(axis=1, keepdims=True) < 1e-9, normals, directions)
+    lift = 1 - np.einsum("ni,ni->n", points, axes)
+    of_metal = [(lift - alpha**2 * (2 - lift))[:, None] * axes, 2 * alpha[:, None] * np.cross(points, axes)]
+    along, across = np.where((alpha > 0)[:, None], of_metal, [axes, points])
+    is_below = np.einsum("ni,ni->n", along + across, facing) < 0
+    directions = np.where(
+        is_below[:, None], np.where((alpha > 0)[:, None], along - across, -along - across), along + across
+    )
+    return np.where(np.abs(directions).max(axis=1, keepdims=True) < 1e-9, axes, directions)
+
+
+def lobe_shares(cosines: Floats, alpha: Floats) -> Floats:
+    """How brightly rough metal shows a light, as a multiple of what a diffuse surface shows that faces it, float64 [n].
+
+    Args:
+        cosines: Of the angle between the light and the direction that a smooth mirror reflects, float64 [n].
+        alpha: Squares of the roughness, float64 [n].
+    """
+    return np.where(cosines > 0, (alpha / (1 - cosines + alpha**2 * (1 + cosines))) ** 2, 0.0)

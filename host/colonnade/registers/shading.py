@@ -14,6 +14,10 @@ from colonnade.scene_image.header import ImageHeader
 
 CHANNELS = "rgb"
 KINDS = {"diffuse": 0, "mirror": 1, "glass": 2}
+#: A mirror with a roughness.
+ROUGH_METAL = 3
+#: Units of the width of reflections, of their slope and of the logarithm of their peak (docs/gather.md).
+ALPHA_UNIT, SLOPE_UNIT, OCTAVE = 256, 64, 128
 
 #: Largest index of refraction whose square fits its register.
 MAX_IOR = 2.8
@@ -79,7 +83,7 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
         if manifest.texture is not None:
             result[f"materials[{index}].hasTexture"] = int(material.texture is not None)
         if manifest.emission:
-            emission = np.array(material.emission) * (material.kind == "diffuse")
+            emission = np.array(material.emission) * (material.kind == "diffuse" or material.roughness > 0)
             result |= _colour(f"materials[{index}].emission", emission * white, white)
     if manifest.gathers:
         points = () if view.gather is None else view.gather.points
@@ -96,7 +100,12 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
 
 
 def _kind(name: str, material: MeshMaterial, fraction: int, one: int) -> dict[str, int]:
-    result = {f"{name}.kind": KINDS[material.kind]}
+    result = {f"{name}.kind": ROUGH_METAL if material.roughness > 0 else KINDS[material.kind]}
+    if material.roughness > 0:
+        alpha = min(max(round(ALPHA_UNIT * material.roughness**2), 1), ALPHA_UNIT - 1) / ALPHA_UNIT
+        result[f"{name}.lobe.alpha"] = round(ALPHA_UNIT * alpha)
+        result[f"{name}.lobe.slope"] = round(SLOPE_UNIT * (1 - alpha**2) / (2 * alpha**2))
+        result[f"{name}.lobe.peak"] = round(-2 * OCTAVE * np.log2(alpha))
     if material.kind == "glass":
         normal_reflectance = ((material.ior - 1) / (material.ior + 1)) ** 2
         result[f"{name}.etaFront"] = round(2**fraction / material.ior)

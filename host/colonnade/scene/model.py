@@ -187,18 +187,22 @@ class Material:
         kind: diffuse, mirror or glass.
         albedo: Diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
+        roughness: Of a mirror, 0 to 1.
         flat: Use geometric normals instead of smooth ones.
     """
 
     kind: Kind | None = None
     albedo: _Colour | None = None
     ior: Annotated[_Float, Interval(ge=1.0, le=4.0)] | None = None
+    roughness: Annotated[_Float, Interval(ge=0.0, le=1.0)] | None = None
     flat: StrictBool = False
 
     @model_validator(mode="after")
-    def _ior_is_of_glass(self) -> Self:
+    def _values_are_of_the_kind(self) -> Self:
         if self.ior is not None and self.kind not in (None, "glass"):
             raise ValueError(f"material.ior is for glass, not for a {self.kind} material")
+        if self.roughness is not None and self.kind not in (None, "mirror"):
+            raise ValueError(f"material.roughness is for a mirror, not for a {self.kind} material")
         return self
 
 

@@ -12,6 +12,7 @@ from colonnade.mesh.palette import (
     table_entries,
     with_corner_albedo,
     with_face_colours,
+    with_rendered_metal,
     without_emission,
     without_textures,
 )
@@ -70,6 +71,8 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     Of more colours than the material table holds, after the scene's values have overridden those of the mesh, plain
     ones move to the corners of faces, or else similar ones are merged.
     """
+    mesh, lines = with_rendered_metal(mesh, scene.paths.gather > 0)
+    notes.report(lines)
     if not features.textures:
         mesh, lines = without_textures(mesh)
         notes.report(lines)

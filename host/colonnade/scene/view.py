@@ -13,7 +13,7 @@ import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
-from colonnade.mesh.materials import PLAIN, MeshMaterial
+from colonnade.mesh.materials import PLAIN, MeshMaterial, as_rendered
 from colonnade.mesh.mesh import Extent
 from colonnade.scene.cameras import (
     WorldCamera,
@@ -198,7 +198,10 @@ def make_view(
             )
             for light in placed.lights
         ),
-        materials=_dimmed(with_overrides(materials, scene.material), scene.headroom),
+        materials=_dimmed(
+            tuple(as_rendered(one, scene.paths.gather > 0) for one in with_overrides(materials, scene.material)),
+            scene.headroom,
+        ),
         ambient=np.array(scene.ambient.colour) * scene.headroom,
         background=np.array(scene.background.colour),
         flat=scene.material.flat,
@@ -219,7 +222,9 @@ def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tu
 
     An albedo replaces corner colours and textures too.
     """
-    given = {key: value for key in ("kind", "albedo", "ior") if (value := getattr(overrides, key)) is not None}
+    given = {
+        key: value for key in ("kind", "albedo", "ior", "roughness") if (value := getattr(overrides, key)) is not None
+    }
     if "albedo" in given:
         given |= {"has_corner_colours": False, "texture": None}
     return tuple(replace(material, **given) for material in materials)

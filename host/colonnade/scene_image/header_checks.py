@@ -55,6 +55,7 @@ def check_header(header: Any) -> None:
         _number(material["ior"])
         _require(isinstance(material["has_corner_colours"], bool))
         _numbers(material["emission"], 3)
+        _number(material.get("roughness", 0.0))
         if material["texture"] is not None:
             _count(material["texture"])
     for part in _list(header["parts"]):

@@ -97,19 +97,21 @@ public:
             const Surface surface = surfaceOf(ray, hit, *face, numbers_);
             const Material& material = frame_.lighting.materialOf(*face);
             const Colour albedo = albedoOf(material, hit, *face);
-            if (material.kind != MaterialKind::diffuse) {
+            if (material.kind == MaterialKind::mirror || material.kind == MaterialKind::glass) {
                 if (!continuePath(surface, material, albedo, path, request)) return finish(pixel, path, lightBehind(path, request));
                 continue;
             }
             const bool gathers = path.gathered < frame_.gather.bounces;
-            const Colour colour = emitted(material, light(surface, albedo, !gathers));
+            const Lobe* const lobe = gathers && material.kind == MaterialKind::roughMetal ? &material.lobe : nullptr;
+            const WideVector normal = shadingNormal(surface, frame_.lighting.flat), axis = lobe ? lobeAxis(normal, surface.dir, numbers_) : normal;
+            const Colour colour = emitted(material, light(surface, axis, lobe, albedo, !gathers));
             if (!gathers) return finish(pixel, path, colour);
             for (int channel = 0; channel < 3; ++channel) {
                 std::int64_t& throughput = path.throughput[channel];
                 path.radiance[channel] = std::min(white(), path.radiance[channel] + ((throughput * colour[channel]) >> numbers_.lightFraction));
                 throughput = (throughput * tintOf(albedo[channel])) >> numbers_.lightFraction;
             }
-            const Vector direction = gatherDirection(shadingNormal(surface, frame_.lighting.flat), surface.faceForwardNormal, frame_.gather.points[path.gathered] ^ pixelPoint(x, y), numbers_);
+            const Vector direction = gatherDirection(axis, surface.faceForwardNormal, frame_.gather.points[path.gathered] ^ pixelPoint(x, y), lobe, numbers_);
             request = {offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_), {direction[0], direction[1], direction[2]}, numbers_.unlimited(), ~std::uint64_t(0)};
             ++path.gathered;
             ++counters.raysGather;
@@ -147,12 +149,12 @@ private:
         Colour unoccluded, visible;
     };
 
-    Incoming incoming(const WideVector& origin, const WideVector& normal, bool shadows, bool isAmbient = true) {
+    Incoming incoming(const WideVector& origin, const WideVector& normal, bool shadows, bool isAmbient = true, const Lobe* lobe = nullptr) {
         const Lighting& lighting = frame_.lighting;
         const Colour ambient = isAmbient ? lighting.ambient : Colour{};
         Incoming result{ambient, ambient};
         for (const Light& source : lighting.lights) {
-            const Illumination illumination = illuminate(origin, normal, source, lighting.shadows && shadows, numbers_);
+            const Illumination illumination = illuminate(origin, normal, source, lighting.shadows && shadows, numbers_, lobe);
             Occlusion occluder = Occlusion::none;
             if (illumination.needsShadowRay) {
                 ++counters.raysShadow;
@@ -180,9 +182,10 @@ private:
         return colour;
     }
 
-    Colour light(const Surface& surface, const Colour& albedo, bool isAmbient) {
+    /// The light that a surface reflects: a diffuse one about its normal, a rough metal about the axis of its lobe.
+    Colour light(const Surface& surface, const WideVector& axis, const Lobe* lobe, const Colour& albedo, bool isAmbient) {
         const WideVector origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
-        return reflectedBy(albedo, incoming(origin, shadingNormal(surface, frame_.lighting.flat), true, isAmbient).visible);
+        return reflectedBy(albedo, incoming(origin, axis, true, isAmbient, lobe).visible);
     }
 
     /// Incoming light at a point of the environment; `normal` has 11 fraction bits.

@@ -1,7 +1,5 @@
 // Gathered rays: their sample points and directions, and the light that they meet (docs/gather.md).
 #pragma once
-#include <cmath>
-
 #include "shading.hpp"
 
 namespace colonnade {
@@ -73,21 +71,55 @@ inline Vector spherePoint(const SamplePoint& point) {
     return result;
 }
 
-/// The direction of the ray that gathers light at a surface: n + |n| · s, for a normal of any length; negated if it points below the surface.
-/// It is never zero.
-inline Vector gatherDirection(const WideVector& about, const Vector& faceForwardNormal, const SamplePoint& point, const Numbers& n) {
-    Vector normal;
+/// The direction in which a smooth mirror would reflect a ray, the axis of a rough one's lobe; its largest component has `shadeBits` bits.
+inline WideVector lobeAxis(const WideVector& about, const Vector& dir, const Numbers& n) {
+    Vector normal, ray, reflection;
     blockNormalise(about, n.shadeBits, normal);
+    for (int a = 0; a < 3; ++a) {
+        normal[a] = floorShift(normal[a], n.shadeBits - 12);
+        ray[a] = floorShift(dir[a], n.shadeBits - 12);
+    }
+    const Wide square = dot(normal, normal), against = std::max<Wide>(0, -dot(normal, ray));
+    const int drop = bitLength(square) - 12;
+    const std::int64_t length = static_cast<std::int64_t>(floorShift(square, drop)), along = static_cast<std::int64_t>(floorShift(against, drop));
+    WideVector sum;
+    for (int a = 0; a < 3; ++a) sum[a] = length * ray[a] + 2 * along * normal[a];
+    blockNormalise(sum, n.shadeBits, reflection);
+    return {reflection[0], reflection[1], reflection[2]};
+}
+
+/// The direction of the ray that gathers light at a surface, about an axis of any length: n + |n| · s at a diffuse one, about its normal; for a rough
+/// metal a ray of its lobe. One that points below the surface is negated, or lies on the other side of the lobe's axis. It is never zero.
+inline Vector gatherDirection(const WideVector& about, const Vector& faceForwardNormal, const SamplePoint& point, const Lobe* lobe, const Numbers& n) {
+    Vector scaled, axis;
+    blockNormalise(about, n.shadeBits, scaled);
+    for (int a = 0; a < 3; ++a) axis[a] = floorShift(scaled[a], n.shadeBits - 11);
     const Vector sphere = spherePoint(point);
-    const auto length = static_cast<std::int64_t>(squareRoot(static_cast<std::uint64_t>(floorShift(dot(normal, normal), 2 * n.shadeBits + 2 - 24))));
+    const auto length = static_cast<std::int64_t>(squareRoot(static_cast<std::uint64_t>(floorShift(dot(scaled, scaled), 2 * n.shadeBits + 2 - 22))));
+    Vector along, across;
+    if (lobe) {
+        const auto lift = static_cast<std::int64_t>(floorShift(dot(sphere, axis) + 256, 9));
+        const std::int64_t lowered = floorShift(lobe->alpha * floorShift(lobe->alpha * std::max<std::int64_t>(0, length + lift), 8), 8);
+        const std::int64_t scaleAlong = length - lift - lowered, scaleAcross = floorShift(lobe->alpha * length + 64, 7);
+        for (int a = 0; a < 3; ++a) {
+            const int b = (a + 1) % 3, c = (a + 2) % 3;
+            along[a] = scaleAlong * axis[a];
+            across[a] = scaleAcross * floorShift(sphere[b] * axis[c] - sphere[c] * axis[b], 8);
+        }
+    } else {
+        for (int a = 0; a < 3; ++a) {
+            along[a] = axis[a] << 10;
+            across[a] = length * sphere[a] << 3;
+        }
+    }
     Vector direction;
     Wide side = 0;
     for (int a = 0; a < 3; ++a) {
-        direction[a] = floorShift(length * sphere[a] + (floorShift(normal[a], n.shadeBits - 12) << 7), 4);
-        side += floorShift(direction[a], 8) * floorShift(faceForwardNormal[a], 4);
+        direction[a] = floorShift(along[a] + across[a], 11);
+        side += floorShift(direction[a], 2) * floorShift(faceForwardNormal[a], 4);
     }
     if (side < 0)
-        for (std::int64_t& component : direction) component = -component;
+        for (int a = 0; a < 3; ++a) direction[a] = lobe ? floorShift(along[a] - across[a], 11) : -direction[a];
     direction[2] |= 1;
     return direction;
 }

@@ -78,7 +78,8 @@ struct Frame {
             const std::string name = entry("materials", i);
             lighting.materials.push_back({vector(name + "albedo", "rgb"), takeIfThere(name + "hasCornerColours") != 0, takeIfThere(name + "hasTexture") != 0,
                                           registers.count(name + "emission.r") ? vector(name + "emission", "rgb") : Vector{}, static_cast<MaterialKind>(takeIfThere(name + "kind")),
-                                          {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")}, takeIfThere(name + "reflectance")});
+                                          {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")}, takeIfThere(name + "reflectance"),
+                                          {takeIfThere(name + "lobe.alpha"), takeIfThere(name + "lobe.slope"), takeIfThere(name + "lobe.peak")}});
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));
         triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));

@@ -1,5 +1,7 @@
 // Surfaces and lights (docs/numbers.md, section 5).
 #pragma once
+#include <cmath>
+
 #include "traversal.hpp"
 
 namespace colonnade {
@@ -7,7 +9,12 @@ namespace colonnade {
 using Colour = std::array<std::int64_t, 3>;
 
 /// How a surface continues a path.
-enum class MaterialKind : std::uint8_t { diffuse = 0, mirror = 1, glass = 2 };
+enum class MaterialKind : std::uint8_t { diffuse = 0, mirror = 1, glass = 2, roughMetal = 3 };
+
+/// How wide and how bright a rough metal spreads its reflections (docs/gather.md): `alpha` has 8 fraction bits, `slope` 6, `peak` is a logarithm.
+struct Lobe {
+    std::int64_t alpha, slope, peak;
+};
 
 /// A material. `eta` is the relative index of refraction on the front and the back side; `reflectance` is at normal incidence, 12 fraction bits.
 struct Material {
@@ -21,6 +28,7 @@ struct Material {
     MaterialKind kind;
     std::array<std::int64_t, 2> eta;
     std::int64_t reflectance;
+    Lobe lobe;
 };
 
 /// A point light. With `reachMantissa` = 0 its intensity is constant. Otherwise it has its colour where the squared distance is
@@ -140,8 +148,30 @@ inline WideVector shadingNormal(const Surface& surface, bool flat) {
     return flat || isZero(surface.smooth) ? WideVector{surface.faceForwardNormal[0], surface.faceForwardNormal[1], surface.faceForwardNormal[2]} : surface.smooth;
 }
 
-/// Illumination by one light at `origin` (off the surface), for a normal of any length.
-inline Illumination illuminate(const WideVector& origin, const WideVector& normal, const Light& light, bool shadows, const Numbers& n) {
+/// How brightly a rough metal shows a light at an angle to its axis, as a multiple of `cosineFraction` fraction bits.
+inline std::int64_t lobeShare(std::int64_t cosine, const Lobe& lobe, const Numbers& n) {
+    static const auto logarithms = [] {
+        std::array<std::int64_t, 128> table;
+        for (std::size_t i = 0; i < table.size(); ++i) table[i] = std::lrint(128 * std::log2(1 + (static_cast<double>(i) + 0.5) / 128));
+        return table;
+    }();
+    static const auto powers = [] {
+        std::array<std::int64_t, 128> table;
+        for (std::size_t i = 0; i < table.size(); ++i) table[i] = std::lrint(256 * std::exp2(static_cast<double>(i) / 128));
+        return table;
+    }();
+    const int fraction = n.cosineFraction, slopeFraction = 6;
+    const std::int64_t one = std::int64_t(1) << fraction;
+    const Normalised length = normalise(static_cast<UnsignedWide>((one << slopeFraction) + lobe.slope * (one - cosine)), 8);
+    const std::int64_t octaves = length.exponent - (fraction + slopeFraction + 1);
+    const std::int64_t logarithm = lobe.peak - 2 * 128 - 2 * (128 * octaves + logarithms[length.mantissa & 127]);
+    const int exponent = static_cast<int>(floorShift(logarithm, 7));
+    const std::int64_t most = (one << 6) - 1;
+    return exponent > 5 ? most : floorShift(powers[static_cast<std::size_t>(logarithm & 127)], 8 - fraction - exponent);
+}
+
+/// Illumination by one light at `origin` (off the surface), for a normal of any length; at a rough metal for the axis of its lobe.
+inline Illumination illuminate(const WideVector& origin, const WideVector& normal, const Light& light, bool shadows, const Numbers& n, const Lobe* lobe = nullptr) {
     WideVector toLight;
     for (int a = 0; a < 3; ++a) toLight[a] = light.position[a] - origin[a];
     Vector shadingNormal, shadingLight;
@@ -149,6 +179,7 @@ inline Illumination illuminate(const WideVector& origin, const WideVector& norma
     const int shift = blockNormalise(toLight, n.shadeBits, shadingLight);
     const Wide facingLight = dot(shadingNormal, shadingLight), ll = dot(shadingLight, shadingLight);
     std::int64_t cosine = cosineOf(facingLight, dot(shadingNormal, shadingNormal), ll, n);
+    if (lobe) cosine = facingLight > 0 ? lobeShare(cosine, *lobe, n) : 0;
     if (light.reachMantissa != 0 && cosine != 0) {
         const Normalised square = normalise(ll, n.shadeBits), divisor = normalise(square.mantissa, n.mantissaBits);
         const int exponent = n.mantissaBits + light.reachExponent - square.exponent - 2 * shift;
@@ -157,6 +188,8 @@ inline Illumination illuminate(const WideVector& origin, const WideVector& norma
         const std::int64_t falloff = exponent > 3 ? maximum : static_cast<std::int64_t>(std::min<Wide>(maximum, floorShift<Wide>(quotient, n.cosineFraction - n.lightFraction - exponent)));
         cosine = (cosine * falloff) >> n.lightFraction;
     }
+    // The brightest that the product of a cosine and a falloff may be
+    cosine = std::min(cosine, (std::int64_t(16) << n.cosineFraction) - 1);
     Illumination result{};
     const std::int64_t maxLight = (std::int64_t(1) << n.lightBits) - 1;
     for (int channel = 0; channel < 3; ++channel)

@@ -45,10 +45,12 @@ def with_cube(image: SceneImage, seed: int) -> SceneImage:
 
 
 def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, int]:
-    """Registers with random sample points."""
+    """Registers with random sample points; material 3 is rough metal."""
     drawn = np.random.default_rng(seed).integers(0, 256, (4, 2))
     points = {f"gather.points[{i}].{axis}": int(drawn[i, a]) for i in range(4) for a, axis in enumerate("uv")}
-    return registers | points | {"gather.bounces": bounces}
+    rough = {"kind": 3, "lobe.alpha": 52, "lobe.slope": 743, "lobe.peak": 589}
+    metal = {f"materials[3].{name}": value for name, value in rough.items()}
+    return registers | points | metal | {"gather.bounces": bounces}
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
@@ -67,10 +69,11 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
     mesh = load_mesh("teapot:4")
     placed = replace(SCENE, placement=Placement((322.0, 306.0), 0.58), background=Background(room=ROOMS / "living"))
     scene, held = (placed, EncodedEnvironment.load(ROOMS / "living", design.manifest)) if in_room else (SCENE, None)
-    # Faces of three materials beside each other, so that rays go from one to the other
-    parts = np.arange(len(mesh.faces)) % 3
-    mesh = replace(mesh, face_materials=parts.astype(mesh.face_materials.dtype), materials=3 * mesh.materials[:1])
+    # Faces of four materials beside each other, so that rays go from one to the other
+    parts = np.arange(len(mesh.faces)) % 4
+    mesh = replace(mesh, face_materials=parts.astype(mesh.face_materials.dtype), materials=4 * mesh.materials[:1])
     kinds = [Material(kind="diffuse", albedo=(1.0, 0.7, 0.4)), Material(kind="mirror"), Material(kind="glass")]
+    kinds.append(Material(kind="diffuse", albedo=(0.9, 0.6, 0.3)))
     materials = tuple(with_overrides(mesh.materials[:1], kind)[0] for kind in kinds)
     image = with_cube(pack(replace(mesh, materials=materials), design.manifest, materials), 5)
     if held is not None:

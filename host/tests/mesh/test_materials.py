@@ -21,7 +21,7 @@ def test_gltf_materials() -> None:
     assert (
         from_gltf({"pbrMetallicRoughness": surface | {"metallicFactor": 0.5, "roughnessFactor": 0.2}}).kind == "mirror"
     )
-    assert from_gltf({"pbrMetallicRoughness": {}}).kind == "diffuse"  # glTF is rough metal by default
+    assert from_gltf({"pbrMetallicRoughness": {}}) == MeshMaterial("mirror", (1.0, 1.0, 1.0), roughness=1.0)
     assert from_gltf({}).kind == "diffuse"
     textured = surface | {"metallicFactor": 1.0, "metallicRoughnessTexture": {"index": 0}}
     assert from_gltf({"pbrMetallicRoughness": textured}).kind == "diffuse"

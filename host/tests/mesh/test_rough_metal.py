@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from colonnade.mesh.materials import MIRROR_ROUGHNESS, from_gltf, from_mtl
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import MIRROR_ROUGHNESS, SHARP_ROUGHNESS, MeshMaterial, as_rendered, from_gltf, from_mtl
+from colonnade.mesh.palette import with_rendered_metal
 
 ROUGHNESS = np.arange(0.1, 0.75, 0.05)
 
@@ -67,9 +71,24 @@ def test_a_metal_is_a_mirror_up_to_where_diffuse_is_nearer() -> None:
     assert abs(crossing - MIRROR_ROUGHNESS) < 0.05
 
 
-def test_rough_metal_is_diffuse_and_noted() -> None:
+def test_rough_metal_is_diffuse_without_gathered_light() -> None:
     for roughness, kind in ((0.0, "mirror"), (0.35, "mirror"), (0.36, "diffuse"), (1.0, "diffuse")):
         surface = {"baseColorFactor": [1.0, 0.8, 0.3, 1.0], "roughnessFactor": roughness}
         found = from_gltf({"pbrMetallicRoughness": surface})
-        assert (found.kind, found.albedo) == (kind, (1.0, 0.8, 0.3))
-        assert from_mtl({"pm": ["1"], "pr": [str(roughness)]}).kind == kind
+        assert found == MeshMaterial("mirror", (1.0, 0.8, 0.3), roughness=roughness)
+        assert from_mtl({"pm": ["1"], "pr": [str(roughness)]}).roughness == roughness
+        assert as_rendered(found, gathers=False) == MeshMaterial(kind, (1.0, 0.8, 0.3))
+        lobe = roughness if roughness > SHARP_ROUGHNESS else 0.0
+        assert as_rendered(found, gathers=True) == MeshMaterial("mirror", (1.0, 0.8, 0.3), roughness=lobe)
+
+
+def test_what_rough_metal_loses_is_named() -> None:
+    """Without gathered light all of it; with it the blur of nearly smooth mirrors."""
+    mesh = load_mesh("cube")
+    materials = (*(MeshMaterial("mirror", roughness=roughness) for roughness in (0.05, 0.2, 0.3, 0.5)), MeshMaterial())
+    mesh = replace(mesh, materials=materials)
+    sharp, diffuse = "slightly rough metals are a perfect mirror", "rough metal is diffuse"
+    assert [line.split(": ")[1] for line in with_rendered_metal(mesh, False)[1]] == [f"2 {sharp}", f"1 {diffuse}"]
+    assert [line.split(": ")[1] for line in with_rendered_metal(mesh, True)[1]] == [
+        "1 slightly rough metal is a perfect mirror"
+    ]

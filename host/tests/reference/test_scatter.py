@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colonnade.common.vectors import unit_vectors
-from colonnade.reference.scatter import COORDINATE_BITS, cosine_directions, pixel_words, sphere_points
+from colonnade.reference.scatter import COORDINATE_BITS, gathered_directions, lobe_shares, pixel_words, sphere_points
 
 EVERY = np.stack(np.meshgrid(np.arange(256), np.arange(256)), axis=-1).reshape(-1, 2).astype(np.uint8)
 
@@ -23,11 +23,32 @@ def test_points_lie_on_the_sphere_and_are_spread_evenly() -> None:
 @given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: max(map(abs, v)) > 0.1))
 def test_directions_have_the_cosine_as_their_density(normal: list[float]) -> None:
     unit = unit_vectors(np.array([normal]))
-    directions = unit_vectors(cosine_directions(np.repeat(unit, len(EVERY), axis=0), sphere_points(EVERY)))
+    normals, smooth = np.repeat(unit, len(EVERY), axis=0), np.zeros(len(EVERY))
+    directions = unit_vectors(gathered_directions(normals, normals, sphere_points(EVERY), smooth))
     cosine = directions @ unit[0]
     assert (cosine < 0).mean() < 0.001
     assert abs(cosine.mean() - 2 / 3) < 0.001
     assert abs((cosine**2).mean() - 1 / 2) < 0.001
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: max(map(abs, v)) > 0.1), st.floats(0.07, 0.6)
+)
+def test_lobes_have_the_angles_of_microfacets(axis: list[float], alpha: float) -> None:
+    """Quantiles of GGX; as bright as the lights that are sampled."""
+    axes = np.repeat(unit_vectors(np.array([axis])), len(EVERY), axis=0)
+    found = unit_vectors(
+        gathered_directions(axes, np.zeros_like(axes), sphere_points(EVERY), np.full(len(axes), alpha))
+    )
+    cosine = (found * axes).sum(axis=1)
+    half = np.sort(np.sqrt((1 + cosine) / 2))[::-1]
+    share = np.array([26, 64, 128, 192, 230]) / 256
+    quantiles = [half[rank - 256 : rank + 256].mean() for rank in (share * len(half)).astype(int)]
+    assert np.abs(quantiles - (1 + alpha**2 * share / (1 - share)) ** -0.5).max() < 0.002
+    # The share over pi is the density of directions: its integral is the number of them before the axis
+    x = np.linspace(0, 1, 100_001)
+    assert abs(2 * lobe_shares(x, np.full(len(x), alpha)).mean() - (cosine > 0).mean()) < 0.01
 
 
 @settings(max_examples=50, deadline=None)

@@ -68,9 +68,44 @@ object MaterialKind {
   def mirror: UInt  = 1.U(bits.W)
 
   /** Refracts, and reflects by Schlick's approximation. */
-  def glass: UInt = last.U(bits.W)
+  def glass: UInt = 2.U(bits.W)
 
-  val last: BigInt = 2
+  /** Where it gathers light, reflects it and the lights with a spread. Otherwise as a diffuse surface. */
+  def roughMetal: UInt = 3.U(bits.W)
+
+  /** The largest number of a kind. */
+  def last(gather: Boolean): BigInt = if (gather) 3 else 2
+
+  /** Whether the path goes on at once, without a look at the lights. */
+  def isSpecular(kind: UInt): Bool = kind === mirror || kind === glass
+}
+
+/** The spread of the reflections of rough metal: docs/gather.md. */
+final class Lobe extends Bundle {
+  val alpha = UInt(Lobe.alphaBits.W) // the square of the roughness
+  val slope = UInt(Lobe.slopeBits.W) // how fast it falls with the distance from its axis
+  val peak  = UInt(Lobe.peakBits.W)  // 1 / alpha², a logarithm
+}
+
+object Lobe {
+  val alphaBits:     Int = 8
+  val slopeFraction: Int = 6
+  val slopeBits:     Int = 13
+  val octaveLog:     Int = 7 // log2 of the steps of a logarithm in an octave
+  val peakBits:      Int = octaveLog + 4
+  val wholeBits:     Int = 6 // of a share of a light, without its fraction
+  val powerBits:     Int = 8 // fraction bits of a power
+
+  private val steps = 1 << octaveLog
+
+  /** By the bits below the leading one: the logarithm in the middle of their interval. */
+  val logarithms: Seq[Int] = Seq.tabulate(steps) { index =>
+    math.rint(steps * math.log(1 + (index + 0.5) / steps) / math.log(2)).toInt
+  }
+
+  /** By the fraction of a logarithm, from 1 to 2. */
+  val powers: Seq[Int] =
+    Seq.tabulate(steps)(index => math.rint((1 << powerBits) * math.pow(2, index.toDouble / steps)).toInt)
 }
 
 final class Material(config: ColonnadeConfig) extends Bundle {
@@ -99,4 +134,7 @@ final class Material(config: ColonnadeConfig) extends Bundle {
 
   /** Glass: reflectance at normal incidence. */
   val reflectance = ifBounces(FrameRegisters.weight)
+
+  /** Rough metal. */
+  val lobe = Option.when(config.frame.gather)(new Lobe)
 }

@@ -2,8 +2,8 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, PriorityEncoder, Reverse}
-import colonnade.common.ModuloSchedule
-import colonnade.common.ModuloSchedule.xyz
+import colonnade.common.ModuloSchedule.{interval, xyz}
+import colonnade.common.{ModuloSchedule, Timed}
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.Light
 import colonnade.numbers.{Normalise, Rounding}
@@ -21,15 +21,23 @@ final class AngleStageIO(config: PathConfig) extends Bundle {
   val light        = Input(UInt(log2Ceil(config.frame.lights.max(2)).W))
   val lightFalloff = Input(UInt(log2Ceil(config.frame.lights.max(2)).W))
 
-  /** From cycle 6 on, and from cycle 7 on. */
-  val origin = Input(SInt(ShaderFormats.originBits(config).W))
-  val normal = Input(SInt(formats.narrowBits.W))
+  val origin = Input(SInt(ShaderFormats.originBits(config).W)) // from cycle 6 on
+  val normal = Input(SInt(formats.narrowBits.W))               // from `AngleCycles.normal` on
 
-  /** In cycles 17 to 19, but the product of the lengths and their exponent in cycle 21, and the falloff in cycle 17. */
-  val angle   = Output(new Angle(formats))
-  val falloff = Output(new FalloffRequest(numbers))
+  /** From `AngleCycles.angle` on for three cycles, but the product of the lengths and their exponent in the fifth. */
+  val angle = Output(new Angle(formats))
 
-  val squaredNormal = Output(UInt(formats.dotBits.W)) // in cycle 16: n·n
+  val falloff       = Output(new FalloffRequest(numbers)) // in cycle 17
+  val squaredNormal = Output(UInt(formats.dotBits.W))     // in the cycle before the angle: n·n
+}
+
+/** Cycles of [[AngleStage]]. */
+final class AngleCycles(config: PathConfig) {
+  val normal:  Int = if (config.frame.gather) LobeAxisStage.axis0 else 7
+  val dot:     Int = normal.max(12)
+  val square:  Int = dot + 4
+  val angle:   Int = dot + 5
+  val lengths: Int = angle + 4
 }
 
 /** The vector from a point to a light, and its angle to the normal: docs/numbers.md, 5.4 to 5.6 and the product of 5.7. An
@@ -39,6 +47,7 @@ final class AngleStage(config: PathConfig) extends Module {
   private val numbers   = config.numbers
   private val formats   = new ShaderFormats(numbers)
   private val shadeBits = formats.shadeBits
+  private val cycles    = new AngleCycles(config)
 
   val io = IO(new AngleStageIO(config))
 
@@ -68,25 +77,34 @@ final class AngleStage(config: PathConfig) extends Module {
   }
 
   // Dot products
-  private val n               = delay(arriving(io.normal, xyz(7)), xyz(7), 5).at(xyz(12))
-  private val l               = light.at(xyz(12))
-  private val Seq(nn, nl, ll) = Seq((n, n), (n, l), (l, l)).map { case (left, right) =>
-    val product = latch(xyz(12))(left * right)
-    accumulate(xyz(13), product.at(xyz(13)).pad(formats.dotBits + 1))(_ + _)
-  }
-  private val Seq(ofNormal, ofLight) = Seq(nn, ll).map { sum =>
-    val (mantissa, exponent) = normalised(sum.at(16).asUInt)
-    (latch(16)(mantissa.zext), latch(16)(exponent))
-  }
-  private val normProduct = multiply(ofNormal._1, ofLight._1, 17)
-  private val exponent    = latch(19)(ofNormal._2.at(19) +& ofLight._2.at(19))
+  import cycles.{angle, dot, square}
 
-  io.squaredNormal := nn.at(16).asUInt(formats.dotBits - 1, 0)
+  private def sum(left: SInt, right: SInt, first: Int): Timed[SInt] = {
+    val product = latch(xyz(first))(left * right)
+    accumulate(xyz(first + 1), product.at(xyz(first + 1)).pad(formats.dotBits + 1))(_ + _)
+  }
+  private val n  = delay(arriving(io.normal, xyz(cycles.normal)), xyz(cycles.normal), dot - cycles.normal).at(xyz(dot))
+  private val l  = delay(light, xyz(12), dot - 12).at(xyz(dot))
+  private val nn = sum(n, n, dot)
+  private val nl = sum(n, l, dot)
+  private val ll = sum(light.at(xyz(12)), light.at(xyz(12)), 12)
 
-  io.angle.isAcute     := latch(16)(nl.at(16) > 0.S).at(17)
-  io.angle.dot         := latch(16)(nl.at(16).asUInt(formats.dotBits - 1, 0)).at(17)
-  io.angle.normProduct := normProduct.at(21).asUInt(formats.normProductBits - 1, 0)
-  io.angle.exponent    := exponent.at(21)
+  private def normalisedAt(sum: Timed[SInt], cycle: Int): (Timed[SInt], Timed[UInt]) = {
+    val (mantissa, exponent) = normalised(sum.at(cycle).asUInt)
+    (latch(cycle)(mantissa.zext), latch(cycle)(exponent))
+  }
+  private val ofNormal    = normalisedAt(nn, square)
+  private val ofLight     = normalisedAt(ll, 16)
+  private val lightLater  = delayed(ofLight._1, 17, angle)
+  private val normProduct = multiply(ofNormal._1, lightLater, angle)
+  private val exponent    = latch(angle + 2)(ofNormal._2.at(angle + 2) +& delayed(ofLight._2, 17, angle).at(angle + 2))
+
+  io.squaredNormal := nn.at(square).asUInt(formats.dotBits - 1, 0)
+
+  io.angle.isAcute     := latch(square)(nl.at(square) > 0.S).at(angle)
+  io.angle.dot         := latch(square)(nl.at(square).asUInt(formats.dotBits - 1, 0)).at(angle)
+  io.angle.normProduct := normProduct.at(cycles.lengths).asUInt(formats.normProductBits - 1, 0)
+  io.angle.exponent    := exponent.at(cycles.lengths)
 
   // The light's squared distance has 2 · shadeBits - 1 + exponent bits, after a left shift by twice the zeros
   private val scale       = 2 * (formats.toLightBits - 1 - shadeBits) + 2 * shadeBits - 1 - numbers.mantissaBits
@@ -95,6 +113,14 @@ final class AngleStage(config: PathConfig) extends Module {
   io.falloff.reference := reach.reachMantissa
   io.falloff.mantissa  := ofLight._1.at(17).asUInt(shadeBits - 1, 0)
   io.falloff.exponent  := reach.reachExponent -& squaredBits
+
+  /** A value that is there for an interval from a cycle on, from a later one on. */
+  private def delayed[T <: Data](value: Timed[T], from: Int, to: Int): Timed[T] =
+    if (from == to) value
+    else {
+      val step = (to - from).min(interval)
+      delayed(latch(from + step - 1)(value.at(from + step - 1)), from + step, to)
+    }
 
   /** A squared length as a mantissa and an exponent, see [[Angle]]: the highest bit is one of the top four. */
   private def normalised(sum: UInt): (UInt, UInt) = {

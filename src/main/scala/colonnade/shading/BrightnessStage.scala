@@ -1,16 +1,17 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.log2Ceil
+import chisel3.util.{log2Ceil, Cat}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.{ModuloSchedule, Timed}
 import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.formats.{FrameRegisters, Rgb}
+import colonnade.formats.{FrameRegisters, Lobe, Rgb}
 import colonnade.numbers.{Fixed, FoldedDivider, FoldedSquareRoot, Normalise, Rounding, SquareRoot}
 
 final class BrightnessStageIO(config: PathConfig) extends Bundle {
-  private val numbers = config.numbers
-  private val formats = new ShaderFormats(numbers)
+  private val numbers                                  = config.numbers
+  private val formats                                  = new ShaderFormats(numbers)
+  private def rough[T <: Data](field: => T): Option[T] = Option.when(config.frame.gather)(Input(field))
 
   val phase = Input(ModuloSchedule.phase())
 
@@ -20,18 +21,29 @@ final class BrightnessStageIO(config: PathConfig) extends Bundle {
 
   val colour = Input(Rgb(FrameRegisters.intensity))  // of the light, in three cycles from `BrightnessCycles.colour` on
   val direct = Output(Rgb(FrameRegisters.intensity)) // in the third cycle after
+
+  /** From `BrightnessCycles.cosine` on for three cycles: whether the surface is rough metal. One cycle later its slope, and
+    * eight cycles later its peak.
+    */
+  val isRough = rough(Bool())
+  val slope   = rough(UInt(Lobe.slopeBits.W))
+  val peak    = rough(UInt(Lobe.peakBits.W))
 }
 
 /** Cycles of [[BrightnessStage]]. */
-final class BrightnessCycles(numbers: NumberFormats) {
+final class BrightnessCycles(config: PathConfig) {
+  private val numbers = config.numbers
+
   val falloff:  Int = 17
-  val radicand: Int = 21
+  val angle:    Int = new AngleCycles(config).angle
+  val radicand: Int = new AngleCycles(config).lengths
   val root:     Int = radicand + 1 + interval * FoldedSquareRoot.intervals(numbers.radicandBits, interval)
 
   private val division = 1 + interval * FoldedDivider.intervals(numbers.cosineFraction, interval)
   val quotient:        Int = root + division
   val falloffQuotient: Int = falloff + division
-  val brightness:      Int = quotient + 1
+  val cosine:          Int = quotient + 1
+  val brightness:      Int = cosine + (if (config.frame.gather) LobeStage.latency else 0)
   val colour:          Int = brightness + interval + 1
   val direct:          Int = colour + 3
 }
@@ -42,7 +54,7 @@ final class BrightnessCycles(numbers: NumberFormats) {
 final class BrightnessStage(config: PathConfig) extends Module {
   private val numbers   = config.numbers
   private val formats   = new ShaderFormats(numbers)
-  private val cycles    = new BrightnessCycles(numbers)
+  private val cycles    = new BrightnessCycles(config)
   private val fraction  = numbers.cosineFraction
   private val shadeBits = formats.shadeBits
 
@@ -52,12 +64,13 @@ final class BrightnessStage(config: PathConfig) extends Module {
   import schedule._
 
   // The dot product with its top bit set
-  private val dot        = arriving(io.angle.dot, 17, 19)
-  private val dotZeros   = latch(17)(Normalise.countLeadingZeros(dot.at(17))._2)
+  private val angle      = cycles.angle
+  private val dot        = arriving(io.angle.dot, angle, angle + interval - 1)
+  private val dotZeros   = latch(angle)(Normalise.countLeadingZeros(dot.at(angle))._2)
   private val dotBits    = numbers.mantissaBits.min(formats.dotBits)
-  private val isAcute    = arriving(io.angle.isAcute, 17, 19)
-  private val normalised = latch(18) {
-    (dot.at(18) << dotZeros.at(18))(formats.dotBits - 1, formats.dotBits - dotBits)
+  private val isAcute    = arriving(io.angle.isAcute, angle, angle + interval - 1)
+  private val normalised = latch(angle + 1) {
+    (dot.at(angle + 1) << dotZeros.at(angle + 1))(formats.dotBits - 1, formats.dotBits - dotBits)
   }
 
   // The root. One of the product's two top bits is set, and the exponent is made even
@@ -77,11 +90,31 @@ final class BrightnessStage(config: PathConfig) extends Module {
     carry(normalised, cycles.root).at(cycles.root),
     root.root.head(rootBits.min(numbers.mantissaBits))
   )
-  private val cosine = latch(cycles.quotient) {
+  private val isAcuteThen = carry(isAcute, cycles.quotient)
+  private val cosine      = latch(cycles.quotient) {
     val exponent = carry(down, cycles.quotient).at(cycles.quotient)
     val cosine   = (quotient << 1).asUInt >> Mux(exponent > 2.U, exponent - 2.U, 0.U)
     val limited  = Mux(cosine(fraction + 1, fraction).orR, (BigInt(1) << fraction).U, cosine(fraction, 0))
-    Mux(carry(isAcute, cycles.quotient).at(cycles.quotient), limited, 0.U).zext
+    Mux(isAcuteThen.at(cycles.quotient), limited, 0.U)
+  }
+
+  // At rough metal a light has another share
+  private val share = io.isRough.fold(arriving(cosine.at(cycles.cosine).zext, cosine.first, cosine.last)) { isRough =>
+    val lobe = Module(new LobeStage(numbers, cycles.cosine)).io
+    lobe.phase  := io.phase
+    lobe.cosine := cosine.at(cycles.cosine)
+    lobe.slope  := io.slope.get
+    lobe.peak   := io.peak.get
+    val first = cycles.brightness
+    val flags =
+      latch(cycles.cosine)(Cat(isRough, latch(cycles.quotient)(isAcuteThen.at(cycles.quotient)).at(cycles.cosine)))
+
+    def late[T <: Data](value: Timed[T]): T = carry(value, first - 1).at(first - 1)
+    val spread                              = arriving(lobe.share, first, first + interval - 1)
+    val kept                                = latch(first - 1)(Cat(late(flags), late(cosine)))
+    val now                                 = kept.at(first)
+    val light = Mux(now(fraction + 2), Mux(now(fraction + 1), spread.at(first), 0.U), now(fraction, 0))
+    arriving(light.zext, first, first + interval - 1)
   }
 
   // The falloff: its quotient has guard bits below, so that it only has to move down
@@ -103,9 +136,10 @@ final class BrightnessStage(config: PathConfig) extends Module {
   }
 
   // The products
-  private val falloffThen = latch(cycles.quotient)(carry(falloff, cycles.quotient).at(cycles.quotient).zext)
-  private val product     = multiply(cosine, falloffThen, cycles.brightness)
-  private val scaled      = Rounding.narrow(
+  private val before      = cycles.brightness - 1
+  private val falloffThen = latch(before)(carry(falloff, before).at(before).zext)
+  private val product     = multiply(share, falloffThen, cycles.brightness)
+  private val scaled      = Rounding.saturate(
     Rounding.floor(product.at(cycles.colour).asUInt, NumberFormats.lightFraction),
     formats.brightnessBits
   )

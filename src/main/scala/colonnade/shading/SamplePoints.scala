@@ -6,10 +6,11 @@ import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
 import colonnade.formats.{Gather, PixelPosition, SamplePoint}
 
-/** Asks for the sample point of a context, which comes in the next cycle. */
+/** Asks for the sample point of a context, and whether its path has rays left to gather. Both come in the next cycle. */
 final class SamplePort(config: PathConfig) extends Bundle {
-  val read  = Valid(Context(config))
-  val point = Input(new SamplePoint)
+  val read    = Valid(Context(config))
+  val point   = Input(new SamplePoint)
+  val gathers = Input(Bool())
 }
 
 /** A context and its pixel. */
@@ -34,8 +35,10 @@ final class SamplePoints(config: PathConfig) extends Module {
   when(io.pixel.valid) { points.write(start.context, SamplePoints.ofPixel(start.pixel)) }
 
   private val read  = io.port.read
-  private val index = RegEnable(io.counts(read.bits)(log2Ceil(Gather.maxBounces) - 1, 0), read.valid)
+  private val count = RegEnable(io.counts(read.bits), read.valid)
+  private val index = count(log2Ceil(Gather.maxBounces) - 1, 0)
   private val pixel = points.read(read.bits, read.valid)
+  io.port.gathers := count < io.gather.bounces
   io.port.point.u := io.gather.points(index).u ^ pixel.u
   io.port.point.v := io.gather.points(index).v ^ pixel.v
 }

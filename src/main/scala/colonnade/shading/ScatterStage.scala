@@ -2,10 +2,10 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.Cat
-import colonnade.common.ModuloSchedule
+import colonnade.common.{ModuloSchedule, Timed}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.formats.{SamplePoint, Vec3}
+import colonnade.formats.{Lobe, SamplePoint, Vec3}
 import colonnade.numbers.{FoldedSquareRoot, Rounding}
 
 /** Ports of [[ScatterStage]]. Vectors come and go a component at a time, x first. */
@@ -15,22 +15,29 @@ final class ScatterStageIO(config: PathConfig) extends Bundle {
   val phase = Input(ModuloSchedule.phase())
   val point = Input(new SamplePoint) // in cycle 0
 
-  /** From cycle 1 and from cycle 7 on, and in cycle 16: as those of [[SurfaceStage]], and the normal's squared length. */
+  /** From cycle 1 and from `LobeAxisStage.axis0` on; and the axis' squared length in the cycle `AngleCycles.square`. */
   val faceForwardNormal = Input(SInt((NumberFormats.normalBits + 1).W))
-  val normal            = Input(SInt(formats.narrowBits.W))
-  val squaredNormal     = Input(UInt(formats.dotBits.W))
+  val axis              = Input(SInt(formats.narrowBits.W))
+  val squaredAxis       = Input(UInt(formats.dotBits.W))
+
+  /** In three cycles from `ScatterStage.rough` on, and in the fourth: the width of a lobe; the surface is rough metal. */
+  val alpha   = Input(UInt(Lobe.alphaBits.W))
+  val isRough = Input(Bool())
 
   val dir = Output(ScatterStage.component) // from cycle `dir0` on
 }
 
-/** The direction of the ray that gathers light at a diffuse surface: n + |n| · s, with s a point of the unit sphere, which
-  * makes its density the cosine to n: docs/gather.md. One every three cycles, by a square root and three multipliers: for
-  * s, for |n| · s, and for the side of the surface.
+/** The direction of the ray that gathers light at a surface, by a point s of the unit sphere: docs/gather.md. At a diffuse
+  * one n + |n| · s about its normal n, with the cosine as its density; at rough metal a ray of the lobe about its axis.
+  * One every three cycles, by a square root and nine multipliers.
   */
 final class ScatterStage(config: PathConfig) extends Module {
   import ScatterStage._
 
   private val formats = new ShaderFormats(config.numbers)
+  private val axis0   = LobeAxisStage.axis0
+  private val square  = new AngleCycles(config).square
+  require(square == axis0 + 4, "the root starts when the axis is known")
 
   val io = IO(new ScatterStageIO(config))
 
@@ -38,69 +45,152 @@ final class ScatterStage(config: PathConfig) extends Module {
   import schedule._
 
   // The point of the sphere: z is linear in u, v is the angle about z
-  private val early       = carry(latch(0)(io.point), 18)
-  private val late        = carry(early, 21)
-  private val quarter     = early.at(17).v(SamplePoint.bits - 1, SamplePoint.bits - 2)
-  private val angle       = early.at(17).v(SamplePoint.bits - 3, 0)
-  private val radius      = latch(17)(VecInit(radii.map(_.U(unitBits.W)))(early.at(17).u))
-  private val isBackwards = quarter(0)
-  private val cosine      = Seq(isBackwards, !isBackwards).map(isBackwards => Mux(isBackwards, ~angle, angle))
-  private val across      = latch(Seq(17, 18))(VecInit(cosines.map(_.U(unitBits.W)))(select(Seq(17, 18))(cosine(_))))
-  private val product     = latch(Seq(18, 19))(radius.at(Seq(18, 19)) * across.at(Seq(18, 19)))
-  private val rounded     = ((product.at(Seq(19, 20)) +& (1 << (unit - 1)).U) >> unit)(unitBits - 1, 0).zext
-  private val quarters    = late.at(19).v(SamplePoint.bits - 1, SamplePoint.bits - 2)
-  private val isMinus     = Seq(quarters.xorR, quarters(1))
-  private val ofSphere    = latch(Seq(19, 20, 21)) {
-    val signed = Seq(0, 1).map(axis => Mux(isMinus(axis), -rounded, rounded).pad(unitBits + 1))
-    val z      = (((1 << unit) - 1).S((unitBits + 2).W) - Cat(late.at(21).u, 0.U(1.W)).zext)(unitBits, 0).asSInt
-    select(Seq(19, 20, 21))(axis => if (axis < 2) signed(axis) else z)
+  private val early   = carry(latch(0)(io.point), 18)
+  private val late    = carry(early, 21)
+  private val quarter = early.at(16).v(SamplePoint.bits - 1, SamplePoint.bits - 2)
+  private val angle   = early.at(16).v(SamplePoint.bits - 3, 0)
+  private val radius  = latch(16)(VecInit(radii.map(_.U(unitBits.W)))(early.at(16).u))
+  private val cosines = latch(Seq(16, 17)) {
+    val isBackwards = Seq(quarter(0), !quarter(0)).map(isBackwards => Mux(isBackwards, ~angle, angle))
+    VecInit(ScatterStage.cosines.map(_.U(unitBits.W)))(select(Seq(16, 17))(isBackwards(_)))
   }
+  private val product = latch(Seq(17, 18))(radius.at(Seq(17, 18)) * cosines.at(Seq(17, 18)))
+  private val level   = rounded(product.at(Seq(18, 19)), unit)(unitBits - 1, 0).zext
+  private val isMinus = Seq(early.at(18).v.head(2).xorR, late.at(19).v.head(1).asBool)
+  private val z       = (((1 << unit) - 1).S((unitBits + 2).W) - Cat(late.at(20).u, 0.U(1.W)).zext)(unitBits, 0).asSInt
+  private val point = vector(xyz(18))(axis => if (axis == 2) z else Mux(isMinus(axis), -level, level).pad(unitBits + 1))
 
-  // The normal's length
+  // The axis, and its length
+  private val axis   = vector(xyz(axis0))(_ => Rounding.floor(io.axis, formats.shadeBits - axisBits))
   private val length = Module(new FoldedSquareRoot(2 * lengthBits, interval)).io
-  length.isStep   := isAt(16)
-  length.radicand := Rounding.floor(io.squaredNormal, formats.dotBits - 2 * lengthBits)
+  length.isStep   := isAt(square)
+  length.radicand := Rounding.floor(io.squaredAxis, formats.dotBits - 2 * lengthBits)
   private val root = arriving(length.root, rootCycle, rootCycle + interval - 1)
 
-  // The direction
-  private val normal = Rounding.floor(io.normal, formats.shadeBits - normalBits)
-  private val scaled = latch(xyz(23))(root.at(xyz(23)).zext * delay(ofSphere, xyz(20), 3).at(xyz(23)))
-  private val sum    = latch(xyz(24)) {
-    scaled.at(xyz(24)) +& (delay(arriving(normal, xyz(7)), xyz(7), 17).at(xyz(24)) << normalShift).asSInt
-  }
-  private val dir = Rounding.narrow(Rounding.floor(sum.at(xyz(25)), dropped), componentBits)
+  // Both are used until the direction is known
+  private def held(value: Timed[Vec[SInt]]): Seq[Timed[Vec[SInt]]] =
+    Seq.iterate(value, (wide + 1 - value.first) / interval + 1)(now => latch(now.last)(now.at(now.last)))
+  private val points = held(point)
+  private val axes   = held(axis)
 
-  // It is negated if it points below the surface
+  /** The components of a vector in three cycles, one after the other, or rotated. */
+  private def components(values: Seq[Timed[Vec[SInt]]], first: Int, rotation: Int = 0): SInt = {
+    val now = values((first - values.head.first) / interval)
+    select(xyz(first))(axis => now.at(first + axis)((axis + rotation) % 3))
+  }
+
+  // Rough metal: the parts along and across its axis
+  private val lift = {
+    val product = latch(xyz(rough - 8))(components(points, rough - 8) * components(axes, rough - 8))
+    val sum     = accumulate(xyz(rough - 7), product.at(xyz(rough - 7)).pad(unitBits + axisBits + 4))(_ + _)
+    latch(rough - 4)(Rounding.floor(sum.at(rough - 4) + (1 << unit).S, unit + 1))
+  }
+  private val liftThen = carry(lift, rough - 1).at(rough - 1)
+  private val raised   = latch(rough - 1) {
+    val sum = root.at(rough - 1).zext +& liftThen
+    Mux(sum < 0.S, 0.U, sum.asUInt)(lengthBits, 0)
+  }
+  private val lowered = latch(rough - 1)(root.at(rough - 1).zext -& liftThen)
+  private val scaling = rough until rough + 3
+  private val again   = Wire(UInt((lengthBits + 1).W))
+  private val scaled  = latch(scaling) {
+    val factors = Seq(raised.at(rough), again, carry(root, rough + 2).at(rough + 2))
+    io.alpha * select(scaling)(factors(_).pad(lengthBits + 1))
+  }
+  again := Rounding.floor(scaled.items(0).at(rough + 1), Lobe.alphaBits)
+  private val less  = latch(rough + 2)(Rounding.floor(scaled.items(1).at(rough + 2), Lobe.alphaBits))
+  private val along = latch(wide) {
+    val ofMetal = carry(lowered, wide).at(wide) -& less.at(wide).zext
+    Mux(io.isRough, Rounding.narrow(ofMetal, lengthBits + 2), (1 << (lengthBits - 1)).S)
+  }
+  private val across = latch(wide) {
+    Mux(io.isRough, rounded(scaled.items(2).at(wide), Lobe.alphaBits - 1), carry(root, wide).at(wide))
+  }
+  private val isRough = latch(wide)(io.isRough)
+  private val crossed = {
+    val products = latch(xyz(wide - 2)) {
+      VecInit(Seq((1, 2), (2, 1)).map { case (left, right) =>
+        components(points, wide - 2, left) * components(axes, wide - 2, right)
+      })
+    }
+    val now = products.at(xyz(wide - 1))
+    latch(xyz(wide - 1))(Rounding.floor(now(0) -& now(1), unit))
+  }
+
+  // The direction, with the part across the axis on either side
+  private val ofAxis  = latch(xyz(wide + 1))(along.at(xyz(wide + 1)) * components(axes, wide + 1))
+  private val ofPoint = latch(xyz(wide + 1)) {
+    val metal = delay(crossed, xyz(wide), 1).at(xyz(wide + 1))
+    val point = components(points, wide + 1).pad(metal.getWidth)
+    across.at(xyz(wide + 1)).zext * Mux(isRough.at(xyz(wide + 1)), metal, point)
+  }
+  private val isMetal    = delay(arriving(isRough.at(xyz(wide + 1)), xyz(wide + 1)), xyz(wide + 1), 1)
+  private val partAcross = {
+    val now = ofPoint.at(xyz(wide + 2))
+    Mux(isMetal.at(xyz(wide + 2)), now, (now << diffuseShift).asSInt)
+  }
+  private val both = latch(xyz(wide + 2)) {
+    val now = ofAxis.at(xyz(wide + 2))
+    VecInit(Seq(now +& partAcross, now -& partAcross).map { sum =>
+      Rounding.narrow(Rounding.floor(sum, dropped), componentBits)
+    })
+  }
+
+  // If it points below the surface: at rough metal the other side of the axis, else the opposite
+  private val sideCycle = wide + 3
   private val geometric = delay(
     arriving(Rounding.floor(io.faceForwardNormal, NumberFormats.normalBits - sideBits), xyz(1)),
     xyz(1),
-    24
-  ).at(xyz(25))
-  private val sides   = latch(xyz(25))(Rounding.floor(dir, componentBits - sideBits - 2) * geometric)
-  private val side    = accumulate(xyz(26), sides.at(xyz(26)).pad(2 * sideBits + 6))(_ + _)
-  private val isBelow = latch(29)(side.at(29) < 0.S)
-  private val last    = delay(arriving(dir, xyz(25)), xyz(25), 5).at(xyz(dir0))
-  private val upwards = Mux(isBelow.at(xyz(dir0)), -last, last)
-  io.dir := Mux(isAt(xyz(dir0).last), (upwards.asUInt | 1.U).asSInt, upwards)
+    sideCycle - 1
+  ).at(xyz(sideCycle))
+  private val first  = both.at(xyz(sideCycle))
+  private val second = Mux(delay(isMetal, xyz(wide + 2), 1).at(xyz(sideCycle)), first(1), -first(0))
+  private val sides  = latch(xyz(sideCycle))(Rounding.floor(first(0), sideDropped) * geometric)
+  private val side   =
+    accumulate(xyz(sideCycle + 1), sides.at(xyz(sideCycle + 1)).pad(componentBits + sideBits + 2))(_ + _)
+  private val isBelow = latch(sideCycle + 4)(side.at(sideCycle + 4) < 0.S)
+  private val choices = arriving(VecInit(first(0), second), xyz(sideCycle))
+  private val result  = {
+    val cycles  = xyz(dir0 - 1)
+    val now     = delay(choices, xyz(sideCycle), cycles.head - sideCycle).at(cycles)
+    val upwards = Mux(isBelow.at(cycles), now(1), now(0))
+    latch(cycles)(Mux(isAt(cycles.last), (upwards.asUInt | 1.U).asSInt, upwards))
+  }
+  io.dir := result.at(xyz(dir0))
+
+  private def rounded(x: UInt, bits: Int): UInt = Rounding.floor(x +& (1 << (bits - 1)).U, bits)
+
+  /** Three values that come one after the other, together for an interval after the last of them. */
+  private def vector(cycles: Seq[Int])(component: Int => SInt): Timed[Vec[SInt]] = {
+    val parts = cycles.zipWithIndex.map { case (cycle, axis) => latch(cycle)(component(axis)) }
+    val end   = cycles.last + 1
+    latch(end)(VecInit(parts.map(_.at(end))))
+  }
 }
 
 object ScatterStage {
   private val unit     = SamplePoint.bits // fraction bits of a component of a point of the sphere
   private val unitBits = unit + 1         // of its magnitude
 
-  /** Magnitude bits of the normal, and of its length in units of 2^(1 - normalShift). */
-  private val normalBits  = 12
-  private val lengthBits  = 12
-  private val normalShift = 7
-  private val rootCycle   = 17 + interval * FoldedSquareRoot.intervals(2 * lengthBits, interval)
-  private val dropped     = 4 // low bits of the sum
-  private val sideBits    = 8 // of the geometric normal, with its sign, for the side
+  /** Magnitude bits of the axis, and of its length, which counts in twice its units. */
+  private val axisBits     = 11
+  private val lengthBits   = 11
+  private val diffuseShift = axisBits - unit
+  private val rootCycle    = LobeAxisStage.axis0 + 5 + interval * FoldedSquareRoot.intervals(2 * lengthBits, interval)
+  private val dropped      = 2 * axisBits - 11 // low bits of the sum
+  private val sideBits     = 8                 // of the geometric normal, with its sign, for the side
+  private val sideDropped  = 2                 // low bits of the direction, for the side
+
+  /** First cycle in which it uses the width of a lobe, for the first of three products. */
+  val rough: Int = rootCycle + 1
+
+  private val wide = rough + 3 // its parts along and across the axis are known after this cycle
 
   /** First cycle of the direction. */
-  val dir0: Int = 30
+  val dir0: Int = rough + 12
 
   /** Width of a component of the direction, signed. */
-  val componentBits: Int = 18
+  val componentBits: Int = 14
 
   def component: SInt = SInt(componentBits.W)
 

@@ -41,3 +41,9 @@ final class LightSlot(config: PathConfig) extends Bundle {
   val shadows = Bool() // a shadow ray is needed if the surface faces the light
   val isOn    = Bool() // the light is on
 }
+
+/** Whether a surface is rough metal that gathers light, and of which material. */
+final class RoughSurface(config: PathConfig) extends Bundle {
+  val isRough  = Bool()
+  val material = UInt(log2Ceil(config.frame.materials.max(2)).W)
+}

@@ -5,7 +5,7 @@ import chisel3.util.{log2Ceil, RegEnable}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.ModuloSchedule
 import colonnade.config.PathConfig
-import colonnade.formats.{Material, MaterialKind}
+import colonnade.formats.{Lobe, Material, MaterialKind}
 import colonnade.numbers.Rounding
 
 /** Shades hits as [[SequentialShader]] does, bit for bit: a hit with one light every three cycles, and three cycles more for
@@ -22,8 +22,7 @@ import colonnade.numbers.Rounding
 final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   import ShadingPipeline._
 
-  private val numbers = config.numbers
-  private val cycles  = new BrightnessCycles(numbers)
+  private val cycles = new BrightnessCycles(config)
 
   private val phase    = RegInit(0.U.asTypeOf(ModuloSchedule.phase()))
   private val schedule = new ModuloSchedule(phase)
@@ -73,6 +72,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   private val at5        = latch(4)(slots.at(4))
   private val at6        = carry(slots, 6)
   private val at17       = carry(at5, 17)
+  private val atAngle    = carry(at17, cycles.angle)
   private val isLight    = arriving(isActive && !hit.isBounce, 0, interval - 1)
   private val lightAt6   = carryFlag(isLight, 6)
   private val lightAtEnd = carryFlag(lightAt6, cycles.direct)
@@ -91,9 +91,43 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   angle.normal       := surface.normal
   bright.phase       := phase
   bright.angle       := angle.angle
-  private val faces = angle.angle.isAcute && at17.at(17 to 19).isOn
+  private val faces = angle.angle.isAcute && atAngle.at(cycles.angle until cycles.angle + interval).isOn
   bright.angle.isAcute := faces
   bright.falloff       := angle.falloff
+
+  // Rough metal is lit about the direction in which a smooth mirror would reflect
+  private val roughs = io.sample.map { sample =>
+    // Known in the cycle after the entry, for all lights of the hit
+    val isNew   = RegNext(enters, false.B)
+    val gathers = Mux(isNew, sample.gathers, RegEnable(sample.gathers, isNew))
+    val rough   = Wire(new RoughSurface(config))
+    rough.isRough  := isRough(hit.material) && !hit.isEnvironment && gathers
+    rough.material := hit.material
+    Seq.iterate(arriving(rough, 0, interval - 1), cycles.brightness / interval)(now =>
+      latch(now.last)(now.at(now.last))
+    )
+  }
+
+  private def isRough(number: UInt): Bool =
+    material(config, io.materials, number).kind.get === MaterialKind.roughMetal
+
+  /** Whether a surface is rough metal, in each of these cycles; and its lobe. */
+  private def roughAt(cycles: Seq[Int]): RoughSurface =
+    select(cycles)(index => roughs.get(cycles(index) / interval).at(cycles(index)))
+
+  private def lobeAt(cycles: Seq[Int]): Lobe = material(config, io.materials, roughAt(cycles).material).lobe.get
+
+  if (config.frame.gather) {
+    val stage = Module(new LobeAxisStage(config)).io
+    stage.phase        := phase
+    stage.isRough      := roughAt(Seq(0)).isRough
+    stage.dir          := surface.dir
+    stage.normal       := surface.normal
+    angle.normal       := stage.axis
+    bright.isRough.get := roughAt(Seq(cycles.cosine)).isRough
+    bright.slope.get   := lobeAt(cycles.cosine + 1 until cycles.cosine + 4).slope
+    bright.peak.get    := lobeAt(Seq(cycles.cosine + 8)).peak
+  }
 
   // The rays that gather light
   private val scatter = io.sample.map { sample =>
@@ -103,8 +137,10 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     stage.phase             := phase
     stage.point             := sample.point
     stage.faceForwardNormal := surface.faceForwardNormal
-    stage.normal            := surface.normal
-    stage.squaredNormal     := angle.squaredNormal
+    stage.axis              := angle.normal
+    stage.squaredAxis       := angle.squaredNormal
+    stage.alpha             := lobeAt(ScatterStage.rough until ScatterStage.rough + 3).alpha
+    stage.isRough           := roughAt(Seq(ScatterStage.rough + 3)).isRough
     stage.dir
   }
 
@@ -129,10 +165,13 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     component.valid := isAt(cycle) && isFirst.at(cycle)
     component.bits  := scatter.get
   }
-  require(cycles.direct > xyz(ScatterStage.dir0).last, "lights come before the direction that gathers")
-  private val facing = latch(17) {
-    val now = WireInit(at17.at(17))
-    now.shadows := at17.at(17).shadows && faces
+  require(
+    !config.frame.gather || cycles.direct > xyz(ScatterStage.dir0).last,
+    "lights come before the direction that gathers"
+  )
+  private val facing = latch(cycles.angle) {
+    val now = WireInit(atAngle.at(cycles.angle))
+    now.shadows := atAngle.at(cycles.angle).shadows && faces
     now
   }
   private val atColour = latch(cycles.colour - 1)(carry(facing, cycles.colour - 1).at(cycles.colour - 1))
@@ -216,7 +255,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     to.material      := request.face.material
     to.isEnvironment := isPoint
     to.isBounce      := !isPoint && material(config, io.materials, request.face.material).kind
-      .map(_ =/= MaterialKind.diffuse).getOrElse(false.B)
+      .map(MaterialKind.isSpecular).getOrElse(false.B)
     to.isFlat     := io.shading.flat || isPoint
     to.backSide   := request.hit.backSide
     to.axis       := request.ray.orientation.axis
@@ -248,7 +287,7 @@ object ShadingPipeline {
 
   /** Lights between the entry and the lit surface: what the stages hold and some. */
   private def places(config: PathConfig): Int =
-    1 << log2Ceil(new BrightnessCycles(config.numbers).direct / ModuloSchedule.interval + 4)
+    1 << log2Ceil(new BrightnessCycles(config).direct / ModuloSchedule.interval + 4)
 
   /** The entry of a material's number, truncated to the bits that the table needs; beyond the table it means entry 0. */
   private[shading] def material(config: PathConfig, table: Vec[Material], number: UInt): Material = {

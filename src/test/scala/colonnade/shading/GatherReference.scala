@@ -15,16 +15,52 @@ object GatherReference {
     Seq(if (quarter == 1 || quarter == 2) -x else x, if (quarter >= 2) -y else y, z)
   }
 
-  /** The direction for a normal whose largest component has `shadeBits` bits, and for the geometric normal. */
-  def direction(normal: Seq[Int], faceForward: Seq[Int], shadeBits: Int, u: Int, v: Int): Seq[Int] = {
-    val square = normal.map(component => BigInt(component) * component).sum
-    val length = math.sqrt((square >> (2 * shadeBits + 2 - 24)).toDouble).toLong
-    val sum    = normal.zip(sphere(u, v)).map { case (component, point) =>
-      ((length * point + ((component >> (shadeBits - 12)).toLong << 7)) >> 4).toInt
+  /** The direction about an axis whose largest component has `shadeBits` bits, at rough metal with the width of its lobe,
+    * in units of 1/256; and for the geometric normal.
+    */
+  def direction(axis: Seq[Int], faceForward: Seq[Int], shadeBits: Int, u: Int, v: Int, alpha: Option[Int]): Seq[Int] = {
+    val square          = axis.map(component => BigInt(component) * component).sum
+    val length          = math.sqrt((square >> (2 * shadeBits + 2 - 22)).toDouble).toLong
+    val narrow          = axis.map(component => (component >> (shadeBits - 11)).toLong)
+    val point           = sphere(u, v).map(_.toLong)
+    val (along, across) = alpha match {
+      case None        => (narrow.map(_ << 10), point.map(component => (length * component) << 3))
+      case Some(alpha) =>
+        val lift  = narrow.zip(point).map { case (a, b) => a * b }.sum + 256 >> 9
+        val scale = length - lift - ((alpha * ((alpha * (length + lift).max(0)) >> 8)) >> 8)
+        val cross = Seq.tabulate(3) { k =>
+          (point((k + 1) % 3) * narrow((k + 2) % 3) - point((k + 2) % 3) * narrow((k + 1) % 3)) >> 8
+        }
+        (narrow.map(scale * _), cross.map(((alpha * length + 64) >> 7) * _))
     }
-    val side = sum.zip(faceForward).map { case (component, geometric) => (component >> 8) * (geometric >> 4) }.sum
-    val Seq(x, y, below) = if (side < 0) sum.map(-_) else sum
-    Seq(x, y, below | 1)
+    def sum(sign: Int) = along.zip(across).map { case (a, b) => ((a + sign * b) >> 11).toInt }
+    val above          = sum(1)
+    val side = above.zip(faceForward).map { case (component, geometric) => (component >> 2) * (geometric >> 4) }.sum
+    val Seq(x, y, z) = if (side >= 0) above else if (alpha.isEmpty) above.map(-_) else sum(-1)
+    Seq(x, y, z | 1)
+  }
+
+  /** The direction in which a smooth mirror would reflect, scaled to `shadeBits` bits. */
+  def lobeAxis(normal: Seq[Int], dir: Seq[Int], shadeBits: Int): Seq[Int] = {
+    val Seq(n, d) = Seq(normal, dir).map(_.map(component => BigInt(component >> (shadeBits - 12))))
+    val square    = n.map(component => component * component).sum
+    val against   = BigInt(0).max(-n.zip(d).map { case (a, b) => a * b }.sum)
+    val drop      = square.bitLength - 12
+    val sum       = n.zip(d).map { case (n, d) => (square >> drop) * d + 2 * (against >> drop) * n }
+    val shift     = sum.map(_.abs.bitLength).max - shadeBits
+    sum.map(component => (if (shift < 0) component << -shift else component >> shift).toInt)
+  }
+
+  /** How brightly rough metal shows a light, with `fraction` fraction bits. */
+  def share(cosine: Int, slope: Int, peak: Int, fraction: Int): BigInt = {
+    val length    = (BigInt(1) << (fraction + 6)) + BigInt(slope) * ((1 << fraction) - cosine)
+    val octaves   = length.bitLength - 1 - (fraction + 6)
+    val mantissa  = ((length << 7) >> (length.bitLength - 1)).toInt & 127
+    val logarithm =
+      peak - 256 - 2 * (128 * octaves + math.rint(128 * math.log(1 + (mantissa + 0.5) / 128) / math.log(2)).toInt)
+    val exponent = logarithm >> 7
+    val power    = BigInt(math.rint(256 * math.pow(2, (logarithm & 127) / 128.0)).toInt)
+    if (exponent > 5) (BigInt(1) << (fraction + 6)) - 1 else (power << (fraction + 64)) >> (8 + 64 - exponent)
   }
 
   /** The address of the texel of the light cube that a direction meets. */

@@ -13,13 +13,19 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ScatterStage"
 
   for (mac <- Seq(16, 32))
-    it should s"scatter a normal every three cycles with $mac bits" in
-      test(new ScatterStage(TestConfigs.gathering(TestConfigs.withPrecision(mac, mac, 2 * mac)))) { dut =>
+    it should s"scatter rays about an axis every three cycles with $mac bits" in {
+      val config = TestConfigs.gathering(TestConfigs.withPrecision(mac, mac, 2 * mac))
+      test(new ScatterStage(config)) { dut =>
         val shadeBits = NumberFormats.colourBits.+(6).min(mac)
         val random    = new Random(mac)
         val count     = 400
-        val cases     =
-          Seq.fill(count)((normal(random, shadeBits), normal(random, 11), random.nextInt(256), random.nextInt(256)))
+        val cases     = Seq.tabulate(count) { index =>
+          val alpha    = if (random.nextBoolean()) Some(random.nextInt(256)) else None
+          val (u, v)   = (random.nextInt(256), random.nextInt(256))
+          val scale    = (1 << (shadeBits - 9)) * (if (index % 3 == 0) 1 else -1)
+          val extremes = GatherReference.sphere(u, v).map(_ * scale) // the point lies along the axis or against it
+          (if (index % 4 == 0) extremes else normal(random, shadeBits), normal(random, 11), u, v, alpha)
+        }
         dut.clock.setTimeout(0)
         def during[T](cycle: Int, first: Int)(use: (Int, Int) => T): Unit = {
           val (operation, axis) = ((cycle - first) / 3, (cycle - first) % 3)
@@ -28,40 +34,72 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
         for (cycle <- 0 until 3 * count + ScatterStage.dir0 + 3) {
           dut.io.phase.poke(cycle % 3)
           during(cycle, 0) { (operation, axis) =>
-            val (_, _, u, v) = cases(operation)
+            val (_, _, u, v, _) = cases(operation)
             // The point is there in one cycle only
             dut.io.point.u.poke(if (axis == 0) u else random.nextInt(256))
             dut.io.point.v.poke(if (axis == 0) v else random.nextInt(256))
           }
           during(cycle, 1)((operation, axis) => dut.io.faceForwardNormal.poke(cases(operation)._2(axis)))
-          during(cycle, 7)((operation, axis) => dut.io.normal.poke(cases(operation)._1(axis)))
-          during(cycle, 16) { (operation, axis) =>
+          during(cycle, LobeAxisStage.axis0)((operation, axis) => dut.io.axis.poke(cases(operation)._1(axis)))
+          during(cycle, new AngleCycles(config).square) { (operation, axis) =>
             val square = cases(operation)._1.map(component => BigInt(component) * component).sum
-            dut.io.squaredNormal.poke(if (axis == 0) square else BigInt(0))
+            dut.io.squaredAxis.poke(if (axis == 0) square else BigInt(0))
+          }
+          during(cycle, ScatterStage.rough)((operation, _) => dut.io.alpha.poke(cases(operation)._5.getOrElse(0)))
+          during(cycle, ScatterStage.rough + 3) { (operation, axis) =>
+            dut.io.isRough.poke(cases(operation)._5.nonEmpty ^ axis > 0)
           }
           during(cycle, ScatterStage.dir0) { (operation, axis) =>
-            val (normal, geometric, u, v) = cases(operation)
-            dut.io.dir.expect(GatherReference.direction(normal, geometric, shadeBits, u, v)(axis), s"case $operation")
+            val (normal, geometric, u, v, alpha) = cases(operation)
+            val expected = GatherReference.direction(normal, geometric, shadeBits, u, v, alpha)(axis)
+            dut.io.dir.expect(expected, s"case $operation")
           }
           dut.clock.step()
         }
       }
+    }
 
-  "Directions" should "have the cosine as their density, and none be zero" in {
+  private val all  = for (u <- 0 until 256; v <- 0 until 256) yield (u, v)
+  private val axes = {
     val random = new Random(3)
-    val axes   = Seq(Seq(1, 0, 0), Seq(0, -1, 0), Seq(0, 0, 1)).map(_.map(_ * ((1 << 18) - 1)))
-    for (normal <- axes ++ Seq.fill(5)(normal(random, 18))) {
-      val length  = math.sqrt(normal.map(x => x.toDouble * x).sum)
-      val cosines = for (u <- 0 until 256; v <- 0 until 256) yield {
-        val direction = GatherReference.direction(normal, normal.map(_ >> 7), 18, u, v)
+    Seq(Seq(1, 0, 0), Seq(0, -1, 0), Seq(0, 0, 1)).map(_.map(_ * ((1 << 18) - 1))) ++ Seq.fill(5)(normal(random, 18))
+  }
+
+  private def cosine(a: Seq[Int], b: Seq[Int]): Double = {
+    def dot(a: Seq[Int], b: Seq[Int]) = a.zip(b).map { case (x, y) => x.toDouble * y }.sum
+    dot(a, b) / math.sqrt(dot(a, a)) / math.sqrt(dot(b, b))
+  }
+
+  "Directions of a diffuse surface" should "have the cosine as their density, and none be zero" in {
+    for (normal <- axes) {
+      val cosines = all.map { case (u, v) =>
+        val direction = GatherReference.direction(normal, normal.map(_ >> 7), 18, u, v, None)
         assert(direction.exists(_ != 0))
-        direction.zip(normal).map { case (a, b) => a.toDouble * b }.sum / length / math.sqrt(direction.map(x =>
-          x.toDouble * x
-        ).sum)
+        cosine(direction, normal)
       }
       assert(cosines.count(_ < 0) <= cosines.size / 200, "below the surface")
       assert(math.abs(cosines.sum / cosines.size - 2.0 / 3) <= 0.001, s"mean cosine at $normal")
       assert(math.abs(cosines.map(x => x * x).sum / cosines.size - 0.5) <= 0.001, s"mean squared cosine at $normal")
+    }
+  }
+
+  "Directions of rough metal" should "be spread like reflections at microfacets (GGX)" in {
+    for (axis <- axes; alpha <- Seq(17, 52, 128)) {
+      // A surface below that no ray reaches
+      val halves = all.map { case (u, v) =>
+        val direction = GatherReference.direction(axis, Seq(0, 0, 0), 18, u, v, Some(alpha))
+        math.sqrt((1 + cosine(direction, axis)) / 2)
+      }.sorted
+      for (share <- Seq(26, 64, 128, 192, 230).map(_ / 256.0)) {
+        val index = math.rint((1 - share) * halves.size).toInt
+        // The points have 256 to 512 heights about an axis: the mean of some
+        val found    = halves.slice(index - 256, index + 256).sum / 512
+        val expected = 1 / math.sqrt(1 + math.pow(alpha / 256.0, 2) * share / (1 - share))
+        assert(
+          math.abs(found - expected) <= (if (share > 0.75) 0.0012 else 0.001),
+          s"quantile $share of $alpha about $axis"
+        )
+      }
     }
   }
 

@@ -1,0 +1,53 @@
+package colonnade.shading
+
+import chiseltest._
+import colonnade.TestConfigs
+import org.scalatest.flatspec.AnyFlatSpec
+
+import scala.util.Random
+
+/** Rough metal shows lights as [[GatherReference]] says: the distribution of Trowbridge and Reitz. */
+class LobeStageSpec extends AnyFlatSpec with ChiselScalatestTester {
+  behavior of "LobeStage"
+
+  for ((mac, div) <- Seq((16, 16), (32, 64))) {
+    val numbers = TestConfigs.withPrecision(mac, mac, div).numbers
+
+    it should s"find a share every three cycles with ${numbers.cosineFraction} bits" in
+      test(new LobeStage(numbers, 4)) { dut =>
+        val random = new Random(div)
+        val one    = 1 << numbers.cosineFraction
+        val cases  = Seq.fill(300) {
+          val cosine = if (random.nextBoolean()) random.nextInt(one + 1) else one - random.nextInt(one / 16)
+          (cosine, random.nextInt(8192), random.nextInt(if (random.nextBoolean()) 1100 else 2048))
+        } ++ Seq((one, 8191, 2047), (one, 0, 0), (0, 8191, 0), (0, 8191, 2047))
+        dut.clock.setTimeout(0)
+        def during(cycle: Int, first: Int)(use: ((Int, Int, Int), Int) => Unit): Unit = {
+          val (operation, offset) = ((cycle - first) / 3, (cycle - first) % 3)
+          if (cycle >= first && operation < cases.size) use(cases(operation), offset)
+        }
+        for (cycle <- 0 until 3 * cases.size + LobeStage.latency + 3) {
+          dut.io.phase.poke((cycle + 4) % 3)
+          during(cycle, 0)((now, _) => dut.io.cosine.poke(now._1))
+          during(cycle, 1)((now, _) => dut.io.slope.poke(now._2))
+          during(cycle, 8)((now, offset) => dut.io.peak.poke(if (offset == 0) now._3 else random.nextInt(2048)))
+          during(cycle, LobeStage.latency) { (now, _) =>
+            val (cosine, slope, peak) = now
+            dut.io.share.expect(GatherReference.share(cosine, slope, peak, numbers.cosineFraction), s"$now")
+          }
+          dut.clock.step()
+        }
+      }
+  }
+
+  "Shares" should "be (alpha / (1 - x + alpha² (1 + x)))² within 2 %" in
+    (for (alpha <- 17 to 192 by 7; x <- 0 to 65536 by 97) {
+      val a        = alpha / 256.0
+      val slope    = math.rint(64 * (1 - a * a) / (2 * a * a)).toInt
+      val peak     = math.rint(-256 * math.log(a) / math.log(2)).toInt
+      val cosine   = x / 65536.0
+      val expected = math.pow(a / (1 - cosine + a * a * (1 + cosine)), 2)
+      val found    = GatherReference.share(x, slope, peak, 16).toDouble / 65536
+      assert(math.abs(found / expected - 1) <= 0.02, s"$alpha at $cosine")
+    })
+}
