@@ -1,6 +1,7 @@
 package colonnade.formats
 
 import chiseltest._
+import colonnade.Simulation
 import colonnade.config.{ColonnadeConfig, ConfigIO}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
@@ -47,7 +48,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     LayoutSpec.number(unit.io.frame, register.name).peek().litValue & ones(register)
 
   it should "store every setting, clamp it for the hardware, and read it back" in {
-    test(new RegisterFile(config)) { unit =>
+    test(new RegisterFile(config)).withAnnotations(Simulation.verilator) { unit =>
       val random = new Random(8)
       val values = settings.map(r => r -> BigInt(r.width, random))
       values.foreach { case (register, bits) => writeWhole(unit, register, bits) }
@@ -66,7 +67,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       "camera.stepShift",
       "scene.recordCount"
     )
-    test(new RegisterFile(config)) { unit =>
+    test(new RegisterFile(config)).withAnnotations(Simulation.verilator) { unit =>
       for (register <- limited.sortBy(_.name != "scene.recordCount"); limit <- register.limit)
         withClue(s"${register.name}: ") {
           for (value <- Seq(limit - 1, limit + 1, ones(register), limit).filter(_ >= 0)) {
@@ -98,7 +99,7 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   }
 
   it should "read status, errors and counters" in {
-    test(new RegisterFile(config)) { unit =>
+    test(new RegisterFile(config)).withAnnotations(Simulation.verilator) { unit =>
       val random = new Random(9)
       for (register <- registers if register.access == Access.ReadOnly) withClue(s"${register.name}: ") {
         val bits = BigInt(register.width, random)

@@ -3,10 +3,10 @@ package colonnade.ray
 import chisel3._
 import chisel3.util.log2Ceil
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.Vec3
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -22,7 +22,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     val name = s"${formats.precision} with ${formats.geometry.vertexBits}-bit vertices"
 
     it should s"send every pixel's exact ray under random stalls, $name" in {
-      test(new RayGenerator(formats)) { generator =>
+      test(new RayGenerator(formats)).withAnnotations(Simulation.verilator) { generator =>
         val random = new Random(1)
         for (frame <- frames(formats, random)) {
           setRegisters(generator, frame)
@@ -70,7 +70,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
 
   it should "send every pixel's exact ray of two mixed tiles under random stalls" in {
     val config = TestConfigs.withEnvironment(TestConfigs.environment)
-    test(new RayGenerator(config)) { generator =>
+    test(new RayGenerator(config)).withAnnotations(Simulation.verilator) { generator =>
       val random = new Random(4)
       for (frame <- frames(config, random)) {
         setRegisters(generator, frame)

@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.{Simulation, TestConfigs}
 import colonnade.TestParts._
 import colonnade.numbers.FixedPorts._
 import org.scalatest.flatspec.AnyFlatSpec
@@ -16,7 +16,7 @@ class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val config = tiny.copy(units = tiny.units.copy(pathContexts = 4))
 
   it should "read the texel of a direction" in
-    test(new LightCube(config)) { dut =>
+    test(new LightCube(config)).withAnnotations(Simulation.verilator) { dut =>
       val random                                                       = new Random(4)
       val bits                                                         = config.numbers.directionBits
       val last                                                         = Array.fill(4)(0)

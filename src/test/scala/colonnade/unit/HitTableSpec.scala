@@ -6,7 +6,7 @@ import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.FixedPorts._
 import colonnade.shading.Occlusion
-import colonnade.{Model, TestConfigs}
+import colonnade.{Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -21,12 +21,16 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
   for ((contexts, format) <- Seq((1, 0), (4, 0), (5, 2), (3, 4)))
     it should s"hold the least hit of $contexts contexts, format $format" in {
       val shape = config(contexts, TestConfigs.formats(format))
-      test(new HitTable(shape))(dut => new HitTableDriver(dut, shape, seed = contexts).run(cycles = 600))
+      test(new HitTable(shape)).withAnnotations(Simulation.verilator) { dut =>
+        new HitTableDriver(dut, shape, seed = contexts).run(cycles = 600)
+      }
     }
 
   it should "hold the least hit with extra slices" in {
     val shape = TestConfigs.withExtraSlices(config(contexts = 4, TestConfigs.formats.head))
-    test(new HitTable(shape))(dut => new HitTableDriver(dut, shape, seed = 9).run(cycles = 400))
+    test(new HitTable(shape)).withAnnotations(Simulation.verilator) { dut =>
+      new HitTableDriver(dut, shape, seed = 9).run(cycles = 400)
+    }
   }
 
   it should "prefer the smaller id of two hits at the same distance, whichever comes first" in

@@ -16,10 +16,6 @@ import scala.util.Random
 class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "RecordFetch"
 
-  /** The interpreter is slow with many contexts, and in long simulations. */
-  private def simulation(contexts: Int, isLong: Boolean = false) =
-    if (contexts > (if (isLong) 1 else 4)) Simulation.verilator else Seq()
-
   private def variant(contexts: Int, banks: Int, snooping: Boolean, recordBuffers: Int = 2): ColonnadeConfig =
     TestConfigs.tiny.copy(
       array = TestConfigs.tiny.array.copy(rows = 3, contexts = contexts),
@@ -47,7 +43,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   } {
     it should s"serve $contexts contexts from $banks banks and $recordBuffers buffers, snooping $snooping" in {
       val config = variant(contexts, banks, snooping, recordBuffers)
-      test(new RecordFetch(config)).withAnnotations(simulation(contexts)) { dut =>
+      test(new RecordFetch(config)).withAnnotations(Simulation.verilator) { dut =>
         new Column(dut, config, new Random(contexts * 10 + banks)).run(fetches = 200)
       }
     }
@@ -56,7 +52,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   for ((contexts, snooping) <- Seq((4, true), (4, false), (6, true)))
     it should s"serve $contexts contexts with extra slices, snooping $snooping" in {
       val config = withExtraSlices(variant(contexts, banks = 2, snooping))
-      test(new RecordFetch(config)).withAnnotations(simulation(contexts)) { dut =>
+      test(new RecordFetch(config)).withAnnotations(Simulation.verilator) { dut =>
         new Column(dut, config, new Random(contexts)).run(fetches = 200)
       }
     }
@@ -70,7 +66,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       val shape  = if (extraSlices) withExtraSlices(plain) else plain
       val cached = TestConfigs.withCache().columnBvhMemory.cache
       val config = shape.copy(columnBvhMemory = shape.columnBvhMemory.copy(depth = 256, cache = cached))
-      test(new RecordFetch(config)).withAnnotations(simulation(contexts, isLong = true)) { dut =>
+      test(new RecordFetch(config)).withAnnotations(Simulation.verilator) { dut =>
         new Column(dut, config, new Random(contexts)).run(fetches = 300)
       }
     }
