@@ -38,7 +38,7 @@ def test_without_a_room_every_texel_is_the_ambient_light() -> None:
 @pytest.mark.parametrize("scene", [SCENE, IN_ROOM], ids=["alone", "in a room"])
 def test_an_image_keeps_its_light_in_a_file(scene: Scene, tmp_path: Path) -> None:
     manifest = manifest_for("textured").manifest
-    image = DeviceScene.of(scene, manifest).image
+    image = DeviceScene.of(scene, manifest, encoder="live").image
     again = SceneImage.load(image.save(tmp_path / "scene.image"), manifest)
     assert again.header.to_json() == image.header.to_json()
     assert [section.memory for section in again.attributes] == [section.memory for section in image.attributes]
@@ -53,15 +53,15 @@ def test_a_room_lights_the_object_from_its_picture() -> None:
     """Another place has another light; a scene that gathers nothing has no cube."""
     manifest = manifest_for("textured").manifest
     moved = replace(IN_ROOM, placement=Placement((150.0, 380.0), 0.5))
-    words = [DeviceScene.of(scene, manifest).image.attributes[-1].words for scene in (IN_ROOM, moved)]
+    words = [DeviceScene.of(scene, manifest, encoder="live").image.attributes[-1].words for scene in (IN_ROOM, moved)]
     assert (words[0] != words[1]).any()
-    still = DeviceScene.of(replace(IN_ROOM, paths=Paths()), manifest).image
+    still = DeviceScene.of(replace(IN_ROOM, paths=Paths()), manifest, encoder="live").image
     assert all(section.memory != "light.cube" for section in still.attributes)
     assert still.header.light == ()
 
 
 def test_a_new_view_of_the_room_brings_its_light() -> None:
-    prepared = DeviceScene.of(IN_ROOM, manifest_for("textured").manifest)
+    prepared = DeviceScene.of(IN_ROOM, manifest_for("textured").manifest, encoder="live")
     assert prepared.maps is not None
     room, image = load_environment(ROOM), prepared.maps.image
     assert room.photo is not None

@@ -96,6 +96,6 @@ def test_the_format_hash_covers_the_numbers_of_images() -> None:
     recorder = Recorder(golden.numbers)
     design = replace(golden, numbers=recorder)
     scene = Scene(MeshSource(name="cube")).with_environment(ROOT / "scenes" / "rooms" / "living")
-    DeviceScene.of(scene, design).registers((64, 48))
+    DeviceScene.of(scene, design, encoder="live").registers((64, 48))
     assert recorder.read <= hashed
     assert len(recorder.read) > 12
