@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -59,14 +60,45 @@ direction = [{}, 0.4, 1.0]
 SECONDS = 120
 
 
+def write_study(folder: Path, direction: float) -> Path:
+    (folder / "scene.toml").write_text(SCENE.format(direction))
+    (folder / "study.toml").write_text(STUDY)
+    return folder / "study.toml"
+
+
 @pytest.fixture
 def study(tmp_path: Path) -> Iterator[Path]:
     """A study of a scene that no other test renders, so that no result is cached before or after."""
-    (tmp_path / "scene.toml").write_text(SCENE.format(random.random()))
-    (tmp_path / "study.toml").write_text(STUDY)
-    exploration = Exploration(load_study(tmp_path / "study.toml"), {})
-    yield tmp_path / "study.toml"
+    study = write_study(tmp_path, random.random())
+    exploration = Exploration(load_study(study), {})
+    yield study
     forget(exploration)
+
+
+@dataclass(frozen=True)
+class Explored:
+    """A study that ran on this machine without a break, and its figures."""
+
+    direction: float
+    figures: dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def explored_study(tmp_path_factory: pytest.TempPathFactory) -> Explored:
+    direction = random.random()
+    study = write_study(tmp_path_factory.mktemp("explored"), direction)
+    content, _ = explored(study)
+    assert content["jobs"]["cached"] == 0
+    forget(Exploration(load_study(study), {}))
+    return Explored(direction, figures(content))
+
+
+@pytest.fixture
+def again(explored_study: Explored, tmp_path: Path) -> Iterator[Path]:
+    """That study without its results."""
+    study = write_study(tmp_path, explored_study.direction)
+    yield study
+    forget(Exploration(load_study(study), {}))
 
 
 def forget(exploration: Exploration) -> None:
@@ -92,31 +124,29 @@ def figures(content: dict[str, Any]) -> dict[str, Any]:
     return {point["name"]: (point["figures"], point["workloads"]) for point in content["points"]}
 
 
-def test_a_study_killed_in_the_middle_continues_and_gives_the_same_numbers(study: Path) -> None:
-    running = subprocess.Popen(command(study, "--jobs", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+def test_a_study_killed_in_the_middle_continues_and_gives_the_same_numbers(
+    again: Path, explored_study: Explored
+) -> None:
+    running = subprocess.Popen(command(again, "--jobs", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + SECONDS
-    while not (study.parent / "out" / "study.json").exists():
+    while not (again.parent / "out" / "study.json").exists():
         assert running.poll() is None and time.monotonic() < deadline
         time.sleep(0.02)
     running.send_signal(signal.SIGKILL)
     running.wait()
-    partial = json.loads((study.parent / "out" / "study.json").read_text())
+    partial = json.loads((again.parent / "out" / "study.json").read_text())
     assert partial["jobs"]["run"] < 7
 
-    continued, printed = explored(study)
+    continued, printed = explored(again)
     assert continued["jobs"]["cached"] >= 1
     assert continued["jobs"]["run"] + continued["jobs"]["cached"] == 7
     assert continued["jobs"]["failed"] == 0
     assert "report.html" in printed
-    out = study.parent / "out"
+    out = again.parent / "out"
     assert len(list((out / "pictures").iterdir())) == 3
     assert (out / "report.html").stat().st_size > 100_000
     assert "16b16s32d" in (out / "points.csv").read_text()
-
-    forget(Exploration(load_study(study), {}))
-    fresh, _ = explored(study)
-    assert fresh["jobs"]["cached"] == 0
-    assert figures(fresh) == figures(continued)
+    assert figures(continued) == explored_study.figures
 
 
 def test_a_study_is_extended(study: Path) -> None:
@@ -180,25 +210,22 @@ def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]
             process.wait(SECONDS)
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(study: Path) -> None:
-    here, _ = explored(study)
-    forget(Exploration(load_study(study), {}))
-    shutil.rmtree(study.parent / "out")
-    with cluster(study.parent) as (address, workers):
+def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(again: Path, explored_study: Explored) -> None:
+    with cluster(again.parent) as (address, workers):
         running = subprocess.Popen(
-            command(study, "--scheduler", address), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+            command(again, "--scheduler", address), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )
         deadline = time.monotonic() + SECONDS
-        while not (study.parent / "out" / "study.json").exists():
+        while not (again.parent / "out" / "study.json").exists():
             assert running.poll() is None and time.monotonic() < deadline
             time.sleep(0.02)
         kill_with_children(workers[0].pid)
         _, errors = running.communicate(timeout=SECONDS)
         assert running.returncode == 0, errors
-    there = json.loads((study.parent / "out" / "study.json").read_text())
+    there = json.loads((again.parent / "out" / "study.json").read_text())
     assert there["jobs"]["failed"] == 0
     assert there["jobs"]["cached"] == 0
-    assert figures(there) == figures(here)
+    assert figures(there) == explored_study.figures
 
 
 def kill_with_children(number: int) -> None:
