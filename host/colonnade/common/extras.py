@@ -10,6 +10,7 @@ from colonnade.common.errors import UserError
 EXTRAS = {
     "reference": {"embreex": "Linux on x86_64 and macOS", "trimesh": ""},
     "quality": {"flip_evaluator": "Linux on x86_64 and macOS, Python up to 3.13"},
+    "panorama": {"OpenImageIO": ""},
     "capture": {"lzfse": "", "imageio_ffmpeg": ""},
     "integration": {"systemrdl": "", "peakrdl_cheader": "", "peakrdl_html": "", "peakrdl_ipxact": ""},
 }

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.progress import QUIET, Progress
-from colonnade.environment.light_cube import FACE, LightCube
+from colonnade.environment.light_cube import FACE, MOST, LightCube
+from colonnade.environment.seen_light import FINE
 from colonnade.maps.room_light import room_light
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.room_lights import lights_of
@@ -17,6 +18,7 @@ from colonnade.scene_image.header import LoadedMemory
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
+    from colonnade.environment.panorama import Panorama
     from colonnade.maps.image import AttributeImage
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.model import Scene
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 
 #: The device's memory of the light cube.
 MEMORY = "light.cube"
+#: Share of the light that the cube cannot hold, from which a note reports it.
+_REPORTED_LOSS = 0.02
 
 
 def scene_cube(
@@ -32,11 +36,12 @@ def scene_cube(
     room: Environment | None,
     image: AttributeImage | None,
     relit: bool,
+    panorama: Panorama | None = None,
     progress: Progress = QUIET,
 ) -> LightCube | None:
     """The light that gathered rays meet, by directions of mesh space; None for a scene without them.
 
-    In a room it is the room's light at the middle of the object, elsewhere the ambient light.
+    In a room it is the room's light at the middle of the object, elsewhere that of a panorama or the ambient light.
 
     Args:
         scene: With lights and a place for the object, as in `LitRoom`.
@@ -44,19 +49,33 @@ def scene_cube(
         room: The room with the colours that rays see.
         image: Its encoded maps.
         relit: The frame shows the room under the scene's lights, not its photo.
-        progress: Notes how much of the room's light the picture shows.
+        panorama: The light that no photo shows (`LitRoom.panorama`).
+        progress: Notes where the light comes from, and what the cube cannot hold.
     """
     if scene.paths.gather == 0:
         return None
-    if room is None or image is None:
-        return LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, FACE, FACE, 3)))
     pose = object_pose(scene, extent, room)
-    light = room_light(room, image, lights_of(scene, extent, room), pose.to_world(extent.centre), not relit)
-    progress.note(
-        f"gathered rays meet the light of room {room.name}: its picture shows {light.seen:.0%} of the directions, its"
-        " bounding planes under the scene's lights stand for the others"
-    )
-    return light.cube.turned(pose.rotation)
+    if room is not None and image is not None:
+        lights = lights_of(scene, extent, room)
+        light = room_light(room, image, lights, pose.to_world(extent.centre), not relit, panorama)
+        others = "panorama" if panorama is not None else "bounding planes under the scene's lights, a fit,"
+        progress.note(
+            f"gathered rays meet the light of room {room.name}: its picture shows {light.seen:.0%} of all directions,"
+            f" and its {others} the other {1 - light.seen:.0%}"
+        )
+        cube = light.cube
+    elif panorama is not None:
+        progress.note("gathered rays meet the light of the panorama, which shows all directions")
+        cube = panorama.cube(FINE)
+    else:
+        return LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, FACE, FACE, 3)))
+    cube = cube.turned(pose.rotation)
+    lost = 1 - cube.texels.clip(max=MOST).sum() / max(cube.texels.sum(), 1e-9)
+    if lost > _REPORTED_LOSS:
+        progress.note(
+            f"{lost:.0%} of the light is brighter than {MOST:g}, the most that a gathered ray brings, and is lost"
+        )
+    return cube
 
 
 def with_cube(image: SceneImage, cube: LightCube | None) -> SceneImage:

@@ -24,6 +24,7 @@ from colonnade.scene_image.packer import pack
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
     from colonnade.environment.model import Environment, EnvironmentCamera
+    from colonnade.environment.panorama import Panorama
     from colonnade.mesh.mesh import Mesh
     from colonnade.scene.model import Scene
     from colonnade.scene_image.file import SceneImage
@@ -39,6 +40,7 @@ class DeviceScene:
         image: Records of the mesh, textures, and maps of the room.
         maps: The room and its encoded maps; None without a room.
         photo: The photo of the frames' view, sRGB, uint8 [rows, columns, 3]; None without one.
+        panorama: The light that no photo shows, without the scene's lights; None without a panorama.
     """
 
     scene: Scene
@@ -46,6 +48,7 @@ class DeviceScene:
     image: SceneImage
     maps: EncodedEnvironment | None
     photo: NDArray[np.uint8] | None = None
+    panorama: Panorama | None = None
 
     @classmethod
     def of(
@@ -95,8 +98,9 @@ class DeviceScene:
             image = with_environment(image, maps, manifest)
         if manifest.gathers:
             held = None if maps is None else maps.image
-            image = with_cube(image, scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, progress))
-        return cls(lit.scene, manifest, image, maps, photo)
+            cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.panorama, progress)
+            image = with_cube(image, cube)
+        return cls(lit.scene, manifest, image, maps, photo, lit.panorama)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
         """The scene in another view of its room: object and lights stay in the world, camera and maps are new.
@@ -112,7 +116,7 @@ class DeviceScene:
         maps = EncodedEnvironment.of(next_view(scene, extent, room, relit), self.manifest, encode)
         image = with_environment(self.image, maps, self.manifest)
         if self.manifest.gathers:
-            image = with_cube(image, scene_cube(scene, extent, maps.environment, maps.image, relit))
+            image = with_cube(image, scene_cube(scene, extent, maps.environment, maps.image, relit, self.panorama))
         return replace(self, scene=scene, image=image, maps=maps, photo=room.photo)
 
     def seen_by(self, camera: EnvironmentCamera, photo: NDArray[np.uint8] | None) -> DeviceScene:

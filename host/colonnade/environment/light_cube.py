@@ -16,7 +16,9 @@ FACE = 8
 #: Directions averaged along each edge of a texel.
 _SUBSAMPLES = 8
 #: The value 1.0 in the device's cube, and its largest value.
-_ONE, _MOST = 1 << 12, (1 << 16) - 1
+_ONE, _LAST = 1 << 12, (1 << 16) - 1
+#: The largest radiance of the device's cube.
+MOST = _LAST / _ONE
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class LightCube:
 
     def words(self) -> NDArray[np.uint8]:
         """The words of the device's memory, uint8 [texels, 6]: blue, green, red, 16 bits each, low byte first."""
-        fixed = np.rint(self.texels.reshape(-1, 3) * _ONE).clip(0, _MOST).astype("<u2")
+        fixed = np.rint(self.texels.reshape(-1, 3) * _ONE).clip(0, _LAST).astype("<u2")
         return np.ascontiguousarray(fixed[:, ::-1]).view(np.uint8)
 
 

@@ -17,7 +17,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 from colonnade.common.types import Floats
-from colonnade.environment.lights import RoomLight, RoomLights, exposure, irradiance, world_surface
+from colonnade.environment.lights import RoomLight, RoomLights, exposure, irradiance, light_box, world_surface
 from colonnade.environment.model import Environment
 from colonnade.quality.image_metrics import psnr
 
@@ -35,9 +35,6 @@ _MIN_ALBEDO = 0.01
 #: Positions tried along x, y and z, and the distances of unit intensity, metres.
 _GRID = (7, 5, 7)
 _FALLOFFS = (None, 1.0, 2.0)
-#: Distance between lights and the box of what the camera sees, metres, at most; the camera is part of the box.
-_MARGIN = np.array([1.0, 0.5, 1.5])
-_MIN_HEIGHT = 0.3
 #: Refined starts for each further light.
 _STARTS = 4
 _EVALUATIONS = 50
@@ -145,11 +142,7 @@ def _samples(environment: Environment) -> Samples:
         raise UserError(
             f"the photo of room {environment.name} is nearly all black or saturated: lights cannot be fitted"
         )
-    eye = environment.camera_to_world[:, 3]
-    low = np.minimum(np.percentile(points, 2, axis=0), eye) - _MARGIN
-    high = np.maximum(np.percentile(points, 98, axis=0), eye) + _MARGIN
-    low[1] = np.percentile(points[:, 1], 2) + _MIN_HEIGHT
-    return Samples(points, normals, albedo, encoded / 255.0, usable, low, high)
+    return Samples(points, normals, albedo, encoded / 255.0, usable, *light_box(environment))
 
 
 def _candidates(samples: Samples) -> Floats:

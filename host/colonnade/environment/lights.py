@@ -12,6 +12,9 @@ from colonnade.environment.model import Environment
 
 #: Upper limit of a light's distance falloff, reached at half its reference distance.
 MAX_FALLOFF = 4.0
+#: Distance between lights and the box of what the camera sees, metres, at most; the camera is part of the box.
+_MARGIN = np.array([1.0, 0.5, 1.5])
+_MIN_HEIGHT = 0.3
 
 
 @dataclass(frozen=True)
@@ -22,11 +25,13 @@ class RoomLight:
         position: World space, metres, float64 [3].
         colour: Linear intensity, float64 [3].
         falloff: Distance of that intensity, metres; None for constant intensity.
+        radius: Of a light with an area, metres; 0: a point.
     """
 
     position: Floats
     colour: Floats
     falloff: float | None
+    radius: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,15 @@ def exposure(points: Floats, normals: Floats, position: Floats, falloff: float |
     if falloff is None:
         return np.asarray(cosine)
     return np.asarray(cosine * np.minimum(falloff**2 / squared, MAX_FALLOFF))
+
+
+def light_box(environment: Environment) -> tuple[Floats, Floats]:
+    """The corners of the box that may hold lights, world space, float64 [3] each: what the camera sees, and around."""
+    points, eye = world_surface(environment)[0].reshape(-1, 3), environment.camera_to_world[:, 3]
+    low = np.minimum(np.percentile(points, 2, axis=0), eye) - _MARGIN
+    high = np.maximum(np.percentile(points, 98, axis=0), eye) + _MARGIN
+    low[1] = np.percentile(points[:, 1], 2) + _MIN_HEIGHT
+    return low, high
 
 
 def world_surface(environment: Environment) -> tuple[Floats, Floats]:

@@ -15,6 +15,7 @@ from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
 from colonnade.maps.encoded import layout_of
 from colonnade.scene.object_pose import object_pose, with_free_placement
+from colonnade.scene.panorama_light import panorama_light
 from colonnade.scene.room_lights import as_vector, lights_of, with_lights
 from colonnade.scene.standing import surface_point
 from colonnade.scene.view import world_positions
@@ -22,6 +23,7 @@ from colonnade.scene.view import world_positions
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
     from colonnade.environment.model import Environment
+    from colonnade.environment.panorama import Panorama
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.model import Scene
 
@@ -38,12 +40,14 @@ class LitRoom:
         environment: With the colours that rays see; None without a room.
         albedo: The room with its albedo, as its folder has it; None without a room.
         colours: How the photo's colours were made; None where the colours are the albedo.
+        panorama: The light that no photo shows, without the scene's lights; None without a panorama.
     """
 
     scene: Scene
     environment: Environment | None = None
     albedo: Environment | None = None
     colours: PhotoColours | None = None
+    panorama: Panorama | None = None
 
 
 def scene_room(scene: Scene) -> Environment | None:
@@ -90,7 +94,9 @@ def lit_room(
     relit: bool,
     progress: Progress = QUIET,
 ) -> LitRoom:
-    """Fit lights to a scene's room if the scene names none, and choose the colours that rays see.
+    """Find the lights of a scene that names none, and choose the colours that rays see.
+
+    They are those of its panorama, or are fitted to the photo of its room.
 
     Args:
         scene: The scene.
@@ -98,16 +104,19 @@ def lit_room(
         extent: Bounds of the mesh, for lights relative to it.
         max_lights: Lights of the design.
         relit: The frame shows the room under the scene's lights, not its photo.
-        progress: Shows the fit, and notes what was fitted.
+        progress: Shows the fit, and notes what was found.
 
     Raises:
-        UserError: The object cannot stand in the room, or `background.colours` asks for a photo that it lacks.
+        UserError: The object cannot stand in the room, or `background.colours` asks for a photo that it lacks;
+            or the panorama cannot be read.
     """
-    if room is None:
-        return LitRoom(scene)
     scene = with_free_placement(scene, extent, room)
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
-    if not scene.names_light:
+    around = panorama_light(scene, extent, room, max_lights, progress)
+    scene, panorama = (scene, None) if around is None else (around.scene, around.panorama)
+    if room is None:
+        return LitRoom(scene, panorama=panorama)
+    if not scene.names_light and (around is None or not around.has_lights):
         scene = _with_fitted_lights(scene, room, max_lights, progress)
     if scene.places_camera:
         drawn = scene.background.photo is None or relit
@@ -123,7 +132,7 @@ def lit_room(
     # Gathered light has the photo's own scale
     colours = _photo_colours(scene, room, extent, relit, 1.0 if scene.paths.gather else None)
     if colours is None:
-        return LitRoom(scene, room, room)
+        return LitRoom(scene, room, room, panorama=panorama)
     if colours.clamped > _REPORTED_CLAMPED:
         progress.note(
             f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
@@ -134,7 +143,7 @@ def lit_room(
                 else "raise the ambient light, or leave out all lights so that they are fitted"
             )
         )
-    return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours)
+    return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours, panorama)
 
 
 def fixed_in_world(scene: Scene, extent: Extent, room: Environment) -> Scene:

@@ -329,6 +329,12 @@ class Background:
         photo: In a room whose camera the scene places: the picture that this camera took, relative to the scene file.
             None: the room is drawn from its maps.
         occlusion: The room hides the object where it is nearer.
+        panorama: An equirectangular picture of the light around the object, relative to the scene file: that of the
+            directions that no photo shows.
+        panorama_yaw: Rotation of the panorama about the world's y, degrees, as an object's turn; at 0 its middle looks
+            along -z.
+        panorama_exposure: Factor of its radiance. None: in a room with a photo, fitted where both show something; 1
+            elsewhere.
         colours: Colours of the room in reflections and refractions: ``photo``, those of its photo, or ``albedo``, its
             albedo under the scene's lights. None: ``photo`` in a frame that shows the photo, else ``albedo``.
     """
@@ -337,6 +343,9 @@ class Background:
     room: _File | None = None
     photo: _File | None = None
     occlusion: StrictBool = True
+    panorama: _File | None = None
+    panorama_yaw: Annotated[_Float, Interval(ge=-360.0, le=360.0)] = 0.0
+    panorama_exposure: Annotated[_Float, Interval(ge=1e-6, le=1e6)] | None = None
     colours: Literal["photo", "albedo"] | None = None
 
 

@@ -58,6 +58,8 @@ def load_scene(path: str | Path) -> Scene:
         scene = scene.with_environment(file.parent / background.room)
     if background.photo is not None:
         scene = replace(scene, background=replace(scene.background, photo=file.parent / background.photo))
+    if background.panorama is not None:
+        scene = replace(scene, background=replace(scene.background, panorama=file.parent / background.panorama))
     return scene
 
 
@@ -109,6 +111,9 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
         raise ValueError("background.photo is for a camera that the scene places: give [camera]; a room has its photo")
     if "photo" in background and "camera" in _table(data, "motion"):
         raise ValueError("background.photo is the view of one camera: leave out motion.camera")
+    for key in ("panorama_yaw", "panorama_exposure"):
+        if key in background and "panorama" not in background:
+            raise ValueError(f"background.{key} is of a panorama: it needs background.panorama")
     if "room" not in background and "colours" in background:
         raise ValueError("background.colours chooses the colours of a room: it needs background.room")
     if "room" not in background and "object" in data:

@@ -1,4 +1,4 @@
-"""The lights of a scene in a room: fitted to the room's photo, and as `RoomLights` in world space."""
+"""The lights of a scene as `RoomLights` in world space, and lights that were found as those of a scene."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def lights_of(scene: Scene, extent: Extent, environment: Environment) -> RoomLig
     return RoomLights(
         np.array(scene.ambient.colour),
         tuple(
-            RoomLight(position, np.array(light.colour), light.falloff)
+            RoomLight(position, np.array(light.colour), light.falloff, light.radius)
             for position, light in zip(positions, scene.lights, strict=True)
         ),
     )
@@ -39,11 +39,14 @@ def with_lights(scene: Scene, lights: RoomLights) -> Scene:
             as_vector(first.position),
             colour=as_vector(first.colour),
             falloff=first.falloff,
+            radius=first.radius,
             shadows=scene.light.shadows,
             shadow_offset=scene.light.shadow_offset,
         ),
         more_lights=tuple(
-            PointLight(as_vector(light.position), colour=as_vector(light.colour), falloff=light.falloff)
+            PointLight(
+                as_vector(light.position), colour=as_vector(light.colour), falloff=light.falloff, radius=light.radius
+            )
             for light in more
         ),
         ambient=Colour(as_vector(lights.ambient)),

@@ -6,16 +6,23 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO
 import pytest
 
 from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import render_model
+from colonnade.device.gathered_light import scene_cube
 from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
+from colonnade.maps.cache import encoded_environment
+from colonnade.maps.layout import AttributeLayout
+from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render_frames
 from colonnade.render.request import RenderRequest
+from colonnade.scene.lit_room import LitRoom, lit_room
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene
+from colonnade.scene.object_pose import object_pose
 from colonnade.scene.samples import samples_of_frame
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.file import SceneImage
@@ -110,3 +117,64 @@ def test_a_surface_in_a_dome_of_light_is_as_bright_as_under_ambient_light() -> N
     shows = frames[0].is_object
     means = [frame.colour[shows].mean(axis=0) / 4095 for frame in frames]
     assert np.abs(means[0] - means[1]).max() < 0.003
+
+
+def panorama_scene(path: Path, level: float, scene: Scene) -> Scene:
+    """A scene with a grey panorama with a lamp of 100 times its light in the first of 50 rows."""
+    pixels = np.full((200, 400, 3), level)
+    pixels[:4] *= 100
+    output = OpenImageIO.ImageOutput.create(str(path))
+    assert output is not None and output.open(str(path), OpenImageIO.ImageSpec(400, 200, 3, "float"))
+    output.write_image(pixels.astype(np.float32))
+    output.close()
+    return replace(scene, background=replace(scene.background, panorama=path))
+
+
+def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Lights that the scene names add to it; otherwise they are taken out of it, and the rest is ambient light."""
+    manifest, scene = manifest_for("textured").manifest, panorama_scene(tmp_path / "sky.exr", 0.5, SCENE)
+    scene = replace(scene, background=replace(scene.background, panorama_exposure=0.5))
+    words = DeviceScene.of(scene, manifest).image.attributes[-1].words.view("<u2") / 4096
+    assert (np.sort(words, axis=None)[: 380 * 3] == 0.25).all() and words.max() > 1
+    capsys.readouterr()
+    prepared = DeviceScene.of(replace(scene, names_light=False), manifest)
+    extent, light = prepared.image.header.extent, prepared.scene.light
+    to_light = np.array(light.position) - object_pose(scene, extent, None).to_world(extent.centre)
+    assert to_light[1] > 0.999 * np.linalg.norm(to_light) and light.radius > 0
+    solid = 2 * np.pi * (1 - np.cos(np.pi / 50))
+    assert light.colour == pytest.approx([solid * 0.25 * 94 / np.pi] * 3, rel=0.02)
+    assert prepared.scene.ambient.colour == pytest.approx([0.25] * 3, rel=0.01)
+    assert (prepared.image.attributes[-1].words.view("<u2") / 4096).max() < 0.75
+    prepared.registers((32, 24))  # Its distance is within the registers
+    assert capsys.readouterr().err.splitlines() == [
+        "colonnade: the scene names no light: ambient light and 1 light are those of panorama sky.exr, which have their"
+        " area with several --samples",
+        "colonnade: gathered rays meet the light of the panorama, which shows all directions",
+    ]
+
+
+def test_in_a_room_a_panorama_is_what_the_photo_does_not_show(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its exposure is the photo's, whatever its own; its lights are in the room."""
+    room, extent = load_environment(ROOM), load_mesh("teapot:4").extent
+    image = encoded_environment(room, AttributeLayout(room.width, room.height))
+
+    def lit_cube(scene: Scene) -> tuple[LitRoom, np.ndarray]:
+        lit = lit_room(scene, room, extent, 2, False)
+        cube = scene_cube(lit.scene, extent, room, image, False, lit.panorama)
+        assert cube is not None
+        return lit, cube.texels.reshape(-1, 3)
+
+    scene = replace(IN_ROOM, names_light=False)
+    (lit, one), (_, other) = (lit_cube(panorama_scene(tmp_path / f"{level}.exr", level, scene)) for level in (0.5, 2.0))
+    np.testing.assert_allclose(one, other, atol=0.002)
+    light = lit.scene.light
+    assert light.position is not None and 1.0 < light.position[1] < 4.0 and light.falloff is not None
+    _, without = lit_cube(IN_ROOM)
+    assert 0.1 < (np.abs(one - without) < 1e-9).all(axis=1).mean() < 0.6, "directions of the photo keep its light"
+    grey = np.median(one, axis=0)
+    assert (np.abs(one - grey) < 0.002).all(axis=1).mean() > 0.3, "the others are the panorama's"
+    notes = capsys.readouterr().err
+    assert "has the exposure" in notes and "and its panorama the other" in notes and "1 light are" in notes
+    assert "a fit, the other" in notes

@@ -119,6 +119,8 @@ def test_colours_need_a_room_with_a_photo(folder: Path) -> None:
         frame(folder, MIRROR.replace("attic", "dark") + LAMP + 'background.colours = "photo"\n')
     with pytest.raises(UserError, match=r"background.colours chooses the colours of a room: it needs background.room"):
         frame(folder, 'mesh.name = "cube"\nbackground.colours = "photo"\n')
+    with pytest.raises(UserError, match=r"background.panorama_yaw is of a panorama: it needs background.panorama"):
+        frame(folder, 'mesh.name = "cube"\nbackground.panorama_yaw = 90.0\n')
     with pytest.raises(UserError, match=r"background.colours must be one of photo, albedo"):
         frame(folder, MIRROR + 'background.colours = "grey"\n')
 
