@@ -95,21 +95,26 @@ class Accumulation:
         """The mean colours, linear, float64 [height, width, 3]."""
         return np.asarray((self.objects + self.background) / self.white / self.samples, dtype=np.float64)
 
-    def over(self, photo: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def over(
+        self, photo: npt.NDArray[np.float64], strength: npt.NDArray[np.uint8] | None = None
+    ) -> npt.NDArray[np.float64]:
         """The object over a photo of the background, with its shadow.
 
         Args:
             photo: Linear, float64 [height, width, 3].
+            strength: Of the shadow, uint8 [height, width], 255 the whole one; None: it is whole everywhere.
 
         Returns:
             Linear colours, float64 [height, width, 3]. Each sample that does not show the object shows the photo, times
             its shadow ratio; on the device, rounded to 16 bits (`shadowed_photo`).
         """
         assert self.ratio is not None
-        if self.unshadowed == UNSHADOWED:
-            background = shadowed_photo(photo, self.ratio) / PHOTO_WHITE
-        else:
-            background = photo * (self.ratio / self.unshadowed)
+        ratio, is_exact = self.ratio, self.unshadowed == UNSHADOWED
+        if strength is not None:
+            part, others = strength.astype(np.int64)[..., None], (self.samples - self.coverage)[..., None]
+            ratio = part * ratio + (255 - part) * others * (UNSHADOWED if is_exact else self.unshadowed)
+            ratio = (ratio + 127) // 255 if is_exact else ratio / 255
+        background = shadowed_photo(photo, ratio) / PHOTO_WHITE if is_exact else photo * (ratio / self.unshadowed)
         return (self.objects / self.white + background) / self.samples
 
 

@@ -15,7 +15,7 @@ from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.view_file import view_file
 from colonnade.scene.cameras import check_camera
-from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, view_photo
+from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, photo_strength, view_photo
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.view import View, make_view, place, with_overrides
 from colonnade.scene_image.environment import with_environment
@@ -41,6 +41,7 @@ class DeviceScene:
         maps: The room and its encoded maps; None without a room.
         photo: The photo of the frames' view, sRGB, uint8 [rows, columns, 3]; None without one.
         panorama: The light that no photo shows, without the scene's lights; None without a panorama.
+        strength: Of the object's shadow on the photo, uint8 [rows, columns]; None: it is whole.
     """
 
     scene: Scene
@@ -49,6 +50,7 @@ class DeviceScene:
     maps: EncodedEnvironment | None
     photo: NDArray[np.uint8] | None = None
     panorama: Panorama | None = None
+    strength: NDArray[np.uint8] | None = None
 
     @classmethod
     def of(
@@ -100,7 +102,7 @@ class DeviceScene:
             held = None if maps is None else maps.image
             cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.panorama, progress)
             image = with_cube(image, cube)
-        return cls(lit.scene, manifest, image, maps, photo, lit.panorama)
+        return cls(lit.scene, manifest, image, maps, photo, lit.panorama, lit.strength)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
         """The scene in another view of its room: object and lights stay in the world, camera and maps are new.
@@ -117,7 +119,8 @@ class DeviceScene:
         image = with_environment(self.image, maps, self.manifest)
         if self.manifest.gathers:
             image = with_cube(image, scene_cube(scene, extent, maps.environment, maps.image, relit, self.panorama))
-        return replace(self, scene=scene, image=image, maps=maps, photo=room.photo)
+        strength = photo_strength(scene, room, extent, relit)
+        return replace(self, scene=scene, image=image, maps=maps, photo=room.photo, strength=strength)
 
     def seen_by(self, camera: EnvironmentCamera, photo: NDArray[np.uint8] | None) -> DeviceScene:
         """The scene from another camera: object, lights and maps stay in the world, primary rays march.
@@ -128,7 +131,7 @@ class DeviceScene:
         """
         assert self.environment is not None
         scene = fixed_in_world(self.scene, self.image.header.extent, self.environment)
-        return replace(self, scene=replace(scene, frame_camera=camera), photo=photo)
+        return replace(self, scene=replace(scene, frame_camera=camera), photo=photo, strength=None)
 
     @property
     def environment(self) -> Environment | None:

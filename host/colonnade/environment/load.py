@@ -168,7 +168,7 @@ def load_maps(
     colours = np.zeros((height, width, 3)) if albedo is None else albedo
     room = Environment(name, colours, normals, depth, maps.depth is not None, camera, photo, tuple(notes))
     if albedo is None:
-        room = replace(room, albedo=derived_albedo(room, lights), notes=(*notes, _ALBEDO_NOTE))
+        room = replace(room, albedo=derived_albedo(room, lights), notes=(*notes, _ALBEDO_NOTE), has_albedo=False)
     return room
 
 

@@ -50,6 +50,7 @@ class Environment:
         camera: The camera of the maps.
         photo: uint8 [height, width, 3], sRGB, or None.
         notes: Assumptions and repairs of the loader, one line each.
+        has_albedo: Whether the room came with an albedo map; otherwise the albedo has the shadows of the photo.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Environment:
     camera: EnvironmentCamera
     photo: NDArray[np.uint8] | None
     notes: tuple[str, ...] = ()
+    has_albedo: bool = True
 
     @property
     def width(self) -> int:

@@ -11,12 +11,15 @@ from colonnade.common.image_io import decode_srgb
 Photo = npt.NDArray[np.uint8]
 
 
-def composited(sums: Accumulation, photo: Photo | None) -> npt.NDArray[np.float64]:
+def composited(
+    sums: Accumulation, photo: Photo | None, strength: npt.NDArray[np.uint8] | None = None
+) -> npt.NDArray[np.float64]:
     """The object over the photo of its view, with its shadow (differential rendering, Debevec 1998).
 
     Args:
         sums: The samples of the frame.
         photo: sRGB, uint8 [rows, columns, 3]. Without one the result is the frame's own picture.
+        strength: Of the shadow, uint8 [rows, columns] (`colonnade.environment.shadow_strength`); None: it is whole.
 
     Returns:
         Linear colours, float64 [height, width, 3].
@@ -24,11 +27,12 @@ def composited(sums: Accumulation, photo: Photo | None) -> npt.NDArray[np.float6
     if photo is None or sums.ratio is None:
         return sums.image()
     height, width = sums.coverage.shape
-    return sums.over(decode_srgb(resized_photo(photo, width, height)))
+    part = None if strength is None else resized_photo(strength, width, height)
+    return sums.over(decode_srgb(resized_photo(photo, width, height)), part)
 
 
 def resized_photo(photo: Photo, width: int, height: int) -> Photo:
-    """A photo in the size of a frame: sRGB, uint8 [height, width, 3]."""
+    """A photo, or a map of one channel, in the size of a frame: uint8 [height, width, …]."""
     if photo.shape[:2] == (height, width):
         return photo
     from PIL import Image

@@ -413,7 +413,9 @@ def render_model(scene: Scene, mesh: Mesh, manifest: Manifest, size: Size, progr
 
 def _composited(result: RenderResult, prepared: DeviceScene) -> RenderResult:
     """The result in the photo of its room; as it is without a room."""
-    return result if prepared.environment is None else replace(result, image=composited(result.sums, prepared.photo))
+    if prepared.environment is None:
+        return result
+    return replace(result, image=composited(result.sums, prepared.photo, prepared.strength))
 
 
 def _denoised(result: RenderResult, passes: FramePasses, view: View) -> RenderResult:

@@ -141,7 +141,7 @@ def traced_frames(
             other = render_reference(mesh, view, progress, backdrop)
             sums += _accumulated(other)
             rays = {kind: count + other.rays[kind] for kind, count in rays.items()}
-        image = composited(sums, None if options.relit else photo)
+        image = composited(sums, None if options.relit else photo, room.strength)
         yield TracedFrame(image, first, sums, rays, time.perf_counter() - begun)
 
 

@@ -13,6 +13,7 @@ from colonnade.common.image_io import read_picture
 from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
+from colonnade.environment.shadow_strength import shadow_strength
 from colonnade.maps.encoded import layout_of
 from colonnade.scene.object_pose import object_pose, with_free_placement
 from colonnade.scene.panorama_light import panorama_light
@@ -41,6 +42,7 @@ class LitRoom:
         albedo: The room with its albedo, as its folder has it; None without a room.
         colours: How the photo's colours were made; None where the colours are the albedo.
         panorama: The light that no photo shows, without the scene's lights; None without a panorama.
+        strength: Of the object's shadow on the photo (`photo_strength`); None: it is whole.
     """
 
     scene: Scene
@@ -48,6 +50,7 @@ class LitRoom:
     albedo: Environment | None = None
     colours: PhotoColours | None = None
     panorama: Panorama | None = None
+    strength: NDArray[np.uint8] | None = None
 
 
 def scene_room(scene: Scene) -> Environment | None:
@@ -131,8 +134,9 @@ def lit_room(
         )
     # Gathered light has the photo's own scale
     colours = _photo_colours(scene, room, extent, relit, 1.0 if scene.paths.gather else None)
+    strength = photo_strength(scene, room, extent, relit)
     if colours is None:
-        return LitRoom(scene, room, room, panorama=panorama)
+        return LitRoom(scene, room, room, panorama=panorama, strength=strength)
     if colours.clamped > _REPORTED_CLAMPED:
         progress.note(
             f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
@@ -143,7 +147,7 @@ def lit_room(
                 else "raise the ambient light, or leave out all lights so that they are fitted"
             )
         )
-    return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours, panorama)
+    return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours, panorama, strength)
 
 
 def fixed_in_world(scene: Scene, extent: Extent, room: Environment) -> Scene:
@@ -171,6 +175,28 @@ def next_view(scene: Scene, extent: Extent, room: Environment, relit: bool) -> E
     """
     colours = _photo_colours(scene, room, extent, relit, scene.headroom)
     return room if colours is None else colours.environment
+
+
+def photo_strength(scene: Scene, room: Environment, extent: Extent, relit: bool) -> NDArray[np.uint8] | None:
+    """The strength of the object's shadow on the photo of a room, uint8 [height, width].
+
+    None, and whole, for a camera that is not that of the maps; and unless the scene wants something else, for lights
+    that it names, which the photo may not show, and in a room without an albedo map.
+
+    Raises:
+        UserError: `background.shadows` asks for a photo or an albedo map that the room lacks.
+    """
+    wanted = scene.background.shadows
+    if wanted == "photo" and (room.photo is None or not room.has_albedo):
+        raise UserError(
+            f"background.shadows is photo, but room {room.name} has no "
+            + ("photo.png or render.png" if room.photo is None else "albedo.png: its albedo has the photo's shadows")
+        )
+    if relit or scene.places_camera or room.photo is None or not room.has_albedo:
+        return None
+    if wanted == "whole" or (wanted is None and scene.names_light):
+        return None
+    return shadow_strength(room, lights_of(scene, extent, room))
 
 
 def _photo_colours(

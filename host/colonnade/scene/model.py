@@ -335,6 +335,8 @@ class Background:
             along -z.
         panorama_exposure: Factor of its radiance. None: in a room with a photo, fitted where both show something; 1
             elsewhere.
+        shadows: The object's shadow in a room's photo: ``photo``, none where the photo has a shadow of the room, or
+            ``whole``. None: ``photo`` for lights that the scene does not name, if the room has an albedo map.
         colours: Colours of the room in reflections and refractions: ``photo``, those of its photo, or ``albedo``, its
             albedo under the scene's lights. None: ``photo`` in a frame that shows the photo, else ``albedo``.
     """
@@ -346,6 +348,7 @@ class Background:
     panorama: _File | None = None
     panorama_yaw: Annotated[_Float, Interval(ge=-360.0, le=360.0)] = 0.0
     panorama_exposure: Annotated[_Float, Interval(ge=1e-6, le=1e6)] | None = None
+    shadows: Literal["photo", "whole"] | None = None
     colours: Literal["photo", "albedo"] | None = None
 
 

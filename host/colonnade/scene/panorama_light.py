@@ -112,10 +112,10 @@ def fitted_exposure(panorama: Panorama, seen: SeenLight) -> float:
     """
     weights = np.broadcast_to(face_directions(FINE)[1], (6, FINE, FINE)).ravel()
     used = weights * (seen.is_seen & ~seen.is_bright)
-    shown = float(used @ (panorama.cube(FINE).texels.reshape(-1, 3) @ LUMINANCE))
-    if used.sum() < _LEAST_SEEN * weights.sum() or shown <= 0:
+    total = float(used @ (panorama.cube(FINE).texels.reshape(-1, 3) @ LUMINANCE))
+    if used.sum() < _LEAST_SEEN * weights.sum() or total <= 0:
         return 1.0
-    return float(f"{used @ (seen.radiance @ LUMINANCE) / shown:.4g}")
+    return float(f"{used @ (seen.radiance @ LUMINANCE) / total:.4g}")
 
 
 def _mean(panorama: Panorama, seen: SeenLight | None) -> Floats:

@@ -114,6 +114,8 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     for key in ("panorama_yaw", "panorama_exposure"):
         if key in background and "panorama" not in background:
             raise ValueError(f"background.{key} is of a panorama: it needs background.panorama")
+    if "room" not in background and "shadows" in background:
+        raise ValueError("background.shadows is of shadows on a room's photo: it needs background.room")
     if "room" not in background and "colours" in background:
         raise ValueError("background.colours chooses the colours of a room: it needs background.room")
     if "room" not in background and "object" in data:

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colonnade.common.accumulation import Accumulation, FramePasses
+from colonnade.common.accumulation import UNSHADOWED, WHITE, Accumulation, FramePasses
 from colonnade.common.framebuffer import Frame
 from colonnade.common.types import Floats
 
@@ -92,3 +92,18 @@ def test_counters_add_up_levels_do_not_and_errors_are_kept() -> None:
     assert frame.counters["deepestStack"] == max(one.counters["deepestStack"] for one in frames)
     assert frame.errors == ["watchdog"]
     np.testing.assert_array_equal(frame.colour, frames[0].colour)
+
+
+def test_the_strength_of_shadows_is_a_part_of_them() -> None:
+    """None is the photo, the whole is the ratio's; of the samples of a pixel only those of the photo count."""
+    ratio = np.full((1, 1, 3), 1024, dtype=np.uint32)
+    colour = np.full((1, 1, 3), 4095, dtype=np.uint32)
+    samples = [Accumulation.of_pixels(colour, np.array([[on]]), ratio, WHITE, UNSHADOWED) for on in (True, False)]
+    visible, hidden = samples
+    photo = np.full((1, 1, 3), 0.5)
+    for sums in (hidden, hidden + hidden, hidden + visible):
+        whole, none, half = (sums.over(photo, np.array([[part]], dtype=np.uint8)) for part in (255, 0, 128))
+        np.testing.assert_array_equal(whole, sums.over(photo))
+        unshadowed = replace(sums, ratio=np.full_like(ratio, 4096) * (sums.samples - sums.coverage[0, 0]))
+        np.testing.assert_array_equal(none, unshadowed.over(photo))
+        np.testing.assert_allclose(half, (whole * 128 + none * 127) / 255, atol=2e-4)

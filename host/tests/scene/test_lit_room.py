@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,16 @@ from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.device import scene as device_scene
 from colonnade.device.scene import DeviceScene
+from colonnade.environment.load import load_environment
 from colonnade.lab.evaluation.studies.synthetic_attic import attic, write_attic
+from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import psnr
+from colonnade.render.composite import composited
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
+from colonnade.scene.lit_room import lit_room
+from colonnade.scene.model import Background, MeshSource, Scene
 from colonnade.scene.parser import load_scene
 
 SIZE = (96, 72)
@@ -67,6 +73,33 @@ def test_a_scene_without_lights_gets_those_of_the_photo(folder: Path, capsys: py
     frame(folder, MIRROR.replace("attic", "dark"))
     (line,) = capsys.readouterr().err.splitlines()
     assert "room dark has no photo to fit lights to: one light beside the object" in line
+
+
+def test_found_lights_cast_no_shadow_where_the_photo_has_one(folder: Path) -> None:
+    """Those that a scene names cast whole shadows; so do all in a room whose albedo has the photo's shadows."""
+    room = load_environment(folder / "attic")
+    extent, scene = load_mesh("teapot:4").extent, Scene(MeshSource("teapot:4"), background=Background(room=folder))
+    strengths = [
+        lit_room(replace(scene, names_light=names), one, extent, 2, relit).strength
+        for names, one, relit in (
+            (True, room, False),
+            (False, replace(room, has_albedo=False), False),
+            (False, room, True),
+            (False, room, False),
+        )
+    ]
+    assert strengths[:3] == [None, None, None]
+    strength = strengths[3]
+    assert strength is not None and strength.shape == (SIZE[1], SIZE[0]) and strength.min() == 0
+    assert np.median(strength) > 200
+    partial = frame(folder, MIRROR)
+    assert (partial.image >= composited(partial.sums, room.photo) - 1e-4).all(), (
+        "no pixel is darker than with whole ones"
+    )
+    whole = frame(folder, MIRROR + 'background.shadows = "whole"\n')
+    np.testing.assert_array_equal(whole.image, composited(partial.sums, room.photo))
+    with pytest.raises(UserError, match=r"background.shadows is photo, but room dark has no photo.png"):
+        frame(folder, MIRROR.replace("attic", "dark") + 'background.shadows = "photo"\n')
 
 
 @pytest.mark.parametrize("light", ["", LAMP, "ambient.colour = [0.3, 0.3, 0.3]\n"])
@@ -157,7 +190,7 @@ def test_the_light_command_prints_a_scene(folder: Path, tmp_path: Path) -> None:
     result = runner.invoke(cli, ["light", str(folder / "attic"), "--output", str(tmp_path / "out")])
     assert result.exit_code == 0, result.output
     assert (tmp_path / "out" / "light.png").is_file()
-    text = MIRROR + "\n" + result.stdout
+    text = MIRROR + 'background.shadows = "photo"\n' + result.stdout
     fitted, named = frame(folder, MIRROR), frame(folder, text)
     np.testing.assert_array_equal(fitted.image, named.image)
     failed = runner.invoke(cli, ["light", str(folder / "dark")])

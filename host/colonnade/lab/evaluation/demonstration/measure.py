@@ -121,7 +121,7 @@ def _picture(prepared: DeviceScene, size: tuple[int, int], samples: int) -> NDAr
     for scene in prepared.scene.with_samples(samples).passes():
         passes.add(model_frame(model, prepared.registers(size, scene, composited=True)))
     require_no_errors(passes.frame)
-    return encode_srgb(composited(passes.sums, prepared.photo))
+    return encode_srgb(composited(passes.sums, prepared.photo, prepared.strength))
 
 
 def _cost(
