@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from colonnade.common.accumulation import LUMINANCE
 from colonnade.common.image_io import decode_srgb
@@ -16,6 +17,8 @@ WHOLE = 255
 _PHOTO_RANGE = (2, 253)
 #: Reflected light below this does not tell the share of the lights.
 _DARK = 1e-6
+#: Edge of the median's window, pixels.
+_MEDIAN = 5
 
 
 def shadow_strength(room: Environment, lights: RoomLights) -> NDArray[np.uint8]:
@@ -23,7 +26,8 @@ def shadow_strength(room: Environment, lights: RoomLights) -> NDArray[np.uint8]:
 
     photo = albedo · (ambient + s · light), in least squares of the three channels, gives the share s of the light that
     reaches a pixel, 0 to 1. An object in the way takes s · light, so 1 - ratio has the factor
-    s · (ambient + light) / (ambient + s · light), in luminance. Saturated pixels have all the light.
+    s · (ambient + light) / (ambient + s · light), in luminance. Saturated pixels have all the light. A median removes
+    the photo's noise.
 
     Args:
         room: With a photo, and an albedo of its own.
@@ -40,7 +44,8 @@ def shadow_strength(room: Environment, lights: RoomLights) -> NDArray[np.uint8]:
         return np.full(usable.shape, WHOLE, dtype=np.uint8)
     scale = np.median((photo * whole).sum(axis=2)[usable] / (whole**2).sum(axis=2)[usable])
     reached = ((photo - scale * ambient) * lit).sum(axis=2) / (scale * (lit**2).sum(axis=2)).clip(min=_DARK)
-    share = np.where(room.photo.max(axis=2) > _PHOTO_RANGE[1], 1.0, reached.clip(0.0, 1.0))
+    share = np.where(room.photo.max(axis=2) > _PHOTO_RANGE[1], 1.0, reached)
+    share = ndimage.median_filter(share, size=_MEDIAN, mode="nearest").clip(0.0, 1.0)
     base, light = float(lights.ambient @ LUMINANCE), direct @ LUMINANCE
     strength = share * (base + light) / (base + share * light).clip(min=_DARK)
     return np.asarray(np.rint(WHOLE * np.where(light > _DARK, strength, 1.0)), dtype=np.uint8)
