@@ -9,7 +9,9 @@ import numpy as np
 
 from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.light_cube import FACE, MOST, LightCube
+from colonnade.environment.panorama import Panorama
 from colonnade.environment.seen_light import FINE
+from colonnade.environment.surround import Surround
 from colonnade.maps.room_light import room_light
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.room_lights import lights_of
@@ -18,7 +20,6 @@ from colonnade.scene_image.header import LoadedMemory
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.environment.panorama import Panorama
     from colonnade.maps.image import AttributeImage
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.model import Scene
@@ -36,12 +37,12 @@ def scene_cube(
     room: Environment | None,
     image: AttributeImage | None,
     relit: bool,
-    panorama: Panorama | None = None,
+    unseen: Panorama | Surround | None = None,
     progress: Progress = QUIET,
 ) -> LightCube | None:
     """The light that gathered rays meet, by directions of mesh space; None for a scene without them.
 
-    In a room it is the room's light at the middle of the object, elsewhere that of a panorama or the ambient light.
+    In a room it is the room's light at the middle of the object, elsewhere that of a panorama, or the ambient light.
 
     Args:
         scene: With lights and a place for the object, as in `LitRoom`.
@@ -49,7 +50,7 @@ def scene_cube(
         room: The room with the colours that rays see.
         image: Its encoded maps.
         relit: The frame shows the room under the scene's lights, not its photo.
-        panorama: The light that no photo shows (`LitRoom.panorama`).
+        unseen: The light that no photo shows (`LitRoom.unseen`).
         progress: Notes where the light comes from, and what the cube cannot hold.
     """
     if scene.paths.gather == 0:
@@ -57,16 +58,18 @@ def scene_cube(
     pose = object_pose(scene, extent, room)
     if room is not None and image is not None:
         lights = lights_of(scene, extent, room)
-        light = room_light(room, image, lights, pose.to_world(extent.centre), not relit, panorama)
-        others = "panorama" if panorama is not None else "bounding planes under the scene's lights, a fit,"
+        light = room_light(room, image, lights, pose.to_world(extent.centre), not relit, unseen)
+        others = "bounding planes, a fit under the scene's lights,"
+        if unseen is not None:
+            others = "fitted walls" if isinstance(unseen, Surround) else "panorama"
         progress.note(
             f"gathered rays meet the light of room {room.name}: its picture shows {light.seen:.0%} of all directions,"
             f" and its {others} the other {1 - light.seen:.0%}"
         )
         cube = light.cube
-    elif panorama is not None:
+    elif isinstance(unseen, Panorama):
         progress.note("gathered rays meet the light of the panorama, which shows all directions")
-        cube = panorama.cube(FINE)
+        cube = unseen.cube(FINE)
     else:
         return LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, FACE, FACE, 3)))
     cube = cube.turned(pose.rotation)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
     from colonnade.environment.model import Environment, EnvironmentCamera
     from colonnade.environment.panorama import Panorama
+    from colonnade.environment.surround import Surround
     from colonnade.mesh.mesh import Mesh
     from colonnade.scene.model import Scene
     from colonnade.scene_image.file import SceneImage
@@ -40,7 +41,7 @@ class DeviceScene:
         image: Records of the mesh, textures, and maps of the room.
         maps: The room and its encoded maps; None without a room.
         photo: The photo of the frames' view, sRGB, uint8 [rows, columns, 3]; None without one.
-        panorama: The light that no photo shows, without the scene's lights; None without a panorama.
+        unseen: The light that no photo shows (`LitRoom.unseen`).
         strength: Of the object's shadow on the photo, uint8 [rows, columns]; None: it is whole.
     """
 
@@ -49,7 +50,7 @@ class DeviceScene:
     image: SceneImage
     maps: EncodedEnvironment | None
     photo: NDArray[np.uint8] | None = None
-    panorama: Panorama | None = None
+    unseen: Panorama | Surround | None = None
     strength: NDArray[np.uint8] | None = None
 
     @classmethod
@@ -100,9 +101,9 @@ class DeviceScene:
             image = with_environment(image, maps, manifest)
         if manifest.gathers:
             held = None if maps is None else maps.image
-            cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.panorama, progress)
+            cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.unseen, progress)
             image = with_cube(image, cube)
-        return cls(lit.scene, manifest, image, maps, photo, lit.panorama, lit.strength)
+        return cls(lit.scene, manifest, image, maps, photo, lit.unseen, lit.strength)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
         """The scene in another view of its room: object and lights stay in the world, camera and maps are new.
@@ -118,7 +119,7 @@ class DeviceScene:
         maps = EncodedEnvironment.of(next_view(scene, extent, room, relit), self.manifest, encode)
         image = with_environment(self.image, maps, self.manifest)
         if self.manifest.gathers:
-            image = with_cube(image, scene_cube(scene, extent, maps.environment, maps.image, relit, self.panorama))
+            image = with_cube(image, scene_cube(scene, extent, maps.environment, maps.image, relit, self.unseen))
         strength = photo_strength(scene, room, extent, relit)
         return replace(self, scene=scene, image=image, maps=maps, photo=room.photo, strength=strength)
 

@@ -15,23 +15,28 @@ from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.environment.light_fit import DEFAULT_LIGHTS, LightFit, fit_lights
 from colonnade.environment.lights import RoomLight, RoomLights
 from colonnade.environment.model import Environment
+from colonnade.environment.surround import Surround
 
 #: Sources that determine a fit, beside this file.
-_SOURCES = ("light_fit.py", "lights.py", "../common/fixed_order.py", "../common/srgb.py")
+_SOURCES = tuple(
+    "light_fit.py light_samples.py wall_fit.py lights.py surround.py ../common/fixed_order.py ../common/srgb.py".split()
+)
 
 
-def fitted_lights(environment: Environment, count: int = DEFAULT_LIGHTS, folder: Path | None = None) -> LightFit:
+def fitted_lights(
+    environment: Environment, count: int = DEFAULT_LIGHTS, folder: Path | None = None, walls: bool = False
+) -> LightFit:
     """Fit lights to a room's photo (`fit_lights`), or take them from the cache ``folder``, by default the project's.
 
     Raises:
         UserError: The room has no photo, or it does not tell the light.
     """
-    key = {"inputs": _digest(environment), "count": count, "sources": _sources()}
+    key = {"inputs": _digest(environment), "count": count, "walls": walls, "sources": _sources()}
     name = hashlib.sha256(repr(sorted(key.items())).encode()).hexdigest()[:32]
     file = (folder or cache_directory(project_root()) / "lights") / f"{name}.json"
     if (stored := cache.stored(file, key)) is not None:
         return _from_json(stored)
-    fit = fit_lights(environment, count)
+    fit = fit_lights(environment, count, walls)
     cache.store(file, key, asdict(fit))
     return fit
 
@@ -58,4 +63,7 @@ def _from_json(stored: dict[str, Any]) -> LightFit:
         RoomLight(np.array(light["position"]), np.array(light["colour"]), light["falloff"])
         for light in stored["lights"]["lights"]
     )
-    return LightFit(RoomLights(np.array(stored["lights"]["ambient"]), lights), stored["psnr"], stored["ambient_psnr"])
+    walls = stored["surround"]
+    surround = None if walls is None else Surround(**{name: np.array(value) for name, value in walls.items()})
+    found = RoomLights(np.array(stored["lights"]["ambient"]), lights)
+    return LightFit(found, stored["psnr"], stored["ambient_psnr"], surround)

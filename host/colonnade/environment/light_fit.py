@@ -7,31 +7,33 @@ highlights and lamps in the photo are outliers of a robust fit in sRGB. Everythi
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
-from colonnade.common.errors import UserError
 from colonnade.common.image_io import decode_srgb, encode_srgb
-from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
+from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats
-from colonnade.environment.lights import RoomLight, RoomLights, exposure, irradiance, light_box, world_surface
+from colonnade.environment.light_samples import (
+    OUTLIER,
+    Samples,
+    cost_of,
+    residuals_of,
+    samples_of,
+    slope_of,
+    weights_of,
+)
+from colonnade.environment.lights import RoomLight, RoomLights, exposure, irradiance, world_surface
 from colonnade.environment.model import Environment
+from colonnade.environment.surround import Surround
+from colonnade.environment.wall_fit import ALTERNATIONS, Walls, with_best_ambient
 from colonnade.quality.image_metrics import psnr
 
 #: Default number of point lights.
 DEFAULT_LIGHTS = 2
 #: Most point lights of a fit.
 MAX_LIGHTS = 4
-#: Pixels of the photo that the fit uses, about.
-_SAMPLES = 2500
-#: Residuals beyond this, in sRGB from 0 to 1, count as outliers.
-_OUTLIER = 0.1
-#: Channels of the photo are used from and up to these values; the fit ignores lamps and black.
-_PHOTO_RANGE = (2, 250)
-_MIN_ALBEDO = 0.01
 #: Positions tried along x, y and z, and the distances of unit intensity, metres.
 _GRID = (7, 5, 7)
 _FALLOFFS = (None, 1.0, 2.0)
@@ -53,27 +55,6 @@ _FALLOFF_RANGE = (0.5, 4.0)
 
 
 @dataclass(frozen=True)
-class Samples:
-    """The pixels that the fit uses.
-
-    Attributes:
-        points, normals: World space, float64 [n, 3].
-        albedo: Linear, float64 [n, 3].
-        photo: sRGB, 0 to 1, float64 [n, 3].
-        usable: The channel tells the light, bool [n, 3].
-        low, high: Corners of the box that may hold lights, world space, float64 [3].
-    """
-
-    points: Floats
-    normals: Floats
-    albedo: Floats
-    photo: Floats
-    usable: NDArray[np.bool_]
-    low: Floats
-    high: Floats
-
-
-@dataclass(frozen=True)
 class LightFit:
     """Fitted lights and their residuals.
 
@@ -81,33 +62,52 @@ class LightFit:
         lights: In world space.
         psnr: Of the relit room against its photo, 8-bit sRGB, decibels.
         ambient_psnr: The same of the best ambient light alone.
+        surround: The light of the walls, with which the lights were fitted in place of ambient light; None: without it.
     """
 
     lights: RoomLights
     psnr: float
     ambient_psnr: float
+    surround: Surround | None = None
 
 
-def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS) -> LightFit:
+def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS, walls: bool = False) -> LightFit:
     """Fit ambient light and at most ``count`` point lights to a room's photo.
 
     A light that does not improve the fit is left out.
 
+    Args:
+        environment: The room.
+        count: Number of point lights.
+        walls: Fit the light of the walls of a box around the room, too: large sources do not become point lights.
+            The ambient light of the result is then the best one beside the point lights.
+
     Raises:
         UserError: The room has no photo, or too few pixels are neither black nor saturated.
     """
-    samples = _samples(environment)
+    samples = samples_of(environment)
     ambient = best = _refined(samples, RoomLights(np.full(3, 0.5)))
     floor = _AMBIENT_SHARE * ambient.ambient
+    shining = Walls.around(samples) if walls else None
+    if shining is not None:
+        for _ in range(ALTERNATIONS):
+            samples, best, shining = shining.fitted(samples, best)
     for _ in range(count):
         starts = _starts(samples, best, _candidates(samples))
         refined = [_refined(samples, start, floor) for start in starts]
-        better = min(refined, key=lambda lights: _cost(samples, lights))
-        if not _cost(samples, better) <= _GAIN * _cost(samples, best):
+        better = min(refined, key=lambda lights: cost_of(samples, lights))
+        if not cost_of(samples, better) <= _GAIN * cost_of(samples, best):
             break
         best = better
+        if shining is not None:
+            samples, best, shining = shining.fitted(samples, best)
+            best = _refined(samples, best, floor)
+    surround = None
+    if shining is not None:
+        surround = shining.surround(best.ambient)
+        best = with_best_ambient(replace(samples, surround=np.ones_like(samples.surround)), best)
     rounded = _rounded(best)
-    return LightFit(rounded, relit_psnr(environment, rounded), relit_psnr(environment, ambient))
+    return LightFit(rounded, relit_psnr(environment, rounded), relit_psnr(environment, ambient), surround)
 
 
 def relit(environment: Environment, lights: RoomLights) -> Floats:
@@ -129,22 +129,6 @@ def comparison_picture(environment: Environment, lights: RoomLights) -> Floats:
     return np.concatenate([decode_srgb(environment.photo), fit, linear_from_srgb(difference.clip(max=1.0))], axis=1)
 
 
-def _samples(environment: Environment) -> Samples:
-    """The pixels of a regular grid whose colours can tell the light."""
-    if environment.photo is None:
-        raise UserError(f"room {environment.name} has no photo.png or render.png: there is nothing to fit lights to")
-    step = max(1, round(float(np.sqrt(environment.width * environment.height / _SAMPLES))))
-    grid = np.s_[step // 2 :: step, step // 2 :: step]
-    points, normals = (surface[grid].reshape(-1, 3) for surface in world_surface(environment))
-    albedo, encoded = environment.albedo[grid].reshape(-1, 3), environment.photo[grid].reshape(-1, 3)
-    usable = (encoded >= _PHOTO_RANGE[0]) & (encoded <= _PHOTO_RANGE[1]) & (albedo >= _MIN_ALBEDO)
-    if np.count_nonzero(usable.all(axis=1)) < len(usable) / 20:
-        raise UserError(
-            f"the photo of room {environment.name} is nearly all black or saturated: lights cannot be fitted"
-        )
-    return Samples(points, normals, albedo, encoded / 255.0, usable, *light_box(environment))
-
-
 def _candidates(samples: Samples) -> Floats:
     """Positions to try, world space, in and around what the camera sees, float64 [n, 3]."""
     axes = [np.linspace(samples.low[axis], samples.high[axis], _GRID[axis]) for axis in range(3)]
@@ -153,12 +137,9 @@ def _candidates(samples: Samples) -> Floats:
 
 def _starts(samples: Samples, lights: RoomLights, positions: Floats) -> list[RoomLights]:
     """The best starts with one more light: intensities of all lights by non-negative least squares."""
-    model = samples.albedo * irradiance(samples.points, samples.normals, lights)
-    relative = _residuals(samples, lights) / _OUTLIER
-    # Weights of soft-L1, and the slope that makes linear differences those of the picture
-    weights = _slope(samples, model) / np.sqrt(np.sqrt(1 + relative**2))
-    known = [np.ones(len(samples.points))]
-    known += [exposure(samples.points, samples.normals, light.position, light.falloff) for light in lights.lights]
+    weights = weights_of(samples, lights)
+    points = [exposure(samples.points, samples.normals, light.position, light.falloff) for light in lights.lights]
+    known = [samples.surround, *(np.repeat(one[:, None], 3, axis=1) for one in points)]
     tried = list(itertools.product(positions, _FALLOFFS))
     new = [exposure(samples.points, samples.normals, position, falloff) for position, falloff in tried]
     intensities, costs = _non_negative(samples, weights, np.stack(known, axis=1), np.stack(new, axis=1))
@@ -186,7 +167,7 @@ def _non_negative(samples: Samples, weights: Floats, known: Floats, new: Floats)
     Args:
         samples: n samples.
         weights: float64 [n, 3].
-        known: Exposures by k lights, float64 [n, k].
+        known: Exposures by k lights, float64 [n, k, 3].
         new: Exposures by m other lights, float64 [n, m].
 
     Returns:
@@ -197,7 +178,7 @@ def _non_negative(samples: Samples, weights: Floats, known: Floats, new: Floats)
     for channel in range(3):
         scale = (weights * samples.albedo)[:, channel, None]
         target = weights[:, channel, None] * linear_from_srgb(samples.photo[:, channel, None])
-        old, added = known * scale, new * scale
+        old, added = known[:, :, channel] * scale, new * scale
         gram, moment = np.empty((m, k + 1, k + 1)), np.empty((m, k + 1))
         gram[:, :k, :k] = fixed_order.product(old.T, old)
         gram[:, :k, k] = gram[:, k, :k] = fixed_order.product(added.T, old)
@@ -230,24 +211,6 @@ def _non_negative_solution(gram: Floats, moment: Floats) -> Floats:
     return best
 
 
-def _residuals(samples: Samples, lights: RoomLights) -> Floats:
-    """Differences from the photo, sRGB, float64 [n, 3]."""
-    model = samples.albedo * irradiance(samples.points, samples.normals, lights)
-    return np.asarray(np.where(samples.usable, srgb_from_linear(model) - samples.photo, 0.0))
-
-
-def _slope(samples: Samples, model: Floats) -> Floats:
-    """Derivative of sRGB at linear colours, 0 for unused channels, float64 [n, 3]; finite at 0."""
-    slope = np.where(model > 0.0031308, 1.055 / 2.4 / fixed_order.power(model.clip(min=0.0031308), 1 - 1 / 2.4), 12.92)
-    return np.asarray(np.where(samples.usable, slope, 0.0))
-
-
-def _cost(samples: Samples, lights: RoomLights) -> float:
-    """The robust cost that `_refined` minimises."""
-    relative = _residuals(samples, lights) / _OUTLIER
-    return float((np.sqrt(1 + relative**2) - 1).sum())
-
-
 def _refined(samples: Samples, start: RoomLights, floor: Floats | None = None) -> RoomLights:
     """Refine all values of some lights by robust least squares; ``floor`` is the least ambient light.
 
@@ -263,12 +226,12 @@ def _refined(samples: Samples, start: RoomLights, floor: Floats | None = None) -
             high.append(_FALLOFF_RANGE[1])
     lower, upper = np.array(low), np.array(high)
     values = np.clip(layout.pack(start), lower, upper)
-    cost, damping = _cost(samples, layout.unpack(values)), _FIRST_DAMPING
+    cost, damping = cost_of(samples, layout.unpack(values)), _FIRST_DAMPING
     for _ in range(_EVALUATIONS):
         lights = layout.unpack(values)
-        residuals, slopes = _residuals(samples, lights).ravel(), _jacobian(samples, lights)
+        residuals, slopes = residuals_of(samples, lights).ravel(), _jacobian(samples, lights)
         # Derivatives of the soft-L1 cost: its slope is r / root, its curvature root^-3
-        root = np.sqrt(1 + (residuals / _OUTLIER) ** 2)
+        root = np.sqrt(1 + (residuals / OUTLIER) ** 2)
         gradient = fixed_order.product(slopes.T, residuals / root)
         normal = fixed_order.product((slopes / (root * root * root)[:, None]).T, slopes)
         held = ((values <= lower) & (gradient > 0)) | ((values >= upper) & (gradient < 0))
@@ -278,7 +241,7 @@ def _refined(samples: Samples, start: RoomLights, floor: Floats | None = None) -
             tried = values.copy()
             tried[free] -= fixed_order.solve(normal + damping * diagonal, gradient[free])
             tried = np.clip(tried, lower, upper)
-            new_cost = _cost(samples, layout.unpack(tried))
+            new_cost = cost_of(samples, layout.unpack(tried))
             if new_cost < cost:
                 break
             damping *= 4
@@ -313,10 +276,10 @@ class _Layout:
 
 
 def _jacobian(samples: Samples, lights: RoomLights) -> Floats:
-    """Derivatives of `_residuals` in the order of `_Layout`, float64 [3 n, values]; of positions by differences."""
-    scaled = _slope(samples, samples.albedo * irradiance(samples.points, samples.normals, lights)) * samples.albedo
+    """Derivatives of `residuals_of` in the order of `_Layout`, float64 [3 n, values]; of positions by differences."""
+    scaled = slope_of(samples, samples.colours(lights)) * samples.albedo
     channels = scaled[:, :, None] * np.eye(3)  # [n, 3, 3]
-    columns = [channels]
+    columns = [channels * samples.surround[:, :, None]]
     for light in lights.lights:
 
         def at(position: Floats, falloff: float | None) -> Floats:

@@ -14,7 +14,8 @@ from colonnade.environment.model import Environment
 MAX_FALLOFF = 4.0
 #: Distance between lights and the box of what the camera sees, metres, at most; the camera is part of the box.
 _MARGIN = np.array([1.0, 0.5, 1.5])
-_MIN_HEIGHT = 0.3
+#: Height of a light above the lowest thing in view, metres, at least.
+MIN_HEIGHT = 0.3
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def light_box(environment: Environment) -> tuple[Floats, Floats]:
     points, eye = world_surface(environment)[0].reshape(-1, 3), environment.camera_to_world[:, 3]
     low = np.minimum(np.percentile(points, 2, axis=0), eye) - _MARGIN
     high = np.maximum(np.percentile(points, 98, axis=0), eye) + _MARGIN
-    low[1] = np.percentile(points[:, 1], 2) + _MIN_HEIGHT
+    low[1] = np.percentile(points[:, 1], 2) + MIN_HEIGHT
     return low, high
 
 

@@ -1,4 +1,4 @@
-"""The light of a room around a point: its picture, a panorama where there is one, and bounding planes elsewhere."""
+"""The light of a room around a point: its picture, and elsewhere a panorama, fitted walls, or bounding planes."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from colonnade.environment.lights import RoomLights, irradiance
 from colonnade.environment.model import Environment
 from colonnade.environment.panorama import Panorama
 from colonnade.environment.seen_light import FINE, SeenLight
+from colonnade.environment.surround import Surround
 from colonnade.maps.decoded_planes import DecodedPlanes
 from colonnade.maps.image import AttributeImage
 
@@ -36,7 +37,7 @@ def room_light(
     lights: RoomLights,
     point: Floats,
     from_photo: bool,
-    panorama: Panorama | None = None,
+    unseen: Panorama | Surround | None = None,
 ) -> RoomLight:
     """The light of a room that meets a point.
 
@@ -46,16 +47,18 @@ def room_light(
         lights: Of the room, without shadows: they light what nothing shows.
         point: World space, float64 [3].
         from_photo: The light is that of the room's photo, if there is one, not of its albedo under the lights.
-        panorama: The light of directions that the room's picture does not show.
+        unseen: The light of directions that the room's picture does not show; None: that of the bounding planes.
     """
     directions, weights = face_directions(FINE)
     solid = np.broadcast_to(weights, directions.shape[:3]).ravel()
     seen = SeenLight.of(environment, point, None if from_photo and environment.photo is not None else lights)
-    if panorama is None:
-        unseen = _bounding_light(environment, image, lights, point, seen)
+    if unseen is None:
+        others = _bounding_light(environment, image, lights, point, seen)
+    elif isinstance(unseen, Surround):
+        others = unseen.at(point, directions.reshape(-1, 3))
     else:
-        unseen = panorama.cube(FINE).texels.reshape(-1, 3)
-    radiance = np.where(seen.is_seen[:, None], seen.radiance, unseen)
+        others = unseen.cube(FINE).texels.reshape(-1, 3)
+    radiance = np.where(seen.is_seen[:, None], seen.radiance, others)
     return RoomLight(LightCube(radiance.reshape(directions.shape)), float(solid[seen.is_seen].sum() / solid.sum()))
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
     from colonnade.environment.model import Environment
     from colonnade.environment.panorama import Panorama
+    from colonnade.environment.surround import Surround
     from colonnade.mesh.mesh import Extent
     from colonnade.scene.model import Scene
 
@@ -41,7 +42,8 @@ class LitRoom:
         environment: With the colours that rays see; None without a room.
         albedo: The room with its albedo, as its folder has it; None without a room.
         colours: How the photo's colours were made; None where the colours are the albedo.
-        panorama: The light that no photo shows, without the scene's lights; None without a panorama.
+        unseen: The light that no photo shows, without the scene's lights: a panorama, or walls that were fitted; None
+            without them.
         strength: Of the object's shadow on the photo (`photo_strength`); None: it is whole.
     """
 
@@ -49,7 +51,7 @@ class LitRoom:
     environment: Environment | None = None
     albedo: Environment | None = None
     colours: PhotoColours | None = None
-    panorama: Panorama | None = None
+    unseen: Panorama | Surround | None = None
     strength: NDArray[np.uint8] | None = None
 
 
@@ -116,11 +118,14 @@ def lit_room(
     scene = with_free_placement(scene, extent, room)
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     around = panorama_light(scene, extent, room, max_lights, progress)
-    scene, panorama = (scene, None) if around is None else (around.scene, around.panorama)
+    unseen: Panorama | Surround | None = None
+    if around is not None:
+        scene, unseen = around.scene, around.panorama
     if room is None:
-        return LitRoom(scene, panorama=panorama)
+        return LitRoom(scene, unseen=unseen)
     if not scene.names_light and (around is None or not around.has_lights):
-        scene = _with_fitted_lights(scene, room, max_lights, progress)
+        scene, walls = _with_fitted_lights(scene, room, max_lights, progress)
+        unseen = unseen or walls
     if scene.places_camera:
         drawn = scene.background.photo is None or relit
         progress.note(
@@ -136,7 +141,7 @@ def lit_room(
     colours = _photo_colours(scene, room, extent, relit, 1.0 if scene.paths.gather else None)
     strength = photo_strength(scene, room, extent, relit)
     if colours is None:
-        return LitRoom(scene, room, room, panorama=panorama, strength=strength)
+        return LitRoom(scene, room, room, unseen=unseen, strength=strength)
     if colours.clamped > _REPORTED_CLAMPED:
         progress.note(
             f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
@@ -147,7 +152,7 @@ def lit_room(
                 else "raise the ambient light, or leave out all lights so that they are fitted"
             )
         )
-    return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours, panorama, strength)
+    return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours, unseen, strength)
 
 
 def fixed_in_world(scene: Scene, extent: Extent, room: Environment) -> Scene:
@@ -211,7 +216,10 @@ def _photo_colours(
     return photo_colours(room, lights_of(scene, extent, room), headroom)
 
 
-def _with_fitted_lights(scene: Scene, room: Environment, max_lights: int, progress: Progress) -> Scene:
+def _with_fitted_lights(
+    scene: Scene, room: Environment, max_lights: int, progress: Progress
+) -> tuple[Scene, Surround | None]:
+    """The scene with fitted lights; if it gathers light, they are fitted beside that of the room's walls."""
     from colonnade.environment.fitted_lights import fitted_lights
     from colonnade.environment.light_fit import DEFAULT_LIGHTS
 
@@ -220,12 +228,12 @@ def _with_fitted_lights(scene: Scene, room: Environment, max_lights: int, progre
             f"the scene names no light, and room {room.name} has no photo to fit lights to: one light beside the object"
             " and ambient light 0.1 are used"
         )
-        return scene
+        return scene, None
     with progress.step("fitting lights to the photo"):
-        fit = fitted_lights(room, min(DEFAULT_LIGHTS, max_lights))
+        fit = fitted_lights(room, min(DEFAULT_LIGHTS, max_lights), walls=scene.paths.gather > 0)
     count = len(fit.lights.lights)
     progress.note(
         f"the scene names no light: ambient light and {count} point light{'' if count == 1 else 's'} were fitted to the"
         f" photo of room {room.name}, {fit.psnr:.1f} dB"
     )
-    return with_lights(scene, fit.lights)
+    return with_lights(scene, fit.lights), fit.surround

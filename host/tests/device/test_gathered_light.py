@@ -162,7 +162,7 @@ def test_in_a_room_a_panorama_is_what_the_photo_does_not_show(
 
     def lit_cube(scene: Scene) -> tuple[LitRoom, np.ndarray]:
         lit = lit_room(scene, room, extent, 2, False)
-        cube = scene_cube(lit.scene, extent, room, image, False, lit.panorama)
+        cube = scene_cube(lit.scene, extent, room, image, False, lit.unseen)
         assert cube is not None
         return lit, cube.texels.reshape(-1, 3)
 
@@ -177,4 +177,4 @@ def test_in_a_room_a_panorama_is_what_the_photo_does_not_show(
     assert (np.abs(one - grey) < 0.002).all(axis=1).mean() > 0.3, "the others are the panorama's"
     notes = capsys.readouterr().err
     assert "has the exposure" in notes and "and its panorama the other" in notes and "1 light are" in notes
-    assert "a fit, the other" in notes
+    assert "a fit under the scene's lights, the other" in notes
