@@ -49,6 +49,8 @@ _STEP = 1e-4
 _AMBIENT_SHARE = 0.5
 #: A further light has to lower the robust cost to this share.
 _GAIN = 0.97
+#: Walls may cost so many decibels of the room that is relit by the other lights.
+_WALLS_LOSS = 1.0
 #: Limits of an intensity (that of a scene), and of a fitted falloff.
 _MAX_INTENSITY = 15.0
 _FALLOFF_RANGE = (0.5, 4.0)
@@ -80,11 +82,21 @@ def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS, walls: boo
         environment: The room.
         count: Number of point lights.
         walls: Fit the light of the walls of a box around the room, too: large sources do not become point lights.
-            The ambient light of the result is then the best one beside the point lights.
+            The ambient light of the result is then the best one beside the point lights. The walls are dropped if the
+            lights explain the photo much worse with them.
 
     Raises:
         UserError: The room has no photo, or too few pixels are neither black nor saturated.
     """
+    found = _fitted(environment, count, walls)
+    if found.surround is None:
+        return found
+    without = _fitted(environment, count, False)
+    return found if found.psnr >= without.psnr - _WALLS_LOSS else without
+
+
+def _fitted(environment: Environment, count: int, walls: bool) -> LightFit:
+    """As `fit_lights`, with the walls whatever they explain."""
     samples = samples_of(environment)
     ambient = best = _refined(samples, RoomLights(np.full(3, 0.5)))
     floor = _AMBIENT_SHARE * ambient.ambient
