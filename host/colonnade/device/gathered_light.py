@@ -38,6 +38,7 @@ def scene_cube(
     image: AttributeImage | None,
     relit: bool,
     unseen: Panorama | Surround | None = None,
+    second: Environment | None = None,
     progress: Progress = QUIET,
 ) -> LightCube | None:
     """The light that gathered rays meet, by directions of mesh space; None for a scene without them.
@@ -51,6 +52,7 @@ def scene_cube(
         image: Its encoded maps.
         relit: The frame shows the room under the scene's lights, not its photo.
         unseen: The light that no photo shows (`LitRoom.unseen`).
+        second: Another view of the room (`LitRoom.second`).
         progress: Notes where the light comes from, and what the cube cannot hold.
     """
     if scene.paths.gather == 0:
@@ -58,13 +60,14 @@ def scene_cube(
     pose = object_pose(scene, extent, room)
     if room is not None and image is not None:
         lights = lights_of(scene, extent, room)
-        light = room_light(room, image, lights, pose.to_world(extent.centre), not relit, unseen)
+        light = room_light(room, image, lights, pose.to_world(extent.centre), not relit, unseen, second)
         others = "bounding planes, a fit under the scene's lights,"
         if unseen is not None:
             others = "fitted walls" if isinstance(unseen, Surround) else "panorama"
+        pictures = "its picture shows" if second is None else "its two pictures show"
         progress.note(
-            f"gathered rays meet the light of room {room.name}: its picture shows {light.seen:.0%} of all directions,"
-            f" and its {others} the other {1 - light.seen:.0%}"
+            f"gathered rays meet the light of room {room.name}: {pictures} {light.seen:.0%} of all directions, and its"
+            f" {others} the other {1 - light.seen:.0%}"
         )
         cube = light.cube
     elif isinstance(unseen, Panorama):

@@ -42,6 +42,7 @@ class DeviceScene:
         maps: The room and its encoded maps; None without a room.
         photo: The photo of the frames' view, sRGB, uint8 [rows, columns, 3]; None without one.
         unseen: The light that no photo shows (`LitRoom.unseen`).
+        second: Another view of the room (`LitRoom.second`).
         strength: Of the object's shadow on the photo, uint8 [rows, columns]; None: it is whole.
     """
 
@@ -52,6 +53,7 @@ class DeviceScene:
     photo: NDArray[np.uint8] | None = None
     unseen: Panorama | Surround | None = None
     strength: NDArray[np.uint8] | None = None
+    second: Environment | None = None
 
     @classmethod
     def of(
@@ -101,9 +103,9 @@ class DeviceScene:
             image = with_environment(image, maps, manifest)
         if manifest.gathers:
             held = None if maps is None else maps.image
-            cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.unseen, progress)
+            cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.unseen, lit.second, progress)
             image = with_cube(image, cube)
-        return cls(lit.scene, manifest, image, maps, photo, lit.unseen, lit.strength)
+        return cls(lit.scene, manifest, image, maps, photo, lit.unseen, lit.strength, lit.second)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
         """The scene in another view of its room: object and lights stay in the world, camera and maps are new.
@@ -119,7 +121,9 @@ class DeviceScene:
         maps = EncodedEnvironment.of(next_view(scene, extent, room, relit), self.manifest, encode)
         image = with_environment(self.image, maps, self.manifest)
         if self.manifest.gathers:
-            image = with_cube(image, scene_cube(scene, extent, maps.environment, maps.image, relit, self.unseen))
+            image = with_cube(
+                image, scene_cube(scene, extent, maps.environment, maps.image, relit, self.unseen, self.second)
+            )
         strength = photo_strength(scene, room, extent, relit)
         return replace(self, scene=scene, image=image, maps=maps, photo=room.photo, strength=strength)
 

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
+from colonnade.common.accumulation import LUMINANCE
 from colonnade.common.image_io import decode_srgb
 from colonnade.common.types import Floats
-from colonnade.environment.light_cube import LightCube
+from colonnade.environment.light_cube import LightCube, face_directions
 from colonnade.environment.lights import RoomLights, irradiance, world_surface
 from colonnade.environment.model import Environment
 
@@ -18,6 +19,11 @@ from colonnade.environment.model import Environment
 FINE = 32
 #: Pixels of a texel that are farther than its nearest one by this factor are behind it.
 _BEHIND = 1.1
+
+
+def texel_weights() -> Floats:
+    """Weights of the texels by solid angle, in the order of `LightCube.texel_of`, float64 [texels]."""
+    return np.broadcast_to(face_directions(FINE)[1], (6, FINE, FINE)).ravel()
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,28 @@ class SeenLight:
     is_seen: NDArray[np.bool_]
     is_bright: NDArray[np.bool_]
     distance: Floats
+
+    def beside(self, other: SeenLight) -> SeenLight:
+        """This light, and that of another picture in directions that this one does not show.
+
+        The other one's exposure is that of this one where both show something.
+        """
+        both = self.is_seen & other.is_seen & ~self.is_bright & ~other.is_bright
+        weights = texel_weights() * both
+        total = float(weights @ (other.radiance @ LUMINANCE))
+        factor = float(weights @ (self.radiance @ LUMINANCE)) / total if total > 0 else 1.0
+        return SeenLight(
+            np.where(self.is_seen[:, None], self.radiance, other.radiance * factor),
+            self.is_seen | other.is_seen,
+            np.where(self.is_seen, self.is_bright, other.is_bright),
+            np.where(self.is_seen, self.distance, other.distance),
+        )
+
+    @property
+    def share(self) -> float:
+        """Share of all directions in which the picture shows something, 0 to 1."""
+        weights = texel_weights()
+        return float(weights[self.is_seen].sum() / weights.sum())
 
     @staticmethod
     def of(environment: Environment, point: Floats, lights: RoomLights | None = None) -> SeenLight:

@@ -38,6 +38,7 @@ def room_light(
     point: Floats,
     from_photo: bool,
     unseen: Panorama | Surround | None = None,
+    second: Environment | None = None,
 ) -> RoomLight:
     """The light of a room that meets a point.
 
@@ -48,10 +49,13 @@ def room_light(
         point: World space, float64 [3].
         from_photo: The light is that of the room's photo, if there is one, not of its albedo under the lights.
         unseen: The light of directions that the room's picture does not show; None: that of the bounding planes.
+        second: Another view of the room, which shows further directions.
     """
-    directions, weights = face_directions(FINE)
-    solid = np.broadcast_to(weights, directions.shape[:3]).ravel()
-    seen = SeenLight.of(environment, point, None if from_photo and environment.photo is not None else lights)
+    directions, _ = face_directions(FINE)
+    shadowless = None if from_photo and environment.photo is not None else lights
+    seen = SeenLight.of(environment, point, shadowless)
+    if second is not None:
+        seen = seen.beside(SeenLight.of(second, point, shadowless))
     if unseen is None:
         others = _bounding_light(environment, image, lights, point, seen)
     elif isinstance(unseen, Surround):
@@ -59,7 +63,7 @@ def room_light(
     else:
         others = unseen.cube(FINE).texels.reshape(-1, 3)
     radiance = np.where(seen.is_seen[:, None], seen.radiance, others)
-    return RoomLight(LightCube(radiance.reshape(directions.shape)), float(solid[seen.is_seen].sum() / solid.sum()))
+    return RoomLight(LightCube(radiance.reshape(directions.shape)), seen.share)
 
 
 def _bounding_light(

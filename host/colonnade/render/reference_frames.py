@@ -156,7 +156,7 @@ def _light_cube(
     image = None
     if room.scene.paths.gather and environment is not None:
         image = encoded_environment(environment, _layout_for(environment, layout))
-    return scene_cube(room.scene, mesh.extent, environment, image, relit, room.unseen, progress)
+    return scene_cube(room.scene, mesh.extent, environment, image, relit, room.unseen, room.second, progress)
 
 
 def _layout_for(environment: Environment, layout: AttributeLayout | None) -> AttributeLayout:

@@ -45,6 +45,7 @@ class LitRoom:
         unseen: The light that no photo shows, without the scene's lights: a panorama, or walls that were fitted; None
             without them.
         strength: Of the object's shadow on the photo (`photo_strength`); None: it is whole.
+        second: Another view of the room, which shows further directions; None without one.
     """
 
     scene: Scene
@@ -53,6 +54,7 @@ class LitRoom:
     colours: PhotoColours | None = None
     unseen: Panorama | Surround | None = None
     strength: NDArray[np.uint8] | None = None
+    second: Environment | None = None
 
 
 def scene_room(scene: Scene) -> Environment | None:
@@ -118,6 +120,7 @@ def lit_room(
     scene = with_free_placement(scene, extent, room)
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     around = panorama_light(scene, extent, room, max_lights, progress)
+    second = _second_view(scene, progress)
     unseen: Panorama | Surround | None = None
     if around is not None:
         scene, unseen = around.scene, around.panorama
@@ -141,7 +144,7 @@ def lit_room(
     colours = _photo_colours(scene, room, extent, relit, 1.0 if scene.paths.gather else None)
     strength = photo_strength(scene, room, extent, relit)
     if colours is None:
-        return LitRoom(scene, room, room, unseen=unseen, strength=strength)
+        return LitRoom(scene, room, room, unseen=unseen, strength=strength, second=second)
     if colours.clamped > _REPORTED_CLAMPED:
         progress.note(
             f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
@@ -152,7 +155,23 @@ def lit_room(
                 else "raise the ambient light, or leave out all lights so that they are fitted"
             )
         )
-    return LitRoom(replace(scene, headroom=colours.headroom), colours.environment, room, colours, unseen, strength)
+    return LitRoom(
+        replace(scene, headroom=colours.headroom), colours.environment, room, colours, unseen, strength, second
+    )
+
+
+def _second_view(scene: Scene, progress: Progress) -> Environment | None:
+    """The second view of a scene's room; None without one, or where nothing gathers its light."""
+    folder = scene.background.second_view
+    if folder is None:
+        return None
+    second = load_environment(folder)
+    if second.photo is None:
+        raise UserError(f"background.second_view is {folder}, which has no photo.png or render.png")
+    if scene.paths.gather == 0:
+        progress.note(f"the second view {folder} has no effect: the scene gathers no light, set paths.gather = 1")
+        return None
+    return second
 
 
 def fixed_in_world(scene: Scene, extent: Extent, room: Environment) -> Scene:

@@ -329,6 +329,8 @@ class Background:
         photo: In a room whose camera the scene places: the picture that this camera took, relative to the scene file.
             None: the room is drawn from its maps.
         occlusion: The room hides the object where it is nearer.
+        second_view: The folder of another view of the room, in the same world, relative to the scene file: its photo is
+            light around the object.
         panorama: An equirectangular picture of the light around the object, relative to the scene file: that of the
             directions that no photo shows.
         panorama_yaw: Rotation of the panorama about the world's y, degrees, as an object's turn; at 0 its middle looks
@@ -345,6 +347,7 @@ class Background:
     room: _File | None = None
     photo: _File | None = None
     occlusion: StrictBool = True
+    second_view: _File | None = None
     panorama: _File | None = None
     panorama_yaw: Annotated[_Float, Interval(ge=-360.0, le=360.0)] = 0.0
     panorama_exposure: Annotated[_Float, Interval(ge=1e-6, le=1e6)] | None = None

@@ -10,12 +10,12 @@ import numpy as np
 from colonnade.common.accumulation import LUMINANCE
 from colonnade.common.progress import Progress
 from colonnade.common.types import Floats
-from colonnade.environment.light_cube import LightCube, face_directions
+from colonnade.environment.light_cube import LightCube
 from colonnade.environment.lights import RoomLight, RoomLights, light_box
 from colonnade.environment.panorama import Panorama, read_panorama
 from colonnade.environment.panorama_lights import DistantLight, split_lights
 from colonnade.environment.photo_colours import MAX_INTENSITY
-from colonnade.environment.seen_light import FINE, SeenLight
+from colonnade.environment.seen_light import FINE, SeenLight, texel_weights
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.room_lights import with_lights
 
@@ -110,7 +110,7 @@ def fitted_exposure(panorama: Panorama, seen: SeenLight) -> float:
     It is that of least squares with a variance that grows with the brightness, so a panorama of another place does not
     darken it. Directions in which the photo saturates do not count.
     """
-    weights = np.broadcast_to(face_directions(FINE)[1], (6, FINE, FINE)).ravel()
+    weights = texel_weights()
     used = weights * (seen.is_seen & ~seen.is_bright)
     total = float(used @ (panorama.cube(FINE).texels.reshape(-1, 3) @ LUMINANCE))
     if used.sum() < _LEAST_SEEN * weights.sum() or total <= 0:
@@ -122,7 +122,7 @@ def _mean(panorama: Panorama, seen: SeenLight | None) -> Floats:
     """The mean light of all directions, float64 [3]."""
     if seen is None:
         return panorama.mean()
-    weights = np.broadcast_to(face_directions(FINE)[1], (6, FINE, FINE)).ravel()
+    weights = texel_weights()
     light = np.where(seen.is_seen[:, None], seen.radiance, panorama.cube(FINE).texels.reshape(-1, 3))
     return np.asarray(weights @ light / weights.sum())
 

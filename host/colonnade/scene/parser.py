@@ -58,6 +58,8 @@ def load_scene(path: str | Path) -> Scene:
         scene = scene.with_environment(file.parent / background.room)
     if background.photo is not None:
         scene = replace(scene, background=replace(scene.background, photo=file.parent / background.photo))
+    if background.second_view is not None:
+        scene = replace(scene, background=replace(scene.background, second_view=file.parent / background.second_view))
     if background.panorama is not None:
         scene = replace(scene, background=replace(scene.background, panorama=file.parent / background.panorama))
     return scene
@@ -114,6 +116,8 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     for key in ("panorama_yaw", "panorama_exposure"):
         if key in background and "panorama" not in background:
             raise ValueError(f"background.{key} is of a panorama: it needs background.panorama")
+    if "room" not in background and "second_view" in background:
+        raise ValueError("background.second_view is another view of a room: it needs background.room")
     if "room" not in background and "shadows" in background:
         raise ValueError("background.shadows is of shadows on a room's photo: it needs background.room")
     if "room" not in background and "colours" in background:

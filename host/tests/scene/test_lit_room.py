@@ -195,3 +195,14 @@ def test_the_light_command_prints_a_scene(folder: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(fitted.image, named.image)
     failed = runner.invoke(cli, ["light", str(folder / "dark")])
     assert failed.exit_code == 2 and "has no photo.png or render.png" in failed.stderr
+
+
+def test_a_second_view_needs_a_room_a_photo_and_gathered_light(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(UserError, match=r"background.second_view is another view of a room: it needs background.room"):
+        frame(folder, 'mesh.name = "cube"\nbackground.second_view = "attic"\n')
+    with pytest.raises(UserError, match=r"background.second_view is .*dark, which has no photo.png"):
+        frame(folder, MIRROR + LAMP + 'background.second_view = "dark"\n')
+    frame(folder, MIRROR + LAMP + 'background.second_view = "attic"\n')
+    assert "has no effect: the scene gathers no light" in capsys.readouterr().err
