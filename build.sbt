@@ -17,6 +17,8 @@ lazy val colonnade = (project in file("."))
       "edu.berkeley.cs"   %% "chiseltest"      % "6.0.0"        % Test,
       "org.scalatestplus" %% "scalacheck-1-17" % "3.2.17.0"     % Test // for chiseltest's scalatest
     ),
+    // It is there to download firtool unchecked.
+    excludeDependencies += ExclusionRule("io.get-coursier", "coursier_2.13"),
     addCompilerPlugin("org.chipsalliance" % "chisel-plugin" % chiselVersion cross CrossVersion.full),
     scalacOptions ++= Seq(
       "-deprecation",
@@ -38,6 +40,15 @@ lazy val colonnade = (project in file("."))
         target / preset.getName
       }
     }.taskValue,
+    // The generator with its libraries and firtool as one file, the same for the same sources: tools/release.
+    assembly / mainClass             := Some("colonnade.Generate"),
+    assembly / assemblyOutputPath    := baseDirectory.value / ".cache" / "release" / "colonnade-generator.jar",
+    assembly / assemblyMergeStrategy := {
+      case path if path.startsWith("META-INF/semanticdb")    => MergeStrategy.discard
+      case path if path.endsWith("module-info.class")        => MergeStrategy.discard
+      case path if path.matches(".*/bin/om-linker(\\.exe)?") => MergeStrategy.discard
+      case path                                              => (assembly / assemblyMergeStrategy).value(path)
+    },
     // Elaboration recurses deeply; a fork also keeps the simulators' memory out of sbt.
     Test / fork := true,
     Test / javaOptions ++= Seq("-Xmx4g", "-Xss16m"),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,8 +18,9 @@ from colonnade.maps.encoders import ENCODERS, Encoder
 if TYPE_CHECKING:
     _NumberType = click.ParamType[float]
     _TextType = click.ParamType[str]
+    _PathType = click.ParamType[Path]
 else:
-    _NumberType = _TextType = click.ParamType
+    _NumberType = _TextType = _PathType = click.ParamType
 
 
 class PositiveNumber(_NumberType):
@@ -40,6 +43,32 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 #: A path argument. The code that reads the file checks that it exists and names the expected content.
 FILE = click.Path(path_type=Path)
+
+
+class SceneName(_PathType):
+    """A scene file, or the name of one of the project's scenes, such as ``room``. A file of that name comes first."""
+
+    name = "scene"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Find the file; the code that reads it checks that it exists."""
+        path = Path(value)
+        if re.fullmatch(r"[\w-]+", str(value)) is None or os.path.lexists(path):
+            return path
+        from colonnade.design.toolchain import project_root
+
+        try:
+            scenes = project_root() / "scenes"
+        except UserError:
+            return path
+        named = scenes / f"{value}.toml"
+        if not named.is_file():
+            known = ", ".join(sorted(scene.stem for scene in scenes.glob("*.toml")))
+            raise UserError(f"no scene {value}: name a TOML file, or a scene of {scenes} ({known})")
+        return named
+
+
+SCENE = SceneName()
 
 
 def configuration_options(command: Command) -> Command:

@@ -8,6 +8,7 @@ import click
 
 from colonnade.cli.options import (
     FILE,
+    SCENE,
     background_option,
     configuration_options,
     echo,
@@ -23,7 +24,7 @@ from colonnade.maps.encoders import Encoder
 
 
 @click.command(short_help="Pack a scene into the image that the hardware loads.")
-@click.argument("scene", type=FILE)
+@click.argument("scene", type=SCENE)
 @configuration_options
 @mesh_option
 @background_option

@@ -11,6 +11,7 @@ import click
 
 from colonnade.cli.options import (
     FILE,
+    SCENE,
     background_option,
     configuration_options,
     echo,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Render frames with the RTL, its model, or Embree.")
-@click.argument("scene", type=FILE)
+@click.argument("scene", type=SCENE)
 @configuration_options
 @click.option(
     "--backend",
@@ -116,7 +117,7 @@ def render(
     waveform: Path | None,
     json_file: Path | None,
 ) -> None:
-    """Render SCENE, a TOML file, and print its rays, cycles and seconds.
+    """Render SCENE, a TOML file or the name of one such as room, and print its rays, cycles and seconds.
 
     With --frames the object or a light moves, with --sequence the camera.
     """

@@ -1,8 +1,9 @@
 """Runs the Chisel generator and caches its output.
 
-sbt compiles the generator once for each state of its sources; after that, each configuration is one Java run. The cache
-entries are ``generator/SOURCES/KEY``, where SOURCES is the hash of the generator's sources. KEY is the hash of the
-configuration, its overrides and the kind of output. The compiled classes are ``generator/SOURCES/classes``.
+In a checkout sbt compiles the generator once for each state of its sources; a wheel carries it as a jar. After that,
+each configuration is one Java run. The cache entries are ``generator/SOURCES/KEY``, where SOURCES is the hash of the
+generator's sources, or of the jar. KEY is the hash of the configuration, its overrides and the kind of output. The
+compiled classes are ``generator/SOURCES/classes``.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.config_name import ConfigurationSource, find_configuration
 from colonnade.design.design_folder import check_replaceable, replace_folder
 from colonnade.design.manifest import Manifest
-from colonnade.design.toolchain import cache_directory, find_java, project_root
+from colonnade.design.toolchain import cache_directory, find_java, generator_jar, project_root
 
 #: Source states to keep in the cache; older ones are removed when they were not used for a day.
 KEPT_STATES = 4
@@ -32,6 +33,9 @@ KEPT_STATES = 4
 #: Entries of the cache: the generator's output folder, and the file with the class path.
 DESIGN = "design"
 CLASSPATH = "classpath.json"
+
+#: The generator's option for a manifest without SystemVerilog.
+MANIFEST_ONLY = "--manifest-only"
 
 #: Most of the generator's code runs once. The optimising compiler of Java would take longer than it saves.
 JAVA_OPTIONS = ("-XX:TieredStopAtLevel=1", "-XX:ErrorFile=/dev/null")
@@ -68,7 +72,7 @@ class GeneratedDesign:
 
 def manifest_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
     """Generate only the manifest, enough for packing, the model and the frame registers."""
-    return _cached(config, overrides, ("--manifest-only",), progress)
+    return _cached(config, overrides, (MANIFEST_ONLY,), progress)
 
 
 def design_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
@@ -85,7 +89,7 @@ def shell_manifest_for(
     config: str, overrides: Sequence[str] = (), bus_bytes: int = 16, progress: Progress = QUIET
 ) -> GeneratedDesign:
     """Generate only ``manifest.json`` and ``shell.json``, enough for register descriptions."""
-    return _cached(config, overrides, ("--manifest-only", *_shell_options(bus_bytes)), progress)
+    return _cached(config, overrides, (MANIFEST_ONLY, *_shell_options(bus_bytes)), progress)
 
 
 def shell_design_for(
@@ -123,7 +127,7 @@ def generate(
         pixel_stream: The shell has an AXI4-Stream of pixels.
     """
     check_replaceable(output)
-    options = ("--manifest-only",) * manifest_only + ("--black-box-memories",) * black_box_memories
+    options = (MANIFEST_ONLY,) * manifest_only + ("--black-box-memories",) * black_box_memories
     options += () if bus_bytes is None else _shell_options(bus_bytes)
     options += ("--pixel-stream",) * pixel_stream
     design = _cached(config, overrides, options, progress)
@@ -132,7 +136,10 @@ def generate(
 
 
 def source_hash(root: Path) -> str:
-    """A short hash of the generator's source and build files."""
+    """A short hash of the generator: of its source and build files, or of the jar."""
+    jar = generator_jar(root)
+    if jar is not None:
+        return hashlib.sha256(jar.read_bytes()).hexdigest()[:20]
     sources = [*root.glob("*.sbt"), root / "project" / "build.properties", root / "project" / "dependencies.sha256"]
     sources += [*(root / "project").glob("*.sbt"), *(root / "project").glob("*.scala")]
     sources += [path for path in (root / "src" / "main").rglob("*") if path.is_file()]
@@ -147,15 +154,28 @@ def source_hash(root: Path) -> str:
 def _cached(config: str, overrides: Sequence[str], options: tuple[str, ...], progress: Progress) -> GeneratedDesign:
     root = project_root()
     source = find_configuration(config, overrides, root)
+    if options == (MANIFEST_ONLY,) and (released := _released(root, source)) is not None:
+        return released
     state = cache_directory(root) / "generator" / source_hash(root)
 
     def make(folder: Path) -> None:
         java = find_java()
-        _run(root, java, _compiled(root, state, progress), source, options, folder / DESIGN, state, progress)
+        jar = generator_jar(root)
+        classpath = str(jar) if jar is not None else _compiled(root, state, progress)
+        _run(root, java, classpath, source, options, folder / DESIGN, state, progress)
 
     entry = cache.entry(state / _key(source, options), make, "design", progress)
     cache.touch(state)
     return GeneratedDesign(entry / DESIGN, Manifest.load(entry / DESIGN / "manifest.json"))
+
+
+def _released(root: Path, source: ConfigurationSource) -> GeneratedDesign | None:
+    """The manifest of a preset that a wheel carries, so that its users need no Java for it."""
+    folder = root / "manifests" / source.path.stem
+    is_preset = source.path.parent == root / "configs" and not source.overrides
+    if not is_preset or not (folder / "manifest.json").is_file():
+        return None
+    return GeneratedDesign(folder, Manifest.load(folder / "manifest.json"))
 
 
 def _shell_options(bus_bytes: int) -> tuple[str, ...]:
@@ -222,7 +242,7 @@ def _run(
     sets = [argument for override in source.overrides for argument in ("--set", override)]
     command = [str(java), *JAVA_OPTIONS, *_java_options(root), "-cp", classpath, "colonnade.Generate"]
     command += ["--config", str(source.path), "--output", str(design), *sets, *options]
-    with progress.step("generating the manifest" if "--manifest-only" in options else "generating the hardware"):
+    with progress.step("generating the manifest" if MANIFEST_ONLY in options else "generating the hardware"):
         done = processes.run(command, cwd=root)
     if done.returncode == 2:
         lines = [line for line in done.stderr.splitlines() if line.strip()] or ["the generator refused its input"]

