@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup render test test-hardware test-host verify bench soc live check docs lock format clean
+.PHONY: help setup render test test-hardware test-host verify bench soc live check docs release release-check lock format clean
 
 venv := .venv/bin
 SCENE ?= scenes/room.toml
@@ -49,6 +49,12 @@ check: setup ## formatters, linters, types, layers, derived files
 docs: setup ## the documentation site in out/site; fails on a broken link
 	@tools/docs
 
+release: setup ## wheels, the generator as a jar, designs of all presets, site, bill of materials and checksums in out/release
+	@tools/release
+
+release-check: setup ## make the release twice, compare, and use its files in bare systems; as root, long
+	@tools/release-check
+
 lock: setup ## make host/locks, project/dependencies.sha256 and sbom.json again
 	@tools/lock
 
@@ -56,7 +62,7 @@ format: setup ## let the formatters rewrite the sources
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host
 	@$(venv)/ruff format host
-	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain tools/site tools/diagrams tools/layers-* tools/vocabulary tools/frame-digests tools/mutations
+	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain tools/site tools/diagrams tools/layers-* tools/vocabulary tools/frame-digests tools/mutations tools/distribution
 
 clean: ## remove everything that was built, fetched or cached
 	@rm -rf .venv .tools .cache out target project/target project/project test_run_dir build host/build
