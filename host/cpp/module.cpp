@@ -8,15 +8,17 @@ void bind_bvh(nb::module_& module);
 void bind_fixed_order(nb::module_& module);
 void bind_live(nb::module_& module);
 void bind_model(nb::module_& module);
+void bind_packer(nb::module_& module);
 void bind_view(nb::module_& module);
 
 NB_MODULE(_core, module) {
   module.doc() =
-      "BVH builder, bit-exact model of the device, live encoder, arithmetic in a fixed order, registers as a target computes them.";
+      "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, registers as a target computes them.";
   bind_environment(module);
   bind_bvh(module);
   bind_fixed_order(module);
   bind_live(module);
   bind_model(module);
+  bind_packer(module);
   bind_view(module);
 }

@@ -224,6 +224,14 @@ class Manifest:
         )
 
 
+def field_places(layouts: Mapping[str, RecordLayout]) -> dict[str, dict[str, tuple[int, int, bool]]]:
+    """Offset, width and signedness of each field, by layout and field name."""
+    return {
+        name: {field.name: (field.offset, field.width, field.signed) for field in layout.fields.values()}
+        for name, layout in layouts.items()
+    }
+
+
 def _layout(name: str, fields: list[Mapping[str, Any]], bits: int | None) -> RecordLayout:
     parsed = {
         f["name"]: Field(f["name"], int(f["offset"]), int(f["width"]), bool(f["signed"]), int(f.get("fraction", 0)))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from colonnade.common.framebuffer import Frame
-from colonnade.design.manifest import Manifest, RecordLayout
+from colonnade.design.manifest import Manifest, field_places
 from colonnade.scene_image.file import SceneImage
 
 #: Rows rendered between two reports of progress.
@@ -29,14 +29,6 @@ def new_model(manifest: Manifest) -> Any:
     }
     limits = {name: register.limit for name, register in manifest.registers.items() if register.limit is not None}
     return _core.Model(numbers, field_places(manifest.layouts), limits)
-
-
-def field_places(layouts: Mapping[str, RecordLayout]) -> dict[str, dict[str, tuple[int, int, bool]]]:
-    """Offset, width and signedness of each field, by layout and field name."""
-    return {
-        name: {field.name: (field.offset, field.width, field.signed) for field in layout.fields.values()}
-        for name, layout in layouts.items()
-    }
 
 
 def load_scene(model: Any, image: SceneImage) -> None:

@@ -39,27 +39,20 @@ def subdivide_corners(values: Floats) -> Floats:
     return quarters.reshape(-1, 3, values.shape[2])
 
 
-def merge_rows(rows: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
+def merge_rows(rows: Floats) -> tuple[Floats, npt.NDArray[np.int64]]:
     """The distinct rows [k, 3] in ascending order, and each row's index among them, int64 [n]."""
-    order = np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))
-    ordered = rows[order]
-    first = np.ones(len(rows), dtype=bool)
-    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    index = np.empty(len(rows), dtype=np.int64)
-    index[order] = np.cumsum(first) - 1
-    return ordered[first], index
+    from colonnade import _core
+
+    merged: tuple[Floats, npt.NDArray[np.int64]] = _core.merge_rows(rows)
+    return merged
 
 
-def drop_faces(vertices: npt.NDArray[Any], faces: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+def drop_faces(vertices: Floats, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """Indices of the faces to keep, ascending: with an area, and the first of each vertex set."""
-    corners = vertices[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any(axis=1)
-    candidates = np.flatnonzero(area)
-    ordered = np.sort(faces[candidates], axis=1)
-    sets, index = merge_rows(ordered)
-    first = np.full(len(sets), len(faces), dtype=np.int64)
-    np.minimum.at(first, index, candidates)
-    return np.sort(first)
+    from colonnade import _core
+
+    keep: npt.NDArray[np.int64] = _core.drop_faces(vertices, faces)
+    return keep
 
 
 def edge_keys(faces: npt.NDArray[Any]) -> npt.NDArray[np.int64]:

@@ -1,5 +1,6 @@
 // The manifest's number formats and record layouts. No width or offset is repeated here.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -89,6 +90,22 @@ struct Field {
         }
         if (isSigned && width < 64 && (bits >> (width - 1))) bits |= ~std::uint64_t(0) << width;
         return static_cast<std::int64_t>(bits);
+    }
+
+    /// Whether the field can hold a value.
+    bool holds(std::int64_t value) const {
+        if (width >= 64) return isSigned || value >= 0;
+        const std::int64_t low = isSigned ? -(std::int64_t(1) << (width - 1)) : 0;
+        return value >= low && value < low + (std::int64_t(1) << width);
+    }
+
+    /// Sets the bits of a field that is 0 in the record.
+    void write(std::uint8_t* record, std::int64_t value) const {
+        for (int bit = 0; bit < width;) {
+            const int position = offset + bit, shift = position % 8, count = std::min(8 - shift, width - bit);
+            record[position / 8] |= static_cast<std::uint8_t>(((static_cast<std::uint64_t>(value) >> bit) & ((1u << count) - 1)) << shift);
+            bit += count;
+        }
     }
 };
 

@@ -10,13 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.scene_image.bvh import LEAF, NODE
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.inspect import describe, report_lines
-from colonnade.scene_image.packer import geometric_normals, memory_use, pack, quantise, shared_edge_order
+from colonnade.scene_image.packer import QuantisedMesh, memory_use, pack, quantise
 
 MakeManifest = Callable[..., Manifest]
 
@@ -33,6 +35,12 @@ def packed_triangles(image: SceneImage, manifest: Manifest) -> dict[int, list[li
             assert int(fields["firstTriangle"][row]) + k not in result
             result[int(fields["firstTriangle"][row]) + k] = corners
     return result
+
+
+def geometric_normals(quantised: QuantisedMesh) -> Floats:
+    """Unit normals of the quantised triangles by their winding, float64 [m, 3]."""
+    corners = quantised.vertices[quantised.faces].astype(np.int64)
+    return unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).astype(np.float64))
 
 
 @settings(deadline=None, max_examples=40)
@@ -137,15 +145,23 @@ def test_attributes_lie_in_the_order_of_packed_ids_and_corners(manifest: Manifes
         assert fields[f"faces[{slot}].material"][row] == 0
 
 
-def test_a_common_edge_comes_first_in_both_triangles_of_a_leaf() -> None:
+def test_a_common_edge_comes_first_in_both_triangles_of_a_leaf(manifest: Manifest) -> None:
     """The triangle unit tests such a leaf as a pair. A common edge of one direction, and other leaves, stay."""
     a, b, c, d, e = ([0, 0, 0], [9, 0, 0], [0, 9, 0], [9, 9, 1], [4, 4, 9])
     leaves = [[[c, a, b], [d, b, a]], [[a, b, c], [d, a, b]], [[a, b, c], [e, d, c]], [[b, c, a]]]
-    corners = np.array([triangle for leaf in leaves for triangle in leaf], dtype=np.int32)
-    order = shared_edge_order(corners, np.array([0, 2, 4, 6], dtype=np.uint32), np.array([2, 2, 2, 1], dtype=np.uint32))
-    assert order.tolist() == [[1, 2, 0], [1, 2, 0]] + 5 * [[0, 1, 2]]
-    first, second = np.take_along_axis(corners, order[:, :, None], axis=1)[:2].tolist()
-    assert first[:2] == second[1::-1] == [a, b]
+    away = [[0, 0, 0], [100, 0, 0], [0, 100, 0], [100, 100, 0]]
+    corners = np.array([triangle for leaf in leaves for triangle in leaf], dtype=np.float64)
+    corners += np.repeat(np.array(away, dtype=np.float64), [2, 2, 2, 1], axis=0)[:, None]
+    mesh = clean_mesh(corners.reshape(-1, 3), np.arange(21, dtype=np.int32).reshape(-1, 3), "pairs")
+    image = pack(mesh, manifest)
+    units, triangles = quantise(mesh, 16), packed_triangles(image, manifest)
+    rotated = {}
+    for packed, face in enumerate(image.source_faces):
+        source = units.vertices[units.faces[np.flatnonzero(units.mesh_faces == face)[0]]].tolist()
+        rotated[int(face)] = source.index(triangles[packed][0])
+    assert [rotated[face] for face in range(7)] == [1, 1, 0, 0, 0, 0, 0]
+    pair = [triangles[int(np.flatnonzero(image.source_faces == face)[0])] for face in (0, 1)]
+    assert pair[0][:2] == pair[1][1::-1]
 
 
 def test_most_leaves_of_a_mesh_have_a_common_edge_first(manifest: Manifest) -> None:

@@ -9,8 +9,7 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
-from colonnade.design.manifest import Manifest
-from colonnade.device.bit_exact import field_places
+from colonnade.design.manifest import Manifest, field_places
 from colonnade.maps.image import memory_words
 from colonnade.maps.planes import SLOPE_PIXELS
 from colonnade.reference.environment.ray_march import HIDDEN, HIT, LEFT_VIEW, LOST, MarchHits

@@ -10,8 +10,8 @@ import pytest
 
 from colonnade import _core
 from colonnade.design.generator import design_for, manifest_for
-from colonnade.design.manifest import Manifest, value_range
-from colonnade.device.bit_exact import field_places, loaded_model, model_frame
+from colonnade.design.manifest import Manifest, field_places, value_range
+from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.lab.evaluation.fuzz.campaign import fuzz
 from colonnade.lab.evaluation.fuzz.corruption import KINDS, corrupt_case
 from colonnade.lab.evaluation.fuzz.environments import environment_cases

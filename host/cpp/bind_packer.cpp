@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The packer (cpp/packer) and the operations on meshes (cpp/mesh) for Python.
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+
+#include <cstring>
+#include <memory>
+#include <optional>
+
+#include "binding.hpp"
+#include "mesh/normals.hpp"
+#include "packer/records.hpp"
+#include "packer/surface_offset.hpp"
+
+using namespace nanobind::literals;
+using namespace colonnade;
+using namespace colonnade::binding;
+
+namespace {
+
+template <class T> using Rows = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+template <class T> using CornerRows = nb::ndarray<const T, nb::shape<-1, 3, 3>, nb::c_contig, nb::device::cpu>;
+template <class T> using Column = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+template <class Row, class Array> const Row* rowsOf(const Array& array) { return reinterpret_cast<const Row*>(array.data()); }
+
+template <class Row, class Array> std::vector<Row> vectorOf(const Array& array) { return {rowsOf<Row>(array), rowsOf<Row>(array) + array.shape(0)}; }
+
+template <class T, class Values> nb::object arrayOf(const Values& values, std::initializer_list<std::size_t> shape) {
+    T* data;
+    auto result = makeArray<T>(shape, data);
+    std::memcpy(data, values.data(), values.size() * sizeof values[0]);
+    return nb::cast(result);
+}
+
+void checkFaces(const Rows<std::int32_t>& faces, std::size_t vertices) {
+    for (std::size_t i = 0; i < 3 * faces.shape(0); ++i)
+        if (faces.data()[i] < 0 || static_cast<std::size_t>(faces.data()[i]) >= vertices) throw std::invalid_argument("a face names a vertex that does not exist");
+}
+
+nb::dict quantise(const Rows<double>& vertices, const Rows<std::int32_t>& faces, int vertexBits) {
+    checkFaces(faces, vertices.shape(0));
+    const packer::QuantisedMesh mesh = packer::quantise(rowsOf<mesh::Vector>(vertices), vertices.shape(0), rowsOf<mesh::Face>(faces), faces.shape(0), vertexBits);
+    nb::dict result;
+    result["vertices"] = arrayOf<std::int32_t>(mesh.vertices, {mesh.vertices.size(), 3});
+    result["faces"] = arrayOf<std::int32_t>(mesh.faces, {mesh.faces.size(), 3});
+    result["mesh_faces"] = arrayOf<std::int64_t>(mesh.meshFaces, {mesh.meshFaces.size()});
+    result["scale"] = mesh.scale;
+    result["offset"] = mesh.offset;
+    return result;
+}
+
+/// A quantised mesh and its tree, ready to be written as records.
+class Packing {
+public:
+    Packing(const Rows<std::int32_t>& vertices, const Rows<std::int32_t>& faces, const Column<std::int64_t>& meshFaces, const Values& format, const FieldTuples& layouts)
+        : format_{layoutsOf(layouts),         valueOf(format, "recordBits"),         valueOf(format, "vertexBits"), valueOf(format, "boxBits"),
+                  valueOf(format, "arity"),   valueOf(format, "trianglesPerRecord"), valueOf(format, "stackDepth"), valueOf(format, "normalFraction"),
+                  valueOf(format, "bvh") != 0} {
+        checkFaces(faces, vertices.shape(0));
+        if (faces.shape(0) == 0 || meshFaces.shape(0) != faces.shape(0)) throw std::invalid_argument("the numbers of faces differ, or are 0");
+        mesh_.vertices = vectorOf<packer::Units>(vertices);
+        mesh_.faces = vectorOf<mesh::Face>(faces);
+        mesh_.meshFaces = vectorOf<std::int64_t>(meshFaces);
+        nb::gil_scoped_release release;
+        tree_ = packer::buildTree(mesh_, format_);
+        packer_ = std::make_unique<packer::RecordPacker>(mesh_, tree_, format_);
+    }
+
+    nb::dict sections() const {
+        const packer::Sections& sections = packer_->sections();
+        nb::dict result;
+        result["record_count"] = sections.recordCount;
+        result["triangle_base"] = sections.triangleBase;
+        result["triangle_records"] = sections.triangleRecords;
+        result["attribute_base"] = sections.attributeBase;
+        result["bounds_low"] = nb::make_tuple(sections.boundsLow[0], sections.boundsLow[1], sections.boundsLow[2]);
+        result["bounds_high"] = nb::make_tuple(sections.boundsHigh[0], sections.boundsHigh[1], sections.boundsHigh[2]);
+        result["largest_triangle"] = sections.largestTriangle;
+        return result;
+    }
+
+    nb::dict statistics() const {
+        nb::dict result;
+        result["nodes"] = tree_.tree.nodes();
+        result["leaves"] = tree_.tree.leafFirst.size();
+        result["depth"] = tree_.tree.depth;
+        result["stack_bound"] = tree_.tree.stackBound;
+        result["cost"] = tree_.tree.cost;
+        result["height_limit"] = tree_.heightLimit;
+        return result;
+    }
+
+    nb::object order() const { return arrayOf<std::uint32_t>(tree_.order, {tree_.order.size()}); }
+
+    nb::object records(const CornerRows<double>& normals, const Column<std::uint8_t>& materials, const Column<bool>& isClear, const std::optional<CornerRows<std::int64_t>>& colours) const {
+        const auto faces = static_cast<std::size_t>(1 + *std::max_element(mesh_.meshFaces.begin(), mesh_.meshFaces.end()));
+        if (std::min({normals.shape(0), materials.shape(0), isClear.shape(0)}) < faces || (colours && colours->shape(0) < faces)) throw std::invalid_argument("a face has no attributes");
+        const packer::FaceAttributes attributes{rowsOf<std::array<mesh::Vector, 3>>(normals), materials.data(), reinterpret_cast<const std::uint8_t*>(isClear.data()),
+                                                colours ? rowsOf<std::array<mesh::Row<std::int64_t>, 3>>(*colours) : nullptr};
+        const std::vector<std::uint8_t> records = packer_->records(attributes);
+        return arrayOf<std::uint8_t>(records, {packer_->sections().recordCount, format_.recordBytes()});
+    }
+
+private:
+    static int valueOf(const Values& values, const char* key) { return static_cast<int>(lookUp(values, key)); }
+
+    packer::RecordFormat format_;
+    packer::QuantisedMesh mesh_;
+    bvh::Bvh tree_;
+    std::unique_ptr<packer::RecordPacker> packer_;
+};
+
+nb::tuple mergeRows(const Rows<double>& rows) {
+    const mesh::MergedRows<double> merged = mesh::mergeRows(rowsOf<mesh::Vector>(rows), rows.shape(0));
+    return nb::make_tuple(arrayOf<double>(merged.rows, {merged.rows.size(), 3}), arrayOf<std::int64_t>(merged.index, {merged.index.size()}));
+}
+
+nb::object dropFaces(const Rows<double>& vertices, const Rows<std::int64_t>& faces) {
+    const std::vector<std::int64_t> keep = mesh::dropFaces(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Row<std::int64_t>>(faces));
+    return arrayOf<std::int64_t>(keep, {keep.size()});
+}
+
+nb::object creaseNormals(const Rows<double>& vertices, const Rows<std::int32_t>& faces, double leastCosine) {
+    const std::vector<mesh::Corners> normals = mesh::creaseNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), leastCosine);
+    return arrayOf<double>(normals, {normals.size(), 3, 3});
+}
+
+nb::tuple cornerNormals(const Rows<double>& vertices, const Rows<std::int32_t>& faces, const CornerRows<double>& authored, double leastCosine) {
+    const mesh::CornerNormals result =
+        mesh::cornerNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), vectorOf<mesh::Corners>(authored), leastCosine);
+    return nb::make_tuple(arrayOf<double>(result.normals, {result.normals.size(), 3, 3}), result.flipped, result.replaced, result.missing);
+}
+
+} // namespace
+
+void bind_packer(nb::module_& module) {
+    module.def("quantise", &quantise, "vertices"_a, "faces"_a, "vertex_bits"_a);
+    nb::class_<Packing>(module, "Packing")
+        .def(nb::init<const Rows<std::int32_t>&, const Rows<std::int32_t>&, const Column<std::int64_t>&, const Values&, const FieldTuples&>(), "vertices"_a, "faces"_a, "mesh_faces"_a, "format"_a, "layouts"_a)
+        .def("sections", &Packing::sections)
+        .def("statistics", &Packing::statistics)
+        .def("order", &Packing::order)
+        .def("records", &Packing::records, "normals"_a, "materials"_a, "is_clear"_a, "colours"_a.none());
+    module.def(
+        "surface_offset",
+        [](int gridFraction, int weightBits, int mantissaBits, int distanceDigits, int largestTriangle) {
+            return packer::surfaceOffset({gridFraction, weightBits, mantissaBits, distanceDigits}, largestTriangle);
+        },
+        "grid_fraction"_a, "weight_bits"_a, "mantissa_bits"_a, "distance_digits"_a, "largest_triangle"_a);
+    module.def("merge_rows", &mergeRows, "rows"_a);
+    module.def("drop_faces", &dropFaces, "vertices"_a, "faces"_a);
+    module.def("crease_normals", &creaseNormals, "vertices"_a, "faces"_a, "least_cosine"_a);
+    module.def("corner_normals", &cornerNormals, "vertices"_a, "faces"_a, "authored"_a, "least_cosine"_a);
+}

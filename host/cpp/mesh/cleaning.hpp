@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Cleaning, as host/colonnade/mesh/load.py does it: vertices are merged by position; degenerate faces, equal faces and unused
+/// vertices go. Closed parts that point inward stay as they are.
+#pragma once
+
+#include <limits>
+
+#include "normals.hpp"
+
+namespace colonnade::mesh {
+
+/// A file's triangles.
+struct RawMesh {
+    std::vector<Vector> vertices;
+    std::vector<Face> faces;
+    std::vector<Corners> normals;  ///< of any length, 0 for none; empty: the file has none
+};
+
+struct CleanMesh {
+    std::vector<Vector> vertices;
+    std::vector<Face> faces;
+    std::vector<std::int64_t> sources;  ///< of each face, its index in the raw mesh
+    CornerNormals normals;
+};
+
+/// Null, or why a mesh cannot be cleaned.
+inline const char* whyUnclean(const RawMesh& raw) {
+    if (raw.faces.empty()) return "the mesh has no faces";
+    for (const Face& face : raw.faces)
+        for (const std::int32_t vertex : face) {
+            if (vertex < 0 || static_cast<std::size_t>(vertex) >= raw.vertices.size()) return "a face names a vertex that does not exist";
+            for (const double component : raw.vertices[vertex])
+                if (!std::isfinite(component) || std::fabs(component) > 1e100) return "a vertex is not a number, or beyond 1e100";
+        }
+    return nullptr;
+}
+
+/// No faces are left if none has an area.
+inline CleanMesh clean(const RawMesh& raw, double leastCosine) {
+    std::vector<bool> isUsed(raw.vertices.size());
+    for (const Face& face : raw.faces)
+        for (const std::int32_t vertex : face) isUsed[vertex] = true;
+    std::vector<Vector> used;
+    std::vector<std::int64_t> number(raw.vertices.size());
+    for (std::size_t i = 0; i < raw.vertices.size(); ++i)
+        if (isUsed[i]) {
+            number[i] = static_cast<std::int64_t>(used.size());
+            used.push_back({raw.vertices[i][0] + 0.0, raw.vertices[i][1] + 0.0, raw.vertices[i][2] + 0.0});
+        }
+    const MergedRows<double> merged = mergeRows(used.data(), used.size());
+    Vector low = merged.rows[0], high = merged.rows[0];
+    for (const Vector& vertex : merged.rows)
+        for (int axis = 0; axis < 3; ++axis) {
+            low[axis] = std::min(low[axis], vertex[axis]);
+            high[axis] = std::max(high[axis], vertex[axis]);
+        }
+    const double edge = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+    CleanMesh result;
+    if (!(edge >= 1e-100)) return result;
+    std::vector<Vector> scaled = merged.rows;
+    for (Vector& vertex : scaled)
+        for (int axis = 0; axis < 3; ++axis) vertex[axis] = (vertex[axis] - low[axis]) / edge;
+    std::vector<Row<std::int64_t>> corners(raw.faces.size());
+    for (std::size_t i = 0; i < corners.size(); ++i)
+        for (int corner = 0; corner < 3; ++corner) corners[i][corner] = merged.index[number[raw.faces[i][corner]]];
+    result.sources = dropFaces(scaled, corners);
+
+    std::vector<std::int32_t> renumbered(merged.rows.size(), -1);
+    for (const std::int64_t source : result.sources)
+        for (const std::int64_t vertex : corners[source]) renumbered[vertex] = 0;
+    for (std::size_t i = 0; i < renumbered.size(); ++i)
+        if (renumbered[i] == 0) {
+            renumbered[i] = static_cast<std::int32_t>(result.vertices.size());
+            result.vertices.push_back(merged.rows[i]);
+        }
+    std::vector<Corners> authored;
+    bool hasNormals = false;
+    for (const std::int64_t source : result.sources) {
+        result.faces.push_back({renumbered[corners[source][0]], renumbered[corners[source][1]], renumbered[corners[source][2]]});
+        if (!raw.normals.empty()) authored.push_back(raw.normals[source]);
+        hasNormals = hasNormals || (!raw.normals.empty() && raw.normals[source] != Corners{});
+    }
+    if (hasNormals) result.normals = cornerNormals(result.vertices, result.faces, std::move(authored), leastCosine);
+    else if (!result.faces.empty()) result.normals.normals = creaseNormals(result.vertices, result.faces, leastCosine);
+    return result;
+}
+
+} // namespace colonnade::mesh
