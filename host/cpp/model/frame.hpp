@@ -71,8 +71,10 @@ public:
         RayRequest request = primaryRay(x, y);
         if (!frame_.maySeeObject(x, y)) return directView(pixel, x, y, request);
         Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, {}};
+        RayKind kind = RayKind::primary;
         for (bool isPrimary = true;; isPrimary = false) {
             path.direction = request.direction;
+            log.addRay(kind, request, numbers_);
             const Ray ray = prepareRay(request, frame_.bounds, numbers_);
             const Hit hit = trace(ray);
             if (!hit.found && isPrimary) return directView(pixel, x, y, request);
@@ -98,7 +100,7 @@ public:
             const Material& material = frame_.lighting.materialOf(*face);
             const Colour albedo = albedoOf(material, hit, *face);
             if (material.kind == MaterialKind::mirror || material.kind == MaterialKind::glass) {
-                if (!continuePath(surface, material, albedo, path, request)) return finish(pixel, path, lightBehind(path, request));
+                if (!continuePath(surface, material, albedo, path, request, kind)) return finish(pixel, path, lightBehind(path, request));
                 continue;
             }
             const bool gathers = path.gathered < frame_.gather.bounces;
@@ -115,6 +117,7 @@ public:
             request = {offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_), {direction[0], direction[1], direction[2]}, numbers_.unlimited(), ~std::uint64_t(0)};
             ++path.gathered;
             ++counters.raysGather;
+            kind = RayKind::gather;
         }
     }
 
@@ -158,6 +161,7 @@ private:
             Occlusion occluder = Occlusion::none;
             if (illumination.needsShadowRay) {
                 ++counters.raysShadow;
+                log.addRay(RayKind::shadow, illumination.shadowRay, numbers_);
                 occluder = occlusion(prepareRay(illumination.shadowRay, frame_.bounds, numbers_));
             }
             for (int channel = 0; channel < 3; ++channel) {
@@ -263,7 +267,7 @@ private:
     std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const { return part == whole ? std::int64_t(1) << numbers_.lightFraction : (part << numbers_.lightFraction) / whole; }
 
     /// Continues a path at a mirror or glass; false if the next ray sees only the background.
-    bool continuePath(const Surface& surface, const Material& material, const Colour& albedo, Path& path, RayRequest& request) {
+    bool continuePath(const Surface& surface, const Material& material, const Colour& albedo, Path& path, RayRequest& request, RayKind& kind) {
         const Bounce next = bounce(surface, material, frame_.lighting.flat, frame_.lighting.offset, numbers_);
         Colour reflectionColour = frame_.lighting.background;
         if (frame_.hasEnvironment && next.fresnelWeight != 0) {
@@ -286,6 +290,7 @@ private:
         if (path.bounces == frame_.lighting.bounces) return false;
         ++path.bounces;
         ++(next.isRefraction ? counters.raysRefraction : counters.raysReflection);
+        kind = next.isRefraction ? RayKind::refraction : RayKind::reflection;
         return true;
     }
 

@@ -1,6 +1,7 @@
 // Rays through the records of the column memory: closest hits and occluders, with counters and errors.
 #pragma once
 #include "column_memory.hpp"
+#include "ray_log.hpp"
 #include "registers.hpp"
 
 namespace colonnade {
@@ -30,6 +31,7 @@ public:
         ++counters.raysInBox;
         TraceState state{ray, best, false, Occlusion::none};
         run(state);
+        if (state.best.found) log.addHit(state.best.id, static_cast<double>(state.best.t));
         return state.best;
     }
 
@@ -44,6 +46,7 @@ public:
 
     Counters counters{};
     Errors errors{};
+    RayLog log;
 
 protected:
     Tracer(const Numbers& numbers, const std::map<std::string, Layout>& layouts) : numbers_(numbers), memory_(layouts, numbers) {}
@@ -82,6 +85,7 @@ private:
             return;
         }
         const Triangles& record = *found;
+        log.addRead(RayStep::Kind::record, address);
         if (!record.isLegal) {
             errors.illegalRecord = true;
             ++counters.triangleTests; // an empty record takes as many cycles as one triangle
@@ -90,7 +94,9 @@ private:
         for (int i = 0; i < record.count; ++i) {
             ++counters.triangleTests;
             Hit hit = state.best;
-            if (!testTriangle(state.ray, record.vertices[i], memory_.idOf(record, i), numbers_, hit)) continue;
+            const bool isHit = testTriangle(state.ray, record.vertices[i], memory_.idOf(record, i), numbers_, hit);
+            log.addTriangle(record.vertices[i], memory_.idOf(record, i), isHit);
+            if (!isHit) continue;
             if (state.isShadow) state.occlusion = std::max(state.occlusion, record.isTransmissive[i] && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
             else state.best = hit;
         }
@@ -121,6 +127,7 @@ private:
                 int count = 0;
                 if (node.isLegal) count = testBoxes(state.ray, node, best.t, numbers_, entered, counters.boxTests);
                 else errors.illegalRecord = true;
+                if (log.isOn()) logNode(next.address, node, entered, count);
                 for (int i = count - 1; i > 0; --i) {
                     if (depth < static_cast<std::size_t>(numbers_.stackDepth)) stack[depth++] = entryOf(node, entered[i]);
                     else errors.stackOverflow = true;
@@ -135,6 +142,15 @@ private:
                 next = stack[--depth];
                 busy = next.tNear <= tMaxUnits(best.t, numbers_);
             }
+        }
+    }
+
+    void logNode(std::uint32_t address, const Node& node, const std::array<Entered, 4>& entered, int count) const {
+        log.addRead(RayStep::Kind::node, address);
+        for (int slot = 0; slot < numbers_.arity; ++slot) {
+            if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
+            const bool isHit = std::any_of(entered.begin(), entered.begin() + count, [slot](const Entered& child) { return child.slot == slot; });
+            log.addChild(node, slot, entryOf(node, {slot, 0}).address, isHit);
         }
     }
 

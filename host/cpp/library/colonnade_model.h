@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The packer and the bit-exact model without Python, behind C: docs/browser.md. With software/include/colonnade_view.h, which
+ * computes registers from poses, it renders meshes as a design does. One design at a time; calls are those of one thread. */
+#ifndef COLONNADE_MODEL_H
+#define COLONNADE_MODEL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A mesh as it is packed: sections in records, bounds in vertex units. */
+struct colonnade_packed {
+    int32_t triangles, record_count, triangle_base, triangle_records, attribute_base;
+    int32_t bounds_low[3], bounds_high[3];
+    int32_t shading_offset; /* register shading.offset, grid steps */
+    int32_t tree_depth, stack_bound;
+    int32_t dropped;  /* faces of the mesh that are equal to another one or have no area */
+    int32_t flipped;  /* faces whose normals pointed to their back, and were negated */
+    int32_t replaced; /* corners whose normal pointed to the back of their face, or that had none */
+};
+
+struct colonnade_step {
+    int32_t kind;      /* 0 a ray, 1 a node is read, 2 a child's box, 3 a record of triangles is read, 4 a triangle, 5 a hit */
+    int32_t value;     /* ray: 0 primary, 1 shadow, 2 reflection, 3 refraction, 4 gathered; an address; a packed id */
+    int32_t is_hit;    /* box entered, triangle the closest so far */
+    int32_t is_leaf;   /* the child is a record of triangles */
+    double places[9];  /* vertex units: origin and direction, low and high, vertices; of a hit, t in grid steps */
+};
+
+/* Every call but the last three returns NULL, or a text that says what is wrong. */
+
+/* Opens a design, by lines of words from its manifest:
+ *   number NAME VALUE                             numbers; arity, trianglesPerRecord, stackDepth, bvh, recordBits, depth
+ *   layout RECORD FIELD OFFSET WIDTH SIGNED       of records
+ *   register NAME ADDRESS WORDS WIDTH SIGNED LIMIT   those that are written; limit -1 for none */
+const char *colonnade_model_open(const char *design);
+
+/* Cleans and packs a mesh, and loads it into the model. `normals`: three for each face, of any length, 0 for none; or NULL.
+ * `colours`: linear red, green, blue at the corners, 0 to 1, for a design with corner colours; or NULL. Faces have entry 0 of
+ * the material table. */
+const char *colonnade_model_pack(const double *vertices, uint32_t vertex_count, const int32_t *faces, uint32_t face_count,
+                           const double *normals, const double *colours, uint32_t is_glass, struct colonnade_packed *packed);
+
+/* Loads records in place of a packed mesh. */
+const char *colonnade_model_load(const uint8_t *records, uint32_t count);
+
+/* Writes registers, pairs of word address and value, low byte first, and starts a frame. */
+const char *colonnade_model_start(const uint8_t *writes, uint32_t count);
+
+/* Renders rows first to last − 1: linear red, green, blue, and the packed id or −1, of each pixel. */
+const char *colonnade_model_rows(uint32_t first, uint32_t last, uint16_t *colours, int32_t *triangles);
+
+/* The steps of a pixel's rays; they are valid until the next call. */
+uint32_t colonnade_model_trace(uint32_t x, uint32_t y, const struct colonnade_step **steps);
+
+/* The records of the packed mesh. */
+const uint8_t *colonnade_model_records(void);
+
+/* Counters of the frame that the model has: primary, shadow, reflected, refracted and in-box rays, nodes read, boxes tested,
+ * triangles tested, hits, deepest stack. */
+const double *colonnade_model_counters(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
