@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup render test test-hardware test-host verify bench soc live check docs release release-check lock format clean
+.PHONY: help setup render test test-hardware test-host verify bench soc live browser check docs release release-check lock format clean
 
 venv := .venv/bin
 SCENE ?= scenes/room.toml
@@ -43,6 +43,10 @@ soc: setup ## a LiteX SoC in the simulator: boots, computes views, renders by th
 live: setup ## a mirror in a room before a moving camera: videos, time and energy a frame, out/live/index.html
 	@$(venv)/python tools/live
 
+browser: setup ## the packer and the model as one HTML file, out/browser/index.html
+	@tools/browser-environment
+	@$(venv)/python tools/browser
+
 check: setup ## formatters, linters, types, layers, derived files
 	@tools/check
 
@@ -62,7 +66,7 @@ format: setup ## let the formatters rewrite the sources
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host
 	@$(venv)/ruff format host
-	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain tools/site tools/diagrams tools/layers-* tools/vocabulary tools/frame-digests tools/mutations tools/distribution
+	@$(venv)/ruff format --config host/pyproject.toml tools/supply_chain tools/site tools/browser tools/diagrams tools/layers-* tools/vocabulary tools/frame-digests tools/mutations tools/distribution
 
 clean: ## remove everything that was built, fetched or cached
 	@rm -rf .venv .tools .cache out target project/target project/project test_run_dir build host/build

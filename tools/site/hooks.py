@@ -2,8 +2,8 @@
 
 - README, CHANGELOG, CONTRIBUTING and SECURITY become pages, so that each text exists once.
 - Each Python package of host/colonnade gets a page of its docstrings.
-- Scaladoc and PeakRDL's register pages are copied into the site, from the folders that the environment variables
-  COLONNADE_SCALADOC and COLONNADE_REGISTERS name.
+- Scaladoc, PeakRDL's register pages and the page of tools/browser are copied into the site, from the folders that the
+  environment variables COLONNADE_SCALADOC, COLONNADE_REGISTERS and COLONNADE_BROWSER name.
 - Links are written for the repository (``../SECURITY.md``); here they are pointed at the site's pages. Of a link to a
   source file only the text stays. A link to a file that the repository lacks is a warning, and the build is strict.
 - GitHub's Markdown needs no blank line before a list or a table; Python-Markdown does.
@@ -36,6 +36,7 @@ _ROOT_PAGES = {
 _COPIED = (
     ("COLONNADE_SCALADOC", "scala", "Hardware by stage", "Scaladoc"),
     ("COLONNADE_REGISTERS", "registers", "Integration", "Register pages"),
+    ("COLONNADE_BROWSER", "browser", "Host", "Browser tab"),
 )
 #: Weight in the search of pages that hold many words and explain few. A guide has 1; words of a title count 1000 times.
 _SEARCH_WEIGHTS = {"api/": 1e-4, "changelog.md": 0.1, "hardening.md": 0.3}

@@ -220,7 +220,7 @@ std::uint32_t colonnade_model_trace(std::uint32_t x, std::uint32_t y, const colo
     library->result.clear();
     for (const RayStep& step : library->steps) {
         colonnade_step each{static_cast<std::int32_t>(step.kind), step.value, step.isHit, step.isLeaf, {}};
-        std::copy(step.places.begin(), step.places.end(), each.places);
+        std::copy(step.values.begin(), step.values.end(), each.values);
         library->result.push_back(each);
     }
     *steps = library->result.data();

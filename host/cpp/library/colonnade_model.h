@@ -28,7 +28,7 @@ struct colonnade_step {
     int32_t value;     /* ray: 0 primary, 1 shadow, 2 reflection, 3 refraction, 4 gathered; an address; a packed id */
     int32_t is_hit;    /* box entered, triangle the closest so far */
     int32_t is_leaf;   /* the child is a record of triangles */
-    double places[9];  /* vertex units: origin and direction, low and high, vertices; of a hit, t in grid steps */
+    double values[9];  /* vertex units: origin and direction, low and high, vertices; of a hit, t in grid steps */
 };
 
 /* Every call but the last three returns NULL, or a text that says what is wrong. */

@@ -106,7 +106,7 @@ struct CornerNormals {
 inline CornerNormals cornerNormals(const std::vector<Vector>& vertices, const std::vector<Face>& faces, std::vector<Corners> authored, double leastCosine) {
     CornerNormals result;
     const std::vector<Corners> corners = scaledCorners(vertices, faces);
-    std::vector<std::array<bool, 3>> isKept(faces.size());
+    std::vector<std::array<bool, 3>> isAuthored(faces.size());
     bool isWhole = true;
     for (std::size_t i = 0; i < faces.size(); ++i) {
         const Vector normal = unit(cross(difference(corners[i][1], corners[i][0]), difference(corners[i][2], corners[i][0])));
@@ -124,10 +124,10 @@ inline CornerNormals cornerNormals(const std::vector<Vector>& vertices, const st
         for (int corner = 0; corner < 3; ++corner) {
             if (isFlipped)
                 for (double& component : authored[i][corner]) component = -component;
-            isKept[i][corner] = isGiven[corner] && (isFlipped || !isBack(corner));
-            result.replaced += isGiven[corner] && !isKept[i][corner];
+            isAuthored[i][corner] = isGiven[corner] && (isFlipped || !isBack(corner));
+            result.replaced += isGiven[corner] && !isAuthored[i][corner];
             result.missing += !isGiven[corner];
-            isWhole = isWhole && isKept[i][corner];
+            isWhole = isWhole && isAuthored[i][corner];
         }
     }
     result.normals = std::move(authored);
@@ -135,7 +135,7 @@ inline CornerNormals cornerNormals(const std::vector<Vector>& vertices, const st
     const std::vector<Corners> smooth = creaseNormals(vertices, faces, leastCosine);
     for (std::size_t i = 0; i < faces.size(); ++i)
         for (int corner = 0; corner < 3; ++corner)
-            if (!isKept[i][corner]) result.normals[i][corner] = smooth[i][corner];
+            if (!isAuthored[i][corner]) result.normals[i][corner] = smooth[i][corner];
     return result;
 }
 

@@ -20,7 +20,7 @@ struct RayStep {
     /// `child`: whether it is a record of triangles.
     bool isLeaf;
     /// `ray`: origin and direction. `child`: both corners of its box. `triangle`: its vertices. `hit`: t, grid steps.
-    std::array<double, 9> places;
+    std::array<double, 9> values;
 };
 
 /// A log of steps, or none.
@@ -36,8 +36,8 @@ public:
         RayStep step{RayStep::Kind::ray, static_cast<std::int32_t>(kind), false, false, {}};
         const double unit = static_cast<double>(std::int64_t(1) << std::max(0, n.gridFraction)) / static_cast<double>(std::int64_t(1) << std::max(0, -n.gridFraction));
         for (int axis = 0; axis < 3; ++axis) {
-            step.places[axis] = static_cast<double>(request.origin[axis]) / unit;
-            step.places[3 + axis] = static_cast<double>(request.direction[axis]);
+            step.values[axis] = static_cast<double>(request.origin[axis]) / unit;
+            step.values[3 + axis] = static_cast<double>(request.direction[axis]);
         }
         add(step);
     }
@@ -49,8 +49,8 @@ public:
     void addChild(const Node& node, int slot, std::uint32_t address, bool isHit) const {
         RayStep step{RayStep::Kind::child, static_cast<std::int32_t>(address), isHit, node.kinds[slot] == Child::leaf, {}};
         for (int axis = 0; axis < 3; ++axis) {
-            step.places[axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.low[slot][axis]) << node.exponent[axis]));
-            step.places[3 + axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.high[slot][axis]) << node.exponent[axis]));
+            step.values[axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.low[slot][axis]) << node.exponent[axis]));
+            step.values[3 + axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.high[slot][axis]) << node.exponent[axis]));
         }
         add(step);
     }
@@ -58,7 +58,7 @@ public:
     void addTriangle(const std::array<Vector, 3>& vertices, std::uint64_t id, bool isHit) const {
         if (!isOn()) return;
         RayStep step{RayStep::Kind::triangle, static_cast<std::int32_t>(id), isHit, false, {}};
-        for (int i = 0; i < 9; ++i) step.places[i] = static_cast<double>(vertices[i / 3][i % 3]);
+        for (int i = 0; i < 9; ++i) step.values[i] = static_cast<double>(vertices[i / 3][i % 3]);
         add(step);
     }
 

@@ -40,8 +40,8 @@ inline QuantisedMesh quantise(const mesh::Vector* vertices, std::size_t vertexCo
     result.vertices.resize(vertexCount);
     for (std::size_t i = 0; i < vertexCount; ++i)
         for (int axis = 0; axis < 3; ++axis) {
-            const double place = std::rint((vertices[i][axis] - low[axis]) * result.scale) + start[axis];
-            positions[i][axis] = result.vertices[i][axis] = static_cast<std::int32_t>(std::clamp(place, 0.0, maximum));
+            const double unit = std::rint((vertices[i][axis] - low[axis]) * result.scale) + start[axis];
+            positions[i][axis] = result.vertices[i][axis] = static_cast<std::int32_t>(std::clamp(unit, 0.0, maximum));
         }
     // Merge coincident vertices to compare faces
     const mesh::MergedRows<std::int64_t> merged = mesh::mergeRows(positions.data(), vertexCount);

@@ -1,0 +1,232 @@
+"""The page in Chromium: it orbits, follows a ray, reads files and links. `make browser` builds it."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+
+from colonnade.design.manifest import Manifest
+from colonnade.device.bit_exact import render_model
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.mesh import Mesh
+from colonnade.scene_image.packer import pack
+
+ROOT = Path(__file__).resolve().parents[3]
+FILE = ROOT / "out" / "browser" / "index.html"
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
+#: A tetrahedron with a colour at each vertex.
+OBJ = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\nl 1 2\n"
+
+pytestmark = pytest.mark.skipif(not FILE.is_file(), reason="the page is not built: run `make browser`")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
+    if program is None:
+        pytest.skip("no Chromium: install it with `apt-get install chromium`")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+class Tab:
+    """The open page, and what it asked for or complained about."""
+
+    def __init__(self, context: BrowserContext, link: str = "") -> None:
+        self.page: Page = context.new_page()
+        self.page.set_default_timeout(30_000)
+        self.requests: list[str] = []
+        self.complaints: list[str] = []
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.goto(FILE.as_uri() + link)
+        self.wait()
+
+    def wait(self, before: int = 0) -> None:
+        """Wait for a whole frame after so many."""
+        self.page.wait_for_selector("body[data-frames]")
+        while int(self.page.get_attribute("body", "data-frames") or 0) <= before:
+            time.sleep(0.02)
+
+    def frames(self) -> int:
+        return int(self.page.get_attribute("body", "data-frames") or 0)
+
+    def picture(self) -> dict[str, Any]:
+        """The last whole frame, and the writes of its registers."""
+        return dict(
+            self.page.evaluate(
+                """async () => {
+                  const { width, height, view, colours, triangles } = colonnade.picture;
+                  const { writes } = await colonnade.renderer.writes(view);
+                  return { width, height, writes, colours: [...colours], triangles: [...triangles] };
+                }"""
+            )
+        )
+
+    def drop(self, name: str, text: str) -> None:
+        """Drop a file onto the picture."""
+        self.page.evaluate(
+            """([name, text]) => {
+              const dataTransfer = new DataTransfer();
+              dataTransfer.items.add(new File([text], name));
+              document.getElementById("stage").dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true }));
+            }""",
+            [name, text],
+        )
+
+    def is_quiet(self) -> bool:
+        """Whether the page asked no host, and the console is empty."""
+        assert not [url for url in self.requests if not url.startswith((FILE.as_uri(), "blob:", "data:"))]
+        assert not self.complaints
+        return True
+
+
+@pytest.fixture
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    context = browser.new_context(viewport={"width": 800, "height": 240}, offline=True)
+    yield context
+    context.close()
+
+
+def host_frame(picture: dict[str, Any], mesh: Mesh, design: str) -> Any:
+    """The host's frame of the registers that the page wrote."""
+    manifest = Manifest.load(ROOT / "configs" / "golden" / f"{design}.json")
+    words = {address: value for address, value in picture["writes"]}
+    registers = {
+        register.name: register.decode([words.get(register.address + word, 0) for word in range(register.words)])
+        for register in manifest.registers.values()
+        if register.access == "rw"
+    }
+    return render_model(manifest, pack(mesh, manifest), registers)
+
+
+def test_the_page_is_small_and_fast_and_equals_the_host(context: BrowserContext) -> None:
+    assert len(gzip.compress(FILE.read_bytes())) < 2_000_000
+    begin = time.monotonic()
+    tab = Tab(context, "#pixel=4")
+    assert time.monotonic() - begin < 10  # some 3 s on a busy machine
+    picture = tab.picture()
+    frame = host_frame(picture, load_mesh("teapot"), "textured")
+    assert frame.is_object.sum() > 100
+    np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
+    np.testing.assert_array_equal(np.reshape(picture["triangles"], frame.triangle.shape), frame.triangle)
+    assert tab.is_quiet()
+
+
+def test_a_click_follows_a_ray_and_the_link_holds_it(context: BrowserContext) -> None:
+    tab = Tab(context, "#pixel=4&material=mirror&design=edge&distance=3")
+    page = tab.page
+    box = page.locator("#stage").bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.click(x, y)
+    expect(page.locator("#rays tbody tr").first).to_contain_text("primary")
+    rays = page.evaluate("colonnade.rays.map(({steps, ...ray}) => ray)")
+    assert [ray["kind"] for ray in rays][:2] == ["primary", "reflection"]
+    picture = tab.picture()
+    column, row = (int(value) for value in page.locator("#pixel").inner_text().split(","))
+    assert rays[0]["hit"] == picture["triangles"][row * picture["width"] + column]
+    first = rays[0]
+    assert first["records"] >= first["nodes"] >= 1 and first["entered"] <= first["boxes"] <= 4 * first["nodes"]
+    assert 1 <= first["lines"] <= first["records"]
+    page.locator("#rays tbody tr").nth(1).click()
+    expect(page.locator("#rays tr.chosen")).to_contain_text("reflection")
+    assert page.locator("#steps li").count() == page.evaluate("colonnade.rays[1].steps.length")
+
+    before = tab.frames()
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 40, y - 20, steps=3)
+    page.mouse.up()
+    tab.wait(before)
+    link = page.evaluate("location.hash")
+    assert "azimuth=" in link and "follow=" in link
+    other = Tab(context, link)
+    expect(other.page.locator("#rays tbody tr")).to_have_count(len(rays))
+    assert other.page.evaluate("colonnade.rays.map(({steps, ...ray}) => ray)") == rays
+    assert tab.is_quiet() and other.is_quiet()
+
+
+def test_files_are_read_and_what_is_left_out_is_said(context: BrowserContext, tmp_path: Path) -> None:
+    tab = Tab(context, "#pixel=4")
+    page = tab.page
+    (tmp_path / "four.obj").write_text(OBJ)
+    before = tab.frames()
+    page.set_input_files("#file", tmp_path / "four.obj")
+    expect(page.locator("#mesh")).to_have_text("four.obj")
+    expect(page.locator("#notes")).to_have_text("lines, points and curves are left out")
+    tab.wait(before)
+    assert page.evaluate("[colonnade.packed.triangles, colonnade.mesh.hasColours]") == [4, True]
+    colours = np.reshape(tab.picture()["colours"], (-1, 3))
+    assert len(np.unique(colours, axis=0)) > 50
+    # A drop, of a file that is none
+    tab.drop("broken.ply", "ply nothing")
+    expect(page.locator("#error")).to_have_text("this is no PLY file")
+    before = tab.frames()
+    tab.drop("one.gltf", json.dumps(triangle_document()))
+    expect(page.locator("#mesh")).to_have_text("one.gltf")
+    tab.wait(before)
+    assert page.evaluate("colonnade.packed.triangles") == 1
+    assert page.locator("#error").is_hidden()
+    assert tab.is_quiet()
+
+
+def triangle_document() -> dict[str, Any]:
+    """A glTF file with one triangle, moved and mirrored by its node."""
+    content = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype="<f4").tobytes()
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "scale": [-2, 1, 1], "translation": [1, 2, 3]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": len(content)}],
+        "buffers": [{"byteLength": len(content), "uri": "data:;base64," + base64.b64encode(content).decode()}],
+    }
+
+
+def test_controls_and_the_size_of_a_phone(browser: Browser) -> None:
+    context = browser.new_context(viewport={"width": 360, "height": 640}, has_touch=True, is_mobile=True, offline=True)
+    tab = Tab(context, "#pixel=4&design=tiny")
+    page = tab.page
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    stage, form = page.locator("#stage").bounding_box(), page.locator("#controls").bounding_box()
+    assert stage is not None and form is not None and form["y"] >= stage["y"] + stage["height"] - 1
+    before = tab.frames()
+    page.select_option("select[name=material]", "glass")
+    expect(page.locator("#notes")).to_have_text("this hardware has neither mirrors nor glass")
+    tab.wait(before)
+    before = tab.frames()
+    page.select_option("select[name=design]", "lean")
+    tab.wait(before)
+    expect(page.locator("#notes li")).to_have_count(0)
+    expect(page.locator("#figures")).to_contain_text("refracted rays")
+    page.touchscreen.tap(180, 190)
+    expect(page.locator("#rays tbody tr").first).to_contain_text("primary")
+    assert tab.is_quiet()
+    context.close()
+
+
+def test_the_rtl_in_the_tab_equals_the_model(context: BrowserContext) -> None:
+    tab = Tab(context, "#pixel=4&azimuth=70")
+    page = tab.page
+    page.click("#rtl-start")
+    expect(page.locator("#rtl-status")).to_contain_text("Equal: 3072 pixels", timeout=60_000)
+    result = page.evaluate("colonnade.rtl")
+    assert result["hashes"][0] == result["hashes"][1] and not result["different"]
+    assert result["counters"]["cycles"] > result["counters"]["boxTests"] > 1000
+    assert tab.is_quiet()

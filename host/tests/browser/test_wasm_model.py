@@ -1,0 +1,86 @@
+"""The page's WebAssembly equals the host: records, pixels, hits and counters. `tools/browser` compiles it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import playwright
+import pytest
+
+from colonnade.design.manifest import Manifest
+from colonnade.device.bit_exact import render_model
+from colonnade.mesh.load import load_mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.parser import load_scene
+from colonnade.scene_image.packer import pack
+
+ROOT = Path(__file__).resolve().parents[3]
+MODULE = ROOT / "out" / "browser" / "colonnade.wasm"
+EIGHT = ("teapot", "stanford-bunny", "cheburashka", "fandisk", "rocker-arm", "duck", "armadillo", "dragon")
+pytestmark = pytest.mark.skipif(not MODULE.is_file(), reason="the page is not built: run `make browser`")
+
+
+def node() -> str:
+    """The node that Playwright brings, or the system's."""
+    own = Path(playwright.__file__).parent / "driver" / "node"
+    program = str(own) if own.is_file() else shutil.which("node")
+    return program if program is not None else pytest.skip("no node")
+
+
+def check(folder: Path, mesh_name: str, config: str, scene_name: str, size: tuple[int, int]) -> None:
+    """Compare a mesh and a frame of it with the host's."""
+    manifest_text = json.loads((ROOT / "configs" / "golden" / f"{config}.json").read_text())
+    manifest = Manifest.from_dict(manifest_text)
+    mesh, scene = load_mesh(mesh_name), load_scene(ROOT / "scenes" / scene_name)
+    plain = tuple(replace(material, kind=scene.material.kind or "diffuse") for material in mesh.materials[:1])
+    mesh = replace(mesh, materials=plain, face_materials=np.zeros(len(mesh.faces), dtype=np.uint8))
+    image = pack(mesh, manifest)
+    registers = frame_registers(scene, image.header, manifest, *size)
+    frame = render_model(manifest, image, registers)
+
+    writes = [pair for name, value in registers.items() for pair in manifest.registers[name].encode(value)]
+    job = {
+        "module": str(MODULE),
+        "manifest": manifest_text,
+        "isGlass": plain[0].kind == "glass",
+        "frames": [{"writes": writes, "width": size[0], "height": size[1]}],
+    }
+    (folder / "job.json").write_text(json.dumps(job))
+    mesh.vertices.astype("<f8").tofile(folder / "vertices.bin")
+    mesh.faces.astype("<i4").tofile(folder / "faces.bin")
+    mesh.corner_normals.astype("<f8").tofile(folder / "normals.bin")
+    subprocess.run([node(), Path(__file__).with_name("frames.mjs"), folder], check=True)
+
+    assert (folder / "records.bin").read_bytes() == image.records.tobytes()
+    packed = json.loads((folder / "packed.json").read_text())
+    assert packed["shadingOffset"] == registers["shading.offset"]
+    assert packed["recordCount"] == image.header.record_count
+    colours = np.fromfile(folder / "colours0.bin", dtype="<u2").reshape(frame.colour.shape)
+    np.testing.assert_array_equal(colours, frame.colour)
+    triangles = np.fromfile(folder / "triangles0.bin", dtype="<i4").reshape(frame.triangle.shape)
+    np.testing.assert_array_equal(triangles, frame.triangle)
+    assert (triangles >= 0).any()
+    counters = json.loads((folder / "counters0.json").read_text())
+    known = counters.keys() & frame.counters.keys()
+    assert {"nodeReads", "triangleTests"} <= known
+    assert {name: counters[name] for name in known} == {name: frame.counters[name] for name in known}
+
+
+@pytest.mark.parametrize(
+    ("config", "scene"),
+    [("textured", "object.toml"), ("edge", "mirror.toml"), ("lean", "glass.toml"), ("tiny", "object.toml")],
+)
+def test_webassembly_equals_the_host(tmp_path: Path, config: str, scene: str) -> None:
+    check(tmp_path, "teapot:4", config, scene, (64, 48))
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("mesh", EIGHT)
+@pytest.mark.parametrize("scene", ["object.toml", "mirror.toml"])
+def test_eight_meshes_are_equal(tmp_path: Path, mesh: str, scene: str) -> None:
+    check(tmp_path, mesh, "edge", scene, (320, 240))

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// The packer, the model and colonnade_view in WebAssembly (host/cpp/library, software/src).
+
+import { designLines, registerWrites } from "./design.js";
+
+const PACKED = [
+  "triangles", "recordCount", "triangleBase", "triangleRecords", "attributeBase", "lowX", "lowY", "lowZ", "highX", "highY",
+  "highZ", "shadingOffset", "treeDepth", "stackBound", "dropped", "flipped", "replaced",
+];
+/** Those of the register map that do not depend on time. */
+const COUNTERS = [
+  "raysPrimary", "raysShadow", "raysReflection", "raysRefraction", "raysInBox", "nodeReads", "boxTests", "triangleTests",
+  "hits", "deepestStack",
+];
+const VIEW_ERRORS = { 20: "no view file", 21: "bad pose", 22: "bad lens", 23: "the camera is too far away", 24: "no such light" };
+const STEP_BYTES = 88;
+const FRACTION = 2 ** 32;
+
+/** What a module of WASI needs that writes nowhere and reads nothing. */
+export function wasi() {
+  const functions = {};
+  return new Proxy(functions, {
+    get: (_, name) => (...args) => {
+      if (name === "proc_exit") throw new Error(`the model stopped with status ${args[0]}`);
+      return 52; // not supported
+    },
+  });
+}
+
+/** Instantiates a module: a WebAssembly.Module, or its bytes. */
+export async function instantiate(code) {
+  const module = code instanceof WebAssembly.Module ? code : await WebAssembly.compile(code);
+  const imports = {};
+  for (const { module: from, name } of WebAssembly.Module.imports(module)) (imports[from] ??= {})[name] = wasi()[name];
+  const instance = await WebAssembly.instantiate(module, imports);
+  instance.exports._initialize?.();
+  return instance.exports;
+}
+
+/** A design, a mesh packed for it, and frames of it. Errors are thrown, with a text for the visitor. */
+export class Library {
+  constructor(exports) {
+    this.wasm = exports;
+    this.view = 0;
+  }
+
+  static async from(code) {
+    return new Library(await instantiate(code));
+  }
+
+  get bytes() {
+    return new Uint8Array(this.wasm.memory.buffer);
+  }
+
+  text(pointer) {
+    const end = this.bytes.indexOf(0, pointer);
+    return new TextDecoder().decode(this.bytes.slice(pointer, end));
+  }
+
+  check(pointer) {
+    if (pointer !== 0) throw new Error(this.text(pointer));
+  }
+
+  /** Calls `use` with the addresses of copies of typed arrays; 0 for null. */
+  withArrays(arrays, use) {
+    const pointers = arrays.map((array) => {
+      if (array === null) return 0;
+      const pointer = this.wasm.malloc(Math.max(8, array.byteLength));
+      if (pointer === 0) throw new Error("the page is out of memory");
+      this.bytes.set(new Uint8Array(array.buffer, array.byteOffset, array.byteLength), pointer);
+      return pointer;
+    });
+    try {
+      return use(...pointers);
+    } finally {
+      for (const pointer of pointers) if (pointer !== 0) this.wasm.free(pointer);
+    }
+  }
+
+  /** Opens a design by its manifest. */
+  open(manifest) {
+    this.manifest = manifest;
+    this.withArrays([new TextEncoder().encode(designLines(manifest) + "\0")], (lines) => this.check(this.wasm.colonnade_model_open(lines)));
+  }
+
+  /** Packs a mesh: vertices and normals are Float64Array, faces Int32Array; the model has it then. */
+  pack(mesh, isGlass = false) {
+    const { vertices, faces, normals = null, colours = null } = mesh;
+    return this.withArrays([vertices, faces, normals, colours, new Int32Array(PACKED.length)], (v, f, n, c, out) => {
+      this.check(this.wasm.colonnade_model_pack(v, vertices.length / 3, f, faces.length / 3, n, c, Number(isGlass), out));
+      const values = new Int32Array(this.wasm.memory.buffer, out, PACKED.length);
+      return Object.fromEntries(PACKED.map((name, index) => [name, values[index]]));
+    });
+  }
+
+  /** The records of a packed mesh, copied. */
+  records(packed) {
+    const start = this.wasm.colonnade_model_records();
+    return this.bytes.slice(start, start + (packed.recordCount * this.manifest.records.bits) / 8);
+  }
+
+  /** Gives the model records that another one has packed. */
+  load(records) {
+    const count = records.length / (this.manifest.records.bits / 8);
+    this.withArrays([records], (pointer) => this.check(this.wasm.colonnade_model_load(pointer, count)));
+  }
+
+  /** Starts a frame: `writes` are pairs of word address and value. */
+  start(writes) {
+    this.withArrays([new Uint32Array(writes.flat())], (pointer) => this.check(this.wasm.colonnade_model_start(pointer, writes.length)));
+  }
+
+  /** Rows of the frame: `colours` Uint16Array, three for each pixel, linear; `triangles` Int32Array. */
+  rows(first, last, width) {
+    const pixels = (last - first) * width;
+    return this.withArrays([new Uint16Array(3 * pixels), new Int32Array(pixels)], (c, t) => {
+      this.check(this.wasm.colonnade_model_rows(first, last, c, t));
+      return {
+        colours: new Uint16Array(this.wasm.memory.buffer, c, 3 * pixels).slice(),
+        triangles: new Int32Array(this.wasm.memory.buffer, t, pixels).slice(),
+      };
+    });
+  }
+
+  /** Counters of the rendered rows. */
+  counters() {
+    const values = new Float64Array(this.wasm.memory.buffer, this.wasm.colonnade_model_counters(), COUNTERS.length);
+    return Object.fromEntries(COUNTERS.map((name, index) => [name, values[index]]));
+  }
+
+  /** The steps of the rays of a pixel: {kind, value, isHit, isLeaf, values}. */
+  trace(x, y) {
+    return this.withArrays([new Uint32Array(1)], (out) => {
+      const count = this.wasm.colonnade_model_trace(x, y, out);
+      const view = new DataView(this.wasm.memory.buffer);
+      const start = view.getUint32(out, true);
+      return Array.from({ length: count }, (_, index) => {
+        const at = start + STEP_BYTES * index;
+        const word = (place) => view.getInt32(at + 4 * place, true);
+        const values = Array.from({ length: 9 }, (_, place) => view.getFloat64(at + 16 + 8 * place, true));
+        return { kind: word(0), value: word(1), isHit: word(2) !== 0, isLeaf: word(3) !== 0, values };
+      });
+    });
+  }
+
+  /** Opens a view file. Its device has the word addresses of the manifest. */
+  openView(file) {
+    const registers = this.manifest.registers.fields.filter((field) => field.access === "rw");
+    const design = new Uint32Array(64);
+    for (let i = 0; i < 8; ++i) design[i] = parseInt(this.manifest.formatHash.slice(8 * i, 8 * i + 8), 16);
+    design[8] = 0x8000 + 4 * Math.max(...registers.map((field) => field.address + field.words));
+    design[9] = 0x8000 + 4 * Math.min(...registers.map((field) => field.address));
+    if (this.view !== 0) for (const pointer of [this.view, this.file]) this.wasm.free(pointer);
+    this.view = this.wasm.malloc(this.wasm.colonnade_view_size());
+    this.file = this.wasm.malloc(file.length); // the view points into it
+    this.bytes.set(file, this.file);
+    this.withArrays([design], (pointer) => this.checkView(this.wasm.colonnade_view_open(this.view, pointer, this.file, file.length)));
+  }
+
+  checkView(error) {
+    if (error !== 0) throw new Error(VIEW_ERRORS[error] ?? `the view was refused: error ${error}`);
+  }
+
+  /** Sets the camera: position, and columns right, down and forward of its rotation; lens in pixels. */
+  setCamera({ position, right, down, forward, focal, width, height }) {
+    const camera = new DataView(new ArrayBuffer(104));
+    position.forEach((value, axis) => camera.setBigInt64(8 * axis, BigInt(Math.round(value * FRACTION)), true));
+    for (let row = 0; row < 3; ++row)
+      [right, down, forward].forEach((axis, column) =>
+        camera.setInt32(24 + 4 * (3 * row + column), Math.round(axis[row] * 2 ** 30), true),
+      );
+    [focal, focal, width / 2, height / 2].forEach((value, i) => camera.setBigInt64(64 + 8 * i, BigInt(Math.round(value * FRACTION)), true));
+    camera.setUint32(96, width, true);
+    camera.setUint32(100, height, true);
+    this.withArrays([new Uint8Array(camera.buffer)], (pointer) => this.checkView(this.wasm.colonnade_view_set_camera(this.view, pointer)));
+  }
+
+  /** Sets a light of constant intensity. */
+  setLight(index, position, colour) {
+    const light = new DataView(new ArrayBuffer(48));
+    position.forEach((value, axis) => light.setBigInt64(8 * axis, BigInt(Math.round(value * FRACTION)), true));
+    colour.forEach((value, channel) => light.setUint32(24 + 4 * channel, Math.round(value * 2 ** 16), true));
+    this.withArrays([new Uint8Array(light.buffer)], (pointer) => this.checkView(this.wasm.colonnade_view_set_light(this.view, index, pointer)));
+  }
+
+  /** The writes of the view's frame, all of its registers, and those of `values` by name. */
+  frame(values) {
+    const most = this.wasm.colonnade_view_most_writes(this.view);
+    const writes = this.withArrays([new Uint32Array(2 * most), new Uint32Array(4)], (pairs, frame) => {
+      this.checkView(this.wasm.colonnade_view_frame(this.view, pairs, most, frame));
+      const count = new DataView(this.wasm.memory.buffer).getUint32(frame + 4, true);
+      const words = new Uint32Array(this.wasm.memory.buffer, pairs, 2 * count);
+      return Array.from({ length: count }, (_, index) => [words[2 * index], words[2 * index + 1]]);
+    });
+    return [...writes, ...registerWrites(this.manifest, values)];
+  }
+}

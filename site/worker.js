@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// A worker with a model of its own. The first one packs meshes, and gives their records to the others.
+
+import { Library } from "./library.js";
+import { readMesh } from "./meshes.js";
+import { renderRtl } from "./rtl.js";
+
+const BAND = 4;
+
+/** Linear codes of the device to sRGB. */
+function curveOf(bits) {
+  const white = 2 ** bits - 1;
+  return Uint8ClampedArray.from({ length: white + 1 }, (_, code) => {
+    const value = code / white;
+    return Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
+  });
+}
+
+/** Answers messages {id, call, …} with {id, …}; of a frame, with its bands, until another frame begins. */
+export function serve(scope) {
+  let library;
+  let curve;
+  let raw;
+  let frame = 0;
+  const pause = () => new Promise((resolve) => setTimeout(resolve));
+
+  const calls = {
+    async open({ module, manifest, view }) {
+      library ??= await Library.from(module);
+      library.open(manifest);
+      library.openView(view);
+      curve = curveOf(manifest.numbers.colourBits);
+      return {};
+    },
+    read({ name, bytes, files }) {
+      raw = readMesh(name, bytes, files);
+      const { vertices, faces, colours, notes } = raw;
+      return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, notes };
+    },
+    pack({ isGlass }) {
+      const begin = performance.now();
+      const packed = library.pack(raw, isGlass);
+      return { packed, records: library.records(packed), milliseconds: performance.now() - begin };
+    },
+    load({ records }) {
+      library.load(records);
+      return {};
+    },
+    writes({ camera, lights, registers }) {
+      start(camera, lights, registers);
+      return { writes: library.frame(registers) };
+    },
+    async frame({ camera, lights, registers, part, parts }, post) {
+      const own = ++frame;
+      const begin = performance.now();
+      start(camera, lights, registers);
+      for (let first = BAND * part; first < camera.height; first += BAND * parts) {
+        await pause();
+        if (own !== frame) return { isStopped: true };
+        const last = Math.min(first + BAND, camera.height);
+        const { colours, triangles } = library.rows(first, last, camera.width);
+        post({ first, last, pixels: shown(colours), colours, triangles });
+      }
+      return { counters: library.counters(), milliseconds: performance.now() - begin };
+    },
+    stop() {
+      ++frame;
+      return {};
+    },
+    /** A frame by the RTL and by the model; `rtl` is the module of the open design. */
+    async rtl({ rtl, packed, camera, lights, registers }, post) {
+      start(camera, lights, registers);
+      const { width, height } = camera;
+      const model = { ...library.rows(0, height, width), counters: library.counters() };
+      const job = { records: library.records(packed), writes: library.frame(registers), width, height };
+      const frame = await renderRtl(rtl, library.manifest, job, async ({ cycles, colours }) => {
+        post({ cycles, pixels: shown(colours) });
+        await pause();
+      });
+      return { frame, model, framePixels: shown(frame.colours), modelPixels: shown(model.colours) };
+    },
+    trace({ camera, lights, registers, x, y }) {
+      start(camera, lights, registers);
+      return { steps: library.trace(x, y) };
+    },
+  };
+
+  /** Linear colours as a browser draws them. */
+  function shown(colours) {
+    const pixels = new Uint8ClampedArray((4 * colours.length) / 3).fill(255);
+    for (let i = 0; i < pixels.length / 4; ++i) for (let channel = 0; channel < 3; ++channel) pixels[4 * i + channel] = curve[colours[3 * i + channel]];
+    return pixels;
+  }
+
+  function start(camera, lights, registers) {
+    library.setCamera(camera);
+    lights.forEach(({ position, colour }, index) => library.setLight(index, position, colour));
+    library.start(library.frame(registers));
+  }
+
+  scope.onmessage = async ({ data: { id, call, ...parameters } }) => {
+    try {
+      const answer = await calls[call](parameters, (band) => scope.postMessage({ id, band }));
+      scope.postMessage({ id, answer });
+    } catch (error) {
+      scope.postMessage({ id, error: String(error.message ?? error) });
+    }
+  };
+}

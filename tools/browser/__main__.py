@@ -1,0 +1,79 @@
+"""Builds Colonnade in a browser tab: out/browser/index.html, one file that works from a folder (docs/browser.md).
+
+Usage: tools/browser; run it with the Python of .venv, after tools/browser-environment.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+
+import bundle
+import colonnade
+import module
+import numpy as np
+import rtl
+from colonnade.common.atomic_files import replacing
+from colonnade.design.manifest import Manifest
+from colonnade.device.scene import DeviceScene
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.mesh import Mesh
+from colonnade.scene.parser import load_scene
+
+ROOT = Path(__file__).resolve().parents[2]
+OUTPUT = ROOT / "out" / "browser"
+#: The design whose RTL the page has.
+RTL = "tiny"
+DESIGNS = ("textured", "edge", "lean", "small", "diffuse", "tiny")
+#: Its view file is every mesh's, but for the registers that the page sets: its edge is the cube's.
+SCENE, MESH, SIZE = "object.toml", "cube", (640, 480)
+
+
+def view_file(manifest: Manifest) -> bytes:
+    """The view file of a cube for a design."""
+    scene = load_scene(ROOT / "scenes" / SCENE)
+    return DeviceScene.of(scene, manifest, load_mesh(MESH), size=SIZE).view_file(SIZE)
+
+
+def ply(mesh: Mesh) -> bytes:
+    """A mesh as a PLY file with exact positions, without normals."""
+    head = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\nproperty double x\n"
+        f"property double y\nproperty double z\nelement face {len(mesh.faces)}\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    )
+    faces = np.zeros(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, mesh.faces
+    return head.encode() + mesh.vertices.astype("<f8").tobytes() + faces.tobytes()
+
+
+def main() -> None:
+    """Compile, collect, write."""
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    code = OUTPUT / "colonnade.wasm"
+    module.compile_module(code)
+    rtl_code = OUTPUT / f"{RTL}.wasm"
+    rtl.compile_rtl(RTL, rtl_code)
+    texts = {name: json.loads((ROOT / "configs" / "golden" / f"{name}.json").read_text("utf-8")) for name in DESIGNS}
+    views = {name: view_file(Manifest.from_dict(text)) for name, text in texts.items()}
+    data = {
+        "version": colonnade.__version__,
+        "manifests": texts,
+        "views": {name: bundle.base64_text(view) for name, view in views.items()},
+    }
+    contents = {
+        "module": code.read_bytes(),
+        "data": json.dumps(data, separators=(",", ":")).encode(),
+        "rtl": rtl_code.read_bytes(),
+        "teapot": ply(load_mesh("teapot")),
+    }
+    html = bundle.page(contents).encode()
+    with replacing(OUTPUT / "index.html") as stream:
+        stream.write(html)
+    size = len(gzip.compress(html, 9))
+    print(f"colonnade: out/browser/index.html, {len(html):,} bytes, {size:,} compressed")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""Compiles the packer, the model and colonnade_view to WebAssembly."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+ENVIRONMENT = ROOT / ".cache" / "browser-environment"
+OBJECTS = ROOT / ".cache" / "browser-objects"
+LIBRARY = ROOT / "host" / "cpp" / "library"
+VIEW = ROOT / "software"
+
+TARGET = ("-target", "wasm32-wasi", "-O2", "-DNDEBUG", "-ffp-contract=off")
+#: A throw ends the module: it has no exceptions.
+CPP = (
+    "-std=gnu++17",
+    "-fno-exceptions",
+    "-fno-rtti",
+    "-Dthrow=__builtin_trap(),",
+    "-Wno-keyword-macro",
+    "-Wno-unused-value",
+)
+SOURCES = (
+    ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{VIEW / 'include'}")),
+    *(
+        ("cc", VIEW / "src" / f"{name}.c", ("-std=c11", f"-I{VIEW / 'include'}"))
+        for name in ("colonnade_files", "colonnade_view", "colonnade_view_room")
+    ),
+    ("cc", LIBRARY / "colonnade_view_size.c", ("-std=c11", f"-I{VIEW / 'include'}")),
+)
+HEADERS = (LIBRARY / "colonnade_model.h", VIEW / "include" / "colonnade_view.h")
+
+
+def compile_module(output: Path) -> None:
+    """Write the module; it exports the functions of `HEADERS`, and malloc and free.
+
+    Raises:
+        subprocess.CalledProcessError: The compiler found an error; it has printed it.
+    """
+    OBJECTS.mkdir(parents=True, exist_ok=True)
+    with ThreadPoolExecutor() as pool:
+        objects = list(pool.map(lambda source: _compile(*source), SOURCES))
+    names = {name for header in HEADERS for name in re.findall(r"\b(colonnade_\w+)\(", header.read_text("utf-8"))}
+    exports = [f"-Wl,--export={name}" for name in sorted(names | {"colonnade_view_size", "malloc", "free"})]
+    zig("c++", *TARGET, "-mexec-model=reactor", "-s", *map(str, objects), *exports, "-o", str(output))
+
+
+def _compile(language: str, source: Path, options: tuple[str, ...]) -> Path:
+    target = OBJECTS / f"{source.stem}.o"
+    zig(language, *TARGET, *options, "-c", str(source), "-o", str(target))
+    return target
+
+
+def zig(*arguments: str) -> None:
+    """Run the compiler."""
+    cache = str(ROOT / ".cache" / "zig")
+    environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
+    subprocess.run([ENVIRONMENT / "bin" / "python", "-m", "ziglang", *arguments], check=True, env=environment)
