@@ -28,3 +28,23 @@ export function project({ position, right, down, forward, focal, width, height }
   const depth = along(forward);
   return { x: width / 2 + (focal * along(right)) / depth, y: height / 2 + (focal * along(down)) / depth, depth };
 }
+
+/** The camera of a room's maps: `lens` has its focal length in heights of the frame. */
+export function roomCamera({ camera: { lens, ...axes } }, width, height) {
+  return { ...axes, focal: lens[0] * height, width, height, isOfMaps: true };
+}
+
+/** The pose of an object that stands in a room: turned by degrees, its lowest point at `low`, from 0 to 1 of the cube. */
+export function poseOf({ object: { position, scale } }, degrees, low) {
+  const [c, s] = [Math.cos, Math.sin].map((f) => f((degrees * Math.PI) / 180));
+  const rotation = [[c, 0, s], [0, 1, 0], [-s, 0, c]];
+  return { position: [position[0], position[1] - 2 * scale * low, position[2]], rotation, scale };
+}
+
+/** The world's position of one in the object's cube, from -1 to 1. */
+export function toWorld({ position, rotation, scale }, local) {
+  return position.map((value, row) => value + scale * rotation[row].reduce((sum, factor, column) => sum + factor * local[column], 0));
+}
+
+/** Without a room the cube is the world. */
+export const CUBE = { position: [0, 0, 0], rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], scale: 1 };

@@ -105,6 +105,14 @@ export class Library {
     this.withArrays([records], (pointer) => this.check(this.wasm.colonnade_model_load(pointer, count)));
   }
 
+  /** Gives the model the maps of a room: {memory, words, bytes}, words as a Uint8Array, of so many bytes each. */
+  loadMaps(maps) {
+    for (const { memory, words, bytes } of maps)
+      this.withArrays([new TextEncoder().encode(memory + "\0"), words], (name, pointer) =>
+        this.check(this.wasm.colonnade_model_load_map(name, pointer, words.length / bytes, bytes)),
+      );
+  }
+
   /** Starts a frame: `writes` are pairs of word address and value. */
   start(writes) {
     this.withArrays([new Uint32Array(writes.flat())], (pointer) => this.check(this.wasm.colonnade_model_start(pointer, writes.length)));
@@ -173,6 +181,14 @@ export class Library {
     camera.setUint32(96, width, true);
     camera.setUint32(100, height, true);
     this.withArrays([new Uint8Array(camera.buffer)], (pointer) => this.checkView(this.wasm.colonnade_view_set_camera(this.view, pointer)));
+  }
+
+  /** Sets the object's pose: position, and rotation by rows. */
+  setObject({ position, rotation }) {
+    const pose = new DataView(new ArrayBuffer(64));
+    position.forEach((value, axis) => pose.setBigInt64(8 * axis, BigInt(Math.round(value * FRACTION)), true));
+    rotation.flat().forEach((value, index) => pose.setInt32(24 + 4 * index, Math.round(value * 2 ** 30), true));
+    this.withArrays([new Uint8Array(pose.buffer)], (pointer) => this.checkView(this.wasm.colonnade_view_set_object(this.view, pointer)));
   }
 
   /** Sets a light of constant intensity. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: controls, orbit, dropped files, the ray of a pixel.
 
-import { START, cameraOf, lightOf } from "./camera.js";
+import { CUBE, START, cameraOf, lightOf, poseOf, roomCamera } from "./camera.js";
 import { hasRegister } from "./design.js";
 import { draw, lineOf, raysOf } from "./path.js";
 import { Renderer } from "./renderer.js";
@@ -49,15 +49,18 @@ function colourOf(hex) {
   });
 }
 
+/** The room of the state, if the hardware has its maps. */
+const roomOf = () => (data.rooms[state.room]?.views[state.design] ? data.rooms[state.room] : null);
+
 /** The registers that the mesh and the controls set. */
-function registersOf(manifest, packed) {
+function registersOf(manifest, packed, room) {
   const { numbers, config } = manifest;
   const white = 2 ** numbers.colourBits - 1;
   const one = 2 ** numbers.lightFraction;
   const rgb = (name, colour) => Object.fromEntries([..."rgb"].map((channel, i) => [`${name}.${channel}`, Math.round(colour[i] * white)]));
   const registers = {
-    ...rgb("background", colourOf(state.background)),
-    ...rgb("materials[0].albedo", colourOf(state.colour)),
+    ...(room ? {} : rgb("background", colourOf(state.background))),
+    ...rgb("materials[0].albedo", colourOf(state.colour).map((value) => value / (materialOf(manifest) === "diffuse" ? (room?.headroom ?? 1) : 1))),
     "bounds.low.x": packed.lowX, "bounds.low.y": packed.lowY, "bounds.low.z": packed.lowZ,
     "bounds.high.x": packed.highX, "bounds.high.y": packed.highY, "bounds.high.z": packed.highZ,
     "scene.recordCount": packed.recordCount,
@@ -81,13 +84,35 @@ function registersOf(manifest, packed) {
 
 const materialOf = (manifest) => (manifest.config.frame.maxBounces > 0 ? state.material : "diffuse");
 
+/** The object's pose in the room, turned by the orbit. */
+const poseIn = (room, orbit) => (room ? poseOf(room, orbit.azimuth - START.azimuth, packed.lowY / (2 ** manifest.config.geometry.vertexBits - 1)) : CUBE);
+
+/** A frame of the state, or of another orbit. In a room the camera is that of the maps, and an orbit turns the object. */
 function viewOf(width, height, orbit = state) {
-  const light = { position: lightOf(cameraOf(START, width, height), LIGHT), colour: [0.9, 0.9, 0.9].map((value) => value * state.light) };
-  return { camera: cameraOf(orbit, width, height), lights: [light], registers: registersOf(manifest, packed) };
+  const room = roomOf();
+  if (!room) return plainView(width, height, manifest, packed, orbit);
+  const file = String(room.height / height);
+  return { file, camera: roomCamera(room, width, height), object: poseIn(room, orbit), lights: [], registers: registersOf(manifest, packed, room) };
 }
 
-/** The size of a frame, pixels, at so many of the screen's pixels for each. */
+function plainView(width, height, manifest, packed, orbit) {
+  const light = { position: lightOf(cameraOf(START, width, height), LIGHT), colour: [0.9, 0.9, 0.9].map((value) => value * state.light) };
+  return { file: "plain", camera: cameraOf(orbit, width, height), lights: [light], registers: registersOf(manifest, packed, null) };
+}
+
+/** The picture's box on the stage, in its pixels: in a room it has the room's proportions. */
+function boxOf() {
+  const [width, height] = [stage.clientWidth, stage.clientHeight];
+  const room = roomOf();
+  const scale = room ? Math.min(width / room.width, height / room.height) : 1;
+  const size = room ? [room.width * scale, room.height * scale] : [width, height];
+  return { left: (width - size[0]) / 2, top: (height - size[1]) / 2, width: size[0], height: size[1] };
+}
+
+/** The size of a frame, pixels, at so many of the screen's, or of the room's maps, for each. */
 function sizeOf(pixel) {
+  const room = roomOf();
+  if (room) return [room.width / pixel, room.height / pixel];
   const { maxWidth, maxHeight } = manifest.config.frame;
   const scale = Math.min(1, maxWidth / stage.clientWidth, maxHeight / stage.clientHeight) / pixel;
   return [stage.clientWidth, stage.clientHeight].map((length) => Math.max(8, Math.floor(length * scale)));
@@ -102,7 +127,7 @@ async function update() {
   try {
     while (isChanged) {
       isChanged = false;
-      await render(COARSE * state.pixel, true);
+      await render(roomOf() ? COARSE : COARSE * state.pixel, true);
       if (!isChanged) await render(state.pixel, false);
     }
     fail("");
@@ -114,6 +139,8 @@ async function update() {
 }
 
 async function render(pixel, isCoarse) {
+  const box = boxOf();
+  for (const canvas of [picture.canvas, overlay.canvas]) for (const [name, value] of Object.entries(box)) canvas.style[name] = `${value}px`;
   const [width, height] = sizeOf(pixel);
   const view = viewOf(width, height);
   const target = new OffscreenCanvas(width, height).getContext("2d");
@@ -182,6 +209,7 @@ function showNotes() {
   if (packed.dropped) notes.push(`${packed.dropped.toLocaleString("en")} faces without area, or there twice, are left out`);
   if (packed.flipped) notes.push(`normals of ${packed.flipped.toLocaleString("en")} faces pointed to their back and are negated`);
   if (page.mesh.hasColours && !hasRegister(manifest, "materials[0].hasCornerColours")) notes.push("this hardware has no corner colours: the mesh has one colour");
+  if (state.room && !roomOf()) notes.push("this hardware has no maps of a room");
   if (materialOf(manifest) !== state.material) notes.push("this hardware has neither mirrors nor glass");
   element("notes").replaceChildren(
     ...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })),
@@ -192,7 +220,11 @@ function showNotes() {
 
 async function openDesign() {
   manifest = data.manifests[state.design] ?? data.manifests[(state.design = "textured")];
-  await renderer.open(page.module, manifest, bytesOf(data.views[state.design]));
+  const room = roomOf();
+  const files = room ? room.views[state.design] : { plain: data.views[state.design] };
+  const views = Object.fromEntries(Object.entries(files).map(([name, text]) => [name, bytesOf(text)]));
+  const maps = (room?.maps ?? []).map(({ words, ...map }) => ({ ...map, words: bytesOf(words) }));
+  await renderer.open({ module: page.module, manifest, views, maps });
 }
 
 async function pack() {
@@ -236,9 +268,10 @@ const openTeapot = () => readFile("teapot.ply", page.teapot, new Map());
 // Controls, and the link
 
 function fill() {
-  for (const name of ["design", "material", "light", "bounces", "pixel"]) form.elements[name].value = state[name];
+  for (const name of ["design", "room", "material", "light", "bounces", "pixel"]) form.elements[name].value = state[name];
   for (const name of ["colour", "background"]) form.elements[name].value = `#${state[name]}`;
   form.elements.shadows.checked = Boolean(state.shadows);
+  for (const name of ["background", "light"]) form.elements[name].disabled = roomOf() !== null;
   element("mesh").textContent = state.mesh;
 }
 
@@ -255,7 +288,7 @@ function show() {
 form.addEventListener("input", ({ target }) => {
   const value = target.type === "checkbox" ? Number(target.checked) : target.type === "color" ? target.value.slice(1) : target.value;
   state[target.name] = ["light", "bounces", "pixel"].includes(target.name) ? Number(value) : value;
-  if (target.name === "design") then(async () => (await openDesign(), forget(), pack()));
+  if (target.name === "design" || target.name === "room") then(async () => (await openDesign(), forget(), pack()));
   else if (target.name === "material") then(pack);
   else show();
   if (traced && target.name !== "pixel") follow();
@@ -270,12 +303,13 @@ element("link").onclick = async ({ target }) => {
   setTimeout(() => (target.textContent = "Copy"), 1500);
 };
 window.addEventListener("hashchange", () => {
-  const { design, material } = state;
+  const { design, material, room } = state;
   const mesh = state.mesh;
   state = { ...readState(location.hash), mesh };
   then(async () => {
-    if (design !== state.design) await openDesign();
-    if (design !== state.design || material !== state.material) await pack();
+    const isOther = design !== state.design || room !== state.room;
+    if (isOther) await openDesign();
+    if (isOther || material !== state.material) await pack();
     if (state.follow) await follow();
   });
 });
@@ -317,10 +351,11 @@ stage.addEventListener("pointermove", (event) => {
 stage.addEventListener("pointerup", (event) => {
   pointers.delete(event.pointerId);
   if (moved >= 4) return;
-  const box = stage.getBoundingClientRect();
+  const box = picture.canvas.getBoundingClientRect();
   const [width, height] = sizeOf(state.pixel);
   const x = Math.floor(((event.clientX - box.left) / box.width) * width);
   const y = Math.floor(((event.clientY - box.top) / box.height) * height);
+  if (x < 0 || y < 0 || x >= width || y >= height) return;
   const { azimuth, elevation, distance, x: panX, y: panY } = state;
   state.follow = [x, y, width, height, azimuth, elevation, distance, panX, panY].map((value) => Math.round(value * 1000) / 1000).join();
   keepLink();
@@ -398,11 +433,13 @@ function listRays() {
 
 function drawPath() {
   const canvas = overlay.canvas;
-  canvas.width = Math.round(stage.clientWidth * devicePixelRatio);
-  canvas.height = Math.round(stage.clientHeight * devicePixelRatio);
+  const box = boxOf();
+  canvas.width = Math.round(box.width * devicePixelRatio);
+  canvas.height = Math.round(box.height * devicePixelRatio);
   if (!rays) return;
-  const camera = cameraOf(state, stage.clientWidth, stage.clientHeight);
-  draw(overlay, camera, rays, 2 ** manifest.config.geometry.vertexBits - 1, chosen);
+  const room = roomOf();
+  const camera = room ? roomCamera(room, box.width, box.height) : cameraOf(state, box.width, box.height);
+  draw(overlay, camera, poseIn(room, state), rays, 2 ** manifest.config.geometry.vertexBits - 1, chosen);
 }
 
 function forget() {
@@ -425,10 +462,10 @@ async function renderRtl() {
     const begin = performance.now();
     const rtl = await unpack(JSON.parse(element("data").textContent).rtl);
     const manifest = data.manifests[design];
-    const opened = { module: page.module, manifest, view: bytesOf(data.views[design]), file: page.file };
-    const answer = await renderer.aside(opened, (worker, { packed }) => {
-      const view = { ...viewOf(width, height), registers: registersOf(manifest, packed) };
-      return renderer.ask(worker, "rtl", { rtl, packed, ...view }, ({ cycles, pixels }) => {
+    const opened = { module: page.module, manifest, views: { plain: bytesOf(data.views[design]) }, maps: [] };
+    const answer = await renderer.aside(opened, page.file, (worker, { packed }) => {
+      const view = plainView(width, height, manifest, packed, state);
+      return renderer.ask(worker, "rtl", { rtl, packed, view }, ({ cycles, pixels }) => {
         own.putImageData(new ImageData(pixels, width, height), 0, 0);
         status.textContent = `${cycles.toLocaleString("en")} cycles, ${Math.round(cycles / (performance.now() - begin))} thousand a second`;
       });
@@ -471,6 +508,7 @@ async function start() {
   data = JSON.parse(new TextDecoder().decode(json));
   page.module = code;
   page.teapot = teapot;
+  for (const name of Object.keys(data.rooms)) form.elements.room.add(new Option(name));
   for (const name of Object.keys(data.manifests)) form.elements.design.add(new Option(name));
   element("about").textContent = `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
   renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The rays of a pixel, step by step: as a table, and drawn over the picture.
 
-import { project } from "./camera.js";
+import { project, toWorld } from "./camera.js";
 
 const [RAY, NODE, CHILD, RECORD, TRIANGLE, HIT] = [0, 1, 2, 3, 4, 5];
 const KINDS = ["primary", "shadow", "reflection", "refraction", "gathered"];
@@ -49,12 +49,12 @@ export function lineOf(step) {
   return `triangle ${step.value}: ${step.isHit ? "hit, the closest so far" : "no closer hit"}`;
 }
 
-/** Draws rays: boxes entered, triangles tested and hit, and secondary rays. `units`: vertex units of the cube's edge. */
-export function draw(context, camera, rays, units, chosen = null) {
+/** Draws rays: boxes entered, triangles tested and hit, and the ways. `units`: vertex units of the cube's edge. */
+export function draw(context, camera, pose, rays, units, chosen = null) {
   const scale = context.canvas.width / camera.width;
   const onto = (place) => {
-    const { x, y, depth } = project(camera, place.map((value) => (2 * value) / units - 1));
-    return depth > 0.05 ? [x * scale, y * scale] : null;
+    const { x, y, depth } = project(camera, toWorld(pose, place.map((value) => (2 * value) / units - 1)));
+    return depth > 0.05 * pose.scale ? [x * scale, y * scale] : null;
   };
   const stroke = (corners, colour, width, isClosed = false) => {
     const points = corners.map(onto);

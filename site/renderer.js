@@ -33,8 +33,8 @@ export class Renderer {
     return Promise.all(this.workers.map((worker) => this.ask(worker, call, parameters)));
   }
 
-  open(module, manifest, view) {
-    return this.askAll("open", { module, manifest, view });
+  open(design) {
+    return this.askAll("open", design);
   }
 
   read(name, bytes, files) {
@@ -52,7 +52,7 @@ export class Renderer {
   /** Renders a frame; null if another one has begun. Counters are sums, the stack's the largest. */
   async frame(view, onBand) {
     const parts = this.workers.length;
-    const answers = await Promise.all(this.workers.map((worker, part) => this.ask(worker, "frame", { ...view, part, parts }, onBand)));
+    const answers = await Promise.all(this.workers.map((worker, part) => this.ask(worker, "frame", { view, part, parts }, onBand)));
     if (answers.some(({ isStopped }) => isStopped)) return null;
     const counters = {};
     for (const { counters: own } of answers)
@@ -65,11 +65,11 @@ export class Renderer {
   }
 
   /** Opens a design in a worker of its own, packs a file there, and calls `use` with the worker. */
-  async aside({ module, manifest, view, file }, use) {
+  async aside(design, file, use) {
     const worker = new Worker(this.url);
     worker.onmessage = ({ data }) => this.receive(data);
     try {
-      await this.ask(worker, "open", { module, manifest, view });
+      await this.ask(worker, "open", design);
       await this.ask(worker, "read", file);
       return await use(worker, await this.ask(worker, "pack", { isGlass: false }));
     } finally {
@@ -78,10 +78,10 @@ export class Renderer {
   }
 
   trace(view, x, y) {
-    return this.ask(this.workers[0], "trace", { ...view, x, y });
+    return this.ask(this.workers[0], "trace", { view, x, y });
   }
 
   writes(view) {
-    return this.ask(this.workers[0], "writes", view);
+    return this.ask(this.workers[0], "writes", { view });
   }
 }

@@ -6,6 +6,7 @@ import { START } from "./camera.js";
 export const DEFAULTS = {
   mesh: "teapot.ply",
   design: "textured",
+  room: "",
   material: "diffuse",
   colour: "d8c8b0",
   background: "182028",

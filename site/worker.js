@@ -21,14 +21,19 @@ export function serve(scope) {
   let library;
   let curve;
   let raw;
+  let files;
+  let opened;
   let frame = 0;
   const pause = () => new Promise((resolve) => setTimeout(resolve));
 
   const calls = {
-    async open({ module, manifest, view }) {
+    /** `views`: view files by name; `maps`: those of a room. */
+    async open({ module, manifest, views, maps }) {
       library ??= await Library.from(module);
       library.open(manifest);
-      library.openView(view);
+      library.loadMaps(maps);
+      files = views;
+      opened = null;
       curve = curveOf(manifest.numbers.colourBits);
       return {};
     },
@@ -46,14 +51,15 @@ export function serve(scope) {
       library.load(records);
       return {};
     },
-    writes({ camera, lights, registers }) {
-      start(camera, lights, registers);
-      return { writes: library.frame(registers) };
+    writes({ view }) {
+      start(view);
+      return { writes: library.frame(view.registers) };
     },
-    async frame({ camera, lights, registers, part, parts }, post) {
+    async frame({ view, part, parts }, post) {
       const own = ++frame;
       const begin = performance.now();
-      start(camera, lights, registers);
+      const { camera } = view;
+      start(view);
       for (let first = BAND * part; first < camera.height; first += BAND * parts) {
         await pause();
         if (own !== frame) return { isStopped: true };
@@ -68,19 +74,19 @@ export function serve(scope) {
       return {};
     },
     /** A frame by the RTL and by the model; `rtl` is the module of the open design. */
-    async rtl({ rtl, packed, camera, lights, registers }, post) {
-      start(camera, lights, registers);
-      const { width, height } = camera;
+    async rtl({ rtl, packed, view }, post) {
+      start(view);
+      const { width, height } = view.camera;
       const model = { ...library.rows(0, height, width), counters: library.counters() };
-      const job = { records: library.records(packed), writes: library.frame(registers), width, height };
+      const job = { records: library.records(packed), writes: library.frame(view.registers), width, height };
       const frame = await renderRtl(rtl, library.manifest, job, async ({ cycles, colours }) => {
         post({ cycles, pixels: shown(colours) });
         await pause();
       });
       return { frame, model, framePixels: shown(frame.colours), modelPixels: shown(model.colours) };
     },
-    trace({ camera, lights, registers, x, y }) {
-      start(camera, lights, registers);
+    trace({ view, x, y }) {
+      start(view);
       return { steps: library.trace(x, y) };
     },
   };
@@ -92,8 +98,12 @@ export function serve(scope) {
     return pixels;
   }
 
-  function start(camera, lights, registers) {
-    library.setCamera(camera);
+  /** A view: the name of its file, and what replaces the file's poses and registers. */
+  function start({ file, camera, object, lights, registers }) {
+    if (opened !== file) library.openView(files[file]);
+    opened = file;
+    if (!camera.isOfMaps) library.setCamera(camera);
+    if (object) library.setObject(object);
     lights.forEach(({ position, colour }, index) => library.setLight(index, position, colour));
     library.start(library.frame(registers));
   }

@@ -13,6 +13,7 @@ import bundle
 import colonnade
 import module
 import numpy as np
+import rooms
 import rtl
 from colonnade.common.atomic_files import replacing
 from colonnade.design.manifest import Manifest
@@ -56,10 +57,12 @@ def main() -> None:
     rtl_code = OUTPUT / f"{RTL}.wasm"
     rtl.compile_rtl(RTL, rtl_code)
     texts = {name: json.loads((ROOT / "configs" / "golden" / f"{name}.json").read_text("utf-8")) for name in DESIGNS}
-    views = {name: view_file(Manifest.from_dict(text)) for name, text in texts.items()}
+    manifests = {name: Manifest.from_dict(text) for name, text in texts.items()}
+    views = {name: view_file(manifest) for name, manifest in manifests.items()}
     data = {
         "version": colonnade.__version__,
         "manifests": texts,
+        "rooms": {name: rooms.room_data(name, manifests) for name in rooms.PLACEMENTS},
         "views": {name: bundle.base64_text(view) for name, view in views.items()},
     }
     contents = {

@@ -38,6 +38,9 @@ struct Library {
     std::vector<Register> registers;
     std::vector<std::uint32_t> words;
     Registers limits;
+    std::map<std::string, std::int64_t> mapSizes;
+    std::map<std::string, Layout> mapLayouts;
+    std::unique_ptr<AttributeImage> maps;
     std::unique_ptr<Device> device;
     std::unique_ptr<Packed> packed;
     std::vector<std::uint8_t> records;
@@ -59,14 +62,14 @@ const char* refuse(const std::string& error) {
 const char* readDesign(std::istringstream& design) {
     std::string kind, record, name;
     while (design >> kind) {
-        if (kind == "number") {
+        if (kind == "number" || kind == "size") {
             std::int64_t value;
             design >> name >> value;
-            library->numbers[name] = value;
-        } else if (kind == "layout") {
+            (kind == "number" ? library->numbers : library->mapSizes)[name] = value;
+        } else if (kind == "layout" || kind == "map") {
             Field field;
             design >> record >> name >> field.offset >> field.width >> field.isSigned;
-            library->format.layouts[record][name] = field;
+            (kind == "layout" ? library->format.layouts : library->mapLayouts)[record][name] = field;
         } else if (kind == "register") {
             Register each;
             std::int64_t limit;
@@ -174,6 +177,14 @@ const char* colonnade_model_pack(const double* vertices, std::uint32_t vertexCou
 
 const char* colonnade_model_load(const std::uint8_t* records, std::uint32_t count) {
     library->device->load(records, count, library->format.recordBytes());
+    return nullptr;
+}
+
+const char* colonnade_model_load_map(const char* memory, const std::uint8_t* words, std::uint32_t count, std::uint32_t bytes) {
+    if (library->mapSizes.empty()) return "this design has no memory for a room";
+    if (!library->maps) library->maps = std::make_unique<AttributeImage>(AttributeSizes(library->mapSizes), library->mapLayouts);
+    library->maps->load(memory, words, count, bytes);
+    library->device->load(*library->maps);
     return nullptr;
 }
 

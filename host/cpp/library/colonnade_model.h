@@ -36,7 +36,10 @@ struct colonnade_step {
 /* Opens a design, by lines of words from its manifest:
  *   number NAME VALUE                             numbers; arity, trianglesPerRecord, stackDepth, bvh, recordBits, depth
  *   layout RECORD FIELD OFFSET WIDTH SIGNED       of records
- *   register NAME ADDRESS WORDS WIDTH SIGNED LIMIT   those that are written; limit -1 for none */
+ *   register NAME ADDRESS WORDS WIDTH SIGNED LIMIT   those that are written; limit -1 for none
+ * and for a design with the maps of a room:
+ *   size NAME VALUE                               of the maps
+ *   map RECORD FIELD OFFSET WIDTH SIGNED          of their words */
 const char *colonnade_model_open(const char *design);
 
 /* Cleans and packs a mesh, and loads it into the model. `normals`: three for each face, of any length, 0 for none; or NULL.
@@ -47,6 +50,9 @@ const char *colonnade_model_pack(const double *vertices, uint32_t vertex_count, 
 
 /* Loads records in place of a packed mesh. */
 const char *colonnade_model_load(const uint8_t *records, uint32_t count);
+
+/* Loads one of the memories of a room's maps, by its name in the manifest: `count` words of `bytes` bytes. */
+const char *colonnade_model_load_map(const char *memory, const uint8_t *words, uint32_t count, uint32_t bytes);
 
 /* Writes registers, pairs of word address and value, low byte first, and starts a frame. */
 const char *colonnade_model_start(const uint8_t *writes, uint32_t count);

@@ -13,13 +13,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
-
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
+from colonnade.environment.load import load_environment
+from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
+from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[3]
 FILE = ROOT / "out" / "browser" / "index.html"
@@ -101,7 +103,7 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
     context.close()
 
 
-def host_frame(picture: dict[str, Any], mesh: Mesh, design: str) -> Any:
+def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, room: str | None = None) -> Any:
     """The host's frame of the registers that the page wrote."""
     manifest = Manifest.load(ROOT / "configs" / "golden" / f"{design}.json")
     words = {address: value for address, value in picture["writes"]}
@@ -110,7 +112,11 @@ def host_frame(picture: dict[str, Any], mesh: Mesh, design: str) -> Any:
         for register in manifest.registers.values()
         if register.access == "rw"
     }
-    return render_model(manifest, pack(mesh, manifest), registers)
+    image = pack(mesh, manifest)
+    if room is not None:
+        environment = load_environment(ROOT / "scenes" / "rooms" / room)
+        image = with_environment(image, EncodedEnvironment.of(environment, manifest, "live"), manifest)
+    return render_model(manifest, image, registers)
 
 
 def test_the_page_is_small_and_fast_and_equals_the_host(context: BrowserContext) -> None:
@@ -123,6 +129,26 @@ def test_the_page_is_small_and_fast_and_equals_the_host(context: BrowserContext)
     assert frame.is_object.sum() > 100
     np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
     np.testing.assert_array_equal(np.reshape(picture["triangles"], frame.triangle.shape), frame.triangle)
+    assert tab.is_quiet()
+
+
+def test_a_room_equals_the_host_and_a_drag_turns_the_object(context: BrowserContext) -> None:
+    tab = Tab(context, "#pixel=4&room=living&design=edge&material=mirror")
+    pictures = []
+    for _ in range(2):
+        picture = tab.picture()
+        assert (picture["width"], picture["height"]) == (160, 120)
+        frame = host_frame(picture, load_mesh("teapot"), "edge", "living")
+        assert frame.is_object.sum() > 100
+        np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
+        pictures.append(picture["triangles"])
+        before = tab.frames()
+        tab.page.focus("#stage")
+        tab.page.keyboard.press("ArrowLeft")
+        tab.wait(before)
+    assert pictures[0] != pictures[1]
+    tab.page.select_option("select[name=design]", "tiny")
+    expect(tab.page.locator("#notes")).to_contain_text("this hardware has no maps of a room")
     assert tab.is_quiet()
 
 
