@@ -209,7 +209,8 @@ function showNotes() {
   if (packed.dropped) notes.push(`${packed.dropped.toLocaleString("en")} faces without area, or there twice, are left out`);
   if (packed.flipped) notes.push(`normals of ${packed.flipped.toLocaleString("en")} faces pointed to their back and are negated`);
   if (page.mesh.hasColours && !hasRegister(manifest, "materials[0].hasCornerColours")) notes.push("this hardware has no corner colours: the mesh has one colour");
-  if (state.room && !roomOf()) notes.push("this hardware has no maps of a room");
+  if (state.room && !roomOf())
+    notes.push(manifest.attributes ? "the page has rooms for presets only" : "this hardware has no maps of a room");
   if (materialOf(manifest) !== state.material) notes.push("this hardware has neither mirrors nor glass");
   element("notes").replaceChildren(
     ...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })),
@@ -225,6 +226,12 @@ async function openDesign() {
   const views = Object.fromEntries(Object.entries(files).map(([name, text]) => [name, bytesOf(text)]));
   const maps = (room?.maps ?? []).map(({ words, ...map }) => ({ ...map, words: bytesOf(words) }));
   await renderer.open({ module: page.module, manifest, views, maps });
+}
+
+async function changeDesign() {
+  await openDesign();
+  forget();
+  await pack();
 }
 
 async function pack() {
@@ -248,13 +255,23 @@ function then(work) {
   return queue;
 }
 
+/** Reads and packs a file; if it cannot be, the mesh stays what it was. */
 async function readFile(name, bytes, files) {
-  const mesh = await renderer.read(name, bytes, files);
-  page.mesh = mesh;
+  const [mesh, file] = [page.mesh, page.file];
+  try {
+    page.mesh = await renderer.read(name, bytes, files);
+    await pack();
+  } catch (error) {
+    page.mesh = mesh;
+    if (file) {
+      await renderer.read(file.name, file.bytes, file.files);
+      await pack();
+    }
+    throw error;
+  }
   page.file = { name, bytes, files };
-  forget();
   state.mesh = name;
-  await pack();
+  forget();
 }
 
 async function openFiles(list) {
@@ -271,6 +288,7 @@ function fill() {
   for (const name of ["design", "room", "material", "light", "bounces", "pixel"]) form.elements[name].value = state[name];
   for (const name of ["colour", "background"]) form.elements[name].value = `#${state[name]}`;
   form.elements.shadows.checked = Boolean(state.shadows);
+  showCosts();
   for (const name of ["background", "light"]) form.elements[name].disabled = roomOf() !== null;
   element("mesh").textContent = state.mesh;
 }
@@ -286,9 +304,13 @@ function show() {
 }
 
 form.addEventListener("input", ({ target }) => {
+  if (target.name === "precision") {
+    state.design = data.studies[0].points[target.value].design;
+    return void then(changeDesign);
+  }
   const value = target.type === "checkbox" ? Number(target.checked) : target.type === "color" ? target.value.slice(1) : target.value;
   state[target.name] = ["light", "bounces", "pixel"].includes(target.name) ? Number(value) : value;
-  if (target.name === "design" || target.name === "room") then(async () => (await openDesign(), forget(), pack()));
+  if (target.name === "design" || target.name === "room") then(changeDesign);
   else if (target.name === "material") then(pack);
   else show();
   if (traced && target.name !== "pixel") follow();
@@ -320,6 +342,36 @@ stage.addEventListener("drop", (event) => {
   stage.classList.remove("dropping");
   openFiles(event.dataTransfer.files);
 });
+
+// Studies
+
+function listDesigns() {
+  const group = (label, names) => {
+    const options = Object.assign(document.createElement("optgroup"), { label });
+    options.append(...names.map((name) => new Option(name)));
+    form.elements.design.append(options);
+  };
+  group("Presets", data.presets);
+  for (const { title, points } of data.studies) group(title, points.map(({ design }) => design).filter((name) => !data.presets.includes(name)));
+  form.elements.precision.max = data.studies[0].points.length - 1;
+}
+
+/** Error, energy, area and rate of the hardware, from the studies that have it. */
+function showCosts() {
+  const index = data.studies[0].points.findIndex(({ design }) => design === state.design);
+  if (index >= 0) form.elements.precision.value = index;
+  element("precision").textContent = index >= 0 ? state.design : "";
+  const lines = [];
+  for (const { title, command, columns, points } of data.studies) {
+    const point = points.find(({ design }) => design === state.design);
+    if (!point) continue;
+    const known = columns.filter(({ key }) => point.figures[key] !== null);
+    lines.push(...known.map(({ key, label, unit, format }) => row([label, `${point.figures[key].toFixed(Number(/[.](\d)/.exec(format)[1]))} ${unit}`])));
+    element("study").textContent = `${title}: ${command}`;
+  }
+  element("costs").hidden = lines.length === 0;
+  element("costs").tBodies[0].replaceChildren(...lines);
+}
 
 // Orbit
 
@@ -398,6 +450,8 @@ async function follow() {
   page.rays = rays;
   chosen = null;
   element("path").hidden = false;
+  element("times").hidden = true;
+  element("time").hidden = roomOf() !== null;
   element("pixel").textContent = `${x}, ${y}`;
   for (const head of document.querySelectorAll(".lines")) head.hidden = !manifest.memories.columnBvh.line;
   listRays();
@@ -452,25 +506,64 @@ element("forget").onclick = () => (forget(), keepLink());
 
 // The RTL
 
+/** Where the cycles of a pixel alone go: counters of `tiny` that count each context's cycles in a state. */
+const STATES = {
+  contextsRaySetup: "ray set-up", waitRecord: "waits for a record", waitUnit: "waits for a unit", contextsBox: "box tests",
+  contextsTriangles: "triangle tests", contextsShading: "shading",
+};
+
+async function timePixel() {
+  const button = element("time");
+  button.disabled = true;
+  try {
+    const [x, y, width, height, azimuth, elevation, distance, panX, panY] = state.follow.split(",").map(Number);
+    const viewFor = (manifest, packed) => {
+      const view = plainView(width, height, manifest, packed, { azimuth, elevation, distance, x: panX, y: panY });
+      return { ...view, camera: { ...view.camera, width: 1, height: 1, centre: [width / 2 - x, height / 2 - y] } };
+    };
+    const { frame, model } = await byRtl(viewFor, () => {});
+    const { counters } = frame;
+    page.pixelCounters = counters;
+    const isEqual = (await hashOf(frame)) === (await hashOf(model));
+    const rows = [
+      ["cycles of the frame", counters.cycles],
+      ...Object.entries(STATES).filter(([name]) => name in counters).map(([name, label]) => [label, counters[name]]),
+    ];
+    element("times").tBodies[0].replaceChildren(...rows.map(([label, value]) => row([label, value.toLocaleString("en")])));
+    element("times").caption.textContent = `A frame of this pixel by the RTL of ${RTL.design}; its colour ${isEqual ? "is" : "is not"} the model's`;
+    element("times").hidden = false;
+  } catch (error) {
+    fail(error.message);
+  } finally {
+    button.disabled = false;
+  }
+}
+element("time").onclick = timePixel;
+
+/** Renders by RTL and model: a view of the open mesh for a manifest and its packed mesh. */
+async function byRtl(viewFor, onSlice) {
+  const manifest = data.manifests[RTL.design];
+  const rtl = await unpack(JSON.parse(element("data").textContent).rtl);
+  const opened = { module: page.module, manifest, views: { plain: bytesOf(data.views[RTL.design]) }, maps: [] };
+  return renderer.aside(opened, page.file, (worker, { packed }) =>
+    renderer.ask(worker, "rtl", { rtl, packed, view: viewFor(manifest, packed) }, onSlice),
+  );
+}
+
 async function renderRtl() {
   const status = element("rtl-status");
   const [own, models] = ["rtl-frame", "rtl-model"].map((id) => element(id).getContext("2d"));
-  const { width, height, design } = RTL;
+  const { width, height } = RTL;
   element("rtl-start").disabled = true;
   element("rtl").classList.add("started");
   try {
     const begin = performance.now();
-    const rtl = await unpack(JSON.parse(element("data").textContent).rtl);
-    const manifest = data.manifests[design];
-    const opened = { module: page.module, manifest, views: { plain: bytesOf(data.views[design]) }, maps: [] };
-    const answer = await renderer.aside(opened, page.file, (worker, { packed }) => {
-      const view = plainView(width, height, manifest, packed, state);
-      return renderer.ask(worker, "rtl", { rtl, packed, view }, ({ cycles, pixels }) => {
-        own.putImageData(new ImageData(pixels, width, height), 0, 0);
-        status.textContent = `${cycles.toLocaleString("en")} cycles, ${Math.round(cycles / (performance.now() - begin))} thousand a second`;
-      });
+    const viewFor = (manifest, packed) => plainView(width, height, manifest, packed, state);
+    const answer = await byRtl(viewFor, ({ cycles, pixels }) => {
+      own.putImageData(new ImageData(pixels, width, height), 0, 0);
+      status.textContent = `${cycles.toLocaleString("en")} cycles, ${Math.round(cycles / (performance.now() - begin))} thousand a second`;
     });
-    showRtl(answer, own, models);
+    await showRtl(answer, own, models);
   } catch (error) {
     status.textContent = error.message;
   } finally {
@@ -509,7 +602,7 @@ async function start() {
   page.module = code;
   page.teapot = teapot;
   for (const name of Object.keys(data.rooms)) form.elements.room.add(new Option(name));
-  for (const name of Object.keys(data.manifests)) form.elements.design.add(new Option(name));
+  listDesigns();
   element("about").textContent = `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
   renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));
   page.renderer = renderer;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// `colonnade._core.build_bvh`: the tree builder on numpy arrays.
+/// `colonnade._core.build_bvh`: the tree builder on numpy arrays, for tests of its structure.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -76,5 +76,5 @@ nb::dict buildBvh(const Integers& vertices, const Integers& faces, unsigned perR
 
 void bind_bvh(nb::module_& module) {
     module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "triangles_per_record"_a, "arity"_a, "box_bits"_a, "stack_depth"_a,
-                          "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the arrays of colonnade.scene_image.bvh.Bvh.");
+                          "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the arrays of tests/trees.py.");
 }

@@ -15,6 +15,7 @@ import module
 import numpy as np
 import rooms
 import rtl
+import studies
 from colonnade.common.atomic_files import replacing
 from colonnade.design.manifest import Manifest
 from colonnade.device.scene import DeviceScene
@@ -57,12 +58,17 @@ def main() -> None:
     rtl_code = OUTPUT / f"{RTL}.wasm"
     rtl.compile_rtl(RTL, rtl_code)
     texts = {name: json.loads((ROOT / "configs" / "golden" / f"{name}.json").read_text("utf-8")) for name in DESIGNS}
+    points, found = studies.studies(texts)
+    presets = {name: Manifest.from_dict(text) for name, text in texts.items()}
+    texts |= points
     manifests = {name: Manifest.from_dict(text) for name, text in texts.items()}
     views = {name: view_file(manifest) for name, manifest in manifests.items()}
     data = {
         "version": colonnade.__version__,
         "manifests": texts,
-        "rooms": {name: rooms.room_data(name, manifests) for name in rooms.PLACEMENTS},
+        "presets": list(presets),
+        "studies": found,
+        "rooms": {name: rooms.room_data(name, presets) for name in rooms.PLACEMENTS},
         "views": {name: bundle.base64_text(view) for name, view in views.items()},
     }
     contents = {

@@ -9,7 +9,26 @@ import numpy as np
 
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Extent, MeshPart
-from colonnade.scene_image.bvh import TreeStatistics
+
+
+@dataclass(frozen=True)
+class TreeStatistics:
+    """Size and cost of a tree.
+
+    Attributes:
+        nodes, leaves: Number of node records and leaf records.
+        depth: Nodes on the longest path from the root.
+        stack_bound: Largest number of stack entries that a ray can need.
+        cost: Expected record reads of a random ray through the root box, by the surface-area heuristic.
+        height_limit: Limit of the binary tree's levels that keeps the stack within its depth; 0 for none.
+    """
+
+    nodes: int
+    leaves: int
+    depth: int
+    stack_bound: int
+    cost: float
+    height_limit: int
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,8 @@ from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.palette import TEXTURE_SETTINGS, table_entries
 from colonnade.scene_image.atlas import Atlas, make_atlas, uv_codes
-from colonnade.scene_image.bvh import TreeStatistics
 from colonnade.scene_image.file import SceneImage
-from colonnade.scene_image.header import ImageHeader, ObjectFrame
+from colonnade.scene_image.header import ImageHeader, ObjectFrame, TreeStatistics
 from colonnade.scene_image.textures import with_textures
 
 Units = npt.NDArray[np.int32]

@@ -13,15 +13,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.environment.load import load_environment
 from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
+from colonnade.registers.frame import frame_registers
+from colonnade.scene.parser import load_scene
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[3]
 FILE = ROOT / "out" / "browser" / "index.html"
@@ -104,7 +107,7 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
 
 
 def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, room: str | None = None) -> Any:
-    """The host's frame of the registers that the page wrote."""
+    """The host's frame of the registers that the page wrote; those of the mesh are the host's."""
     manifest = Manifest.load(ROOT / "configs" / "golden" / f"{design}.json")
     words = {address: value for address, value in picture["writes"]}
     registers = {
@@ -113,6 +116,9 @@ def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, room: str | Non
         if register.access == "rw"
     }
     image = pack(mesh, manifest)
+    own = frame_registers(load_scene(ROOT / "scenes" / "object.toml"), image.header, manifest, 64, 48)
+    of_mesh = [name for name in own if name.startswith(("bounds.", "scene.")) or name == "shading.offset"]
+    assert len(of_mesh) == 11 and {name: registers[name] for name in of_mesh} == {name: own[name] for name in of_mesh}
     if room is not None:
         environment = load_environment(ROOT / "scenes" / "rooms" / room)
         image = with_environment(image, EncodedEnvironment.of(environment, manifest, "live"), manifest)
@@ -247,11 +253,32 @@ def test_controls_and_the_size_of_a_phone(browser: Browser) -> None:
     context.close()
 
 
+def test_the_precision_has_its_picture_and_its_costs(context: BrowserContext) -> None:
+    tab = Tab(context, "#pixel=4&design=edge")
+    page = tab.page
+    expect(page.locator("#costs")).to_contain_text("nJ/ray")
+    sharp = tab.picture()["colours"]
+    before = tab.frames()
+    page.fill("input[name=precision]", "0")
+    expect(page.locator("#precision")).to_have_text("16b16s32d")
+    tab.wait(before)
+    expect(page.locator("#costs")).to_contain_text("PSNR, lowest")
+    expect(page.locator("#study")).to_contain_text("colonnade explore scenes/studies/mixed-precision.toml")
+    assert tab.picture()["colours"] != sharp
+    assert "design=16b16s32d" in page.evaluate("location.hash")
+    assert tab.is_quiet()
+
+
 def test_the_rtl_in_the_tab_equals_the_model(context: BrowserContext) -> None:
     tab = Tab(context, "#pixel=4&azimuth=70")
     page = tab.page
     page.click("#rtl-start")
     expect(page.locator("#rtl-status")).to_contain_text("Equal: 3072 pixels", timeout=60_000)
+    page.mouse.click(208, 120)
+    page.click("#time")
+    expect(page.locator("#times caption")).to_contain_text("its colour is the model's", timeout=60_000)
+    pixel = page.evaluate("colonnade.pixelCounters")
+    assert pixel["raysPrimary"] == pixel["hits"] == 1 and pixel["waitRecord"] > 0
     result = page.evaluate("colonnade.rtl")
     assert result["hashes"][0] == result["hashes"][1] and not result["different"]
     assert result["counters"]["cycles"] > result["counters"]["boxTests"] > 1000

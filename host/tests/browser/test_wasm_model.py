@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import playwright
 import pytest
+
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.mesh.load import load_mesh

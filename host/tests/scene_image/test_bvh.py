@@ -12,8 +12,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from colonnade.scene_image.bvh import EMPTY, LEAF, NODE, Bvh, build_bvh
+from trees import EMPTY, LEAF, NODE, Bvh, build_bvh
 
 Integers = npt.NDArray[np.int32]
 

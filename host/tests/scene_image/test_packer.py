@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from trees import LEAF, NODE
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
@@ -15,7 +16,6 @@ from colonnade.common.vectors import unit_vectors
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.mesh import Mesh
-from colonnade.scene_image.bvh import LEAF, NODE
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.inspect import describe, report_lines
 from colonnade.scene_image.packer import QuantisedMesh, memory_use, pack, quantise

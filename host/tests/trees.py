@@ -1,4 +1,4 @@
-"""The bounding-volume hierarchy (BVH) over quantised triangles, built by the C++ extension."""
+"""The tree of the C++ packer as arrays, for tests of its structure."""
 
 from __future__ import annotations
 
@@ -8,27 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from colonnade import _core
+from colonnade.scene_image.header import TreeStatistics
+
 EMPTY, NODE, LEAF = 0, 1, 2
-
-
-@dataclass(frozen=True)
-class TreeStatistics:
-    """Size and cost of a tree.
-
-    Attributes:
-        nodes, leaves: Number of node records and leaf records.
-        depth: Nodes on the longest path from the root.
-        stack_bound: Largest number of stack entries that a ray can need.
-        cost: Expected record reads of a random ray through the root box, by the surface-area heuristic.
-        height_limit: Limit of the binary tree's levels that keeps the stack within its depth; 0 for none.
-    """
-
-    nodes: int
-    leaves: int
-    depth: int
-    stack_bound: int
-    cost: float
-    height_limit: int
 
 
 @dataclass(frozen=True)
@@ -84,8 +67,6 @@ def build_bvh(
         box_bits: Bits of a child's plane relative to its node.
         stack_depth: Entries of the traversal stack.
     """
-    from colonnade import _core
-
     arrays: dict[str, Any] = _core.build_bvh(
         np.ascontiguousarray(vertices, dtype=np.int32),
         np.ascontiguousarray(faces, dtype=np.int32),
