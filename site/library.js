@@ -118,12 +118,13 @@ export class Library {
     this.withArrays([new Uint32Array(writes.flat())], (pointer) => this.check(this.wasm.colonnade_model_start(pointer, writes.length)));
   }
 
-  /** Rows of the frame: `colours` Uint16Array, three for each pixel, linear; `triangles` Int32Array. */
+  /** Rows of the frame: `colours`, linear, and `ratios`, Uint16Array, three for each pixel; `triangles` Int32Array. */
   rows(first, last, width) {
     const pixels = (last - first) * width;
-    return this.withArrays([new Uint16Array(3 * pixels), new Int32Array(pixels)], (c, t) => {
-      this.check(this.wasm.colonnade_model_rows(first, last, c, t));
+    return this.withArrays([new Uint16Array(3 * pixels), new Uint16Array(3 * pixels), new Int32Array(pixels)], (c, r, t) => {
+      this.check(this.wasm.colonnade_model_rows(first, last, c, r, t));
       return {
+        ratios: new Uint16Array(this.wasm.memory.buffer, r, 3 * pixels).slice(),
         colours: new Uint16Array(this.wasm.memory.buffer, c, 3 * pixels).slice(),
         triangles: new Int32Array(this.wasm.memory.buffer, t, pixels).slice(),
       };

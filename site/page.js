@@ -92,7 +92,7 @@ function viewOf(width, height, orbit = state) {
   const room = roomOf();
   if (!room) return plainView(width, height, manifest, packed, orbit);
   const file = String(room.height / height);
-  return { file, camera: roomCamera(room, width, height), object: poseIn(room, orbit), lights: [], registers: registersOf(manifest, packed, room) };
+  return { file, camera: roomCamera(room, width, height), object: poseIn(room, orbit), lights: [], registers: registersOf(manifest, packed, room), inPhoto: Boolean(state.photo) };
 }
 
 function plainView(width, height, manifest, packed, orbit) {
@@ -144,13 +144,14 @@ async function render(pixel, isCoarse) {
   const [width, height] = sizeOf(pixel);
   const view = viewOf(width, height);
   const target = new OffscreenCanvas(width, height).getContext("2d");
-  const whole = { width, height, view, colours: new Uint16Array(3 * width * height), triangles: new Int32Array(width * height) };
+  const whole = { width, height, view, colours: new Uint16Array(3 * width * height), ratios: new Uint16Array(3 * width * height), triangles: new Int32Array(width * height) };
   if (!isCoarse) Object.assign(picture.canvas, resized(picture.canvas, width, height));
-  const frame = await renderer.frame(view, ({ first, last, pixels, colours, triangles }) => {
+  const frame = await renderer.frame(view, ({ first, last, pixels, colours, ratios, triangles }) => {
     const rows = new ImageData(pixels, width, last - first);
     if (isCoarse) target.putImageData(rows, 0, first);
     else if (!isChanged) picture.putImageData(rows, 0, first);
     whole.colours.set(colours, 3 * width * first);
+    whole.ratios.set(ratios, 3 * width * first);
     whole.triangles.set(triangles, width * first);
   });
   if (frame === null) return;
@@ -225,7 +226,16 @@ async function openDesign() {
   const files = room ? room.views[state.design] : { plain: data.views[state.design] };
   const views = Object.fromEntries(Object.entries(files).map(([name, text]) => [name, bytesOf(text)]));
   const maps = (room?.maps ?? []).map(({ words, ...map }) => ({ ...map, words: bytesOf(words) }));
-  await renderer.open({ module: page.module, manifest, views, maps });
+  await renderer.open({ module: page.module, manifest, views, maps, photo: room && (await photoOf(room)) });
+}
+
+/** The pixels of a room's photo. */
+async function photoOf({ photo, width, height }) {
+  const picture = await createImageBitmap(new Blob([bytesOf(photo)], { type: "image/jpeg" }));
+  const context = new OffscreenCanvas(width, height).getContext("2d");
+  context.drawImage(picture, 0, 0);
+  const { data } = context.getImageData(0, 0, width, height);
+  return { data, width, height };
 }
 
 async function changeDesign() {
@@ -287,7 +297,8 @@ const openTeapot = () => readFile("teapot.ply", page.teapot, new Map());
 function fill() {
   for (const name of ["design", "room", "material", "light", "bounces", "pixel"]) form.elements[name].value = state[name];
   for (const name of ["colour", "background"]) form.elements[name].value = `#${state[name]}`;
-  form.elements.shadows.checked = Boolean(state.shadows);
+  for (const name of ["shadows", "photo"]) form.elements[name].checked = Boolean(state[name]);
+  form.elements.photo.disabled = roomOf() === null;
   showCosts();
   for (const name of ["background", "light"]) form.elements[name].disabled = roomOf() !== null;
   element("mesh").textContent = state.mesh;
@@ -544,7 +555,7 @@ element("time").onclick = timePixel;
 async function byRtl(viewFor, onSlice) {
   const manifest = data.manifests[RTL.design];
   const rtl = await unpack(JSON.parse(element("data").textContent).rtl);
-  const opened = { module: page.module, manifest, views: { plain: bytesOf(data.views[RTL.design]) }, maps: [] };
+  const opened = { module: page.module, manifest, views: { plain: bytesOf(data.views[RTL.design]) }, maps: [], photo: null };
   return renderer.aside(opened, page.file, (worker, { packed }) =>
     renderer.ask(worker, "rtl", { rtl, packed, view: viewFor(manifest, packed) }, onSlice),
   );

@@ -7,6 +7,7 @@ export const DEFAULTS = {
   mesh: "teapot.ply",
   design: "textured",
   room: "",
+  photo: 1,
   material: "diffuse",
   colour: "d8c8b0",
   background: "182028",

@@ -3,6 +3,7 @@
 
 import { Library } from "./library.js";
 import { readMesh } from "./meshes.js";
+import { composite, encode, resizedPhoto } from "./photo.js";
 import { renderRtl } from "./rtl.js";
 
 const BAND = 4;
@@ -10,10 +11,7 @@ const BAND = 4;
 /** Linear codes of the device to sRGB. */
 function curveOf(bits) {
   const white = 2 ** bits - 1;
-  return Uint8ClampedArray.from({ length: white + 1 }, (_, code) => {
-    const value = code / white;
-    return Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
-  });
+  return Uint8ClampedArray.from({ length: white + 1 }, (_, code) => encode(code / white));
 }
 
 /** Answers messages {id, call, …} with {id, …}; of a frame, with its bands, until another frame begins. */
@@ -23,17 +21,19 @@ export function serve(scope) {
   let raw;
   let files;
   let opened;
+  let photos;
   let frame = 0;
   const pause = () => new Promise((resolve) => setTimeout(resolve));
 
   const calls = {
-    /** `views`: view files by name; `maps`: those of a room. */
-    async open({ module, manifest, views, maps }) {
+    /** `views`: view files by name; `maps` and `photo`: those of a room, the photo as RGBA. */
+    async open({ module, manifest, views, maps, photo }) {
       library ??= await Library.from(module);
       library.open(manifest);
       library.loadMaps(maps);
       files = views;
       opened = null;
+      photos = photo ? Object.fromEntries(Object.keys(views).map((factor) => [factor, resizedPhoto(photo, Number(factor))])) : {};
       curve = curveOf(manifest.numbers.colourBits);
       return {};
     },
@@ -64,8 +64,10 @@ export function serve(scope) {
         await pause();
         if (own !== frame) return { isStopped: true };
         const last = Math.min(first + BAND, camera.height);
-        const { colours, triangles } = library.rows(first, last, camera.width);
-        post({ first, last, pixels: shown(colours), colours, triangles });
+        const rows = library.rows(first, last, camera.width);
+        const pixels = shown(rows.colours);
+        if (view.inPhoto) composite(pixels, rows, photos[view.file], first * camera.width);
+        post({ first, last, pixels, ...rows });
       }
       return { counters: library.counters(), milliseconds: performance.now() - begin };
     },

@@ -53,9 +53,9 @@ def ply(mesh: Mesh) -> bytes:
 def main() -> None:
     """Compile, collect, write."""
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    code = OUTPUT / "colonnade.wasm"
+    code = module.OBJECTS / "colonnade.wasm"
     module.compile_module(code)
-    rtl_code = OUTPUT / f"{RTL}.wasm"
+    rtl_code = module.OBJECTS / f"{RTL}.wasm"
     rtl.compile_rtl(RTL, rtl_code)
     texts = {name: json.loads((ROOT / "configs" / "golden" / f"{name}.json").read_text("utf-8")) for name in DESIGNS}
     points, found = studies.studies(texts)

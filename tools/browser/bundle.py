@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
 #: Modules after those that they import.
-WORKER = ("design", "library", "meshes", "rtl", "worker")
+WORKER = ("design", "library", "meshes", "photo", "rtl", "worker")
 PAGE = ("camera", "design", "path", "renderer", "state", "page")
 
 _IMPORT = re.compile(r'^import [^;]*? from "\./(\w+)\.js";\n', re.MULTILINE)

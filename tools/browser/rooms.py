@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from colonnade.scene.model import Placement, Scene
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import place
 from colonnade.scene_image.environment import map_memories
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = ROOT / "scenes" / "room.toml"
@@ -42,7 +44,7 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     for design, manifest in manifests.items():
         if manifest.attributes is None:
             continue
-        ready = DeviceScene.of(scene, manifest, load_mesh(MESH), relit=True, encoder="live")
+        ready = DeviceScene.of(scene, manifest, load_mesh(MESH), encoder="live")
         views[design] = {str(pixel): base64_text(ready.view_file(size)) for pixel, size in SIZES.items()}
         own = [
             {"memory": part.memory, "bytes": part.words.shape[1], "words": base64_text(part.words.tobytes())}
@@ -52,7 +54,9 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
         if maps is not None and own != maps:
             raise ValueError(f"the maps of {design} are not those of the other designs")
         maps = own
-    return {"views": views, "maps": maps, **_poses(ready)}
+    photo = io.BytesIO()
+    Image.fromarray(ready.photo).save(photo, "JPEG", quality=88)
+    return {"views": views, "maps": maps, "photo": base64_text(photo.getvalue()), **_poses(ready)}
 
 
 def _poses(ready: DeviceScene) -> dict[str, Any]:

@@ -209,13 +209,16 @@ const char* colonnade_model_start(const std::uint8_t* writes, std::uint32_t coun
     return nullptr;
 }
 
-const char* colonnade_model_rows(std::uint32_t first, std::uint32_t last, std::uint16_t* colours, std::int32_t* triangles) {
+const char* colonnade_model_rows(std::uint32_t first, std::uint32_t last, std::uint16_t* colours, std::uint16_t* ratios, std::int32_t* triangles) {
     const Frame& frame = library->device->frame();
     if (last > static_cast<std::uint32_t>(frame.height) || first > last) return "these rows are not those of the frame";
     for (std::uint32_t y = first; y < last; ++y)
         for (std::int64_t x = 0; x < frame.width; ++x) {
             const Pixel pixel = library->device->render(x, y);
-            for (int channel = 0; channel < 3; ++channel) *colours++ = static_cast<std::uint16_t>(pixel.colour[channel]);
+            for (int channel = 0; channel < 3; ++channel) {
+                *colours++ = static_cast<std::uint16_t>(pixel.colour[channel]);
+                *ratios++ = static_cast<std::uint16_t>(pixel.ratio[channel]);
+            }
             *triangles++ = pixel.isObject ? static_cast<std::int32_t>(pixel.triangle) : -1;
         }
     return nullptr;

@@ -57,8 +57,9 @@ const char *colonnade_model_load_map(const char *memory, const uint8_t *words, u
 /* Writes registers, pairs of word address and value, low byte first, and starts a frame. */
 const char *colonnade_model_start(const uint8_t *writes, uint32_t count);
 
-/* Renders rows first to last − 1: linear red, green, blue, and the packed id or −1, of each pixel. */
-const char *colonnade_model_rows(uint32_t first, uint32_t last, uint16_t *colours, int32_t *triangles);
+/* Renders rows first to last − 1: linear red, green, blue, the ratios of light with the object to light without it, 4096 for
+ * 1, and the packed id or −1, of each pixel. */
+const char *colonnade_model_rows(uint32_t first, uint32_t last, uint16_t *colours, uint16_t *ratios, int32_t *triangles);
 
 /* The steps of a pixel's rays; they are valid until the next call. */
 uint32_t colonnade_model_trace(uint32_t x, uint32_t y, const struct colonnade_step **steps);

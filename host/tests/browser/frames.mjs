@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Packs a mesh and renders frames in WebAssembly: node frames.mjs FOLDER, which has job.json and the mesh's arrays.
-// It writes records.bin, and colours and triangles of each frame.
+// It writes records.bin, and colours, triangles and counters of the frame, by the RTL too if the job names its module.
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { Library } from "../../../site/library.js";
+import { renderRtl } from "../../../site/rtl.js";
 
 const folder = process.argv[2];
 const read = (name, Array) => new Array(Uint8Array.from(readFileSync(`${folder}/${name}`)).buffer);
@@ -16,10 +17,13 @@ const packed = library.pack(
 );
 writeFileSync(`${folder}/records.bin`, library.records(packed));
 writeFileSync(`${folder}/packed.json`, JSON.stringify(packed));
-job.frames.forEach(({ writes, width, height }, index) => {
-  library.start(writes);
-  const { colours, triangles } = library.rows(0, height, width);
-  writeFileSync(`${folder}/colours${index}.bin`, new Uint8Array(colours.buffer));
-  writeFileSync(`${folder}/triangles${index}.bin`, new Uint8Array(triangles.buffer));
-  writeFileSync(`${folder}/counters${index}.json`, JSON.stringify(library.counters()));
-});
+const { writes, width, height } = job.frame;
+library.start(writes);
+write("model", { ...library.rows(0, height, width), counters: library.counters() });
+if (job.rtl) write("rtl", await renderRtl(readFileSync(job.rtl), job.manifest, { records: library.records(packed), writes, width, height }, () => {}));
+
+function write(name, { colours, triangles, counters }) {
+  writeFileSync(`${folder}/${name}-colours.bin`, new Uint8Array(colours.buffer));
+  writeFileSync(`${folder}/${name}-triangles.bin`, new Uint8Array(triangles.buffer));
+  writeFileSync(`${folder}/${name}-counters.json`, JSON.stringify(counters));
+}

@@ -17,8 +17,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_play
 
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.environment.load import load_environment
-from colonnade.maps.encoded import EncodedEnvironment
+from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
@@ -74,9 +73,10 @@ class Tab:
         return dict(
             self.page.evaluate(
                 """async () => {
-                  const { width, height, view, colours, triangles } = colonnade.picture;
+                  const { width, height, view, ...pixels } = colonnade.picture;
                   const { writes } = await colonnade.renderer.writes(view);
-                  return { width, height, writes, colours: [...colours], triangles: [...triangles] };
+                  const lists = Object.entries(pixels).map(([name, values]) => [name, [...values]]);
+                  return { width, height, writes, ...Object.fromEntries(lists) };
                 }"""
             )
         )
@@ -106,7 +106,7 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
     context.close()
 
 
-def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, room: str | None = None) -> Any:
+def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, is_in_room: bool = False) -> Any:
     """The host's frame of the registers that the page wrote; those of the mesh are the host's."""
     manifest = Manifest.load(ROOT / "configs" / "golden" / f"{design}.json")
     words = {address: value for address, value in picture["writes"]}
@@ -119,9 +119,12 @@ def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, room: str | Non
     own = frame_registers(load_scene(ROOT / "scenes" / "object.toml"), image.header, manifest, 64, 48)
     of_mesh = [name for name in own if name.startswith(("bounds.", "scene.")) or name == "shading.offset"]
     assert len(of_mesh) == 11 and {name: registers[name] for name in of_mesh} == {name: own[name] for name in of_mesh}
-    if room is not None:
-        environment = load_environment(ROOT / "scenes" / "rooms" / room)
-        image = with_environment(image, EncodedEnvironment.of(environment, manifest, "live"), manifest)
+    if is_in_room:
+        maps = DeviceScene.of(
+            load_scene(ROOT / "scenes" / "room.toml"), manifest, load_mesh("cube"), encoder="live"
+        ).maps
+        assert maps is not None
+        image = with_environment(image, maps, manifest)
     return render_model(manifest, image, registers)
 
 
@@ -144,15 +147,21 @@ def test_a_room_equals_the_host_and_a_drag_turns_the_object(context: BrowserCont
     for _ in range(2):
         picture = tab.picture()
         assert (picture["width"], picture["height"]) == (160, 120)
-        frame = host_frame(picture, load_mesh("teapot"), "edge", "living")
+        frame = host_frame(picture, load_mesh("teapot"), "edge", is_in_room=True)
         assert frame.is_object.sum() > 100
         np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
+        np.testing.assert_array_equal(np.reshape(picture["ratios"], frame.ratio.shape), frame.ratio)
         pictures.append(picture["triangles"])
         before = tab.frames()
         tab.page.focus("#stage")
         tab.page.keyboard.press("ArrowLeft")
         tab.wait(before)
-    assert pictures[0] != pictures[1]
+    assert pictures[0] != pictures[1] and frame.ratio.min() < 3000
+    photographed = tab.page.evaluate("document.getElementById('picture').toDataURL()")
+    before = tab.frames()
+    tab.page.uncheck("input[name=photo]")
+    tab.wait(before)
+    assert tab.page.evaluate("document.getElementById('picture').toDataURL()") != photographed
     tab.page.select_option("select[name=design]", "tiny")
     expect(tab.page.locator("#notes")).to_contain_text("this hardware has no maps of a room")
     assert tab.is_quiet()

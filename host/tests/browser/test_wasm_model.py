@@ -1,4 +1,4 @@
-"""The page's WebAssembly equals the host: records, pixels, hits and counters. `tools/browser` compiles it."""
+"""The page's WebAssembly equals the host: records, pixels, hits and counters, of the model and of the RTL of tiny."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
 
 ROOT = Path(__file__).resolve().parents[3]
-MODULE = ROOT / "out" / "browser" / "colonnade.wasm"
+MODULE, RTL = (ROOT / ".cache" / "browser-objects" / f"{name}.wasm" for name in ("colonnade", "tiny"))
 EIGHT = ("teapot", "stanford-bunny", "cheburashka", "fandisk", "rocker-arm", "duck", "armadillo", "dragon")
 pytestmark = pytest.mark.skipif(not MODULE.is_file(), reason="the page is not built: run `make browser`")
 
@@ -48,7 +48,8 @@ def check(folder: Path, mesh_name: str, config: str, scene_name: str, size: tupl
         "module": str(MODULE),
         "manifest": manifest_text,
         "isGlass": plain[0].kind == "glass",
-        "frames": [{"writes": writes, "width": size[0], "height": size[1]}],
+        "frame": {"writes": writes, "width": size[0], "height": size[1]},
+        "rtl": str(RTL) if config == "tiny" else None,
     }
     (folder / "job.json").write_text(json.dumps(job))
     mesh.vertices.astype("<f8").tofile(folder / "vertices.bin")
@@ -60,15 +61,16 @@ def check(folder: Path, mesh_name: str, config: str, scene_name: str, size: tupl
     packed = json.loads((folder / "packed.json").read_text())
     assert packed["shadingOffset"] == registers["shading.offset"]
     assert packed["recordCount"] == image.header.record_count
-    colours = np.fromfile(folder / "colours0.bin", dtype="<u2").reshape(frame.colour.shape)
-    np.testing.assert_array_equal(colours, frame.colour)
-    triangles = np.fromfile(folder / "triangles0.bin", dtype="<i4").reshape(frame.triangle.shape)
-    np.testing.assert_array_equal(triangles, frame.triangle)
-    assert (triangles >= 0).any()
-    counters = json.loads((folder / "counters0.json").read_text())
-    known = counters.keys() & frame.counters.keys()
-    assert {"nodeReads", "triangleTests"} <= known
-    assert {name: counters[name] for name in known} == {name: frame.counters[name] for name in known}
+    for kind in ("model", "rtl") if config == "tiny" else ("model",):
+        colours = np.fromfile(folder / f"{kind}-colours.bin", dtype="<u2").reshape(frame.colour.shape)
+        np.testing.assert_array_equal(colours, frame.colour)
+        triangles = np.fromfile(folder / f"{kind}-triangles.bin", dtype="<i4").reshape(frame.triangle.shape)
+        np.testing.assert_array_equal(triangles, frame.triangle)
+        assert (triangles >= 0).any()
+        counters = json.loads((folder / f"{kind}-counters.json").read_text())
+        known = counters.keys() & frame.counters.keys()
+        assert {"nodeReads", "triangleTests"} <= known
+        assert {name: counters[name] for name in known} == {name: frame.counters[name] for name in known}
 
 
 @pytest.mark.parametrize(
@@ -81,6 +83,9 @@ def test_webassembly_equals_the_host(tmp_path: Path, config: str, scene: str) ->
 
 @pytest.mark.matrix
 @pytest.mark.parametrize("mesh", EIGHT)
-@pytest.mark.parametrize("scene", ["object.toml", "mirror.toml"])
-def test_eight_meshes_are_equal(tmp_path: Path, mesh: str, scene: str) -> None:
-    check(tmp_path, mesh, "edge", scene, (320, 240))
+@pytest.mark.parametrize(
+    ("config", "scene", "size"),
+    [("edge", "object.toml", (320, 240)), ("edge", "mirror.toml", (320, 240)), ("tiny", "object.toml", (64, 48))],
+)
+def test_eight_meshes_are_equal(tmp_path: Path, mesh: str, config: str, scene: str, size: tuple[int, int]) -> None:
+    check(tmp_path, mesh, config, scene, size)
