@@ -5,7 +5,7 @@ import { designLines, registerWrites } from "./design.js";
 
 const PACKED = [
   "triangles", "recordCount", "triangleBase", "triangleRecords", "attributeBase", "lowX", "lowY", "lowZ", "highX", "highY",
-  "highZ", "shadingOffset", "treeDepth", "stackBound", "dropped", "flipped", "replaced",
+  "highZ", "shadingOffset", "treeDepth", "stackBound", "dropped", "flipped", "replaced", "reversed",
 ];
 /** Those of the register map that do not depend on time. */
 const COUNTERS = [

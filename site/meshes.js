@@ -7,7 +7,14 @@ export function readMesh(name, bytes, files = new Map()) {
   const suffix = name.toLowerCase().split(".").pop();
   const readers = { obj: readObj, ply: readPly, glb: readGlb, gltf: readGltf };
   if (!readers[suffix]) throw new Error(`${name}: only OBJ, PLY, glTF and GLB are read here; the command line reads more`);
-  const mesh = readers[suffix](bytes, files);
+  let mesh;
+  try {
+    mesh = readers[suffix](bytes, files);
+  } catch (error) {
+    // What the language throws on wrong offsets, lengths and fields
+    const isDamaged = [RangeError, TypeError, SyntaxError].some((kind) => error instanceof kind);
+    throw isDamaged ? new Error(`${name} is damaged, or no ${suffix.toUpperCase()} file`) : error;
+  }
   if (mesh.faces.length === 0) throw new Error(`${name} has no triangles`);
   return { name, ...mesh };
 }
@@ -109,6 +116,7 @@ function readPly(bytes) {
       elements.at(-1).properties.push({ name: words.at(-1), type: isList ? words[2] : words[0], size: isList ? words[1] : null });
     }
   }
+  if (elements.some(({ count }) => !(count >= 0 && count <= bytes.length))) throw new RangeError("more rows than bytes");
   const next = plySource(bytes, end.index + end[0].length, format);
   const rows = Object.fromEntries(elements.map((element) => [element.name, readElement(element, next)]));
   const { vertex = [], face = [] } = rows;

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "binding.hpp"
-#include "mesh/normals.hpp"
+#include "mesh/winding.hpp"
 #include "packer/records.hpp"
 #include "packer/surface_offset.hpp"
 
@@ -121,6 +121,12 @@ nb::object dropFaces(const Rows<double>& vertices, const Rows<std::int64_t>& fac
     return arrayOf<std::int64_t>(keep, {keep.size()});
 }
 
+nb::tuple findWinding(const Rows<double>& vertices, const Rows<std::int32_t>& faces) {
+    const mesh::Winding winding = mesh::findWinding(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces));
+    const std::size_t count = faces.shape(0);
+    return nb::make_tuple(arrayOf<bool>(winding.reversed, {count}), winding.mixed, winding.inverted, arrayOf<bool>(winding.isOpen, {count}));
+}
+
 nb::object creaseNormals(const Rows<double>& vertices, const Rows<std::int32_t>& faces, double leastCosine) {
     const std::vector<mesh::Corners> normals = mesh::creaseNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), leastCosine);
     return arrayOf<double>(normals, {normals.size(), 3, 3});
@@ -150,6 +156,7 @@ void bind_packer(nb::module_& module) {
         "grid_fraction"_a, "weight_bits"_a, "mantissa_bits"_a, "distance_digits"_a, "largest_triangle"_a);
     module.def("merge_rows", &mergeRows, "rows"_a);
     module.def("drop_faces", &dropFaces, "vertices"_a, "faces"_a);
+    module.def("find_winding", &findWinding, "vertices"_a, "faces"_a);
     module.def("crease_normals", &creaseNormals, "vertices"_a, "faces"_a, "least_cosine"_a);
     module.def("corner_normals", &cornerNormals, "vertices"_a, "faces"_a, "authored"_a, "least_cosine"_a);
 }

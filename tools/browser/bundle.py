@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
 #: Modules after those that they import.
 WORKER = ("design", "library", "meshes", "photo", "rtl", "worker")
-PAGE = ("camera", "design", "path", "renderer", "state", "page")
+PAGE = ("camera", "design", "photo", "path", "panels", "orbit", "renderer", "state", "view", "page")
 
 _IMPORT = re.compile(r'^import [^;]*? from "\./(\w+)\.js";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=async |function |class |const |let )", re.MULTILINE)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -53,10 +51,3 @@ def drop_faces(vertices: Floats, faces: npt.NDArray[np.int64]) -> npt.NDArray[np
 
     keep: npt.NDArray[np.int64] = _core.drop_faces(vertices, faces)
     return keep
-
-
-def edge_keys(faces: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """A number for the edge from each corner to the next, the same for both directions, int64 [3 · m]."""
-    start = faces.astype(np.int64)
-    end = np.roll(start, -1, axis=1)
-    return (np.minimum(start, end) * (int(faces.max()) + 1) + np.maximum(start, end)).reshape(-1)

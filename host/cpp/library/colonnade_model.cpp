@@ -115,6 +115,7 @@ void describe(colonnade_packed& packed, std::uint32_t faceCount) {
     packed.stack_bound = static_cast<std::int32_t>(from.tree.tree.stackBound);
     packed.dropped = static_cast<std::int32_t>(faceCount - from.tree.order.size());
     packed.flipped = static_cast<std::int32_t>(from.clean.normals.flipped);
+    packed.reversed = static_cast<std::int32_t>(from.clean.winding.mixed + from.clean.winding.inverted);
     packed.replaced = static_cast<std::int32_t>(from.clean.normals.replaced + from.clean.normals.missing);
 }
 
@@ -166,7 +167,10 @@ const char* colonnade_model_pack(const double* vertices, std::uint32_t vertexCou
     std::vector<std::array<mesh::Row<std::int64_t>, 3>> codes;
     if (library->format.layouts.at("attributes").count("faces[0].colours[0].r")) {
         codes.resize(clean.faces.size());
-        for (std::size_t i = 0; colours && i < codes.size(); ++i) codes[i] = colourCodes(colours + 9 * clean.sources[i]);
+        for (std::size_t i = 0; colours && i < codes.size(); ++i) {
+            codes[i] = colourCodes(colours + 9 * clean.sources[i]);
+            if (clean.winding.reversed[i]) std::reverse(codes[i].begin(), codes[i].end());
+        }
     }
     library->records = next->packer->records({clean.normals.normals.data(), materials.data(), isClear.data(), codes.empty() ? nullptr : codes.data()});
     library->packed = std::move(next);

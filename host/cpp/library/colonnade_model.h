@@ -21,6 +21,7 @@ struct colonnade_packed {
     int32_t dropped;  /* faces of the mesh that are equal to another one or have no area */
     int32_t flipped;  /* faces whose normals pointed to their back, and were negated */
     int32_t replaced; /* corners whose normal pointed to the back of their face, or that had none */
+    int32_t reversed; /* closed parts that did not point outward, and do now */
 };
 
 struct colonnade_step {

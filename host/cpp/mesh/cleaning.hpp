@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Cleaning, as host/colonnade/mesh/load.py does it: vertices are merged by position; degenerate faces, equal faces and unused
-/// vertices go. Closed parts that point inward stay as they are.
+/// vertices go, and closed parts are reversed that point inward.
 #pragma once
 
-#include <limits>
-
-#include "normals.hpp"
+#include "winding.hpp"
 
 namespace colonnade::mesh {
 
@@ -20,6 +18,7 @@ struct CleanMesh {
     std::vector<Vector> vertices;
     std::vector<Face> faces;
     std::vector<std::int64_t> sources;  ///< of each face, its index in the raw mesh
+    Winding winding;                    ///< reversed faces have the corners of their source backwards
     CornerNormals normals;
 };
 
@@ -80,8 +79,15 @@ inline CleanMesh clean(const RawMesh& raw, double leastCosine) {
         if (!raw.normals.empty()) authored.push_back(raw.normals[source]);
         hasNormals = hasNormals || (!raw.normals.empty() && raw.normals[source] != Corners{});
     }
+    if (result.faces.empty()) return result;
+    result.winding = findWinding(result.vertices, result.faces);
+    for (std::size_t i = 0; i < result.faces.size(); ++i)
+        if (result.winding.reversed[i]) {
+            std::reverse(result.faces[i].begin(), result.faces[i].end());
+            if (hasNormals) std::reverse(authored[i].begin(), authored[i].end());
+        }
     if (hasNormals) result.normals = cornerNormals(result.vertices, result.faces, std::move(authored), leastCosine);
-    else if (!result.faces.empty()) result.normals.normals = creaseNormals(result.vertices, result.faces, leastCosine);
+    else result.normals.normals = creaseNormals(result.vertices, result.faces, leastCosine);
     return result;
 }
 

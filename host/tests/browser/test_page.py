@@ -216,6 +216,12 @@ def test_files_are_read_and_what_is_left_out_is_said(context: BrowserContext, tm
     # A drop, of a file that is none
     tab.drop("broken.ply", "ply nothing")
     expect(page.locator("#error")).to_have_text("this is no PLY file")
+    tab.drop(
+        "huge.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\nproperty float x\nend_header\n"
+    )
+    expect(page.locator("#error")).to_have_text("huge.ply is damaged, or no PLY file")
+    tab.drop("cycle.gltf", json.dumps(triangle_document() | {"nodes": [{"children": [0]}]}))
+    expect(page.locator("#error")).to_have_text("cycle.gltf is damaged, or no GLTF file")
     before = tab.frames()
     tab.drop("one.gltf", json.dumps(triangle_document()))
     expect(page.locator("#mesh")).to_have_text("one.gltf")

@@ -14,7 +14,9 @@ import pytest
 
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.mesh.load import load_mesh
+from colonnade.mesh.load import clean_mesh, load_mesh
+from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.primitives import Geometry, cube, sphere
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
@@ -32,11 +34,13 @@ def node() -> str:
     return program if program is not None else pytest.skip("no node")
 
 
-def check(folder: Path, mesh_name: str, config: str, scene_name: str, size: tuple[int, int]) -> None:
-    """Compare a mesh and a frame of it with the host's."""
+def check(
+    folder: Path, mesh: Mesh, config: str, scene_name: str, size: tuple[int, int], raw: Geometry | None = None
+) -> None:
+    """Compare a mesh and a frame of it with the host's; the module cleans ``raw``, of which the host made the mesh."""
     manifest_text = json.loads((ROOT / "configs" / "golden" / f"{config}.json").read_text())
     manifest = Manifest.from_dict(manifest_text)
-    mesh, scene = load_mesh(mesh_name), load_scene(ROOT / "scenes" / scene_name)
+    scene = load_scene(ROOT / "scenes" / scene_name)
     plain = tuple(replace(material, kind=scene.material.kind or "diffuse") for material in mesh.materials[:1])
     mesh = replace(mesh, materials=plain, face_materials=np.zeros(len(mesh.faces), dtype=np.uint8))
     image = pack(mesh, manifest)
@@ -52,9 +56,10 @@ def check(folder: Path, mesh_name: str, config: str, scene_name: str, size: tupl
         "rtl": str(RTL) if config == "tiny" else None,
     }
     (folder / "job.json").write_text(json.dumps(job))
-    mesh.vertices.astype("<f8").tofile(folder / "vertices.bin")
-    mesh.faces.astype("<i4").tofile(folder / "faces.bin")
-    mesh.corner_normals.astype("<f8").tofile(folder / "normals.bin")
+    vertices, faces = (mesh.vertices, mesh.faces) if raw is None else raw
+    vertices.astype("<f8").tofile(folder / "vertices.bin")
+    faces.astype("<i4").tofile(folder / "faces.bin")
+    (mesh.corner_normals if raw is None else np.zeros((len(faces), 3, 3))).astype("<f8").tofile(folder / "normals.bin")
     subprocess.run([node(), Path(__file__).with_name("frames.mjs"), folder], check=True)
 
     assert (folder / "records.bin").read_bytes() == image.records.tobytes()
@@ -78,7 +83,19 @@ def check(folder: Path, mesh_name: str, config: str, scene_name: str, size: tupl
     [("textured", "object.toml"), ("edge", "mirror.toml"), ("lean", "glass.toml"), ("tiny", "object.toml")],
 )
 def test_webassembly_equals_the_host(tmp_path: Path, config: str, scene: str) -> None:
-    check(tmp_path, "teapot:4", config, scene, (64, 48))
+    check(tmp_path, load_mesh("teapot:4"), config, scene, (64, 48))
+
+
+def test_a_file_is_cleaned_as_by_the_host(tmp_path: Path) -> None:
+    """Parts that point inward, a face twice, one without area, vertices twice and unused."""
+    ball, box = sphere(1), cube()
+    vertices = np.concatenate([ball[0], box[0] * 0.5 + 3.0, ball[0][:5], [[9.0, 9.0, 9.0]]])
+    faces = np.concatenate([ball[1], ball[1][:3], box[1][:, ::-1] + len(ball[0]), [[0, 1, 1]]]).astype(np.int32)
+    faces[faces == 2] = len(ball[0]) + len(box[0]) + 2
+    mesh = clean_mesh(vertices, faces, "raw")
+    assert mesh.notes and len(mesh.faces) == len(ball[1]) + len(box[1])
+    check(tmp_path, mesh, "tiny", "object.toml", (64, 48), (vertices, faces))
+    assert json.loads((tmp_path / "packed.json").read_text())["reversed"] == 1
 
 
 @pytest.mark.matrix
@@ -88,4 +105,4 @@ def test_webassembly_equals_the_host(tmp_path: Path, config: str, scene: str) ->
     [("edge", "object.toml", (320, 240)), ("edge", "mirror.toml", (320, 240)), ("tiny", "object.toml", (64, 48))],
 )
 def test_eight_meshes_are_equal(tmp_path: Path, mesh: str, config: str, scene: str, size: tuple[int, int]) -> None:
-    check(tmp_path, mesh, config, scene, size)
+    check(tmp_path, load_mesh(mesh), config, scene, size)

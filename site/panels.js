@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tables and lists of the page.
+
+import { lineOf } from "./path.js";
+
+export const element = (id) => document.getElementById(id);
+
+/** Counters of the register map, in words. */
+const NAMES = {
+  raysPrimary: "primary rays", raysShadow: "shadow rays", raysReflection: "reflected rays", raysRefraction: "refracted rays",
+  raysInBox: "rays in the box", nodeReads: "nodes read", boxTests: "boxes tested", triangleTests: "triangles tested",
+  hits: "hits", deepestStack: "deepest stack",
+};
+/** Where the cycles of a pixel alone go: counters of `tiny` that count each context's cycles in a state. */
+const STATES = {
+  contextsRaySetup: "ray set-up", waitRecord: "waits for a record", waitUnit: "waits for a unit", contextsBox: "box tests",
+  contextsTriangles: "triangle tests", contextsShading: "shading",
+};
+
+const grouped = (value) => (typeof value === "number" ? value.toLocaleString("en") : value);
+
+function row(cells) {
+  const line = document.createElement("tr");
+  for (const cell of cells) line.insertCell().textContent = grouped(cell);
+  return line;
+}
+
+/** Replaces the rows of a table. */
+export function fillTable(id, rows) {
+  element(id).tBodies[0].replaceChildren(...rows.map(row));
+}
+
+/** The figures of a frame: what the page knows of it, and its counters. */
+export function showFigures({ width, height, workers, packed, packTime }, { counters, milliseconds }) {
+  const rate = counters.raysInBox / milliseconds;
+  const rows = {
+    frame: `${width} × ${height}`,
+    "time in this tab": `${Math.round(milliseconds)} ms, ${workers} workers`,
+    "in-box rays a second": Math.round(1000 * rate).toLocaleString("en"),
+    "triangles, records": `${packed.triangles.toLocaleString("en")}, ${packed.recordCount.toLocaleString("en")}`,
+    "depth of the tree": packed.treeDepth,
+    "packed in": `${Math.round(packTime)} ms`,
+    ...Object.fromEntries(Object.entries(counters).map(([name, value]) => [NAMES[name], value.toLocaleString("en")])),
+  };
+  fillTable("figures", Object.entries(rows));
+}
+
+/** The designs to choose from: presets, and the points of studies. */
+export function listDesigns({ presets, studies }) {
+  const form = element("controls");
+  const group = (label, names) => {
+    const options = Object.assign(document.createElement("optgroup"), { label });
+    options.append(...names.map((name) => new Option(name)));
+    form.elements.design.append(options);
+  };
+  group("Presets", presets);
+  for (const { title, points } of studies) group(title, points.map(({ design }) => design).filter((name) => !presets.includes(name)));
+  form.elements.precision.max = studies[0].points.length - 1;
+}
+
+/** Error, energy, area and rate of the hardware, from the studies that have it. */
+export function showCosts(studies, chosen) {
+  const index = studies[0].points.findIndex(({ design }) => design === chosen);
+  if (index >= 0) element("controls").elements.precision.value = index;
+  element("precision").textContent = index >= 0 ? chosen : "";
+  const lines = [];
+  for (const { title, command, columns, points } of studies) {
+    const point = points.find(({ design }) => design === chosen);
+    if (!point) continue;
+    const known = columns.filter(({ key }) => point.figures[key] !== null);
+    lines.push(...known.map(({ key, label, unit, format }) => [label, `${point.figures[key].toFixed(Number(/[.](\d)/.exec(format)[1]))} ${unit}`]));
+    element("study").textContent = `${title}: ${command}`;
+  }
+  element("costs").hidden = lines.length === 0;
+  fillTable("costs", lines);
+}
+
+/** The cycles of a frame of one pixel. */
+export function showTimes(counters, caption) {
+  const states = Object.entries(STATES).filter(([name]) => name in counters);
+  fillTable("times", [["cycles of the frame", counters.cycles], ...states.map(([name, label]) => [label, counters[name]])]);
+  element("times").caption.textContent = caption;
+  element("times").hidden = false;
+}
+
+/** The rays of a pixel, and the steps of the chosen one. `choose` is called with the index of a clicked ray. */
+export function showRays(rays, chosen, choose) {
+  const cellsOf = ({ kind, nodes, boxes, entered, triangles, records, lines, hit, blocker }) => {
+    const met = hit ?? (kind === "shadow" && blocker ? blocker.value : null);
+    return [kind, nodes, boxes, entered, triangles, records, ...(lines === null ? [] : [lines]), met === null ? "–" : String(met)];
+  };
+  fillTable("rays", rays.map(cellsOf));
+  [...element("rays").tBodies[0].rows].forEach((line, index) => {
+    line.classList.toggle("chosen", chosen === index);
+    line.onclick = () => choose(index);
+  });
+  const steps = rays[chosen ?? 0]?.steps ?? [];
+  element("steps").replaceChildren(
+    ...steps.map((step) => {
+      const item = document.createElement("li");
+      item.textContent = lineOf(step);
+      if (step.kind === 2 || step.kind === 4) item.className = "indent";
+      if (step.kind === 4 && step.isHit) item.classList.add("hit");
+      return item;
+    }),
+  );
+}
