@@ -19,8 +19,6 @@ from colonnade.scene.parser import load_scene
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
-pytestmark = pytest.mark.long_simulation
-
 #: Counters that do not depend on time.
 EVENTS = ("raysPrimary", "raysShadow", "raysInBox", "nodeReads", "triangleTests", "hits")
 
@@ -58,12 +56,16 @@ SHAPES = {
 
 @pytest.mark.parametrize(
     "shape",
-    ["one of everything", pytest.param("two columns", marks=pytest.mark.matrix), *list(SHAPES)[2:]],
+    [
+        pytest.param("one of everything", marks=pytest.mark.long_simulation),
+        pytest.param("two columns", marks=pytest.mark.matrix),
+        *list(SHAPES)[2:],
+    ],
 )
 def test_no_frame_depends_on_the_memory(shape: str) -> None:
     rows, columns, banks, buffers, sizes = SHAPES[shape]
     design = design_with(rows, columns, banks, buffers, sizes)
-    image, registers = scene_of(design, 24, 18)
+    image, registers = scene_of(design, 18, 14)
     expected = render_model(design.manifest, image, registers)
     for seed, (latency, random) in enumerate([(1, 0), (100, 0), (7, 60), (300, 20)]):
         stalls = Stalls(percent=10 * seed, seed=seed, dram_latency=latency, dram_random=random)
@@ -88,7 +90,7 @@ def test_frames_of_the_preset_for_fpgas() -> None:
     design = design_for("fpga")
     image = pack(load_mesh("torus"), design.manifest)
     scene = load_scene(toolchain.project_root() / "scenes" / "object.toml").with_mesh("torus")
-    registers = frame_registers(scene, image.header, design.manifest, 100, 75)
+    registers = frame_registers(scene, image.header, design.manifest, 64, 48)
     expected = render_model(design.manifest, image, registers)
     for stalls in (Stalls(dram_latency=15, dram_interval=2), Stalls(percent=20, seed=3, dram_latency=40)):
         for frame in render_rtl(design, image, [registers, registers], stalls).frames:
@@ -98,7 +100,7 @@ def test_frames_of_the_preset_for_fpgas() -> None:
 def test_a_scene_that_fits_is_read_once() -> None:
     """A line that the shared cache holds is never read again, whatever else happens while it is looked up."""
     design = design_with(1, 5, 1, 2, (4, 1, 4, 1024, 16, 8, 32, False))
-    image, registers = scene_of(design, 48, 36)
+    image, registers = scene_of(design, 32, 24)
     lines = -(-len(image.records) // 4)
     assert lines <= 1024
     expected = render_model(design.manifest, image, registers)

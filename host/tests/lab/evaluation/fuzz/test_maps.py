@@ -27,7 +27,6 @@ def manifest() -> Manifest:
 
 
 @NEEDS_SIMULATOR
-@pytest.mark.long_simulation
 def test_hardware_and_model_agree_on_corrupt_maps() -> None:
     """Pixels, ratios, counters and error bits, and the legal frame after each. Long version:
     ``colonnade fuzz --config small --kind maps --frames 700``.
