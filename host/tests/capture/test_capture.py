@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from colonnade.capture import convert as conversion
 from colonnade.cli.main import cli
+from colonnade.environment.depth_normals import DepthNormals
 from colonnade.environment.load import load_environment
 from colonnade.environment.sequence import Sequence, load_sequence
 
@@ -52,10 +53,15 @@ def living() -> Recording:
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the albedo of the first frame, whose lights take seconds to fit."""
+    """Without albedo and normals of rooms, which take seconds to derive."""
     from colonnade.environment import load
 
     monkeypatch.setattr(load, "derived_albedo", lambda room, light=None: np.full((room.height, room.width, 3), 0.5))
+    monkeypatch.setattr(
+        load,
+        "normals_of_depth",
+        lambda depth, *_: DepthNormals(np.broadcast_to([0.0, 0.0, -1.0], (*depth.shape, 3)), 0.0, 0, 0.0),
+    )
 
 
 def test_every_format_gives_poses_lens_and_depth(living: Recording, tmp_path: Path, quick: None) -> None:
