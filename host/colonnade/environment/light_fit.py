@@ -47,10 +47,8 @@ _STEP = 1e-4
 #: Least ambient light, as a share of the best ambient light without point lights: shadows that are drawn are not darker
 #: than those of a room whose walls reflect light.
 _AMBIENT_SHARE = 0.5
-#: A further light has to lower the robust cost to this share.
+#: A further light, or the walls, have to lower the robust cost to this share.
 _GAIN = 0.97
-#: Walls may cost so many decibels of the room that is relit by the other lights.
-_WALLS_LOSS = 1.0
 #: Limits of an intensity (that of a scene), and of a fitted falloff.
 _MAX_INTENSITY = 15.0
 _FALLOFF_RANGE = (0.5, 4.0)
@@ -82,21 +80,21 @@ def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS, walls: boo
         environment: The room.
         count: Number of point lights.
         walls: Fit the light of the walls of a box around the room, too: large sources do not become point lights.
-            The ambient light of the result is then the best one beside the point lights. The walls are dropped if the
-            lights explain the photo much worse with them.
+            The ambient light of the result is then the best one beside the point lights. The walls are dropped if they
+            do not explain the photo better.
 
     Raises:
         UserError: The room has no photo, or too few pixels are neither black nor saturated.
     """
-    found = _fitted(environment, count, walls)
-    if found.surround is None:
-        return found
-    without = _fitted(environment, count, False)
-    return found if found.psnr >= without.psnr - _WALLS_LOSS else without
+    found, cost = _fitted(environment, count, False)
+    if walls:
+        beside, beside_cost = _fitted(environment, count, True)
+        found = beside if beside_cost <= _GAIN * cost else found
+    return found
 
 
-def _fitted(environment: Environment, count: int, walls: bool) -> LightFit:
-    """As `fit_lights`, with the walls whatever they explain."""
+def _fitted(environment: Environment, count: int, walls: bool) -> tuple[LightFit, float]:
+    """As `fit_lights`, with the walls whatever they explain; and the robust cost."""
     samples = samples_of(environment)
     ambient = best = _refined(samples, RoomLights(np.full(3, 0.5)))
     floor = _AMBIENT_SHARE * ambient.ambient
@@ -114,12 +112,12 @@ def _fitted(environment: Environment, count: int, walls: bool) -> LightFit:
         if shining is not None:
             samples, best, shining = shining.fitted(samples, best)
             best = _refined(samples, best, floor)
-    surround = None
+    surround, cost = None, cost_of(samples, best)
     if shining is not None:
         surround = shining.surround(best.ambient)
         best = with_best_ambient(replace(samples, surround=np.ones_like(samples.surround)), best)
     rounded = _rounded(best)
-    return LightFit(rounded, relit_psnr(environment, rounded), relit_psnr(environment, ambient), surround)
+    return LightFit(rounded, relit_psnr(environment, rounded), relit_psnr(environment, ambient), surround), cost
 
 
 def relit(environment: Environment, lights: RoomLights) -> Floats:
