@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -85,6 +85,8 @@ def test_yaw_turns_the_directions(yaw: float) -> None:
     st.floats(0.06, 0.3),
     st.floats(10.0, 500.0),
 )
+@example((0.0, 0.1, 1.0), 0.25, 50.0)
+@example((0.0, -1.0, 0.05), 0.25, 50.0)
 def test_a_lamp_becomes_a_light_of_its_size(direction: tuple[float, float, float], radius: float, level: float) -> None:
     """Across the seam and over a pole, too. Light and rest together have the light of the panorama."""
     panorama = disc(direction, radius, level)
