@@ -23,6 +23,8 @@ Points = TypeVar("Points", ObjectPoints, BackdropPoints)
 
 #: A surface of the room hides a hit if it is nearer by more than this fraction of the hit's distance to the camera.
 OCCLUSION_TOLERANCE = 0.005
+#: The largest shadow ratio.
+MAX_RATIO = 2.0
 #: In place of a face: a ray hits none, or a path ends without a ray.
 _MISS, _END = -1, -2
 
@@ -79,6 +81,7 @@ class PathTracer:
         is_object = faces >= 0
         colours, t, ratio = np.empty((count, 3)), np.full(count, np.nan), np.ones((count, 3))
         outside = np.zeros(count, dtype=np.bool_)
+        state = _PathState(np.ones((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=np.int64))
         missed = np.flatnonzero(~is_object)
         colours[missed] = self._view.background
         if self._backdrop is not None:
@@ -86,14 +89,25 @@ class PathTracer:
             outside[missed] = points.outside
             known = np.flatnonzero(~points.outside)
             seen = missed[known]
-            colours[seen], ratio[seen] = self._shade_background(_select(points, known))
-
-        # Active paths: their index, the ray that hit the object, the face it hit, and their reflections and refractions
+            colours[seen], ratio[seen] = self._light_room(seen, _select(points, known), words, state, outside)
         path = np.flatnonzero(is_object)
-        ray_origins, ray_directions, hit_faces = origins[path], directions[path], faces[path]
+        t[path] = self._object.points(faces[path], origins[path], directions[path]).t
+        self._follow(path, origins[path], directions[path], faces[path], words, state, outside)
+        colours[path] = state.radiance[path].clip(max=1.0)
+        return TracedPaths(colours, faces, t, ratio, outside)
+
+    def _follow(
+        self,
+        path: Indices,
+        ray_origins: Floats,
+        ray_directions: Floats,
+        hit_faces: Indices,
+        words: Bytes,
+        state: _PathState,
+        outside: NDArray[np.bool_],
+    ) -> None:
+        """Follow paths to their end, from the rays that hit faces of the object; updates `state` and `outside`."""
         bounces = np.zeros(len(path), dtype=np.int64)
-        state = _PathState(np.ones((count, 3)), np.zeros((count, 3)), np.zeros(count, dtype=np.int64))
-        t[path] = self._object.points(hit_faces, ray_origins, ray_directions).t
         while len(path):
             hits = self._object.points(hit_faces, ray_origins, ray_directions)
             is_diffuse = self._object.kinds[hit_faces] == DIFFUSE
@@ -128,8 +142,24 @@ class PathTracer:
             active = np.flatnonzero(hit_faces >= 0)
             path, hit_faces, bounces = path[active], hit_faces[active], bounces[active]
             ray_origins, ray_directions = ray_origins[active], ray_directions[active]
-        colours[is_object] = state.radiance[is_object].clip(max=1.0)
-        return TracedPaths(colours, faces, t, ratio, outside)
+
+    def _light_room(
+        self, path: Indices, points: BackdropPoints, words: Bytes, state: _PathState, outside: NDArray[np.bool_]
+    ) -> tuple[Floats, Floats]:
+        """Colours and shadow ratios of surfaces of the room in direct view, float64 [n, 3] each.
+
+        Where the ray that gathers light there meets the object, what it brings replaces the ambient light.
+        """
+        origins, (visible, everything) = self._background_light(points, self._view.shadows)
+        if self._view.gather is not None:
+            directions, faces = self._scattered(
+                path, origins, points.normals, points.normals, np.zeros(len(path)), words, state
+            )
+            hit = np.flatnonzero(faces >= 0)
+            self._follow(path[hit], origins[hit], directions[hit], faces[hit], words, state, outside)
+            visible[hit] += state.radiance[path[hit]].clip(max=1.0) - self._view.ambient
+        ratio = np.divide(visible, everything, out=np.where(visible > 0, np.inf, 1.0), where=everything > 0)
+        return np.asarray((points.albedo * visible).clip(max=1.0)), ratio.clip(max=MAX_RATIO)
 
     def _add_cube(self, path: Indices, directions: Floats, state: _PathState) -> None:
         """Add the light of the cube to paths that have gathered and leave the object."""
@@ -163,15 +193,33 @@ class PathTracer:
         state.radiance[path] += state.weight[path] * (points.albedo * irradiance + points.emission).clip(max=1.0)
         directions, hit_faces = np.zeros_like(origins), np.full(len(path), _END, dtype=np.int64)
         rows = np.flatnonzero(goes_on)
-        if gather is not None and len(rows):
-            going = path[rows]
-            sphere = sphere_points(words[going] ^ np.array(gather.points, np.uint8)[state.gathered[going]])
-            directions[rows] = gathered_directions(axes[rows], points.facing[rows], sphere, alpha[rows])
-            state.weight[going] *= points.albedo[rows]
-            state.gathered[going] += 1
-            self.rays["gather"] += len(rows)
-            hit_faces[rows] = self._first_hits(origins[rows], directions[rows])
+        if len(rows):
+            directions[rows], hit_faces[rows] = self._scattered(
+                path[rows], origins[rows], axes[rows], points.facing[rows], alpha[rows], words, state
+            )
+            state.weight[path[rows]] *= points.albedo[rows]
         return origins, directions, hit_faces
+
+    def _scattered(
+        self,
+        path: Indices,
+        origins: Floats,
+        axes: Floats,
+        facing: Floats,
+        alpha: Floats,
+        words: Bytes,
+        state: _PathState,
+    ) -> tuple[Floats, Indices]:
+        """Directions and first faces (`_MISS`: none) of the rays that gather light at surfaces; counts them.
+
+        Axes, geometric normals and widths of lobes as for `gathered_directions`.
+        """
+        assert self._view.gather is not None
+        drawn = np.array(self._view.gather.points, np.uint8)[state.gathered[path]]
+        directions = gathered_directions(axes, facing, sphere_points(words[path] ^ drawn), alpha)
+        state.gathered[path] += 1
+        self.rays["gather"] += len(path)
+        return directions, self._first_hits(origins, directions)
 
     def _next_rays(
         self,
@@ -194,7 +242,7 @@ class PathTracer:
         is_tinted = (kinds == MIRROR) | points.front
         state.weight[path] *= np.where(is_tinted[:, None], points.albedo, 1.0)
         offset = self._object.tracer.offset * points.facing
-        split = np.flatnonzero(scattered.fresnel_weights > 0)
+        split = np.flatnonzero((scattered.fresnel_weights > 0) & (state.gathered[path] == 0))
         if len(split):
             origins = points.position[split] + offset[split]
             colour, is_outside = self._trace_background(origins, scattered.fresnel_directions[split], shadows=False)
@@ -253,12 +301,10 @@ class PathTracer:
         self.rays["in_box"] += int(np.count_nonzero(self._object.tracer.enters_box(origins, directions)[0]))
         return self._object.tracer.first_hits(origins, directions)
 
-    def _shade_background(self, points: BackdropPoints, shadows: bool = True) -> tuple[Floats, Floats]:
-        """Colours and shadow ratios of background surfaces, float64 [n, 3] each."""
+    def _background_light(self, points: BackdropPoints, shadows: bool) -> tuple[Floats, tuple[Floats, Floats]]:
+        """Origins of rays from background surfaces, and `_irradiance` there."""
         origins = points.position + self._object.tracer.offset * points.normals
-        shadowed, unshadowed = self._irradiance(origins, points.normals, shadows and self._view.shadows)
-        ratio = np.divide(shadowed, unshadowed, out=np.ones_like(shadowed), where=unshadowed > 0)
-        return np.asarray((points.albedo * shadowed).clip(max=1.0)), np.asarray(ratio, dtype=np.float64)
+        return origins, self._irradiance(origins, points.normals, shadows and self._view.shadows)
 
     def _trace_background(self, origins: Floats, directions: Floats, shadows: bool) -> tuple[Floats, NDArray[np.bool_]]:
         """Colours of rays that miss the object, float64 [n, 3], and whether no map covers what they hit, bool [n]."""
@@ -269,7 +315,9 @@ class PathTracer:
         view_directions = unit_vectors(directions @ matrix.T)
         points = self._to_mesh_space(self._backdrop.intersect(origins @ matrix.T + shift, view_directions))
         known = np.flatnonzero(~points.outside)
-        colours[known], _ = self._shade_background(_select(points, known), shadows)
+        surfaces = _select(points, known)
+        _, (light, _) = self._background_light(surfaces, shadows)
+        colours[known] = (surfaces.albedo * light).clip(max=1.0)
         return colours, points.outside
 
     def _irradiance(

@@ -1,4 +1,4 @@
-"""The shadow window: the pixels of a room's photo that the object may darken, which the device must render."""
+"""The shadow window: the pixels of a room's photo whose light the object may change, which the device must render."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ Window = tuple[int, int, int, int]
 
 #: Margin of the object's box, as a fraction of its edge; larger than the device's rounding errors.
 MARGIN = 0.02
+#: Surfaces within this many edges of the object's box gather light from it.
+GATHER_REACH = 1.0
 EMPTY: Window = (0, 0, 0, 0)
 
 
@@ -30,20 +32,23 @@ def whole_frame(view: View) -> Window:
 def shadow_window(view: View, environment: Environment, depth: Floats, extent: Extent) -> Window:
     """The smallest window of pixels whose shadow rays may hit the object's box, a pixel wider on each side.
 
+    With gathered light it also has the pixels whose surface is near the box.
+
     Args:
         view: The frame, with the room's pose.
         environment: The room, for its camera.
         depth: The device's decoded depth, float64 [environment.height, environment.width], metres along z.
         extent: Bounds of the object.
     """
-    if not view.shadows:
-        return EMPTY
     points = surface_points(view, environment, depth)
     margin = MARGIN * extent.edge
     low, high = extent.low - margin, extent.high + margin
     shaded = np.zeros(points.shape[:2], dtype=bool)
-    for light in view.lights:
+    for light in view.lights if view.shadows else ():
         shaded |= _hits_box(points, light.position - points, low, high)
+    if view.gather is not None:
+        reach = GATHER_REACH * extent.edge
+        shaded |= ((points >= extent.low - reach) & (points <= extent.high + reach)).all(axis=2)
     if not shaded.any():
         return EMPTY
     if not view.is_map_camera:

@@ -340,7 +340,7 @@ def _surface_words(
     return [
         *_position(low, "the room"),
         *_position(high, "the room"),
-        WINDOW_WHOLE if window == [0, 0, *size] else shadowed,
+        WINDOW_WHOLE if window == [0, 0, *size] or registers.get("gather.bounces", 0) else shadowed,
         int(occlusion),
         round(header.extent.edge * _step(header, manifest)),
         *(limit, tile, tiles.shape[1], tiles.shape[0]),

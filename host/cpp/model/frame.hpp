@@ -68,65 +68,81 @@ public:
         const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
         Pixel pixel{frame_.lighting.background, {one, one, one}, false, 0, 0};
         ++counters.raysPrimary;
-        RayRequest request = primaryRay(x, y);
+        const RayRequest request = primaryRay(x, y);
         if (!frame_.maySeeObject(x, y)) return directView(pixel, x, y, request);
-        Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, {}};
-        RayKind kind = RayKind::primary;
-        for (bool isPrimary = true;; isPrimary = false) {
-            path.direction = request.direction;
-            log.addRay(kind, request, numbers_);
-            const Ray ray = prepareRay(request, frame_.bounds, numbers_);
-            const Hit hit = trace(ray);
-            if (!hit.found && isPrimary) return directView(pixel, x, y, request);
-            if (!hit.found) return finish(pixel, path, lightBehind(path, request));
-            const Wide distance = floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t;
-            if (mayBeHidden(path)) {
-                const EnvironmentHit found = isPrimary ? findDirectView(x, y, request) : findHit(request);
-                if (march_->hides(found.point, found.direction, distance, isPrimary, frame_.environment))
-                    return isPrimary ? showDirectView(pixel, request, found) : finish(pixel, path, radianceOf(request, found, true));
-            }
-            if (isPrimary) {
-                ++counters.hits;
-                pixel.isObject = true;
-                pixel.triangle = static_cast<std::uint32_t>(hit.id);
-                pixel.distance = distance;
-            }
+        log.addRay(RayKind::primary, request, numbers_);
+        const Ray ray = prepareRay(request, frame_.bounds, numbers_);
+        const Hit hit = trace(ray);
+        if (!hit.found) return directView(pixel, x, y, request);
+        const Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, request.direction};
+        const Wide distance = distanceOf(ray, hit);
+        if (mayBeHidden(path)) {
+            const EnvironmentHit found = findDirectView(x, y, request);
+            if (march_->hides(found.point, found.direction, distance, true, frame_.environment)) return showDirectView(pixel, x, y, request, found);
+        }
+        ++counters.hits;
+        pixel.isObject = true;
+        pixel.triangle = static_cast<std::uint32_t>(hit.id);
+        pixel.distance = distance;
+        pixel.colour = follow(path, request, ray, hit, pixelPoint(x, y));
+        return pixel;
+    }
+
+private:
+    /// The colour that a path brings, from the first hit of the object on. `point`: the pixel's sample point.
+    Colour follow(Path path, RayRequest request, Ray ray, Hit hit, const SamplePoint& point) {
+        for (;;) {
+            RayKind kind = RayKind::gather;
             const Face* const face = memory_.faceOf(hit.id);
             if (!face) {
                 errors.illegalRecord = true;
-                return finish(pixel, path, path.gathered > 0 ? cube_.texel(path.direction) : frame_.lighting.background);
+                return total(path, path.gathered > 0 ? cube_.texel(path.direction) : frame_.lighting.background);
             }
             const Surface surface = surfaceOf(ray, hit, *face, numbers_);
             const Material& material = frame_.lighting.materialOf(*face);
             const Colour albedo = albedoOf(material, hit, *face);
             if (material.kind == MaterialKind::mirror || material.kind == MaterialKind::glass) {
-                if (!continuePath(surface, material, albedo, path, request, kind)) return finish(pixel, path, lightBehind(path, request));
-                continue;
+                if (!continuePath(surface, material, albedo, path, request, kind)) return total(path, lightBehind(path, request));
+            } else {
+                const bool gathers = path.gathered < frame_.gather.bounces;
+                const Lobe* const lobe = gathers && material.kind == MaterialKind::roughMetal ? &material.lobe : nullptr;
+                const WideVector normal = shadingNormal(surface, frame_.lighting.flat), axis = lobe ? lobeAxis(normal, surface.dir, numbers_) : normal;
+                const Colour colour = emitted(material, light(surface, axis, lobe, albedo, !gathers));
+                if (!gathers) return total(path, colour);
+                path.radiance = total(path, colour);
+                for (int channel = 0; channel < 3; ++channel) path.throughput[channel] = (path.throughput[channel] * tintOf(albedo[channel])) >> numbers_.lightFraction;
+                request = gatheredRay(offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_), axis, surface.faceForwardNormal, lobe, path, point);
             }
-            const bool gathers = path.gathered < frame_.gather.bounces;
-            const Lobe* const lobe = gathers && material.kind == MaterialKind::roughMetal ? &material.lobe : nullptr;
-            const WideVector normal = shadingNormal(surface, frame_.lighting.flat), axis = lobe ? lobeAxis(normal, surface.dir, numbers_) : normal;
-            const Colour colour = emitted(material, light(surface, axis, lobe, albedo, !gathers));
-            if (!gathers) return finish(pixel, path, colour);
-            for (int channel = 0; channel < 3; ++channel) {
-                std::int64_t& throughput = path.throughput[channel];
-                path.radiance[channel] = std::min(white(), path.radiance[channel] + ((throughput * colour[channel]) >> numbers_.lightFraction));
-                throughput = (throughput * tintOf(albedo[channel])) >> numbers_.lightFraction;
+            path.direction = request.direction;
+            log.addRay(kind, request, numbers_);
+            ray = prepareRay(request, frame_.bounds, numbers_);
+            hit = trace(ray);
+            if (!hit.found) return total(path, lightBehind(path, request));
+            if (mayBeHidden(path)) {
+                const EnvironmentHit found = findHit(request);
+                if (march_->hides(found.point, found.direction, distanceOf(ray, hit), false, frame_.environment)) return total(path, radianceOf(request, found, true));
             }
-            const Vector direction = gatherDirection(axis, surface.faceForwardNormal, frame_.gather.points[path.gathered] ^ pixelPoint(x, y), lobe, numbers_);
-            request = {offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_), {direction[0], direction[1], direction[2]}, numbers_.unlimited(), ~std::uint64_t(0)};
-            ++path.gathered;
-            ++counters.raysGather;
-            kind = RayKind::gather;
         }
     }
 
-private:
-    Pixel finish(Pixel pixel, const Path& path, const Colour& colour) const {
-        for (int channel = 0; channel < 3; ++channel)
-            pixel.colour[channel] = std::min(white(), path.radiance[channel] + ((path.throughput[channel] * colour[channel]) >> numbers_.lightFraction));
-        return pixel;
+    /// The ray that gathers light at a surface, from `origin` off it.
+    RayRequest gatheredRay(const WideVector& origin, const WideVector& axis, const Vector& faceForwardNormal, const Lobe* lobe, Path& path, const SamplePoint& point) {
+        const Vector direction = gatherDirection(axis, faceForwardNormal, frame_.gather.points[path.gathered] ^ point, lobe, numbers_);
+        ++path.gathered;
+        ++counters.raysGather;
+        return {origin, {direction[0], direction[1], direction[2]}, numbers_.unlimited(), ~std::uint64_t(0)};
     }
+
+    Wide distanceOf(const Ray& ray, const Hit& hit) const { return floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t; }
+
+    /// The radiance of a path that ends in a colour.
+    Colour total(const Path& path, const Colour& colour) const {
+        Colour radiance;
+        for (int channel = 0; channel < 3; ++channel)
+            radiance[channel] = std::min(white(), path.radiance[channel] + ((path.throughput[channel] * colour[channel]) >> numbers_.lightFraction));
+        return radiance;
+    }
+private:
 
     /// The albedo of the object at a hit.
     Colour albedoOf(const Material& material, const Hit& hit, const Face& face) {
@@ -251,26 +267,49 @@ private:
     /// Completes a pixel whose ray misses the object.
     Pixel directView(const Pixel& pixel, std::int64_t x, std::int64_t y, const RayRequest& ray) {
         if (!hasEnvironment() || (!frame_.maySeeObject(x, y) && !frame_.environment.shows(x, y))) return pixel;
-        return showDirectView(pixel, ray, findDirectView(x, y, ray));
+        return showDirectView(pixel, x, y, ray, findDirectView(x, y, ray));
     }
 
     /// Completes a pixel that shows the environment itself.
-    Pixel showDirectView(Pixel pixel, const RayRequest& ray, const EnvironmentHit& found) {
+    Pixel showDirectView(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray, const EnvironmentHit& found) {
         if (found.point.kind == EnvironmentPoint::Kind::miss) return pixel;
-        const Incoming light = lightAt(ray, found, true);
+        Incoming light = lightAt(ray, found, true);
+        if (const auto gathered = gatherFromObject(x, y, ray, found))
+            for (int channel = 0; channel < 3; ++channel) light.visible[channel] += (*gathered)[channel] - frame_.lighting.ambient[channel];
         pixel.colour = reflectedBy(found.texel.albedo, light.visible);
         for (int channel = 0; channel < 3; ++channel) pixel.ratio[channel] = ratioOf(light.visible[channel], light.unoccluded[channel]);
         return pixel;
     }
 
-    /// part / whole with 12 fraction bits, 1 for 0 / 0; part must not be larger.
-    std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const { return part == whole ? std::int64_t(1) << numbers_.lightFraction : (part << numbers_.lightFraction) / whole; }
+    /// The light of the ray that a point of the environment gathers, if it meets the object.
+    std::optional<Colour> gatherFromObject(std::int64_t x, std::int64_t y, const RayRequest& view, const EnvironmentHit& found) {
+        if (frame_.gather.bounces == 0) return std::nullopt;
+        const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
+        const Vector& normal = found.texel.normal;
+        const WideVector origin = offSurface(march_->hitPosition(view.origin, found.direction, found.point), normal, frame_.lighting.offset, numbers_);
+        Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, {}};
+        const RayRequest request = gatheredRay(origin, {normal[0], normal[1], normal[2]}, normal, nullptr, path, pixelPoint(x, y));
+        path.direction = request.direction;
+        log.addRay(RayKind::gather, request, numbers_);
+        const Ray ray = prepareRay(request, frame_.bounds, numbers_);
+        const Hit hit = trace(ray);
+        if (!hit.found) return std::nullopt;
+        return follow(path, request, ray, hit, pixelPoint(x, y));
+    }
+
+    /// part / whole with 12 fraction bits, less than 2; 1 for 0 / 0.
+    std::int64_t ratioOf(std::int64_t part, std::int64_t whole) const {
+        const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
+        if (part == whole) return one;
+        return part < 2 * whole ? (part << numbers_.lightFraction) / whole : 2 * one - 1;
+    }
 
     /// Continues a path at a mirror or glass; false if the next ray sees only the background.
     bool continuePath(const Surface& surface, const Material& material, const Colour& albedo, Path& path, RayRequest& request, RayKind& kind) {
         const Bounce next = bounce(surface, material, frame_.lighting.flat, frame_.lighting.offset, numbers_);
         Colour reflectionColour = frame_.lighting.background;
-        if (frame_.hasEnvironment && next.fresnelWeight != 0) {
+        const std::int64_t fresnelWeight = path.gathered == 0 ? next.fresnelWeight : 0;
+        if (frame_.hasEnvironment && fresnelWeight != 0) {
             RayRequest reflection = next.ray;
             // The Fresnel reflection starts on the opposite side of the surface to the refracted ray
             reflection.origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
@@ -282,7 +321,7 @@ private:
         for (int channel = 0; channel < 3; ++channel) {
             std::int64_t& throughput = path.throughput[channel];
             if (isTinted) throughput = (throughput * tintOf(albedo[channel])) >> numbers_.lightFraction;
-            const std::int64_t reflected = (throughput * next.fresnelWeight) >> numbers_.lightFraction;
+            const std::int64_t reflected = (throughput * fresnelWeight) >> numbers_.lightFraction;
             path.radiance[channel] = std::min(white(), path.radiance[channel] + ((reflected * reflectionColour[channel]) >> numbers_.lightFraction));
             throughput -= reflected;
         }

@@ -94,6 +94,9 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
     none, one, four, _ = simulated.frames
     assert none.counters["raysGather"] == 0 < one.counters["raysGather"] < four.counters["raysGather"]
     assert (one.colour != none.colour).any(axis=2)[one.is_object].mean() > 0.3
+    if one.ratio is not None and none.ratio is not None and four.ratio is not None:
+        assert (one.ratio != none.ratio).any(axis=2).sum() > 5 and (four.ratio != one.ratio).any()
+        assert (four.ratio > 4096).any(), "light is reflected onto the room"
 
 
 @pytest.mark.matrix

@@ -9,6 +9,7 @@ import numpy as np
 import OpenImageIO
 import pytest
 
+from colonnade.common.accumulation import FramePasses
 from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import render_model
@@ -19,6 +20,7 @@ from colonnade.maps.cache import encoded_environment
 from colonnade.maps.layout import AttributeLayout
 from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render_frames
+from colonnade.render.reference_frames import traced_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.lit_room import LitRoom, lit_room
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene
@@ -103,6 +105,24 @@ def test_what_cannot_gather_is_refused(tmp_path: Path) -> None:
         manifest_for("textured", ("units.shadeInterval=128",))
     with pytest.raises(UserError, match=r"frame\.gather"):
         manifest_for("textured", ("frame.maxBounces=0",))
+
+
+def test_room_pixels_near_the_object_gather_its_light() -> None:
+    """The ratios of the model are those of the reference, in the window and beside it."""
+    design, size = manifest_for("textured").manifest, (80, 60)
+    scene = replace(IN_ROOM, material=Material(albedo=(0.8, 0.1, 0.1))).with_samples(4)
+    prepared = DeviceScene.of(scene, design)
+    passes = FramePasses()
+    for one in prepared.scene.passes():
+        passes.add(render_model(design, prepared.image, prepared.registers(size, one)))
+    room = load_environment(ROOM)
+    (traced,) = traced_frames([scene], load_mesh("teapot:4"), room, size, 2)
+    expected, found = traced.sums.ratio, passes.sums.ratio
+    assert expected is not None and found is not None
+    shows_room = (traced.sums.coverage == 0) & (passes.sums.coverage == 0)
+    errors = np.abs(found / 4096 - expected)[shows_room] / 4
+    print(errors.mean(), (errors > 0.02).mean(), found[shows_room].min(), found[shows_room].max())
+    assert errors.mean() < 0.004
 
 
 def test_a_surface_in_a_dome_of_light_is_as_bright_as_under_ambient_light() -> None:

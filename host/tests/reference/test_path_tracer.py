@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from colonnade.environment.light_cube import LightCube
 from colonnade.environment.model import Environment, EnvironmentCamera
 from colonnade.lab.evaluation.studies.synthetic_attic import attic
 from colonnade.mesh.load import clean_mesh, load_mesh
@@ -16,7 +17,7 @@ from colonnade.reference.bounce import bounce
 from colonnade.reference.environment.depth_mesh import DepthMesh, full_backdrop
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints
 from colonnade.reference.render import ReferenceResult, render_reference
-from colonnade.scene.view import PlacedLight, View
+from colonnade.scene.view import Gather, PlacedLight, View
 
 SIZE = 48, 32
 LIGHT = PlacedLight(np.array([0.3, -0.4, 0.5]), np.array([0.6, 0.5, 0.4]))
@@ -124,6 +125,22 @@ def test_the_most_opaque_occluder_determines_the_shadow(kinds: tuple[str, ...], 
     np.testing.assert_allclose(
         frame.image[16, 24] / environment.albedo[16, 24], frame.shadow_ratio[16, 24] * everything, rtol=1e-3
     )
+
+
+def test_a_wall_gathers_light_from_what_stands_on_it() -> None:
+    """Close to a wide plate almost half of the directions meet it: they bring its colour in place of ambient light."""
+    environment, plate = wall(), MeshMaterial(albedo=(0.9, 0.3, 0.0))
+    dark = (PlacedLight(LIGHT.position, np.zeros(3)),)
+    gather = Gather(1, ((37, 201),) * 4, LightCube(np.full((6, 8, 8, 3), 0.2)))
+    view = placed(environment, plate, lights=dark, gather=gather)
+    frame = rendered(quads(lying(0.5, 9.0, 0.5, 3.99), materials=(plate,)), view, environment)
+    # Rows of squares of 4 x 4 pixels, 0.2 m to 0.5 m above the plate
+    ratio = frame.shadow_ratio[16:20]
+    meets = ratio[..., 2] < 0.5
+    assert not frame.object_mask[16:20].any() and 0.42 < meets.mean() < 0.48
+    np.testing.assert_allclose(ratio, np.where(meets[..., None], plate.albedo, 1.0), rtol=1e-9)
+    np.testing.assert_allclose(frame.image[16:20], environment.albedo[16:20] * 0.2 * ratio, rtol=1e-9)
+    assert frame.rays["gather"] == SIZE[0] * SIZE[1]
 
 
 def test_a_mirror_on_the_floor_shows_the_wall_upside_down() -> None:

@@ -222,6 +222,9 @@ final case class ColonnadeConfig(
   /** The device supports an environment. */
   val hasEnvironment: Boolean = physicalAttributeMemory.nonEmpty
 
+  /** Points of the environment gather light from the object. */
+  val gathersInRoom: Boolean = frame.gather && hasEnvironment
+
   /** Columns that read one copy of the environment's maps. */
   val columnsPerCopy: Int = physicalAttributeMemory.fold(1)(_.columnsPerCopy.min(array.columns))
 

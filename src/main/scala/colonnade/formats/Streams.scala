@@ -22,7 +22,7 @@ final class Pixel(config: ColonnadeConfig) extends Bundle {
   val colour   = Rgb(FrameRegisters.colour) // a linear colour
   val isObject = Bool()
 
-  /** The shadow ratio: the fraction of the light that the object leaves to a pixel of the environment; 1 for others. */
+  /** The shadow ratio: of a pixel of the environment, its light with the object over that without; 1 for others. */
   val ratio = if (config.hasEnvironment) Some(Rgb(FrameRegisters.weight)) else None
   val hit   = if (config.frame.hits) Some(new PixelHit(config)) else None
 }

@@ -22,6 +22,10 @@ final private[shading] class ColourOperation(config: PathConfig) extends Bundle 
   /** Of an end: the path goes on with a gathered ray; it ends in the light cube. */
   val gathers   = Option.when(config.frame.gather)(Bool())
   val showsCube = Option.when(config.frame.gather)(Bool())
+
+  /** Of an end: its colour is what a point of the environment has gathered; that replaces the point's ambient light. */
+  val goesBack    = Option.when(config.gathersInRoom)(Bool())
+  val hasGathered = Option.when(config.gathersInRoom)(Bool())
 }
 
 /** A channel and a light of an operation in the stages of [[ColourUnit]]. */
@@ -51,4 +55,7 @@ final private[shading] class ColourSlot(config: PathConfig) extends Bundle {
   /** The path gathers; the light of the cube where it ends there. */
   val gathers = Option.when(config.frame.gather)(Bool())
   val cube    = Option.when(config.frame.gather)(Valid(UInt(NumberFormats.lightBits.W)))
+
+  val goesBack    = Option.when(config.gathersInRoom)(Bool())
+  val hasGathered = Option.when(config.gathersInRoom)(Bool()) // the radiance is that light
 }

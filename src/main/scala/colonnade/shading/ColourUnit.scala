@@ -2,7 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, MuxLookup, Valid}
-import colonnade.common.{Context, ContextTable}
+import colonnade.common.ContextTable
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
 import colonnade.numbers.{Fixed, Rounding}
@@ -17,7 +17,7 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   val colour     = Valid(new PathColour(config))
 
   /** A path whose surface's light is added, and which goes on; the light cube. */
-  val continued = Option.when(config.frame.gather)(Valid(Context(config)))
+  val continued = Option.when(config.frame.gather)(Valid(new ContinuedPath(config)))
   val cube      = Option.when(config.frame.gather)(new LightPort(config))
 }
 
@@ -29,7 +29,8 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   * }}}
   * An end takes 3 · lights cycles, with the lights that are on, at least one; in the background 3. A bounce takes 3, and
   * 3 · lights more if its reflection shows a surface; none if it is the path's first and has no Fresnel reflection.
-  * An end whose surface gathers light needs 3 cycles more, and gives no colour: the path goes on.
+  * An end whose surface gathers light needs 3 cycles more, and gives no colour: the path goes on. Nor does an end of a ray
+  * that a point of the environment gathers: its colour becomes the path's radiance.
   * Colours come in any order; the throughput and radiance of every path are in a table.
   *
   * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights · transmittance))
@@ -78,6 +79,7 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val mayBounce = io.bounce.map(_.valid && !isDirect).getOrElse(false.B)
   private val bounces   = mayBounce && isFree
   private val takes     = bounces || io.end.fire
+  private val isOfRoom = io.end.bits.isOfEnvironment.getOrElse(true.B) || bounces
   private val taken = Mux(mayBounce, io.bounce.map(_.bits.context).getOrElse(io.end.bits.context), io.end.bits.context)
   private val tints = io.bounce.map { bounce =>
     bounce.bits.albedo.channels.map(albedo => Mux(bounce.bits.isTinted, albedo +& albedo(colourBits - 1), one))
@@ -93,8 +95,12 @@ final class ColourUnit(config: PathConfig) extends Module {
     when(bounces) { next.occlusions.foreach(_ := Occlusion.none) }
     val showsSurface = Mux(bounces, io.bounce.flatMap(_.bits.hasSurface).getOrElse(false.B), !io.end.bits.isBackground)
     next.hasSurface := showsSurface
-    next.needsRatio := !bounces && showsSurface && io.end.bits.isDirectView.getOrElse(false.B) &&
-      io.end.bits.occlusions.map(_ =/= Occlusion.none).reduce(_ || _)
+    val isDirectView = !bounces && io.end.bits.isDirectView.getOrElse(false.B)
+    val hasGathered  = isDirectView && isOfRoom && !io.end.bits.isStraight.getOrElse(true.B)
+    next.needsRatio := isDirectView && isOfRoom && showsSurface &&
+      (io.end.bits.occlusions.map(_ =/= Occlusion.none).reduce(_ || _) || hasGathered)
+    next.hasGathered.foreach(_ := hasGathered)
+    for (to <- next.goesBack; gathers <- io.end.bits.gathers) to  := isDirectView && !isOfRoom && !gathers
     for (to <- next.gathers; from <- io.end.bits.gathers) to      := !bounces && from
     for (to <- next.showsCube; end <- io.end.bits.isScattered) to := !bounces && io.end.bits.isBackground && end
     next.fresnel.foreach(_.raw := 0.U)
@@ -127,8 +133,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   }.elsewhen(isLast) { isIssuing := false.B }
   ratios.foreach(_.claim := starts && next.needsRatio)
 
-  private val surfaces    = ContextTable(config, new TerminalSurface(config))
-  private val surface     = surfaces.read(taken, takes)
+  private val surfaces = new SurfaceTable(config)
+  private val surface  = surfaces.read(taken, isOfRoom, takes)
   private val albedo      = Reg(Vec(3, UInt(colourBits.W)))
   private val directLight = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
   private val emission    = Option.when(config.frame.emission)(Reg(Vec(3, UInt(colourBits.W))))
@@ -137,7 +143,7 @@ final class ColourUnit(config: PathConfig) extends Module {
     surface.albedo      := io.surface.bits.albedo
     surface.directLight := io.surface.bits.directLight
     surface.emission.zip(io.surface.bits.emission).foreach { case (to, from) => to := from }
-    surfaces.write(io.surface.bits.context, surface)
+    surfaces.write(io.surface.bits.context, io.surface.bits.isOfEnvironment.getOrElse(false.B), surface)
   }
   when(RegNext(takes, false.B)) {
     albedo      := VecInit(surface.albedo.channels)
@@ -150,7 +156,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val radiance   = if (hasBounces) Reg(Vec(3, UInt(colourBits.W))) else VecInit.fill(3)(0.U(colourBits.W))
   for (path <- paths.map(_.read(Mux(repeats, next.context, taken), reads)))
     when(starts) {
-      throughput := VecInit(path.throughput.map(weight => Mux(next.isStraight, one, weight.natural)))
+      val isNew = next.isStraight || next.hasGathered.getOrElse(false.B)
+      throughput := VecInit(path.throughput.map(weight => Mux(isNew, one, weight.natural)))
       radiance   := VecInit(path.radiance.channels.map(Mux(next.isStraight, 0.U, _)))
     }
 
@@ -200,6 +207,7 @@ final class ColourUnit(config: PathConfig) extends Module {
     cube.bits       := of(port.light.channels.map(_.natural))
   }
   slot.gathers.foreach(_ := gathers)
+  for ((to, from) <- slot.goesBack.zip(operation.goesBack) ++ slot.hasGathered.zip(operation.hasGathered)) to := from
   private val tint = operation.tint
     .map(tint => Mux(gathers, of(albedo) +& of(albedo)(colourBits - 1), of(tint.map(_.natural))))
     .getOrElse(one)
@@ -213,13 +221,20 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val arrival = after(slot)()
   private val lit     = Reg(UInt(sumBits.W))
   private val all     = Reg(UInt(sumBits.W))
-  private val ambient =
-    Mux(arrival.gathers.getOrElse(false.B), 0.U, of(io.ambient.channels, arrival.channel).natural)
-  lit := Mux(arrival.isBounce && arrival.isPath, 0.U, Mux(arrival.isFirstLight, ambient, lit)) + arriving
+  private val ambient = of(io.ambient.channels, arrival.channel).natural
+  private val indirect = Mux(
+    arrival.gathers.getOrElse(false.B),
+    0.U,
+    Mux(arrival.hasGathered.getOrElse(false.B), arrival.radiance, ambient)
+  )
+  lit := Mux(arrival.isBounce && arrival.isPath, 0.U, Mux(arrival.isFirstLight, indirect, lit)) + arriving
   all := Mux(arrival.isFirstLight, ambient, all) + RegNext(direct)
 
   // The light that leaves the surface, or the weight of the Fresnel reflection
-  private val sum       = after(arrival)(slot => slot.isValid := arrival.isValid && arrival.isLastLight)
+  private val sum = after(arrival) { slot =>
+    slot.isValid := arrival.isValid && arrival.isLastLight
+    when(arrival.hasGathered.getOrElse(false.B)) { slot.radiance := 0.U }
+  }
   private val factors   = Reg(Vec(2, UInt(weightBits.W)))
   private val reflected = Reg(UInt((sumBits + weightBits - fraction).W))
   factors   := VecInit(Mux(ofSurface, of(albedo), fresnel), factors(0))
@@ -271,9 +286,10 @@ final class ColourUnit(config: PathConfig) extends Module {
     shiftIn(weights, added.weight)
   }
 
-  // An end's colour leaves, or waits for its ratio
-  private val done    = after(added)(slot => slot.isValid := added.isValid && added.isLast)
-  private val isShown = done.isValid && !done.isBounce && !done.needsRatio
+  // An end's colour leaves, or waits for its ratio, or becomes the radiance that a point of the environment gathers
+  private val done     = after(added)(slot => slot.isValid := added.isValid && added.isLast)
+  private val goesBack = done.goesBack.getOrElse(false.B)
+  private val isShown  = done.isValid && !done.isBounce && !done.needsRatio && !goesBack
   private val result  = Wire(new PathColour(config))
   result.context := done.context
   result.colour.channels.zip(colours).foreach { case (to, from) => to := from }
@@ -291,10 +307,11 @@ final class ColourUnit(config: PathConfig) extends Module {
   }
 
   // A bounce's path enters the table; a read in the same cycle does not count
-  isWriting := done.isValid && done.isBounce
+  isWriting := done.isValid && (done.isBounce || goesBack)
   for (continued <- io.continued) {
-    continued.valid := isWriting && done.gathers.get
-    continued.bits  := done.context
+    continued.valid        := isWriting && (done.gathers.get || goesBack)
+    continued.bits.context := done.context
+    continued.bits.isBack.foreach(_ := goesBack)
   }
   for (table <- paths; bounce <- io.bounce) when(isWriting || (bounce.fire && isDirect)) {
     val path = Wire(new PathState)
@@ -319,6 +336,20 @@ final private class TerminalSurface(config: PathConfig) extends Bundle {
   val albedo      = Rgb(FrameRegisters.colour)
   val directLight = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
   val emission    = if (config.frame.emission) Some(Rgb(FrameRegisters.colour)) else None
+}
+
+/** The surfaces of all contexts. Where points of the environment gather, a context may have one of the object beside. */
+final private class SurfaceTable(config: PathConfig) {
+  private val table = SyncReadMem(config.contexts.max(2) * (if (config.gathersInRoom) 2 else 1), new TerminalSurface(config))
+
+  private def address(context: UInt, isOfEnvironment: Bool): UInt =
+    if (config.gathersInRoom) context ## isOfEnvironment else context
+
+  def write(context: UInt, isOfEnvironment: Bool, surface: TerminalSurface): Unit =
+    table.write(address(context, isOfEnvironment), surface)
+
+  def read(context: UInt, isOfEnvironment: Bool, isRead: Bool): TerminalSurface =
+    table.read(address(context, isOfEnvironment), isRead)
 }
 
 /** A path after its bounces so far. */

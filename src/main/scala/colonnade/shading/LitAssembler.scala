@@ -93,6 +93,7 @@ final class LitAssembler(config: PathConfig, places: Int) extends Module {
   lit.context := label.context
   lit.albedo  := albedo.albedo
   for (albedo <- label.environment) when(albedo.valid)(lit.albedo := albedo.bits)
+  lit.isOfEnvironment.foreach(_ := isEnvironment)
   for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
     channel                                           := Mux(isEnvironment, 0.U, value)
   for ((to, from) <- lit.origin.axes.zip(origins)) to := Fixed(new RayFormats(config.numbers).scene, from.bits)

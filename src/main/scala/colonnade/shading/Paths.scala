@@ -9,7 +9,7 @@ import colonnade.formats.{FrameRegisters, Rgb}
 final class PathTermination(config: PathConfig) extends Bundle {
   val context      = Context(config)
   val isBackground = Bool() // there is no surface: the path ends with the background's colour
-  val isStraight = Option.when(config.frame.hasBounces)(Bool()) // the path has hit neither mirror nor glass
+  val isStraight = Option.when(config.frame.hasBounces)(Bool()) // the path's throughput is 1, its radiance 0
   val occlusions = Vec(config.frame.lights, Occlusion())        // by light: the shadow rays' outcomes
 
   /** The camera sees the environment's surface directly: the shadow ratio is needed as well. */
@@ -18,6 +18,19 @@ final class PathTermination(config: PathConfig) extends Bundle {
   /** The surface gathers light: the path goes on, without ambient light; without a surface it ends in the light cube. */
   val gathers     = Option.when(config.frame.gather)(Bool())
   val isScattered = Option.when(config.frame.gather)(Bool())
+
+  /** The surface is of the environment. In direct view, the ray that it has gathered is complete: its light replaces the
+    * ambient light, unless the path is straight. A path in direct view that ends elsewhere is that ray.
+    */
+  val isOfEnvironment = Option.when(config.gathersInRoom)(Bool())
+}
+
+/** A path that goes on after the light of its surface is added. */
+final class ContinuedPath(config: PathConfig) extends Bundle {
+  val context = Context(config)
+
+  /** The ray that a point of the environment has gathered is complete: the point is lit. */
+  val isBack = Option.when(config.gathersInRoom)(Bool())
 }
 
 /** The change of a path's throughput at a mirror or glass. */

@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{log2Ceil, RegEnable, Valid}
+import chisel3.util.{log2Ceil, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
 import colonnade.formats.{Gather, PixelPosition, SamplePoint}
@@ -21,8 +21,8 @@ final class PixelOfContext(config: PathConfig) extends Bundle {
 
 final class SamplePointsIO(config: PathConfig) extends Bundle {
   val gather = Input(new Gather)
-  val pixel  = Flipped(Valid(new PixelOfContext(config)))            // a context that gets a pixel
-  val counts = Input(Vec(config.contexts, UInt(Gather.countBits.W))) // of the rays that each path has gathered
+  val pixel  = Flipped(Valid(new PixelOfContext(config))) // a context that gets a pixel
+  val count  = Input(UInt(Gather.countBits.W))            // of rays gathered so far; in the cycle of the point
   val port   = Flipped(new SamplePort(config))
 }
 
@@ -35,10 +35,9 @@ final class SamplePoints(config: PathConfig) extends Module {
   when(io.pixel.valid) { points.write(start.context, SamplePoints.ofPixel(start.pixel)) }
 
   private val read  = io.port.read
-  private val count = RegEnable(io.counts(read.bits), read.valid)
-  private val index = count(log2Ceil(Gather.maxBounces) - 1, 0)
+  private val index = io.count(log2Ceil(Gather.maxBounces) - 1, 0)
   private val pixel = points.read(read.bits, read.valid)
-  io.port.gathers := count < io.gather.bounces
+  io.port.gathers := io.count < io.gather.bounces
   io.port.point.u := io.gather.points(index).u ^ pixel.u
   io.port.point.v := io.gather.points(index).v ^ pixel.v
 }

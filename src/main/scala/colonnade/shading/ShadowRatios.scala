@@ -21,7 +21,9 @@ final class ShadowRatiosIO(config: PathConfig, bits: Int) extends Bundle {
   val claim = Input(Bool())
   val busy  = Output(Bool())
 
-  /** A channel, in the order 0, 1, 2; and its light without shadows, at least `part`. */
+  /** A channel, in the order 0, 1, 2; and its light without the object, at least `part` unless points of the environment
+    * gather.
+    */
   val load  = Flipped(Valid(new ShadowRatioRequest(bits)))
   val whole = Input(UInt(bits.W))
 
@@ -30,7 +32,7 @@ final class ShadowRatiosIO(config: PathConfig, bits: Int) extends Bundle {
 }
 
 /** Shadow ratios of one pixel at a time, beside the stream of [[ColourUnit]]: three dividers, one quotient bit a cycle
-  * each. The result is offered 13 cycles after the last channel.
+  * each. The result is offered 13 cycles after the last channel. A ratio of 2 or more is the largest number.
   */
 final class ShadowRatios(config: PathConfig, bits: Int) extends Module {
   private val fraction = NumberFormats.lightFraction
@@ -51,22 +53,28 @@ final class ShadowRatios(config: PathConfig, bits: Int) extends Module {
   private val divides = isLoaded && bitsLeft =/= 0.U
   when(divides) { bitsLeft := bitsLeft - 1.U }
 
+  // The integer digit of a channel that comes
+  private val part           = io.load.bits.part
+  private val isOne          = part === io.whole
+  private val (digit, above) = if (config.gathersInRoom) DigitRecurrence.step(part, io.whole, bits) else (false.B, part)
+  private val isTooLarge     = if (config.gathersInRoom) above >= io.whole else false.B
+
   private val ratios = Seq.tabulate(3) { channel =>
     val whole     = Reg(UInt(bits.W))
     val remainder = Reg(UInt(bits.W))
     val ratio     = Reg(UInt((fraction + 1).W))
 
-    val isOne        = Reg(Bool()) // the ratio is one, and needs no division
+    val isKnown      = Reg(Bool()) // the ratio needs no division
     val (fits, rest) = DigitRecurrence.step((remainder << 1).asUInt, whole, bits)
-    when(divides && !isOne) {
+    when(divides && !isKnown) {
       remainder := rest
       ratio     := Cat(ratio(fraction - 1, 0), fits)
     }
     when(io.load.valid && io.load.bits.channel === channel.U) {
       whole     := io.whole
-      remainder := io.load.bits.part
-      ratio     := Mux(io.load.bits.part === io.whole, (1 << fraction).U, 0.U)
-      isOne     := io.load.bits.part === io.whole
+      remainder := above
+      ratio     := Mux(isOne, (1 << fraction).U, Mux(isTooLarge, ((2 << fraction) - 1).U, digit))
+      isKnown   := isOne || isTooLarge
     }
     ratio
   }

@@ -24,8 +24,8 @@ final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val shading = Input(new Shading(config))
   val start   = Flipped(Valid(Context(config))) // a context gets a new pixel
 
-  /** A context gathers light: its path has a throughput before its first bounce. */
-  val gathers = Option.when(config.frame.gather)(Flipped(Valid(Context(config))))
+  /** The path of `in`. */
+  val path = Option.when(config.frame.gather)(Input(new BouncingPath))
 
   /** From the shader; to the colour unit and to ray set-up. */
   val in     = Flipped(Decoupled(new BouncedRay(config)))
@@ -49,10 +49,11 @@ final class BounceScheduler(config: PathConfig) extends Module {
   private val incoming = Wire(new PendingBounce(config))
   private val result   = io.in.bits.bounce
   incoming.update.context  := result.context
-  incoming.update.isFirst  := DontCare // known when it is issued
+  incoming.update.isFirst  := io.path.map(_.isStraight).getOrElse(DontCare) // unless it is known when it is issued
   incoming.update.albedo   := io.in.bits.albedo
   incoming.update.isTinted := io.in.bits.isTinted
   incoming.update.fresnel  := result.fresnel
+  for (path <- io.path) when(path.isScattered) { incoming.update.fresnel.raw := 0.U }
   incoming.update.hasSurface.foreach(_ := false.B)
   incoming.isRefraction := result.isRefraction
   incoming.origin       := result.origin
@@ -71,17 +72,11 @@ final class BounceScheduler(config: PathConfig) extends Module {
   private val isTraced = counts(context) =/= io.shading.bounces.get
   when(bounce.fire && isTraced) { counts(context) := counts(context) + 1.U }
   when(io.start.valid) { counts(io.start.bits) := 0.U }
-  private val hasGathered = io.gathers.map { gathers =>
-    val flags = Reg(Vec(config.contexts, Bool()))
-    when(gathers.valid) { flags(gathers.bits) := true.B }
-    when(io.start.valid) { flags(io.start.bits) := false.B }
-    flags(context)
-  }.getOrElse(false.B)
 
   bounce.ready             := io.update.ready && (!isTraced || io.ray.ready)
   io.update.valid          := bounce.valid && (!isTraced || io.ray.ready)
   io.update.bits           := bounce.bits.update
-  io.update.bits.isFirst   := counts(context) === 0.U && !hasGathered
+  if (io.path.isEmpty) io.update.bits.isFirst := counts(context) === 0.U
   io.ray.valid             := bounce.valid && isTraced && io.update.ready
   io.ray.bits.context      := context
   io.ray.bits.isShadow     := false.B
@@ -95,7 +90,7 @@ final class BounceScheduler(config: PathConfig) extends Module {
 
   private def deferBounces(environment: DeferredBounceIO): Unit = {
     val bounces       = ContextTable(config, new PendingBounce(config))
-    val hasReflection = environment.enabled && result.fresnel.natural =/= 0.U
+    val hasReflection = environment.enabled && incoming.update.fresnel.natural =/= 0.U
 
     // Read the table, and hold the bounce until it is issued
     val isRead    = RegNext(environment.resume.fire, false.B)

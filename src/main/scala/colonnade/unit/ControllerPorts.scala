@@ -6,7 +6,7 @@ import colonnade.common.Context
 import colonnade.config.PathConfig
 import colonnade.environment.{EnvironmentAccepts, EnvironmentRequest}
 import colonnade.formats.Gather
-import colonnade.shading.{Occlusion, PathTermination, ShadowRequest}
+import colonnade.shading.{ContinuedPath, Occlusion, PathTermination, ShadowRequest}
 
 /** The state of a context. */
 object ContextState extends ChiselEnum {
@@ -27,7 +27,10 @@ object ContextState extends ChiselEnum {
   val accumulatePending, accumulating = Value
 
   val done          = Value // the colour of its pixel is complete
-  val lit           = Value // its surface and all shadow rays are known; the path ends, or the surface's bounce resumes
+  /** Its surface and all shadow rays are known; the path ends, or the surface's bounce resumes, or the ray that gathers at
+    * a point of the environment waits.
+    */
+  val lit           = Value
   val gatherPending = Value // the light of its surface is added; the ray that gathers there waits
 }
 
@@ -121,10 +124,22 @@ final class PixelControl(config: PathConfig) extends Bundle {
 
 /** Control of gathered rays. */
 final class GatherControl(config: PathConfig) extends Bundle {
-  val bounces   = Input(UInt(Gather.countBits.W))                        // the register
-  val continued = Flipped(Valid(Context(config)))                        // the light of a surface that gathers is added
-  val gathers   = Valid(Context(config))                                 // its ray leaves
-  val counts    = Output(Vec(config.contexts, UInt(Gather.countBits.W))) // gathered rays of each path
+  val bounces   = Input(UInt(Gather.countBits.W))             // the register
+  val continued = Flipped(Valid(new ContinuedPath(config))) // the light of a surface that gathers is added
+
+  /** A context whose sample point is read; in the next cycle, the rays that its path has gathered. */
+  val sample = Flipped(Valid(Context(config)))
+  val count  = Output(UInt(Gather.countBits.W))
+
+  /** A context at a mirror or glass; what its path is there. */
+  val bounced     = Input(Context(config))
+  val bouncedPath = Output(new BouncingPath)
+}
+
+/** What a path is at a mirror or glass. */
+final class BouncingPath extends Bundle {
+  val isStraight  = Bool() // its throughput is 1, its radiance 0
+  val isScattered = Bool() // it has gathered: there is no Fresnel reflection
 }
 
 final class RtControllerIO(config: PathConfig) extends Bundle {

@@ -109,8 +109,6 @@ final class PathHits(config: PathConfig) extends Module {
   private val readHit  = Mux(distance.valid, distance.bits, control.query.bits)
   private val hit      = closest.read(readHit, reads)
   private val context  = RegEnable(readHit, reads)
-  trace.hasSurface.valid          := shades
-  trace.hasSurface.bits           := control.query.bits
   trace.surfaceHit.valid          := RegNext(shades, false.B)
   trace.surfaceHit.bits.context   := context
   trace.surfaceHit.bits.isPrimary := RegNext(control.isPrimary)

@@ -85,7 +85,6 @@ final class PathUnit(config: PathConfig) extends Module {
   colourUnit.end :<>= controller.end
   colourUnit.surface   := lit
   assembler.allocated  := primaryRays.allocated
-  assembler.hasSurface := trace.hasSurface
   assembler.surfaceHit := trace.surfaceHit
   assembler.colour     := colourUnit.colour
   io.pixels :<>= assembler.pixels
@@ -99,11 +98,15 @@ final class PathUnit(config: PathConfig) extends Module {
     points.pixel.bits.context := primaryRays.allocated.bits.context
     points.pixel.bits.pixel.x := primaryRays.allocated.bits.pixel.x
     points.pixel.bits.pixel.y := primaryRays.allocated.bits.pixel.y
-    points.counts             := gathers.counts
+    points.count              := gathers.count
     points.port :<>= shader.sample.get
     gathers.bounces   := registers.bounces
     gathers.continued := colourUnit.continued.get
-    bounces.foreach(_.gathers.get := gathers.gathers)
+    gathers.sample    := shader.sample.get.read
+    for (bounces <- bounces; path <- bounces.path) {
+      gathers.bounced := bounces.in.bits.bounce.context
+      path            := gathers.bouncedPath
+    }
     val light = Module(new LightCube(config)).io
     light.ray.valid := rayArbiter.out.fire
     light.ray.bits  := rayArbiter.out.bits

@@ -2,7 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Decoupled, Queue, RegEnable, Valid}
-import colonnade.common.{Context, ContextTable}
+import colonnade.common.ContextTable
 import colonnade.config.PathConfig
 import colonnade.formats.{FrameRegisters, Pixel, PixelHit, Rgb, UnitPosition}
 import colonnade.shading.PathColour
@@ -11,8 +11,6 @@ final class PixelAssemblerIO(config: PathConfig) extends Bundle {
   val background = Input(Rgb(FrameRegisters.colour))
   val allocated  = Flipped(Valid(new AllocatedPixel(config)))
 
-  /** A context whose ray has a surface; one cycle later its hit. */
-  val hasSurface = Flipped(Valid(Context(config)))
   val surfaceHit = Flipped(Valid(new SurfaceHit(config)))
   val colour     = Flipped(Valid(new PathColour(config)))
   val control    = new PixelControl(config)
@@ -36,7 +34,8 @@ final class PixelAssembler(config: PathConfig) extends Module {
     pixels.write(io.allocated.bits.context, io.allocated.bits.pixel)
     isObject(io.allocated.bits.context) := false.B
   }
-  when(io.hasSurface.valid) { isObject(io.hasSurface.bits) := true.B }
+  private val isPrimaryHit = io.surfaceHit.valid && io.surfaceHit.bits.isPrimary
+  when(isPrimaryHit) { isObject(io.surfaceHit.bits.context) := true.B }
   when(io.colour.valid) { colours.write(io.colour.bits.context, io.colour.bits) }
 
   /** Finished pixels that wait. Many contexts give a pixel a cycle: two wait while one is on its way. */
@@ -68,7 +67,7 @@ final class PixelAssembler(config: PathConfig) extends Module {
   // The primary ray's hit
   for (hit <- finished.bits.hit; distance <- io.surfaceHit.bits.distance) {
     val hits = ContextTable(config, new PixelHit(config))
-    when(io.surfaceHit.valid && io.surfaceHit.bits.isPrimary) {
+    when(isPrimaryHit) {
       val primary = Wire(new PixelHit(config))
       primary.triangle     := io.surfaceHit.bits.id
       primary.distance.raw := distance

@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Mux1H, PopCount}
+import chisel3.util.{Mux1H, PopCount, RegEnable}
 import colonnade.common.{Choice, First}
 import colonnade.config.PathConfig
 import colonnade.formats.Gather
@@ -27,8 +27,10 @@ final class RtController(config: PathConfig) extends Module {
 
   private val state     = RegInit(VecInit(Seq.fill(contexts)(ContextState.idle)))
   private val isShadow  = Reg(Vec(contexts, Bool()))
-  private val isPrimary = Reg(Vec(contexts, Bool()))
   private val hasColour = Reg(Vec(contexts, Bool()))
+
+  /** The path has left no surface of the object: its ray is the primary one, or the first that it gathers in the room. */
+  private val isStraight = Reg(Vec(contexts, Bool()))
 
   /** The camera sees the environment directly in this pixel. */
   private val isDirectView = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
@@ -44,13 +46,20 @@ final class RtController(config: PathConfig) extends Module {
     if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
   private val hasOcclusion = io.environment.map(_.occlusion).getOrElse(false.B) && hasEnvironment
 
-  /** Rays that the path has gathered. After the first one it meets the light cube, not the environment. */
-  private val gathered    = io.gather.map(_ => Reg(Vec(contexts, UInt(Gather.countBits.W))))
-  private val isScattered = gathered.fold(VecInit.fill(contexts)(false.B))(counts => VecInit(counts.map(_ =/= 0.U)))
+  /** The path has gathered rays, so many. After the first one it meets the light cube, not the environment. */
+  private val isScattered = if (config.frame.gather) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val gathered    = Option.when(config.frame.gather)(new FlagTable(config, UInt(Gather.countBits.W)))
 
   /** The surface is of the environment. */
   private val isOfEnvironment =
-    if (config.frame.gather) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+    if (config.gathersInRoom) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+
+  /** A point of the environment is lit, and the ray that gathers there has still to leave. */
+  private val gathersInRoom = state.lazyZip(isDirectView).lazyZip(isScattered).toSeq.map {
+    case (at, isDirectView, isScattered) =>
+      if (config.gathersInRoom) at === ContextState.lit && isDirectView && !isScattered && io.gather.get.bounces =/= 0.U
+      else false.B
+  }
 
   private val shadows = new ShadowProgress(config)
   io.idleCount     := count(isAt(ContextState.idle), atReset = contexts)
@@ -62,10 +71,9 @@ final class RtController(config: PathConfig) extends Module {
   move(io.allocation.allocate, free.bits, ContextState.raySetup)
   when(io.allocation.allocate) {
     isShadow(free.bits)  := false.B
-    isPrimary(free.bits) := true.B
+    isStraight(free.bits) := true.B
     hasColour(free.bits) := false.B
-    gathered.foreach(_(free.bits) := 0.U)
-    if (config.frame.gather) isOfEnvironment(free.bits) := false.B
+    if (config.frame.gather) isScattered(free.bits) := false.B
     if (config.hasEnvironment) {
       isFresnelReflection(free.bits) := false.B
       isDirectView(free.bits)        := false.B
@@ -85,13 +93,14 @@ final class RtController(config: PathConfig) extends Module {
   private val resolved   = ended.now.bits
   private val hasVisible = io.trace.hasHit && !mayBeHidden(resolved)
   io.trace.startsShading := ended.now.valid && !isShadow(resolved) && hasVisible
-  io.trace.isPrimary     := isPrimary(resolved)
+  io.trace.isPrimary     := isStraight(resolved) && !isScattered(resolved)
   io.trace.readsDistance := 0.U.asTypeOf(io.trace.readsDistance)
-  private val afterTrace = afterObject(resolved, afterMiss(resolved))
+  private val isOfRoom   = if (config.gathersInRoom) isStraight(resolved) && isScattered(resolved) else false.B
+  private val afterTrace = Mux(isOfRoom, ContextState.lit, afterObject(resolved, afterMiss(resolved)))
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
   private val lightsLeft = shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusion)
   move(ended.now.valid, resolved, Mux(isShadow(resolved), afterLights(lightsLeft), afterHit))
-  if (config.frame.gather) when(io.trace.startsShading) { isOfEnvironment(resolved) := false.B }
+  if (config.gathersInRoom) when(io.trace.startsShading) { isOfEnvironment(resolved) := false.B }
   if (config.hasEnvironment) when(ended.now.valid) {
     mayBeHidden(resolved)     := false.B
     isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit && mayBeHidden(resolved)
@@ -105,7 +114,7 @@ final class RtController(config: PathConfig) extends Module {
   private val untraced = afterObject(bounced, ContextState.accumulatePending)
   move(io.bounced.valid, bounced, Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced))
   when(io.bounced.valid) {
-    isPrimary(bounced) := false.B
+    isStraight(bounced) := false.B
     if (config.hasEnvironment)
       mayBeHidden(bounced) := hasOcclusion && !io.bounced.bits.isInside && !isScattered(bounced)
   }
@@ -124,41 +133,63 @@ final class RtController(config: PathConfig) extends Module {
 
   // Issue rays that gather light, while there is no shadow ray to issue
   for (gather <- io.gather) {
-    val waiting = choose(isAt(ContextState.gatherPending), io.shadow.ready && !shadow.valid).now
+    val claims  = isAt(ContextState.gatherPending).zip(gathersInRoom).map { case (waits, ofRoom) => waits || ofRoom }
+    val next    = choose(claims, io.shadow.ready && !shadow.valid)
+    val waiting = next.now
     val issues  = io.shadow.ready && !shadow.valid && waiting.valid
+    val isFirst = !isScattered(waiting.bits)
     io.shadow.bits.isGathered.get := !shadow.valid
     when(!shadow.valid) {
       io.shadow.valid        := waiting.valid
       io.shadow.bits.context := waiting.bits
     }
-    gather.gathers.valid := issues
-    gather.gathers.bits  := waiting.bits
     move(issues, waiting.bits, ContextState.raySetup)
     when(issues) {
-      isShadow(waiting.bits)     := false.B
-      isPrimary(waiting.bits)    := false.B
-      gathered.get(waiting.bits) := gathered.get(waiting.bits) + 1.U
+      isShadow(waiting.bits)    := false.B
+      isScattered(waiting.bits) := true.B
+      if (config.gathersInRoom) mayBeHidden(waiting.bits) := false.B
     }
-    move(gather.continued.valid, gather.continued.bits, ContextState.gatherPending)
-    gather.counts := gathered.get
+    gathered.get.write(issues, waiting.bits, Mux(isFirst, 1.U, gathered.get.read(next) + 1.U))
+    if (config.gathersInRoom) shadows.keep(issues && isFirst, next)
+
+    // The light of a surface is added, or what a point of the environment has gathered is complete
+    val continued = gather.continued.bits
+    val isBack    = continued.isBack.getOrElse(false.B)
+    move(gather.continued.valid, continued.context, Mux(isBack, ContextState.lit, ContextState.gatherPending))
+    when(gather.continued.valid) {
+      isStraight(continued.context) := false.B
+      if (config.gathersInRoom) when(isBack) { isOfEnvironment(continued.context) := true.B }
+    }
+
+    val sampled = Choice(RegEnable(gather.sample, gather.sample.valid), gather.sample)
+    gather.count := Mux(RegEnable(isScattered(gather.sample.bits), gather.sample.valid), gathered.get.read(sampled), 0.U)
+    gather.bouncedPath.isStraight  := isStraight(gather.bounced)
+    gather.bouncedPath.isScattered := isScattered(gather.bounced)
   }
 
   // End paths: all shadow rays of the surface are traced, or the path meets the background
-  private val isEnding = state.zip(isFresnelReflection).map { case (at, reflection) =>
-    at === ContextState.accumulatePending || (at === ContextState.lit && !reflection)
+  private val isEnding = state.lazyZip(isFresnelReflection).lazyZip(gathersInRoom).toSeq.map {
+    case (at, reflection, gathers) =>
+      at === ContextState.accumulatePending || (at === ContextState.lit && !reflection && !gathers)
   }
   private val last   = choose(isEnding, io.end.ready)
   private val ending = last.now
   io.end.valid             := ending.valid
   io.end.bits.context      := ending.bits
   io.end.bits.isBackground := state(ending.bits) === ContextState.accumulatePending
-  io.end.bits.isStraight.foreach(_ := isPrimary(ending.bits))
+  io.end.bits.isStraight.foreach(_ := isStraight(ending.bits))
   io.end.bits.occlusions := VecInit(shadows.occlusions(last))
   io.end.bits.isDirectView.foreach(_ := isDirectView(ending.bits))
   for (gather <- io.gather) {
-    val surfaceGathers = !isOfEnvironment(ending.bits) && gathered.get(ending.bits) < gather.bounces
-    io.end.bits.gathers.get     := surfaceGathers && !io.end.bits.isBackground
-    io.end.bits.isScattered.get := isScattered(ending.bits)
+    val hasGathered = isScattered(ending.bits)
+    val mayGather   = Mux(hasGathered, gathered.get.read(last) < gather.bounces, gather.bounces =/= 0.U)
+    val isOfRoom    = isOfEnvironment(ending.bits)
+    io.end.bits.gathers.get     := mayGather && !isOfRoom && !io.end.bits.isBackground
+    io.end.bits.isScattered.get := hasGathered
+    for (isOfEnvironment <- io.end.bits.isOfEnvironment) {
+      isOfEnvironment := isOfRoom
+      when(isOfRoom && hasGathered) { io.end.bits.occlusions := VecInit(shadows.kept(last)) }
+    }
   }
   move(io.end.fire, ending.bits, ContextState.accumulating)
   move(io.accumulated.valid, io.accumulated.bits, ContextState.done)
@@ -177,13 +208,13 @@ final class RtController(config: PathConfig) extends Module {
     move(reflection.valid, reflection.bits, ContextState.environmentPending)
     when(reflection.valid) {
       isFresnelReflection(reflection.bits) := true.B
-      isPrimary(reflection.bits)           := false.B
+      isStraight(reflection.bits)          := false.B
     }
     // A ray from the camera goes first, if it is accepted; no kind waits for the other
     val isServed            = Wire(Vec(2, Bool()))
     val Seq(camera, others) = Seq(true.B, false.B).zip(isServed).map { case (ofCamera, isServed) =>
       choose(
-        isAt(ContextState.environmentPending).zip(isPrimary).map { case (waits, is) => waits && is === ofCamera },
+        isAt(ContextState.environmentPending).zip(isStraight).map { case (waits, is) => waits && is === ofCamera },
         isServed
       ).now
     }
@@ -198,7 +229,7 @@ final class RtController(config: PathConfig) extends Module {
     val isAny  = isCamera || (others.valid && environment.accepts.march)
     environment.req.valid                    := isAny && !(isTest && io.trace.startsShading)
     environment.req.bits.context             := pending
-    environment.req.bits.isDirectView        := isPrimary(pending)
+    environment.req.bits.isDirectView        := isStraight(pending)
     environment.req.bits.isFresnelReflection := isFresnelReflection(pending)
     environment.req.bits.isOcclusionTest     := isTest
     io.trace.readsDistance.valid             := environment.req.fire && isTest
@@ -211,8 +242,8 @@ final class RtController(config: PathConfig) extends Module {
     move(environment.hit.valid, environment.hit.bits, ContextState.shading)
     move(environment.visible.valid, environment.visible.bits, ContextState.resolve)
     when(environment.hit.valid) {
-      isOcclusionTest(environment.hit.bits)                          := false.B
-      if (config.frame.gather) isOfEnvironment(environment.hit.bits) := true.B
+      isOcclusionTest(environment.hit.bits)                           := false.B
+      if (config.gathersInRoom) isOfEnvironment(environment.hit.bits) := true.B
     }
     when(environment.visible.valid) {
       isDirectView(environment.visible.bits)    := false.B
@@ -243,7 +274,7 @@ final class RtController(config: PathConfig) extends Module {
 
   /** The next state of a ray that hits nothing; a primary ray's pixel has the background's colour. */
   private def afterMiss(context: UInt): ContextState.Type =
-    Mux(isPrimary(context), ContextState.done, ContextState.accumulatePending)
+    Mux(isStraight(context), ContextState.done, ContextState.accumulatePending)
 
   /** The next state of a ray that leaves the object, and otherwise has the state `alone`. */
   private def afterObject(context: UInt, alone: ContextState.Type): ContextState.Type =

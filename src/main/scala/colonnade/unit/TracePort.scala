@@ -13,10 +13,9 @@ final class TracePort(config: PathConfig) extends Bundle {
   val rays    = Decoupled(new PreparedRay(config))
   val control = Flipped(new TraceControl(config))
 
-  /** A context whose ray has a surface to shade; one cycle later its hit. After `control.readsDistance`, the hit's
-    * distance comes in the same way.
+  /** The hit of the ray that has a surface to shade, a cycle after it is resolved. After `control.readsDistance`, the
+    * hit's distance comes in the same way.
     */
-  val hasSurface = Flipped(Valid(Context(config)))
   val surfaceHit = Flipped(Valid(new SurfaceHit(config)))
 
   /** Hits to shade; they come only after a cycle with `hitsReadyNext`. */

@@ -15,15 +15,20 @@ sealed trait ColourEvent
 
 object ColourEvent {
   case object Start                                                                               extends ColourEvent
-  final case class Remember(what: LitColours)                                                     extends ColourEvent
+  final case class Remember(what: LitColours, isOfRoom: Boolean)                                  extends ColourEvent
   final case class Bounce(albedo: Seq[Int], isTinted: Boolean, fresnel: Int, hasSurface: Boolean) extends ColourEvent
 
   /** @param occlusions by light, 0: none, 1: transmissive, 2: opaque */
-  final case class End(isBackground: Boolean, occlusions: Seq[Int], isDirectView: Boolean) extends ColourEvent
+  final case class End(isBackground: Boolean, occlusions: Seq[Int], isDirectView: Boolean, isOfRoom: Boolean)
+      extends ColourEvent
 
   /** A surface that gathers light; the path ends in light of the cube. */
   final case class Gather(occlusions: Seq[Int]) extends ColourEvent
   final case class EndInCube(light: Seq[Int])   extends ColourEvent
+
+  /** The ray that a point of the room gathers ends, in light of the cube or else at a surface; then that point. */
+  final case class GoBack(light: Option[Seq[Int]], occlusions: Seq[Int]) extends ColourEvent
+  final case class EndWithGathered(occlusions: Seq[Int])                 extends ColourEvent
 }
 
 /** A surface: albedo, direct light of each light, emission. */
@@ -66,19 +71,30 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
 
   def path(): Seq[ColourEvent] = {
     val bounces = if (config.frame.hasBounces) random.nextInt(4) else 0
-    if (!config.frame.gather || random.nextInt(3) == 0) Start +: Seq.fill(bounces)(bounce()).flatten ++: end()
+    val kind    = if (config.frame.gather) random.nextInt(if (config.gathersInRoom) 3 else 2) else 0
+    if (kind == 0) Start +: Seq.fill(bounces)(bounce()).flatten ++: end(mayBeDirect = bounces == 0)
     else {
-      val steps = Seq.fill(bounces)(if (random.nextBoolean()) bounce() else gather()) :+ gather()
-      Start +: steps.flatten ++: (if (random.nextBoolean()) Seq(EndInCube(intensity())) else end())
+      val steps = Seq.fill(bounces)(if (random.nextBoolean()) bounce(mayReflect = kind == 1) else gather()).flatten
+      if (kind == 2) {
+        val light = Option.when(random.nextBoolean())(intensity())
+        (Start +: Remember(surface(), isOfRoom = true) +: steps) ++ Seq(
+          Remember(surface(), isOfRoom = false),
+          GoBack(light, occlusions()),
+          EndWithGathered(occlusions())
+        )
+      } else
+        Start +: steps ++: gather() ++:
+          (if (random.nextBoolean()) Seq(EndInCube(intensity())) else end(mayBeDirect = false))
     }
   }
 
-  private def gather(): Seq[ColourEvent] = Seq(Remember(surface()), Gather(occlusions()))
+  private def gather(): Seq[ColourEvent] = Seq(Remember(surface(), isOfRoom = false), Gather(occlusions()))
 
-  private def bounce(): Seq[ColourEvent] = {
-    val hasSurface = config.hasEnvironment && random.nextBoolean()
-    val fresnel    = if (random.nextBoolean()) 0 else random.nextInt(one + 1)
-    Seq(Remember(surface())).filter(_ => hasSurface) :+ Bounce(colour(), random.nextBoolean(), fresnel, hasSurface)
+  private def bounce(mayReflect: Boolean = true): Seq[ColourEvent] = {
+    val hasSurface = config.hasEnvironment && mayReflect && random.nextBoolean()
+    val fresnel    = if (!mayReflect || random.nextBoolean()) 0 else random.nextInt(one + 1)
+    Seq(Remember(surface(), isOfRoom = true)).filter(_ => hasSurface) :+
+      Bounce(colour(), random.nextBoolean(), fresnel, hasSurface)
   }
 
   private def occlusions(): Seq[Int] = {
@@ -86,10 +102,12 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
     Seq.fill(config.frame.lights)(if (random.nextBoolean()) 0 else 2 - random.nextInt(kinds - 1))
   }
 
-  private def end(): Seq[ColourEvent] = {
-    val occlusions = this.occlusions()
-    if (random.nextInt(4) == 0) Seq(End(isBackground = true, occlusions, random.nextBoolean()))
-    else Seq(Remember(surface()), End(isBackground = false, occlusions, random.nextBoolean()))
+  private def end(mayBeDirect: Boolean): Seq[ColourEvent] = {
+    val occlusions   = this.occlusions()
+    val isDirectView = config.hasEnvironment && mayBeDirect && random.nextBoolean()
+    val isOfRoom     = isDirectView || (config.hasEnvironment && random.nextBoolean())
+    if (random.nextInt(4) == 0) Seq(End(isBackground = true, occlusions, isDirectView = false, isOfRoom))
+    else Seq(Remember(surface(), isOfRoom), End(isBackground = false, occlusions, isDirectView, isOfRoom))
   }
 }
 
@@ -137,11 +155,14 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       case it: End       => it
       case it: Gather    => it
       case it: EndInCube => it
+      case it: GoBack    => it
+      case it: EndWithGathered => it
     }
 
     start.foreach { case (context, _) => isStraight(context) = true }
     io.surface.valid.poke(remember.nonEmpty)
-    for ((context, Remember(what)) <- remember) {
+    for ((context, Remember(what, isOfRoom)) <- remember) {
+      io.surface.bits.isOfEnvironment.foreach(_.poke(isOfRoom))
       io.surface.bits.context.poke(context)
       pokeUInt(io.surface.bits.albedo, what.albedo)
       io.surface.bits.directLight.zip(what.direct).foreach { case (port, value) => poke(port, value) }
@@ -160,23 +181,27 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
     }
     io.end.valid.poke(end.nonEmpty)
     for ((context, event) <- end) {
-      val (isBackground, occlusions, isDirectView) = event match {
-        case End(isBackground, occlusions, isDirectView) => (isBackground, occlusions, isDirectView)
-        case Gather(occlusions)                          => (false, occlusions, false)
-        case _                                           => (true, Seq.fill(config.frame.lights)(0), false)
+      val dark                                               = Seq.fill(config.frame.lights)(0)
+      val (isBackground, occlusions, isDirectView, isOfRoom) = event match {
+        case End(isBackground, occlusions, isDirectView, isOfRoom) => (isBackground, occlusions, isDirectView, isOfRoom)
+        case Gather(occlusions)                                    => (false, occlusions, random.nextBoolean(), false)
+        case GoBack(light, occlusions)                             => (light.nonEmpty, occlusions, true, false)
+        case EndWithGathered(occlusions)                           => (false, occlusions, true, true)
+        case _                                                     => (true, dark, false, random.nextBoolean())
       }
       io.end.bits.context.poke(context)
       io.end.bits.isBackground.poke(isBackground)
       io.end.bits.isStraight.foreach(_.poke(isStraight(context)))
       io.end.bits.isDirectView.foreach(_.poke(isDirectView))
+      io.end.bits.isOfEnvironment.foreach(_.poke(isOfRoom))
       io.end.bits.occlusions.zip(occlusions).foreach { case (port, what) => port.poke(Occlusion.all(what)) }
       io.end.bits.gathers.foreach(_.poke(event.isInstanceOf[Gather]))
-      io.end.bits.isScattered.foreach(_.poke(event.isInstanceOf[EndInCube]))
+      io.end.bits.isScattered.foreach(_.poke(lightOf(event).nonEmpty))
     }
     // The light stays until the next one comes
     for (cube <- io.cube) {
       requested.last.foreach(light => poke(cube.light, light))
-      val light = end.collect { case (_, EndInCube(light)) => light }
+      val light = end.flatMap { case (_, event) => lightOf(event) }
       requested =
         Option.when(
           cube.read.valid.peekBoolean()
@@ -189,8 +214,8 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       val ended   = waits(context).getOrElse(throw new AssertionError(s"context $context has not ended"))
       val ratio   = io.colour.bits.ratio.filter { _ =>
         ended match {
-          case End(isBackground, _, isDirectView) => isDirectView && !isBackground
-          case _                                  => false
+          case End(isBackground, _, isDirectView, _) => isDirectView && !isBackground
+          case other                                 => other.isInstanceOf[EndWithGathered]
         }
       }
       colours(context) +=
@@ -198,8 +223,9 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       waits(context) = None
     }
     for (continued <- io.continued if continued.valid.peekBoolean()) {
-      val context = continued.bits.peekInt().toInt
-      assert(waits(context).exists(_.isInstanceOf[Gather]), s"context $context does not gather")
+      val context = continued.bits.context.peekInt().toInt
+      val isBack  = continued.bits.isBack.exists(_.peekBoolean())
+      assert(waits(context).exists(event => if (isBack) event.isInstanceOf[GoBack] else event.isInstanceOf[Gather]))
       waits(context) = None
       isStraight(context) = false
     }
@@ -212,6 +238,13 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       todo(context).dequeue()
       waits(context) = Some(ended)
     }
+  }
+
+  /** The light of the cube that an end meets. */
+  private def lightOf(event: ColourEvent): Option[Seq[Int]] = event match {
+    case EndInCube(light) => Some(light)
+    case GoBack(light, _) => light
+    case _                => None
   }
 
   private def poke(port: Rgb[Fixed], values: Seq[Int]): Unit =

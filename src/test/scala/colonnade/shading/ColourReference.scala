@@ -22,7 +22,8 @@ final class ColourReference(
   /** Colours of the paths of one context, and the shadow ratios of those that have one. Paths end before the last event. */
   def colours(events: Seq[ColourEvent]): Seq[(Xyz, Option[Xyz])] = {
     var throughput, radiance           = Seq.empty[Int]
-    var surface                        = Option.empty[LitColours]
+    var surface, environment                  = Option.empty[LitColours]
+    var gathered                       = Seq.empty[Int]
     def add(part: Xyz, seen: Xyz): Xyz =
       Seq(radiance, part, seen).transpose.map { case Seq(sure, part, seen) =>
         white.min(sure + (part.toLong * seen >> 12).toInt)
@@ -32,15 +33,15 @@ final class ColourReference(
         throughput = Seq.fill(3)(one)
         radiance = Seq.fill(3)(0)
         None
-      case Remember(what) =>
-        surface = Some(what)
+      case Remember(what, isOfRoom) =>
+        if (isOfRoom) environment = Some(what) else surface = Some(what)
         None
       case Bounce(albedo, isTinted, fresnel, hasSurface) =>
         val tinted = throughput.zip(albedo).map { case (weight, tint) =>
           if (isTinted) weight * (tint + (tint >> 11)) >> 12 else weight
         }
         val parts = tinted.map(_ * fresnel >> 12)
-        radiance = add(parts, if (hasSurface) leaving(surface.get, unshadowed(surface.get)) else background)
+        radiance = add(parts, if (hasSurface) leaving(environment.get, unshadowed(environment.get)) else background)
         throughput = tinted.zip(parts).map { case (weight, part) => weight - part }
         None
       case Gather(occlusions) =>
@@ -49,15 +50,27 @@ final class ColourReference(
         radiance = add(throughput, leaving(what, light))
         throughput = throughput.zip(what.albedo).map { case (weight, tint) => weight * (tint + (tint >> 11)) >> 12 }
         None
-      case EndInCube(light)                     => Some(add(throughput, light) -> None)
-      case End(true, _, _)                      => Some(add(throughput, background) -> None)
-      case End(false, occlusions, isDirectView) =>
-        val (light, all) = (visible(surface.get, occlusions), unshadowed(surface.get))
-        val ratio        = light.zip(all).map { case (part, all) =>
-          if (part == all) one else (part.toLong * one / all).toInt
+      case EndInCube(light)                             => Some(add(throughput, light) -> None)
+      case End(true, _, _, _)                           => Some(add(throughput, background) -> None)
+      case End(false, occlusions, isDirectView, isOfRoom) =>
+        val what  = (if (isOfRoom) environment else surface).get
+        val light = visible(what, occlusions)
+        Some(add(throughput, leaving(what, light)) -> Option.when(isDirectView)(ratio(light, unshadowed(what))))
+      case GoBack(light, occlusions) =>
+        gathered =
+          light.map(add(throughput, _)).getOrElse(add(throughput, leaving(surface.get, visible(surface.get, occlusions))))
+        None
+      case EndWithGathered(occlusions) =>
+        val light = Seq(visible(environment.get, occlusions), gathered, ambient).transpose.map { case Seq(all, gathered, ambient) =>
+          all - ambient + gathered
         }
-        Some(add(throughput, leaving(surface.get, light)) -> Option.when(config.hasEnvironment && isDirectView)(ratio))
+        Some(leaving(environment.get, light) -> Some(ratio(light, unshadowed(environment.get))))
     }
+  }
+
+  /** Less than 2; 1 for 0 / 0. */
+  private def ratio(part: Xyz, whole: Xyz): Xyz = part.zip(whole).map { case (part, whole) =>
+    if (part == whole) one else if (part < 2 * whole) (part.toLong * one / whole).toInt else 2 * one - 1
   }
 
   private def unshadowed(surface: LitColours): Xyz = visible(surface, surface.direct.map(_ => 0))

@@ -64,6 +64,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private var resumed  = Map.empty[Int, Boolean]
   private var offered  = Option.empty[Int]
   private val counts   = Array.fill(config.units.pathContexts)(0)
+  private val straight = Array.fill(config.units.pathContexts)(false)
   private val gathered = Array.fill(config.units.pathContexts)(false)
   private var issued   = 0
   private var untraced = 0
@@ -87,26 +88,21 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     for (context <- start) {
       dut.io.start.bits.poke(context)
       counts(context) = 0
-      gathered(context) = false
     }
     val idle = counts.indices.filterNot(context => waiting.contains(context) || start.contains(context))
     if (offers && offered.isEmpty && idle.nonEmpty && isWilling) {
       val context = idle(random.nextInt(idle.size))
+      straight(context) = counts(context) == 0 && random.nextBoolean()
+      gathered(context) = dut.io.path.nonEmpty && random.nextBoolean()
       val fields  = bounced.unpack(BigInt(bounced.width, random)) ++
         Map("bounce.context" -> BigInt(context), "bounce.fresnel" -> BigInt(random.nextInt(2) * random.nextInt(4097)))
       waiting += context -> fields
       offered = Some(context)
       dut.in.poke(bounced.pack(fields))
     }
-    // A context whose path gathers has no bounce under way
-    for (port <- dut.io.gathers) {
-      val gathers = counts.indices.filterNot(context => waiting.contains(context) || start.contains(context)).headOption
-        .filter(_ => random.nextInt(6) == 0)
-      port.valid.poke(gathers.nonEmpty)
-      gathers.foreach { context =>
-        port.bits.poke(context)
-        gathered(context) = true
-      }
+    for (path <- dut.io.path; context <- offered) {
+      path.isStraight.poke(straight(context))
+      path.isScattered.poke(gathered(context))
     }
     dut.io.in.valid.poke(offered.nonEmpty)
     val (takesUpdate, takesRay) = (isWilling, isWilling)
@@ -142,12 +138,13 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private def issue(fields: Fields, takesRay: Boolean): Unit = {
     val context  = fields("context").toInt
     val bounce   = waiting(context)
-    val wasAside = hasReflection(bounce)
+    val wasAside = hasReflection(context, bounce)
     assert(!wasAside || resumed.contains(context))
     for (name <- Seq("isTinted") ++ Seq("r", "g", "b").map(channel => s"albedo.$channel"))
       assert(fields(name) == bounce(name), name)
-    assert(fields("fresnel") == bounce("bounce.fresnel"))
-    assert(fields("isFirst") == (if (counts(context) == 0 && !gathered(context)) 1 else 0))
+    assert(fields("fresnel") == fresnel(context, bounce))
+    val isFirst = if (dut.io.path.isEmpty) counts(context) == 0 else straight(context)
+    assert(fields("isFirst") == (if (isFirst) 1 else 0))
     for (hasSurface <- fields.get("hasSurface")) assert(hasSurface == (if (resumed.getOrElse(context, false)) 1 else 0))
 
     val isTraced     = counts(context) < most
@@ -174,13 +171,16 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private def defer(): Unit = {
     val context = offered.get
     val bounce  = waiting(context)
-    assert(hasReflection(bounce) && !deferred(context))
+    assert(hasReflection(context, bounce) && !deferred(context))
     dut.io.environment.get.fresnelReflection.bits.expect(context)
     checkStored(dut.stored.get, context, way(bounce, "fresnelOrigin", "bounce.reflection"))
     deferred += context
   }
 
-  private def hasReflection(bounce: Fields): Boolean = enabled && bounce("bounce.fresnel") != 0
+  private def hasReflection(context: Int, bounce: Fields): Boolean = enabled && fresnel(context, bounce) != 0
+
+  /** A path that has gathered has no Fresnel reflection. */
+  private def fresnel(context: Int, bounce: Fields): BigInt = if (gathered(context)) 0 else bounce("bounce.fresnel")
 
   private def checkStored(port: UInt, context: Int, expected: Fields): Unit = {
     val found = ray.unpack(port.peekInt())

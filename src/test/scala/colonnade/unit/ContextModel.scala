@@ -6,7 +6,7 @@ import colonnade.shading.Occlusion
 private class ContextModel(lights: Int) {
   var state         = ContextState.idle
   var isShadow      = false
-  var isPrimary     = false
+  var isStraight    = false // it has left no surface of the object
   var hasColour     = false
   var isBackground  = false
   var hasHit        = false
@@ -28,6 +28,10 @@ private class ContextModel(lights: Int) {
   var gathered        = 0
   var isOfEnvironment = false
   var gathers         = false
+
+  /** The ray of a point of the environment is complete, and what the shadow rays of that point have met. */
+  var goesBack = false
+  var kept     = Seq.empty[Occlusion.Type]
 
   /** Its primary ray cannot hit the object. */
   var bypasses = false

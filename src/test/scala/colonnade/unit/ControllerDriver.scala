@@ -28,8 +28,11 @@ private class ControllerDriver(
   private var started  = 0
   dut.io.gather.foreach(_.bounces.poke(gathers))
 
-  /** Gathered rays of all paths. */
-  var gathered = 0
+  /** Points of the environment gather. */
+  private val isInRoom = dut.io.end.bits.isOfEnvironment.nonEmpty && gathers > 0
+
+  /** Gathered rays of all paths; those of points of the environment that have met the object. */
+  var gathered, returned = 0
 
   private var retired = 0
 
@@ -49,8 +52,12 @@ private class ControllerDriver(
 
   private def ending: Seq[Int] =
     contextsWith(context =>
-      context.state == ContextState.accumulatePending || (isShadowDone(context) && !context.isFresnelReflection)
+      context.state == ContextState.accumulatePending ||
+        (isShadowDone(context) && !context.isFresnelReflection && !gathersInRoom(context))
     )
+
+  private def gathersInRoom(context: ContextModel): Boolean =
+    isInRoom && isShadowDone(context) && context.isDirectView && context.gathered == 0
 
   private def resumable: Seq[Int] =
     contextsWith(context =>
@@ -85,7 +92,9 @@ private class ControllerDriver(
         else if (contexts(context).isOcclusionTest) events.visible = Some(context)
         else events.environmentMiss = Some(context)
       for (context <- one(at(ContextState.accumulating)) if happens)
-        if (contexts(context).gathers) events.continued = Some(context) else events.accumulated = Some(context)
+        if (contexts(context).gathers || contexts(context).goesBack)
+          events.continued = Some((context, contexts(context).goesBack))
+        else events.accumulated = Some(context)
     }
     assert(started == pixels && at(ContextState.idle).size == count, "every pixel has retired")
   }
@@ -94,7 +103,7 @@ private class ControllerDriver(
     val context = contexts(index)
     if (!context.willBounce.getOrElse(random.nextInt(3) < (if (occlusion) 2 else 1)))
       events.shaded = Some((index, Seq.fill(lights)(!context.isFresnelReflection && random.nextBoolean())))
-    else if (hasEnvironment && context.willBounce.isEmpty && random.nextInt(4) > 0)
+    else if (hasEnvironment && context.willBounce.isEmpty && context.gathered == 0 && random.nextInt(4) > 0)
       events.fresnelReflection = Some(index)
     else {
       events.bounced = Some((index, random.nextInt(3) > 0))
@@ -111,14 +120,15 @@ private class ControllerDriver(
     // A gathered ray leaves while there is no shadow ray
     val isGathered = dut.io.shadow.bits.isGathered.exists(_.peekBoolean())
     if (!isLate) assert(!isGathered || needsShadow.isEmpty)
-    val waiting               = if (isGathered) at(ContextState.gatherPending) else needsShadow
+    val waiting               =
+      if (isGathered) at(ContextState.gatherPending) ++ contextsWith(gathersInRoom) else needsShadow
     val (scattered, shadowed) =
       shown(dut.io.shadow.valid, dut.io.shadow.bits.context, waiting).partition(_ => isGathered)
     val ended = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
     for (index <- resolved) {
       dut.io.trace.hasHit.poke(contexts(index).hasHit)
       dut.io.trace.occlusion.poke(contexts(index).occlusion)
-      dut.io.trace.isPrimary.expect(contexts(index).isPrimary)
+      dut.io.trace.isPrimary.expect(contexts(index).isStraight && contexts(index).gathered == 0)
     }
     // The hit of an occlusion test is not read together with that of a surface
     val shades =
@@ -132,7 +142,7 @@ private class ControllerDriver(
         isAccepted
       }
     }
-    val (camera, others) = at(ContextState.environmentPending).partition(contexts(_).isPrimary)
+    val (camera, others) = at(ContextState.environmentPending).partition(contexts(_).isStraight)
     val pending          =
       if (accepts.headOption.contains(true) && camera.nonEmpty) camera
       else if (accepts.lastOption.contains(true)) others
@@ -156,18 +166,30 @@ private class ControllerDriver(
       assert(contexts(index).shadowPending.contains(dut.io.shadow.bits.light.peekInt().toInt))
     for (index <- ended) {
       dut.io.end.bits.isBackground.expect(contexts(index).isBackground)
-      dut.io.end.bits.isStraight.foreach(_.expect(contexts(index).isPrimary))
+      dut.io.end.bits.isStraight.foreach(_.expect(contexts(index).isStraight))
       dut.io.end.bits.isDirectView.foreach(_.expect(contexts(index).isDirectView))
       dut.io.end.bits.gathers.foreach(_.expect(isGathering(contexts(index))))
       dut.io.end.bits.isScattered.foreach(_.expect(contexts(index).gathered > 0))
-      if (!contexts(index).isBackground)
-        dut.io.end.bits.occlusions.zip(contexts(index).occlusions).foreach { case (port, occlusion) =>
-          port.expect(occlusion)
+      val context  = contexts(index)
+      val isOfRoom = context.isOfEnvironment && context.gathered > 0
+      if (!context.isBackground)
+        dut.io.end.bits.occlusions.zip(if (isOfRoom) context.kept else context.occlusions).foreach {
+          case (port, occlusion) => port.expect(occlusion)
         }
+      if (!context.isBackground || context.isDirectView)
+        dut.io.end.bits.isOfEnvironment.foreach(_.expect(context.isOfEnvironment))
     }
+    val sampled = one(at(ContextState.shading)).filter(_ => dut.io.gather.nonEmpty)
+    for (gather <- dut.io.gather; index <- sampled) {
+      gather.bounced.poke(index)
+      gather.bouncedPath.isStraight.expect(contexts(index).isStraight)
+      gather.bouncedPath.isScattered.expect(contexts(index).gathered > 0)
+      gather.sample.bits.poke(index)
+    }
+    dut.io.gather.foreach(_.sample.valid.poke(sampled.nonEmpty))
 
     for (environment <- dut.io.environment; index <- marched) {
-      environment.req.bits.isDirectView.expect(contexts(index).isPrimary)
+      environment.req.bits.isDirectView.expect(contexts(index).isStraight)
       environment.req.bits.isFresnelReflection.expect(contexts(index).isFresnelReflection)
       environment.req.bits.isOcclusionTest.expect(contexts(index).isOcclusionTest)
     }
@@ -185,12 +207,13 @@ private class ControllerDriver(
     dut.io.trace.readsDistance.valid.expect(measured.nonEmpty)
     for (index <- measured) dut.io.trace.readsDistance.bits.expect(index)
     dut.clock.step()
+    for (gather <- dut.io.gather; index <- sampled) gather.count.expect(contexts(index).gathered)
 
     def change(index: Option[Int])(how: ContextModel => Unit): Unit = index.foreach(index => how(contexts(index)))
     change(allocated) { context =>
       context.state = ContextState.raySetup
       context.isShadow = false
-      context.isPrimary = true
+      context.isStraight = true
       context.hasColour = false
       context.isDirectView = false
       context.isFresnelReflection = false
@@ -219,7 +242,7 @@ private class ControllerDriver(
       context.state = if (isTraced) ContextState.raySetup
       else if (hasEnvironment && context.gathered == 0) ContextState.environmentPending
       else ContextState.accumulatePending
-      context.isPrimary = false
+      context.isStraight = false
       context.isBackground = true
       context.mayBeHidden = hasEnvironment && occlusion && !events.isInside && context.gathered == 0
     }
@@ -236,15 +259,25 @@ private class ControllerDriver(
     change(scattered.headOption.filter(_ => events.shadow)) { context =>
       context.state = ContextState.raySetup
       context.isShadow = false
-      context.isPrimary = false
+      context.mayBeHidden = false
+      if (context.gathered == 0) context.kept = context.occlusions
       context.gathered += 1
       gathered += 1
     }
     change(ended.filter(_ => events.end)) { context =>
       context.gathers = isGathering(context)
+      context.goesBack = !context.gathers && isInRoom && context.isDirectView && !context.isOfEnvironment
       context.state = ContextState.accumulating
     }
-    change(events.continued)(_.state = ContextState.gatherPending)
+    change(events.continued.map(_._1)) { context =>
+      context.state = if (context.goesBack) ContextState.lit else ContextState.gatherPending
+      context.isStraight = false
+      if (context.goesBack) {
+        context.isOfEnvironment = true
+        context.isBackground = false
+        returned += 1
+      }
+    }
     change(events.accumulated) { context =>
       context.state = ContextState.done
       context.hasColour = true
@@ -256,11 +289,11 @@ private class ControllerDriver(
     change(events.fresnelReflection) { context =>
       context.state = ContextState.environmentPending
       context.isFresnelReflection = true
-      context.isPrimary = false
+      context.isStraight = false
     }
     change(marched.filter(_ => events.march)) { context =>
       context.state = ContextState.environmentMarch
-      context.isDirectView = context.isPrimary
+      context.isDirectView = context.isStraight
       context.isShadow = false
     }
     change(events.environmentHit) { context =>
@@ -268,13 +301,13 @@ private class ControllerDriver(
       context.willBounce = Some(false)
       context.isOfEnvironment = true
       outcomes += ((context.isFresnelReflection, true))
-      if (context.isOcclusionTest) tests += ((context.isPrimary, true))
+      if (context.isOcclusionTest) tests += ((context.isStraight, true))
       context.isOcclusionTest = false
     }
     change(events.visible) { context =>
       context.state = ContextState.resolve
       context.isDirectView = false
-      tests += ((context.isPrimary, false))
+      tests += ((context.isStraight, false))
       context.isOcclusionTest = false
     }
     change(events.environmentMiss) { context =>
@@ -308,7 +341,8 @@ private class ControllerDriver(
       context.isBackground = false
       context.state = ContextState.shading
       context.willBounce = None
-    } else {
+    } else if (context.isStraight && context.gathered > 0) context.state = ContextState.lit
+    else {
       context.state =
         if (hasEnvironment && context.gathered == 0) ContextState.environmentPending else afterMiss(context)
       context.isBackground = true
@@ -322,7 +356,7 @@ private class ControllerDriver(
     if (context.shadowPending.nonEmpty) ContextState.shadowTest else ContextState.lit
 
   private def afterMiss(context: ContextModel): ContextState.Type =
-    if (context.isPrimary) ContextState.done else ContextState.accumulatePending
+    if (context.isStraight) ContextState.done else ContextState.accumulatePending
 
   /** The context that the controller selects from `these`, if there are any. */
   private def shown(valid: Bool, bits: UInt, these: Seq[Int]): Option[Int] = {

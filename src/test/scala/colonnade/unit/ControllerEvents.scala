@@ -19,7 +19,8 @@ private class ControllerEvents {
   var end         = false
   var accumulated = Option.empty[Int]
 
-  var continued = Option.empty[Int]
+  /** A context, and whether the ray of a point of the environment is complete. */
+  var continued = Option.empty[(Int, Boolean)]
 
   // With an environment
   var bypasses          = Option.empty[Int]
@@ -56,7 +57,11 @@ private class ControllerEvents {
     }
     name(dut.io.fetchFailed, fetchFailed)
     name(dut.io.accumulated, accumulated)
-    dut.io.gather.foreach(gather => name(gather.continued, continued))
+    for (port <- dut.io.gather.map(_.continued)) {
+      port.valid.poke(continued.nonEmpty)
+      port.bits.context.poke(continued.map(_._1).getOrElse(other))
+      port.bits.isBack.foreach(_.poke(continued.exists(_._2)))
+    }
     for (environment <- dut.io.environment) {
       environment.enabled.poke(hasEnvironment)
       environment.req.ready.poke(march)

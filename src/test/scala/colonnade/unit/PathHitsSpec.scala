@@ -211,7 +211,6 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
       if (shades.isEmpty) retire(other)
       else other.state = shading
     }
-    trace.hasSurface.valid.expect(shades.nonEmpty)
     measuring =
       if (shades.isEmpty && chance(2)) one(in(ended).filter(other => all(other).hasHit && all(other).endedAt < cycle))
       else None

@@ -52,6 +52,7 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
             new ControllerDriver(dut, contexts, seed, hasEnvironment, hasEnvironment, gathers, isLate = extraSlices)
           rounds.run(pixels = 150, eagerness)
           assert((rounds.gathered > 5) == (gathers > 0), s"${rounds.gathered} gathered rays")
+          assert((rounds.returned > 5) == (gathers > 0 && hasEnvironment), s"${rounds.returned} to the environment")
         }
       }
     }
