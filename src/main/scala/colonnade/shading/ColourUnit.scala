@@ -79,7 +79,7 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val mayBounce = io.bounce.map(_.valid && !isDirect).getOrElse(false.B)
   private val bounces   = mayBounce && isFree
   private val takes     = bounces || io.end.fire
-  private val isOfRoom = io.end.bits.isOfEnvironment.getOrElse(true.B) || bounces
+  private val isOfRoom  = io.end.bits.isOfEnvironment.getOrElse(true.B) || bounces
   private val taken = Mux(mayBounce, io.bounce.map(_.bits.context).getOrElse(io.end.bits.context), io.end.bits.context)
   private val tints = io.bounce.map { bounce =>
     bounce.bits.albedo.channels.map(albedo => Mux(bounce.bits.isTinted, albedo +& albedo(colourBits - 1), one))
@@ -133,8 +133,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   }.elsewhen(isLast) { isIssuing := false.B }
   ratios.foreach(_.claim := starts && next.needsRatio)
 
-  private val surfaces = new SurfaceTable(config)
-  private val surface  = surfaces.read(taken, isOfRoom, takes)
+  private val surfaces    = new SurfaceTable(config)
+  private val surface     = surfaces.read(taken, isOfRoom, takes)
   private val albedo      = Reg(Vec(3, UInt(colourBits.W)))
   private val directLight = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
   private val emission    = Option.when(config.frame.emission)(Reg(Vec(3, UInt(colourBits.W))))
@@ -218,10 +218,10 @@ final class ColourUnit(config: PathConfig) extends Module {
     drop(Mux(ofSurface, direct, of(throughput)) * Mux(ofSurface, transmittance, tint), NumberFormats.lightBits)
 
   // The sum of the lights
-  private val arrival = after(slot)()
-  private val lit     = Reg(UInt(sumBits.W))
-  private val all     = Reg(UInt(sumBits.W))
-  private val ambient = of(io.ambient.channels, arrival.channel).natural
+  private val arrival  = after(slot)()
+  private val lit      = Reg(UInt(sumBits.W))
+  private val all      = Reg(UInt(sumBits.W))
+  private val ambient  = of(io.ambient.channels, arrival.channel).natural
   private val indirect = Mux(
     arrival.gathers.getOrElse(false.B),
     0.U,
@@ -290,7 +290,7 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val done     = after(added)(slot => slot.isValid := added.isValid && added.isLast)
   private val goesBack = done.goesBack.getOrElse(false.B)
   private val isShown  = done.isValid && !done.isBounce && !done.needsRatio && !goesBack
-  private val result  = Wire(new PathColour(config))
+  private val result   = Wire(new PathColour(config))
   result.context := done.context
   result.colour.channels.zip(colours).foreach { case (to, from) => to := from }
   result.ratio.foreach(_.channels.foreach(to => to := Fixed(to.format, one)))
@@ -340,7 +340,8 @@ final private class TerminalSurface(config: PathConfig) extends Bundle {
 
 /** The surfaces of all contexts. Where points of the environment gather, a context may have one of the object beside. */
 final private class SurfaceTable(config: PathConfig) {
-  private val table = SyncReadMem(config.contexts.max(2) * (if (config.gathersInRoom) 2 else 1), new TerminalSurface(config))
+  private val table =
+    SyncReadMem(config.contexts.max(2) * (if (config.gathersInRoom) 2 else 1), new TerminalSurface(config))
 
   private def address(context: UInt, isOfEnvironment: Bool): UInt =
     if (config.gathersInRoom) context ## isOfEnvironment else context

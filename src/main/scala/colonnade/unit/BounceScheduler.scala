@@ -73,20 +73,20 @@ final class BounceScheduler(config: PathConfig) extends Module {
   when(bounce.fire && isTraced) { counts(context) := counts(context) + 1.U }
   when(io.start.valid) { counts(io.start.bits) := 0.U }
 
-  bounce.ready             := io.update.ready && (!isTraced || io.ray.ready)
-  io.update.valid          := bounce.valid && (!isTraced || io.ray.ready)
-  io.update.bits           := bounce.bits.update
+  bounce.ready                                := io.update.ready && (!isTraced || io.ray.ready)
+  io.update.valid                             := bounce.valid && (!isTraced || io.ray.ready)
+  io.update.bits                              := bounce.bits.update
   if (io.path.isEmpty) io.update.bits.isFirst := counts(context) === 0.U
-  io.ray.valid             := bounce.valid && isTraced && io.update.ready
-  io.ray.bits.context      := context
-  io.ray.bits.isShadow     := false.B
-  io.ray.bits.origin       := bounce.bits.origin
-  io.ray.bits.dir          := bounce.bits.dir
-  io.bounced.valid         := bounce.fire
-  io.bounced.bits.context  := context
-  io.bounced.bits.isTraced := isTraced
-  io.bounced.bits.isInside := bounce.bits.isRefraction === bounce.bits.update.isTinted
-  io.isRefraction          := bounce.bits.isRefraction
+  io.ray.valid                                := bounce.valid && isTraced && io.update.ready
+  io.ray.bits.context                         := context
+  io.ray.bits.isShadow                        := false.B
+  io.ray.bits.origin                          := bounce.bits.origin
+  io.ray.bits.dir                             := bounce.bits.dir
+  io.bounced.valid                            := bounce.fire
+  io.bounced.bits.context                     := context
+  io.bounced.bits.isTraced                    := isTraced
+  io.bounced.bits.isInside                    := bounce.bits.isRefraction === bounce.bits.update.isTinted
+  io.isRefraction                             := bounce.bits.isRefraction
 
   private def deferBounces(environment: DeferredBounceIO): Unit = {
     val bounces       = ContextTable(config, new PendingBounce(config))

@@ -26,7 +26,7 @@ object ContextState extends ChiselEnum {
   /** Its path has ended; its colour waits to be accumulated, or is being accumulated. */
   val accumulatePending, accumulating = Value
 
-  val done          = Value // the colour of its pixel is complete
+  val done = Value // the colour of its pixel is complete
   /** Its surface and all shadow rays are known; the path ends, or the surface's bounce resumes, or the ray that gathers at
     * a point of the environment waits.
     */
@@ -124,7 +124,7 @@ final class PixelControl(config: PathConfig) extends Bundle {
 
 /** Control of gathered rays. */
 final class GatherControl(config: PathConfig) extends Bundle {
-  val bounces   = Input(UInt(Gather.countBits.W))             // the register
+  val bounces   = Input(UInt(Gather.countBits.W))           // the register
   val continued = Flipped(Valid(new ContinuedPath(config))) // the light of a surface that gathers is added
 
   /** A context whose sample point is read; in the next cycle, the rays that its path has gathered. */

@@ -70,9 +70,9 @@ final class RtController(config: PathConfig) extends Module {
   io.allocation.free := free
   move(io.allocation.allocate, free.bits, ContextState.raySetup)
   when(io.allocation.allocate) {
-    isShadow(free.bits)  := false.B
-    isStraight(free.bits) := true.B
-    hasColour(free.bits) := false.B
+    isShadow(free.bits)                             := false.B
+    isStraight(free.bits)                           := true.B
+    hasColour(free.bits)                            := false.B
     if (config.frame.gather) isScattered(free.bits) := false.B
     if (config.hasEnvironment) {
       isFresnelReflection(free.bits) := false.B
@@ -145,8 +145,8 @@ final class RtController(config: PathConfig) extends Module {
     }
     move(issues, waiting.bits, ContextState.raySetup)
     when(issues) {
-      isShadow(waiting.bits)    := false.B
-      isScattered(waiting.bits) := true.B
+      isShadow(waiting.bits)                              := false.B
+      isScattered(waiting.bits)                           := true.B
       if (config.gathersInRoom) mayBeHidden(waiting.bits) := false.B
     }
     gathered.get.write(issues, waiting.bits, Mux(isFirst, 1.U, gathered.get.read(next) + 1.U))
@@ -162,7 +162,11 @@ final class RtController(config: PathConfig) extends Module {
     }
 
     val sampled = Choice(RegEnable(gather.sample, gather.sample.valid), gather.sample)
-    gather.count := Mux(RegEnable(isScattered(gather.sample.bits), gather.sample.valid), gathered.get.read(sampled), 0.U)
+    gather.count := Mux(
+      RegEnable(isScattered(gather.sample.bits), gather.sample.valid),
+      gathered.get.read(sampled),
+      0.U
+    )
     gather.bouncedPath.isStraight  := isStraight(gather.bounced)
     gather.bouncedPath.isScattered := isScattered(gather.bounced)
   }

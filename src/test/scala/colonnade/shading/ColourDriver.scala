@@ -152,10 +152,10 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
     val remember = next { case it: Remember => it }
     val bounce   = next { case it: Bounce => it }
     val end      = next {
-      case it: End       => it
-      case it: Gather    => it
-      case it: EndInCube => it
-      case it: GoBack    => it
+      case it: End             => it
+      case it: Gather          => it
+      case it: EndInCube       => it
+      case it: GoBack          => it
       case it: EndWithGathered => it
     }
 

@@ -22,7 +22,7 @@ final class ColourReference(
   /** Colours of the paths of one context, and the shadow ratios of those that have one. Paths end before the last event. */
   def colours(events: Seq[ColourEvent]): Seq[(Xyz, Option[Xyz])] = {
     var throughput, radiance           = Seq.empty[Int]
-    var surface, environment                  = Option.empty[LitColours]
+    var surface, environment           = Option.empty[LitColours]
     var gathered                       = Seq.empty[Int]
     def add(part: Xyz, seen: Xyz): Xyz =
       Seq(radiance, part, seen).transpose.map { case Seq(sure, part, seen) =>
@@ -50,19 +50,23 @@ final class ColourReference(
         radiance = add(throughput, leaving(what, light))
         throughput = throughput.zip(what.albedo).map { case (weight, tint) => weight * (tint + (tint >> 11)) >> 12 }
         None
-      case EndInCube(light)                             => Some(add(throughput, light) -> None)
-      case End(true, _, _, _)                           => Some(add(throughput, background) -> None)
+      case EndInCube(light)                               => Some(add(throughput, light) -> None)
+      case End(true, _, _, _)                             => Some(add(throughput, background) -> None)
       case End(false, occlusions, isDirectView, isOfRoom) =>
         val what  = (if (isOfRoom) environment else surface).get
         val light = visible(what, occlusions)
         Some(add(throughput, leaving(what, light)) -> Option.when(isDirectView)(ratio(light, unshadowed(what))))
       case GoBack(light, occlusions) =>
         gathered =
-          light.map(add(throughput, _)).getOrElse(add(throughput, leaving(surface.get, visible(surface.get, occlusions))))
+          light.map(add(throughput, _)).getOrElse(add(
+            throughput,
+            leaving(surface.get, visible(surface.get, occlusions))
+          ))
         None
       case EndWithGathered(occlusions) =>
-        val light = Seq(visible(environment.get, occlusions), gathered, ambient).transpose.map { case Seq(all, gathered, ambient) =>
-          all - ambient + gathered
+        val light = Seq(visible(environment.get, occlusions), gathered, ambient).transpose.map {
+          case Seq(all, gathered, ambient) =>
+            all - ambient + gathered
         }
         Some(leaving(environment.get, light) -> Some(ratio(light, unshadowed(environment.get))))
     }

@@ -94,7 +94,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
       val context = idle(random.nextInt(idle.size))
       straight(context) = counts(context) == 0 && random.nextBoolean()
       gathered(context) = dut.io.path.nonEmpty && random.nextBoolean()
-      val fields  = bounced.unpack(BigInt(bounced.width, random)) ++
+      val fields = bounced.unpack(BigInt(bounced.width, random)) ++
         Map("bounce.context" -> BigInt(context), "bounce.fresnel" -> BigInt(random.nextInt(2) * random.nextInt(4097)))
       waiting += context -> fields
       offered = Some(context)

@@ -120,7 +120,7 @@ private class ControllerDriver(
     // A gathered ray leaves while there is no shadow ray
     val isGathered = dut.io.shadow.bits.isGathered.exists(_.peekBoolean())
     if (!isLate) assert(!isGathered || needsShadow.isEmpty)
-    val waiting               =
+    val waiting =
       if (isGathered) at(ContextState.gatherPending) ++ contextsWith(gathersInRoom) else needsShadow
     val (scattered, shadowed) =
       shown(dut.io.shadow.valid, dut.io.shadow.bits.context, waiting).partition(_ => isGathered)
