@@ -115,6 +115,18 @@ def _gather() -> Entry:
     return Entry("gather", "edge", commands, (override,), libraries=("ASAP7",))
 
 
+def _light() -> Entry:
+    """Frames in known rooms against a path tracer, and a pass of the RTL over one of them, with gathered light."""
+    scene = "out/light/panorama-1/attic-rough.toml"
+    hardware = ("--config", "edge", "--set", "frame.gather=true", "--backend", "rtl")
+    options = ("--samples", "1", "--size", "640x480", "--json", REPORT)
+    commands = {
+        "frames": ("tools/light", "frames", "--json", REPORT),
+        "pass": ("colonnade", "render", scene, *hardware, *options),
+    }
+    return Entry("light", "textured", commands)
+
+
 def catalog() -> dict[str, Entry]:
     """All entries by name. Those that the pages need most come first."""
     entries = (
@@ -155,6 +167,7 @@ def catalog() -> dict[str, Entry]:
         Entry("captures", "small", _colonnade("study", "--capture", *_ROOMS, _ATTIC)),
         _samples(),
         _gather(),
+        _light(),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),

@@ -24,7 +24,8 @@ _DEFAULTS = "tiny"
 
 #: What the figures depend on, as arguments of git.
 SOURCES = (
-    *("build.sbt", "configs", "host", "project", "scenes", "software", "src", "tools/room-frames", "tools/soc-fpga"),
+    *("build.sbt", "configs", "host", "project", "scenes", "software", "src", "tools/light"),
+    *("tools/room-frames", "tools/soc-fpga"),
     *(":!host/colonnade/lab/figures", ":!host/colonnade/lab/report", ":!host/tests", ":!host/locks", ":!src/test"),
 )
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
-from colonnade.lab.figures import cost_tables, map_tables, performance_tables, result_tables, study_tables
+from colonnade.lab.figures import cost_tables, light_tables, map_tables, performance_tables, result_tables, study_tables
 from colonnade.lab.figures.data import Data, Missing
 from colonnade.lab.figures.facts import FORMATS, PRESETS, facts, text
 
@@ -23,6 +23,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     **cost_tables.TABLES,
     **study_tables.TABLES,
     **map_tables.TABLES,
+    **light_tables.TABLES,
 }
 
 _TABLE = re.compile(r"^<!-- ([\w-]+) -->\n.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)

@@ -154,6 +154,10 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "pass": {"counters": {"cycles": 50_000, "raysGather": 900}},
             "compare": {"psnr": 48.0},
         },
+        "light": {
+            "frames": {"frames": {"r-rough": compared("matt", "metal"), "r-clear": compared("mirror")}},
+            "pass": {"cycles": 50_000, "rays": {"in_box": 1_000_000}},
+        },
         "environments": {
             "accuracy": {"Room, device": {"mirror": {"ok": 0.97}, "mean_steps": 18.0}},
             "living": room("Room"),
@@ -201,6 +205,16 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
     return tmp_path / "docs"
 
 
+def compared(*kinds: str) -> dict[str, Any]:
+    """A frame in a known room."""
+    parts = {name: 30.0 for name in ("frame", "object", "room")}
+    own = {**parts, **{f"{name}_flip": 0.125 for name in parts}, "brightness": 0.75}
+    columns = ("no object", "probe, rasteriser", "ambient light", "1 pass")
+    qualities = {column: {**own, "things": dict.fromkeys(kinds, 20.0 + index)} for index, column in enumerate(columns)}
+    errors = {kind: {"rays": 9, "median": 1.25, "high": 3.0} for kind in ("probe", "colonnade")}
+    return {"qualities": qualities, "mirrors": errors}
+
+
 def table(docs: Path, name: str) -> str:
     before, after = "before\n", "\nafter\n"
     text = pages.page(f"{before}<!-- {name} -->\nold\n<!-- end -->{after}", Data(docs))
@@ -238,7 +252,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| pixels, hits and counters of 2 meshes on `small` | 2 |" in table(docs, "equality")
     assert "| **8** | 1.1 | 1.10 |" in table(docs, "energy-area")
     assert "**32b32s64d**" in table(docs, "precision")
-    assert "| all | 31.5 |" in table(docs, "measuring")
+    assert "| all | 33.0 |" in table(docs, "measuring")
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 (×1.20) | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
     assert "| seed 1 | –, – |" in live and "15.0" not in live
@@ -246,6 +260,13 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert path in table(docs, "live-paths")
     assert "60 kGE; with it 63, + 5.0 %" in table(docs, "gather")
     assert "50,000 cycles, 900 gathered rays" in table(docs, "gather")
+    assert "| 1 pass | 30.0, 0.125 |" in table(docs, "light-objects")
+    assert "| ambient light | 22.0 | 22.0 | 22.0 |" in table(docs, "light-materials")
+    assert "| 1 pass | 23.0 dB, 0.75 |" in table(docs, "light-mirrors")
+    assert "| rays of Colonnade | 1.2°, 3.0° |" in table(docs, "light-mirrors")
+    assert "| frames a second at 200 MHz | 4,000 | 1,000 | 250 |" in table(docs, "light-cost")
+    # A million rays of 2 nJ
+    assert "| mJ a frame | 2.00 | 8.00 | 32.00 |" in table(docs, "light-cost")
     marched = "| pixels that march | 0 % | 95 % |\n| --- | ---: | ---: |\n| r | 10,000 | 200,000 |"
     assert marched in table(docs, "moved-rooms")
     moved = "| 0.1 m, 3.3° | 40.0, 40.0, 40.0 | 30.2, 30.2, 30.2 | –, –, – | 1.5, 1.5, 1.5 |"

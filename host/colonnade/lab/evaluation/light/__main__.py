@@ -1,0 +1,75 @@
+"""The parts of ``tools/light``: see its usage."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from colonnade.common import progress
+from colonnade.common.atomic_files import made_folder, write_json
+from colonnade.common.errors import UserError
+from colonnade.common.processes import tool
+from colonnade.lab.evaluation.light.rooms import ROOMS
+
+
+def main() -> None:
+    """Run the part that the first argument names."""
+    part, *arguments = sys.argv[1:]
+    {"job": _job, "store": _store, "frames": _frames, "assets": _assets, "asset": _asset}[part](arguments)
+
+
+def _job(arguments: list[str]) -> None:
+    """ROOM FILE: write what the path tracer needs."""
+    from colonnade.lab.evaluation.light.jobs import write_job
+
+    name, file = arguments
+    if name not in ROOMS:
+        raise UserError(f"there is no room {name}: choose from {', '.join(ROOMS)}")
+    write_job(Path(file), ROOMS[name])
+
+
+def _store(arguments: list[str]) -> None:
+    """ROOM FILE: store what the path tracer made."""
+    from colonnade.lab.evaluation.light.files import store
+
+    name, file = arguments
+    store(name, Path(file))
+
+
+def _frames(arguments: list[str]) -> None:
+    """FOLDER [--json FILE]: measure all frames; scenes and pictures are in the folder."""
+    from colonnade.lab.evaluation.light import columns, report
+
+    folder = Path(arguments[0])
+    with made_folder(folder):
+        results: dict[str, columns.FrameResult] = {}
+        strips: dict[str, list[report.Strip]] = {}
+        for name, result, pictures in columns.measure(folder, progress=progress.for_terminal()):
+            results[name] = result
+            kind = name.rpartition("-")[2]
+            strips.setdefault(kind, []).append(report.write_pictures(folder, name, pictures))
+        for kind, rows in strips.items():
+            report.write_strips(folder / f"light-{kind}.jpg", rows)
+    print(report.table(results))
+    if "--json" in arguments:
+        found = {name: asdict(result) for name, result in results.items()}
+        write_json(Path(arguments[arguments.index("--json") + 1]), {"config": columns.CONFIG, "frames": found})
+
+
+def _assets(arguments: list[str]) -> None:
+    """FOLDER FILE…: write what the path tracer needs of glTF files."""
+    from colonnade.lab.evaluation.light.assets import write_jobs
+
+    write_jobs(Path(arguments[0]), [Path(file) for file in arguments[1:]])
+
+
+def _asset(arguments: list[str]) -> None:
+    """FOLDER: compare Colonnade's pictures of glTF files with those of the path tracer."""
+    from colonnade.lab.evaluation.light.assets import compare
+
+    print(compare(Path(arguments[0])))
+
+
+if __name__ == "__main__":
+    tool(main)

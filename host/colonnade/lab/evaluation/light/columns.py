@@ -1,0 +1,193 @@
+"""Measures frames with objects in known rooms against the path tracer: what phones do, and Colonnade.
+
+Regions are those of the truth: the object's pixels, and the *room that changes*, its pixels that differ from the photo
+by more than `CHANGED` codes. They are the same for all columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common.accumulation import LUMINANCE
+from colonnade.common.image_io import decode_srgb, encode_srgb, read_picture
+from colonnade.common.progress import QUIET, Progress
+from colonnade.common.types import Floats
+from colonnade.environment.load import load_environment
+from colonnade.environment.model import Environment
+from colonnade.lab.evaluation.light import files
+from colonnade.lab.evaluation.light.mirror_rays import MirrorErrors, mirror_errors
+from colonnade.lab.evaluation.light.probe import ProbeFrame
+from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS
+from colonnade.lab.evaluation.light.surfaces import RoomSurface
+from colonnade.lab.evaluation.region_metrics import compare_regions
+from colonnade.render.composite import resized_photo
+from colonnade.render.frames import render
+from colonnade.render.request import RenderRequest
+
+#: The preset that renders.
+CONFIG = "textured"
+#: A pixel of the room has changed if a channel differs by more, of 255: the two pictures of the room without objects,
+#: that of the photo and that of the truth, differ by less.
+CHANGED = 8
+#: Passes of the columns.
+PASSES = (1, 4, 16)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A way to render Colonnade's frame.
+
+    Attributes:
+        passes: Samples of a pixel.
+        gather: Gathered rays of a path.
+        denoise: The host filters the picture.
+        light: What is known: ``panorama``, the lights, and the panorama of all other light; ``lights``, these alone;
+            ``around``, the whole panorama, in which lights are found; ``photo``, nothing.
+    """
+
+    passes: int
+    gather: int = 1
+    denoise: bool = False
+    light: str = "panorama"
+
+
+def columns() -> dict[str, Column]:
+    """Colonnade's columns by name."""
+    found = {"ambient light": Column(4, gather=0, light="lights")}
+    for passes in PASSES:
+        count = f"{passes} pass{'es' if passes > 1 else ''}"
+        found |= {count: Column(passes), f"{count}, filtered": Column(passes, denoise=True)}
+    most = Column(PASSES[-1], denoise=True)
+    return found | {"panorama alone": replace(most, light="around"), "photo alone": replace(most, light="photo")}
+
+
+@dataclass(frozen=True)
+class Quality:
+    """The error of a frame in decibels and FLIP.
+
+    Attributes:
+        frame, object, room: PSNR of the whole frame, of the objects, of the room that changes.
+        frame_flip, object_flip, room_flip: Mean FLIP there.
+        things: PSNR of each object, by its kind.
+        brightness: Light of the mirror's pixels over that of the truth; None without a mirror.
+    """
+
+    frame: float
+    object: float
+    room: float
+    frame_flip: float
+    object_flip: float
+    room_flip: float
+    things: Mapping[str, float]
+    brightness: float | None = None
+
+
+@dataclass(frozen=True)
+class FrameResult:
+    """What was measured of a frame.
+
+    Attributes:
+        pixels: Those of the objects, and of the room that changes.
+        qualities: By column.
+        rays: Rays of a pass of 640x480 pixels that enter the objects' box.
+        mirrors: Errors of mirror rays, of the probe and of Colonnade; None without a mirror.
+    """
+
+    pixels: tuple[int, int]
+    qualities: Mapping[str, Quality]
+    rays: int
+    mirrors: Mapping[str, MirrorErrors] | None = None
+
+
+def measure(
+    folder: Path, names: tuple[str, ...] = tuple(ROOMS), progress: Progress = QUIET
+) -> Iterator[tuple[str, FrameResult, dict[str, NDArray[np.uint8]]]]:
+    """Measure all frames of rooms; scenes and rooms are written to a folder.
+
+    Yields:
+        Room and frame, what was measured, and the pictures by column, sRGB.
+    """
+    for name in names:
+        room = ROOMS[name]
+        surface = RoomSurface.of(room)
+        environment = surface.maps(name, room.camera(), read_picture(files.stored(name) / "photo.webp"))
+        scenes = {light: files.write_scenes(folder / light, name, room, light, environment) for light in files.LIGHTS}
+        loaded = load_environment(folder / files.LIGHTS[0] / name)
+        for frame, things in room.frames.items():
+            of_frame = {light: own[frame] for light, own in scenes.items()}
+            with progress.step(f"measuring {name}, {frame}"):
+                mirrors = None
+                if any(thing.kind == "mirror" for thing in things):
+                    mirrors = mirror_errors(room, things, surface, loaded)
+                result, pictures = _frame(name, frame, environment, of_frame, mirrors)
+            yield f"{name}-{frame}", result, pictures
+
+
+def _frame(
+    name: str,
+    frame: str,
+    environment: Environment,
+    scenes: Mapping[str, Path],
+    mirrors: Mapping[str, MirrorErrors] | None,
+) -> tuple[FrameResult, dict[str, NDArray[np.uint8]]]:
+    room, truth = ROOMS[name], files.truth(name, frame)
+    assert environment.photo is not None
+    things = room.frames[frame]
+    pictures = {"truth": truth, "no object": resized_photo(environment.photo, *FRAME)}
+    panoramas = (files.read_hdr(files.stored(name) / f"{which}.hdr") for which in ("around", "panorama"))
+    image, owners = ProbeFrame(room, things, environment, *panoramas).render()
+    pictures["probe, rasteriser"] = encode_srgb(image)
+    for title, column in columns().items():
+        pictures[title] = encode_srgb(_colonnade(scenes, column))
+    whole = render(_request(scenes, Column(1), PHOTO))
+    is_object = owners >= 0
+    difference = np.abs(truth.astype(int) - pictures["no object"]).max(axis=2)
+    regions = {"frame": np.ones_like(is_object), "object": is_object, "room": ~is_object & (difference > CHANGED)}
+    of_things: dict[str, NDArray[np.bool_]] = {thing.kind: owners == index for index, thing in enumerate(things)}
+    mirror = of_things.get("mirror")
+    qualities = {
+        title: _quality(truth, picture, regions, of_things, mirror)
+        for title, picture in pictures.items()
+        if title != "truth"
+    }
+    pixels = (int(is_object.sum()), int(regions["room"].sum()))
+    return FrameResult(pixels, qualities, int(whole.report.rays["in_box"] or 0), mirrors), pictures
+
+
+def _request(scenes: Mapping[str, Path], column: Column, size: tuple[int, int] = FRAME) -> RenderRequest:
+    scene = scenes[f"{column.light}-{column.gather}"]
+    return RenderRequest(scene, CONFIG, backend="model", size=size, samples=column.passes, denoise=column.denoise)
+
+
+def _colonnade(scenes: Mapping[str, Path], column: Column) -> Floats:
+    return render(_request(scenes, column)).image
+
+
+def _quality(
+    truth: NDArray[np.uint8],
+    picture: NDArray[np.uint8],
+    regions: Mapping[str, NDArray[np.bool_]],
+    of_things: Mapping[str, NDArray[np.bool_]],
+    mirror: NDArray[np.bool_] | None,
+) -> Quality:
+    own = compare_regions(truth, picture, {**regions, **of_things}, with_dists=False)
+    values = {part: own[part].psnr or 0.0 for part in own}
+    flips = {part: own[part].flip or 0.0 for part in regions}
+    quality = Quality(
+        values["frame"],
+        values["object"],
+        values["room"],
+        flips["frame"],
+        flips["object"],
+        flips["room"],
+        {kind: values[kind] for kind in of_things},
+    )
+    if mirror is None:
+        return quality
+    light = [float((decode_srgb(image[mirror]) @ LUMINANCE).mean()) for image in (picture, truth)]
+    return replace(quality, brightness=light[0] / light[1])

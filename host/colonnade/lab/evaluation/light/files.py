@@ -1,0 +1,188 @@
+"""The files of a known room: what is stored in the repository, and the folder and scenes that are made of it.
+
+Stored in ``scenes/light/NAME`` are pictures of the path tracer: ``photo.webp`` and ``FRAME.webp``, sRGB without loss,
+and panoramas, ``panorama.hdr`` and, without the emitters, ``around.hdr``. Maps and objects are made.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common.atomic_files import replacing
+from colonnade.common.errors import UserError
+from colonnade.common.image_io import encode_srgb, read_picture
+from colonnade.common.types import Floats
+from colonnade.design.toolchain import project_root
+from colonnade.environment.model import Environment
+from colonnade.lab.evaluation.light.rooms import FRAME, KnownRoom, Thing
+from colonnade.lab.evaluation.light.surfaces import pose_of
+from colonnade.lab.evaluation.studies.synthetic_attic import write_room
+from colonnade.mesh.load import load_mesh
+
+#: A panorama of `Radiance` begins so.
+_HDR = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n"
+_FLOAT, _ARRAY = 5126, 34962
+
+
+def stored(name: str) -> Path:
+    """The folder of a room's stored pictures."""
+    return project_root() / "scenes" / "light" / name
+
+
+def truth(name: str, frame: str) -> NDArray[np.uint8]:
+    """The path tracer's picture of a frame, sRGB, uint8 [height, width, 3].
+
+    Raises:
+        UserError: It is not stored.
+    """
+    return read_picture(stored(name) / f"{frame}.webp")
+
+
+def write_hdr(path: Path, radiance: Floats) -> None:
+    """Write linear radiance, float64 [height, width, 3], as Radiance HDR with shared exponents."""
+    largest = radiance.max(axis=2)
+    _, exponent = np.frexp(largest)
+    scaled = np.ldexp(radiance, (8 - exponent)[..., None]).clip(0, 255)
+    shared = np.where(largest > 1e-32, exponent + 128, 0)
+    pixels = np.concatenate([np.where(shared[..., None] > 0, scaled, 0), shared[..., None]], axis=2)
+    with replacing(path) as stream:
+        stream.write(_HDR % radiance.shape[:2] + pixels.astype(np.uint8).tobytes())
+
+
+def read_hdr(path: Path) -> Floats:
+    """Read what `write_hdr` wrote, float64 [height, width, 3].
+
+    Raises:
+        UserError: The file is missing or another one.
+    """
+    try:
+        data = path.read_bytes()
+        height, width = (int(word) for word in data.split(b"\n", 4)[3].split()[1::2])
+        pixels = np.frombuffer(data[len(_HDR % (height, width)) :], dtype=np.uint8).reshape(height, width, 4)
+    except (OSError, ValueError, IndexError) as error:
+        raise UserError(f"{path} is no panorama of tools/light: run tools/light truth ({error})") from None
+    values = np.ldexp(pixels[..., :3] + 0.5, (pixels[..., 3:].astype(np.int64) - 136))
+    return np.where(pixels[..., 3:] > 0, values, 0.0)
+
+
+#: The scenes of a frame: what is known of the light (see `columns.Column`), and the gathered rays of a path.
+LIGHTS = ("lights-0", "panorama-1", "around-1", "photo-1")
+
+
+def write_scenes(folder: Path, name: str, room: KnownRoom, light: str, environment: Environment) -> dict[str, Path]:
+    """Write a room's folder, its objects as glTF files, and a scene for each frame; returns the scenes.
+
+    ``light`` is one of `LIGHTS`.
+    """
+    known, gather = light.split("-")
+    write_room(folder / name, environment)
+    scenes = {}
+    for frame, things in room.frames.items():
+        lines = []
+        for index, thing in enumerate(things):
+            file = f"{name}-{frame}{index}.glb"
+            write_glb(folder / file, thing)
+            pose = pose_of(thing)
+            transform = f"rotate = {_row(pose.rotate)}, scale = {pose.scale:.8f}, translate = {_row(pose.translate)}"
+            lines += ["[[object]]", f'mesh = {{path = "{file}"}}', f"transform = {{{transform}}}", ""]
+        if known in ("lights", "panorama"):
+            lines += _lights(name, room)
+        lines += ["[background]", f'room = "{name}"', 'shadows = "photo"']
+        if known in ("panorama", "around"):
+            file = stored(name) / ("around.hdr" if known == "panorama" else "panorama.hdr")
+            lines += [f"panorama = {json.dumps(str(file))}", "panorama_exposure = 1.0"]
+        lines += ["", "[paths]", f"gather = {gather}", "", "[frame]", f"width = {FRAME[0]}", f"height = {FRAME[1]}"]
+        scenes[frame] = folder / f"{name}-{frame}.toml"
+        scenes[frame].write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return scenes
+
+
+def _lights(name: str, room: KnownRoom) -> list[str]:
+    """The emitters as point lights, as bright at the objects, and the mean of all other light."""
+    lines = []
+    for emitter in room.emitters:
+        position, colour, radius = emitter.seen_from(np.array(room.place))
+        lines += ["[[light]]", f"position = {_row(position)}", f"colour = {_row(colour.clip(max=15.0))}"]
+        lines += ["falloff = 1.0", f"radius = {radius:.4f}", ""]
+    around = read_hdr(stored(name) / "around.hdr")
+    weights = np.sin((np.arange(len(around)) + 0.5) / len(around) * np.pi)
+    ambient = (around.mean(axis=1) * weights[:, None]).sum(axis=0) / weights.sum()
+    return [*lines, "[ambient]", f"colour = {_row(ambient)}", ""]
+
+
+def _row(values: Sequence[float] | Floats) -> str:
+    return "[" + ", ".join(f"{value:.6f}" for value in values) + "]"
+
+
+def write_glb(path: Path, thing: Thing) -> None:
+    """Write the mesh of an object as binary glTF, with its metallic-roughness material."""
+    mesh = load_mesh(thing.mesh)
+    corners = (mesh.vertices[mesh.faces].reshape(-1, 3), mesh.corner_normals.reshape(-1, 3))
+    arrays = [np.ascontiguousarray(values, dtype="<f4") for values in corners]
+    material: dict[str, Any] = {
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*thing.colour, 1.0],
+            "metallicFactor": float(thing.kind in ("metal", "mirror")),
+            "roughnessFactor": thing.roughness,
+        }
+    }
+    used = []
+    if thing.kind == "glass":
+        used = ["KHR_materials_transmission", "KHR_materials_ior"]
+        material["extensions"] = {used[0]: {"transmissionFactor": 1.0}, used[1]: {"ior": 1.5}}
+    lengths = [values.nbytes for values in arrays]
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "material": 0}]}],
+        "materials": [material],
+        "extensionsUsed": used,
+        "buffers": [{"byteLength": sum(lengths)}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": start, "byteLength": length, "target": _ARRAY}
+            for start, length in zip((0, lengths[0]), lengths, strict=True)
+        ],
+        "accessors": [
+            {
+                "bufferView": index,
+                "componentType": _FLOAT,
+                "count": len(values),
+                "type": "VEC3",
+                "min": values.min(axis=0).tolist(),
+                "max": values.max(axis=0).tolist(),
+            }
+            for index, values in enumerate(arrays)
+        ],
+    }
+    if not used:
+        del document["extensionsUsed"]
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    body = b"".join(values.tobytes() for values in arrays)
+    with replacing(path) as stream:
+        stream.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(body)))
+        stream.write(struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(body), b"BIN\0") + body)
+
+
+def store(name: str, result: Path) -> None:
+    """Store the pictures that ``tools/path_tracer/room.py`` made of a room."""
+    from PIL import Image
+
+    folder, made = stored(name), np.load(result)
+    folder.mkdir(parents=True, exist_ok=True)
+    for what in made.files:
+        light = made[what].astype(np.float64)
+        if what in ("panorama", "around"):
+            write_hdr(folder / f"{what}.hdr", light)
+        else:
+            with replacing(folder / f"{what}.webp") as stream:
+                Image.fromarray(encode_srgb(light)).save(stream, "WEBP", lossless=True, quality=100, method=6)

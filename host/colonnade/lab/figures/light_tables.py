@@ -1,0 +1,96 @@
+"""The tables of ``docs/light-comparison.md``: frames in known rooms against a path tracer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from colonnade.lab.common.markdown import markdown
+from colonnade.lab.figures.data import Data
+from colonnade.lab.figures.facts import MEGAHERTZ, facts
+
+Frame = Mapping[str, Any]
+#: Frames of passes whose cost is given.
+_PASSES = (1, 4, 16)
+
+
+def _of(data: Data, suffix: str) -> dict[str, Frame]:
+    """The frames of a kind by room."""
+    frames = data.result("light")["frames"]["frames"]
+    return {name.removesuffix(suffix): own for name, own in frames.items() if name.endswith(suffix)}
+
+
+def _columns(frames: Mapping[str, Frame]) -> list[str]:
+    return list(next(iter(frames.values()))["qualities"])
+
+
+def _cells(frames: Mapping[str, Frame], column: str, part: str) -> list[str]:
+    found = (own["qualities"][column] for own in frames.values())
+    return [f"{own[part]:.1f}, {own[f'{part}_flip']:.3f}" for own in found]
+
+
+def objects(data: Data) -> str:
+    """PSNR and FLIP of the rough objects' pixels."""
+    frames = _of(data, "-rough")
+    rows = [[column, *_cells(frames, column, "object")] for column in _columns(frames)[1:]]
+    return markdown(["objects: dB, FLIP", *frames], rows)
+
+
+def rooms(data: Data) -> str:
+    """PSNR and FLIP of the room that changes, and of the whole frame, with the rough objects."""
+    frames = _of(data, "-rough")
+    rows = [[column, *_cells(frames, column, "room"), *_cells(frames, column, "frame")] for column in _columns(frames)]
+    titles = [f"{room}, {part}" for part in ("room", "frame") for room in frames]
+    return markdown(["dB, FLIP", *titles], rows)
+
+
+def materials(data: Data) -> str:
+    """PSNR of each object, in the mean of the rooms."""
+    every = [_of(data, "-rough"), _of(data, "-clear")]
+    kinds = [list(next(iter(frames.values()))["qualities"]["ambient light"]["things"]) for frames in every]
+    rows = []
+    for column in _columns(every[0])[1:]:
+        cells = [
+            f"{_mean([own['qualities'][column]['things'][kind] for own in frames.values()]):.1f}"
+            for frames, own_kinds in zip(every, kinds, strict=True)
+            for kind in own_kinds
+        ]
+        rows.append([column, *cells])
+    return markdown(["mean of the rooms, dB", *kinds[0], *kinds[1]], rows)
+
+
+def mirrors(data: Data) -> str:
+    """Light of the mirrors against the truth, and where their rays look."""
+    frames = _of(data, "-clear")
+    rows = []
+    for column in _columns(frames)[1:]:
+        own = [frame["qualities"][column] for frame in frames.values()]
+        rows.append([column, *(f"{one['things']['mirror']:.1f} dB, {one['brightness']:.2f}" for one in own)])
+    for kind, title in (("probe", "rays of the probe"), ("colonnade", "rays of Colonnade")):
+        errors = [frame["mirrors"][kind] for frame in frames.values()]
+        rows.append([title, *(f"{one['median']:.1f}°, {one['high']:.1f}°" for one in errors)])
+    return markdown(["mirror teapot", *frames], rows)
+
+
+def cost(data: Data) -> str:
+    """Energy of a frame and frames a second, by passes."""
+    found, edge = data.result("light"), facts(data, "edge")
+    cycles, rays = found["pass"]["cycles"], found["pass"]["rays"]["in_box"]
+    nanojoules = edge["njGlitches"]
+    row = [f"{MEGAHERTZ * 1e6 / cycles / passes:,.0f}" for passes in _PASSES]
+    energy = [f"{passes * rays * nanojoules * 1e-6:.2f}" for passes in _PASSES]
+    rows = [["frames a second at 200 MHz", *row], ["mJ a frame", *energy]]
+    return markdown([f"{cycles:,} cycles and {rays:,} in-box rays a pass", *(f"{n}" for n in _PASSES)], rows)
+
+
+def _mean(values: list[float]) -> float:
+    return sum(values) / len(values)
+
+
+TABLES: Mapping[str, Callable[[Data], str]] = {
+    "light-objects": objects,
+    "light-rooms": rooms,
+    "light-materials": materials,
+    "light-mirrors": mirrors,
+    "light-cost": cost,
+}

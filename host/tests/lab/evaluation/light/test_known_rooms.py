@@ -1,0 +1,77 @@
+"""The rooms of the comparison with a path tracer: their files, and the probe against light that is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colonnade.common.errors import UserError
+from colonnade.lab.evaluation.light import files
+from colonnade.lab.evaluation.light.probe import Probe
+from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS, Lamp, Thing, Window
+from colonnade.lab.evaluation.light.surfaces import ThingSurface
+from colonnade.mesh.load import load_mesh
+
+#: What the stored pictures may take, bytes.
+BUDGET = 1_500_000
+
+
+def test_every_room_is_stored() -> None:
+    total = 0
+    for name, room in ROOMS.items():
+        for frame in room.frames:
+            assert files.truth(name, frame).shape == (FRAME[1], FRAME[0], 3)
+        for panorama in ("panorama", "around"):
+            assert files.read_hdr(files.stored(name) / f"{panorama}.hdr").shape[2] == 3
+        total += sum(file.stat().st_size for file in files.stored(name).iterdir())
+    assert PHOTO[0] % FRAME[0] == 0
+    assert total <= BUDGET
+
+
+@given(scale=st.floats(1e-6, 1e6), seed=st.integers(0, 99))
+def test_a_panorama_keeps_its_radiance(scale: float, seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+    radiance = np.random.default_rng(seed).random((4, 8, 3)) * scale
+    radiance[0, 0] = 0.0
+    file = tmp_path_factory.mktemp("hdr") / "a.hdr"
+    files.write_hdr(file, radiance)
+    found = files.read_hdr(file)
+    assert np.all(np.abs(found - radiance) <= radiance.max(axis=2, keepdims=True) / 128)
+
+
+def test_another_file_is_no_panorama(tmp_path: Path) -> None:
+    (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\n")
+    with pytest.raises(UserError, match=r"a\.hdr is no panorama"):
+        files.read_hdr(tmp_path / "a.hdr")
+
+
+def test_an_object_has_its_material_and_its_place(tmp_path: Path) -> None:
+    thing = Thing("torus:12", "glass", (1.0, 1.0, 1.0), (1.0, 2.0, 3.0), 0.5, turn=20.0, tilt=90.0)
+    files.write_glb(tmp_path / "a.glb", thing)
+    mesh = load_mesh(tmp_path / "a.glb")
+    assert [material.kind for material in mesh.materials] == ["glass"]
+    assert len(mesh.faces) == len(load_mesh("torus:12").faces)
+    vertices = ThingSurface.of(thing).vertices
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    np.testing.assert_allclose([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2], thing.foot, atol=1e-12)
+
+
+def test_a_probe_of_constant_light_lights_all_surfaces_alike() -> None:
+    probe, ways = Probe(np.full((32, 64, 3), 0.7)), np.eye(3)
+    harmonics = probe.harmonics()
+    np.testing.assert_allclose(harmonics[0] * 0.282095, 0.7, rtol=2e-3)
+    assert np.abs(harmonics[1:]).max() < 0.02
+    np.testing.assert_allclose(probe.at(ways), 0.7)
+    np.testing.assert_allclose(probe.filtered(ways, 0.4), 0.7)
+
+
+@pytest.mark.parametrize("emitter", [Lamp((0.0, 9.0, 0.0), 0.1, (5.0, 6.0, 7.0)), None])
+def test_a_point_light_is_as_bright_as_its_emitter(emitter: Lamp | None) -> None:
+    one = emitter or Window((0.0, 0.0, -9.0), (0.0, 0.0, 1.0), 0.3, 0.2, (5.0, 6.0, 7.0))
+    at, power, _ = one.seen_from(np.zeros(3))
+    area = np.pi * 0.1**2 if emitter else 0.06
+    # A small emitter of this area, face on, seen by a surface that faces it: radiance times solid angle over pi
+    np.testing.assert_allclose(power / (at @ at), np.array([5.0, 6.0, 7.0]) * area / 81 / np.pi)
