@@ -113,8 +113,8 @@ def compare(folder: Path) -> str:
         truth = encode_srgb(np.load(result)["picture"].astype(np.float64))
         frame = render(RenderRequest(own / "scene.toml", _CONFIG, backend="model"))
         picture = encode_srgb(frame.image)
-        shown = _covered(truth) | frame.object_mask
-        difference = compare_regions(truth, picture, {"object": shown}, with_dists=False)["object"]
+        visible = _covered(truth) | frame.object_mask
+        difference = compare_regions(truth, picture, {"object": visible}, with_dists=False)["object"]
         lines.append(f"{own.name}: {difference.psnr:.1f} dB, FLIP {difference.flip:.3f}")
         with replacing(own / "beside.png") as stream:
             Image.fromarray(np.concatenate([truth, picture], axis=1)).save(stream, "PNG")

@@ -62,8 +62,8 @@ def columns() -> dict[str, Column]:
     for passes in PASSES:
         count = f"{passes} pass{'es' if passes > 1 else ''}"
         found |= {count: Column(passes), f"{count}, filtered": Column(passes, denoise=True)}
-    most = Column(PASSES[-1], denoise=True)
-    return found | {"panorama alone": replace(most, light="around"), "photo alone": replace(most, light="photo")}
+    best = Column(PASSES[-1], denoise=True)
+    return found | {"panorama alone": replace(best, light="around"), "photo alone": replace(best, light="photo")}
 
 
 @dataclass(frozen=True)

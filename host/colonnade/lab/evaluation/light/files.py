@@ -96,8 +96,8 @@ def write_scenes(folder: Path, name: str, room: KnownRoom, light: str, environme
             lines += _lights(name, room)
         lines += ["[background]", f'room = "{name}"', 'shadows = "photo"']
         if known in ("panorama", "around"):
-            file = stored(name) / ("around.hdr" if known == "panorama" else "panorama.hdr")
-            lines += [f"panorama = {json.dumps(str(file))}", "panorama_exposure = 1.0"]
+            panorama = stored(name) / ("around.hdr" if known == "panorama" else "panorama.hdr")
+            lines += [f"panorama = {json.dumps(str(panorama))}", "panorama_exposure = 1.0"]
         lines += ["", "[paths]", f"gather = {gather}", "", "[frame]", f"width = {FRAME[0]}", f"height = {FRAME[1]}"]
         scenes[frame] = folder / f"{name}-{frame}.toml"
         scenes[frame].write_text("\n".join(lines) + "\n", encoding="utf-8")

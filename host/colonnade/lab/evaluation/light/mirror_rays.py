@@ -67,9 +67,9 @@ def mirror_errors(
     u = hits.seen_u.clip(0, environment.width - 1).astype(int)
     v = hits.seen_v.clip(0, environment.height - 1).astype(int)
     rays = environment.camera.directions(environment.width, environment.height)[v, u]
-    shown = (rays * environment.depth[v, u][:, None]) @ to_view.T + eye
+    visible = (rays * environment.depth[v, u][:, None]) @ to_view.T + eye
     # What went to a bounding plane shows no point of the photo: the end of its way, off by what the plane is
-    marched = np.where(on_map[:, None], shown, origins + 1e3 * ways)
+    marched = np.where(on_map[:, None], visible, origins + 1e3 * ways)
     found = {"probe": _angles(origins, truth, probe), "colonnade": _angles(origins, truth, marched)}
     found["colonnade"] = np.where(on_map, found["colonnade"], 180.0)
     return {
