@@ -158,13 +158,14 @@ def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:
 def with_rendered_metal(mesh: Mesh, gathers: bool) -> tuple[Mesh, tuple[str, ...]]:
     """A mesh whose rough metal is as the device shows it (`as_rendered`), and lines on what that leaves out."""
     found = Losses()
-    for material in mesh.materials:
-        rendered = as_rendered(material, gathers)
+    materials = tuple(as_rendered(material, gathers) for material in mesh.materials)
+    if materials == mesh.materials:
+        return mesh, ()
+    for material, rendered in zip(mesh.materials, materials, strict=True):
         if rendered.kind != material.kind:
             found.add(lost.ROUGH_METAL)
         elif rendered.roughness == 0.0 and material.roughness > SMOOTH_ROUGHNESS:
             found.add(lost.ROUGH_MIRROR)
-    materials = tuple(as_rendered(material, gathers) for material in mesh.materials)
     return replace(mesh, materials=materials), found.lines(f"mesh {mesh.name}")
 
 
