@@ -118,7 +118,9 @@ def _gather() -> Entry:
 def _light() -> Entry:
     """Frames in known rooms against a path tracer, and a pass of the RTL over one of them, with gathered light."""
     scene = "out/light/panorama-1/attic-rough.toml"
-    hardware = ("--config", "edge", "--set", "frame.gather=true", "--backend", "rtl")
+    # Its meshes need more records than those of the benchmark
+    larger = ("--set", "columnBvhMemory.depth=262144")
+    hardware = ("--config", "edge", "--set", "frame.gather=true", *larger, "--backend", "rtl")
     options = ("--samples", "1", "--size", "640x480", "--json", REPORT)
     commands = {
         "frames": ("tools/light", "frames", "--json", REPORT),
