@@ -207,7 +207,7 @@ function readDocument(document, binary, files) {
     const own = primitive.attributes.COLOR_0 === undefined ? null : accessor(primitive.attributes.COLOR_0);
     const colourOf = (vertex) => (own || factor ? [0, 1, 2].map((channel) => (own?.[vertex][channel] ?? 1) * (factor?.[channel] ?? 1)) : null);
     if (material?.pbrMetallicRoughness?.baseColorTexture) corners.notes.add("textures are left out");
-    if (material && (material.pbrMetallicRoughness?.metallicFactor ?? 1) > 0) corners.notes.add("metal and roughness of the file are left out: the page has a material for the whole mesh");
+    if (material?.pbrMetallicRoughness && (material.pbrMetallicRoughness.metallicFactor ?? 1) > 0) corners.notes.add("metal and roughness of the file are left out: the page has a material for the whole mesh");
     if (material?.emissiveFactor?.some((channel) => channel > 0)) corners.notes.add("emission is left out");
     const indices = primitive.indices === undefined ? positions.map((_, index) => index) : accessor(primitive.indices).flat();
     for (let i = 0; i + 2 < indices.length; i += 3) {
