@@ -53,15 +53,23 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
   private def intensity(): Seq[Int] =
     xyz(if (random.nextInt(6) == 0) 65535 else random.nextInt(6) * random.nextInt(1800))
 
+  /** So dark that what a point of the environment gathers may be more than twice as bright. */
+  private def darkness(): Seq[Int] = xyz(random.nextInt(200))
+
   /** Ambient light, background, transmittance for shadow rays. */
   def registers(): (Seq[Int], Seq[Int], Int) = {
-    ambient = if (random.nextBoolean()) intensity() else xyz(0)
+    ambient = random.nextInt(4) match {
+      case 0 => darkness()
+      case 1 => xyz(0)
+      case _ => intensity()
+    }
     (ambient, colour(), random.nextInt(one + 1))
   }
 
   /** Some lights are as bright as the ambient light, which gives a ratio of exactly one half. */
   def surface(): LitColours = {
-    def light() = if (random.nextInt(3) == 0) ambient else intensity()
+    val isDark  = random.nextInt(3) == 0
+    def light() = if (random.nextInt(3) == 0) ambient else if (isDark) darkness() else intensity()
     LitColours(
       colour(),
       Seq.tabulate(config.frame.lights)(index => if (index < lights) light() else xyz(0)),
