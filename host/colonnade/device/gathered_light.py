@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.progress import QUIET, Progress
-from colonnade.environment.light_cube import FACE, MOST, LightCube
+from colonnade.common.types import Floats
+from colonnade.environment.light_cube import MOST, LightCube
+from colonnade.environment.lights import RoomLight
 from colonnade.environment.panorama import Panorama
 from colonnade.environment.seen_light import FINE
 from colonnade.environment.surround import Surround
 from colonnade.maps.room_light import room_light
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import Pose, object_pose
 from colonnade.scene.room_lights import lights_of
 from colonnade.scene_image.file import LoadSection, SceneImage
 from colonnade.scene_image.header import LoadedMemory
@@ -41,9 +43,10 @@ def scene_cube(
     second: Environment | None = None,
     progress: Progress = QUIET,
 ) -> LightCube | None:
-    """The light that gathered rays meet, by directions of mesh space; None for a scene without them.
+    """The light that rays meet that leave the object, by directions of mesh space; None for a scene that gathers none.
 
     In a room it is the room's light at the middle of the object, elsewhere that of a panorama, or the ambient light.
+    The lights with a radius are marked in it.
 
     Args:
         scene: With lights and a place for the object, as in `LitRoom`.
@@ -58,30 +61,35 @@ def scene_cube(
     if scene.paths.gather == 0:
         return None
     pose = object_pose(scene, extent, room)
+    point, lights = pose.to_world(extent.centre), lights_of(scene, extent, room)
     if room is not None and image is not None:
-        lights = lights_of(scene, extent, room)
-        light = room_light(room, image, lights, pose.to_world(extent.centre), not relit, unseen, second)
+        light = room_light(room, image, lights, point, not relit, unseen, second)
         others = "bounding planes, a fit under the scene's lights,"
         if unseen is not None:
             others = "fitted walls" if isinstance(unseen, Surround) else "panorama"
         pictures = "its picture shows" if second is None else "its two pictures show"
         progress.note(
-            f"gathered rays meet the light of room {room.name}: {pictures} {light.seen:.0%} of all directions, and its"
-            f" {others} the other {1 - light.seen:.0%}"
+            f"rays that leave the object meet the light of room {room.name}: {pictures} {light.seen:.0%} of all"
+            f" directions, and its {others} the other {1 - light.seen:.0%}"
         )
         cube = light.cube
     elif isinstance(unseen, Panorama):
-        progress.note("gathered rays meet the light of the panorama, which shows all directions")
+        progress.note("rays that leave the object meet the light of the panorama, which shows all directions")
         cube = unseen.cube(FINE)
     else:
-        return LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, FACE, FACE, 3)))
+        cube = LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, 1, 1, 3)))
     cube = cube.turned(pose.rotation)
     lost = 1 - cube.texels.clip(max=MOST).sum() / max(cube.texels.sum(), 1e-9)
     if lost > _REPORTED_LOSS:
-        progress.note(
-            f"{lost:.0%} of the light is brighter than {MOST:g}, the most that a gathered ray brings, and is lost"
-        )
-    return cube
+        progress.note(f"{lost:.0%} of the light is brighter than {MOST:g}, the most that a ray brings, and is lost")
+    return cube.with_lights([_disc(light, point, pose) for light in lights.lights if light.radius > 0])
+
+
+def _disc(light: RoomLight, point: Floats, pose: Pose) -> tuple[Floats, float]:
+    """Direction in mesh space and angular radius of a light, as seen from a point in world space."""
+    away = light.position - point
+    distance = float(np.sqrt(away @ away))
+    return np.asarray((away / distance) @ pose.rotation), float(np.arctan(light.radius / distance))
 
 
 def with_cube(image: SceneImage, cube: LightCube | None) -> SceneImage:

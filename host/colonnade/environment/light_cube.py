@@ -1,9 +1,9 @@
-"""Light by direction around an object: a cube map of radiance, which gathered rays meet (docs/gather.md)."""
+"""Light by direction around an object: a cube map of radiance, which rays meet that leave it (docs/gather.md)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,9 @@ from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 
 #: Texels of the device's cube along the edge of a face.
-FACE = 8
+FACE = 16
 #: Directions averaged along each edge of a texel.
-_SUBSAMPLES = 8
+_SUBSAMPLES = 4
 #: The value 1.0 in the device's cube, and its largest value.
 _ONE, _LAST = 1 << 12, (1 << 16) - 1
 #: The largest radiance of the device's cube.
@@ -29,9 +29,11 @@ class LightCube:
         texels: Linear, float64 [6, n, n, 3]. Face 2 a + s is that of directions whose largest component is a, 0 to 2,
             with sign s, 1 for a negative one. Rows part the slope of the next axis, columns that of the one after it,
             from -1 to 1.
+        lights: Texels in which there is a light, bool [6, n, n]; None: there are none. Their radiance is without it.
     """
 
     texels: Floats
+    lights: NDArray[np.bool_] | None = None
 
     @staticmethod
     def of(radiance: Callable[[Floats], Floats], size: int = FACE) -> LightCube:
@@ -56,19 +58,44 @@ class LightCube:
             index = index * size + np.clip(np.floor((slope + 1) * (size / 2)), 0, size - 1).astype(np.intp)
         return np.asarray(index, dtype=np.intp)
 
-    def radiance(self, directions: Floats) -> Floats:
-        """Radiance from directions of any length, float64 [n, 3] each."""
-        return np.asarray(self.texels.reshape(-1, 3)[self.texel_of(directions)])
+    def radiance(self, directions: Floats, sees_lights: NDArray[np.bool_] | None = None) -> Floats:
+        """Radiance from directions of any length, float64 [n, 3] each.
+
+        Where there is a light, it is `MOST` for those that see lights, bool [n]; None: none do.
+        """
+        texels = self.texel_of(directions)
+        radiance = self.texels.reshape(-1, 3)[texels]
+        if self.lights is None or sees_lights is None:
+            return np.asarray(radiance)
+        return np.where((sees_lights & self.lights.ravel()[texels])[:, None], MOST, radiance)
+
+    def with_lights(self, discs: Sequence[tuple[Floats, float]]) -> LightCube:
+        """The cube with discs of light: unit direction, float64 [3], and radius, radians.
+
+        A light covers the texels whose middles lie in it, and at least the one that holds its own middle.
+        """
+        size = self.texels.shape[1]
+        directions = face_directions(size)[0].reshape(-1, 3)
+        lights = np.zeros(len(directions), dtype=np.bool_)
+        for middle, radius in discs:
+            lights |= fixed_order.product(directions, middle[:, None])[:, 0] >= np.cos(radius)
+            lights[self.texel_of(middle[None])] = True
+        return replace(self, lights=lights.reshape(6, size, size))
 
     def turned(self, rotation: Floats) -> LightCube:
-        """The device's cube of another space: a direction d of it is ``rotation @ d`` of this one, float64 [3, 3]."""
+        """The device's cube of another space: a direction d of it is ``rotation @ d`` of this one, float64 [3, 3].
+
+        It has no lights.
+        """
         turn = rotation.T
         return LightCube.of(lambda directions: self.radiance(fixed_order.product(directions, turn)))
 
     def words(self) -> NDArray[np.uint8]:
-        """The words of the device's memory, uint8 [texels, 6]: blue, green, red, 16 bits each, low byte first."""
+        """The words of the device's memory, uint8 [texels, 7]: blue, green, red, low byte first; a light."""
         fixed = np.rint(self.texels.reshape(-1, 3) * _ONE).clip(0, _LAST).astype("<u2")
-        return np.ascontiguousarray(fixed[:, ::-1]).view(np.uint8)
+        colours = np.ascontiguousarray(fixed[:, ::-1]).view(np.uint8)
+        lights = np.zeros(len(colours), np.uint8) if self.lights is None else self.lights.ravel().astype(np.uint8)
+        return np.concatenate([colours, lights[:, None]], axis=1)
 
 
 def face_directions(size: int) -> tuple[Floats, Floats]:

@@ -17,6 +17,7 @@ from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, Pla
 from colonnade.reference.scatter import Bytes, gathered_directions, lobe_shares, sphere_points
 
 if TYPE_CHECKING:
+    from colonnade.environment.light_cube import LightCube
     from colonnade.scene.view import View
 
 Points = TypeVar("Points", ObjectPoints, BackdropPoints)
@@ -131,11 +132,15 @@ class PathTracer:
             ray_origins, ray_directions, hit_faces = (
                 np.concatenate(both) for both in zip(gathered, reflected, strict=True)
             )
-            has_gathered = state.gathered[path] > 0
-            self._add_cube(
-                path[has_gathered & (hit_faces == _MISS)], ray_directions[has_gathered & (hit_faces == _MISS)], state
-            )
-            leaving = np.flatnonzero(~has_gathered & (hit_faces == _MISS))
+            left = np.flatnonzero(hit_faces == _MISS)
+            has_gathered = state.gathered[path[left]] > 0
+            scattered, leaving = left[has_gathered], left[~has_gathered]
+            if len(scattered):
+                cube = self._cube()
+                assert cube is not None
+                state.radiance[path[scattered]] += state.weight[path[scattered]] * cube.radiance(
+                    ray_directions[scattered]
+                )
             colour, is_outside = self._trace_background(ray_origins[leaving], ray_directions[leaving], shadows=True)
             state.radiance[path[leaving]] += state.weight[path[leaving]] * colour
             outside[path[leaving]] |= is_outside
@@ -161,11 +166,9 @@ class PathTracer:
         ratio = np.divide(visible, everything, out=np.where(visible > 0, np.inf, 1.0), where=everything > 0)
         return np.asarray((points.albedo * visible).clip(max=1.0)), ratio.clip(max=MAX_RATIO)
 
-    def _add_cube(self, path: Indices, directions: Floats, state: _PathState) -> None:
-        """Add the light of the cube to paths that have gathered and leave the object."""
-        if len(path):
-            assert self._view.gather is not None and self._view.gather.cube is not None
-            state.radiance[path] += state.weight[path] * self._view.gather.cube.radiance(directions)
+    def _cube(self) -> LightCube | None:
+        """The light where no surface is known, in a frame that gathers."""
+        return None if self._view.gather is None else self._view.gather.cube
 
     def _gathered_rays(
         self, path: Indices, faces: Indices, points: ObjectPoints, rays: Floats, words: Bytes, state: _PathState
@@ -307,10 +310,16 @@ class PathTracer:
         return origins, self._irradiance(origins, points.normals, shadows and self._view.shadows)
 
     def _trace_background(self, origins: Floats, directions: Floats, shadows: bool) -> tuple[Floats, NDArray[np.bool_]]:
-        """Colours of rays that miss the object, float64 [n, 3], and whether no map covers what they hit, bool [n]."""
+        """Colours of rays of paths that have gathered nothing, and miss the object, float64 [n, 3].
+
+        Also whether nothing tells what they hit, bool [n].
+        """
+        cube, nowhere = self._cube(), np.zeros(len(origins), dtype=np.bool_)
         colours = np.tile(self._view.background, (len(origins), 1))
+        if cube is not None:
+            colours = cube.radiance(directions, ~nowhere)
         if self._backdrop is None or len(origins) == 0:
-            return colours, np.zeros(len(origins), dtype=np.bool_)
+            return colours, nowhere
         matrix, shift = self._mesh_to_view()
         view_directions = unit_vectors(directions @ matrix.T)
         points = self._to_mesh_space(self._backdrop.intersect(origins @ matrix.T + shift, view_directions))
@@ -318,7 +327,7 @@ class PathTracer:
         surfaces = _select(points, known)
         _, (light, _) = self._background_light(surfaces, shadows)
         colours[known] = (surfaces.albedo * light).clip(max=1.0)
-        return colours, points.outside
+        return colours, points.outside if cube is None else nowhere
 
     def _irradiance(
         self, origins: Floats, axes: Floats, shadows: bool, alpha: Floats | None = None

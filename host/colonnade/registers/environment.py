@@ -46,7 +46,7 @@ def environment_registers(
     ):
         registers[f"environment.step{name}"] = round(map_pixels / frame_pixels / (2 * SLOPE_PIXELS) * 2.0**fraction)
     return registers | {
-        "environment.boundingPlanes": int(image.planes.bounding.any(axis=1).sum()),
+        "environment.boundingPlanes": 0 if view.gather else int(image.planes.bounding.any(axis=1).sum()),
         "environment.enabled": 1,
         "environment.isMapCamera": int(view.is_map_camera),
     }

@@ -169,14 +169,19 @@ def _layout_for(environment: Environment, layout: AttributeLayout | None) -> Att
 def room_backdrop(
     room: LitRoom, layout: AttributeLayout | None, truth: Path | None = None, progress: Progress = QUIET
 ) -> Backdrop | None:
-    """The room of a scene as background: full maps, the device's bounding planes, and depth map or real geometry."""
+    """The room of a scene as background: full maps, and depth map or real geometry.
+
+    Without gathered light it has the device's bounding planes.
+    """
     environment = room.environment
     if environment is None:
         if truth is not None:
             raise UserError("--truth is the real geometry of a room, but the scene has none: set background.room")
         return None
-    with progress.step("finding the bounding planes"):
-        bounding = BoundingPlanes(environment, encoded_environment(environment, _layout_for(environment, layout)))
+    bounding = None
+    if room.scene.paths.gather == 0:
+        with progress.step("finding the bounding planes"):
+            bounding = BoundingPlanes(environment, encoded_environment(environment, _layout_for(environment, layout)))
     if truth is not None:
         assert room.albedo is not None
         return true_room(truth, environment, room.albedo.albedo, 1.0 / room.scene.headroom, bounding)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from colonnade.mesh.mesh import Extent
 
 
-def lights_of(scene: Scene, extent: Extent, environment: Environment) -> RoomLights:
+def lights_of(scene: Scene, extent: Extent, environment: Environment | None) -> RoomLights:
     """The lights of a scene at the start of its motion."""
     scene = scene.at(0.0)
     positions = world_positions(scene, extent, environment)

@@ -230,10 +230,13 @@ def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tu
     return tuple(replace(material, **given) for material in materials)
 
 
-def world_positions(scene: Scene, extent: Extent, environment: Environment) -> list[Floats]:
-    """World positions of a scene's lights in a room, float64 [3] each; of a light with a radius its middle."""
-    camera = environment_camera(environment, environment.width, environment.height)
+def world_positions(scene: Scene, extent: Extent, environment: Environment | None) -> list[Floats]:
+    """World positions of a scene's lights, float64 [3] each; of a light with a radius its middle."""
     start = object_pose(scene.at(0.0), extent, environment)
+    if environment is None:
+        camera = start_camera(scene, start, extent, 1, 1, None)
+    else:
+        camera = environment_camera(environment, environment.width, environment.height)
     centre, edge = start.to_world(extent.centre), extent.edge * start.scale
     return [_world_position(light, camera.axes, centre, edge) for light in scene.lights]
 

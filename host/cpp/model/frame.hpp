@@ -96,13 +96,13 @@ private:
             const Face* const face = memory_.faceOf(hit.id);
             if (!face) {
                 errors.illegalRecord = true;
-                return total(path, path.gathered > 0 ? cube_.texel(path.direction) : frame_.lighting.background);
+                return total(path, path.bounces + path.gathered > 0 ? lightBehind(path) : frame_.lighting.background);
             }
             const Surface surface = surfaceOf(ray, hit, *face, numbers_);
             const Material& material = frame_.lighting.materialOf(*face);
             const Colour albedo = albedoOf(material, hit, *face);
             if (material.kind == MaterialKind::mirror || material.kind == MaterialKind::glass) {
-                if (!continuePath(surface, material, albedo, path, request, kind)) return total(path, lightBehind(path, request));
+                if (!continuePath(surface, material, albedo, path, request, kind)) return total(path, leavingRadiance(path, request));
             } else {
                 const bool gathers = path.gathered < frame_.gather.bounces;
                 const Lobe* const lobe = gathers && material.kind == MaterialKind::roughMetal ? &material.lobe : nullptr;
@@ -113,14 +113,13 @@ private:
                 for (int channel = 0; channel < 3; ++channel) path.throughput[channel] = (path.throughput[channel] * tintOf(albedo[channel])) >> numbers_.lightFraction;
                 request = gatheredRay(offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_), axis, surface.faceForwardNormal, lobe, path, point);
             }
-            path.direction = request.direction;
             log.addRay(kind, request, numbers_);
             ray = prepareRay(request, frame_.bounds, numbers_);
             hit = trace(ray);
-            if (!hit.found) return total(path, lightBehind(path, request));
+            if (!hit.found) return total(path, leavingRadiance(path, request));
             if (mayBeHidden(path)) {
                 const EnvironmentHit found = findHit(request);
-                if (march_->hides(found.point, found.direction, distanceOf(ray, hit), false, frame_.environment)) return total(path, radianceOf(request, found, true));
+                if (march_->hides(found.point, found.direction, distanceOf(ray, hit), false, frame_.environment)) return total(path, radianceOf(path, request, found, true));
             }
         }
     }
@@ -130,7 +129,8 @@ private:
         const Vector direction = gatherDirection(axis, faceForwardNormal, frame_.gather.points[path.gathered] ^ point, lobe, numbers_);
         ++path.gathered;
         ++counters.raysGather;
-        return {origin, {direction[0], direction[1], direction[2]}, numbers_.unlimited(), ~std::uint64_t(0)};
+        path.direction = {direction[0], direction[1], direction[2]};
+        return {origin, path.direction, numbers_.unlimited(), ~std::uint64_t(0)};
     }
 
     Wide distanceOf(const Ray& ray, const Hit& hit) const { return floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t; }
@@ -160,8 +160,15 @@ private:
     /// A value of all ones is 1.0.
     std::int64_t tintOf(std::int64_t albedo) const { return albedo + (albedo >> (numbers_.colourBits - 1)); }
 
-    /// The light behind the object: of the light cube for a path that has gathered.
-    Colour lightBehind(const Path& path, const RayRequest& ray) { return path.gathered > 0 ? cube_.texel(path.direction) : missRadiance(ray); }
+    /// The light that a path meets where no surface is known: in a frame that gathers the light cube's, else the background.
+    Colour lightBehind(const Path& path) const {
+        return frame_.gather.bounces > 0 ? cube_.light(path.direction, path.gathered == 0) : frame_.lighting.background;
+    }
+
+    /// The colour that a path's ray sees as it leaves the object: of the environment, unless the path has gathered.
+    Colour leavingRadiance(const Path& path, const RayRequest& ray, bool shadows = true) {
+        return hasEnvironment() && path.gathered == 0 ? radianceOf(path, ray, findHit(ray), shadows) : lightBehind(path);
+    }
 
     /// Incoming light at a surface whose shadow rays start at `origin`: without occlusion, and with it.
     struct Incoming {
@@ -253,15 +260,10 @@ private:
         return environmentLight(march_->hitPosition(ray.origin, found.direction, found.point), found.texel.normal, shadows);
     }
 
-    /// The colour of the environment where a ray hits it; the background's if it misses.
-    Colour radianceOf(const RayRequest& ray, const EnvironmentHit& found, bool shadows) {
-        if (found.point.kind == EnvironmentPoint::Kind::miss) return frame_.lighting.background;
+    /// The colour of the environment where a path's ray hits it.
+    Colour radianceOf(const Path& path, const RayRequest& ray, const EnvironmentHit& found, bool shadows) {
+        if (found.point.kind == EnvironmentPoint::Kind::miss) return lightBehind(path);
         return reflectedBy(found.texel.albedo, lightAt(ray, found, shadows).visible);
-    }
-
-    /// The colour that a ray sees if it misses the object.
-    Colour missRadiance(const RayRequest& ray, bool shadows = true) {
-        return hasEnvironment() ? radianceOf(ray, findHit(ray), shadows) : frame_.lighting.background;
     }
 
     /// Completes a pixel whose ray misses the object.
@@ -289,7 +291,6 @@ private:
         const WideVector origin = offSurface(march_->hitPosition(view.origin, found.direction, found.point), normal, frame_.lighting.offset, numbers_);
         Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, {}};
         const RayRequest request = gatheredRay(origin, {normal[0], normal[1], normal[2]}, normal, nullptr, path, pixelPoint(x, y));
-        path.direction = request.direction;
         log.addRay(RayKind::gather, request, numbers_);
         const Ray ray = prepareRay(request, frame_.bounds, numbers_);
         const Hit hit = trace(ray);
@@ -314,7 +315,8 @@ private:
             // The Fresnel reflection starts on the opposite side of the surface to the refracted ray
             reflection.origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
             for (int a = 0; a < 3; ++a) reflection.direction[a] = next.reflection[a];
-            reflectionColour = missRadiance(reflection, false);
+            path.direction = reflection.direction;
+            reflectionColour = leavingRadiance(path, reflection, false);
         }
         const bool isTinted = !surface.backSide || material.kind == MaterialKind::mirror;
         path.isInside = next.isRefraction == isTinted;
@@ -326,6 +328,7 @@ private:
             throughput -= reflected;
         }
         request = next.ray;
+        path.direction = request.direction;
         if (path.bounces == frame_.lighting.bounces) return false;
         ++path.bounces;
         ++(next.isRefraction ? counters.raysRefraction : counters.raysReflection);

@@ -124,21 +124,30 @@ inline Vector gatherDirection(const WideVector& about, const Vector& faceForward
     return direction;
 }
 
-/// The light cube: linear radiance by direction, 12 fraction bits; faces of 8 × 8 texels.
+/// The light cube: linear radiance by direction, 12 fraction bits, and where lights are; faces of 16 × 16 texels.
 class LightCube {
 public:
-    static constexpr int faceLog = 3, texels = 6 << (2 * faceLog);
+    static constexpr int faceLog = 4, texels = 6 << (2 * faceLog);
 
     /// Loads texels from address 0; words of `stride` bytes, low byte first.
     void load(const std::uint8_t* words, std::size_t count, std::size_t stride) {
-        for (std::size_t i = 0; i < std::min(count, texels_.size()); ++i)
-            for (std::size_t channel = 0; channel < 3; ++channel) {
-                const std::uint8_t* const low = words + i * stride + 2 * (2 - channel);
-                texels_[i][channel] = low[0] | low[1] << 8;
-            }
+        for (std::size_t i = 0; i < std::min(count, texels_.size()); ++i) {
+            const std::uint8_t* const word = words + i * stride;
+            for (std::size_t channel = 0; channel < 3; ++channel) texels_[i][channel] = word[2 * (2 - channel)] | word[2 * (2 - channel) + 1] << 8;
+            isLight_[i] = stride > 6 && (word[6] & 1);
+        }
     }
 
-    const Colour& texel(const WideVector& direction) const {
+    /// What a ray meets that leaves the object; the lights are seen by paths that have gathered nothing.
+    Colour light(const WideVector& direction, bool seesLights) const {
+        const std::size_t address = addressOf(direction);
+        return seesLights && isLight_[address] ? Colour{most, most, most} : texels_[address];
+    }
+
+private:
+    static constexpr std::int64_t most = 0xffff;
+
+    static std::size_t addressOf(const WideVector& direction) {
         Vector scaled;
         blockNormalise(direction, 8, scaled);
         std::array<std::int64_t, 3> size;
@@ -153,11 +162,11 @@ public:
                 left = 2 * (fits ? left - size[axis] : left);
             }
         }
-        return texels_[address];
+        return address;
     }
 
-private:
     std::array<Colour, texels> texels_{};
+    std::array<bool, texels> isLight_{};
 };
 
 } // namespace colonnade

@@ -39,8 +39,10 @@ SCENE = Scene(
 
 
 def with_cube(image: SceneImage, seed: int) -> SceneImage:
-    """The image with random light, up to 2.0."""
-    words = np.random.default_rng(seed).integers(0, 8192, (384, 3)).astype("<u2").view(np.uint8)
+    """The image with random light, up to 2.0, and lights in one of eight directions."""
+    random = np.random.default_rng(seed)
+    light = random.integers(0, 8192, (1536, 3)).astype("<u2").view(np.uint8)
+    words = np.concatenate([light, random.integers(0, 8, (1536, 1)).astype(np.uint8) // 7], axis=1)
     return replace(image, attributes=(*image.attributes, LoadSection("light.cube", words)))
 
 
@@ -82,6 +84,9 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
     still = frame_registers(scene, image.header, design.manifest, *size, held)
     mirrors = frame_registers(replace(scene, paths=Paths(bounces=1)), image.header, design.manifest, *size, held)
     registers = [gathering(still, bounces, bounces) for bounces in (0, 1, 4)] + [gathering(mirrors, 2, 9)]
+    if held is not None:
+        for settings in registers[1::2]:
+            settings["environment.boundingPlanes"] = 0  # Mirrors and glass see the cube
     simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
     for frame, settings in zip(simulated.frames, registers, strict=True):
         model = render_model(design.manifest, image, settings)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 import pytest
+from numpy.typing import NDArray
 
 from colonnade.common.accumulation import FramePasses
 from colonnade.common.errors import UserError
@@ -37,11 +38,17 @@ SCENE = Scene(
 IN_ROOM = replace(SCENE, placement=Placement((322.0, 306.0), 0.5), background=Background(room=ROOM))
 
 
+def light_of(words: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Blue, green and red of the cube's words, [texels, 3]."""
+    return np.ascontiguousarray(words[:, :6]).view("<u2").astype(int)
+
+
 def test_without_a_room_every_texel_is_the_ambient_light() -> None:
     prepared = DeviceScene.of(SCENE, manifest_for("textured").manifest)
     (cube,) = (section for section in prepared.image.attributes if section.memory == "light.cube")
-    assert cube.words.shape == (384, 6)
-    assert (cube.words.view("<u2") == np.rint(np.array([0.1, 0.2, 0.4]) * 4096)).all()
+    assert cube.words.shape == (1536, 7)
+    assert (light_of(cube.words) == np.rint(np.array([0.1, 0.2, 0.4]) * 4096)).all()
+    assert not cube.words[:, 6].any(), "a point light has no size"
 
 
 @pytest.mark.parametrize("scene", [SCENE, IN_ROOM], ids=["alone", "in a room"])
@@ -52,10 +59,10 @@ def test_an_image_keeps_its_light_in_a_file(scene: Scene, tmp_path: Path) -> Non
     assert again.header.to_json() == image.header.to_json()
     assert [section.memory for section in again.attributes] == [section.memory for section in image.attributes]
     assert image.attributes[-1].memory == "light.cube"
-    assert describe(again)["light"] == [{"memory": "light.cube", "words": 384, "word_bytes": 6}]
+    assert describe(again)["light"] == [{"memory": "light.cube", "words": 1536, "word_bytes": 7}]
     for one, other in zip(again.attributes, image.attributes, strict=True):
         np.testing.assert_array_equal(one.words, other.words)
-    assert image.attributes[-1].words.tobytes()[:6] in device_image(image, manifest)
+    assert image.attributes[-1].words.tobytes()[:7] in device_image(image, manifest)
 
 
 def test_a_room_lights_the_object_from_its_picture() -> None:
@@ -75,10 +82,7 @@ def test_a_new_view_of_the_room_brings_its_light() -> None:
     room, image = load_environment(ROOM), prepared.maps.image
     assert room.photo is not None
     darker = replace(room, photo=(room.photo // 2).astype(np.uint8))
-    words = [
-        prepared.seen_in(view, lambda _: image).image.attributes[-1].words.view("<u2").astype(int)
-        for view in (room, darker)
-    ]
+    words = [light_of(prepared.seen_in(view, lambda _: image).image.attributes[-1].words) for view in (room, darker)]
     assert words[1].sum() < 0.8 * words[0].sum()
 
 
@@ -139,6 +143,33 @@ def test_a_surface_in_a_dome_of_light_is_as_bright_as_under_ambient_light() -> N
     assert np.abs(means[0] - means[1]).max() < 0.003
 
 
+def test_a_mirror_shows_the_light_and_the_lamps_that_leave_it_nothing_else() -> None:
+    """A matt object does not see them: they are lights already."""
+    manifest, lamp = manifest_for("textured").manifest, Light((0.0, 6.0, 0.0), radius=2.0)
+    for kind, brightest in (("mirror", 4095), ("diffuse", 0)):
+        dark = Light((0.0, 6.0, 0.0), colour=(0.0, 0.0, 0.0), radius=2.0) if kind == "diffuse" else lamp
+        scene = replace(SCENE, mesh=MeshSource(name="sphere"), light=dark, material=Material(kind=kind))
+        scene = replace(scene, ambient=Colour((0.0, 0.0, 0.5)), background=Background((0.0, 1.0, 0.0)))
+        prepared = DeviceScene.of(scene, manifest)
+        frame = render_model(manifest, prepared.image, prepared.registers((48, 36)))
+        colours = frame.colour[frame.is_object]
+        assert colours[:, 0].max() == brightest, "the lamp"
+        assert (colours[colours[:, 0] < brightest] if kind == "mirror" else colours)[:, 1].max() == 0, "no background"
+
+
+def test_mirrors_and_glass_in_a_room_are_those_of_the_reference() -> None:
+    design, size, room = manifest_for("textured").manifest, (80, 60), load_environment(ROOM)
+    for kind, limit in (("mirror", 0.004), ("glass", 0.02)):
+        scene = replace(IN_ROOM, mesh=MeshSource(name="sphere"), material=Material(kind=kind), paths=Paths(gather=1))
+        prepared = DeviceScene.of(scene, design, encoder="live")
+        frame = render_model(design, prepared.image, prepared.registers(size))
+        (traced,) = traced_frames([scene], load_mesh("sphere"), room, size, 2)
+        expected = traced.first.image[frame.is_object & traced.first.object_mask]
+        found = frame.colour[frame.is_object & traced.first.object_mask] / 4095
+        errors = np.abs(found - expected).max(axis=1)
+        assert np.median(errors) < limit, "at edges of glass a ray may go elsewhere"
+
+
 def panorama_scene(path: Path, level: float, scene: Scene) -> Scene:
     """A scene with a grey panorama with a lamp of 100 times its light in the first of 50 rows."""
     pixels = np.full((200, 400, 3), level)
@@ -154,8 +185,8 @@ def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, capsys: pytest.C
     """Lights that the scene names add to it; otherwise they are taken out of it, and the rest is ambient light."""
     manifest, scene = manifest_for("textured").manifest, panorama_scene(tmp_path / "sky.exr", 0.5, SCENE)
     scene = replace(scene, background=replace(scene.background, panorama_exposure=0.5))
-    words = DeviceScene.of(scene, manifest).image.attributes[-1].words.view("<u2") / 4096
-    assert (np.sort(words, axis=None)[: 380 * 3] == 0.25).all() and words.max() > 1
+    words = light_of(DeviceScene.of(scene, manifest).image.attributes[-1].words) / 4096
+    assert (np.sort(words, axis=None)[: 1528 * 3] == 0.25).all() and words.max() > 1
     capsys.readouterr()
     prepared = DeviceScene.of(replace(scene, names_light=False), manifest)
     extent, light = prepared.image.header.extent, prepared.scene.light
@@ -164,12 +195,13 @@ def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, capsys: pytest.C
     solid = 2 * np.pi * (1 - np.cos(np.pi / 50))
     assert light.colour == pytest.approx([solid * 0.25 * 94 / np.pi] * 3, rel=0.02)
     assert prepared.scene.ambient.colour == pytest.approx([0.25] * 3, rel=0.01)
-    assert (prepared.image.attributes[-1].words.view("<u2") / 4096).max() < 0.75
+    words = prepared.image.attributes[-1].words
+    assert (light_of(words) / 4096).max() < 0.75 and 1 <= words[:, 6].sum() <= 8, "the lamp is a light instead"
     prepared.registers((32, 24))  # Its distance is within the registers
     assert capsys.readouterr().err.splitlines() == [
         "colonnade: the scene names no light: ambient light and 1 light are those of panorama sky.exr, which have their"
         " area with several --samples",
-        "colonnade: gathered rays meet the light of the panorama, which shows all directions",
+        "colonnade: rays that leave the object meet the light of the panorama, which shows all directions",
     ]
 
 

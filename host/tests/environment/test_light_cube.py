@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colonnade.common.vectors import unit_vectors
-from colonnade.environment.light_cube import FACE, LightCube, face_directions
+from colonnade.environment.light_cube import FACE, MOST, LightCube, face_directions
 from colonnade.environment.lights import RoomLights
 from colonnade.environment.load import load_environment
 from colonnade.maps.cache import encoded_environment
@@ -51,8 +51,25 @@ def test_words_hold_light_above_one_and_saturate() -> None:
     texels = np.zeros((6, FACE, FACE, 3))
     texels[0, 0, 1] = (0.5, 2.0, 99.0)
     words = LightCube(texels).words()
-    assert words.shape == (384, 6)
-    assert list(words[1].view("<u2")) == [65535, 8192, 2048], "blue, green, red"
+    assert words.shape == (1536, 7)
+    assert list(words[1, :6].view("<u2")) == [65535, 8192, 2048], "blue, green, red"
+
+
+@settings(max_examples=30, deadline=None)
+@given(DIRECTION, st.floats(0.0, 0.6))
+def test_a_light_is_where_it_is(direction: list[float], radius: float) -> None:
+    """In its directions and near them, for those that see lights; its texels keep their light for the others."""
+    middle = unit_vectors(np.array([direction]))[0]
+    cube = LightCube(np.full((6, FACE, FACE, 3), 0.25)).with_lights([(middle, radius)])
+    directions = unit_vectors(np.random.default_rng(3).normal(size=(2000, 3)))
+    angle = np.arccos((directions @ middle).clip(-1, 1))
+    sees = np.ones(len(directions), dtype=np.bool_)
+    light = cube.radiance(directions, sees)[:, 0]
+    texel = 2 * np.sqrt(2) / FACE  # At least the angle between two corners
+    assert (light[angle < radius - texel] == MOST).all() and (light[angle > radius + texel] == 0.25).all()
+    assert cube.radiance(middle[None], sees[:1])[0, 0] == MOST
+    assert (cube.radiance(directions) == 0.25).all() and (cube.radiance(directions, ~sees) == 0.25).all()
+    assert cube.words()[:, 6].sum() == np.count_nonzero(cube.lights)
 
 
 @pytest.mark.parametrize("name", ["living", "attic"])

@@ -1,8 +1,7 @@
 package colonnade.formats
 
-import chisel3.Bundle
+import chisel3.{Bool, Bundle}
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.numbers.Fixed
 
 /** One memory of the environment's maps.
   *
@@ -12,6 +11,12 @@ import colonnade.numbers.Fixed
   * @param target number of the memory for loads
   */
 final case class AttributeMemory(name: String, depth: Int, bits: Int, target: Int)
+
+/** A texel of the light cube: linear radiance, as the intensity of a light; whether there is a light. */
+final class CubeTexel extends Bundle {
+  val isLight  = Bool()
+  val radiance = Rgb(FrameRegisters.intensity)
+}
 
 /** The memories for loads beside that of the records: of the environment's maps, of the textures, of gathered light. */
 object AttributeMemories {
@@ -41,10 +46,10 @@ object AttributeMemories {
     )
 
   /** Texels of a face of the light cube along an edge. */
-  val cubeLog: Int = 3
+  val cubeLog: Int = 4
 
-  /** A texel of the light cube: linear radiance, as the intensity of a light. */
-  def cubeTexel: Rgb[Fixed] = Rgb(FrameRegisters.intensity)
+  /** A texel of the light cube. */
+  def cubeTexel: CubeTexel = new CubeTexel
 
   private def lightCube(config: ColonnadeConfig): Seq[(String, Int, Int)] =
     if (config.frame.gather) Seq(("light.cube", 6 << (2 * cubeLog), cubeTexel.getWidth)) else Nil

@@ -19,8 +19,10 @@ final private[shading] class ColourOperation(config: PathConfig) extends Bundle 
   val tint    = Option.when(config.frame.hasBounces)(Vec(3, FrameRegisters.weight))
   val fresnel = Option.when(config.frame.hasBounces)(FrameRegisters.weight)
 
-  /** Of an end: the path goes on with a gathered ray; it ends in the light cube. */
-  val gathers   = Option.when(config.frame.gather)(Bool())
+  /** Of an end: the path goes on with a gathered ray. */
+  val gathers = Option.when(config.frame.gather)(Bool())
+
+  /** The path ends in the light cube, or the Fresnel reflection does. */
   val showsCube = Option.when(config.frame.gather)(Bool())
 
   /** Of an end: its colour is what a point of the environment has gathered; that replaces the point's ambient light. */
@@ -52,7 +54,7 @@ final private[shading] class ColourSlot(config: PathConfig) extends Bundle {
   val weight   = UInt((NumberFormats.lightFraction + 1).W)
   val emission = Option.when(config.frame.emission)(UInt(bits.W))
 
-  /** The path gathers; the light of the cube where it ends there. */
+  /** The path gathers; the light of the cube where the ray ends there, from the second stage on. */
   val gathers = Option.when(config.frame.gather)(Bool())
   val cube    = Option.when(config.frame.gather)(Valid(UInt(NumberFormats.lightBits.W)))
 

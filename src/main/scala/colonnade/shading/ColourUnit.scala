@@ -86,6 +86,17 @@ final class ColourUnit(config: PathConfig) extends Module {
   }
   io.bounce.foreach(_.ready := Mux(isDirect, !isWriting, isFree))
   io.end.ready := isFree && !mayBounce
+  private val meetsCube = Mux(
+    bounces,
+    io.bounce.flatMap(_.bits.showsCube).getOrElse(false.B),
+    io.end.bits.isBackground && io.end.bits.endsInCube.getOrElse(false.B)
+  )
+  for (port <- io.cube) {
+    port.read.valid             := (bounces || io.end.fire) && meetsCube
+    port.read.bits.context      := taken
+    port.read.bits.seesLights   := bounces || !io.end.bits.isScattered.get
+    port.read.bits.isReflection := bounces
+  }
   when(takes) {
     next.context    := taken
     next.isBounce   := bounces
@@ -100,9 +111,9 @@ final class ColourUnit(config: PathConfig) extends Module {
     next.needsRatio := isDirectView && isOfRoom && showsSurface &&
       (io.end.bits.occlusions.map(_ =/= Occlusion.none).reduce(_ || _) || hasGathered)
     next.hasGathered.foreach(_ := hasGathered)
-    for (to <- next.goesBack; gathers <- io.end.bits.gathers) to  := isDirectView && !isOfRoom && !gathers
-    for (to <- next.gathers; from <- io.end.bits.gathers) to      := !bounces && from
-    for (to <- next.showsCube; end <- io.end.bits.isScattered) to := !bounces && io.end.bits.isBackground && end
+    for (to <- next.goesBack; gathers <- io.end.bits.gathers) to := isDirectView && !isOfRoom && !gathers
+    for (to <- next.gathers; from <- io.end.bits.gathers) to     := !bounces && from
+    next.showsCube.foreach(_ := meetsCube)
     next.fresnel.foreach(_.raw := 0.U)
     for (bounce <- io.bounce) when(bounces) {
       next.fresnel.get := bounce.bits.fresnel
@@ -200,11 +211,9 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val shadowTransmittance = io.shading.shadowTransmittance.map(_.natural).getOrElse(one)
   private val transmittance       =
     MuxLookup(at(occlusions), 0.U)(Seq(Occlusion.none -> one, Occlusion.transmissive -> shadowTransmittance))
-  for (cube <- slot.cube; port <- io.cube) {
-    port.read.valid := io.end.fire && io.end.bits.isBackground
-    port.read.bits  := io.end.bits.context
-    cube.valid      := operation.showsCube.get
-    cube.bits       := of(port.light.channels.map(_.natural))
+  for (cube <- slot.cube) {
+    cube.valid := operation.showsCube.get
+    cube.bits  := DontCare
   }
   slot.gathers.foreach(_ := gathers)
   for ((to, from) <- slot.goesBack.zip(operation.goesBack) ++ slot.hasGathered.zip(operation.hasGathered)) to := from
@@ -232,7 +241,8 @@ final class ColourUnit(config: PathConfig) extends Module {
 
   // The light that leaves the surface, or the weight of the Fresnel reflection
   private val sum = after(arrival) { slot =>
-    slot.isValid := arrival.isValid && arrival.isLastLight
+    slot.isValid                                       := arrival.isValid && arrival.isLastLight
+    for (cube <- slot.cube; port <- io.cube) cube.bits := of(port.light.channels.map(_.natural), arrival.channel)
     when(arrival.hasGathered.getOrElse(false.B)) { slot.radiance := 0.U }
   }
   private val factors   = Reg(Vec(2, UInt(weightBits.W)))

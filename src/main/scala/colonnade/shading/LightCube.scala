@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{Cat, RegEnable, Valid}
+import chisel3.util.{Cat, Fill, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
 import colonnade.formats.{AttributeMemories, FrameRegisters, Rgb}
@@ -14,19 +14,29 @@ final class CubePort extends Bundle {
   val word = Input(AttributeMemories.cubeTexel)
 }
 
-/** Asks for the light that the last ray of a context meets. It comes two cycles later, and stays until the next read. */
+/** The context whose light is read. */
+final class LightRead(config: PathConfig) extends Bundle {
+  val context    = Context(config)
+  val seesLights = Bool()
+
+  /** The last ray is a Fresnel reflection; the next one of the context may leave in this cycle. */
+  val isReflection = Bool()
+}
+
+/** Asks for the light that the last ray of a context meets. It comes three cycles later, and stays until the next read. */
 final class LightPort(config: PathConfig) extends Bundle {
-  val read  = Valid(Context(config))
+  val read  = Valid(new LightRead(config))
   val light = Input(Rgb(FrameRegisters.intensity))
 }
 
 final class LightCubeIO(config: PathConfig) extends Bundle {
-  val ray    = Flipped(Valid(new RayRequest(config))) // rays that are traced; not read within three cycles
+  val ray    = Flipped(Valid(new RayRequest(config))) // its context is read in a later cycle
   val port   = Flipped(new LightPort(config))
   val memory = new CubePort
 }
 
-/** The texel of the light cube in the direction of each context's last ray: docs/gather.md. A ray a cycle. {{{
+/** The texel of the light cube in the direction of each context's last ray: docs/gather.md. A ray a cycle. A path that sees
+  * lights meets the largest radiance where one is. {{{
   *
   * ray ─▶ scaled direction ─▶ face and slopes ─▶ table, by context ─▶ memory
   * }}}
@@ -36,16 +46,28 @@ final class LightCube(config: PathConfig) extends Module {
 
   val io = IO(new LightCubeIO(config))
 
-  private val isTraced = io.ray.valid && !io.ray.bits.isShadow
-  private val dir      = RegEnable(VecInit(scaled(io.ray.bits.dir.axes)), isTraced)
-  private val context  = RegEnable(io.ray.bits.context, isTraced)
-  private val texels   = ContextTable(config, UInt(addressBits.W))
-  when(RegNext(isTraced, false.B)) { texels.write(context, address(dir)) }
+  private val dir     = RegEnable(VecInit(scaled(io.ray.bits.dir.axes)), io.ray.valid)
+  private val context = RegEnable(io.ray.bits.context, io.ray.valid)
+  private val texels  = ContextTable(config, UInt(addressBits.W))
+  when(RegNext(io.ray.valid, false.B)) { texels.write(context, address(dir)) }
 
-  io.memory.read.valid := RegNext(io.port.read.valid, false.B)
-  io.memory.read.bits  := texels.read(io.port.read.bits, io.port.read.valid)
-  private val comes = RegNext(io.memory.read.valid, false.B)
-  io.port.light := Mux(comes, io.memory.word, RegEnable(io.memory.word, comes))
+  // The table is read at once for a reflection, before the next ray enters it, and else when the last ray has
+  private val read      = io.port.read
+  private val readsNow  = read.valid && read.bits.isReflection
+  private val request   = RegEnable(read.bits, read.valid)
+  private val hasRead   = RegNext(read.valid, false.B)
+  private val readsThen = hasRead && !request.isReflection
+  private val texel     = texels.read(Mux(readsNow, read.bits.context, request.context), readsNow || readsThen)
+  assert(!(readsNow && readsThen), "two contexts are read in a cycle")
+  private val isOfReflection = RegEnable(request.isReflection, hasRead)
+  io.memory.read.valid := RegNext(hasRead, false.B)
+  io.memory.read.bits  := Mux(isOfReflection, RegEnable(texel, hasRead), texel)
+  private val seesLights = RegEnable(request.seesLights, hasRead)
+  private val comes      = RegNext(io.memory.read.valid, false.B)
+  private val word       = io.memory.word
+  private val isMost     = word.isLight && RegEnable(seesLights, io.memory.read.valid)
+  private val light      = Mux(isMost, Fill(word.radiance.getWidth, 1.U(1.W)).asTypeOf(word.radiance), word.radiance)
+  io.port.light := Mux(comes, light, RegEnable(light, comes))
 }
 
 object LightCube {

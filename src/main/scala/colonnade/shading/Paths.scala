@@ -15,8 +15,11 @@ final class PathTermination(config: PathConfig) extends Bundle {
   /** The camera sees the environment's surface directly: the shadow ratio is needed as well. */
   val isDirectView = if (config.hasEnvironment) Some(Bool()) else None
 
-  /** The surface gathers light: the path goes on, without ambient light; without a surface it ends in the light cube. */
-  val gathers     = Option.when(config.frame.gather)(Bool())
+  /** The surface gathers light: the path goes on, without ambient light. */
+  val gathers = Option.when(config.frame.gather)(Bool())
+
+  /** Without a surface, the path ends in the light cube; the path has gathered, so it does not see lights there. */
+  val endsInCube  = Option.when(config.frame.gather)(Bool())
   val isScattered = Option.when(config.frame.gather)(Bool())
 
   /** The surface is of the environment. In direct view, the ray that it has gathered is complete: its light replaces the
@@ -41,8 +44,9 @@ final class BounceUpdate(config: PathConfig) extends Bundle {
   val isTinted = Bool()                // the path is tinted by the albedo
   val fresnel  = FrameRegisters.weight // the Fresnel term: the weight of the deferred reflection
 
-  /** The reflection shows the remembered surface, lit by all lights; otherwise the background's colour. */
+  /** The reflection shows the remembered surface, lit by all lights, or the light cube; otherwise the background's colour. */
   val hasSurface = if (config.hasEnvironment) Some(Bool()) else None
+  val showsCube  = if (config.gathersInRoom) Some(Bool()) else None
 }
 
 /** The colour of a path. */

@@ -20,6 +20,16 @@ final class DeferredBounceIO(config: PathConfig) extends Bundle {
   val ray = Valid(new RayRequest(config))
 }
 
+/** Rays that may meet the light cube. */
+final class LeavingRays(config: PathConfig) extends Bundle {
+
+  /** A ray that leaves a mirror or glass, traced or not, or a Fresnel reflection. */
+  val ray = Valid(new RayRequest(config))
+
+  /** One that is not traced may leave. */
+  val mayBypass = Output(Bool())
+}
+
 final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val shading = Input(new Shading(config))
   val start   = Flipped(Valid(Context(config))) // a context gets a new pixel
@@ -35,6 +45,7 @@ final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val bounced      = Valid(new Bounced(config)) // a bounce that is issued
   val isRefraction = Output(Bool())
   val environment  = if (config.hasEnvironment) Some(new DeferredBounceIO(config)) else None
+  val leaves       = Option.when(config.frame.gather)(new LeavingRays(config))
 }
 
 /** Issues bounces at mirrors and glass. In the same cycle, the colour unit gets the update of the path's throughput, and
@@ -55,6 +66,7 @@ final class BounceScheduler(config: PathConfig) extends Module {
   incoming.update.fresnel  := result.fresnel
   for (path <- io.path) when(path.isScattered) { incoming.update.fresnel.raw := 0.U }
   incoming.update.hasSurface.foreach(_ := false.B)
+  incoming.update.showsCube.foreach(_ := false.B)
   incoming.isRefraction := result.isRefraction
   incoming.origin       := result.origin
   incoming.dir          := result.dir
@@ -87,10 +99,21 @@ final class BounceScheduler(config: PathConfig) extends Module {
   io.bounced.bits.isTraced                    := isTraced
   io.bounced.bits.isInside                    := bounce.bits.isRefraction === bounce.bits.update.isTinted
   io.isRefraction                             := bounce.bits.isRefraction
+  for (leaves <- io.leaves) {
+    leaves.ray.valid                               := io.bounced.valid
+    leaves.ray.bits                                := io.ray.bits
+    for (environment <- io.environment) leaves.ray := environment.ray
+    leaves.mayBypass                               := (bounce.valid && !isTraced) ||
+      io.environment.map(environment => io.in.valid && hasReflection(environment)).getOrElse(false.B)
+  }
+
+  /** The bounce from the shader has a Fresnel reflection, which is resolved first. */
+  private def hasReflection(environment: DeferredBounceIO): Bool =
+    environment.enabled && incoming.update.fresnel.natural =/= 0.U
 
   private def deferBounces(environment: DeferredBounceIO): Unit = {
-    val bounces       = ContextTable(config, new PendingBounce(config))
-    val hasReflection = environment.enabled && incoming.update.fresnel.natural =/= 0.U
+    val bounces    = ContextTable(config, new PendingBounce(config))
+    val isDeferred = hasReflection(environment)
 
     // Read the table, and hold the bounce until it is issued
     val isRead    = RegNext(environment.resume.fire, false.B)
@@ -101,15 +124,16 @@ final class BounceScheduler(config: PathConfig) extends Module {
     when(isRead) { isHeld := true.B }.elsewhen(bounce.fire) { isHeld := false.B }
 
     // Write the table
-    environment.fresnelReflection.valid := io.in.valid && hasReflection && !bounce.fire
+    environment.fresnelReflection.valid := io.in.valid && isDeferred && !bounce.fire
     environment.fresnelReflection.bits  := result.context
     when(environment.fresnelReflection.valid) { bounces.write(result.context, incoming) }
 
-    bounce.valid := isHeld || (io.in.valid && !hasReflection)
-    io.in.ready  := Mux(hasReflection, !bounce.fire, bounce.ready && !isHeld)
+    bounce.valid := isHeld || (io.in.valid && !isDeferred)
+    io.in.ready  := Mux(isDeferred, !bounce.fire, bounce.ready && !isHeld)
     when(isHeld) {
-      bounce.bits                       := resumed
-      bounce.bits.update.hasSurface.get := !resumedBy.isBackground
+      bounce.bits                                                                  := resumed
+      bounce.bits.update.hasSurface.get                                            := !resumedBy.isBackground
+      for ((to, from) <- bounce.bits.update.showsCube.zip(resumedBy.showsCube)) to := from
     }
 
     environment.ray.valid := bounce.fire || environment.fresnelReflection.valid

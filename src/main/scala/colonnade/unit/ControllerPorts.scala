@@ -54,7 +54,8 @@ final class Bounced(config: PathConfig) extends Bundle {
 /** A context whose deferred Fresnel reflection is complete, so that its bounce may resume. */
 final class ResumedBounce(config: PathConfig) extends Bundle {
   val context      = Context(config)
-  val isBackground = Bool() // the reflection shows the background
+  val isBackground = Bool() // the reflection shows the background, or the light cube
+  val showsCube    = Option.when(config.gathersInRoom)(Bool())
 }
 
 /** Control of rays that miss the object or whose hit may be hidden, if there may be an environment. */

@@ -46,10 +46,18 @@ final class PathUnit(config: PathConfig) extends Module {
   private val bounces     = Option.when(config.frame.hasBounces)(Module(new BounceScheduler(config)).io)
   private val environment = Option.when(config.hasEnvironment)(Module(new EnvironmentPort(config)).io)
 
+  // A gathered ray waits where a ray may leave that is not traced: the light cube accepts one in a cycle
+  private val isGathered  = shadowRays.ray.valid && !shadowRays.ray.bits.isShadow
+  private val mayLeave    = bounces.flatMap(_.leaves).map(_.mayBypass).getOrElse(false.B)
+  private val surfaceRays = Wire(chiselTypeOf(shadowRays.ray))
+  surfaceRays.bits     := shadowRays.ray.bits
+  surfaceRays.valid    := shadowRays.ray.valid && !(isGathered && mayLeave)
+  shadowRays.ray.ready := surfaceRays.ready && !(isGathered && mayLeave)
+
   // From a position to a prepared ray; rays whose pixels are closer to their end have priority
   primaryRays.positions :<>= io.positions
   private val tracedPrimary = environment.map(_.objectRays).getOrElse(primaryRays.ray)
-  private val raySources    = Seq(shadowRays.ray) ++ bounces.map(_.ray) :+ tracedPrimary
+  private val raySources    = Seq(surfaceRays) ++ bounces.map(_.ray) :+ tracedPrimary
   private val rayArbiter    = Module(new Arbiter(new RayRequest(config), raySources.size)).io
   rayArbiter.in.zip(raySources).foreach { case (in, rays) => in :<>= rays }
   raySetup.request :<>= TimingSlice.queue(rayArbiter.out)       // no path leads from ray set-up to the tiles
@@ -107,9 +115,12 @@ final class PathUnit(config: PathConfig) extends Module {
       gathers.bounced := bounces.in.bits.bounce.context
       path            := gathers.bouncedPath
     }
-    val light = Module(new LightCube(config)).io
-    light.ray.valid := rayArbiter.out.fire
-    light.ray.bits  := rayArbiter.out.bits
+    val light    = Module(new LightCube(config)).io
+    val leaving  = bounces.get.leaves.get.ray
+    val scatters = surfaceRays.fire && isGathered
+    light.ray.valid := leaving.valid || scatters
+    light.ray.bits  := Mux(leaving.valid, leaving.bits, surfaceRays.bits)
+    assert(!(leaving.valid && scatters), "two rays leave in a cycle")
     light.port :<>= colourUnit.cube.get
     cube :<>= light.memory
   }

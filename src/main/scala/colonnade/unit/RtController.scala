@@ -190,6 +190,7 @@ final class RtController(config: PathConfig) extends Module {
     val isOfRoom    = isOfEnvironment(ending.bits)
     io.end.bits.gathers.get     := mayGather && !isOfRoom && !io.end.bits.isBackground
     io.end.bits.isScattered.get := hasGathered
+    io.end.bits.endsInCube.get  := gather.bounces =/= 0.U && (hasGathered || !isStraight(ending.bits))
     for (isOfEnvironment <- io.end.bits.isOfEnvironment) {
       isOfEnvironment := isOfRoom
       when(isOfRoom && hasGathered) { io.end.bits.occlusions := VecInit(shadows.kept(last)) }
@@ -262,6 +263,8 @@ final class RtController(config: PathConfig) extends Module {
     environment.resume.valid             := resumable.valid
     environment.resume.bits.context      := resumable.bits
     environment.resume.bits.isBackground := state(resumable.bits) === ContextState.resumeBounce
+    for (showsCube <- environment.resume.bits.showsCube; gather <- io.gather)
+      showsCube := environment.resume.bits.isBackground && gather.bounces =/= 0.U
     move(environment.resume.fire, resumable.bits, ContextState.shading)
     when(environment.resume.fire) { isFresnelReflection(resumable.bits) := false.B }
   }

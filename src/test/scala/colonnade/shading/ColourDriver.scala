@@ -14,15 +14,23 @@ import scala.util.Random
 sealed trait ColourEvent
 
 object ColourEvent {
-  case object Start                                                                               extends ColourEvent
-  final case class Remember(what: LitColours, isOfRoom: Boolean)                                  extends ColourEvent
-  final case class Bounce(albedo: Seq[Int], isTinted: Boolean, fresnel: Int, hasSurface: Boolean) extends ColourEvent
+  case object Start                                              extends ColourEvent
+  final case class Remember(what: LitColours, isOfRoom: Boolean) extends ColourEvent
+
+  /** @param light of the cube, which the Fresnel reflection meets */
+  final case class Bounce(
+      albedo:     Seq[Int],
+      isTinted:   Boolean,
+      fresnel:    Int,
+      hasSurface: Boolean,
+      light:      Option[Seq[Int]] = None
+  ) extends ColourEvent
 
   /** @param occlusions by light, 0: none, 1: transmissive, 2: opaque */
   final case class End(isBackground: Boolean, occlusions: Seq[Int], isDirectView: Boolean, isOfRoom: Boolean)
       extends ColourEvent
 
-  /** A surface that gathers light; the path ends in light of the cube. */
+  /** A surface that gathers light; a path ends in light of the cube. */
   final case class Gather(occlusions: Seq[Int]) extends ColourEvent
   final case class EndInCube(light: Seq[Int])   extends ColourEvent
 
@@ -101,8 +109,10 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
   private def bounce(mayReflect: Boolean = true): Seq[ColourEvent] = {
     val hasSurface = config.hasEnvironment && mayReflect && random.nextBoolean()
     val fresnel    = if (!mayReflect || random.nextBoolean()) 0 else random.nextInt(one + 1)
+    val meetsCube  =
+      Option.when(config.gathersInRoom && !hasSurface && fresnel > 0 && random.nextBoolean())(intensity())
     Seq(Remember(surface(), isOfRoom = true)).filter(_ => hasSurface) :+
-      Bounce(colour(), random.nextBoolean(), fresnel, hasSurface)
+      Bounce(colour(), random.nextBoolean(), fresnel, hasSurface, meetsCube)
   }
 
   private def occlusions(): Seq[Int] = {
@@ -127,8 +137,8 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
   private val todo     = Seq.fill(contexts)(mutable.Queue.empty[ColourEvent])
   private val waits    = Array.fill(contexts)(Option.empty[ColourEvent])
 
-  /** The light of the cube on its way to the unit: two cycles after its request. */
-  private var requested = Seq.fill(2)(Option.empty[Seq[Int]])
+  /** The light of the cube on its way to the unit: three cycles after its request. */
+  private var requested = Seq.fill(3)(Option.empty[Seq[Int]])
 
   /** By context, whether its path has not bounced. */
   private val isStraight = Array.fill(contexts)(true)
@@ -178,16 +188,18 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
     }
     for (port <- io.bounce) {
       port.valid.poke(bounce.nonEmpty)
-      for ((context, Bounce(albedo, isTinted, fresnel, hasSurface)) <- bounce) {
+      for ((context, Bounce(albedo, isTinted, fresnel, hasSurface, light)) <- bounce) {
         port.bits.context.poke(context)
         port.bits.isFirst.poke(isStraight(context))
         pokeUInt(port.bits.albedo, albedo)
         port.bits.isTinted.poke(isTinted)
         port.bits.fresnel.pokeRaw(fresnel)
         port.bits.hasSurface.foreach(_.poke(hasSurface))
+        port.bits.showsCube.foreach(_.poke(light.nonEmpty))
       }
     }
     io.end.valid.poke(end.nonEmpty)
+    val isScattered = random.nextBoolean()
     for ((context, event) <- end) {
       val dark                                               = Seq.fill(config.frame.lights)(0)
       val (isBackground, occlusions, isDirectView, isOfRoom) = event match {
@@ -204,16 +216,21 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       io.end.bits.isOfEnvironment.foreach(_.poke(isOfRoom))
       io.end.bits.occlusions.zip(occlusions).foreach { case (port, what) => port.poke(Occlusion.all(what)) }
       io.end.bits.gathers.foreach(_.poke(event.isInstanceOf[Gather]))
-      io.end.bits.isScattered.foreach(_.poke(lightOf(event).nonEmpty))
+      io.end.bits.endsInCube.foreach(_.poke(lightOf(event).nonEmpty))
+      io.end.bits.isScattered.foreach(_.poke(isScattered))
     }
     // The light stays until the next one comes
     for (cube <- io.cube) {
       requested.last.foreach(light => poke(cube.light, light))
-      val light = end.flatMap { case (_, event) => lightOf(event) }
-      requested =
-        Option.when(
-          cube.read.valid.peekBoolean()
-        )(light.getOrElse(Seq.fill(3)(random.nextInt(65536)))) +: requested.init
+      val reader = cube.read.bits.context.peekInt().toInt
+      val light  = (end ++ bounce).find(_._1 == reader).flatMap { case (_, event) => lightOf(event) }
+      val reads  = cube.read.valid.peekBoolean()
+      for (_ <- light if reads) {
+        val isReflection = bounce.exists(_._1 == reader)
+        cube.read.bits.isReflection.expect(isReflection)
+        cube.read.bits.seesLights.expect(isReflection || !isScattered)
+      }
+      requested = Option.when(reads)(light.getOrElse(throw new AssertionError("no light is needed"))) +: requested.init
     }
 
     // What was taken
@@ -248,11 +265,12 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
     }
   }
 
-  /** The light of the cube that an end meets. */
+  /** The light of the cube that a path meets. */
   private def lightOf(event: ColourEvent): Option[Seq[Int]] = event match {
-    case EndInCube(light) => Some(light)
-    case GoBack(light, _) => light
-    case _                => None
+    case EndInCube(light)          => Some(light)
+    case GoBack(light, _)          => light
+    case Bounce(_, _, _, _, light) => light
+    case _                         => None
   }
 
   private def poke(port: Rgb[Fixed], values: Seq[Int]): Unit =

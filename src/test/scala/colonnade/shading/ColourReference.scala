@@ -36,12 +36,14 @@ final class ColourReference(
       case Remember(what, isOfRoom) =>
         if (isOfRoom) environment = Some(what) else surface = Some(what)
         None
-      case Bounce(albedo, isTinted, fresnel, hasSurface) =>
+      case Bounce(albedo, isTinted, fresnel, hasSurface, light) =>
         val tinted = throughput.zip(albedo).map { case (weight, tint) =>
           if (isTinted) weight * (tint + (tint >> 11)) >> 12 else weight
         }
         val parts = tinted.map(_ * fresnel >> 12)
-        radiance = add(parts, if (hasSurface) leaving(environment.get, unshadowed(environment.get)) else background)
+        val seen  =
+          if (hasSurface) leaving(environment.get, unshadowed(environment.get)) else light.getOrElse(background)
+        radiance = add(parts, seen)
         throughput = tinted.zip(parts).map { case (weight, part) => weight - part }
         None
       case Gather(occlusions) =>

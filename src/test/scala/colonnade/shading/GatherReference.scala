@@ -71,9 +71,9 @@ object GatherReference {
     val sizes                     = scaled.map(_.abs)
     val axis                      = sizes.indexOf(sizes.max)
     val major                     = sizes(axis)
-    def part(component: Int): Int = if (major == 0) 7 else ((component + major) * 4 / major).min(7)
+    def part(component: Int): Int = if (major == 0) 15 else ((component + major) * 8 / major).min(15)
     val face                      = 2 * axis + (if (scaled(axis) < 0) 1 else 0)
-    (face * 8 + part(scaled((axis + 1) % 3))) * 8 + part(scaled((axis + 2) % 3))
+    (face * 16 + part(scaled((axis + 1) % 3))) * 16 + part(scaled((axis + 2) % 3))
   }
 
   /** The sample point of a pixel: the xor of the columns of two generator matrices of Sobol's sequence, in Morton order. */

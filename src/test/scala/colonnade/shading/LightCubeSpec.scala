@@ -8,7 +8,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** A path meets the texel in the direction of its last ray that is no shadow ray. */
+/** A path meets the texel in the direction of its last ray, or a light there if it sees lights. */
 class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "LightCube"
 
@@ -17,42 +17,53 @@ class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "read the texel of a direction" in
     test(new LightCube(config)).withAnnotations(Simulation.verilator) { dut =>
-      val random                                                       = new Random(4)
-      val bits                                                         = config.numbers.directionBits
-      val last                                                         = Array.fill(4)(0)
-      def ray(context: Int, dir: Seq[BigInt], isShadow: Boolean): Unit = {
+      val random                                    = new Random(4)
+      val bits                                      = config.numbers.directionBits
+      val last                                      = Array.fill(4)(0)
+      def ray(context: Int, dir: Seq[BigInt]): Unit = {
         dut.io.ray.valid.poke(true)
         dut.io.ray.bits.context.poke(context)
-        dut.io.ray.bits.isShadow.poke(isShadow)
         dut.io.ray.bits.dir.axes.zip(dir).foreach { case (axis, value) => axis.poke(value) }
         dut.clock.step()
         dut.io.ray.valid.poke(false)
-        if (!isShadow) last(context) = GatherReference.texel(dir)
+        last(context) = GatherReference.texel(dir)
       }
       def direction(): Seq[BigInt] = random.nextInt(4) match {
         case 0 => Seq.fill(3)(BigInt(random.nextInt(5) - 2) << random.nextInt(bits - 3))
         case 1 => Seq.fill(3)(BigInt(random.nextInt(9) - 4))
         case _ => Seq.fill(3)(BigInt(bits - 1, random) * (random.nextInt(2) * 2 - 1))
       }
-      for (context <- 0 until 4) ray(context, direction(), isShadow = false)
+      for (context <- 0 until 4) ray(context, direction())
       for (_ <- 0 until 2000) {
-        ray(random.nextInt(4), direction(), random.nextInt(4) == 0)
-        dut.clock.step(2)
-        val context = random.nextInt(4)
+        ray(random.nextInt(4), direction())
+        val (context, seesLights, isLight) = (random.nextInt(4), random.nextBoolean(), random.nextInt(3) == 0)
+        val isReflection                   = random.nextBoolean()
+        if (isReflection) dut.clock.step()
         dut.io.port.read.valid.poke(true)
-        dut.io.port.read.bits.poke(context)
-        dut.clock.step()
+        dut.io.port.read.bits.context.poke(context)
+        dut.io.port.read.bits.seesLights.poke(seesLights)
+        dut.io.port.read.bits.isReflection.poke(isReflection)
+        val texel = last(context)
+        // The next ray of the path leaves with the reflection's light
+        if (isReflection) ray(context, direction()) else dut.clock.step()
         dut.io.port.read.valid.poke(false)
+        dut.io.port.read.bits.seesLights.poke(random.nextBoolean())
+        dut.io.port.read.bits.isReflection.poke(random.nextBoolean())
+        dut.io.memory.read.valid.expect(false)
+        dut.clock.step()
         dut.io.memory.read.valid.expect(true)
-        dut.io.memory.read.bits.expect(last(context))
+        dut.io.memory.read.bits.expect(texel)
         dut.clock.step()
         // The word is there in one cycle, the light stays
-        val word = Seq.fill(3)(random.nextInt(65536))
-        dut.io.memory.word.channels.zip(word).foreach { case (port, value) => port.pokeRaw(value) }
+        val word  = Seq.fill(3)(random.nextInt(65536))
+        val light = if (isLight && seesLights) Seq.fill(3)(65535) else word
+        dut.io.memory.word.isLight.poke(isLight)
+        dut.io.memory.word.radiance.channels.zip(word).foreach { case (port, value) => port.pokeRaw(value) }
         for (_ <- 0 to random.nextInt(3)) {
-          dut.io.port.light.channels.zip(word).foreach { case (port, value) => assert(port.peekRaw() == value) }
+          dut.io.port.light.channels.zip(light).foreach { case (port, value) => assert(port.peekRaw() == value) }
           dut.clock.step()
-          dut.io.memory.word.channels.foreach(_.pokeRaw(random.nextInt(65536)))
+          dut.io.memory.word.isLight.poke(random.nextBoolean())
+          dut.io.memory.word.radiance.channels.foreach(_.pokeRaw(random.nextInt(65536)))
         }
       }
     }

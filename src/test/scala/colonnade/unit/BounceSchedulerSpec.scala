@@ -21,9 +21,10 @@ class BounceSchedulerSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val gathering   = TestConfigs.gathering(environment)
   for (
     (config, where) <- Seq(
-      TestConfigs.tiny -> "",
-      environment      -> ", with an environment",
-      gathering        -> ", of paths that gather"
+      TestConfigs.tiny                        -> "",
+      environment                             -> ", with an environment",
+      gathering                               -> ", of paths that gather",
+      TestConfigs.gathering(TestConfigs.tiny) -> ", of paths that gather without an environment"
     )
   )
     it should s"issue every bounce once$where" in
@@ -38,16 +39,18 @@ class BounceSchedulerSpec extends AnyFlatSpec with ChiselScalatestTester {
 private class BounceSchedulerHarness(config: ColonnadeConfig) extends Module {
   private val unit = Module(new BounceScheduler(config)).io
 
-  val io     = IO(chiselTypeOf(unit))
-  val in     = IO(Input(UInt(unit.in.bits.getWidth.W)))
-  val update = IO(Output(UInt(unit.update.bits.getWidth.W)))
-  val ray    = IO(Output(UInt(unit.ray.bits.getWidth.W)))
-  val stored = unit.environment.map(environment => IO(Output(UInt(environment.ray.bits.getWidth.W))))
+  val io      = IO(chiselTypeOf(unit))
+  val in      = IO(Input(UInt(unit.in.bits.getWidth.W)))
+  val update  = IO(Output(UInt(unit.update.bits.getWidth.W)))
+  val ray     = IO(Output(UInt(unit.ray.bits.getWidth.W)))
+  val stored  = unit.environment.map(environment => IO(Output(UInt(environment.ray.bits.getWidth.W))))
+  val leaving = unit.leaves.map(leaves => IO(Output(UInt(leaves.ray.bits.getWidth.W))))
   io :<>= unit
   unit.in.bits                                                   := in.asTypeOf(unit.in.bits)
   update                                                         := unit.update.bits.asUInt
   ray                                                            := unit.ray.bits.asUInt
   for (stored <- stored; environment <- unit.environment) stored := environment.ray.bits.asUInt
+  for (leaving <- leaving; leaves <- unit.leaves) leaving        := leaves.ray.bits.asUInt
 }
 
 private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, random: Random, enabled: Boolean) {
@@ -58,10 +61,13 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private val ray     = new Packed(new RayRequest(config))
   private val most    = 2
 
-  /** Bounces to issue, by context; those whose reflection is resolved, and whether that shows a surface. */
+  /** What a resolved reflection shows. */
+  private case class Resumed(hasSurface: Boolean, showsCube: Boolean)
+
+  /** Bounces to issue, by context; those whose reflection is resolved. */
   private var waiting  = Map.empty[Int, Fields]
   private var deferred = Set.empty[Int]
-  private var resumed  = Map.empty[Int, Boolean]
+  private var resumed  = Map.empty[Int, Resumed]
   private var offered  = Option.empty[Int]
   private val counts   = Array.fill(config.units.pathContexts)(0)
   private val straight = Array.fill(config.units.pathContexts)(false)
@@ -110,22 +116,29 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     dut.io.ray.ready.poke(takesRay)
     val resumes = deferred.headOption.filter(_ => isWilling)
     val isMiss  = random.nextBoolean()
+    val isCube  = isMiss && random.nextBoolean()
     for (resume <- dut.io.environment.map(_.resume)) {
       resume.valid.poke(resumes.nonEmpty)
       resume.bits.context.poke(resumes.getOrElse(0))
       resume.bits.isBackground.poke(isMiss)
+      resume.bits.showsCube.foreach(_.poke(isCube))
     }
 
     val isIssued = takesUpdate && dut.io.update.valid.peekBoolean()
     val reflects = dut.io.environment.exists(_.fresnelReflection.valid.peekBoolean())
     dut.io.bounced.valid.expect(isIssued)
     dut.io.environment.foreach(_.ray.valid.expect(isIssued || reflects))
+    for (leaves <- dut.io.leaves) {
+      leaves.ray.valid.expect(isIssued || reflects)
+      val isTraced = takesRay && dut.io.ray.valid.peekBoolean()
+      if (leaves.ray.valid.peekBoolean() && !isTraced) leaves.mayBypass.expect(true, "what is not traced is announced")
+    }
     if (isIssued) issue(update.unpack(dut.update.peekInt()), takesRay)
     else assert(!(takesRay && dut.io.ray.valid.peekBoolean()))
     if (reflects) defer()
     for (context <- resumes if dut.io.environment.get.resume.ready.peekBoolean()) {
       deferred -= context
-      resumed += context -> !isMiss
+      resumed += context -> Resumed(!isMiss, isCube)
     }
     if (offered.nonEmpty && dut.io.in.ready.peekBoolean()) {
       assert(offered.exists(context => !waiting.contains(context) || deferred(context)), "a bounce is lost")
@@ -145,7 +158,8 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     assert(fields("fresnel") == fresnel(context, bounce))
     val isFirst = if (dut.io.path.isEmpty) counts(context) == 0 else straight(context)
     assert(fields("isFirst") == (if (isFirst) 1 else 0))
-    for (hasSurface <- fields.get("hasSurface")) assert(hasSurface == (if (resumed.getOrElse(context, false)) 1 else 0))
+    for (hasSurface <- fields.get("hasSurface")) assert(hasSurface == flag(resumed.get(context).exists(_.hasSurface)))
+    for (showsCube <- fields.get("showsCube")) assert(showsCube == flag(resumed.get(context).exists(_.showsCube)))
 
     val isTraced     = counts(context) < most
     val isRefraction = bounce("bounce.isRefraction") == 1
@@ -162,7 +176,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
       assert(sent == expected ++ Map("context" -> BigInt(context), "isShadow" -> BigInt(0)))
       counts(context) += 1
     } else untraced += 1
-    for (port <- dut.stored) checkStored(port, context, expected)
+    for (port <- dut.stored ++ dut.leaving) checkStored(port, context, expected)
     waiting -= context
     resumed -= context
     issued += 1
@@ -173,9 +187,12 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     val bounce  = waiting(context)
     assert(hasReflection(context, bounce) && !deferred(context))
     dut.io.environment.get.fresnelReflection.bits.expect(context)
-    checkStored(dut.stored.get, context, way(bounce, "fresnelOrigin", "bounce.reflection"))
+    for (port <- dut.stored ++ dut.leaving)
+      checkStored(port, context, way(bounce, "fresnelOrigin", "bounce.reflection"))
     deferred += context
   }
+
+  private def flag(is: Boolean): Int = if (is) 1 else 0
 
   private def hasReflection(context: Int, bounce: Fields): Boolean = enabled && fresnel(context, bounce) != 0
 

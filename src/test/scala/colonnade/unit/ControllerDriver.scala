@@ -170,6 +170,9 @@ private class ControllerDriver(
       dut.io.end.bits.isDirectView.foreach(_.expect(contexts(index).isDirectView))
       dut.io.end.bits.gathers.foreach(_.expect(isGathering(contexts(index))))
       dut.io.end.bits.isScattered.foreach(_.expect(contexts(index).gathered > 0))
+      dut.io.end.bits.endsInCube.foreach(
+        _.expect(gathers > 0 && (contexts(index).gathered > 0 || !contexts(index).isStraight))
+      )
       val context  = contexts(index)
       val isOfRoom = context.isOfEnvironment && context.gathered > 0
       if (!context.isBackground)
@@ -193,8 +196,10 @@ private class ControllerDriver(
       environment.req.bits.isFresnelReflection.expect(contexts(index).isFresnelReflection)
       environment.req.bits.isOcclusionTest.expect(contexts(index).isOcclusionTest)
     }
-    for (environment <- dut.io.environment; index <- resumed)
+    for (environment <- dut.io.environment; index <- resumed) {
       environment.resume.bits.isBackground.expect(contexts(index).isBackground)
+      environment.resume.bits.showsCube.foreach(_.expect(contexts(index).isBackground && gathers > 0))
+    }
 
     val events = new ControllerEvents
     happen(events)
