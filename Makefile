@@ -44,7 +44,7 @@ live: setup ## a mirror in a room before a moving camera: videos, time and energ
 	@$(venv)/python tools/live
 
 browser: setup ## the packer and the model as one HTML file, out/browser/index.html
-	@tools/browser-environment
+	@tools/zig-environment
 	@$(venv)/python tools/browser
 
 check: setup ## formatters, linters, types, layers, derived files

@@ -1,6 +1,6 @@
 """Builds Colonnade in a browser tab: out/browser/index.html, one file that works from a folder (docs/browser.md).
 
-Usage: tools/browser; run it with the Python of .venv, after tools/browser-environment.
+Usage: tools/browser; run it with the Python of .venv, after tools/zig-environment.
 """
 
 from __future__ import annotations

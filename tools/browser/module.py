@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-ENVIRONMENT = ROOT / ".cache" / "browser-environment"
+ENVIRONMENT = ROOT / ".cache" / "zig-environment"
 OBJECTS = ROOT / ".cache" / "browser-objects"
 LIBRARY = ROOT / "host" / "cpp" / "library"
 VIEW = ROOT / "software"
