@@ -53,7 +53,8 @@ def wall_exposures(points: Floats, normals: Floats, low: Floats, high: Floats) -
     Args:
         points: World space, float64 [n, 3].
         normals: Unit, world space, float64 [n, 3].
-        low, high: Corners of the box, float64 [3].
+        low: Least corner of the box, float64 [3].
+        high: Greatest corner of the box, float64 [3].
 
     Returns:
         float64 [n, PATCHES].
