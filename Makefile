@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup render test test-hardware test-host verify bench soc live browser check docs release release-check lock format clean
+.PHONY: help setup render test test-hardware test-host verify bench soc live browser check docs release release-check container lock format clean
 
 venv := .venv/bin
 SCENE ?= scenes/room.toml
@@ -58,6 +58,9 @@ release: setup ## wheels, the generator as a jar, designs of all presets, site, 
 
 release-check: setup ## make the release twice, compare, and use its files in bare systems; as root, long
 	@tools/release-check
+
+container: ## the image `colonnade`: Debian 12, a checkout that is set up; by podman, buildah or docker
+	@tools/container
 
 lock: setup ## make host/locks, project/dependencies.sha256 and sbom.json again
 	@tools/lock

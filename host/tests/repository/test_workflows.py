@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -47,3 +48,12 @@ def test_jobs_read_the_repository_and_write_only_pages(file: Path) -> None:
     assert re.search(r"^permissions:\n  contents: read\n(?=\S|\n)", text, re.MULTILINE)
     assert set(_PERMISSION.findall(text)) <= {"pages", "id-token"}
     assert text.count("persist-credentials: false") == text.count("uses: actions/checkout@")
+
+
+def test_the_image_is_of_the_base_of_continuous_integration() -> None:
+    """Also, the development container is a stage of its Dockerfile."""
+    dockerfile = (ROOT / "Dockerfile").read_text()
+    bases = re.findall(r"^ARG BASE=docker\.io/library/(\S+)$", dockerfile, re.MULTILINE)
+    assert set(bases) == {image for file in WORKFLOWS for image in _CONTAINER.findall(file.read_text())}
+    development = json.loads((ROOT / ".devcontainer" / "devcontainer.json").read_text())
+    assert f"FROM ${{BASE}} AS {development['build']['target']}\n" in dockerfile
