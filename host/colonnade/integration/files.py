@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 
 from colonnade.common.temporary import temporary_folder
@@ -46,7 +47,9 @@ def write_registers(design: GeneratedDesign, output: Path, base: int = 0, interr
         compiler = RDLCompiler()
         compiler.compile_file(str(source))
         top = compiler.elaborate().top
-        HTMLExporter(generate_source_links=False).export(top, str(folder / "html"))
+        # In place of the time, so that the same registers give the same pages
+        content = {"build_ts": zlib.crc32(source.read_bytes())}
+        HTMLExporter(generate_source_links=False, user_context=content).export(top, str(folder / "html"))
         version = f"{table.version >> 16}.{table.version & 0xFFFF}"
         IPXACTExporter(vendor="colonnade", library="colonnade", version=version).export(
             top, str(folder / "colonnade.xml"), component_name="colonnade"
