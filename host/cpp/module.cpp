@@ -5,6 +5,7 @@ namespace nb = nanobind;
 
 void bind_environment(nb::module_& module);
 void bind_bvh(nb::module_& module);
+void bind_driver(nb::module_& module);
 void bind_fixed_order(nb::module_& module);
 void bind_live(nb::module_& module);
 void bind_model(nb::module_& module);
@@ -13,9 +14,10 @@ void bind_view(nb::module_& module);
 
 NB_MODULE(_core, module) {
   module.doc() =
-      "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, registers as a target computes them.";
+      "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, registers as a target computes them.";
   bind_environment(module);
   bind_bvh(module);
+  bind_driver(module);
   bind_fixed_order(module);
   bind_live(module);
   bind_model(module);

@@ -1,7 +1,7 @@
 """MkDocs hooks: what the site has beyond the pages of docs/.
 
 - README, CHANGELOG, CONTRIBUTING and SECURITY become pages, so that each text exists once.
-- Each Python package of host/colonnade gets a page of its docstrings.
+- Each Python package of host/colonnade gets a page of its docstrings; those of the Python API follow docs/api.md.
 - Scaladoc, PeakRDL's register pages and the page of tools/browser are copied into the site, from the folders that the
   environment variables COLONNADE_SCALADOC, COLONNADE_REGISTERS and COLONNADE_BROWSER name.
 - Links are written for the repository (``../SECURITY.md``); here they are pointed at the site's pages. Of a link to a
@@ -38,6 +38,8 @@ _COPIED = (
     ("COLONNADE_REGISTERS", "registers", "Integration", "Register pages"),
     ("COLONNADE_BROWSER", "browser", "Host", "Browser tab"),
 )
+#: The pages that docstrings follow, and the modules.
+_REFERENCES = {"api.md": ("colonnade.api.scene", "colonnade.device.device", "colonnade.device.shell_device")}
 #: Weight in the search of pages that hold many words and explain few. A guide has 1; words of a title count 1000 times.
 _SEARCH_WEIGHTS = {"api/": 1e-4, "changelog.md": 0.1, "hardening.md": 0.3}
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
@@ -98,7 +100,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
             if lines and lines[-1].strip() and _begins_block(line, lines[-1]):
                 lines.append("")
         lines.append(line)
-    return "\n".join(lines)
+    references = _REFERENCES.get(page.file.src_uri, ())
+    return "\n".join([*lines, *(f"\n::: {module}\n" for module in references)])
 
 
 def _begins_block(line: str, before: str) -> bool:
@@ -135,7 +138,7 @@ def _targets(source: str) -> list[Path]:
 
 def _packages() -> list[str]:
     """The Python packages directly under ``colonnade``, and those of its laboratory."""
-    host = sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py") if path.parent.name != "lab")
+    host = sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py") if path.parent.name not in ("api", "lab"))
     laboratory = sorted(f"lab.{path.parent.name}" for path in PACKAGE.glob("lab/*/__init__.py"))
     return [f"colonnade.{name}" for name in (*host, *laboratory)]
 

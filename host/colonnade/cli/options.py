@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -52,20 +50,9 @@ class SceneName(_PathType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Find the file; the code that reads it checks that it exists."""
-        path = Path(value)
-        if re.fullmatch(r"[\w-]+", str(value)) is None or os.path.lexists(path):
-            return path
-        from colonnade.design.toolchain import project_root
+        from colonnade.scene.parser import scene_file
 
-        try:
-            scenes = project_root() / "scenes"
-        except UserError:
-            return path
-        named = scenes / f"{value}.toml"
-        if not named.is_file():
-            known = ", ".join(sorted(scene.stem for scene in scenes.glob("*.toml")))
-            raise UserError(f"no scene {value}: name a TOML file, or a scene of {scenes} ({known})")
-        return named
+        return scene_file(value)
 
 
 SCENE = SceneName()

@@ -77,11 +77,7 @@ def pack(
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
     from colonnade.device.scene import DeviceScene
-    from colonnade.registers.frame_file import frame_file as encode_frame_file
     from colonnade.scene.parser import load_scene
-    from colonnade.scene_image.device_image import device_image as encode_device_image
-    from colonnade.scene_image.device_image import maps_image as encode_maps_image
-    from colonnade.scene_image.dram_image import dram_image as encode_dram_image
     from colonnade.scene_image.dram_image import line_layout
     from colonnade.scene_image.file import check_image_file, image_file
     from colonnade.scene_image.inspect import describe, print_report
@@ -111,14 +107,14 @@ def pack(
         # Everything is encoded before anything is written: a refusal leaves no file
         others: list[tuple[str, Path, bytes]] = []
         if device_image is not None:
-            others.append(("for a bus", device_image, encode_device_image(image, manifest)))
-        if maps_image is not None and prepared.maps is not None:
-            others.append(("maps", maps_image, encode_maps_image(prepared.maps.image, manifest)))
+            others.append(("for a bus", device_image, prepared.device_image()))
+        if maps_image is not None and (maps := prepared.maps_image()) is not None:
+            others.append(("maps", maps_image, maps))
         if dram_image is not None:
-            others.append(("for DRAM", dram_image, encode_dram_image(image, manifest)))
+            others.append(("for DRAM", dram_image, prepared.dram_image()))
         width, height = pixels or (described.frame.width, described.frame.height)
         if frame_file is not None:
-            others.append(("a frame", frame_file, encode_frame_file(prepared.registers((width, height)), manifest)))
+            others.append(("a frame", frame_file, prepared.frame_file((width, height))))
         if view_file is not None:
             others.append(("a view", view_file, prepared.view_file((width, height), composited=True)))
     image.save(output)

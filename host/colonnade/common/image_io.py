@@ -50,6 +50,16 @@ def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float64]:
     return linear_from_srgb(encoded.astype(np.float64) / 255.0)
 
 
+def resized_photo(photo: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """A photo, or a map of one channel, in the size of a frame: uint8 [height, width, …]."""
+    if photo.shape[:2] == (height, width):
+        return photo
+    import numpy as np
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(photo).resize((width, height), Image.Resampling.BOX))
+
+
 def write_png(path: Path, linear: NDArray[np.float64]) -> None:
     """Write a picture of linear colours, float64 [height, width, 3], as an 8-bit sRGB PNG."""
     from PIL import Image

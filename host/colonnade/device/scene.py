@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.image_io import resized_photo
 from colonnade.common.progress import QUIET, Progress
 from colonnade.device.gathered_light import scene_cube, with_cube
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import frame_registers
+from colonnade.registers.frame_file import frame_file
 from colonnade.registers.view_file import view_file
 from colonnade.scene.cameras import check_camera
 from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, photo_strength, view_photo
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.view import View, make_view, place, with_overrides
+from colonnade.scene_image.device_image import device_image, maps_image
+from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 
@@ -27,7 +31,7 @@ if TYPE_CHECKING:
     from colonnade.environment.panorama import Panorama
     from colonnade.environment.surround import Surround
     from colonnade.mesh.mesh import Mesh
-    from colonnade.scene.model import Scene
+    from colonnade.scene.model import Camera, Scene
     from colonnade.scene_image.file import SceneImage
 
 
@@ -138,6 +142,15 @@ class DeviceScene:
         scene = fixed_in_world(self.scene, self.image.header.extent, self.environment)
         return replace(self, scene=replace(scene, frame_camera=camera), photo=photo, strength=None)
 
+    def with_camera(self, camera: Camera) -> DeviceScene:
+        """The scene with another camera, as if its file had it; the image stays.
+
+        Args:
+            camera: In a room it has a position; frames then show the room as its maps have it.
+        """
+        moved = replace(self, scene=replace(self.scene, camera=camera, frame_camera=None))
+        return moved if self.environment is None else replace(moved, photo=None, strength=None)
+
     @property
     def environment(self) -> Environment | None:
         """The room with the colours that rays see; None without a room."""
@@ -159,6 +172,34 @@ class DeviceScene:
         """
         shows_room = not composited or self.environment is None or self.photo is None
         return frame_registers(scene or self.scene, self.image.header, self.manifest, *size, self.maps, shows_room)
+
+    def frame_photo(self, size: tuple[int, int]) -> NDArray[np.uint8] | None:
+        """The photo in the size of a frame, sRGB, uint8 [height, width, 3]; None without one."""
+        return None if self.photo is None else resized_photo(self.photo, *size)
+
+    def device_image(self) -> bytes:
+        """What the AXI4 shell loads (docs/bus-shell.md, "An image"): `image`, without records that lie in DRAM."""
+        return device_image(self.image, self.manifest)
+
+    def maps_image(self) -> bytes | None:
+        """As `device_image`, with the maps of the room alone; None without a room."""
+        return None if self.maps is None else maps_image(self.maps.image, self.manifest)
+
+    def dram_image(self) -> bytes:
+        """The records as a design with a cache reads them from DRAM.
+
+        Raises:
+            UserError: The design holds the records on chip.
+        """
+        return dram_image(self.image, self.manifest)
+
+    def frame_file(self, size: tuple[int, int]) -> bytes:
+        """The registers of a frame, for the driver (docs/driver.md, "In: two files"); arguments as in `registers`.
+
+        Raises:
+            UserError: See `registers`.
+        """
+        return frame_file(self.registers(size), self.manifest)
 
     def view_file(self, size: tuple[int, int], *, composited: bool = False) -> bytes:
         """The file with which a processor computes frames of other poses (`view_file`); arguments as in `registers`.

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.accumulation import Accumulation
-from colonnade.common.image_io import decode_srgb
+from colonnade.common.image_io import decode_srgb, resized_photo
 
 Photo = npt.NDArray[np.uint8]
 
@@ -29,12 +29,3 @@ def composited(
     height, width = sums.coverage.shape
     part = None if strength is None else resized_photo(strength, width, height)
     return sums.over(decode_srgb(resized_photo(photo, width, height)), part)
-
-
-def resized_photo(photo: Photo, width: int, height: int) -> Photo:
-    """A photo, or a map of one channel, in the size of a frame: uint8 [height, width, …]."""
-    if photo.shape[:2] == (height, width):
-        return photo
-    from PIL import Image
-
-    return np.asarray(Image.fromarray(photo).resize((width, height), Image.Resampling.BOX))

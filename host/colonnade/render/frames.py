@@ -12,12 +12,12 @@ import numpy as np
 from colonnade.common.accumulation import WHITE, FramePasses
 from colonnade.common.errors import UserError
 from colonnade.common.extras import require_extra
-from colonnade.common.framebuffer import Frame
 from colonnade.common.limits import MAX_WAVEFORM_PIXELS
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
+from colonnade.device.device import require_no_errors
 from colonnade.device.scene import DeviceScene
 from colonnade.environment.model import Environment
 from colonnade.environment.sequence import Sequence
@@ -65,13 +65,15 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     """
     if request.backend == "reference":
         require_extra("reference", "the reference backend")
-    scene = load_scene(request.scene)
+    scene = request.scene if isinstance(request.scene, Scene) else load_scene(request.scene)
     if request.background is not None:
         scene = scene.with_environment(request.background)
     if request.sequence is not None:
         scene = scene.with_environment(request.sequence.path.parent)
-    if request.mesh is not None:
+    if isinstance(request.mesh, str):
         scene = scene.with_mesh(request.mesh)
+    elif request.mesh is not None:
+        scene.require_one_object("a mesh replaces that of a single object")
     note = _DEFAULT_SAMPLES if _has_default_samples(scene, request) else None
     scene = with_requested_samples(scene, request)
     size = request.size or (scene.frame.width, scene.frame.height)
@@ -140,7 +142,7 @@ def _reference_frames(
 
     options = ReferenceOptions(scene.motion.exposure(request.frames), request.relit, request.truth)
     poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
-    for index, result in enumerate(reference_frames(poses, manifest, size, progress, options)):
+    for index, result in enumerate(reference_frames(poses, manifest, size, progress, options, _mesh_of(request))):
         if note is not None and index == 0:
             progress.note(note)
         yield result
@@ -153,7 +155,13 @@ def _device_frames(
     begun = time.perf_counter()
     with progress.step("packing the scene"):
         prepared = DeviceScene.of(
-            scene, manifest, size=size, relit=request.relit, encoder=request.encoder, progress=progress
+            scene,
+            manifest,
+            _mesh_of(request),
+            size=size,
+            relit=request.relit,
+            encoder=request.encoder,
+            progress=progress,
         )
         if (line := coarse_line(prepared.image.header)) is not None:
             progress.note(line)
@@ -185,8 +193,9 @@ def _sequence_frames(
     encode = _encoder_of(request, sequence, layout_of(manifest))
     relit, encoder = request.relit, request.encoder
     scenes = sequence_scenes(
-        sequence, scene, manifest, size, encode, every=every, relit=relit, encoder=encoder, progress=progress
-    )
+        sequence, scene, manifest, size, encode, _mesh_of(request), every=every, relit=relit, encoder=encoder,
+        progress=progress,
+    )  # fmt: skip
     for number in range(request.frames):
         title = f"frame {number + 1} of {request.frames}"
         begun = time.perf_counter()
@@ -214,6 +223,7 @@ def sequence_scenes(
     manifest: Manifest,
     size: Size,
     encode: Encode,
+    mesh: Mesh | None = None,
     *,
     every: int = 1,
     relit: bool = False,
@@ -228,6 +238,7 @@ def sequence_scenes(
         manifest: The design's manifest.
         size: Width and height of frames, pixels.
         encode: Encodes the maps of each keyframe, in their order.
+        mesh: As in `DeviceScene.of`.
         every: Number of frames from a keyframe to the next.
         relit: As in `DeviceScene.of`.
         encoder: Of textures.
@@ -236,6 +247,7 @@ def sequence_scenes(
     prepared = DeviceScene.of(
         scene,
         manifest,
+        mesh,
         size=size,
         relit=relit,
         encoder=encoder,
@@ -250,6 +262,11 @@ def sequence_scenes(
         else:
             prepared = prepared.seen_by(sequence.cameras[number], sequence.photo(number))
         yield prepared
+
+
+def _mesh_of(request: RenderRequest) -> Mesh | None:
+    """The mesh in place of that which the scene names."""
+    return None if isinstance(request.mesh, str) else request.mesh
 
 
 def _encoder_of(request: RenderRequest, sequence: Sequence, layout: AttributeLayout) -> Encode:
@@ -283,7 +300,7 @@ def _rendered(
     else:
         rendered = _model_frames(prepared.manifest, prepared.image, registers, progress, request.denoise)
     for of_frame, (rendered_passes, seconds, rate) in zip(passes, rendered, strict=True):
-        require_no_errors(rendered_passes.frame)
+        require_no_errors(rendered_passes.frame.errors)
         report = replace(
             frame_report(request.backend, prepared.manifest, prepared.image.header, rendered_passes.frame),
             seconds=seconds,
@@ -431,18 +448,6 @@ def _denoised(result: RenderResult, passes: FramePasses, view: View) -> RenderRe
     )
     sums = replace(result.sums, objects=filtered * WHITE * count)
     return replace(result, sums=sums, image=sums.image())
-
-
-def require_no_errors(frame: Frame) -> None:
-    """Raise a `UserError` with advice for a frame that has an error bit."""
-    advice = {
-        "stackOverflow": "the traversal stack overflowed: raise columnBvhMemory.stackDepth",
-        "memory": "a read from DRAM failed: check the scene's address and the memory",
-        "illegalRecord": "a record was illegal, or a pointer left its section: pack the scene again",
-        "watchdog": "the watchdog aborted the frame: the scene image may be corrupt, pack the scene again",
-    }
-    if frame.errors:
-        raise UserError("the frame failed: " + "; ".join(advice.get(error, error) for error in frame.errors))
 
 
 def _result(passes: FramePasses, image: SceneImage, view: View, report: FrameReport) -> RenderResult:

@@ -58,6 +58,7 @@ def reference_frames(
     size: tuple[int, int],
     progress: Progress,
     options: ReferenceOptions = ReferenceOptions(),
+    mesh: Mesh | None = None,
 ) -> Iterator[RenderResult]:
     """Render a scene's poses along its motion, at the samples of the device's frames and composited as these are.
 
@@ -67,10 +68,11 @@ def reference_frames(
         size: Width and height, pixels.
         progress: Shows the steps.
         options: Further options.
+        mesh: A mesh that replaces the scene's own, which is not read.
     """
     begun = time.perf_counter()
     maps = scene_room(poses[0])
-    mesh = object_mesh(poses[0], maps, manifest.corner_colours)
+    mesh = mesh or object_mesh(poses[0], maps, manifest.corner_colours)
     mesh = with_materials(poses[0], mesh, SurfaceFeatures.of(manifest))
     layout = None if manifest.config["physicalAttributeMemory"] is None else layout_of(manifest)
     max_lights = int(manifest.config["frame"]["lights"])

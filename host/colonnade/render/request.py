@@ -9,6 +9,8 @@ from typing import Literal, get_args
 
 from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
+from colonnade.mesh.mesh import Mesh
+from colonnade.scene.model import Scene
 
 Backend = Literal["rtl", "model", "reference"]
 BACKENDS: tuple[Backend, ...] = get_args(Backend)
@@ -19,14 +21,14 @@ class RenderRequest:
     """A request for one frame of a scene, or for the frames of its motion.
 
     Attributes:
-        scene: Scene file, TOML.
+        scene: A scene, or its file, TOML.
         config: Preset, path, or precision such as ``32b32s64d``.
         overrides: Changes to the configuration, ``key=value``.
         backend: ``rtl``: the generated Verilog in a simulator; ``model``: its bit-exact model; ``reference``: Embree.
         size: (width, height), pixels; None: that of the scene.
         frames: Number of frames, from 1. The first shows the scene at rest. Of a sequence its first ones.
         samples: Samples of a pixel, from 1; None: those of the scene, or a default.
-        mesh: Name or file of a mesh that replaces the scene's.
+        mesh: A mesh that replaces the scene's, or its name or file.
         background: Folder of a room that replaces the scene's background.
         sequence: Views of a room, one for each frame, which replace the scene's background and motion.
         keyframes: Of a sequence, every so many frames have maps; None: as its file says.
@@ -38,14 +40,14 @@ class RenderRequest:
         denoise: Filter the noise of gathered light; of the model and the RTL.
     """
 
-    scene: Path
+    scene: Path | Scene
     config: str
     overrides: Sequence[str] = ()
     backend: Backend = "rtl"
     size: tuple[int, int] | None = None
     frames: int = 1
     samples: int | None = None
-    mesh: str | None = None
+    mesh: str | Mesh | None = None
     background: Path | None = None
     sequence: RoomSequence | None = None
     keyframes: int | None = None

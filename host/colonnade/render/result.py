@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy.typing as npt
 
 from colonnade.common.accumulation import Accumulation
 from colonnade.common.hits import Hits
+from colonnade.common.image_io import encode_srgb
 from colonnade.mesh.mesh import MeshPart
 from colonnade.render.report import FrameReport
 
@@ -37,6 +39,16 @@ class RenderResult:
     sums: Accumulation
     ratio: npt.NDArray[np.uint16] | None = None
     parts: tuple[MeshPart, ...] = ()
+
+    @property
+    def pixels(self) -> npt.NDArray[np.uint8]:
+        """The picture as a PNG file has it: sRGB, uint8 [height, width, 3]."""
+        return encode_srgb(self.image)
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Counters of the device, sums over the samples: all from the RTL, those without time from the model."""
+        return self.report.counters
 
     def hits(self) -> Hits:
         """The hits by object, and by face of its mesh's file."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,6 +16,7 @@ from pydantic_core import ErrorDetails
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import check_values, read_input
 from colonnade.common.limits import MAX_COORDINATE, MAX_DEPTH
+from colonnade.design.toolchain import project_root
 from colonnade.scene.model import MAX_EDGE, MAX_OBJECTS, MeshSource, Scene
 
 if sys.version_info >= (3, 11):
@@ -29,6 +32,26 @@ _SCHEMA = TypeAdapter(Scene)
 _JSON_SCHEMA: dict[str, Any] = _SCHEMA.json_schema()
 
 
+def scene_file(name: str | Path) -> Path:
+    """The file of a scene: a TOML file, or the name of one of the project's scenes, such as ``room``.
+
+    Raises:
+        UserError: No scene has this name. The code that reads a file checks that it exists.
+    """
+    path = Path(name)
+    if re.fullmatch(r"[\w-]+", str(name)) is None or os.path.lexists(path):
+        return path
+    try:
+        scenes = project_root() / "scenes"
+    except UserError:
+        return path
+    named = scenes / f"{name}.toml"
+    if not named.is_file():
+        known = ", ".join(sorted(scene.stem for scene in scenes.glob("*.toml")))
+        raise UserError(f"no scene {name}: name a TOML file, or a scene of {scenes} ({known})")
+    return named
+
+
 def load_scene(path: str | Path) -> Scene:
     """Read a scene file; its paths are relative to its folder.
 
@@ -36,38 +59,60 @@ def load_scene(path: str | Path) -> Scene:
         UserError: The file is missing, is not TOML, or has an invalid key or value.
     """
     file = Path(path)
+    return scene_of(read_tables(file), f"scene {file}", file.parent)
+
+
+def read_tables(file: Path) -> dict[str, Any]:
+    """The tables of a scene file, as they stand in it.
+
+    Raises:
+        UserError: The file is missing, or is not TOML.
+    """
     content = read_input(file, "the scene", missing=f"scene file {file} does not exist")
     try:
-        data = tomllib.loads(content.decode("utf-8"))
+        return tomllib.loads(content.decode("utf-8"))
     except RecursionError:
         raise UserError(f"scene {file} is nested too deeply: {MAX_DEPTH} levels at most") from None
     except ValueError as error:  # invalid TOML or UTF-8, or too many digits
         raise UserError(f"scene {file} is not TOML: {error}") from None
-    check_values(data, f"scene {file}")
+
+
+def scene_of(tables: Mapping[str, Any], where: str, folder: Path) -> Scene:
+    """The scene of a file's tables.
+
+    Args:
+        tables: By name, with the keys of the file.
+        where: Names the tables in messages.
+        folder: What the paths are relative to.
+
+    Raises:
+        UserError: A key or a value is invalid.
+    """
+    check_values(tables, where)
     try:
-        _check_combinations(data)
-        scene = _SCHEMA.validate_python(_as_schema(data))
+        _check_combinations(tables)
+        scene = _SCHEMA.validate_python(_as_schema(tables))
     except ValidationError as error:
-        raise UserError(f"scene {file}: {_message(error.errors(include_url=False)[0])}") from None
+        raise UserError(f"{where}: {_message(error.errors(include_url=False)[0])}") from None
     except ValueError as error:
-        raise UserError(f"scene {file}: {error}") from None
+        raise UserError(f"{where}: {error}") from None
     background = scene.background
-    objects = tuple(replace(one, mesh=_beside(one.mesh, file)) for one in scene.objects)
-    scene = replace(scene, mesh=objects[0].mesh if objects else _beside(scene.mesh, file), objects=objects)
+    objects = tuple(replace(one, mesh=_beside(one.mesh, folder)) for one in scene.objects)
+    scene = replace(scene, mesh=objects[0].mesh if objects else _beside(scene.mesh, folder), objects=objects)
     if background.room is not None:
-        scene = scene.with_environment(file.parent / background.room)
+        scene = scene.with_environment(folder / background.room)
     if background.photo is not None:
-        scene = replace(scene, background=replace(scene.background, photo=file.parent / background.photo))
+        scene = replace(scene, background=replace(scene.background, photo=folder / background.photo))
     if background.second_view is not None:
-        scene = replace(scene, background=replace(scene.background, second_view=file.parent / background.second_view))
+        scene = replace(scene, background=replace(scene.background, second_view=folder / background.second_view))
     if background.panorama is not None:
-        scene = replace(scene, background=replace(scene.background, panorama=file.parent / background.panorama))
+        scene = replace(scene, background=replace(scene.background, panorama=folder / background.panorama))
     return scene
 
 
-def _beside(mesh: MeshSource, file: Path) -> MeshSource:
-    """The mesh with a path relative to the working directory, not to the scene file."""
-    return mesh if mesh.path is None else replace(mesh, path=file.parent / mesh.path)
+def _beside(mesh: MeshSource, folder: Path) -> MeshSource:
+    """The mesh with a path relative to the working directory, not to the scene's folder."""
+    return mesh if mesh.path is None else replace(mesh, path=folder / mesh.path)
 
 
 def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:

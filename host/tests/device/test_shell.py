@@ -9,7 +9,7 @@ import pytest
 
 from colonnade.common.accumulation import Accumulation
 from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
-from colonnade.common.image_io import encode_srgb
+from colonnade.common.image_io import encode_srgb, resized_photo
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
@@ -17,7 +17,7 @@ from colonnade.device.scene import DeviceScene
 from colonnade.device.shell import Bus, ShellFrame, render_shell
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
-from colonnade.render.composite import composited, resized_photo
+from colonnade.render.composite import composited
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from colonnade.common.framebuffer import Frame
 from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
+from colonnade.common.image_io import resized_photo
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
@@ -35,7 +36,6 @@ from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
 from colonnade.registers.target_view import TargetView
-from colonnade.render.composite import resized_photo
 from colonnade.render.frames import sequence_scenes
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.device_image import device_image, load_cycles, maps_image

@@ -13,11 +13,11 @@ from colonnade.common import cache
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.design.toolchain import cache_directory, project_root
+from colonnade.device.device import require_no_errors
 from colonnade.device.scene import DeviceScene
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.mesh.mesh import Mesh
-from colonnade.render.frames import require_no_errors
 from colonnade.render.report import frame_report, mesh_report
 from colonnade.scene.model import Scene
 from colonnade.scene_image.file import SceneImage
@@ -74,7 +74,7 @@ def measure_frame(
     simulated = render_rtl(design, image, [registers], stalls)
     run_seconds = time.perf_counter() - begun
     frame = simulated.frames[0]
-    require_no_errors(frame)
+    require_no_errors(frame.errors)
     report = {
         **frame_report("rtl", manifest, image.header, frame).as_json(),
         "config_hash": manifest.config_hash,

@@ -16,6 +16,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import GeneratedDesign
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import loaded_model, model_frame
+from colonnade.device.device import require_no_errors
 from colonnade.device.scene import DeviceScene
 from colonnade.device.verilator import render_rtl
 from colonnade.environment.model import Environment
@@ -25,7 +26,7 @@ from colonnade.maps.image import AttributeImage
 from colonnade.maps.live import LiveEncoder, LiveFrame
 from colonnade.registers.target_view import TargetView
 from colonnade.render.composite import composited
-from colonnade.render.frames import require_no_errors, sequence_scenes
+from colonnade.render.frames import sequence_scenes
 from colonnade.scene.model import Scene
 from colonnade.scene_image.device_image import load_cycles
 
@@ -120,7 +121,7 @@ def _picture(prepared: DeviceScene, size: tuple[int, int], samples: int) -> NDAr
     model, passes = loaded_model(prepared.manifest, prepared.image), FramePasses()
     for scene in prepared.scene.with_samples(samples).passes():
         passes.add(model_frame(model, prepared.registers(size, scene, composited=True)))
-    require_no_errors(passes.frame)
+    require_no_errors(passes.frame.errors)
     return encode_srgb(composited(passes.sums, prepared.photo, prepared.strength))
 
 
@@ -133,7 +134,7 @@ def _cost(
     cycles, differing = None, 0
     if number in demonstration.rtl_frames:
         rtl = render_rtl(demonstration.design, prepared.image, [registers]).frames[0]
-        require_no_errors(rtl)
+        require_no_errors(rtl.errors)
         cycles = rtl.counters["cycles"]
         differing = _differing(rtl, frame)
     is_key = encode_ms is not None

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.accumulation import LUMINANCE
-from colonnade.common.image_io import decode_srgb, encode_srgb, read_picture
+from colonnade.common.image_io import decode_srgb, encode_srgb, read_picture, resized_photo
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.environment.load import load_environment
@@ -25,7 +25,6 @@ from colonnade.lab.evaluation.light.probe import ProbeFrame
 from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS
 from colonnade.lab.evaluation.light.surfaces import RoomSurface
 from colonnade.lab.evaluation.region_metrics import compare_regions
-from colonnade.render.composite import resized_photo
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
 

@@ -149,14 +149,14 @@ def device_frame(mesh: Mesh, view: View, encoded: EncodedEnvironment, manifest: 
         manifest: The manifest of the design.
     """
     from colonnade.device.bit_exact import render_model
+    from colonnade.device.device import require_no_errors
     from colonnade.registers.frame import registers_of
-    from colonnade.render.frames import require_no_errors
     from colonnade.scene_image.environment import with_environment
     from colonnade.scene_image.packer import pack
 
     packed = with_environment(pack(mesh, manifest, view.materials), encoded, manifest)
     frame = render_model(manifest, packed, registers_of(view, packed.header, manifest, encoded))
-    require_no_errors(frame)
+    require_no_errors(frame.errors)
     return frame.colour / float((1 << manifest.numbers["colourBits"]) - 1)
 
 

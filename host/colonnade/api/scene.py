@@ -1,0 +1,265 @@
+"""`colonnade.Scene`: a scene from a file or from values, rendered and packed."""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from colonnade.common import notes
+from colonnade.common.errors import UserError
+from colonnade.common.progress import QUIET, Progress
+from colonnade.design.generator import manifest_for
+from colonnade.device.scene import DeviceScene
+from colonnade.maps.encoders import Encoder
+from colonnade.mesh.load import clean_mesh
+from colonnade.mesh.mesh import Mesh
+from colonnade.render.frames import render_frames
+from colonnade.render.request import Backend, RenderRequest
+from colonnade.render.result import RenderResult
+from colonnade.scene import model
+from colonnade.scene.parser import read_tables, scene_file, scene_of
+
+Size = tuple[int, int]
+Table = Mapping[str, Any]
+
+
+class TriangleMesh(Protocol):
+    """What a scene takes of a mesh of another library, such as a ``trimesh.Trimesh``.
+
+    Attributes:
+        vertices: Numbers [n, 3].
+        faces: Whole numbers [m, 3], counter-clockwise seen from outside.
+    """
+
+    vertices: Any
+    faces: Any
+
+
+#: A name or a file; vertices [n, 3] and faces [m, 3]; or an object that has them.
+MeshLike = str | Path | tuple[ArrayLike, ArrayLike] | TriangleMesh
+
+
+class Scene:
+    """A scene: objects, camera, lights and background.
+
+    Its tables and their keys, units and defaults are those of a scene file (docs/host.md, "Placement"). Several lights
+    are a list of tables. Values are checked when the scene is made. A scene does not change; `with_tables` makes
+    another.
+
+    Notes on what a mesh holds and a picture does not show are Python warnings.
+
+    Args:
+        mesh: A name such as ``teapot`` or ``sphere:80``, a file, arrays, or a ``trimesh.Trimesh``, of which vertices
+            and faces are read. None: the table `object` names meshes.
+        crease: Angle up to which edges are smooth, degrees; None: the file's normals, without them 60.
+        camera: ``position`` and ``target``, or ``direction`` and ``framing``; ``up``, ``fov`` (degrees), …
+        light: ``position`` or ``offset``, ``colour``, …; or a list of such tables.
+        material: ``kind`` (diffuse, mirror or glass), ``albedo``, …, in place of the mesh's.
+        transform: ``rotate`` (degrees), ``scale``, ``translate``.
+        object: The place in a room, ``stand_at``, ``size``, ``turn``; or a list of tables of several objects.
+        ambient: ``colour``.
+        background: ``colour``, or ``room``, a folder, …
+        paths: ``bounces``, ``gather``, …
+        motion: What changes over several frames.
+        frame: ``width``, ``height``, ``samples``.
+        folder: What paths in the tables are relative to; by default the working directory.
+
+    Raises:
+        UserError: A key or a value is invalid; the message names it.
+    """
+
+    def __init__(
+        self,
+        mesh: MeshLike | None = None,
+        *,
+        crease: float | None = None,
+        camera: Table | None = None,
+        light: Table | Sequence[Table] | None = None,
+        material: Table | None = None,
+        transform: Table | None = None,
+        object: Table | Sequence[Table] | None = None,
+        ambient: Table | None = None,
+        background: Table | None = None,
+        paths: Table | None = None,
+        motion: Table | None = None,
+        frame: Table | None = None,
+        folder: str | Path | None = None,
+    ) -> None:
+        given = {
+            "transform": transform, "object": object, "camera": camera, "light": light, "material": material,
+            "paths": paths, "ambient": ambient, "background": background, "motion": motion, "frame": frame,
+        }  # fmt: skip
+        tables = {name: table for name, table in given.items() if table is not None}
+        own = None
+        if mesh is not None:
+            tables["mesh"], own = _mesh(mesh, crease)
+        self._set(tables, own, "the scene", Path() if folder is None else Path(folder))
+
+    @classmethod
+    def load(cls, file: str | Path) -> Scene:
+        """Read a scene file.
+
+        Args:
+            file: A TOML file, or the name of one of the project's scenes, such as ``room``.
+
+        Raises:
+            UserError: The file is missing or invalid.
+        """
+        path = scene_file(file)
+        scene = cls.__new__(cls)
+        scene._set(read_tables(path), None, f"scene {path}", path.parent)
+        return scene
+
+    def with_tables(self, **tables: Table | Sequence[Table] | None) -> Scene:
+        """The scene with other tables: each replaces that of its name; None removes it.
+
+        ``scene.with_tables(camera={"position": (0, 1, 3), "target": (0, 0, 0)})``
+
+        Raises:
+            UserError: A key or a value is invalid.
+        """
+        kept = {name: table for name, table in (self.tables | tables).items() if table is not None}
+        scene = type(self).__new__(type(self))
+        scene._set(kept, self.mesh if "mesh" not in tables else None, self._where, self.folder)
+        return scene
+
+    def _set(self, tables: Mapping[str, Any], mesh: Mesh | None, where: str, folder: Path) -> None:
+        self.tables = _plain(tables)
+        self.mesh, self.folder, self._where = mesh, folder, where
+        self.description: model.Scene = scene_of(self.tables, where, folder)
+
+    def render(
+        self, backend: Backend = "model", config: str = "small", size: Size | None = None, **options: Any
+    ) -> RenderResult:
+        """Render one frame.
+
+        Args:
+            backend: ``model``, the bit-exact model; ``rtl``, the generated Verilog in a simulator; or ``reference``,
+                Embree in floating point.
+            config: The design: a preset, a JSON file, or a precision such as ``32b32s64d``.
+            size: Width and height, pixels; None: those of the scene, 640×480 unless given.
+            options: Others of `RenderRequest`: ``overrides``, ``samples``, ``relit``, ``truth``, ``encoder``,
+                ``denoise``, ``hits``, ``waveform``; and ``progress`` (`colonnade.common.progress.for_terminal`).
+
+        Returns:
+            The frame: ``pixels``, uint8 [height, width, 3]; ``image``, linear float64; ``hits()``; ``counters``;
+            ``report``, with rays, cycles and seconds.
+
+        Raises:
+            UserError: The design cannot render the scene, or the hardware raised an error bit.
+        """
+        (result,) = self.frames(1, backend, config, size, **options)
+        return result
+
+    def frames(
+        self, count: int, backend: Backend = "model", config: str = "small", size: Size | None = None, **options: Any
+    ) -> Iterator[RenderResult]:
+        """Render frames of the scene's motion, one after the other; mesh and room are loaded once.
+
+        Args:
+            count: Number of frames.
+            backend: As in `render`.
+            config: As in `render`.
+            size: As in `render`.
+            options: As in `render`.
+
+        Raises:
+            UserError: See `render`.
+        """
+        progress: Progress = options.pop("progress", QUIET)
+        request = RenderRequest(
+            self.description, config, backend=backend, size=size, frames=count, mesh=self.mesh, **options
+        )
+        with _noted():
+            results = render_frames(request, progress)
+        while True:
+            with _noted():
+                result = next(results, None)
+            if result is None:
+                return
+            yield result
+
+    def pack(
+        self,
+        config: str = "small",
+        *,
+        overrides: Sequence[str] = (),
+        size: Size | None = None,
+        relit: bool = False,
+        encoder: Encoder = "offline",
+        progress: Progress = QUIET,
+    ) -> DeviceScene:
+        """Pack the scene for a design.
+
+        Args:
+            config: As in `render`.
+            overrides: Fields that replace some of it, ``key=value``.
+            size: Width and height of frames, to refuse one that the room cannot have; None: no check.
+            relit: Frames show the room under the scene's lights, not its photo.
+            encoder: Of the room's maps and of textures, ``offline`` or ``live``.
+            progress: Shows the steps.
+
+        Returns:
+            ``image``, ``registers(size)``, and the files for a device: ``device_image()``, ``frame_file(size)``, …
+
+        Raises:
+            UserError: The design cannot render the scene.
+        """
+        manifest = manifest_for(config, overrides, progress).manifest
+        with _noted():
+            return DeviceScene.of(
+                self.description, manifest, self.mesh, size=size, relit=relit, encoder=encoder, progress=progress
+            )
+
+    def __repr__(self) -> str:
+        return f"<Scene of {', '.join(self.tables)}>"
+
+
+def _mesh(mesh: MeshLike, crease: float | None) -> tuple[dict[str, Any], Mesh | None]:
+    """The table of a mesh, and the mesh if it is in memory."""
+    table: dict[str, Any] = {} if crease is None else {"crease": crease}
+    if isinstance(mesh, Path):
+        return table | {"path": str(mesh)}, None
+    if isinstance(mesh, str):
+        return table | {"name": mesh}, None
+    vertices, faces = mesh if isinstance(mesh, tuple) else (mesh.vertices, mesh.faces)
+    points, corners = np.array(vertices, dtype=np.float64), np.array(faces)
+    for name, array in (("vertices", points), ("faces", corners)):
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise UserError(f"the mesh's {name} have the shape {list(array.shape)}: give three numbers each, [n, 3]")
+    if not np.issubdtype(corners.dtype, np.integer):
+        raise UserError(f"the mesh's faces are {corners.dtype}: give whole numbers, indices of vertices")
+    if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
+        raise UserError(f"a face of the mesh names a vertex that does not exist: there are {len(points)}")
+    cleaned = clean_mesh(points, corners.astype(np.int32), "memory", crease=crease)
+    kind = getattr(getattr(mesh, "visual", None), "kind", None)
+    lines = list(cleaned.notes)
+    if kind is not None:
+        lines.append(f"mesh memory: colours or textures ({kind}) are left out: save it as a GLB file to keep them")
+    with _noted():
+        notes.report(lines)
+    return table | {"name": "memory"}, cleaned
+
+
+def _plain(value: Any) -> Any:
+    """Tables without numpy's types, as a file has them."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    return value
+
+
+@contextlib.contextmanager
+def _noted() -> Iterator[None]:
+    """Show notes as warnings."""
+    with notes.opened(lambda line: warnings.warn(line, stacklevel=2)):
+        yield

@@ -1,0 +1,229 @@
+"""A device that renders frames, with the same calls for model, simulator and board; and the model as one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import Self
+
+from colonnade.common.errors import UserError
+from colonnade.common.framebuffer import Frame
+from colonnade.common.framebuffer_formats import framebuffer_bytes
+from colonnade.common.progress import QUIET, Progress
+from colonnade.design.frame_limits import check_size
+from colonnade.design.generator import manifest_for
+from colonnade.design.manifest import Manifest
+from colonnade.device.bit_exact import loaded_model, model_frame
+from colonnade.device.scene import DeviceScene
+from colonnade.scene_image.file import SceneImage
+
+Pixels = NDArray[np.uint8]
+
+
+class Device(ABC):
+    """A device. Its calls come in this order: `load`, then for each frame `set_frame`, `start`, `wait` and what reads.
+
+    A device is a context manager, and closed at the end of the block.
+
+    Attributes:
+        manifest: The manifest of its design.
+    """
+
+    manifest: Manifest
+
+    @abstractmethod
+    def load(self, image: SceneImage) -> None:
+        """Load a scene: records, and maps of a room. It stays until the next load.
+
+        Args:
+            image: `DeviceScene.image`, packed for this design.
+
+        Raises:
+            UserError: It was packed for another design, or does not fit the memory.
+        """
+
+    @abstractmethod
+    def set_frame(self, registers: Mapping[str, int], photo: Pixels | None = None) -> None:
+        """Set the registers of the next frame.
+
+        Args:
+            registers: Values of all rw registers by name: `DeviceScene.registers`.
+            photo: In a room: what frames show where the object is not, under the object's shadow. sRGB, uint8 [height,
+                width, 3], in the frame's size.
+
+        Raises:
+            UserError: No scene is loaded, a frame runs, or the frame is too large.
+        """
+
+    @abstractmethod
+    def start(self) -> None:
+        """Start the frame that is set.
+
+        Raises:
+            UserError: None is set.
+        """
+
+    @abstractmethod
+    def wait(self, timeout: float | None = None) -> None:
+        """Wait for the end of the frame.
+
+        Args:
+            timeout: Seconds; None: 10 on this machine's bus, 60 over a bridge, without an end in a simulator.
+
+        Raises:
+            UserError: The frame has not ended in time, or has an error bit.
+        """
+
+    @abstractmethod
+    def counters(self) -> dict[str, int]:
+        """The counters of the last frame, by name without ``counters.``; the model has those that need no clock."""
+
+    @abstractmethod
+    def pixels(self) -> Pixels:
+        """The framebuffer of the last frame: sRGB, uint8 [height, width, 3]."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release the device."""
+
+    def render(self, scene: DeviceScene, size: tuple[int, int] | None = None) -> Pixels:
+        """Load a scene and render one frame of one sample, in the photo of its room if there is one.
+
+        Args:
+            scene: A scene that was packed for this design.
+            size: Width and height, pixels; None: that of the scene.
+
+        Returns:
+            As `pixels`.
+
+        Raises:
+            UserError: See the calls.
+        """
+        size = size or (scene.scene.frame.width, scene.scene.frame.height)
+        check_size(size, self.manifest)
+        self.load(scene.image)
+        self.set_frame(scene.registers(size), scene.frame_photo(size))
+        self.start()
+        self.wait()
+        return self.pixels()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+class ModelDevice(Device):
+    """The bit-exact model as a device; `start` renders the frame.
+
+    Args:
+        config: The design: a preset, a JSON file, or a precision such as ``32b32s64d``.
+        overrides: Fields that replace some of it, ``key=value``.
+        progress: Shows the run of the generator.
+
+    Raises:
+        UserError: There is no such configuration.
+    """
+
+    def __init__(self, config: str = "small", overrides: Sequence[str] = (), progress: Progress = QUIET) -> None:
+        self.manifest = manifest_for(config, overrides, progress).manifest
+        self._model: Any = None
+        self._set: tuple[dict[str, int], Pixels | None] | None = None
+        self._frame: tuple[Frame, Pixels | None] | None = None
+
+    def load(self, image: SceneImage) -> None:
+        """See `Device`."""
+        require_format(image, self.manifest)
+        self._model = loaded_model(self.manifest, image)
+
+    def set_frame(self, registers: Mapping[str, int], photo: Pixels | None = None) -> None:
+        """See `Device`."""
+        if self._model is None:
+            raise UserError("no scene is loaded: load one before the frame")
+        check_size((registers["frame.width"], registers["frame.height"]), self.manifest)
+        check_photo(photo, registers)
+        self._set = dict(registers), photo
+
+    def start(self) -> None:
+        """See `Device`."""
+        if self._set is None:
+            raise UserError("no frame is set: set its registers before the start")
+        registers, photo = self._set
+        self._frame = model_frame(self._model, registers), photo
+
+    def wait(self, timeout: float | None = None) -> None:
+        """See `Device`. The frame has ended."""
+        require_no_errors(self._last[0].errors)
+
+    def counters(self) -> dict[str, int]:
+        """See `Device`."""
+        return dict(self._last[0].counters)
+
+    def pixels(self) -> Pixels:
+        """See `Device`."""
+        frame, photo = self._last
+        return rgb_of(framebuffer_bytes(frame, 0, photo), frame.is_object.shape[1])
+
+    def close(self) -> None:
+        """See `Device`."""
+        self._model = self._set = self._frame = None
+
+    @property
+    def _last(self) -> tuple[Frame, Pixels | None]:
+        if self._frame is None:
+            raise UserError("no frame was started: start one before its result is read")
+        return self._frame
+
+
+def rgb_of(lines: Pixels, width: int) -> Pixels:
+    """Lines of XRGB8888, uint8 [height, stride], as uint8 [height, width, 3]."""
+    return np.ascontiguousarray(lines[:, : 4 * width].reshape(len(lines), width, 4)[..., 2::-1])
+
+
+def require_format(image: SceneImage, manifest: Manifest) -> None:
+    """Refuse an image of another design.
+
+    Raises:
+        UserError: Its format hash differs.
+    """
+    if image.header.format_hash != manifest.format_hash:
+        raise UserError("the scene was packed for another design: pack it with the configuration of this device")
+
+
+def check_photo(photo: Pixels | None, registers: Mapping[str, int]) -> None:
+    """Refuse a photo that the frame cannot show.
+
+    Raises:
+        UserError: It has not the frame's size, or the frame has no room.
+    """
+    if photo is None:
+        return
+    if not registers.get("environment.enabled", 0):
+        raise UserError("a photo shows behind the object of a room, and this frame has none: leave out the photo")
+    wanted = registers["frame.height"], registers["frame.width"], 3
+    if photo.shape != wanted or photo.dtype != np.uint8:
+        raise UserError(f"the photo is {photo.dtype} {list(photo.shape)}, the frame needs uint8 {list(wanted)}")
+
+
+def require_no_errors(errors: Sequence[str]) -> None:
+    """Refuse a frame with an error bit.
+
+    Args:
+        errors: Names of the bits that are set.
+
+    Raises:
+        UserError: With advice for each.
+    """
+    advice = {
+        "stackOverflow": "the traversal stack overflowed: raise columnBvhMemory.stackDepth",
+        "memory": "a read from DRAM failed: check the scene's address and the memory",
+        "illegalRecord": "a record was illegal, or a pointer left its section: pack the scene again",
+        "watchdog": "the watchdog aborted the frame: the scene image may be corrupt, pack the scene again",
+    }
+    if errors:
+        raise UserError("the frame failed: " + "; ".join(advice.get(error, error) for error in errors))

@@ -1,0 +1,97 @@
+"""The Python API: scenes from files and from values are the same, and the examples' notebooks run."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import colonnade
+from colonnade.design.toolchain import project_root
+from colonnade.mesh.load import load_mesh
+
+SIZE = (48, 36)
+FILE = """
+mesh.name = "torus:200"
+camera = {direction = [0.2, 0.5, 1.0], fov = 35.0}
+material = {kind = "diffuse", albedo = [0.9, 0.8, 0.7]}
+background.colour = [0.1, 0.2, 0.4]
+[[light]]
+offset = [-0.75, 0.85, 0.9]
+[[light]]
+position = [2.0, 3.0, 4.0]
+"""
+TABLES = {
+    "camera": {"direction": np.array([0.2, 0.5, 1.0]), "fov": np.float64(35)},
+    "material": {"kind": "diffuse", "albedo": (0.9, 0.8, 0.7)},
+    "background": {"colour": [0.1, 0.2, 0.4]},
+    "light": [{"offset": (-0.75, 0.85, 0.9)}, {"position": (2.0, 3.0, 4.0)}],
+}
+
+
+def test_a_scene_of_values_is_that_of_a_file_also_on_a_device(tmp_path: Path) -> None:
+    """A mesh in memory, too, whose hits name its faces."""
+    (tmp_path / "scene.toml").write_text(FILE)
+    expected = colonnade.Scene.load(tmp_path / "scene.toml").render(size=SIZE)
+    mesh = load_mesh("torus:200")
+    arrays = mesh.vertices, mesh.faces
+    scenes = [colonnade.Scene(given, **TABLES) for given in ("torus:200", arrays, trimesh.Trimesh(*arrays))]
+    for scene in scenes:
+        frame = scene.render(size=SIZE)
+        assert frame.pixels.dtype == np.uint8 and len(np.unique(frame.pixels)) > 20
+        np.testing.assert_array_equal(frame.pixels, expected.pixels)
+        np.testing.assert_array_equal(frame.hits().triangle, expected.hits().triangle)
+        assert frame.counters == expected.counters
+    packed = scenes[1].pack()
+    with colonnade.ModelDevice() as device:
+        np.testing.assert_array_equal(device.render(packed, SIZE), expected.pixels)
+        assert device.counters() == expected.counters
+
+
+def test_tables_replace_those_of_their_name_and_none_removes_one() -> None:
+    scene = colonnade.Scene("octahedron", camera={"position": (0, 1, 4)}, light={"offset": (1, 1, 1)})
+    moved = scene.with_tables(camera={"position": (3, 1, 2)}, light=None)
+    assert scene.description.camera.position == (0, 1, 4) and moved.description.camera.position == (3, 1, 2)
+    assert not moved.description.names_light and moved.description.mesh == scene.description.mesh
+    packed = scene.pack("tiny")
+    expected = scene.with_tables(camera={"position": (3, 1, 2)}).pack("tiny").registers(SIZE)
+    assert packed.with_camera(moved.description.camera).registers(SIZE) == expected != packed.registers(SIZE)
+    turned = list(scene.with_tables(motion={"turn": 50.0}).frames(2, size=SIZE))
+    assert (turned[0].pixels != turned[1].pixels).any()
+
+
+def test_what_is_wrong_is_said_in_one_line() -> None:
+    square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    for message, make in {
+        r"the scene: camera.fov must be a number from 1 to 150": lambda: colonnade.Scene("cube", camera={"fov": 200}),
+        r"the scene: \[mesh\] needs either a name or a path": lambda: colonnade.Scene(),
+        r"no scene nowhere: name a TOML file": lambda: colonnade.Scene.load("nowhere"),
+        r"vertices have the shape \[4, 2\]": lambda: colonnade.Scene((np.zeros((4, 2)), [[0, 1, 2]])),
+        r"a vertex that does not exist: there are 4": lambda: colonnade.Scene((square, [[0, 1, 4]])),
+        r"faces are float64": lambda: colonnade.Scene((square, [[0.0, 1.0, 2.0]])),
+        r"has a mesh of its own: leave out \[mesh\]": lambda: colonnade.Scene(
+            (square, [[0, 1, 2]]), object=[{"mesh": {"name": "cube"}}]
+        ),
+    }.items():
+        with pytest.raises(colonnade.UserError, match=message):
+            make()
+    coloured = trimesh.Trimesh(square, [[0, 1, 2]], vertex_colors=np.full((4, 4), 99, np.uint8), process=False)
+    with pytest.warns(UserWarning, match="colours or textures .vertex. are left out"):
+        colonnade.Scene(coloured)
+    with pytest.raises(AttributeError, match="no attribute Scenes"):
+        colonnade.Scenes  # noqa: B018
+
+
+@pytest.mark.parametrize("name", ["frames", "room"])
+def test_a_notebook_runs(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its cells in order, as in a folder of the project; it holds no outputs."""
+    notebook = json.loads((project_root() / "examples" / "notebooks" / f"{name}.ipynb").read_text(encoding="utf-8"))
+    monkeypatch.chdir(project_root() / "examples" / "notebooks")
+    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert len(cells) >= 5 and all(cell["outputs"] == [] and cell["execution_count"] is None for cell in cells)
+    values: dict[str, object] = {}
+    for number, cell in enumerate(cells):
+        exec(compile("".join(cell["source"]), f"{name}.ipynb, cell {number}", "exec"), values)

@@ -1,0 +1,194 @@
+"""Devices with the same calls: one sequence of register accesses over every transport, and its errors."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.design.generator import GeneratedDesign, shell_design_for
+from colonnade.device.device import Device, ModelDevice
+from colonnade.device.scene import DeviceScene
+from colonnade.device.shell_device import ShellDevice
+from colonnade.device.shell_simulator import SimulatedTransport
+from colonnade.device.transport import LitexTransport, UioTransport
+from colonnade.mesh.load import load_mesh
+from colonnade.scene.model import MeshSource, Scene
+from colonnade.scene_image.device_image import device_image
+
+NEEDS_SIMULATOR = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+SIZE = (20, 6)
+#: `test_shell.py` has the same design: its simulator is built once.
+CONFIG = ("tiny", ("array.columns=2",))
+INTERRUPT_STATUS, CONTROL = 0x48, 0x40
+
+
+@pytest.fixture(scope="module")
+def design() -> GeneratedDesign:
+    return shell_design_for(*CONFIG, bus_bytes=16)
+
+
+@pytest.fixture(scope="module")
+def packed(design: GeneratedDesign) -> DeviceScene:
+    return DeviceScene.of(Scene(MeshSource(name="octahedron")), design.manifest, load_mesh("octahedron"))
+
+
+class Recorded:
+    """A transport whose accesses to registers are recorded; reads that repeat the one before are a wait."""
+
+    def __init__(self, transport: Any) -> None:
+        self._transport = transport
+        self.accesses: list[tuple[Any, ...]] = []
+
+    def read32(self, address: int) -> int:
+        if self.accesses[-1:] != [("read", address)]:
+            self.accesses.append(("read", address))
+        return self._transport.read32(address)
+
+    def write32(self, address: int, value: int) -> None:
+        self.accesses.append(("write", address, value))
+        self._transport.write32(address, value)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+
+class SimulatedSoc:
+    """The calls of LiteX's RemoteClient, for a simulated device at an address of a SoC."""
+
+    REGISTERS = 0x9000_0000
+
+    def __init__(self, device: SimulatedTransport) -> None:
+        self._device = device
+
+    def read(self, addr: int, length: int | None = None) -> int | Sequence[int]:
+        count = length or 1
+        assert count <= 255
+        if addr < self.REGISTERS:
+            words: list[int] = np.frombuffer(self._device.fetch(addr, 4 * count), "<u4").tolist()
+        else:
+            if addr == self.REGISTERS + INTERRUPT_STATUS:
+                self._device.wait()
+            words = [self._device.read32(addr - self.REGISTERS + 4 * word) for word in range(count)]
+        return words if length is not None else words[0]
+
+    def write(self, addr: int, datas: list[int]) -> None:
+        assert len(datas) <= 255
+        if addr < self.REGISTERS:
+            self._device.store(addr, np.array(datas, "<u4").tobytes())
+        for word, value in enumerate(datas if addr >= self.REGISTERS else ()):
+            self._device.write32(addr - self.REGISTERS + 4 * word, value)
+
+
+def plain_file(folder: Path, read32: Callable[[int], int], memory: int) -> UioTransport:
+    """UIO on a file that has the read-only registers of a device.
+
+    Its interrupt.status keeps what acknowledges write: every command has ended at once.
+    """
+    words = np.zeros(0x10000 // 4, "<u4")
+    words[:12] = [read32(4 * word) for word in range(12)]
+    (folder / "uio7").write_bytes(words.tobytes() + bytes(memory))
+    for number, (address, size) in enumerate([(0x9000_0000, 0x10000), (0, memory)]):
+        described = folder / "sysfs" / "uio7" / "maps" / f"map{number}"
+        described.mkdir(parents=True)
+        (described / "addr").write_text(f"{address:#x}\n")
+        (described / "size").write_text(f"{size:#x}\n")
+    return UioTransport(folder / "uio7", folder / "sysfs", page=0x10000)
+
+
+def frame_of(device: Device, packed: DeviceScene) -> tuple[np.ndarray, dict[str, int]]:
+    return device.render(packed, SIZE), device.counters()
+
+
+@NEEDS_SIMULATOR
+def test_all_transports_make_the_same_accesses_and_the_picture_is_the_models(
+    design: GeneratedDesign, packed: DeviceScene, tmp_path: Path
+) -> None:
+    model, model_counters = frame_of(ModelDevice(*CONFIG), packed)
+    assert len(np.unique(model)) >= 10
+
+    simulator = Recorded(SimulatedTransport(design, 1 << 20))
+    with ShellDevice(simulator, design) as device:
+        pixels, counters = frame_of(device, packed)
+        np.testing.assert_array_equal(pixels, model)
+        assert counters.items() >= model_counters.items() and counters["cycles"] > 500
+
+        uio = Recorded(plain_file(tmp_path, simulator._transport.read32, 1 << 20))
+        with ShellDevice(uio, design) as on_file:
+            assert frame_of(on_file, packed)[0].shape == model.shape
+    content = device_image(packed.image, design.manifest)
+    memory = (tmp_path / "uio7").read_bytes()[0x10000:]
+    assert memory == content + bytes(len(memory) - len(content))
+
+    with ShellDevice(Recorded(SimulatedTransport(design, 1 << 20)), design) as hidden:
+        soc = SimulatedSoc(hidden.transport._transport)
+        with ShellDevice(Recorded(LitexTransport(soc, SimulatedSoc.REGISTERS, 0, 1 << 20)), design) as litex:
+            pixels, counters = frame_of(litex, packed)
+            np.testing.assert_array_equal(pixels, model)
+            assert counters.items() >= model_counters.items()
+            # A poll of LiteX is the wait for an interrupt elsewhere
+            accesses = [one.accesses for one in (simulator, uio, litex.transport)]
+    assert accesses[0] == accesses[1] == accesses[2]
+    assert sum(one[:2] == ("write", CONTROL) for one in accesses[0]) == 2
+
+
+@NEEDS_SIMULATOR
+def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScene) -> None:
+    registers = packed.registers(SIZE)
+    other = ModelDevice("small")
+    with pytest.raises(UserError, match="packed for another design"):
+        other.load(packed.image)
+    for device in (ModelDevice(*CONFIG), ShellDevice(SimulatedTransport(design, 1 << 14), design)):
+        with device:
+            with pytest.raises(UserError, match="no scene is loaded"):
+                device.set_frame(registers)
+            device.load(packed.image)
+            with pytest.raises(UserError, match="no frame is set"):
+                device.start()
+            with pytest.raises(UserError, match="no frame was started"):
+                device.pixels()
+            with pytest.raises(UserError, match="a photo shows behind the object of a room"):
+                device.set_frame(registers, np.zeros((6, 20, 3), np.uint8))
+            if isinstance(device, ShellDevice):
+                with pytest.raises(UserError, match=r"size 4000x6 is too large"):
+                    device.set_frame(registers | {"frame.width": 4000})
+                device.set_frame(packed.registers((64, 60)))
+                with pytest.raises(UserError, match=r"memory of 16,384 bytes is too small for the frame: \d,\d+ more"):
+                    device.start()
+                device.set_frame(registers)
+                device.start()
+                with pytest.raises(UserError, match="a frame runs: wait"):
+                    device.set_frame(registers)
+                with pytest.raises(UserError, match="has not answered in time"):
+                    device.wait(timeout=-1.0)
+                device.reset()
+                with pytest.raises(UserError, match="no frame is set"):
+                    device.start()
+                device.set_frame(registers)
+                device.start()
+                device.wait()
+                assert device.counters()["cycles"] > 0
+
+
+def test_a_way_without_a_device_is_an_error_and_so_is_an_exception_of_an_access(
+    design: GeneratedDesign, tmp_path: Path
+) -> None:
+    with pytest.raises(UserError, match=r"uio3/maps/map1/addr cannot be read, the device needs two maps: No such file"):
+        UioTransport("/dev/uio3", tmp_path)
+    with pytest.raises(UserError, match=r"no Colonnade answers.*noDevice"):
+        ShellDevice(plain_file(tmp_path, lambda address: 0, 4096), design)
+
+    class Unplugged:
+        def read(self, addr: int, length: int | None = None) -> int:
+            raise ConnectionResetError("the server is gone")
+
+        def write(self, addr: int, datas: list[int]) -> None:
+            raise AssertionError("a write after a read that failed")
+
+    with pytest.raises(ConnectionResetError, match="the server is gone"):
+        ShellDevice(LitexTransport(Unplugged(), 0, 0, 4096), design)
