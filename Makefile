@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .PHONY: help setup render test test-hardware test-host verify bench soc live browser check docs release release-check container lock format clean
 
 venv := .venv/bin
-SCENE ?= scenes/room.toml
+SCENE ?= scenes/metal.toml
 CONFIG ?= textured
 SIZE ?= 640x480
 SAMPLES ?= 4

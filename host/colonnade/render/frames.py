@@ -76,6 +76,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         scene.require_one_object("a mesh replaces that of a single object")
     note = _DEFAULT_SAMPLES if _has_default_samples(scene, request) else None
     scene = with_requested_samples(scene, request)
+    if scene.frame.denoise and request.backend != "reference":
+        request = replace(request, denoise=True)
     size = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size(size, manifest)
@@ -114,11 +116,11 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
 def _check_denoise(request: RenderRequest, scene: Scene, manifest: Manifest) -> None:
     """Raise a `UserError` if there is no noise to filter, or no depth to guide the filter."""
     if scene.paths.gather == 0:
-        raise UserError("--denoise filters the noise of gathered light: the scene has none, set paths.gather = 1")
+        raise UserError("--denoise or frame.denoise filters the noise of gathered light: the scene has none, set paths.gather = 1")
     if request.backend == "reference":
         raise UserError("--denoise is for the rtl and the model backend: give the reference more --samples")
     if not manifest.config["frame"]["hits"]:
-        raise UserError("--denoise needs the depth of pixels, which this hardware lacks: set frame.hits=true")
+        raise UserError("--denoise or frame.denoise needs the depth of pixels, which this hardware lacks: set frame.hits=true")
 
 
 def _check_sequence(request: RenderRequest, sequence: Sequence, scene: Scene) -> None:

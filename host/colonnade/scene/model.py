@@ -357,11 +357,15 @@ class Background:
 
 @dataclass(frozen=True, config=_STRICT)
 class FrameSize:
-    """Default size of the frame, pixels, and the samples of each pixel; None: `colonnade.render.frames` chooses."""
+    """Default size of the frame, pixels, and the samples of each pixel; None: `colonnade.render.frames` chooses.
+
+    With ``denoise`` the noise of gathered light is filtered, in frames of the model and the RTL.
+    """
 
     width: Annotated[int, Strict(), Ge(1)] = 640
     height: Annotated[int, Strict(), Ge(1)] = 480
     samples: Annotated[int, Strict(), Interval(ge=1, le=MAX_SAMPLES)] | None = None
+    denoise: bool = False
 
 
 @dataclass(frozen=True, config=_STRICT)

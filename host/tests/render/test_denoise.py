@@ -91,6 +91,16 @@ def test_the_command_filters_the_object(tmp_path: Path) -> None:
     assert error["filtered"] < 0.7 * error["raw"]
 
 
+def test_a_scene_asks_for_the_filter(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text(SCENE.format(1) + "[frame]\ndenoise = true\nwidth = 64\nheight = 48\n")
+    run(tmp_path, 1, "--backend", "model", "--denoise", "--output", str(tmp_path / "filtered.png"))
+    for backend in ("model", "reference"):
+        own = ["render", str(tmp_path / "own.toml"), "--config", "textured", "--backend", backend]
+        done = CliRunner().invoke(cli, [*own, "--output", str(tmp_path / f"{backend}.png")])
+        assert done.exit_code == 0, done.output
+    assert (tmp_path / "model.png").read_bytes() == (tmp_path / "filtered.png").read_bytes()
+
+
 @pytest.mark.parametrize(
     ("gather", "options", "message"),
     [
