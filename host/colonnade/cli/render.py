@@ -81,7 +81,11 @@ if TYPE_CHECKING:
     help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene; if it names none, 4 in"
     " the photo of a room, otherwise 1]",
 )
-@click.option("--denoise", is_flag=True, help="Filter the noise of gathered light, as frame.denoise; with --backend rtl or model.")
+@click.option(
+    "--denoise",
+    is_flag=True,
+    help="Filter the noise of gathered light, as the key frame.denoise; not of the reference.",
+)
 @click.option(
     "--output", type=FILE, metavar="FILE", help="Write a PNG picture, or of several frames a .webp animation."
 )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colonnade.common.progress import QUIET, Progress
+from colonnade.common.progress import Progress
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import MOST, LightCube
 from colonnade.environment.lights import RoomLight
@@ -41,7 +41,7 @@ def scene_cube(
     relit: bool,
     unseen: Panorama | Surround | None = None,
     second: Environment | None = None,
-    progress: Progress = QUIET,
+    progress: Progress | None = None,
 ) -> LightCube | None:
     """The light that rays meet that leave the object, by directions of mesh space; None for a scene that gathers none.
 
@@ -56,7 +56,7 @@ def scene_cube(
         relit: The frame shows the room under the scene's lights, not its photo.
         unseen: The light that no photo shows (`LitRoom.unseen`).
         second: Another view of the room (`LitRoom.second`).
-        progress: Notes where the light comes from, and what the cube cannot hold.
+        progress: Notes where the light comes from, and what the cube cannot hold; None: these are known.
     """
     if scene.paths.gather == 0:
         return None
@@ -68,19 +68,21 @@ def scene_cube(
         if unseen is not None:
             others = "fitted walls" if isinstance(unseen, Surround) else "panorama"
         pictures = "its picture shows" if second is None else "its two pictures show"
-        progress.note(
-            f"rays that leave the object meet the light of room {room.name}: {pictures} {light.seen:.0%} of all"
-            f" directions, and its {others} the other {1 - light.seen:.0%}"
-        )
+        if progress is not None:
+            progress.note(
+                f"rays that leave the object meet the light of room {room.name}: {pictures} {light.seen:.0%} of all"
+                f" directions, and its {others} the other {1 - light.seen:.0%}"
+            )
         cube = light.cube
     elif isinstance(unseen, Panorama):
-        progress.note("rays that leave the object meet the light of the panorama, which shows all directions")
+        if progress is not None:
+            progress.note("rays that leave the object meet the light of the panorama, which shows all directions")
         cube = unseen.cube(FINE)
     else:
         cube = LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, 1, 1, 3)))
     cube = cube.turned(pose.rotation)
     lost = 1 - cube.texels.clip(max=MOST).sum() / max(cube.texels.sum(), 1e-9)
-    if lost > _REPORTED_LOSS:
+    if lost > _REPORTED_LOSS and progress is not None:
         progress.note(f"{lost:.0%} of the light is brighter than {MOST:g}, the most that a ray brings, and is lost")
     return cube.with_lights([_disc(light, point, pose) for light in lights.lights if light.radius > 0])
 

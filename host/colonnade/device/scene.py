@@ -131,6 +131,17 @@ class DeviceScene:
         strength = photo_strength(scene, room, extent, relit)
         return replace(self, scene=scene, image=image, maps=maps, photo=room.photo, strength=strength)
 
+    def lit_at(self, pose: Scene, relit: bool = False) -> DeviceScene:
+        """The scene with the light cube of a pose of its motion; itself if it gathers no light.
+
+        Args:
+            pose: As `Scene.at` gives it.
+            relit: As in `of`.
+        """
+        held = None if self.maps is None else self.maps.image
+        cube = scene_cube(pose, self.image.header.extent, self.environment, held, relit, self.unseen, self.second)
+        return self if cube is None else replace(self, image=with_cube(self.image, cube))
+
     def seen_by(self, camera: EnvironmentCamera, photo: NDArray[np.uint8] | None) -> DeviceScene:
         """The scene from another camera: object, lights and maps stay in the world, primary rays march.
 

@@ -17,7 +17,7 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
     names = [*design.errors.items(), *design.counters.items()]
     places = [
         f"    .{name} = {value if name in _COUNTS else f'{value:#x}'},"
-        for name, value in design.places.items()
+        for name, value in design.constants.items()
         if value or name not in ("scene_page", "invalidate")
     ]
     maps = [f"{{{width}, {depth}}}" for width, depth in design.maps]

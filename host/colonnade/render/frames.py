@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -97,8 +98,6 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
             f"nothing moves in these {request.frames} frames, since several objects stand still: give motion.light, or"
             " motion.turn or motion.translate, which move all of them"
         )
-    if scene.paths.gather and request.frames > 1 and scene.motion.turn != 0.0:
-        raise UserError("paths.gather is for an object that does not turn: give motion.turn = 0 for several frames")
     if request.waveform is not None:
         _check_waveform(request, size)
     if request.denoise:
@@ -116,11 +115,11 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
 def _check_denoise(request: RenderRequest, scene: Scene, manifest: Manifest) -> None:
     """Raise a `UserError` if there is no noise to filter, or no depth to guide the filter."""
     if scene.paths.gather == 0:
-        raise UserError("--denoise or frame.denoise filters the noise of gathered light: the scene has none, set paths.gather = 1")
+        raise UserError("denoise filters the noise of gathered light: the scene has none, set paths.gather = 1")
     if request.backend == "reference":
         raise UserError("--denoise is for the rtl and the model backend: give the reference more --samples")
     if not manifest.config["frame"]["hits"]:
-        raise UserError("--denoise or frame.denoise needs the depth of pixels, which this hardware lacks: set frame.hits=true")
+        raise UserError("denoise needs the depth of pixels, which this hardware lacks: set frame.hits=true")
 
 
 def _check_sequence(request: RenderRequest, sequence: Sequence, scene: Scene) -> None:
@@ -176,7 +175,13 @@ def _device_frames(
         if note is not None:
             progress.note(note)
     seconds = {"pack": time.perf_counter() - begun, "build": None}
-    for pose, result in zip(poses, _rendered(request, prepared, size, passes, registers, progress), strict=True):
+    results = _rendered(request, prepared, size, passes, registers, progress)
+    if scene.paths.gather and len(poses) > 1:  # Each has a light cube of its own
+        results = itertools.chain.from_iterable(
+            _rendered(request, prepared.lit_at(pose, request.relit), size, [own], [values], progress)
+            for pose, own, values in zip(poses, passes, registers, strict=True)
+        )
+    for pose, result in zip(poses, results, strict=True):
         report = replace(result.report, share=pose.motion_progress, seconds=seconds | dict(result.report.seconds))
         yield replace(result, report=report)
 

@@ -130,10 +130,11 @@ def traced_frames(
     photo = view_photo(poses[0], maps, size)
     room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)
     backdrop = room_backdrop(room, layout, options.truth, progress)
-    cube = _light_cube(room, mesh, layout, options.relit, progress)
-    for pose in poses:
+    for number, pose in enumerate(poses):
         begun = time.perf_counter()
-        passes = room.scene.at(pose.motion_progress).passes(options.exposure)
+        lit = replace(room, scene=room.scene.at(pose.motion_progress))
+        cube = _light_cube(lit, mesh, layout, options.relit, progress if number == 0 else None)
+        passes = lit.scene.passes(options.exposure)
         views = [make_view(one, mesh.extent, *size, mesh.materials, room.environment) for one in passes]
         if cube is not None:
             views = [replace(view, gather=replace(view.gather, cube=cube)) for view in views if view.gather is not None]
@@ -152,7 +153,7 @@ def _accumulated(frame: ReferenceResult) -> Accumulation:
 
 
 def _light_cube(
-    room: LitRoom, mesh: Mesh, layout: AttributeLayout | None, relit: bool, progress: Progress
+    room: LitRoom, mesh: Mesh, layout: AttributeLayout | None, relit: bool, progress: Progress | None
 ) -> LightCube | None:
     environment = room.environment
     image = None
