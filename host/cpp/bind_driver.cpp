@@ -29,19 +29,19 @@ constexpr std::uint32_t attempts = 0xFFFFFFFF, resetAttempts = 100000;
 
 class Driver {
 public:
-    Driver(nb::object transport, const std::array<std::uint32_t, 8>& formatHash, const std::map<std::string, std::uint32_t>& constants, const Memories& maps)
+    Driver(nb::object transport, const std::array<std::uint32_t, 8>& formatHash, const std::map<std::string, std::uint32_t>& numbers, const Memories& maps)
         : transport_(std::move(transport)), bus_{&read, &write, &wait, this} {
         std::copy(formatHash.begin(), formatHash.end(), design_.format_hash);
-        design_.device_end = constants.at("device_end");
-        design_.frame_registers = constants.at("frame_registers");
-        design_.errors = constants.at("errors");
-        design_.error_count = constants.at("error_count");
-        design_.counters = constants.at("counters");
-        design_.counter_count = constants.at("counter_count");
-        design_.tile_size = constants.at("tile_size");
-        design_.posted_writes = constants.at("posted_writes");
-        design_.scene_page = constants.at("scene_page");
-        design_.invalidate = constants.at("invalidate");
+        design_.device_end = numbers.at("device_end");
+        design_.frame_registers = numbers.at("frame_registers");
+        design_.errors = numbers.at("errors");
+        design_.error_count = numbers.at("error_count");
+        design_.counters = numbers.at("counters");
+        design_.counter_count = numbers.at("counter_count");
+        design_.tile_size = numbers.at("tile_size");
+        design_.posted_writes = numbers.at("posted_writes");
+        design_.scene_page = numbers.at("scene_page");
+        design_.invalidate = numbers.at("invalidate");
         if (maps.size() > COLONNADE_MAX_MAPS) throw std::invalid_argument("too many maps");
         design_.map_count = static_cast<std::uint32_t>(maps.size());
         for (std::size_t i = 0; i < maps.size(); ++i) design_.maps[i] = {maps[i].first, maps[i].second};
@@ -163,7 +163,7 @@ private:
 void bind_driver(nb::module_& module) {
     nb::class_<Driver>(module, "Driver")
         .def(nb::init<nb::object, const std::array<std::uint32_t, 8>&, const std::map<std::string, std::uint32_t>&, const Memories&>(), "transport"_a,
-             "format_hash"_a, "constants"_a, "maps"_a)
+             "format_hash"_a, "numbers"_a, "maps"_a)
         .def("probe", &Driver::probe)
         .def("load", &Driver::load, "image"_a, "address"_a, "window"_a, "is_maps"_a)
         .def("set_scene", &Driver::setScene, "address"_a)

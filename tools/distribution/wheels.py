@@ -101,7 +101,7 @@ def _run(command: list[str], log: Path, cwd: Path | None = None, env: dict[str, 
 
 def gather(data: Path, target: Target, jar: Path) -> None:
     """What ``colonnade.design.toolchain.RELEASE`` is in the wheel."""
-    for folder in ("configs", "scenes", "manifests", "tools"):
+    for folder in ("configs", "scenes", "manifests", "site", "tools"):
         (data / folder).mkdir(parents=True)
     for preset in sorted((ROOT / "configs").glob("*.json")):
         shutil.copy(preset, data / "configs")
@@ -110,6 +110,9 @@ def gather(data: Path, target: Target, jar: Path) -> None:
     for scene in sorted((ROOT / "scenes").glob("*.toml")):
         shutil.copy(scene, data / "scenes")
     shutil.copytree(ROOT / "scenes" / "rooms", data / "scenes" / "rooms")
+    # The page of `colonnade view`
+    for name in ("live.html", "live.js", "orbit.js", "style.css"):
+        shutil.copy(ROOT / "site" / name, data / "site")
     shutil.copy(ROOT / "tools" / "verilated-object", data / "tools")
     shutil.copy(ROOT / ".jvmopts", data)
     shutil.copy(ROOT / "LICENSE", data)

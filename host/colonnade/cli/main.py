@@ -22,6 +22,7 @@ from colonnade.cli.options import echo
 from colonnade.cli.pack import pack
 from colonnade.cli.registers import registers
 from colonnade.cli.render import render
+from colonnade.cli.view import view
 from colonnade.common import ledger, machine_limits, notes
 from colonnade.common.errors import UserError, reason_of
 from colonnade.common.terminal_text import one_line
@@ -150,5 +151,5 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, registers, pack, inspect, capture, light, render, compare):
+for command in (generate, registers, pack, inspect, capture, light, render, view, compare):
     cli.add_command(command)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,6 +14,18 @@ from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 #: Names by the code of ``framebuffer.format``, and bytes of a pixel.
 FORMATS = ("xrgb8888", "rgb565", "linear16")
 PIXEL_BYTES = (4, 2, 8)
+
+
+@cache
+def _codes(white: int) -> npt.NDArray[np.uint16]:
+    """The 8-bit sRGB code of each linear value from 0 to `white`, uint16 [white + 1]."""
+    return np.rint(srgb_from_linear(np.arange(white + 1) / white) * 255.0).astype(np.uint16)
+
+
+@cache
+def _linear() -> npt.NDArray[np.float64]:
+    """The linear value of each 8-bit sRGB code, float64 [256]."""
+    return linear_from_srgb(np.arange(256) / 255.0)
 
 
 def framebuffer_bytes(
@@ -29,18 +43,17 @@ def framebuffer_bytes(
     """
     height, width = frame.is_object.shape
     wide = (frame.colour.astype(np.int64) << 4) | (frame.colour.astype(np.int64) >> 8)
-    linear = frame.colour / WHITE
+    codes = _codes(WHITE)[frame.colour]
     if photo is not None:
         assert frame.ratio is not None
         shows = ~frame.is_object[..., None]
-        shadowed = np.minimum(shadowed_photo(linear_from_srgb(photo / 255.0), frame.ratio), PHOTO_WHITE)
+        shadowed = np.minimum(shadowed_photo(_linear()[photo], frame.ratio), PHOTO_WHITE).astype(np.int64)
         wide = np.where(shows, shadowed, wide)
-        linear = np.where(shows, shadowed / PHOTO_WHITE, linear)
+        codes = np.where(shows, _codes(PHOTO_WHITE)[shadowed], codes)
     if pixel_format == FORMATS.index("linear16"):
         alpha = np.where(frame.is_object, 0xFFFF, 0).astype(np.uint16)
         words = np.concatenate([wide.astype(np.uint16), alpha[..., None]], axis=2).astype("<u2")
         return words.view(np.uint8).reshape(height, width * 8)
-    codes = np.rint(srgb_from_linear(linear) * 255.0).astype(np.uint16)
     if pixel_format == FORMATS.index("rgb565"):
         packed = (codes[..., 0] >> 3 << 11) | (codes[..., 1] >> 2 << 5) | (codes[..., 2] >> 3)
         return np.ascontiguousarray(packed.astype("<u2")).view(np.uint8).reshape(height, width * 2)

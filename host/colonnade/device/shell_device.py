@@ -61,7 +61,7 @@ class ShellDevice(Device):
         self._design = DriverDesign.of(self._table, design.manifest)
         self._paced = PacedTransport(transport)
         self._driver: Any = _core.Driver(
-            self._paced, list(self._design.format_words), dict(self._design.constants), list(self._design.maps)
+            self._paced, list(self._design.format_words), dict(self._design.numbers), list(self._design.maps)
         )
         self._check(self._driver.probe())
         self._driver.enable_interrupts(_FRAME_DONE | _IMAGE_DONE)
@@ -134,7 +134,7 @@ class ShellDevice(Device):
         free = self._stored("the scene", free, content)
         self._begin(None)
         self._check(self._driver.load(content, base, self._window(base, len(content)), False))
-        if self._design.constants["scene_page"]:
+        if self._design.numbers["scene_page"]:
             records = dram_image(image, self.manifest)
             address, free = free, self._stored("the scene", free, records)
             self._check(self._driver.set_scene(address))
@@ -167,7 +167,7 @@ class ShellDevice(Device):
         width, height = self._size
         if width == 0:
             raise UserError("no frame is set: set its registers before the start")
-        tile = self._design.constants["tile_size"]
+        tile = self._design.numbers["tile_size"]
         stride = -(-width // tile) * tile * PIXEL_BYTES[pixel_format]
         base = self._end if address is None else address
         self._require_memory("the frame", base, stride * height)
@@ -273,7 +273,7 @@ class ShellDevice(Device):
     def _photo_lines(self, photo: Pixels) -> Pixels:
         """A photo as XRGB8888, in lines of whole tile rows: uint8 [height, stride]."""
         height, width, _ = photo.shape
-        tile = self._design.constants["tile_size"]
+        tile = self._design.numbers["tile_size"]
         lines = np.zeros((height, -(-width // tile) * tile, 4), np.uint8)
         lines[:, :width, :3] = photo[..., ::-1]
         return lines.reshape(height, -1)

@@ -11,13 +11,13 @@ _COUNTS = ("error_count", "counter_count", "tile_size", "posted_writes")
 
 
 def design_header(table: RegisterTable, manifest: Manifest) -> str:
-    """Format hash, places of registers, and names of errors and counters. Needs ``colonnade.h`` of the driver."""
+    """Format hash, addresses of registers, and names of errors and counters. Needs ``colonnade.h`` of the driver."""
     design = DriverDesign.of(table, manifest)
     words = [f"{word:#010x}u" for word in design.format_words]
     names = [*design.errors.items(), *design.counters.items()]
-    places = [
+    numbers = [
         f"    .{name} = {value if name in _COUNTS else f'{value:#x}'},"
-        for name, value in design.constants.items()
+        for name, value in design.numbers.items()
         if value or name not in ("scene_page", "invalidate")
     ]
     maps = [f"{{{width}, {depth}}}" for width, depth in design.maps]
@@ -35,7 +35,7 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
         "static const struct colonnade_design colonnade_design = {",
         f"    .format_hash = {{{', '.join(words[:4])},",
         f"                    {', '.join(words[4:])}}},",
-        *places,
+        *numbers,
         *([f"    .map_count = {len(maps)},", f"    .maps = {{{', '.join(maps)}}},"] if maps else []),
         "};",
         "",

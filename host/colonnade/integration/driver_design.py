@@ -16,8 +16,8 @@ class DriverDesign:
 
     Attributes:
         format_words: The format hash, 8 words.
-        constants: The numbers of ``struct colonnade_design`` by name. `scene_page` and `invalidate` are 0 if no scene
-            lies in DRAM.
+        numbers: Those of ``struct colonnade_design`` by name. `scene_page` and `invalidate` are 0 if no scene lies in
+            DRAM.
         maps: Words of a record and number of records of each memory of a room's maps, in the order of their load
             targets, which begin at 1.
         errors: Names of the device's error bits, by their number.
@@ -25,7 +25,7 @@ class DriverDesign:
     """
 
     format_words: tuple[int, ...]
-    constants: Mapping[str, int]
+    numbers: Mapping[str, int]
     maps: tuple[tuple[int, int], ...]
     errors: Mapping[int, str]
     counters: Mapping[int, str]
@@ -42,7 +42,7 @@ class DriverDesign:
             return table.device.base + 4 * manifest.registers[name].address
 
         errors, counters = _numbers(manifest, "errors."), _numbers(manifest, "counters.")
-        constants = {
+        numbers = {
             "device_end": table.device.base + table.device.words[-1].address + 4,
             "frame_registers": _first_frame_register(table),
             "errors": place(errors[0]),
@@ -57,8 +57,8 @@ class DriverDesign:
         if manifest.config["columnBvhMemory"]["cache"]:
             if manifest.registers["dram.page"].words != 1:
                 raise ValueError("dram.page has more than one word")
-            constants |= {"scene_page": place("dram.page"), "invalidate": place("control.invalidate")}
-        return cls(tuple(manifest.format_words), constants, _maps(manifest), errors, counters)
+            numbers |= {"scene_page": place("dram.page"), "invalidate": place("control.invalidate")}
+        return cls(tuple(manifest.format_words), numbers, _maps(manifest), errors, counters)
 
 
 def _numbers(manifest: Manifest, prefix: str) -> dict[int, str]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
@@ -14,6 +16,7 @@ from colonnade.maps.cache import encoded_environment
 from colonnade.maps.encoders import Encoder
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.layout import AttributeLayout
+from colonnade.maps.planes import PlaneProjection
 
 #: Encodes the maps of a room.
 Encode = Callable[[Environment], AttributeImage]
@@ -25,6 +28,11 @@ class EncodedEnvironment:
 
     environment: Environment
     image: AttributeImage
+
+    @cached_property
+    def depth(self) -> Floats:
+        """Depth as the device decodes it, metres along z: float64 [height, width]."""
+        return self.image.decoded_depth(PlaneProjection.of(self.environment, self.image.depth_unit))
 
     @staticmethod
     def load(folder: Path, manifest: Manifest) -> EncodedEnvironment:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from colonnade.maps.planes import SLOPE_PIXELS, PlaneProjection
+from colonnade.maps.planes import SLOPE_PIXELS
 from colonnade.registers.occlusion import occlusion_registers
 from colonnade.registers.shadow_window import shadow_window, whole_frame
 
@@ -32,11 +32,7 @@ def environment_registers(
     """
     environment, image = encoded.environment, encoded.image
     registers = occlusion_registers(view, encoded, header, manifest)
-    if relit:
-        window = whole_frame(view)
-    else:
-        depth = image.decoded_depth(PlaneProjection.of(environment, image.depth_unit))
-        window = shadow_window(view, environment, depth, header.extent)
+    window = whole_frame(view) if relit else shadow_window(view, environment, encoded.depth, header.extent)
     edges = (f"environment.window.{edge}" for edge in ("x0", "y0", "x1", "y1"))
     registers |= dict(zip(edges, window, strict=True))
     fraction = manifest.numbers["shadeBits"] + STEP_GUARD

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from colonnade.common.types import Floats
-from colonnade.maps.planes import PlaneProjection
 from colonnade.registers.shadow_window import surface_points
 
 if TYPE_CHECKING:
@@ -38,16 +37,19 @@ def occlusion_registers(
     tolerance = occlusion_tolerance(view, encoded, header.extent)
     if not view.occlusion or not may_hide(view, encoded, header.extent, tolerance):
         return {"environment.occlusion": 0, "environment.occlusionTolerance": 0}
-    return tolerance_registers(view, encoded, header, manifest) | {"environment.occlusion": 1}
+    return _tolerance_register(tolerance, header, manifest) | {"environment.occlusion": 1}
 
 
 def tolerance_registers(
     view: View, encoded: EncodedEnvironment, header: ImageHeader, manifest: Manifest
 ) -> dict[str, int]:
     """The register ``environment.occlusionTolerance``, grid steps; arguments as there."""
+    return _tolerance_register(occlusion_tolerance(view, encoded, header.extent), header, manifest)
+
+
+def _tolerance_register(tolerance: float, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
     steps = header.frame.scale * 2.0 ** manifest.numbers["gridFraction"]
     limit = (1 << manifest.registers["environment.occlusionTolerance"].width) - 1
-    tolerance = occlusion_tolerance(view, encoded, header.extent)
     return {"environment.occlusionTolerance": min(limit, math.ceil(tolerance * steps))}
 
 
@@ -58,7 +60,7 @@ def occlusion_tolerance(view: View, encoded: EncodedEnvironment, extent: Extent)
     the surfaces around the object, which is the error of the surface that it stands on.
     """
     environment = encoded.environment
-    decoded = encoded.image.decoded_depth(PlaneProjection.of(environment, encoded.image.depth_unit))
+    decoded = encoded.depth
     assert view.view_to_mesh is not None
     linear, origin = view.view_to_mesh[:, :3], view.view_to_mesh[:, 3]
     directions = environment.camera.directions(environment.width, environment.height) @ linear.T
@@ -77,8 +79,7 @@ def occlusion_tolerance(view: View, encoded: EncodedEnvironment, extent: Extent)
 def may_hide(view: View, encoded: EncodedEnvironment, extent: Extent, tolerance: float) -> bool:
     """Whether in some pixel the room is nearer than the end of the object's box by more than a tolerance."""
     environment = encoded.environment
-    depth = encoded.image.decoded_depth(PlaneProjection.of(environment, encoded.image.depth_unit))
-    points = surface_points(view, environment, depth)
+    points = surface_points(view, environment, encoded.depth)
     return bool((_margin_of_box_end(view.origin, points, extent) > tolerance).any())
 
 
@@ -95,10 +96,14 @@ def _margin_of_box_end(origin: Floats, points: Floats, extent: Extent) -> Floats
     """
     directions = points - origin
     with np.errstate(divide="ignore", invalid="ignore"):
-        crossings = np.stack([(extent.low - origin) / directions, (extent.high - origin) / directions])
+        low, high = (extent.low - origin) / directions, (extent.high - origin) / directions
     inside = (origin >= extent.low) & (origin <= extent.high)
     parallel = directions == 0
-    enters = np.where(parallel, np.where(inside, -np.inf, np.inf), crossings.min(axis=0)).max(axis=-1)
-    leaves = np.where(parallel, np.where(inside, np.inf, -np.inf), crossings.max(axis=0)).min(axis=-1)
-    margin = (leaves - 1.0) * np.abs(directions).max(axis=-1)
+    first = np.where(parallel, np.where(inside, -np.inf, np.inf), np.minimum(low, high))
+    last = np.where(parallel, np.where(inside, np.inf, -np.inf), np.maximum(low, high))
+    # A reduction over an axis of three is slow
+    enters = np.maximum(np.maximum(first[..., 0], first[..., 1]), first[..., 2])
+    leaves = np.minimum(np.minimum(last[..., 0], last[..., 1]), last[..., 2])
+    x, y, z = (np.abs(directions[..., axis]) for axis in range(3))
+    margin = (leaves - 1.0) * np.maximum(np.maximum(x, y), z)
     return np.where((leaves >= np.maximum(enters, 0.0)), margin, -np.inf)

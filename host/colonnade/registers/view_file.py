@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
-from colonnade.maps.planes import SLOPE_PIXELS, PlaneProjection
+from colonnade.maps.planes import SLOPE_PIXELS
 from colonnade.registers.occlusion import PERCENTILE
 from colonnade.scene.cameras import WorldCamera
 from colonnade.scene.object_pose import Pose
@@ -329,8 +329,7 @@ def _surface_words(
     occlusion: bool,
 ) -> list[int]:
     """What window and occlusion of a moving object need."""
-    environment, unit = room.environment, room.image.depth_unit
-    depth = room.image.decoded_depth(PlaneProjection.of(environment, unit))
+    environment, depth = room.environment, room.depth
     low, high = _bounds(environment, depth, size)
     shadowed = WINDOW_SHADOW if registers["shading.shadows"] else WINDOW_NONE
     window = [registers[name] for name in window_names()[:4]]

@@ -1,0 +1,47 @@
+"""Writes a camera into a scene file, whose other lines stay as they are."""
+
+from __future__ import annotations
+
+from collections.abc import MutableMapping, Sequence
+from pathlib import Path
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from colonnade.common.atomic_files import replacing
+from colonnade.common.errors import UserError
+from colonnade.common.input_files import read_input
+from colonnade.scene.parser import scene_of
+
+#: Digits behind the point: a tenth of a millimetre where the unit is a metre.
+_DIGITS = 4
+
+
+def save_camera(file: Path, position: Sequence[float], target: Sequence[float]) -> None:
+    """Set ``camera.position`` and ``camera.target`` of a scene file; what frames the object instead leaves it.
+
+    Args:
+        file: The scene file.
+        position: World position, 3 numbers; it is rounded.
+        target: World point at the picture's centre, 3 numbers; it is rounded.
+
+    Raises:
+        UserError: The file cannot be read or replaced, or has another camera that forbids this one.
+    """
+    try:
+        document = tomlkit.parse(read_input(file, "the scene").decode("utf-8"))
+    except (TOMLKitError, ValueError) as error:
+        raise UserError(f"scene {file} is not TOML: {error}") from None
+    if "camera" not in document:
+        document["camera"] = tomlkit.table()
+    camera = document["camera"]
+    if not isinstance(camera, MutableMapping):
+        raise UserError(f"scene {file}: camera must be a table: [camera]")
+    for name in ("direction", "framing"):
+        if name in camera:
+            del camera[name]
+    for name, values in (("position", position), ("target", target)):
+        camera[name] = [round(float(value), _DIGITS) + 0.0 for value in values]
+    scene_of(document.unwrap(), f"scene {file}", file.parent)
+    with replacing(file) as stream:
+        stream.write(tomlkit.dumps(document).encode("utf-8"))

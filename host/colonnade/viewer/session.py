@@ -1,0 +1,243 @@
+"""A scene file that is shown while it is edited: the last scene that could be packed, and frames of it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common import notes
+from colonnade.common.errors import UserError
+from colonnade.common.progress import QUIET, Progress
+from colonnade.design.frame_limits import check_size
+from colonnade.design.generator import manifest_for
+from colonnade.device.device import ModelDevice
+from colonnade.device.scene import DeviceScene
+from colonnade.maps.encoders import Encoder
+from colonnade.scene.model import Camera
+from colonnade.scene.parser import load_scene
+from colonnade.scene.view import place
+from colonnade.viewer.camera_table import save_camera
+
+#: Seconds between two looks at the files.
+_INTERVAL = 0.02
+
+
+@dataclass(frozen=True)
+class ViewCamera:
+    """A camera that a visitor has moved.
+
+    Attributes:
+        position: World position.
+        target: World point at the picture's centre.
+    """
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ViewFrame:
+    """A frame of one sample.
+
+    Attributes:
+        pixels: sRGB, uint8 [height, width, 3].
+        version: That of the scene.
+        milliseconds: Time of registers, model and framebuffer.
+        rays: Rays of all kinds.
+    """
+
+    pixels: NDArray[np.uint8]
+    version: int
+    milliseconds: float
+    rays: int
+
+
+class Session:
+    """A scene file in view. Its methods may be called by any thread.
+
+    Args:
+        file: The scene file.
+        config: The design, as in `ModelDevice`.
+        overrides: Fields that replace some of it.
+        size: Width and height, pixels.
+        encoder: Of a room's maps and of textures.
+        progress: Shows the run of the generator.
+
+    Raises:
+        UserError: The scene cannot be read or packed.
+    """
+
+    def __init__(
+        self,
+        file: Path,
+        config: str,
+        overrides: Sequence[str] = (),
+        size: tuple[int, int] = (320, 240),
+        encoder: Encoder = "live",
+        progress: Progress = QUIET,
+    ) -> None:
+        self.file, self.size = file, size
+        self._encoder = encoder
+        self._manifest = manifest_for(config, overrides, progress).manifest
+        check_size(size, self._manifest)
+        self._device = ModelDevice(config, overrides)
+        self._rendering = threading.Lock()
+        self._changed = threading.Condition()
+        self._state: dict[str, Any] = {"version": 0}
+        self._error = ""
+        self._ends = False
+        self._load()
+
+    def state(self, version: int | None = None, timeout: float = 0.0) -> dict[str, Any]:
+        """What the page shows beside the picture.
+
+        Args:
+            version: Wait for a later one than this.
+            timeout: Seconds of waiting, at most.
+        """
+        with self._changed:
+            if version is not None:
+                self._changed.wait_for(lambda: self._ends or self._state["version"] != version, timeout)
+            return self._state | {"error": self._error}
+
+    def frame(self, camera: ViewCamera | None = None) -> ViewFrame:
+        """Render a frame of the scene that was last right.
+
+        Args:
+            camera: In place of the scene's own.
+
+        Raises:
+            UserError: The camera is out of the hardware's range.
+        """
+        with self._rendering:
+            begun = time.perf_counter()
+            scene, version = self._scene, self._state["version"]
+            if camera is not None:
+                scene = scene.with_camera(_moved(scene.scene.camera, camera))
+            registers = scene.registers(self.size, composited=True)
+            self._device.set_frame(registers, scene.frame_photo(self.size))
+            self._device.start()
+            counters = self._device.counters()
+            pixels = self._device.pixels()
+            rays = sum(counters[f"rays{kind}"] for kind in ("Primary", "Shadow", "Reflection", "Refraction"))
+            return ViewFrame(pixels, version, 1e3 * (time.perf_counter() - begun), rays)
+
+    def save(self, camera: ViewCamera) -> None:
+        """Write a camera into the scene file.
+
+        Raises:
+            UserError: See `save_camera`.
+        """
+        save_camera(self.file, camera.position, camera.target)
+
+    def watch(self) -> None:
+        """Load the scene again whenever its file or its mesh changes, until `end`."""
+        while not self._ends:
+            time.sleep(_INTERVAL)
+            self.look()
+
+    def look(self) -> None:
+        """Load the scene again if its file or its mesh has changed."""
+        if _stamps(self._files) == self._seen:
+            return
+        try:
+            self._load()
+        except UserError as wrong:
+            self._tell(str(wrong))
+        except Exception as bug:  # the view goes on
+            self._tell(f"{type(bug).__name__}: {bug}")
+
+    def end(self) -> None:
+        """End `watch` and all waits."""
+        with self._changed:
+            self._ends = True
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Release the model; no frame can be rendered any more."""
+        with self._rendering:
+            self._device.close()
+
+    def _tell(self, error: str) -> None:
+        with self._changed:
+            self._error = error
+            self._state = self._state | {"version": self._state["version"] + 1}
+            self._changed.notify_all()
+
+    def _load(self) -> None:
+        """Read and pack the scene; if it cannot be, the one before stays."""
+        begun = time.perf_counter()
+        self._files = [self.file]
+        self._seen = _stamps(self._files)
+        lines: list[str] = []
+        with notes.opened(lines.append):
+            description = load_scene(self.file)
+            meshes = [description.mesh, *(one.mesh for one in description.objects)]
+            paths = list(dict.fromkeys(mesh.path for mesh in meshes if mesh.path is not None))
+            self._files, self._seen = self._files + paths, self._seen + _stamps(paths)
+            scene = DeviceScene.of(description, self._manifest, size=self.size, encoder=self._encoder)
+        # It is refused here if the hardware cannot show it, and not in every frame
+        scene = self._still(scene)
+        scene.registers(self.size, composited=True)
+        packed = time.perf_counter()
+        with self._rendering, self._changed:
+            self._device.load(scene.image)
+            self._scene = scene
+            self._state = self._described(scene) | {
+                "version": self._state["version"] + 1,
+                "notes": lines,
+                "milliseconds": 1e3 * (packed - begun),
+            }
+            self._error = ""
+            self._changed.notify_all()
+
+    def _still(self, scene: DeviceScene) -> DeviceScene:
+        """A camera that frames the object as one with a place: its search would cost most of a frame's time."""
+        camera = scene.scene.camera
+        if scene.environment is not None or camera.position is not None:
+            return scene
+        view = self._described(scene)["camera"]
+        return scene.with_camera(_moved(camera, ViewCamera(view["position"], view["target"])))
+
+    def _described(self, scene: DeviceScene) -> dict[str, Any]:
+        extent, own = scene.image.header.extent, scene.scene.camera
+        placed = place(scene.scene, extent, *self.size, scene.environment)
+        camera = placed.camera
+        centre = placed.pose.to_world(extent.centre) if own.target is None else np.array(own.target)
+        depth = max(float((camera.position - centre) @ camera.axes[2]), 1e-3 * extent.edge * placed.pose.scale)
+        return {
+            "scene": self.file.name,
+            "size": list(self.size),
+            "triangles": scene.image.header.triangles,
+            "camera": {
+                "position": tuple(camera.position.tolist()),
+                "target": tuple((camera.position - depth * camera.axes[2]).tolist()),
+                "up": list(own.up),
+                "span": float(np.linalg.norm(camera.step_y)) * self.size[1],
+            },
+        }
+
+
+def _stamps(files: Sequence[Path]) -> list[tuple[int, int]]:
+    """Time and size of files; 0 of one that is not there."""
+    stamps = []
+    for file in files:
+        try:
+            status = file.stat()
+        except OSError:
+            stamps.append((0, 0))
+        else:
+            stamps.append((status.st_mtime_ns, status.st_size))
+    return stamps
+
+
+def _moved(camera: Camera, to: ViewCamera) -> Camera:
+    """A scene's camera at another place, with its lens."""
+    return replace(camera, position=to.position, target=to.target)
