@@ -68,6 +68,16 @@ struct RelativeNode {
         return static_cast<std::int64_t>(clamp<Wide>(t, -largest(n.nearBits) - 1, largest(n.nearBits)));
     }
 
+    /// t · 2^scale, rounded down and saturated: `saturate(floorShift<Wide>(t, -scale))` in 64 bits, since children need it most.
+    static std::int64_t scaled(std::int64_t t, int scale, std::int64_t high) {
+        const std::int64_t low = -high - 1;
+        if (scale <= 0) return clamp(t >> std::min(-scale, 63), low, high);
+        const int shift = std::min(scale, 62);
+        if (t > high >> shift) return high;
+        if (t < low >> shift) return low;
+        return std::max(t * (std::int64_t(1) << shift), low);
+    }
+
     /// A child's t in vertex units, rounded down.
     std::int64_t units(std::int64_t t, const Numbers& n) const { return std::max<std::int64_t>(0, z + floorShift(t, n.nearFraction - exponent)); }
 };
@@ -75,20 +85,20 @@ struct RelativeNode {
 /// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
 inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, 4>& entered, std::uint64_t& tests) {
     const RelativeNode relative(ray, node, tMaxUnits(tMax, n), n);
-    const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1;
+    const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1, high = largest(n.nearBits);
+    const std::array<int, 3> axes = {ray.objectAxis(0), ray.objectAxis(1), ray.objectAxis(2)};
     int count = 0;
     for (int slot = 0; slot < n.arity; ++slot) {
         if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
         ++tests;
         std::int64_t tNear = relative.origin, tFar = relative.tMax;
         for (int a = 0; a < 3; ++a) {
-            const int axis = ray.objectAxis(a);
-            const std::int64_t low = node.low[slot][axis], high = node.high[slot][axis];
-            const std::int64_t first = ray.negative[a] ? maxPlane - high : low, last = ray.negative[a] ? maxPlane - low : high;
+            const std::int64_t lower = node.low[slot][axes[a]], upper = node.high[slot][axes[a]];
+            const std::int64_t first = ray.negative[a] ? maxPlane - upper : lower, last = ray.negative[a] ? maxPlane - lower : upper;
             if (a < 2) {
                 const std::int64_t near = relative.near[a] + first * relative.step[a], far = relative.far[a] + last * (relative.step[a] + 1);
-                tNear = std::max(tNear, RelativeNode::saturate(floorShift<Wide>(near, -relative.scale[a]), n));
-                tFar = std::min(tFar, RelativeNode::saturate(floorShift<Wide>(far, -relative.scale[a]), n));
+                tNear = std::max(tNear, RelativeNode::scaled(near, relative.scale[a], high));
+                tFar = std::min(tFar, RelativeNode::scaled(far, relative.scale[a], high));
             } else {
                 tNear = std::max(tNear, (first << n.nearFraction) - relative.pad);
                 tFar = std::min(tFar, (last << n.nearFraction) + relative.pad);
