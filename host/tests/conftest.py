@@ -163,8 +163,8 @@ _SHINY = (("kind", 2), ("etaFront", 16), ("etaBack", 16), ("reflectance", 13))
 _SCENE = ("recordCount", "triangleBase", "triangleRecords", "attributeBase")
 
 
-#: A file with one test of minutes.
-LONGEST = "test_tutorial.py"
+#: A file with tests of a minute.
+LONGEST = "test_starting_pages.py"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
