@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import click
@@ -17,6 +18,17 @@ def _address(context: click.Context, parameter: click.Parameter, value: str) -> 
     if not 0 <= address < 1 << 40 or address % (1 << 16):
         raise click.BadParameter(f"{value!r} is not a multiple of 0x10000 below 2^40", context, parameter)
     return address
+
+
+def _framebuffer(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[int, int, int] | None:
+    """Width, height and address."""
+    if value is None:
+        return None
+    found = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})@(0x[0-9a-fA-F]{1,10}|\d{1,13})", value)
+    address = int(found[3], 0) if found else -1
+    if found is None or address >= 1 << 40 or address % 4096:
+        raise click.BadParameter(f"{value!r} is not WxH@ADDRESS, a multiple of 4096 below 2^40", context, parameter)
+    return int(found[1]), int(found[2]), address
 
 
 @click.command(short_help="Describe the registers: SystemRDL, C, HTML, IP-XACT, SVD, device tree.")
@@ -35,6 +47,12 @@ def _address(context: click.Context, parameter: click.Parameter, value: str) -> 
     metavar="N",
     help="Its interrupt, for the device tree: a cell of 32 bits.",
 )
+@click.option(
+    "--framebuffer",
+    callback=_framebuffer,
+    metavar="WxH@ADDRESS",
+    help="A display's memory, for the device tree: Linux shows it as a simple-framebuffer.",
+)
 @click.option("--shell-header", type=FILE, metavar="FILE", help="Write only the C header of the shell's registers.")
 def registers(
     config: str,
@@ -43,6 +61,7 @@ def registers(
     output: Path | None,
     base: int,
     interrupt: int,
+    framebuffer: tuple[int, int, int] | None,
     shell_header: Path | None,
 ) -> None:
     """Write the registers of a design in its AXI4 shell, from the generator's table.
@@ -59,6 +78,7 @@ def registers(
     from colonnade.design import generator
     from colonnade.design.design_folder import check_replaceable, listed
     from colonnade.integration import files
+    from colonnade.integration.device_tree import Display
 
     require_extra("integration", "colonnade registers")
     if output is not None:
@@ -71,5 +91,9 @@ def registers(
         return
     assert output is not None
     with terminal.step("describing the registers"):
-        files.write_registers(design, output, base, interrupt)
+        display = None
+        if framebuffer is not None:
+            width, height, address = framebuffer
+            display = Display(address, width, height, int(design.manifest.config["frame"]["tileSize"]))
+        files.write_registers(design, output, base, interrupt, display)
     echo(f"{output}: {len(listed(output))} files, format {design.manifest.format_hash[:12]}")

@@ -9,7 +9,7 @@ from colonnade.common.temporary import temporary_folder
 from colonnade.design.design_folder import check_replaceable, replace_folder
 from colonnade.design.generator import GeneratedDesign
 from colonnade.integration.design_header import design_header
-from colonnade.integration.device_tree import device_tree
+from colonnade.integration.device_tree import Display, device_tree
 from colonnade.integration.register_table import RegisterBlock, read_shell, register_table, shell_block
 from colonnade.integration.svd import svd
 from colonnade.integration.system_rdl import system_rdl
@@ -17,7 +17,9 @@ from colonnade.integration.system_rdl import system_rdl
 _NOTE = "/* Written by `colonnade registers` with PeakRDL. Do not edit. */\n"
 
 
-def write_registers(design: GeneratedDesign, output: Path, base: int = 0, interrupt: int = 0) -> None:
+def write_registers(
+    design: GeneratedDesign, output: Path, base: int = 0, interrupt: int = 0, display: Display | None = None
+) -> None:
     """Write the folder ``output``: SystemRDL, C headers, HTML pages, IP-XACT, SVD, and a device tree node.
 
     Args:
@@ -25,6 +27,7 @@ def write_registers(design: GeneratedDesign, output: Path, base: int = 0, interr
         output: The folder; an unchanged earlier output is replaced.
         base: Byte address of the device, for SVD and device tree.
         interrupt: Its interrupt, for the device tree.
+        display: A framebuffer for the device tree.
 
     Raises:
         UserError: The folder cannot be replaced.
@@ -43,7 +46,7 @@ def write_registers(design: GeneratedDesign, output: Path, base: int = 0, interr
         (folder / "colonnade_registers.h").write_text(c_header("colonnade", (table.shell, table.device), work))
         (folder / "colonnade_design.h").write_text(design_header(table, design.manifest))
         (folder / "colonnade.svd").write_text(svd(table, base))
-        (folder / "colonnade.dtsi").write_text(device_tree(table, base, interrupt))
+        (folder / "colonnade.dtsi").write_text(device_tree(table, base, interrupt, display))
         compiler = RDLCompiler()
         compiler.compile_file(str(source))
         top = compiler.elaborate().top

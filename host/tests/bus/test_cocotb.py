@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -87,24 +88,44 @@ def test_the_shell_in_icarus(case: str, tmp_path: Path, monkeypatch: pytest.Monk
     bus_bytes, overrides, settings = CASES[case]
     design = shell_design_for("tiny", overrides, bus_bytes=bus_bytes, pixel_stream="streamed" in settings["tests"])
     write_job(tmp_path, design, {"seed": 1, "scenePlace": 1 << 20, **settings})
+    run_bench(monkeypatch, tmp_path, "ColonnadeAxi", design.sources, "shell_bench,stream_bench", settings["tests"])
+
+
+def test_the_axi4_top_of_the_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Clean under Verilator's lint, and registers answer through it."""
+    sources = sorted((toolchain.project_root() / "examples" / "axi4").glob("*.sv"))
+    design = shell_design_for("tiny", (), bus_bytes=8)
+    command = ["verilator", "--lint-only", "-Wall", "-Wno-fatal", "--top-module", "colonnade_axi4"]
+    command += [f"-I{design.dir}", *map(str, sources)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and str(sources[0].parent) not in done.stderr, done.stderr
+    run_bench(
+        monkeypatch, tmp_path, "colonnade_axi4", [*design.sources, *sources], "axi4_bench", "registers_through_axi4"
+    )
+
+
+def run_bench(
+    monkeypatch: pytest.MonkeyPatch, folder: Path, top: str, sources: list[Path], modules: str, tests: str
+) -> None:
+    """Compile ``sources`` with Icarus Verilog, and run the cocotb tests of ``modules`` that ``tests`` names."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     runner = get_runner("icarus")
     runner.build(
-        sources=design.sources,
-        hdl_toplevel="ColonnadeAxi",
-        build_dir=tmp_path / "build",
+        sources=sources,
+        hdl_toplevel=top,
+        build_dir=folder / "build",
         build_args=["-g2012"],
         timescale=("1ns", "1ps"),
-        log_file=tmp_path / "build.log",
+        log_file=folder / "build.log",
     )
-    log = tmp_path / "test.log"
-    variables = {"COLONNADE_JOB": str(tmp_path), "COCOTB_LOG_LEVEL": "WARNING", "PYTHONWARNINGS": "ignore"}
+    log = folder / "test.log"
+    variables = {"COLONNADE_JOB": str(folder), "COCOTB_LOG_LEVEL": "WARNING", "PYTHONWARNINGS": "ignore"}
     try:
         runner.test(
-            hdl_toplevel="ColonnadeAxi",
-            test_module="shell_bench,stream_bench",
-            test_filter=settings["tests"],
-            build_dir=tmp_path / "build",
+            hdl_toplevel=top,
+            test_module=modules,
+            test_filter=tests,
+            build_dir=folder / "build",
             extra_env={**os.environ, **variables},
             log_file=log,
         )

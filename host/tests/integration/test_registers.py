@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import xml.etree.ElementTree as ET
 import zlib
 from pathlib import Path
@@ -15,7 +17,7 @@ from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_manifest_for
-from colonnade.integration.device_tree import device_tree
+from colonnade.integration.device_tree import Display, device_tree
 from colonnade.integration.files import shell_header, write_registers
 from colonnade.integration.register_table import RegisterTable, register_table
 
@@ -105,6 +107,30 @@ def test_an_interrupt_beyond_a_cell_of_a_device_tree_is_refused(interrupt: str, 
 def test_numbers_of_a_device_tree_fit_their_cells(table: RegisterTable) -> None:
     assert "reg = <0x90000000 0x10000>;" in device_tree(table, BASE, 5)
     assert "reg = <0x12 0x90000000 0x10000>;" in device_tree(table, 0x12 << 32 | BASE, 2**32 - 1)
+
+
+def test_a_framebuffer_of_a_device_tree_compiles(table: RegisterTable, tmp_path: Path) -> None:
+    """By the device tree compiler, without its warnings; a line has whole tile rows of 16 pixels."""
+    display = Display(0x8000_0000, 1000, 600, 16)
+    nodes = device_tree(table, BASE, 5, display)
+    for line in ("stride = <4032>;", "reg = <0x80000000 0x24eA00>;".lower(), 'format = "x8r8g8b8";'):
+        assert line in nodes
+    device, root = nodes.split("\n/* Include these in the root")
+    bus = f"soc {{ #address-cells = <1>; #size-cells = <1>; ranges; {device} }};"
+    head = "/dts-v1/; / { #address-cells = <1>; #size-cells = <1>; interrupt-parent = <&pic>; "
+    pic = "pic: pic { interrupt-controller; #interrupt-cells = <1>; #address-cells = <0>; };"
+    (tmp_path / "board.dts").write_text(f"{head} {pic} {bus} /* {root} }};")
+    if shutil.which("dtc") is None:
+        pytest.skip("no dtc: apt-get install device-tree-compiler")
+    command = ["dtc", "-O", "dtb", "-o", tmp_path / "board.dtb", tmp_path / "board.dts"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and not done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("framebuffer", ["640x480", "0x480@4096", "640x480@4097", "640x480@0x10000000000"])
+def test_a_framebuffer_that_is_none_is_refused(framebuffer: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(cli, ["registers", "--framebuffer", framebuffer, "--output", str(tmp_path / "out")])
+    assert done.exit_code == 2 and "multiple of 4096 below 2^40" in done.output
 
 
 def test_the_shell_is_the_same_in_every_design(design: GeneratedDesign) -> None:
