@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Mapping
@@ -98,7 +99,10 @@ def test_the_axi4_top_of_the_examples(tmp_path: Path, monkeypatch: pytest.Monkey
     command = ["verilator", "--lint-only", "-Wall", "-Wno-fatal", "--top-module", "colonnade_axi4"]
     command += [f"-I{design.dir}", *map(str, sources)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and str(sources[0].parent) not in done.stderr, done.stderr
+    warnings = [
+        line for line in done.stderr.splitlines() if re.match(rf"%\S+ {re.escape(str(sources[0].parent))}", line)
+    ]
+    assert done.returncode == 0 and not warnings, done.stderr
     run_bench(
         monkeypatch, tmp_path, "colonnade_axi4", [*design.sources, *sources], "axi4_bench", "registers_through_axi4"
     )
