@@ -1,6 +1,6 @@
-"""Runs bench.py in Icarus Verilog.
+"""Runs bench.py in Icarus Verilog or Verilator.
 
-usage: run.py DESIGN IMAGE FRAME OUTPUT [BACKDOOR]
+usage: run.py icarus|verilator DESIGN IMAGE FRAME OUTPUT [BACKDOOR]
 
 DESIGN is a folder of `colonnade generate --axi BYTES`; IMAGE and FRAME come from `colonnade pack`; OUTPUT receives
 lines of XRGB8888. With a folder of backdoor.py nothing is loaded through the bus.
@@ -9,28 +9,42 @@ lines of XRGB8888. With a folder of backdoor.py nothing is loaded through the bu
 from __future__ import annotations
 
 import os
+import re
+import subprocess
 import sys
 from pathlib import Path
 
 from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import get_runner
 
+#: The oldest Verilator of cocotb 2.
+MINIMUM_VERILATOR = (5, 36)
 
-def main(design: Path, image: Path, frame: Path, output: Path, backdoor: Path | None = None) -> None:
+
+def require_verilator() -> None:
+    """End with advice if the Verilator on PATH is too old."""
+    answer = subprocess.run(["verilator", "--version"], capture_output=True, text=True, check=True).stdout
+    found = re.match(r"Verilator (\d+)\.(\d+)", answer)
+    if found is None or (int(found[1]), int(found[2])) < MINIMUM_VERILATOR:
+        advice = 'PATH="$(tools/verilator-environment):$PATH" make -C examples cocotb SIMULATOR=verilator'
+        sys.exit(f"cocotb needs Verilator 5.036 or newer, not {answer.strip()}; run: {advice}")
+
+
+def main(simulator: str, design: Path, image: Path, frame: Path, output: Path, backdoor: Path | None = None) -> None:
     """Build and run."""
+    if simulator == "verilator":
+        require_verilator()
     sources = [design / line for line in (design / "filelist.f").read_text().split()]
-    build = output.with_suffix(".icarus")
-    runner = get_runner("icarus")
+    build = output.with_suffix(f".{simulator}")
+    runner = get_runner(simulator)
     extra = [] if backdoor is None else [backdoor / "backdoor.sv"]
+    # Icarus Verilog has no bind: the backdoor is a second top module.
+    tops = [word for _ in extra for word in ("-s", "colonnade_backdoor")]
     runner.build(
         sources=[*sources, *extra],
         hdl_toplevel="ColonnadeAxi",
         build_dir=build,
-        build_args=[
-            "-g2012",
-            *("-s" for _ in extra),
-            *("colonnade_backdoor" for _ in extra),
-        ],
+        build_args=["-g2012", *tops] if simulator == "icarus" else ["-Wno-fatal", "-O3"],
         timescale=("1ns", "1ps"),
         log_file=build.with_suffix(".log"),
         always=True,
@@ -54,6 +68,6 @@ def main(design: Path, image: Path, frame: Path, output: Path, backdoor: Path | 
 
 
 if __name__ == "__main__":
-    if len(sys.argv) not in (5, 6):
+    if len(sys.argv) not in (6, 7) or sys.argv[1] not in ("icarus", "verilator"):
         sys.exit(__doc__)
-    main(*(Path(argument).resolve() for argument in sys.argv[1:]))
+    main(sys.argv[1], *(Path(argument).resolve() for argument in sys.argv[2:]))

@@ -5,8 +5,10 @@ The bench in C++ is run by ``docs/start/soc.md``.
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -42,3 +44,12 @@ def test_the_frame_of_an_example_is_that_of_the_model(output: Path) -> None:
         assert done.returncode == 0, done.stdout + done.stderr
         assert ("load: " in done.stdout) is not bool(backdoor)
         assert "0 of 128 pixels differ from model.png" in done.stdout
+
+
+def test_cocotb_refuses_an_old_verilator(tmp_path: Path) -> None:
+    (tmp_path / "verilator").write_text("#!/bin/sh\necho 'Verilator 5.006 2023-01-22 rev (Debian 5.006-3)'\n")
+    (tmp_path / "verilator").chmod(0o755)
+    command = [sys.executable, EXAMPLES / "cocotb" / "run.py", "verilator", *(["none"] * 4)]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PATH": str(tmp_path)})
+    assert done.returncode == 1
+    assert "cocotb needs Verilator 5.036 or newer" in done.stderr and "tools/verilator-environment" in done.stderr

@@ -87,9 +87,19 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
+def simulators(data: Data) -> str:
+    """Simulated cycles per second of `small` by what drives it and by the simulator."""
+    found = data.result("simulators")["simulators"]
+    rows = [
+        [row["by"], row["simulator"], f"{row['cycles']:,}", f"{row['cycles_per_second']:,.0f}"] for row in found
+    ]
+    return markdown(["by", "simulator", "cycles", "cycles per second"], rows)
+
+
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "rates": rates,
     "utilisation": utilisation,
     "scaling": scaling,
     "ablation": ablation,
+    "simulators": simulators,
 }
