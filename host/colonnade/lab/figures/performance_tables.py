@@ -90,9 +90,7 @@ def _percent(share: float) -> str:
 def simulators(data: Data) -> str:
     """Simulated cycles per second of `small` by what drives it and by the simulator."""
     found = data.result("simulators")["simulators"]
-    rows = [
-        [row["by"], row["simulator"], f"{row['cycles']:,}", f"{row['cycles_per_second']:,.0f}"] for row in found
-    ]
+    rows = [[row["by"], row["simulator"], f"{row['cycles']:,}", f"{row['cycles_per_second']:,.0f}"] for row in found]
     return markdown(["by", "simulator", "cycles", "cycles per second"], rows)
 
 
