@@ -1,7 +1,8 @@
-"""Writes the designs of the presets: Verilog, with and without the AXI4 shell, and descriptions of the registers."""
+"""Writes the designs of the presets: Verilog, with and without the AXI4 shell, their registers, and the driver in C."""
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,13 +15,16 @@ _BUS = "16"
 
 
 def write(preset: str, jar: Path, work: Path, archive: Path, time: int) -> None:
-    """Generate a preset and pack it as ``colonnade-PRESET/``: folders ``device``, ``shell`` and ``registers``."""
+    """Generate a preset and pack it as ``colonnade-PRESET/``: ``device``, ``shell``, ``registers`` and ``driver``."""
     folder = work / preset
     generator = ["java", "-Xss16m", "-jar", str(jar), "--config", preset, "--output"]
     _run([*generator, str(folder / "device")])
     _run([*generator, str(folder / "shell"), "--axi", _BUS])
     colonnade = ROOT / ".venv" / "bin" / "colonnade"
     _run([str(colonnade), "registers", "--config", preset, "--output", str(folder / "registers")])
+    for part in ("include", "src"):
+        shutil.copytree(ROOT / "software" / part, folder / "driver" / part)
+    shutil.copy(ROOT / "LICENSE", folder)
     archives.write_tar(folder, f"colonnade-{preset}", archive, time)
 
 
