@@ -56,7 +56,7 @@ def decoded_with_noise(name: str) -> Any:
         decoded_depth=lambda _: depth,
         planes=SimpleNamespace(bounding=np.ones((8, 3))),
     )
-    return SimpleNamespace(environment=environment, image=image)
+    return SimpleNamespace(environment=environment, image=image, depth=depth)
 
 
 class Room:
