@@ -84,13 +84,18 @@ def scene_cube(
     lost = 1 - cube.texels.clip(max=MOST).sum() / max(cube.texels.sum(), 1e-9)
     if lost > _REPORTED_LOSS and progress is not None:
         progress.note(f"{lost:.0%} of the light is brighter than {MOST:g}, the most that a ray brings, and is lost")
-    return cube.with_lights([_disc(light, point, pose) for light in lights.lights if light.radius > 0])
+    return cube.with_lights([disc for light in lights.lights if (disc := _disc(light, point, pose)) is not None])
 
 
-def _disc(light: RoomLight, point: Floats, pose: Pose) -> tuple[Floats, float]:
-    """Direction in mesh space and angular radius of a light, as seen from a point in world space."""
+def _disc(light: RoomLight, point: Floats, pose: Pose) -> tuple[Floats, float] | None:
+    """Direction in mesh space and angular radius of a light, as seen from a point in world space.
+
+    None for a light without a radius, and for one around the point.
+    """
     away = light.position - point
     distance = float(np.sqrt(away @ away))
+    if not 0 < light.radius < distance:
+        return None
     return np.asarray((away / distance) @ pose.rotation), float(np.arctan(light.radius / distance))
 
 

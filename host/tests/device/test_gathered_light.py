@@ -50,6 +50,8 @@ def test_without_a_room_every_texel_is_the_ambient_light() -> None:
     assert cube.words.shape == (1536, 7)
     assert (light_of(cube.words) == np.rint(np.array([0.1, 0.2, 0.4]) * 4096)).all()
     assert not cube.words[:, 6].any(), "a point light has no size"
+    inside = DeviceScene.of(replace(SCENE, light=Light(offset=(0.0, 0.0, 0.0), radius=0.1)), prepared.manifest)
+    assert not inside.image.attributes[-1].words[:, 6].any(), "a light in the middle of the object is in no direction"
 
 
 @pytest.mark.parametrize("scene", [SCENE, IN_ROOM], ids=["alone", "in a room"])
