@@ -37,7 +37,10 @@ public:
         texture_->load(memory, words.data(), words.shape(0), words.shape(1));
     }
 
-    void loadCube(const Records& words) { device_.loadCube(words.data(), words.shape(0), words.shape(1)); }
+    void loadCube(const Records& words) {
+        if (words.shape(1) != LightCube::wordBytes) throw std::invalid_argument("words of the light cube have 4 bytes");
+        device_.loadCube(words.data(), words.shape(0));
+    }
 
     /// Loads the registers and clears counters and errors.
     void start(const Values& registers) {

@@ -9,7 +9,7 @@ import numpy as np
 
 from colonnade.common.progress import Progress
 from colonnade.common.types import Floats
-from colonnade.environment.light_cube import MOST, LightCube
+from colonnade.environment.light_cube import LARGEST, LightCube
 from colonnade.environment.lights import RoomLight
 from colonnade.environment.panorama import Panorama
 from colonnade.environment.seen_light import FINE
@@ -81,9 +81,9 @@ def scene_cube(
     else:
         cube = LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, 1, 1, 3)))
     cube = cube.turned(pose.rotation)
-    lost = 1 - cube.texels.clip(max=MOST).sum() / max(cube.texels.sum(), 1e-9)
+    lost = 1 - cube.texels.clip(max=LARGEST).sum() / max(cube.texels.sum(), 1e-9)
     if lost > _REPORTED_LOSS and progress is not None:
-        progress.note(f"{lost:.0%} of the light is brighter than {MOST:g}, the most that a ray brings, and is lost")
+        progress.note(f"{lost:.0%} of the light is brighter than {LARGEST:g}, the most that a ray brings, and is lost")
     return cube.with_lights([disc for light in lights.lights if (disc := _disc(light, point, pose)) is not None])
 
 

@@ -15,10 +15,14 @@ from colonnade.common.types import Floats
 FACE = 16
 #: Directions averaged along each edge of a texel.
 _SUBSAMPLES = 4
-#: The value 1.0 in the device's cube, and its largest value.
+#: The value 1.0 in the device's cube, and its largest value, that of a light.
 _ONE, _LAST = 1 << 12, (1 << 16) - 1
-#: The largest radiance of the device's cube.
+#: The radiance of a light in the device's cube.
 MOST = _LAST / _ONE
+#: Bits of a mantissa of the device's cube, and its largest exponent.
+_MANTISSA, _LAST_EXPONENT = 7, 9
+#: The largest radiance of a texel without a light in the device's cube.
+LARGEST = ((1 << _MANTISSA) - 1 << _LAST_EXPONENT) / _ONE
 
 
 @dataclass(frozen=True)
@@ -91,11 +95,20 @@ class LightCube:
         return LightCube.of(lambda directions: self.radiance(fixed_order.product(directions, turn)))
 
     def words(self) -> NDArray[np.uint8]:
-        """The words of the device's memory, uint8 [texels, 7]: blue, green, red, low byte first; a light."""
-        fixed = np.rint(self.texels.reshape(-1, 3) * _ONE).clip(0, _LAST).astype("<u2")
-        colours = np.ascontiguousarray(fixed[:, ::-1]).view(np.uint8)
-        lights = np.zeros(len(colours), np.uint8) if self.lights is None else self.lights.ravel().astype(np.uint8)
-        return np.concatenate([colours, lights[:, None]], axis=1)
+        """The words of the device's memory, uint8 [texels, 4], low byte first.
+
+        The fields are, from the highest, a light, the exponent, and the mantissas of red, green and blue.
+        """
+        fixed = self.texels.reshape(-1, 3) * _ONE
+        most = (1 << _MANTISSA) - 1
+        exponents = np.zeros(len(fixed), dtype=np.int64)
+        for _ in range(_LAST_EXPONENT):
+            exponents += np.rint(np.ldexp(fixed.max(axis=1), -exponents)) > most
+        mantissas = np.rint(np.ldexp(fixed, -exponents[:, None])).clip(0, most).astype("<u4")
+        words = exponents.astype("<u4") if self.lights is None else exponents.astype("<u4") | self.lights.ravel() << 4
+        for channel in range(3):
+            words = words << _MANTISSA | mantissas[:, channel]
+        return np.ascontiguousarray(words, dtype="<u4").view(np.uint8).reshape(-1, 4)
 
 
 def face_directions(size: int) -> tuple[Floats, Floats]:

@@ -41,8 +41,8 @@ public:
     /// Uses the contents of the texture memory, which must outlive the device.
     void load(const TextureImage& image) { texture_ = &image; }
 
-    /// Loads the light cube: `count` words of `stride` bytes.
-    void loadCube(const std::uint8_t* words, std::size_t count, std::size_t stride) { cube_.load(words, count, stride); }
+    /// Loads the light cube: `count` words of `LightCube::wordBytes` bytes.
+    void loadCube(const std::uint8_t* words, std::size_t count) { cube_.load(words, count); }
 
     /// Starts a frame: loads the registers, and clears counters and errors.
     void start(const Registers& registers) {

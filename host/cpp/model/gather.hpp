@@ -124,17 +124,19 @@ inline Vector gatherDirection(const WideVector& about, const Vector& faceForward
     return direction;
 }
 
-/// The light cube: linear radiance by direction, 12 fraction bits, and where lights are; faces of 16 × 16 texels.
+/// The light cube: linear radiance by direction, 12 fraction bits, and where lights are; faces of 16 × 16 texels. The fields of a word are its
+/// mantissas of 7 bits, blue lowest, their exponent of 4 bits and whether there is a light.
 class LightCube {
 public:
     static constexpr int faceLog = 4, texels = 6 << (2 * faceLog);
+    static constexpr std::size_t wordBytes = 4;
 
-    /// Loads texels from address 0; words of `stride` bytes, low byte first.
-    void load(const std::uint8_t* words, std::size_t count, std::size_t stride) {
-        for (std::size_t i = 0; i < std::min(count, texels_.size()); ++i) {
-            const std::uint8_t* const word = words + i * stride;
-            for (std::size_t channel = 0; channel < 3; ++channel) texels_[i][channel] = word[2 * (2 - channel)] | word[2 * (2 - channel) + 1] << 8;
-            isLight_[i] = stride > 6 && (word[6] & 1);
+    /// Loads texels from address 0; words of `wordBytes` bytes, low byte first.
+    void load(const std::uint8_t* words, std::size_t count) {
+        for (std::size_t i = 0; i < std::min(count, texels_.size()); ++i, words += wordBytes) {
+            const std::uint32_t word = words[0] | words[1] << 8 | words[2] << 16 | static_cast<std::uint32_t>(words[3]) << 24;
+            for (std::size_t channel = 0; channel < 3; ++channel) texels_[i][channel] = (word >> (14 - 7 * channel) & 127) << (word >> 21 & 15) & most;
+            isLight_[i] = word >> 25 & 1;
         }
     }
 

@@ -39,10 +39,11 @@ SCENE = Scene(
 
 
 def with_cube(image: SceneImage, seed: int) -> SceneImage:
-    """The image with random light, up to 2.0, and lights in one of eight directions."""
+    """The image with random light, and lights in one of eight directions."""
     random = np.random.default_rng(seed)
-    light = random.integers(0, 8192, (1536, 3)).astype("<u2").view(np.uint8)
-    words = np.concatenate([light, random.integers(0, 8, (1536, 1)).astype(np.uint8) // 7], axis=1)
+    light = random.integers(0, 1 << 21, 1536) | random.integers(0, 10, 1536) << 21
+    marks = (random.integers(0, 8, 1536) == 7).astype(np.int64) << 25
+    words = (light | marks).astype("<u4").view(np.uint8).reshape(-1, 4)
     return replace(image, attributes=(*image.attributes, LoadSection("light.cube", words)))
 
 

@@ -40,18 +40,24 @@ IN_ROOM = replace(SCENE, placement=Placement((322.0, 306.0), 0.5), background=Ba
 
 
 def light_of(words: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Blue, green and red of the cube's words, [texels, 3]."""
-    return np.ascontiguousarray(words[:, :6]).view("<u2").astype(int)
+    """Red, green and blue of the cube's words, 12 fraction bits, [texels, 3]."""
+    fields = np.ascontiguousarray(words).view("<u4").astype(int)
+    return (fields >> np.array([14, 7, 0]) & 127) << (fields >> 21 & 15)
+
+
+def marks_of(words: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Which of the cube's words have a light, [texels]."""
+    return words[:, 3].astype(int) >> 1
 
 
 def test_without_a_room_every_texel_is_the_ambient_light() -> None:
     prepared = DeviceScene.of(SCENE, manifest_for("textured").manifest)
     (cube,) = (section for section in prepared.image.attributes if section.memory == "light.cube")
-    assert cube.words.shape == (1536, 7)
-    assert (light_of(cube.words) == np.rint(np.array([0.1, 0.2, 0.4]) * 4096)).all()
-    assert not cube.words[:, 6].any(), "a point light has no size"
+    assert cube.words.shape == (1536, 4)
+    np.testing.assert_allclose(light_of(cube.words) / 4096, np.broadcast_to((0.4, 0.2, 0.1), (1536, 3)), atol=0.4 / 128)
+    assert not marks_of(cube.words).any(), "a point light has no size"
     inside = DeviceScene.of(replace(SCENE, light=Light(offset=(0.0, 0.0, 0.0), radius=0.1)), prepared.manifest)
-    assert not inside.image.attributes[-1].words[:, 6].any(), "a light in the middle of the object is in no direction"
+    assert not marks_of(inside.image.attributes[-1].words).any(), "a light in the middle of the object is in no direction"
 
 
 @pytest.mark.parametrize("scene", [SCENE, IN_ROOM], ids=["alone", "in a room"])
@@ -62,10 +68,10 @@ def test_an_image_keeps_its_light_in_a_file(scene: Scene, tmp_path: Path) -> Non
     assert again.header.to_json() == image.header.to_json()
     assert [section.memory for section in again.attributes] == [section.memory for section in image.attributes]
     assert image.attributes[-1].memory == "light.cube"
-    assert describe(again)["light"] == [{"memory": "light.cube", "words": 1536, "word_bytes": 7}]
+    assert describe(again)["light"] == [{"memory": "light.cube", "words": 1536, "word_bytes": 4}]
     for one, other in zip(again.attributes, image.attributes, strict=True):
         np.testing.assert_array_equal(one.words, other.words)
-    assert image.attributes[-1].words.tobytes()[:7] in device_image(image, manifest)
+    assert image.attributes[-1].words.tobytes()[:4] in device_image(image, manifest)
 
 
 def test_a_room_lights_the_object_from_its_picture() -> None:
@@ -206,7 +212,7 @@ def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, capsys: pytest.C
     assert light.colour == pytest.approx([solid * 0.25 * 94 / np.pi] * 3, rel=0.02)
     assert prepared.scene.ambient.colour == pytest.approx([0.25] * 3, rel=0.01)
     words = prepared.image.attributes[-1].words
-    assert (light_of(words) / 4096).max() < 0.75 and 1 <= words[:, 6].sum() <= 8, "the lamp is a light instead"
+    assert (light_of(words) / 4096).max() < 0.75 and 1 <= marks_of(words).sum() <= 8, "the lamp is a light instead"
     prepared.registers((32, 24))  # Its distance is within the registers
     assert capsys.readouterr().err.splitlines() == [
         "colonnade: the scene names no light: ambient light and 1 light are those of panorama sky.exr, which have their"

@@ -49,10 +49,20 @@ def test_a_smooth_light_survives_the_cube_and_a_turn() -> None:
 
 def test_words_hold_light_above_one_and_saturate() -> None:
     texels = np.zeros((6, FACE, FACE, 3))
-    texels[0, 0, 1] = (0.5, 2.0, 99.0)
+    texels[0, 0, :3] = (0.5, 2.0, 99.0), (1 / 4096, 127.4 / 4096, 0), (127.6 / 4096, 0.01, 16.0)
     words = LightCube(texels).words()
-    assert words.shape == (1536, 7)
-    assert list(words[1, :6].view("<u2")) == [65535, 8192, 2048], "blue, green, red"
+    assert words.shape == (1536, 4)
+    fields = [(word >> 21, *(word >> shift & 127 for shift in (14, 7, 0))) for word in words.view("<u4")[:4, 0].tolist()]
+    assert fields == [(9, 4, 16, 127), (0, 1, 127, 0), (9, 0, 0, 127), (0, 0, 0, 0)]
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(0, 15.8), min_size=3, max_size=3))
+def test_a_word_holds_its_light_to_a_hundredth(texel: list[float]) -> None:
+    """Of its largest channel, and to half a step of 12 bits."""
+    (word,) = {int(word) for word in LightCube(np.broadcast_to(np.array(texel), (6, 1, 1, 3))).words().view("<u4")[:, 0]}
+    held = [((word >> shift & 127) << (word >> 21)) / 4096 for shift in (14, 7, 0)]
+    assert np.abs(np.array(held) - texel).max() <= max(max(texel) / 128, 0.5 / 4096)
 
 
 @settings(max_examples=30, deadline=None)
@@ -69,7 +79,7 @@ def test_a_light_is_where_it_is(direction: list[float], radius: float) -> None:
     assert (light[angle < radius - texel] == MOST).all() and (light[angle > radius + texel] == 0.25).all()
     assert cube.radiance(middle[None], sees[:1])[0, 0] == MOST
     assert (cube.radiance(directions) == 0.25).all() and (cube.radiance(directions, ~sees) == 0.25).all()
-    assert cube.words()[:, 6].sum() == np.count_nonzero(cube.lights)
+    assert (cube.words().view("<u4") >> 25).sum() == np.count_nonzero(cube.lights)
 
 
 @pytest.mark.parametrize("name", ["living", "attic"])

@@ -1,7 +1,7 @@
 package colonnade.formats
 
-import chisel3.{Bool, Bundle}
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import chisel3._
+import colonnade.config.{AttributeLayout, ColonnadeConfig, NumberFormats}
 
 /** One memory of the environment's maps.
   *
@@ -12,10 +12,14 @@ import colonnade.config.{AttributeLayout, ColonnadeConfig}
   */
 final case class AttributeMemory(name: String, depth: Int, bits: Int, target: Int)
 
-/** A texel of the light cube: linear radiance, as the intensity of a light; whether there is a light. */
+/** A texel of the light cube: linear radiance, mantissas with a common exponent; whether there is a light. */
 final class CubeTexel extends Bundle {
-  val isLight  = Bool()
-  val radiance = Rgb(FrameRegisters.intensity)
+  val isLight   = Bool()
+  val exponent  = UInt(4.W)
+  val mantissas = Rgb(UInt(7.W))
+
+  /** Radiance in the format of the intensity of a light, for a mantissa. */
+  def radiance(mantissa: UInt): UInt = (mantissa << exponent)(NumberFormats.lightBits - 1, 0)
 }
 
 /** The memories for loads beside that of the records: of the environment's maps, of the textures, of gathered light. */

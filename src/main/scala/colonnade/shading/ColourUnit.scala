@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, MuxLookup, Valid}
+import chisel3.util.{log2Ceil, Decoupled, Fill, MuxLookup, Valid}
 import colonnade.common.ContextTable
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Rgb, Shading}
@@ -241,8 +241,11 @@ final class ColourUnit(config: PathConfig) extends Module {
 
   // The light that leaves the surface, or the weight of the Fresnel reflection
   private val sum = after(arrival) { slot =>
-    slot.isValid                                       := arrival.isValid && arrival.isLastLight
-    for (cube <- slot.cube; port <- io.cube) cube.bits := of(port.light.channels.map(_.natural), arrival.channel)
+    slot.isValid := arrival.isValid && arrival.isLastLight
+    for (cube <- slot.cube; port <- io.cube) {
+      val radiance = port.texel.radiance(of(port.texel.mantissas.channels, arrival.channel))
+      cube.bits := Mux(port.texel.isLight, Fill(NumberFormats.lightBits, 1.U(1.W)), radiance)
+    }
     when(arrival.hasGathered.getOrElse(false.B)) { slot.radiance := 0.U }
   }
   private val factors   = Reg(Vec(2, UInt(weightBits.W)))
@@ -300,6 +303,7 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val done     = after(added)(slot => slot.isValid := added.isValid && added.isLast)
   private val goesBack = done.goesBack.getOrElse(false.B)
   private val isShown  = done.isValid && !done.isBounce && !done.needsRatio && !goesBack
+  private val goesOn   = done.isValid && ((done.isBounce && done.gathers.getOrElse(false.B)) || goesBack)
   private val result   = Wire(new PathColour(config))
   result.context := done.context
   result.colour.channels.zip(colours).foreach { case (to, from) => to := from }
@@ -309,8 +313,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   for (ratios <- ratios) {
     ratios.colour.valid := done.isValid && done.needsRatio
     ratios.colour.bits  := result
-    ratios.result.ready := !isShown
-    when(!isShown) {
+    ratios.result.ready := !isShown && !goesOn
+    when(ratios.result.ready) {
       io.colour.valid := ratios.result.valid
       io.colour.bits  := ratios.result.bits
     }
@@ -319,7 +323,7 @@ final class ColourUnit(config: PathConfig) extends Module {
   // A bounce's path enters the table; a read in the same cycle does not count
   isWriting := done.isValid && (done.isBounce || goesBack)
   for (continued <- io.continued) {
-    continued.valid        := isWriting && (done.gathers.get || goesBack)
+    continued.valid        := goesOn
     continued.bits.context := done.context
     continued.bits.isBack.foreach(_ := goesBack)
   }

@@ -1,10 +1,10 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{Cat, Fill, RegEnable, Valid}
+import chisel3.util.{Cat, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.formats.{AttributeMemories, FrameRegisters, Rgb}
+import colonnade.formats.{AttributeMemories, CubeTexel}
 import colonnade.numbers.{DigitRecurrence, Normalise}
 import colonnade.ray.RayRequest
 
@@ -23,10 +23,12 @@ final class LightRead(config: PathConfig) extends Bundle {
   val isReflection = Bool()
 }
 
-/** Asks for the light that the last ray of a context meets. It comes three cycles later, and stays until the next read. */
+/** Asks for the texel that the last ray of a context meets. It comes three cycles later, and stays until the next read. Its
+  * `isLight` is that the path sees a light.
+  */
 final class LightPort(config: PathConfig) extends Bundle {
   val read  = Valid(new LightRead(config))
-  val light = Input(Rgb(FrameRegisters.intensity))
+  val texel = Input(new CubeTexel)
 }
 
 final class LightCubeIO(config: PathConfig) extends Bundle {
@@ -36,7 +38,7 @@ final class LightCubeIO(config: PathConfig) extends Bundle {
 }
 
 /** The texel of the light cube in the direction of each context's last ray: docs/gather.md. A ray a cycle. A path that sees
-  * lights meets the largest radiance where one is. {{{
+  * lights is told where one is. {{{
   *
   * ray ─▶ scaled direction ─▶ face and slopes ─▶ table, by context ─▶ memory
   * }}}
@@ -64,10 +66,9 @@ final class LightCube(config: PathConfig) extends Module {
   io.memory.read.bits  := Mux(isOfReflection, RegEnable(texel, hasRead), texel)
   private val seesLights = RegEnable(request.seesLights, hasRead)
   private val comes      = RegNext(io.memory.read.valid, false.B)
-  private val word       = io.memory.word
-  private val isMost     = word.isLight && RegEnable(seesLights, io.memory.read.valid)
-  private val light      = Mux(isMost, Fill(word.radiance.getWidth, 1.U(1.W)).asTypeOf(word.radiance), word.radiance)
-  io.port.light := Mux(comes, light, RegEnable(light, comes))
+  private val light      = WireInit(io.memory.word)
+  when(!RegEnable(seesLights, io.memory.read.valid)) { light.isLight := false.B }
+  io.port.texel := Mux(comes, light, RegEnable(light, comes))
 }
 
 object LightCube {

@@ -120,46 +120,36 @@ final class RtController(config: PathConfig) extends Module {
   }
   move(io.fetchFailed.valid, io.fetchFailed.bits, ContextState.accumulatePending)
 
-  // Issue shadow rays, one light after the other. A Fresnel reflection has none, so its previous ray is no shadow ray
-  private val tested = choose(isAt(ContextState.shadowTest), io.shadow.ready)
-  private val shadow = tested.now
-  io.shadow.valid        := shadow.valid
-  io.shadow.bits.context := shadow.bits
-  io.shadow.bits.light   := shadows.next(tested, isFirst = !isShadow(shadow.bits))
-  shadows.trace(io.shadow.ready && shadow.valid, shadow.bits, io.shadow.bits.light)
-  private val issuesShadow = io.shadow.ready && shadow.valid
-  move(issuesShadow, shadow.bits, ContextState.raySetup)
-  when(issuesShadow) { isShadow(shadow.bits) := true.B }
-
-  // Issue rays that gather light, while there is no shadow ray to issue
+  // Issue rays from surfaces: shadow rays, one light after the other, and rays that gather light. A Fresnel reflection has
+  // no shadow rays, so its previous ray is none
+  private val isTested = isAt(ContextState.shadowTest)
+  private val gathers  = isAt(ContextState.gatherPending).zip(gathersInRoom).map { case (waits, ofRoom) =>
+    waits || ofRoom
+  }
+  private val next = choose(
+    if (config.frame.gather) isTested.zip(gathers).map { case (tested, gathers) => tested || gathers } else isTested,
+    io.shadow.ready
+  )
+  private val leaving      = next.now.bits
+  private val isGathered   = if (config.frame.gather) !VecInit(isTested)(leaving) else false.B
+  private val leaves       = io.shadow.ready && next.now.valid
+  private val issuesShadow = leaves && !isGathered
+  io.shadow.valid        := next.now.valid
+  io.shadow.bits.context := leaving
+  io.shadow.bits.light   := shadows.next(next, isFirst = !isShadow(leaving))
+  shadows.trace(issuesShadow, leaving, io.shadow.bits.light)
+  move(leaves, leaving, ContextState.raySetup)
+  when(leaves) { isShadow(leaving) := !isGathered }
   for (gather <- io.gather) {
-    val claims  = isAt(ContextState.gatherPending).zip(gathersInRoom).map { case (waits, ofRoom) => waits || ofRoom }
-    val next    = choose(claims, io.shadow.ready && !shadow.valid)
-    val waiting = next.now
-    val issues  = io.shadow.ready && !shadow.valid && waiting.valid
-    val isFirst = !isScattered(waiting.bits)
-    io.shadow.bits.isGathered.get := !shadow.valid
-    when(!shadow.valid) {
-      io.shadow.valid        := waiting.valid
-      io.shadow.bits.context := waiting.bits
-    }
-    move(issues, waiting.bits, ContextState.raySetup)
+    val issues  = leaves && isGathered
+    val isFirst = !isScattered(leaving)
+    io.shadow.bits.isGathered.get := isGathered
     when(issues) {
-      isShadow(waiting.bits)                              := false.B
-      isScattered(waiting.bits)                           := true.B
-      if (config.gathersInRoom) mayBeHidden(waiting.bits) := false.B
+      isScattered(leaving)                           := true.B
+      if (config.gathersInRoom) mayBeHidden(leaving) := false.B
     }
-    gathered.get.write(issues, waiting.bits, Mux(isFirst, 1.U, gathered.get.read(next) + 1.U))
+    gathered.get.write(issues, leaving, Mux(isFirst, 1.U, gathered.get.read(next) + 1.U))
     if (config.gathersInRoom) shadows.keep(issues && isFirst, next)
-
-    // The light of a surface is added, or what a point of the environment has gathered is complete
-    val continued = gather.continued.bits
-    val isBack    = continued.isBack.getOrElse(false.B)
-    move(gather.continued.valid, continued.context, Mux(isBack, ContextState.lit, ContextState.gatherPending))
-    when(gather.continued.valid) {
-      isStraight(continued.context) := false.B
-      if (config.gathersInRoom) when(isBack) { isOfEnvironment(continued.context) := true.B }
-    }
 
     val sampled = Choice(RegEnable(gather.sample, gather.sample.valid), gather.sample)
     gather.count := Mux(
@@ -197,8 +187,20 @@ final class RtController(config: PathConfig) extends Module {
     }
   }
   move(io.end.fire, ending.bits, ContextState.accumulating)
-  move(io.accumulated.valid, io.accumulated.bits, ContextState.done)
-  when(io.accumulated.valid) { hasColour(io.accumulated.bits) := true.B }
+
+  // A path's colour is complete; or the light of a surface is added and the path gathers, or goes back to its point of the
+  // environment with what it has gathered
+  private val continued   = io.gather.map(_.continued)
+  private val isContinued = continued.map(_.valid).getOrElse(false.B)
+  private val accumulated =
+    continued.fold(io.accumulated.bits)(path => Mux(path.valid, path.bits.context, io.accumulated.bits))
+  private val isBack = continued.flatMap(_.bits.isBack).getOrElse(false.B)
+  for (path <- continued) assert(!(io.accumulated.valid && path.valid), "a path is complete or goes on")
+  private val afterLight = Mux(isBack, ContextState.lit, ContextState.gatherPending)
+  move(io.accumulated.valid || isContinued, accumulated, Mux(isContinued, afterLight, ContextState.done))
+  when(io.accumulated.valid) { hasColour(accumulated) := true.B }
+  if (config.frame.gather) when(isContinued) { isStraight(accumulated) := false.B }
+  if (config.gathersInRoom) when(isContinued && isBack) { isOfEnvironment(accumulated) := true.B }
 
   // Retire pixels
   private val done = choose(isAt(ContextState.done), io.pixel.retire).now

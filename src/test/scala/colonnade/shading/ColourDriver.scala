@@ -3,7 +3,7 @@ package colonnade.shading
 import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.Rgb
+import colonnade.formats.{CubeTexel, Rgb}
 import colonnade.numbers.Fixed
 import colonnade.numbers.FixedPorts._
 
@@ -61,6 +61,14 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
   private def intensity(): Seq[Int] =
     xyz(if (random.nextInt(6) == 0) 65535 else random.nextInt(6) * random.nextInt(1800))
 
+  /** Light of the cube: mantissas with a common exponent, or a light. */
+  private def cubeLight(): Seq[Int] =
+    if (random.nextInt(6) == 0) xyz(65535)
+    else {
+      val exponent = random.nextInt(10)
+      xyz(random.nextInt(128) << exponent)
+    }
+
   /** So dark that what a point of the environment gathers may be more than twice as bright. */
   private def darkness(): Seq[Int] = xyz(random.nextInt(200))
 
@@ -92,7 +100,7 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
     else {
       val steps = Seq.fill(bounces)(if (random.nextBoolean()) bounce(mayReflect = kind == 1) else gather()).flatten
       if (kind == 2) {
-        val light = Option.when(random.nextBoolean())(intensity())
+        val light = Option.when(random.nextBoolean())(cubeLight())
         (Start +: Remember(surface(), isOfRoom = true) +: steps) ++ Seq(
           Remember(surface(), isOfRoom = false),
           GoBack(light, occlusions()),
@@ -100,7 +108,7 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
         )
       } else
         Start +: steps ++: gather() ++:
-          (if (random.nextBoolean()) Seq(EndInCube(intensity())) else end(mayBeDirect = false))
+          (if (random.nextBoolean()) Seq(EndInCube(cubeLight())) else end(mayBeDirect = false))
     }
   }
 
@@ -110,7 +118,7 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
     val hasSurface = config.hasEnvironment && mayReflect && random.nextBoolean()
     val fresnel    = if (!mayReflect || random.nextBoolean()) 0 else random.nextInt(one + 1)
     val meetsCube  =
-      Option.when(config.gathersInRoom && !hasSurface && fresnel > 0 && random.nextBoolean())(intensity())
+      Option.when(config.gathersInRoom && !hasSurface && fresnel > 0 && random.nextBoolean())(cubeLight())
     Seq(Remember(surface(), isOfRoom = true)).filter(_ => hasSurface) :+
       Bounce(colour(), random.nextBoolean(), fresnel, hasSurface, meetsCube)
   }
@@ -221,7 +229,7 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
     }
     // The light stays until the next one comes
     for (cube <- io.cube) {
-      requested.last.foreach(light => poke(cube.light, light))
+      requested.last.foreach(light => pokeTexel(cube.texel, light))
       val reader = cube.read.bits.context.peekInt().toInt
       val light  = (end ++ bounce).find(_._1 == reader).flatMap { case (_, event) => lightOf(event) }
       val reads  = cube.read.valid.peekBoolean()
@@ -275,6 +283,14 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
 
   private def poke(port: Rgb[Fixed], values: Seq[Int]): Unit =
     port.channels.zip(values).foreach { case (channel, value) => channel.pokeRaw(value) }
+
+  private def pokeTexel(port: CubeTexel, light: Seq[Int]): Unit = {
+    val isLight  = light.forall(_ == 65535)
+    val exponent = (0 to 9).find(exponent => light.forall(value => (value >> exponent) < 128)).getOrElse(0)
+    port.isLight.poke(isLight)
+    port.exponent.poke(exponent)
+    pokeUInt(port.mantissas, light.map(value => (value >> exponent) & 127))
+  }
 
   private def pokeUInt(port: Rgb[UInt], values: Seq[Int]): Unit =
     port.channels.zip(values).foreach { case (channel, value) => channel.poke(value) }

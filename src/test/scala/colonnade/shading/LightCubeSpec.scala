@@ -3,12 +3,11 @@ package colonnade.shading
 import chiseltest._
 import colonnade.{Simulation, TestConfigs}
 import colonnade.TestParts._
-import colonnade.numbers.FixedPorts._
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** A path meets the texel in the direction of its last ray, or a light there if it sees lights. */
+/** A path meets the texel in the direction of its last ray, with the light there if it sees lights. */
 class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "LightCube"
 
@@ -54,16 +53,20 @@ class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.memory.read.valid.expect(true)
         dut.io.memory.read.bits.expect(texel)
         dut.clock.step()
-        // The word is there in one cycle, the light stays
-        val word  = Seq.fill(3)(random.nextInt(65536))
-        val light = if (isLight && seesLights) Seq.fill(3)(65535) else word
-        dut.io.memory.word.isLight.poke(isLight)
-        dut.io.memory.word.radiance.channels.zip(word).foreach { case (port, value) => port.pokeRaw(value) }
+        // The word is there in one cycle, the texel stays
+        val word                      = dut.io.memory.word
+        val (port, (exponent, light)) = (dut.io.port.texel, (random.nextInt(16), Seq.fill(3)(random.nextInt(128))))
+        word.isLight.poke(isLight)
+        word.exponent.poke(exponent)
+        word.mantissas.channels.zip(light).foreach { case (to, value) => to.poke(value) }
         for (_ <- 0 to random.nextInt(3)) {
-          dut.io.port.light.channels.zip(light).foreach { case (port, value) => assert(port.peekRaw() == value) }
+          port.isLight.expect(isLight && seesLights)
+          port.exponent.expect(exponent)
+          port.mantissas.channels.zip(light).foreach { case (from, value) => from.expect(value) }
           dut.clock.step()
-          dut.io.memory.word.isLight.poke(random.nextBoolean())
-          dut.io.memory.word.radiance.channels.foreach(_.pokeRaw(random.nextInt(65536)))
+          word.isLight.poke(random.nextBoolean())
+          word.exponent.poke(random.nextInt(16))
+          word.mantissas.channels.foreach(_.poke(random.nextInt(128)))
         }
       }
     }

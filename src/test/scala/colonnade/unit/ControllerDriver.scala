@@ -114,16 +114,14 @@ private class ControllerDriver(
   /** One cycle: checks all outputs, then drives the events that `happen` sets. */
   def cycle(happen: ControllerEvents => Unit): Unit = {
     dut.io.idleCount.expect(at(ContextState.idle).size)
-    val free     = shown(dut.io.allocation.free.valid, dut.io.allocation.free.bits, at(ContextState.idle))
-    val resolved = shown(dut.io.trace.query.valid, dut.io.trace.query.bits, at(ContextState.resolve))
-    val done     = shown(dut.io.pixel.done.valid, dut.io.pixel.done.bits, at(ContextState.done))
-    // A gathered ray leaves while there is no shadow ray
-    val isGathered = dut.io.shadow.bits.isGathered.exists(_.peekBoolean())
-    if (!isLate) assert(!isGathered || needsShadow.isEmpty)
-    val waiting =
-      if (isGathered) at(ContextState.gatherPending) ++ contextsWith(gathersInRoom) else needsShadow
+    val free                  = shown(dut.io.allocation.free.valid, dut.io.allocation.free.bits, at(ContextState.idle))
+    val resolved              = shown(dut.io.trace.query.valid, dut.io.trace.query.bits, at(ContextState.resolve))
+    val done                  = shown(dut.io.pixel.done.valid, dut.io.pixel.done.bits, at(ContextState.done))
+    val scattering            = at(ContextState.gatherPending) ++ contextsWith(gathersInRoom)
     val (scattered, shadowed) =
-      shown(dut.io.shadow.valid, dut.io.shadow.bits.context, waiting).partition(_ => isGathered)
+      shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow ++ scattering)
+        .partition(scattering.contains)
+    if ((scattered ++ shadowed).nonEmpty) dut.io.shadow.bits.isGathered.foreach(_.expect(scattered.nonEmpty))
     val ended = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
     for (index <- resolved) {
       dut.io.trace.hasHit.poke(contexts(index).hasHit)
