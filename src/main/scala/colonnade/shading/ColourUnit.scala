@@ -144,8 +144,8 @@ final class ColourUnit(config: PathConfig) extends Module {
   }.elsewhen(isLast) { isIssuing := false.B }
   ratios.foreach(_.claim := starts && next.needsRatio)
 
-  private val surfaces    = new SurfaceTable(config)
-  private val surface     = surfaces.read(taken, isOfRoom, takes)
+  private val surfaces    = ContextTable(config, new TerminalSurface(config))
+  private val surface     = surfaces.read(taken, takes)
   private val albedo      = Reg(Vec(3, UInt(colourBits.W)))
   private val directLight = Reg(Vec(lights, Vec(3, UInt(NumberFormats.lightBits.W))))
   private val emission    = Option.when(config.frame.emission)(Reg(Vec(3, UInt(colourBits.W))))
@@ -154,7 +154,7 @@ final class ColourUnit(config: PathConfig) extends Module {
     surface.albedo      := io.surface.bits.albedo
     surface.directLight := io.surface.bits.directLight
     surface.emission.zip(io.surface.bits.emission).foreach { case (to, from) => to := from }
-    surfaces.write(io.surface.bits.context, io.surface.bits.isOfEnvironment.getOrElse(false.B), surface)
+    surfaces.write(io.surface.bits.context, surface)
   }
   when(RegNext(takes, false.B)) {
     albedo      := VecInit(surface.albedo.channels)
@@ -350,21 +350,6 @@ final private class TerminalSurface(config: PathConfig) extends Bundle {
   val albedo      = Rgb(FrameRegisters.colour)
   val directLight = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
   val emission    = if (config.frame.emission) Some(Rgb(FrameRegisters.colour)) else None
-}
-
-/** The surfaces of all contexts. Where points of the environment gather, a context may have one of the object beside. */
-final private class SurfaceTable(config: PathConfig) {
-  private val table =
-    SyncReadMem(config.contexts.max(2) * (if (config.gathersInRoom) 2 else 1), new TerminalSurface(config))
-
-  private def address(context: UInt, isOfEnvironment: Bool): UInt =
-    if (config.gathersInRoom) context ## isOfEnvironment else context
-
-  def write(context: UInt, isOfEnvironment: Bool, surface: TerminalSurface): Unit =
-    table.write(address(context, isOfEnvironment), surface)
-
-  def read(context: UInt, isOfEnvironment: Bool, isRead: Bool): TerminalSurface =
-    table.read(address(context, isOfEnvironment), isRead)
 }
 
 /** A path after its bounces so far. */

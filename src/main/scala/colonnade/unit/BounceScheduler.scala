@@ -16,8 +16,9 @@ final class DeferredBounceIO(config: PathConfig) extends Bundle {
   val fresnelReflection = Valid(Context(config))
   val resume            = Flipped(Decoupled(new ResumedBounce(config)))
 
-  /** The Fresnel reflection, or the ray with which a path continues. */
-  val ray = Valid(new RayRequest(config))
+  /** The Fresnel reflection, or the ray with which a path continues; whether it may march: the path has not gathered. */
+  val ray     = Valid(new RayRequest(config))
+  val marches = Option.when(config.gathersInRoom)(Output(Bool()))
 }
 
 /** Rays that may meet the light cube. */
@@ -136,7 +137,8 @@ final class BounceScheduler(config: PathConfig) extends Module {
       for ((to, from) <- bounce.bits.update.showsCube.zip(resumedBy.showsCube)) to := from
     }
 
-    environment.ray.valid := bounce.fire || environment.fresnelReflection.valid
+    environment.ray.valid                                         := bounce.fire || environment.fresnelReflection.valid
+    for (marches <- environment.marches; path <- io.path) marches := isHeld || !path.isScattered
     val ray = environment.ray.bits
     ray.context  := Mux(bounce.fire, bounce.bits.update.context, result.context)
     ray.isShadow := false.B

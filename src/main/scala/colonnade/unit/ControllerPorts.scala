@@ -27,11 +27,10 @@ object ContextState extends ChiselEnum {
   val accumulatePending, accumulating = Value
 
   val done = Value // the colour of its pixel is complete
-  /** Its surface and all shadow rays are known; the path ends, or the surface's bounce resumes, or the ray that gathers at
-    * a point of the environment waits.
-    */
-  val lit           = Value
-  val gatherPending = Value // the light of its surface is added; the ray that gathers there waits
+  val lit  = Value // its surface and all shadow rays are known; the path ends, or the surface's bounce resumes
+
+  /** The ray that gathers at its surface waits; the surface's light is added, unless it is of the environment. */
+  val gatherPending = Value
 }
 
 /** A context whose hit has been shaded. */
@@ -40,6 +39,7 @@ final class Shaded(config: PathConfig) extends Bundle {
 
   /** By light, for a surface that ends the path. */
   val needsShadowRays = Vec(config.frame.lights, Bool())
+  val isOfEnvironment = Option.when(config.gathersInRoom)(Bool())
 }
 
 /** A context whose path continues from a mirror or glass. */
@@ -80,6 +80,9 @@ final class EnvironmentControl(config: PathConfig) extends Bundle {
   val visible = Flipped(Valid(Context(config)))
 
   val resume = Decoupled(new ResumedBounce(config)) // a deferred bounce that may resume
+
+  /** A context whose point is to be shaded again, after what it has gathered is known; then its `hit` comes. */
+  val again = Option.when(config.gathersInRoom)(Valid(Context(config)))
 }
 
 /** Allocation of a context, seen from the stage that gives it a pixel. */

@@ -44,10 +44,11 @@ final class EnvironmentPort(config: PathConfig) extends Module {
 
   // March
   stage.req :<>= control.req
-  control.accepts   := stage.accepts
-  control.miss      := stage.miss
-  control.visible   := stage.visible
-  stage.hitDistance := io.hitDistance
+  control.accepts                                       := stage.accepts
+  control.miss                                          := stage.miss
+  for ((to, from) <- stage.again.zip(control.again)) to := from
+  control.visible                                       := stage.visible
+  stage.hitDistance                                     := io.hitDistance
   io.surfaces :<>= stage.surface
   control.hit.valid := stage.surface.fire
   control.hit.bits  := stage.surface.bits.context
@@ -61,13 +62,15 @@ final class EnvironmentPort(config: PathConfig) extends Module {
     bounces.resume :<>= control.resume
   }
 
-  // Store rays, if they may march; those of bounces have priority
+  // Store rays, if they may march; those of bounces have priority. A path that has gathered stores none, for the table
+  // still has the point of the environment at which it may have begun
   private val primary   = io.primary.bits
   private val bounceRay = io.bounces.map(_.ray)
   private val isBounce  = bounceRay.map(_.valid).getOrElse(false.B)
   private val ray       = bounceRay.fold(primary)(bounce => Mux(bounce.valid, bounce.bits, primary))
   private val dir       = Normalise.together(ray.dir.axes, new MarchFormats(config).f)
-  stage.ray.valid           := io.view.enabled && (isBounce || io.primary.fire)
+  private val isStored  = io.bounces.map(bounces => isBounce && bounces.marches.getOrElse(true.B)).getOrElse(false.B)
+  stage.ray.valid           := io.view.enabled && (isStored || io.primary.fire)
   stage.ray.bits.context    := ray.context
   stage.ray.bits.ray.origin := ray.origin
   stage.ray.bits.ray.dir.axes.zip(dir).foreach { case (to, from) => to := from }

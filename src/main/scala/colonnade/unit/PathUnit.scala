@@ -132,10 +132,11 @@ final class PathUnit(config: PathConfig) extends Module {
   controller.shaded.valid                := lit.valid
   controller.shaded.bits.context         := lit.bits.context
   controller.shaded.bits.needsShadowRays := lit.bits.needsShadowRays
-  controller.bounced                     := bounces.map(_.bounced).getOrElse(0.U.asTypeOf(controller.bounced))
-  controller.fetchFailed                 := trace.attributeError
-  controller.accumulated.valid           := colourUnit.colour.valid
-  controller.accumulated.bits            := colourUnit.colour.bits.context
+  for ((to, from) <- controller.shaded.bits.isOfEnvironment.zip(lit.bits.isOfEnvironment)) to := from
+  controller.bounced           := bounces.map(_.bounced).getOrElse(0.U.asTypeOf(controller.bounced))
+  controller.fetchFailed       := trace.attributeError
+  controller.accumulated.valid := colourUnit.colour.valid
+  controller.accumulated.bits  := colourUnit.colour.bits.context
   bounces.foreach(_.start := primaryRays.start)
   environment.foreach(_.control :<>= controller.environment.get)
   io.isIdle := controller.idleCount === config.contexts.U && assembler.isIdle

@@ -51,15 +51,7 @@ final class RtController(config: PathConfig) extends Module {
   private val gathered    = Option.when(config.frame.gather)(new FlagTable(config, UInt(Gather.countBits.W)))
 
   /** The surface is of the environment. */
-  private val isOfEnvironment =
-    if (config.gathersInRoom) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
-
-  /** A point of the environment is lit, and the ray that gathers there has still to leave. */
-  private val gathersInRoom = state.lazyZip(isDirectView).lazyZip(isScattered).toSeq.map {
-    case (at, isDirectView, isScattered) =>
-      if (config.gathersInRoom) at === ContextState.lit && isDirectView && !isScattered && io.gather.get.bounces =/= 0.U
-      else false.B
-  }
+  private val isOfEnvironment = Option.when(config.gathersInRoom)(new FlagTable(config, Bool()))
 
   private val shadows = new ShadowProgress(config)
   io.idleCount     := count(isAt(ContextState.idle), atReset = contexts)
@@ -99,16 +91,18 @@ final class RtController(config: PathConfig) extends Module {
   private val afterTrace = Mux(isOfRoom, ContextState.lit, afterObject(resolved, afterMiss(resolved)))
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
   private val lightsLeft = shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusion)
-  move(ended.now.valid, resolved, Mux(isShadow(resolved), afterLights(lightsLeft), afterHit))
-  if (config.gathersInRoom) when(io.trace.startsShading) { isOfEnvironment(resolved) := false.B }
+  move(ended.now.valid, resolved, Mux(isShadow(resolved), afterLights(resolved, lightsLeft), afterHit))
   if (config.hasEnvironment) when(ended.now.valid) {
     mayBeHidden(resolved)     := false.B
     isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit && mayBeHidden(resolved)
   }
 
-  // Results of the shader
-  private val needs = io.shaded.bits.needsShadowRays.asUInt
-  move(io.shaded.valid, io.shaded.bits.context, afterLights(needs.orR))
+  // Results of the shader. A point of the environment has its shadow rays before it gathers, and none when it is back
+  private val needs  = io.shaded.bits.needsShadowRays.asUInt
+  private val isBack = io.shaded.bits.isOfEnvironment.map(_ && isScattered(io.shaded.bits.context)).getOrElse(false.B)
+  move(io.shaded.valid, io.shaded.bits.context, afterLights(io.shaded.bits.context, needs.orR && !isBack))
+  for (table <- isOfEnvironment; shaded <- io.shaded.bits.isOfEnvironment)
+    table.write(io.shaded.valid, io.shaded.bits.context, shaded)
   shadows.begin(io.shaded.valid, io.shaded.bits.context, needs)
   private val bounced  = io.bounced.bits.context
   private val untraced = afterObject(bounced, ContextState.accumulatePending)
@@ -123,10 +117,8 @@ final class RtController(config: PathConfig) extends Module {
   // Issue rays from surfaces: shadow rays, one light after the other, and rays that gather light. A Fresnel reflection has
   // no shadow rays, so its previous ray is none
   private val isTested = isAt(ContextState.shadowTest)
-  private val gathers  = isAt(ContextState.gatherPending).zip(gathersInRoom).map { case (waits, ofRoom) =>
-    waits || ofRoom
-  }
-  private val next = choose(
+  private val gathers  = isAt(ContextState.gatherPending)
+  private val next     = choose(
     if (config.frame.gather) isTested.zip(gathers).map { case (tested, gathers) => tested || gathers } else isTested,
     io.shadow.ready
   )
@@ -162,9 +154,8 @@ final class RtController(config: PathConfig) extends Module {
   }
 
   // End paths: all shadow rays of the surface are traced, or the path meets the background
-  private val isEnding = state.lazyZip(isFresnelReflection).lazyZip(gathersInRoom).toSeq.map {
-    case (at, reflection, gathers) =>
-      at === ContextState.accumulatePending || (at === ContextState.lit && !reflection && !gathers)
+  private val isEnding = state.zip(isFresnelReflection).map { case (at, reflection) =>
+    at === ContextState.accumulatePending || (at === ContextState.lit && !reflection)
   }
   private val last   = choose(isEnding, io.end.ready)
   private val ending = last.now
@@ -177,7 +168,7 @@ final class RtController(config: PathConfig) extends Module {
   for (gather <- io.gather) {
     val hasGathered = isScattered(ending.bits)
     val mayGather   = Mux(hasGathered, gathered.get.read(last) < gather.bounces, gather.bounces =/= 0.U)
-    val isOfRoom    = isOfEnvironment(ending.bits)
+    val isOfRoom    = isOfEnvironment.map(_.read(last).asBool && !io.end.bits.isBackground).getOrElse(false.B)
     io.end.bits.gathers.get     := mayGather && !isOfRoom && !io.end.bits.isBackground
     io.end.bits.isScattered.get := hasGathered
     io.end.bits.endsInCube.get  := gather.bounces =/= 0.U && (hasGathered || !isStraight(ending.bits))
@@ -189,18 +180,21 @@ final class RtController(config: PathConfig) extends Module {
   move(io.end.fire, ending.bits, ContextState.accumulating)
 
   // A path's colour is complete; or the light of a surface is added and the path gathers, or goes back to its point of the
-  // environment with what it has gathered
+  // environment with what it has gathered, and the point is shaded again
   private val continued   = io.gather.map(_.continued)
   private val isContinued = continued.map(_.valid).getOrElse(false.B)
   private val accumulated =
     continued.fold(io.accumulated.bits)(path => Mux(path.valid, path.bits.context, io.accumulated.bits))
-  private val isBack = continued.flatMap(_.bits.isBack).getOrElse(false.B)
+  private val goesBack = continued.flatMap(_.bits.isBack).getOrElse(false.B)
   for (path <- continued) assert(!(io.accumulated.valid && path.valid), "a path is complete or goes on")
-  private val afterLight = Mux(isBack, ContextState.lit, ContextState.gatherPending)
+  private val afterLight = Mux(goesBack, ContextState.environmentMarch, ContextState.gatherPending)
   move(io.accumulated.valid || isContinued, accumulated, Mux(isContinued, afterLight, ContextState.done))
   when(io.accumulated.valid) { hasColour(accumulated) := true.B }
   if (config.frame.gather) when(isContinued) { isStraight(accumulated) := false.B }
-  if (config.gathersInRoom) when(isContinued && isBack) { isOfEnvironment(accumulated) := true.B }
+  for (environment <- io.environment; again <- environment.again) {
+    again.valid := isContinued && goesBack
+    again.bits  := accumulated
+  }
 
   // Retire pixels
   private val done = choose(isAt(ContextState.done), io.pixel.retire).now
@@ -248,10 +242,7 @@ final class RtController(config: PathConfig) extends Module {
     }
     move(environment.hit.valid, environment.hit.bits, ContextState.shading)
     move(environment.visible.valid, environment.visible.bits, ContextState.resolve)
-    when(environment.hit.valid) {
-      isOcclusionTest(environment.hit.bits)                           := false.B
-      if (config.gathersInRoom) isOfEnvironment(environment.hit.bits) := true.B
-    }
+    when(environment.hit.valid) { isOcclusionTest(environment.hit.bits) := false.B }
     when(environment.visible.valid) {
       isDirectView(environment.visible.bits)    := false.B
       isOcclusionTest(environment.visible.bits) := false.B
@@ -289,7 +280,15 @@ final class RtController(config: PathConfig) extends Module {
   private def afterObject(context: UInt, alone: ContextState.Type): ContextState.Type =
     Mux(hasEnvironment && !isScattered(context), ContextState.environmentPending, alone)
 
-  private def afterLights(isLeft: Bool): ContextState.Type = Mux(isLeft, ContextState.shadowTest, ContextState.lit)
+  /** The next state of a context whose shadow rays are traced, unless one is left. A point of the environment that the
+    * camera sees gathers before it is lit.
+    */
+  private def afterLights(context: UInt, isLeft: Bool): ContextState.Type = {
+    val gathers =
+      if (config.gathersInRoom) isDirectView(context) && !isScattered(context) && io.gather.get.bounces =/= 0.U
+      else false.B
+    Mux(isLeft, ContextState.shadowTest, Mux(gathers, ContextState.gatherPending, ContextState.lit))
+  }
 
   private def isAt(wanted: ContextState.Type): Seq[Bool] = state.map(_ === wanted)
 

@@ -14,8 +14,8 @@ import scala.util.Random
 sealed trait ColourEvent
 
 object ColourEvent {
-  case object Start                                              extends ColourEvent
-  final case class Remember(what: LitColours, isOfRoom: Boolean) extends ColourEvent
+  case object Start                           extends ColourEvent
+  final case class Remember(what: LitColours) extends ColourEvent
 
   /** @param light of the cube, which the Fresnel reflection meets */
   final case class Bounce(
@@ -101,9 +101,10 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
       val steps = Seq.fill(bounces)(if (random.nextBoolean()) bounce(mayReflect = kind == 1) else gather()).flatten
       if (kind == 2) {
         val light = Option.when(random.nextBoolean())(cubeLight())
-        (Start +: Remember(surface(), isOfRoom = true) +: steps) ++ Seq(
-          Remember(surface(), isOfRoom = false),
+        (Start +: steps) ++ Seq(
+          Remember(surface()),
           GoBack(light, occlusions()),
+          Remember(surface()),
           EndWithGathered(occlusions())
         )
       } else
@@ -112,14 +113,14 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
     }
   }
 
-  private def gather(): Seq[ColourEvent] = Seq(Remember(surface(), isOfRoom = false), Gather(occlusions()))
+  private def gather(): Seq[ColourEvent] = Seq(Remember(surface()), Gather(occlusions()))
 
   private def bounce(mayReflect: Boolean = true): Seq[ColourEvent] = {
     val hasSurface = config.hasEnvironment && mayReflect && random.nextBoolean()
     val fresnel    = if (!mayReflect || random.nextBoolean()) 0 else random.nextInt(one + 1)
     val meetsCube  =
       Option.when(config.gathersInRoom && !hasSurface && fresnel > 0 && random.nextBoolean())(cubeLight())
-    Seq(Remember(surface(), isOfRoom = true)).filter(_ => hasSurface) :+
+    Seq(Remember(surface())).filter(_ => hasSurface) :+
       Bounce(colour(), random.nextBoolean(), fresnel, hasSurface, meetsCube)
   }
 
@@ -133,7 +134,7 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
     val isDirectView = config.hasEnvironment && mayBeDirect && random.nextBoolean()
     val isOfRoom     = isDirectView || (config.hasEnvironment && random.nextBoolean())
     if (random.nextInt(4) == 0) Seq(End(isBackground = true, occlusions, isDirectView = false, isOfRoom))
-    else Seq(Remember(surface(), isOfRoom), End(isBackground = false, occlusions, isDirectView, isOfRoom))
+    else Seq(Remember(surface()), End(isBackground = false, occlusions, isDirectView, isOfRoom))
   }
 }
 
@@ -187,8 +188,7 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
 
     start.foreach { case (context, _) => isStraight(context) = true }
     io.surface.valid.poke(remember.nonEmpty)
-    for ((context, Remember(what, isOfRoom)) <- remember) {
-      io.surface.bits.isOfEnvironment.foreach(_.poke(isOfRoom))
+    for ((context, Remember(what)) <- remember) {
       io.surface.bits.context.poke(context)
       pokeUInt(io.surface.bits.albedo, what.albedo)
       io.surface.bits.directLight.zip(what.direct).foreach { case (port, value) => poke(port, value) }

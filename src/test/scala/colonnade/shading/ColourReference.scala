@@ -22,7 +22,7 @@ final class ColourReference(
   /** Colours of the paths of one context, and the shadow ratios of those that have one. Paths end before the last event. */
   def colours(events: Seq[ColourEvent]): Seq[(Xyz, Option[Xyz])] = {
     var throughput, radiance           = Seq.empty[Int]
-    var surface, environment           = Option.empty[LitColours]
+    var surface                        = Option.empty[LitColours]
     var gathered                       = Seq.empty[Int]
     def add(part: Xyz, seen: Xyz): Xyz =
       Seq(radiance, part, seen).transpose.map { case Seq(sure, part, seen) =>
@@ -33,8 +33,8 @@ final class ColourReference(
         throughput = Seq.fill(3)(one)
         radiance = Seq.fill(3)(0)
         None
-      case Remember(what, isOfRoom) =>
-        if (isOfRoom) environment = Some(what) else surface = Some(what)
+      case Remember(what) =>
+        surface = Some(what)
         None
       case Bounce(albedo, isTinted, fresnel, hasSurface, light) =>
         val tinted = throughput.zip(albedo).map { case (weight, tint) =>
@@ -42,7 +42,7 @@ final class ColourReference(
         }
         val parts = tinted.map(_ * fresnel >> 12)
         val seen  =
-          if (hasSurface) leaving(environment.get, unshadowed(environment.get)) else light.getOrElse(background)
+          if (hasSurface) leaving(surface.get, unshadowed(surface.get)) else light.getOrElse(background)
         radiance = add(parts, seen)
         throughput = tinted.zip(parts).map { case (weight, part) => weight - part }
         None
@@ -52,10 +52,10 @@ final class ColourReference(
         radiance = add(throughput, leaving(what, light))
         throughput = throughput.zip(what.albedo).map { case (weight, tint) => weight * (tint + (tint >> 11)) >> 12 }
         None
-      case EndInCube(light)                               => Some(add(throughput, light) -> None)
-      case End(true, _, _, _)                             => Some(add(throughput, background) -> None)
-      case End(false, occlusions, isDirectView, isOfRoom) =>
-        val what  = (if (isOfRoom) environment else surface).get
+      case EndInCube(light)                        => Some(add(throughput, light) -> None)
+      case End(true, _, _, _)                      => Some(add(throughput, background) -> None)
+      case End(false, occlusions, isDirectView, _) =>
+        val what  = surface.get
         val light = visible(what, occlusions)
         Some(add(throughput, leaving(what, light)) -> Option.when(isDirectView)(ratio(light, unshadowed(what))))
       case GoBack(light, occlusions) =>
@@ -66,11 +66,11 @@ final class ColourReference(
           ))
         None
       case EndWithGathered(occlusions) =>
-        val light = Seq(visible(environment.get, occlusions), gathered, ambient).transpose.map {
+        val light = Seq(visible(surface.get, occlusions), gathered, ambient).transpose.map {
           case Seq(all, gathered, ambient) =>
             all - ambient + gathered
         }
-        Some(leaving(environment.get, light) -> Some(ratio(light, unshadowed(environment.get))))
+        Some(leaving(surface.get, light) -> Some(ratio(light, unshadowed(surface.get))))
     }
   }
 

@@ -73,7 +73,7 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
         val seen     = script.surface()
 
         def cycles(name: String, most: Int)(event: Int => ColourEvent): Unit = {
-          play(Seq.fill(contexts)(Seq(Start, Remember(seen, hasEnvironment))), 0)
+          play(Seq.fill(contexts)(Seq(Start, Remember(seen))), 0)
           val each = play(Seq.tabulate(contexts)(context => Seq(event(context))), 0).toDouble / contexts
           info(f"$name: $each%.1f cycles")
           assert(each <= most + 0.7)

@@ -177,6 +177,10 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
       counts(context) += 1
     } else untraced += 1
     for (port <- dut.stored ++ dut.leaving) checkStored(port, context, expected)
+    dut.io.environment.flatMap(_.marches).foreach(_.expect(
+      !gathered(context),
+      "a path that has gathered marches no more"
+    ))
     waiting -= context
     resumed -= context
     issued += 1

@@ -53,11 +53,8 @@ private class ControllerDriver(
   private def ending: Seq[Int] =
     contextsWith(context =>
       context.state == ContextState.accumulatePending ||
-        (isShadowDone(context) && !context.isFresnelReflection && !gathersInRoom(context))
+        (isShadowDone(context) && !context.isFresnelReflection)
     )
-
-  private def gathersInRoom(context: ContextModel): Boolean =
-    isInRoom && isShadowDone(context) && context.isDirectView && context.gathered == 0
 
   private def resumable: Seq[Int] =
     contextsWith(context =>
@@ -88,7 +85,7 @@ private class ControllerDriver(
       for (context <- shading.drop(1).find(contexts(_).willBounce.isEmpty) if happens && random.nextInt(3) == 0)
         events.fetchFailed = Some(context)
       for (context <- one(at(ContextState.environmentMarch)) if happens)
-        if (random.nextBoolean()) events.environmentHit = Some(context)
+        if (contexts(context).goesBack || random.nextBoolean()) events.environmentHit = Some(context)
         else if (contexts(context).isOcclusionTest) events.visible = Some(context)
         else events.environmentMiss = Some(context)
       for (context <- one(at(ContextState.accumulating)) if happens)
@@ -102,7 +99,9 @@ private class ControllerDriver(
   private def finishShading(index: Int, events: ControllerEvents): Unit = {
     val context = contexts(index)
     if (!context.willBounce.getOrElse(random.nextInt(3) < (if (occlusion) 2 else 1)))
-      events.shaded = Some((index, Seq.fill(lights)(!context.isFresnelReflection && random.nextBoolean())))
+      events.shaded = Some(
+        (index, Seq.fill(lights)(!context.isFresnelReflection && random.nextBoolean()), context.isOfEnvironment)
+      )
     else if (hasEnvironment && context.willBounce.isEmpty && context.gathered == 0 && random.nextInt(4) > 0)
       events.fresnelReflection = Some(index)
     else {
@@ -117,7 +116,7 @@ private class ControllerDriver(
     val free                  = shown(dut.io.allocation.free.valid, dut.io.allocation.free.bits, at(ContextState.idle))
     val resolved              = shown(dut.io.trace.query.valid, dut.io.trace.query.bits, at(ContextState.resolve))
     val done                  = shown(dut.io.pixel.done.valid, dut.io.pixel.done.bits, at(ContextState.done))
-    val scattering            = at(ContextState.gatherPending) ++ contextsWith(gathersInRoom)
+    val scattering            = at(ContextState.gatherPending)
     val (scattered, shadowed) =
       shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow ++ scattering)
         .partition(scattering.contains)
@@ -209,6 +208,11 @@ private class ControllerDriver(
     val measured = marched.filter(index => events.march && contexts(index).isOcclusionTest)
     dut.io.trace.readsDistance.valid.expect(measured.nonEmpty)
     for (index <- measured) dut.io.trace.readsDistance.bits.expect(index)
+    for (again <- dut.io.environment.flatMap(_.again)) {
+      val returns = events.continued.filter(_._2).map(_._1)
+      again.valid.expect(returns.nonEmpty)
+      returns.foreach(again.bits.expect(_))
+    }
     dut.clock.step()
     for (gather <- dut.io.gather; index <- sampled) gather.count.expect(contexts(index).gathered)
 
@@ -225,6 +229,7 @@ private class ControllerDriver(
       context.bypasses = hasEnvironment && random.nextInt(3) == 0
       context.gathered = 0
       context.isOfEnvironment = false
+      context.goesBack = false
       started += 1
     }
     change(events.entered)(_.state = ContextState.traversing)
@@ -235,9 +240,9 @@ private class ControllerDriver(
       context.hasHit = random.nextBoolean()
       context.occlusion = random.shuffle(Occlusion.all).head
     }
-    for ((index, needs) <- events.shaded) change(Some(index)) { context =>
+    for ((index, needs, _) <- events.shaded) change(Some(index)) { context =>
       context.isBackground = false
-      context.shadowPending = needs.indices.filter(needs(_))
+      context.shadowPending = if (context.goesBack) Nil else needs.indices.filter(needs(_))
       context.state = afterLights(context)
       context.occlusions = Seq.fill(lights)(Occlusion.none)
     }
@@ -273,13 +278,9 @@ private class ControllerDriver(
       context.state = ContextState.accumulating
     }
     change(events.continued.map(_._1)) { context =>
-      context.state = if (context.goesBack) ContextState.lit else ContextState.gatherPending
+      context.state = if (context.goesBack) ContextState.environmentMarch else ContextState.gatherPending
       context.isStraight = false
-      if (context.goesBack) {
-        context.isOfEnvironment = true
-        context.isBackground = false
-        returned += 1
-      }
+      if (context.goesBack) returned += 1
     }
     change(events.accumulated) { context =>
       context.state = ContextState.done
@@ -356,7 +357,9 @@ private class ControllerDriver(
     !context.isBackground && !context.isOfEnvironment && context.gathered < gathers
 
   private def afterLights(context: ContextModel): ContextState.Type =
-    if (context.shadowPending.nonEmpty) ContextState.shadowTest else ContextState.lit
+    if (context.shadowPending.nonEmpty) ContextState.shadowTest
+    else if (isInRoom && context.isDirectView && context.gathered == 0) ContextState.gatherPending
+    else ContextState.lit
 
   private def afterMiss(context: ContextModel): ContextState.Type =
     if (context.isStraight) ContextState.done else ContextState.accumulatePending

@@ -11,7 +11,7 @@ private class ControllerEvents {
   var entered     = Option.empty[Int]
   var missesBox   = Option.empty[Int]
   var hasResult   = Option.empty[Int]
-  var shaded      = Option.empty[(Int, Seq[Boolean])]
+  var shaded      = Option.empty[(Int, Seq[Boolean], Boolean)] // the lights that need a shadow ray; of the environment
   var bounced     = Option.empty[(Int, Boolean)]
   var isInside    = false
   var fetchFailed = Option.empty[Int]
@@ -45,8 +45,9 @@ private class ControllerEvents {
     name(dut.io.trace.missesBox, missesBox)
     name(dut.io.trace.hasResult, hasResult)
     dut.io.shaded.valid.poke(shaded.nonEmpty)
-    for ((context, needs) <- shaded) {
+    for ((context, needs, isOfEnvironment) <- shaded) {
       dut.io.shaded.bits.context.poke(context)
+      dut.io.shaded.bits.isOfEnvironment.foreach(_.poke(isOfEnvironment))
       dut.io.shaded.bits.needsShadowRays.zip(needs).foreach { case (port, need) => port.poke(need) }
     }
     dut.io.bounced.valid.poke(bounced.nonEmpty)

@@ -6,6 +6,7 @@ import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{EnvironmentRay, MarchCase}
 import colonnade.ray.RayRequest
+import colonnade.shading.EnvironmentSurface
 import colonnade.{Packed, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -94,6 +95,47 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
       assert(stored.size == contexts)
     }
+
+  it should "give a point to the shader once more, after the path from it has gathered" in {
+    val gathering = TestConfigs.gathering(config)
+    test(new EnvironmentPortHarness(gathering)) { dut =>
+      val random  = new Random(5)
+      val points  = new Packed(new EnvironmentSurface(gathering))
+      val rays    = new Packed(new RayRequest(gathering))
+      val port    = dut.io
+      val answer  = port.marches.answer
+      val context = BigInt(1)
+      dut.clock.setTimeout(0)
+      port.view.enabled.poke(true)
+      port.surfaces.ready.poke(true)
+
+      def shaded(): Seq[BigInt] = Seq.fill(8) {
+        val point = Option.when(port.surfaces.valid.peekBoolean())(dut.surface.peekInt())
+        dut.clock.step()
+        point
+      }.flatten
+      for (_ <- 0 until 40) {
+        val point = points.pack(points.unpack(BigInt(points.width, random)) + ("context" -> context))
+        answer.valid.poke(true)
+        answer.bits.isHit.poke(true)
+        dut.point.poke(point)
+        answer.ready.expect(true)
+        dut.clock.step()
+        answer.valid.poke(false)
+        assert(shaded() == Seq(point))
+        port.bounces.get.ray.valid.poke(true)
+        port.bounces.get.marches.get.poke(false)
+        dut.bounce.poke(rays.pack(rays.unpack(BigInt(rays.width, random)) + ("context" -> context)))
+        assert(shaded().isEmpty)
+        port.bounces.get.ray.valid.poke(false)
+        port.control.again.get.valid.poke(true)
+        port.control.again.get.bits.poke(context)
+        dut.clock.step()
+        port.control.again.get.valid.poke(false)
+        assert(shaded() == Seq(point))
+      }
+    }
+  }
 }
 
 /** Packs rays into one port each. */
@@ -104,8 +146,13 @@ private class EnvironmentPortHarness(config: ColonnadeConfig) extends Module {
   val primary = IO(Input(UInt(unit.primary.bits.getWidth.W)))
   val bounce  = IO(Input(UInt(unit.bounces.get.ray.bits.getWidth.W)))
   val order   = IO(Output(UInt(unit.marches.order.ray.getWidth.W)))
+  val point   = IO(Input(UInt(unit.surfaces.bits.getWidth.W)))
+  val surface = IO(Output(UInt(unit.surfaces.bits.getWidth.W)))
   io :<>= unit
   unit.primary.bits         := primary.asTypeOf(unit.primary.bits)
   unit.bounces.get.ray.bits := bounce.asTypeOf(unit.bounces.get.ray.bits)
   order                     := unit.marches.order.ray.asUInt
+
+  unit.marches.answer.bits.surface := point.asTypeOf(unit.surfaces.bits)
+  surface                          := unit.surfaces.bits.asUInt
 }
