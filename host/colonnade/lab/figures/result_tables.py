@@ -156,11 +156,13 @@ def moved_rooms(data: Data) -> str:
 def gather(data: Data) -> str:
     """What gathered light costs `edge`, and how near the model is to the reference."""
     found, without = data.result("gather"), data.result("area-edge-asap7")
-    kge, before = (report["levels"]["column"]["kge"] for report in (found["area"], without))
+    array = without["levels"]["array"]
+    column = without["levels"]["column"]["kge"]
+    more = (found["area"]["levels"]["array"]["kge"] - array["kge"]) / array["of_the_level_below"]
     fo4 = [report["slowest_path"]["fo4"] for report in (without, found["area"])]
     counters = found["pass"]["counters"]
     rows = [
-        ["a column of `edge`", f"{before:,.0f} kGE; with it {kge:,.0f}, + {100 * (kge / before - 1):.1f} %"],
+        ["a column of `edge`, and its part of the array", f"{column:,.0f} kGE; + {more:.1f}, {100 * more / column:.1f} %"],
         ["slowest path", f"{fo4[0]:.1f} FO4; with it {fo4[1]:.1f}"],
         [
             "a pass of the scene above, 640×480",

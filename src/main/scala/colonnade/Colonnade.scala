@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.experimental.hierarchy.{Definition, Instance}
 import chisel3.util.{Decoupled, Pipe}
 import colonnade.common.TimingSlice
-import colonnade.column.{Column, PathTracer, PathTracerModule}
+import colonnade.column.{Column, PathTracer, PathTracerModule, SharedLightCube}
 import colonnade.config.ColonnadeConfig
 import colonnade.environment.{AttributeArbiter, PhysicalAttributeMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
@@ -59,6 +59,13 @@ final class Colonnade(config: ColonnadeConfig, pathTracer: ColonnadeConfig => Pa
     val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, ports.size, tagBits)))
     maps.io.load := load
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
+  }
+
+  // The light cube
+  for (ports <- columns.flatMap(_.io.cube).grouped(SharedLightCube.columns)) {
+    val cube = Module(new SharedLightCube(config, ports.size)).io
+    cube.load := load
+    cube.ports.zip(ports).foreach { case (port, column) => port :<>= column }
   }
 
   // The scene in DRAM. After a request or a failed read, the caches forget it at the next start

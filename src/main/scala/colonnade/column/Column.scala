@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{Decoupled, Valid}
 import colonnade.config.{ColonnadeConfig, PathConfig}
-import colonnade.environment.{AttributePort, AttributeStore, ColumnEnvironment, EnvironmentMarches, TextureMemory}
+import colonnade.environment.{AttributePort, ColumnEnvironment, EnvironmentMarches, TextureMemory}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{
   BackgroundWalker,
@@ -17,6 +17,7 @@ import colonnade.frame.{
   TileWalker
 }
 import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
+import colonnade.shading.CubePort
 
 final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
@@ -47,6 +48,9 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
 
   /** If columns share the maps of the environment. */
   val environment = Option.when(config.columnsPerCopy > 1)(AttributePort.ofColumn(config))
+
+  /** To the [[SharedLightCube]]. */
+  val cube = Option.when(config.frame.gather)(new CubePort)
 
   val events = Output(new EventSums(config, 1)) // delayed by one cycle
 }
@@ -137,12 +141,7 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
     memory.port :<>= port
   }
 
-  // The light cube
-  for (port <- units.cube) {
-    val store = AttributeStore(config, "light.cube", io.load)
-    store.read := port.read
-    port.word  := store.word.asTypeOf(port.word)
-  }
+  for ((port, cube) <- io.cube.zip(units.cube)) port :<>= cube
 
   // Collect finished pixels
   for ((source, pixels) <- collector.io.sources.zip(Seq(units.pixels, background.io.pixels))) source <> pixels

@@ -242,10 +242,6 @@ final class ColourUnit(config: PathConfig) extends Module {
   // The light that leaves the surface, or the weight of the Fresnel reflection
   private val sum = after(arrival) { slot =>
     slot.isValid := arrival.isValid && arrival.isLastLight
-    for (cube <- slot.cube; port <- io.cube) {
-      val radiance = port.texel.radiance(of(port.texel.mantissas.channels, arrival.channel))
-      cube.bits := Mux(port.texel.isLight, Fill(NumberFormats.lightBits, 1.U(1.W)), radiance)
-    }
     when(arrival.hasGathered.getOrElse(false.B)) { slot.radiance := 0.U }
   }
   private val factors   = Reg(Vec(2, UInt(weightBits.W)))
@@ -260,9 +256,16 @@ final class ColourUnit(config: PathConfig) extends Module {
   }
 
   // Its colour
-  private val leaving = after(sum)(slot => when(sum.isBounce) { slot.weight := Rounding.narrow(lit, weightBits) })
-  private val colour  = Rounding.saturate(reflected, colourBits)
-  private val shown   =
+  private val leaving = {
+    val slot = WireInit(after(sum)(slot => when(sum.isBounce) { slot.weight := Rounding.narrow(lit, weightBits) }))
+    for (cube <- slot.cube; texel <- io.cube.map(_.texel)) {
+      val radiance = texel.radiance(of(texel.mantissas.channels, slot.channel))
+      cube.bits := Mux(texel.isLight, Fill(NumberFormats.lightBits, 1.U(1.W)), radiance)
+    }
+    slot
+  }
+  private val colour = Rounding.saturate(reflected, colourBits)
+  private val shown  =
     leaving.emission.map(emission => Rounding.saturate(colour +& emission, colourBits)).getOrElse(colour)
   private val seenBits = if (config.frame.gather) NumberFormats.lightBits else weightBits
   private val seen     = Reg(UInt(seenBits.W))

@@ -8,7 +8,7 @@ import colonnade.formats.{AttributeMemories, CubeTexel}
 import colonnade.numbers.{DigitRecurrence, Normalise}
 import colonnade.ray.RayRequest
 
-/** Reads of a column's light cube: a texel's address, and in the next cycle its word. */
+/** Reads of the light cube: a texel's address, and two cycles later its word. */
 final class CubePort extends Bundle {
   val read = Valid(UInt(LightCube.addressBits.W))
   val word = Input(AttributeMemories.cubeTexel)
@@ -23,8 +23,8 @@ final class LightRead(config: PathConfig) extends Bundle {
   val isReflection = Bool()
 }
 
-/** Asks for the texel that the last ray of a context meets. It comes three cycles later, and stays until the next read. Its
-  * `isLight` is that the path sees a light.
+/** Asks for the texel that the last ray of a context meets. It comes five cycles later, and stays until that of the next
+  * read. Its `isLight` is that the path sees a light.
   */
 final class LightPort(config: PathConfig) extends Bundle {
   val read  = Valid(new LightRead(config))
@@ -65,10 +65,10 @@ final class LightCube(config: PathConfig) extends Module {
   io.memory.read.valid := RegNext(hasRead, false.B)
   io.memory.read.bits  := Mux(isOfReflection, RegEnable(texel, hasRead), texel)
   private val seesLights = RegEnable(request.seesLights, hasRead)
-  private val comes      = RegNext(io.memory.read.valid, false.B)
+  private val comes      = RegNext(RegNext(io.memory.read.valid, false.B), false.B)
   private val light      = WireInit(io.memory.word)
   when(!RegEnable(seesLights, io.memory.read.valid)) { light.isLight := false.B }
-  io.port.texel := Mux(comes, light, RegEnable(light, comes))
+  io.port.texel := RegEnable(light, comes)
 }
 
 object LightCube {

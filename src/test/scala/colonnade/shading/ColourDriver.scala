@@ -146,8 +146,8 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
   private val todo     = Seq.fill(contexts)(mutable.Queue.empty[ColourEvent])
   private val waits    = Array.fill(contexts)(Option.empty[ColourEvent])
 
-  /** The light of the cube on its way to the unit: three cycles after its request. */
-  private var requested = Seq.fill(3)(Option.empty[Seq[Int]])
+  /** The light of the cube on its way to the unit: five cycles after its request. */
+  private var requested = Seq.fill(5)(Option.empty[Seq[Int]])
 
   /** By context, whether its path has not bounced. */
   private val isStraight = Array.fill(contexts)(true)

@@ -53,20 +53,22 @@ class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.memory.read.valid.expect(true)
         dut.io.memory.read.bits.expect(texel)
         dut.clock.step()
-        // The word is there in one cycle, the texel stays
+        // The word is there in one cycle, and the texel follows it and stays
+        dut.clock.step()
         val word                      = dut.io.memory.word
         val (port, (exponent, light)) = (dut.io.port.texel, (random.nextInt(16), Seq.fill(3)(random.nextInt(128))))
         word.isLight.poke(isLight)
         word.exponent.poke(exponent)
         word.mantissas.channels.zip(light).foreach { case (to, value) => to.poke(value) }
+        dut.clock.step()
         for (_ <- 0 to random.nextInt(3)) {
           port.isLight.expect(isLight && seesLights)
           port.exponent.expect(exponent)
           port.mantissas.channels.zip(light).foreach { case (from, value) => from.expect(value) }
-          dut.clock.step()
           word.isLight.poke(random.nextBoolean())
           word.exponent.poke(random.nextInt(16))
           word.mantissas.channels.foreach(_.poke(random.nextInt(128)))
+          dut.clock.step()
         }
       }
     }
