@@ -78,8 +78,8 @@ if TYPE_CHECKING:
     "--samples",
     type=click.IntRange(min=1, max=MAX_SAMPLES),
     metavar="N",
-    help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene; if it names none, 4 in"
-    " the photo of a room, otherwise 1]",
+    help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene; if it names none, what"
+    " frame.budget allows with gathered light, 4 in the photo of a room, otherwise 1]",
 )
 @click.option(
     "--denoise",

@@ -24,14 +24,14 @@ _LEVEL = "deepestStack"
 class Accumulation:
     """Sums over the samples of each pixel. Those of the device are exact, so their order does not matter.
 
-    The arrays are uint32 from the device, and float64 from the reference.
+    The arrays are uint32 from the device, and float64 from the reference, or where they are blurred.
 
     Attributes:
         samples: Number of samples of a pixel.
         objects: Colours of the samples that show the object, [height, width, 3].
         background: Colours of the others, [height, width, 3].
         ratio: Shadow ratios of the others, [height, width, 3]; None without a room.
-        coverage: Number of samples that show the object, int64 [height, width].
+        coverage: Number of samples that show the object, int64 [height, width], or float64 where it is blurred.
         white: The number for the colour 1.0.
         unshadowed: The number for the shadow ratio 1.0.
     """
@@ -40,7 +40,7 @@ class Accumulation:
     objects: npt.NDArray[Any]
     background: npt.NDArray[Any]
     ratio: npt.NDArray[Any] | None
-    coverage: npt.NDArray[np.int64]
+    coverage: npt.NDArray[Any]
     white: float
     unshadowed: float
 

@@ -29,13 +29,14 @@ from colonnade.maps.image import AttributeImage
 from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
 from colonnade.mesh.mesh import Mesh
+from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport, frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
+from colonnade.render.samples import with_requested_samples, within_budget
 from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
-from colonnade.scene.samples import PHOTO_SAMPLES
 from colonnade.scene.view import View
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.inspect import coarse_line
@@ -44,8 +45,6 @@ Size = tuple[int, int]
 
 #: What keyframes cost.
 _BETWEEN = "between keyframes, where their maps show nothing, a frame is its photo without the object's shadow"
-#: Names the default to who has not chosen.
-_DEFAULT_SAMPLES = f"{PHOTO_SAMPLES} samples a pixel, the default in a room: --samples 1 takes a quarter of the time"
 
 
 def render(request: RenderRequest, progress: Progress = QUIET) -> RenderResult:
@@ -75,8 +74,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         scene = scene.with_mesh(request.mesh)
     elif request.mesh is not None:
         scene.require_one_object("a mesh replaces that of a single object")
-    note = _DEFAULT_SAMPLES if _has_default_samples(scene, request) else None
-    scene = with_requested_samples(scene, request)
+    scene, note = with_requested_samples(scene, request)
     if scene.frame.denoise and request.backend != "reference":
         request = replace(request, denoise=True)
     size = request.size or (scene.frame.width, scene.frame.height)
@@ -166,6 +164,8 @@ def _device_frames(
         )
         if (line := coarse_line(prepared.image.header)) is not None:
             progress.note(line)
+    prepared = within_budget(prepared, size, progress)
+    with progress.step("computing the registers"):
         motion = scene.motion
         poses = [prepared.scene.at(fraction) for fraction in motion.frame_progress(request.frames)]
         passes = [pose.passes(motion.exposure(request.frames)) for pose in poses]
@@ -178,8 +178,8 @@ def _device_frames(
     results = _rendered(request, prepared, size, passes, registers, progress)
     if scene.paths.gather and len(poses) > 1:  # Each has a light cube of its own
         results = itertools.chain.from_iterable(
-            _rendered(request, prepared.lit_at(pose, request.relit), size, [own], [values], progress)
-            for pose, own, values in zip(poses, passes, registers, strict=True)
+            _rendered(request, prepared.lit_at(pose, request.relit), size, [own], [values], progress, number)
+            for number, (pose, own, values) in enumerate(zip(poses, passes, registers, strict=True))
         )
     for pose, result in zip(poses, results, strict=True):
         report = replace(result.report, share=pose.motion_progress, seconds=seconds | dict(result.report.seconds))
@@ -203,19 +203,25 @@ def _sequence_frames(
         sequence, scene, manifest, size, encode, _mesh_of(request), every=every, relit=relit, encoder=encoder,
         progress=progress,
     )  # fmt: skip
+    samples = scene.frame.samples
     for number in range(request.frames):
         title = f"frame {number + 1} of {request.frames}"
         begun = time.perf_counter()
         try:
             with progress.step(f"{title}: reading and encoding"):
                 prepared = next(scenes)
+                if samples is not None:
+                    prepared = replace(prepared, scene=prepared.scene.with_samples(samples))
+            prepared = within_budget(prepared, size, progress)
+            samples = prepared.scene.frame.samples
+            with progress.step(f"{title}: computing the registers"):
                 passes = prepared.scene.passes()
                 registers = [prepared.registers(size, one, composited=not request.relit) for one in passes]
             for line in (note, _BETWEEN if every > 1 else None):
                 if line is not None and number == 0:
                     progress.note(line)
             seconds = {"maps": time.perf_counter() - begun}
-            (result,) = _rendered(request, prepared, size, [passes], [registers], progress.of(title))
+            (result,) = _rendered(request, prepared, size, [passes], [registers], progress.of(title), number)
         except UserError as error:
             raise UserError(f"frame {number} of {sequence.path}: {error}") from None
         report = replace(
@@ -299,14 +305,18 @@ def _rendered(
     passes: list[list[Scene]],
     registers: list[list[dict[str, int]]],
     progress: Progress,
+    first: int = 0,
 ) -> Iterator[RenderResult]:
-    """Render the passes of each frame with the model or the RTL."""
+    """Render the passes of each frame, from the number ``first`` on, with the model or the RTL."""
+    look = None if request.relit else CameraLook.of(prepared.scene, prepared.photo, size)
+    if look is not None and look.note is not None and first == 0:
+        progress.note(look.note)
     if request.backend == "rtl":
         design = design_for(request.config, request.overrides, progress)
         rendered = _rtl_frames(design, prepared.image, registers, progress, request.waveform, request.denoise)
     else:
         rendered = _model_frames(prepared.manifest, prepared.image, registers, progress, request.denoise)
-    for of_frame, (rendered_passes, seconds, rate) in zip(passes, rendered, strict=True):
+    for number, (of_frame, (rendered_passes, seconds, rate)) in enumerate(zip(passes, rendered, strict=True), first):
         require_no_errors(rendered_passes.frame.errors)
         report = replace(
             frame_report(request.backend, prepared.manifest, prepared.image.header, rendered_passes.frame),
@@ -319,37 +329,7 @@ def _rendered(
         result = _result(rendered_passes, prepared.image, view, report)
         if request.denoise:
             result = _denoised(result, rendered_passes, view)
-        yield result if request.relit else _composited(result, prepared)
-
-
-def _has_default_samples(scene: Scene, request: RenderRequest) -> bool:
-    """Whether neither scene nor request names samples, and an object in a photo gets several."""
-    is_named = request.samples is not None or scene.frame.samples is not None
-    single = request.relit or request.hits or request.waveform is not None
-    return scene.background.room is not None and not is_named and not single
-
-
-def with_requested_samples(scene: Scene, request: RenderRequest) -> Scene:
-    """The scene with the samples of the request, or with its own ones.
-
-    If neither names them, an object in a photo has `PHOTO_SAMPLES`. Other frames have one.
-
-    Raises:
-        UserError: The request needs the rays of a single pass, or one sample hides what the scene asks for.
-    """
-    if request.samples is not None:
-        scene = scene.with_samples(request.samples)
-    elif _has_default_samples(scene, request):
-        scene = scene.with_samples(PHOTO_SAMPLES)
-    elif scene.blurs and (scene.frame.samples or 1) == 1:
-        raise UserError(
-            f"{scene.blurs[0]} shows only with several samples: give frame.samples or --samples;"
-            " --samples 1 renders the middle"
-        )
-    for what, is_used in (("hits are", request.hits), ("a waveform is", request.waveform is not None)):
-        if is_used and (scene.frame.samples or 1) > 1:
-            raise UserError(f"{what} of one sample a pixel, this frame has {scene.frame.samples}: give --samples 1")
-    return scene
+        yield result if request.relit else _composited(result, prepared, look, number)
 
 
 def _check_waveform(request: RenderRequest, size: Size) -> None:
@@ -435,11 +415,13 @@ def render_model(scene: Scene, mesh: Mesh, manifest: Manifest, size: Size, progr
     return _composited(_result(passes, prepared.image, prepared.view(size), report), prepared)
 
 
-def _composited(result: RenderResult, prepared: DeviceScene) -> RenderResult:
-    """The result in the photo of its room; as it is without a room."""
+def _composited(
+    result: RenderResult, prepared: DeviceScene, look: CameraLook | None = None, number: int = 0
+) -> RenderResult:
+    """The result in the photo of its room, with the look of its camera; as it is without a room."""
     if prepared.environment is None:
         return result
-    return replace(result, image=composited(result.sums, prepared.photo, prepared.strength))
+    return replace(result, image=composited(result.sums, prepared.photo, prepared.strength, look, number))
 
 
 def _denoised(result: RenderResult, passes: FramePasses, view: View) -> RenderResult:

@@ -22,6 +22,7 @@ from colonnade.reference.environment.decoded import BoundingPlanes
 from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.environment.true_room import true_room
 from colonnade.reference.render import ReferenceResult, render_reference
+from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
@@ -127,7 +128,10 @@ def traced_frames(
 ) -> Iterator[TracedFrame]:
     """Trace poses of a scene in the room ``maps``, with bounding planes of ``layout`` or else of the default one."""
     check_camera(poses[0], maps, size)
-    photo = view_photo(poses[0], maps, size)
+    photo = None if options.relit else view_photo(poses[0], maps, size)
+    look = CameraLook.of(poses[0], photo, size)
+    if look is not None and look.note is not None:
+        progress.note(look.note)
     room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)
     backdrop = room_backdrop(room, layout, options.truth, progress)
     for number, pose in enumerate(poses):
@@ -144,7 +148,7 @@ def traced_frames(
             other = render_reference(mesh, view, progress, backdrop)
             sums += _accumulated(other)
             rays = {kind: count + other.rays[kind] for kind, count in rays.items()}
-        image = composited(sums, None if options.relit else photo, room.strength)
+        image = composited(sums, photo, room.strength, look, number)
         yield TracedFrame(image, first, sums, rays, time.perf_counter() - begun)
 
 

@@ -107,6 +107,7 @@ class Camera:
         aperture: Diameter of the lens, world units; 0: a pinhole, everything is in focus.
         focus: Distance of the plane in focus along the view, world units; None: the plane through the target, or
             through the centre of the object's cube.
+        grain: In a photo the object has the grain and the blur of its camera.
     """
 
     position: _Vector | None = None
@@ -117,6 +118,7 @@ class Camera:
     fov: Annotated[_Float, Interval(ge=1.0, le=150.0)] | None = None
     aperture: _Diameter = 0.0
     focus: Annotated[_Float, Interval(ge=1e-6, le=1e9)] | None = None
+    grain: StrictBool = True
 
     @model_validator(mode="after")
     def _has_axes(self) -> Self:
@@ -357,14 +359,18 @@ class Background:
 
 @dataclass(frozen=True, config=_STRICT)
 class FrameSize:
-    """Default size of the frame, pixels, and the samples of each pixel; None: `colonnade.render.frames` chooses.
+    """Default size of the frame, pixels, and the samples of each pixel.
 
-    With ``denoise`` the noise of gathered light is filtered, in frames of the model and the RTL.
+    Attributes:
+        samples: None: `colonnade.render.samples` chooses.
+        budget: Seconds of the device at 200 MHz for a frame that gathers light and names no samples. None: a thirtieth.
+        denoise: The noise of gathered light is filtered, in frames of the model and the RTL.
     """
 
     width: Annotated[int, Strict(), Ge(1)] = 640
     height: Annotated[int, Strict(), Ge(1)] = 480
     samples: Annotated[int, Strict(), Interval(ge=1, le=MAX_SAMPLES)] | None = None
+    budget: Annotated[_Float, Interval(ge=1e-6, le=1e3)] | None = None
     denoise: bool = False
 
 

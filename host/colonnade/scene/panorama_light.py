@@ -93,7 +93,7 @@ def panorama_light(
     count, one_sample = len(lights), (scene.frame.samples or 1) == 1
     progress.note(
         f"the scene names no light: ambient light and {count} light{'' if count == 1 else 's'} are those of panorama"
-        f" {name}" + (", which have their area with several --samples" if lights and one_sample else "")
+        f" {name}" + (", which have their area in frames of several samples" if lights and one_sample else "")
     )
     brightest = max((float(light.colour.max()) for light in found), default=0.0)
     if brightest > MAX_INTENSITY:

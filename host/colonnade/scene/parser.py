@@ -150,14 +150,17 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     lights = data.get("light", {})
     lights = lights if isinstance(lights, list) else [lights]
     camera, transform, background = (data.get(name, {}) for name in ("camera", "transform", "background"))
-    if "room" in background and "camera" in data and "position" not in camera:
+    is_placed = "camera" in data and set(camera) != {"grain"}
+    if "room" in background and is_placed and "position" not in camera:
         raise ValueError("the camera is the room's: give camera.position, or leave out [camera]")
     if "photo" in background and "room" not in background:
         raise ValueError("background.photo is a view of a room: it needs background.room")
-    if "photo" in background and "camera" not in data:
+    if "photo" in background and not is_placed:
         raise ValueError("background.photo is for a camera that the scene places: give [camera]; a room has its photo")
     if "photo" in background and "camera" in _table(data, "motion"):
         raise ValueError("background.photo is the view of one camera: leave out motion.camera")
+    if "grain" in camera and "room" not in background:
+        raise ValueError("camera.grain is of the photo of a room: it needs background.room")
     for key in ("panorama_yaw", "panorama_exposure"):
         if key in background and "panorama" not in background:
             raise ValueError(f"background.{key} is of a panorama: it needs background.panorama")
@@ -175,6 +178,11 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
         raise ValueError("[camera] takes either position and target, or direction and framing")
     if any(isinstance(light, dict) and "position" in light and "offset" in light for light in lights):
         raise ValueError("[light] takes a position or an offset, not both")
+    frame = data.get("frame", {})
+    if "budget" in frame and "samples" in frame:
+        raise ValueError("frame.budget chooses the samples: leave out frame.samples or frame.budget")
+    if "budget" in frame and not _table(data, "paths").get("gather", 0):
+        raise ValueError("frame.budget is of frames that gather light: set paths.gather = 1, or give frame.samples")
     if "motion" in data and not data["motion"]:
         raise ValueError("[motion] moves nothing: give turn, stand_at, translate, light or camera")
     if "light" in data.get("motion", {}) and isinstance(lights[0], dict) and "position" not in lights[0]:

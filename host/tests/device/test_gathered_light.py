@@ -216,7 +216,7 @@ def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, capsys: pytest.C
     prepared.registers((32, 24))  # Its distance is within the registers
     assert capsys.readouterr().err.splitlines() == [
         "colonnade: the scene names no light: ambient light and 1 light are those of panorama sky.exr, which have their"
-        " area with several --samples",
+        " area in frames of several samples",
         "colonnade: rays that leave the object meet the light of the panorama, which shows all directions",
     ]
 

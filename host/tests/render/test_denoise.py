@@ -82,8 +82,9 @@ def run(folder: Path, gather: int, *options: str) -> tuple[int, str]:
 
 def test_the_command_filters_the_object(tmp_path: Path) -> None:
     pictures = {}
-    for name, options in (("raw", ()), ("filtered", ("--denoise",)), ("truth", ("--samples", "256"))):
-        status, output = run(tmp_path, 1, "--backend", "model", "--output", str(tmp_path / f"{name}.png"), *options)
+    for name, options in (("raw", ("1",)), ("filtered", ("1", "--denoise")), ("truth", ("256",))):
+        output_file = str(tmp_path / f"{name}.png")
+        status, output = run(tmp_path, 1, "--backend", "model", "--output", output_file, "--samples", *options)
         assert status == 0, output
         # Without the outline, where samples of the background count
         pictures[name] = read_picture(tmp_path / f"{name}.png")[20:32, 24:40].astype(float)
@@ -92,8 +93,9 @@ def test_the_command_filters_the_object(tmp_path: Path) -> None:
 
 
 def test_a_scene_asks_for_the_filter(tmp_path: Path) -> None:
-    (tmp_path / "own.toml").write_text(SCENE.format(1) + "[frame]\ndenoise = true\nwidth = 64\nheight = 48\n")
-    run(tmp_path, 1, "--backend", "model", "--denoise", "--output", str(tmp_path / "filtered.png"))
+    frame = "[frame]\ndenoise = true\nsamples = 1\nwidth = 64\nheight = 48\n"
+    (tmp_path / "own.toml").write_text(SCENE.format(1) + frame)
+    run(tmp_path, 1, "--backend", "model", "--samples", "1", "--denoise", "--output", str(tmp_path / "filtered.png"))
     for backend in ("model", "reference"):
         own = ["render", str(tmp_path / "own.toml"), "--config", "textured", "--backend", backend]
         done = CliRunner().invoke(cli, [*own, "--output", str(tmp_path / f"{backend}.png")])

@@ -1,0 +1,69 @@
+"""The samples of a frame: those that are named, a default, or what a budget of time allows (docs/sampling.md)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from colonnade.common.errors import UserError
+from colonnade.common.progress import Progress
+from colonnade.device.scene import DeviceScene
+from colonnade.render.budget import MAX_BUDGET_SAMPLES, Budget
+from colonnade.render.request import RenderRequest
+from colonnade.scene.model import Scene
+from colonnade.scene.samples import PHOTO_SAMPLES
+
+#: Name the defaults to who has not chosen.
+_PHOTO = f"{PHOTO_SAMPLES} samples a pixel, the default in a room: --samples 1 takes a quarter of the time"
+_REFERENCE = (
+    f"{MAX_BUDGET_SAMPLES} samples a pixel, the most that a budget gives: the reference has no clock;"
+    " --samples N gives another number"
+)
+#: Seconds of a frame unless the scene names them: thirty frames a second.
+_SECONDS = 1 / 30
+
+
+def with_requested_samples(scene: Scene, request: RenderRequest) -> tuple[Scene, str | None]:
+    """The scene with the samples of the request, its own ones, or a default, and a line that names the default.
+
+    With gathered light the default is what a budget allows; its ``frame.samples`` stays None until `within_budget`. In
+    a room it is `PHOTO_SAMPLES`, otherwise 1. Frames with hits, a waveform, or a relit room have one sample.
+
+    Raises:
+        UserError: The request needs the rays of a single pass, or one sample hides what the scene asks for.
+    """
+    named = request.samples or scene.frame.samples
+    single = request.relit or request.hits or request.waveform is not None
+    if named is None and not single and scene.paths.gather:
+        if request.backend == "reference":
+            return scene.with_samples(MAX_BUDGET_SAMPLES), _REFERENCE
+        return scene, None
+    if named is None and not single and scene.background.room is not None:
+        return scene.with_samples(PHOTO_SAMPLES), _PHOTO
+    if request.samples is None and scene.blurs and (named or 1) == 1:
+        raise UserError(
+            f"{scene.blurs[0]} shows only with several samples: give frame.samples or --samples;"
+            " --samples 1 renders the middle"
+        )
+    for what, is_used in (("hits are", request.hits), ("a waveform is", request.waveform is not None)):
+        if is_used and (named or 1) > 1:
+            raise UserError(f"{what} of one sample a pixel, this frame has {named}: give --samples 1")
+    return scene.with_samples(named or 1), None
+
+
+def within_budget(prepared: DeviceScene, size: tuple[int, int], progress: Progress) -> DeviceScene:
+    """The scene with as many samples as its budget allows; itself if it has a number.
+
+    Args:
+        prepared: A scene from `with_requested_samples`, ready for the device.
+        size: Width and height of frames, pixels.
+        progress: Shows the pass that is measured, and names the number.
+    """
+    scene = prepared.scene
+    if scene.frame.samples is not None:
+        return prepared
+    with progress.step("estimating the time of a pass"):
+        registers = prepared.registers(size, composited=True)
+        budget = Budget.of(prepared.manifest, prepared.image, registers, scene.frame.budget or _SECONDS)
+    hidden = f"; {scene.blurs[0]} shows its middle" if budget.samples == 1 and scene.blurs else ""
+    progress.note(budget.note + hidden)
+    return replace(prepared, scene=scene.with_samples(budget.samples))

@@ -1,0 +1,95 @@
+"""Samples by a budget of time: one number for model and RTL, that of a true estimate."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from colonnade.cli.main import cli
+from colonnade.common.progress import QUIET
+from colonnade.design.generator import manifest_for
+from colonnade.render.budget import Budget, estimated_cycles, rounded
+from colonnade.render.frames import render, render_frames
+from colonnade.render.request import RenderRequest
+from colonnade.scene.model import FrameSize, Light, MeshSource, Paths, Scene
+
+DATA = Path(__file__).parents[3] / "docs" / "data"
+SIZE = (24, 18)
+GATHERS = Scene(MeshSource(name="teapot:4"), paths=Paths(gather=1), frame=FrameSize(*SIZE))
+#: As in `test_gather.py`, so that the simulator is there.
+DESIGN = ("units.shadeInterval=3", "frame.gather=true", "physicalAttributeMemory=null", "array.columns=1")
+OPTIONS = (*DESIGN, "geometry.arity=2", "frame.emission=true")
+
+
+def test_the_estimate_is_that_of_the_rtl() -> None:
+    """Passes of `edge` that the pages have, one whose columns are the bottleneck and one whose units are."""
+    manifest = manifest_for("edge", ("frame.gather=true",)).manifest
+    for name in ("gather", "light"):
+        counters = json.loads((DATA / f"{name}.json").read_text())["result"]["pass"]["counters"]
+        assert estimated_cycles(manifest, counters, True) == pytest.approx(counters["cycles"], rel=0.25)
+
+
+@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+def test_rtl_and_model_have_the_samples_of_one_budget(capsys: pytest.CaptureFixture[str]) -> None:
+    scene = replace(GATHERS, frame=FrameSize(*SIZE, budget=3e-4))
+    rtl, model = (render(RenderRequest(scene, "small", OPTIONS, backend)) for backend in ("rtl", "model"))
+    assert rtl.report.samples == model.report.samples in (2, 4, 8)
+    np.testing.assert_array_equal(rtl.image, model.image)
+    lines = [line for line in capsys.readouterr().err.splitlines() if "a pixel" in line]
+    assert len(lines) == 2 and lines[0] == lines[1]
+    assert f"{model.report.samples} samples a pixel, what frame.budget = 0.0003 s allows at 200 MHz" in lines[0]
+    cycles = rtl.report.cycles_per_sample or 0
+    assert cycles / 2 < float(lines[0].split("about ")[1].split(" ")[0].replace(",", "")) < 2 * cycles
+
+
+def test_longer_budgets_give_more_samples() -> None:
+    def samples(budget: float | None) -> int:
+        scene = replace(GATHERS, frame=FrameSize(*SIZE, budget=budget))
+        return render(RenderRequest(scene, "textured", backend="model")).report.samples
+
+    found = [samples(budget) for budget in (1e-6, 1e-4, 1.0, None)]
+    assert found == sorted(found) and found[0] == 1 and found[2:] == [16, 16]
+    assert set(found) <= {1, 2, 4, 8, 16}
+
+
+def test_what_is_named_wins(capsys: pytest.CaptureFixture[str]) -> None:
+    """And all frames of a motion have the number of the first one."""
+    still = RenderRequest(GATHERS, "textured", backend="model")
+    for request in (replace(still, samples=3), replace(still, scene=GATHERS.with_samples(3))):
+        assert render(request).report.samples == 3
+    assert render(replace(still, hits=True)).report.samples == 1
+    assert "a pixel" not in capsys.readouterr().err
+    assert render(replace(still, backend="reference")).report.samples == 16
+    assert "the reference has no clock" in capsys.readouterr().err
+    short = replace(GATHERS, frame=FrameSize(*SIZE, budget=1e-5), light=Light(radius=0.2))
+    frames = list(render_frames(replace(still, scene=short, frames=2), QUIET))
+    assert [frame.report.samples for frame in frames] == [1, 1]
+    err = capsys.readouterr().err
+    assert err.count("1 sample a pixel") == 1 and "light.radius shows its middle" in err
+
+
+def test_estimates_are_rounded_to_two_digits() -> None:
+    assert [rounded(cycles) for cycles in (7, 99, 104, 105, 112_870)] == [7, 99, 100, 110, 110_000]
+    assert "the least, although frame.budget = 1e-06 s allows less" in Budget(1, 1000, 1e-6).note
+    assert Budget(1, 1000, 1 / 30).note.startswith("1 sample a pixel, what frame.budget = 0.0333 s allows at 200 MHz")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("paths.gather = 1\nframe = {samples = 4, budget = 0.1}", "leave out frame.samples or frame.budget"),
+        ("frame.budget = 0.1", "frame.budget is of frames that gather light: set paths.gather = 1"),
+        ("paths.gather = 1\nframe.budget = 0", "frame.budget must be"),
+    ],
+)
+def test_budgets_that_mean_nothing_are_one_line(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "scene.toml").write_text(f'mesh.name = "teapot:2"\n{text}\n')
+    result = CliRunner().invoke(cli, ["render", str(tmp_path / "scene.toml"), "--config", "textured"])
+    assert result.exit_code == 2
+    assert message in result.stderr and len(result.stderr.splitlines()) == 1
