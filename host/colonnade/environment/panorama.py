@@ -83,9 +83,19 @@ class Panorama:
 
 
 def read_panorama(path: Path, yaw: float = 0.0) -> Panorama:
+    """Read an equirectangular picture (`read_radiance`); one of more than `ROWS` rows is averaged.
+
+    Raises:
+        UserError: See `read_radiance`.
+    """
+    return _resized(Panorama(read_radiance(path), yaw))
+
+
+def read_radiance(path: Path) -> Floats:
     """Read an equirectangular picture: Radiance HDR or OpenEXR, linear, or PNG, JPEG or WebP, sRGB.
 
-    Negative radiance counts as 0. A picture of more than `ROWS` rows is averaged.
+    Returns:
+        Linear radiance, float64 [height, width, 3]; negative one counts as 0.
 
     Raises:
         UserError: The file is missing or damaged, has another format, is not twice as wide as high, or holds light that
@@ -107,7 +117,7 @@ def read_panorama(path: Path, yaw: float = 0.0) -> Panorama:
         )
     if not np.isfinite(radiance).all():
         raise UserError(f"{path} holds light that is not finite: repair these pixels")
-    return _resized(Panorama(radiance.clip(min=0.0), yaw))
+    return np.asarray(radiance.clip(min=0.0))
 
 
 def _linear(path: Path, reader: str) -> Floats:

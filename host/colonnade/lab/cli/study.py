@@ -139,9 +139,11 @@ def study(
 
             terminal = progress.for_terminal()
             with terminal.step("measuring the light"):
+                fits = room_light.study_fits(rooms)
                 qualities = room_light.study_light(rooms, terminal, output)
-            echo_lines(room_light.table(qualities))
-            report = {name: asdict(value) for name, value in qualities.items()}
+            echo_lines(f"{room_light.fits_table(fits)}\n\n{room_light.table(qualities)}")
+            report = {"fits": {name: asdict(value) for name, value in fits.items()}}
+            report["choices"] = {name: asdict(value) for name, value in qualities.items()}
         elif capture:
             from colonnade.lab.evaluation.studies import captured_rooms
 

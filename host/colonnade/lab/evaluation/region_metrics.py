@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,10 +37,18 @@ def compare_regions(
     reference: NDArray[np.uint8],
     test: NDArray[np.uint8],
     regions: Mapping[str, NDArray[np.bool_]],
-    with_dists: bool = True,
+    with_dists: Collection[str] | bool = True,
 ) -> dict[str, RegionDifference]:
-    """Compare two pictures, uint8 [height, width, 3] sRGB, in each region, bool [height, width]."""
+    """Compare two pictures, uint8 [height, width, 3] sRGB, in each region, bool [height, width].
+
+    Args:
+        reference: The true picture.
+        test: The other one.
+        regions: By name.
+        with_dists: Names of the regions whose DISTS is computed too; True: all.
+    """
     errors = flip_map(reference, test)
+    measured: Collection[str] = regions if with_dists is True else with_dists or ()
     result = {}
     for name, region in regions.items():
         if not region.any():
@@ -50,7 +58,7 @@ def compare_regions(
             pixels=int(np.count_nonzero(region)),
             psnr=psnr(reference[region], test[region]),
             flip=float(errors[region].mean(dtype=np.float64)),
-            dists=dists_or_none(*_cut_out(reference, test, region)) if with_dists else None,
+            dists=dists_or_none(*_cut_out(reference, test, region)) if name in measured else None,
         )
     return result
 

@@ -147,10 +147,12 @@ def catalog() -> dict[str, Entry]:
             {
                 "accuracy": ("colonnade", "study", *_ROOMS, "--json", REPORT),
                 **{
-                    Path(room).name: ("colonnade", "inspect", "--background", room, "--json", REPORT) for room in _ROOMS
+                    Path(room).name: ("colonnade", "inspect", "--background", room, "--json", REPORT)
+                    for room in (*_ROOMS, _ATTIC)
                 },
             },
         ),
+        Entry("room-lights", "small", _colonnade("study", "--light", *_ROOMS, _ATTIC)),
         Entry(
             "live-rooms",
             "small",
@@ -170,6 +172,7 @@ def catalog() -> dict[str, Entry]:
         _samples(),
         _gather(),
         _light(),
+        Entry("assets", "textured", {"": ("tools/light", "samples", "--json", REPORT)}),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),

@@ -1,4 +1,4 @@
-"""The tables of ``docs/light-comparison.md``: frames in known rooms against a path tracer."""
+"""The tables of ``docs/light-comparison.md``, frames against a path tracer, and of fitted lights."""
 
 from __future__ import annotations
 
@@ -25,23 +25,28 @@ def _columns(frames: Mapping[str, Frame]) -> list[str]:
 
 
 def _cells(frames: Mapping[str, Frame], column: str, part: str) -> list[str]:
-    found = (own["qualities"][column] for own in frames.values())
-    return [f"{own[part]:.1f}, {own[f'{part}_flip']:.3f}" for own in found]
+    """Decibels, FLIP, and of frame and objects DISTS, if it was measured."""
+    keys = ("flip",) if part == "room" else ("flip", "dists")
+    found = []
+    for own in (frame["qualities"][column] for frame in frames.values()):
+        values = [own.get(f"{part}_{key}") for key in keys]
+        found.append(", ".join([f"{own[part]:.1f}", *("–" if value is None else f"{value:.3f}" for value in values)]))
+    return found
 
 
 def objects(data: Data) -> str:
-    """PSNR and FLIP of the rough objects' pixels."""
+    """PSNR, FLIP and DISTS of the rough objects' pixels."""
     frames = _of(data, "-rough")
     rows = [[column, *_cells(frames, column, "object")] for column in _columns(frames)[1:]]
-    return markdown(["objects: dB, FLIP", *frames], rows)
+    return markdown(["objects: dB, FLIP, DISTS", *frames], rows)
 
 
 def rooms(data: Data) -> str:
-    """PSNR and FLIP of the room that changes, and of the whole frame, with the rough objects."""
+    """PSNR and FLIP of the room that changes, and with DISTS of the whole frame, with the rough objects."""
     frames = _of(data, "-rough")
     rows = [[column, *_cells(frames, column, "room"), *_cells(frames, column, "frame")] for column in _columns(frames)]
     titles = [f"{room}, {part}" for part in ("room", "frame") for room in frames]
-    return markdown(["dB, FLIP", *titles], rows)
+    return markdown(["dB, FLIP, of frames DISTS", *titles], rows)
 
 
 def materials(data: Data) -> str:
@@ -83,6 +88,29 @@ def cost(data: Data) -> str:
     return markdown([f"{cycles:,} cycles and {rays:,} in-box rays a pass", *(f"{n}" for n in _PASSES)], rows)
 
 
+def assets(data: Data) -> str:
+    """PSNR and FLIP of glTF files, and whose they are."""
+    found = data.result("assets")
+    rows = [[name, f"{own['psnr']:.1f}", f"{own['flip']:.3f}"] for name, own in found["files"].items()]
+    return markdown([f"{found['repository']}, commit {found['revision'][:8]}", "dB", "FLIP"], rows)
+
+
+def fits(data: Data) -> str:
+    """Rooms relit by fitted lights, without and with walls."""
+    from colonnade.lab.evaluation.studies.room_light import FitQuality, fits_table
+
+    return fits_table({name: FitQuality(**own) for name, own in data.result("room-lights")["fits"].items()})
+
+
+def choices(data: Data) -> str:
+    """A mirror in rooms under default and fitted lights."""
+    rows = [
+        [name, *(f"{own[key]:.1f}" for key in ("relit", "mirror_device", "mirror_right"))]
+        for name, own in data.result("room-lights")["choices"].items()
+    ]
+    return markdown(["against the photo, dB", "relit room", "mirror", "its rays that are right"], rows)
+
+
 def _mean(values: list[float]) -> float:
     return sum(values) / len(values)
 
@@ -93,4 +121,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     "light-materials": materials,
     "light-mirrors": mirrors,
     "light-cost": cost,
+    "light-assets": assets,
+    "light-fits": fits,
+    "light-choices": choices,
 }

@@ -1,4 +1,4 @@
-"""The tables of ``docs/live-encoder.md`` and ``docs/captures.md``: maps of the live encoder, and rooms of a phone.
+"""The tables of maps: ``docs/background.md``, ``docs/live-encoder.md``, and of rooms of a phone, ``docs/captures.md``.
 
 Reports also have times, which are those of one machine; no table shows them.
 """
@@ -9,6 +9,25 @@ from collections.abc import Callable, Mapping
 
 from colonnade.lab.common.markdown import markdown
 from colonnade.lab.figures.data import Data
+
+
+def loss(data: Data) -> str:
+    """What the encoded maps of rooms lose."""
+    rows = []
+    for name, report in data.result("environments").items():
+        if name == "accuracy":
+            continue
+        albedo, relit = (
+            ", ".join(f"{report[part][key]:{form}}" for key, form in _LOSSES) for part in ("albedo", "relit")
+        )
+        off = ", ".join(f"{report['planes'][key]:.2f} cm" for key in ("mean_cm", "p95_cm"))
+        rows.append([name, albedo, f"{report['normals']['mean_degrees']:.2f}°", relit, off])
+    quality = "PSNR, SSIM, FLIP, DISTS"
+    planes = "planes off along the view ray: mean, 95th percentile"
+    return markdown(["room", f"albedo: {quality}", "normals, mean", f"relit: {quality}", planes], rows)
+
+
+_LOSSES = (("psnr", ".1f"), ("ssim", ".3f"), ("flip", ".3f"), ("dists", ".3f"))
 
 
 def live_rooms(data: Data) -> str:
@@ -85,6 +104,7 @@ def captures(data: Data) -> str:
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {
+    "map-loss": loss,
     "live-rooms": live_rooms,
     "live-paths": live_paths,
     "moving-frames": moving_frames,

@@ -177,7 +177,7 @@ def environments(data: Data) -> str:
     """Size and accuracy of the rooms' maps, and of the device's march."""
     found = data.result("environments")
     accuracy = {name.partition(",")[0]: own for name, own in found["accuracy"].items() if name.endswith(", device")}
-    names = [name for name in found if name != "accuracy"]
+    names = [name for name in found if name != "accuracy" and found[name]["room"] in accuracy]
     maps = [found[name] for name in names]
     marches = [accuracy[each["room"]] for each in maps]
     study, inspect = (commands_of(catalog()["environments"])[index] for index in (0, 1))

@@ -58,17 +58,23 @@ def _frames(arguments: list[str]) -> None:
 
 
 def _assets(arguments: list[str]) -> None:
-    """FOLDER FILE…: write what the path tracer needs of glTF files."""
-    from colonnade.lab.evaluation.light.assets import write_jobs
+    """FOLDER [FILE…]: write what the path tracer needs of glTF files, or of those of the pages."""
+    from colonnade.lab.evaluation.light.assets import sample_files, write_jobs
 
-    write_jobs(Path(arguments[0]), [Path(file) for file in arguments[1:]])
+    folder, *files = map(Path, arguments)
+    write_jobs(folder, files or sample_files())
 
 
 def _asset(arguments: list[str]) -> None:
-    """FOLDER: compare Colonnade's pictures of glTF files with those of the path tracer."""
-    from colonnade.lab.evaluation.light.assets import compare
+    """FOLDER [--json FILE]: compare Colonnade's pictures of glTF files with those of the path tracer."""
+    from colonnade.lab.evaluation.light.assets import COMMIT, REPOSITORY, compare
 
-    print(compare(Path(arguments[0])))
+    results = compare(Path(arguments[0]))
+    print("\n".join(f"{name}: {own.psnr:.1f} dB, FLIP {own.flip:.3f}" for name, own in results.items()))
+    if "--json" in arguments:
+        found = {name: asdict(result) for name, result in results.items()}
+        report = {"repository": REPOSITORY, "revision": COMMIT, "files": found}
+        write_json(Path(arguments[arguments.index("--json") + 1]), report)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,10 @@ are read by trimesh, not by Colonnade, so errors of its reader count. Normal map
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +21,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.common.types import Floats
 from colonnade.lab.evaluation.region_metrics import compare_regions
+from colonnade.mesh.catalog import VARIABLE
 from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
@@ -30,6 +34,63 @@ SIZE, SAMPLES = (320, 240), 64
 _AROUND, _LAMP, _OFFSET = (0.35, 0.38, 0.42), (0.7, 0.65, 0.6), (1.2, 1.6, 1.5)
 #: The preset that renders.
 _CONFIG = "textured"
+#: Files of Khronos that are measured for the pages: repository, commit, and git's name of each file's folder.
+REPOSITORY, COMMIT = "KhronosGroup/glTF-Sample-Models", "29355d2374f829c8f238b3c55ce06981455aa389"
+FILES = {
+    "Avocado": "650b42c9c148b5c5ef238ac5d49e8f7e3ceea669",
+    "BoomBoxWithAxes": "6827953582ab21780ac6402181039fd88b054355",
+    "CesiumMilkTruck": "d598dc2ba906d645ce25c95eeb194cd4d0813543",
+    "DamagedHelmet": "e4deff4578509b6f86bd0984357d11c58a39c46b",
+    "Duck": "f779188bec0572f8356f0a3ebd197a1b36a18f8e",
+    "Suzanne": "bbe5bf53dbd6e1db795e3c8c0cc59578e3ab0e9c",
+    "WaterBottle": "2a3b7efb0b6546cbddf87007f7fc3d0afb871483",
+}
+
+
+@dataclass(frozen=True)
+class AssetResult:
+    """The difference of two pictures of a file, where either shows the object.
+
+    Attributes:
+        pixels: Number of these.
+        psnr: Decibels.
+        flip: Mean FLIP.
+    """
+
+    pixels: int
+    psnr: float
+    flip: float
+
+
+def sample_files() -> list[Path]:
+    """The files of `FILES` in the folders of COLONNADE_MESHES.
+
+    Raises:
+        UserError: One is missing, or is not that of `COMMIT`.
+    """
+    folders = [Path(folder) for folder in os.environ.get(VARIABLE, "").split(os.pathsep) if folder]
+    found = []
+    for name, tree in FILES.items():
+        path = Path(name) / "glTF" / f"{name}.gltf"
+        file = next((folder / path for folder in folders if (folder / path).is_file()), None)
+        if file is None:
+            raise UserError(f"no folder of {VARIABLE} has {path}: add the folder 2.0 of {REPOSITORY}, commit {COMMIT}")
+        if _tree(file.parent) != tree:
+            raise UserError(f"{file.parent} is not that of {REPOSITORY}, commit {COMMIT}: check this commit out")
+        found.append(file)
+    return found
+
+
+def _tree(folder: Path) -> str:
+    """The name that git gives a folder of files."""
+    entries = b""
+    for file in sorted(folder.iterdir()):
+        entries += b"100644 " + file.name.encode() + b"\0" + _object(b"blob", file.read_bytes())
+    return _object(b"tree", entries).hex()
+
+
+def _object(kind: bytes, content: bytes) -> bytes:
+    return hashlib.sha1(kind + b" %d\0" % len(content) + content, usedforsecurity=False).digest()
 
 
 def write_jobs(folder: Path, files: list[Path]) -> None:
@@ -71,7 +132,7 @@ def _parts(file: Path) -> list[tuple[dict[str, NDArray[Any]], dict[str, Any]]]:
     scene = trimesh.load_scene(file)
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
-        mesh = scene.geometry[name].copy()
+        mesh = scene.geometry[name].copy(include_cache=True)  # the file's normals are in the cache
         mesh.apply_transform(transform)
         own: Any = getattr(mesh.visual, "material", None)
         values: dict[str, NDArray[Any]] = {
@@ -97,15 +158,18 @@ def _parts(file: Path) -> list[tuple[dict[str, NDArray[Any]], dict[str, Any]]]:
     return parts
 
 
-def compare(folder: Path) -> str:
-    """Render the scenes of `write_jobs`; a line for each file, and beside.png in its folder: truth, Colonnade.
+def compare(folder: Path) -> dict[str, AssetResult]:
+    """Render the scenes of `write_jobs`, and write beside.png in the folder of each file: truth, Colonnade.
+
+    Returns:
+        By the name of the file, without suffix.
 
     Raises:
         UserError: The path tracer has made no picture.
     """
     from PIL import Image
 
-    lines = []
+    results = {}
     for own in sorted(path for path in folder.iterdir() if path.is_dir()):
         result = own / "truth.npz"
         if not result.is_file():
@@ -114,11 +178,11 @@ def compare(folder: Path) -> str:
         frame = render(RenderRequest(own / "scene.toml", _CONFIG, backend="model"))
         picture = encode_srgb(frame.image)
         visible = _covered(truth) | frame.object_mask
-        difference = compare_regions(truth, picture, {"object": visible}, with_dists=False)["object"]
-        lines.append(f"{own.name}: {difference.psnr:.1f} dB, FLIP {difference.flip:.3f}")
+        found = compare_regions(truth, picture, {"object": visible}, with_dists=False)["object"]
+        results[own.name] = AssetResult(found.pixels, found.psnr or 0.0, found.flip or 0.0)
         with replacing(own / "beside.png") as stream:
             Image.fromarray(np.concatenate([truth, picture], axis=1)).save(stream, "PNG")
-    return "\n".join(lines)
+    return results
 
 
 def _covered(truth: NDArray[np.uint8]) -> NDArray[np.bool_]:

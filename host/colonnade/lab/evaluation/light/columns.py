@@ -19,6 +19,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
+from colonnade.environment.panorama import read_radiance
 from colonnade.lab.evaluation.light import files
 from colonnade.lab.evaluation.light.mirror_rays import MirrorErrors, mirror_errors
 from colonnade.lab.evaluation.light.probe import ProbeFrame
@@ -67,11 +68,13 @@ def columns() -> dict[str, Column]:
 
 @dataclass(frozen=True)
 class Quality:
-    """The error of a frame in decibels and FLIP.
+    """The error of a frame in decibels, FLIP and DISTS.
 
     Attributes:
         frame, object, room: PSNR of the whole frame, of the objects, of the room that changes.
         frame_flip, object_flip, room_flip: Mean FLIP there.
+        frame_dists, object_dists: DISTS of the frame, and of the objects with the truth around them; None without its
+            weights.
         things: PSNR of each object, by its kind.
         brightness: Light of the mirror's pixels over that of the truth; None without a mirror.
     """
@@ -82,6 +85,8 @@ class Quality:
     frame_flip: float
     object_flip: float
     room_flip: float
+    frame_dists: float | None
+    object_dists: float | None
     things: Mapping[str, float]
     brightness: float | None = None
 
@@ -138,7 +143,7 @@ def _frame(
     assert environment.photo is not None
     things = room.frames[frame]
     pictures = {"truth": truth, "no object": resized_photo(environment.photo, *FRAME)}
-    panoramas = (files.read_hdr(files.stored(name) / f"{which}.hdr") for which in ("around", "panorama"))
+    panoramas = (read_radiance(files.stored(name) / f"{which}.hdr") for which in ("around", "panorama"))
     image, owners = ProbeFrame(room, things, environment, *panoramas).render()
     pictures["probe, rasteriser"] = encode_srgb(image)
     for title, column in columns().items():
@@ -174,7 +179,7 @@ def _quality(
     of_things: Mapping[str, NDArray[np.bool_]],
     mirror: NDArray[np.bool_] | None,
 ) -> Quality:
-    own = compare_regions(truth, picture, {**regions, **of_things}, with_dists=False)
+    own = compare_regions(truth, picture, {**regions, **of_things}, with_dists=("frame", "object"))
     values = {part: own[part].psnr or 0.0 for part in own}
     flips = {part: own[part].flip or 0.0 for part in regions}
     quality = Quality(
@@ -184,6 +189,8 @@ def _quality(
         flips["frame"],
         flips["object"],
         flips["room"],
+        own["frame"].dists,
+        own["object"].dists,
         {kind: values[kind] for kind in of_things},
     )
     if mirror is None:

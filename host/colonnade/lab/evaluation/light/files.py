@@ -16,18 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.atomic_files import replacing
-from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb, read_picture
+from colonnade.common.temporary import temporary_folder
 from colonnade.common.types import Floats
 from colonnade.design.toolchain import project_root
 from colonnade.environment.model import Environment
+from colonnade.environment.panorama import read_radiance
 from colonnade.lab.evaluation.light.rooms import FRAME, KnownRoom, Thing
 from colonnade.lab.evaluation.light.surfaces import pose_of
 from colonnade.lab.evaluation.studies.synthetic_attic import write_room
 from colonnade.mesh.load import load_mesh
 
-#: A panorama of `Radiance` begins so.
-_HDR = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n"
+#: Constants of glTF.
 _FLOAT, _ARRAY = 5126, 34962
 
 
@@ -45,31 +45,20 @@ def truth(name: str, frame: str) -> NDArray[np.uint8]:
     return read_picture(stored(name) / f"{frame}.webp")
 
 
-def write_hdr(path: Path, radiance: Floats) -> None:
-    """Write linear radiance, float64 [height, width, 3], as Radiance HDR with shared exponents."""
-    largest = radiance.max(axis=2)
-    _, exponent = np.frexp(largest)
-    scaled = np.ldexp(radiance, (8 - exponent)[..., None]).clip(0, 255)
-    shared = np.where(largest > 1e-32, exponent + 128, 0)
-    pixels = np.concatenate([np.where(shared[..., None] > 0, scaled, 0), shared[..., None]], axis=2)
-    with replacing(path) as stream:
-        stream.write(_HDR % radiance.shape[:2] + pixels.astype(np.uint8).tobytes())
+def write_panorama(path: Path, radiance: Floats) -> None:
+    """Write linear radiance, float64 [height, width, 3], as Radiance HDR."""
+    import OpenImageIO
 
-
-def read_hdr(path: Path) -> Floats:
-    """Read what `write_hdr` wrote, float64 [height, width, 3].
-
-    Raises:
-        UserError: The file is missing or another one.
-    """
-    try:
-        data = path.read_bytes()
-        height, width = (int(word) for word in data.split(b"\n", 4)[3].split()[1::2])
-        pixels = np.frombuffer(data[len(_HDR % (height, width)) :], dtype=np.uint8).reshape(height, width, 4)
-    except (OSError, ValueError, IndexError) as error:
-        raise UserError(f"{path} is no panorama of tools/light: run tools/light truth ({error})") from None
-    values = np.ldexp(pixels[..., :3] + 0.5, (pixels[..., 3:].astype(np.int64) - 136))
-    return np.where(pixels[..., 3:] > 0, values, 0.0)
+    height, width = radiance.shape[:2]
+    with temporary_folder() as folder:
+        file = folder / path.name
+        output = OpenImageIO.ImageOutput.create(str(file))
+        assert output is not None
+        output.open(str(file), OpenImageIO.ImageSpec(width, height, 3, "float"))
+        output.write_image(np.ascontiguousarray(radiance, dtype=np.float32))
+        output.close()
+        with replacing(path) as stream:
+            stream.write(file.read_bytes())
 
 
 #: The scenes of a frame: what is known of the light (see `columns.Column`), and the gathered rays of a path.
@@ -111,7 +100,7 @@ def _lights(name: str, room: KnownRoom) -> list[str]:
         position, colour, radius = emitter.seen_from(np.array(room.place))
         lines += ["[[light]]", f"position = {_row(position)}", f"colour = {_row(colour.clip(max=15.0))}"]
         lines += ["falloff = 1.0", f"radius = {radius:.4f}", ""]
-    around = read_hdr(stored(name) / "around.hdr")
+    around = read_radiance(stored(name) / "around.hdr")
     weights = np.sin((np.arange(len(around)) + 0.5) / len(around) * np.pi)
     ambient = (around.mean(axis=1) * weights[:, None]).sum(axis=0) / weights.sum()
     return [*lines, "[ambient]", f"colour = {_row(ambient)}", ""]
@@ -182,7 +171,7 @@ def store(name: str, result: Path) -> None:
     for what in made.files:
         light = made[what].astype(np.float64)
         if what in ("panorama", "around"):
-            write_hdr(folder / f"{what}.hdr", light)
+            write_panorama(folder / f"{what}.hdr", light)
         else:
             with replacing(folder / f"{what}.webp") as stream:
                 Image.fromarray(encode_srgb(light)).save(stream, "WEBP", lossless=True, quality=100, method=6)

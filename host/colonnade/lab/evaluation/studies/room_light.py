@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -21,7 +21,12 @@ from colonnade.common.image_io import decode_srgb, encode_srgb, write_png
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
+from colonnade.environment.fitted_lights import fitted_lights
 from colonnade.environment.light_fit import DEFAULT_LIGHTS, relit_psnr
+from colonnade.environment.lights import irradiance, world_surface
+from colonnade.environment.load import load_environment
+from colonnade.environment.surround import wall_exposures
+from colonnade.lab.common.markdown import markdown
 from colonnade.lab.evaluation.studies.environment_accuracy import NEAR_METRES, NEAR_PIXELS
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.bounce import bounce
@@ -81,6 +86,42 @@ class LightQuality:
     headroom: float
 
 
+@dataclass(frozen=True)
+class FitQuality:
+    """How well fitted light explains a room's photo: PSNR of the relit room without shadows, decibels.
+
+    Attributes:
+        ambient: Ambient light alone.
+        lights: With lamps.
+        walls: Lamps beside the light of walls; None if the fit drops the walls.
+        lamps: The lamps of that fit with the best ambient light, which scenes that gather light have.
+    """
+
+    ambient: float
+    lights: float
+    walls: float | None
+    lamps: float
+
+
+def study_fits(folders: Iterable[Path]) -> dict[str, FitQuality]:
+    """The quality of the lights that are fitted to rooms, by room."""
+    found = {}
+    for folder in folders:
+        environment = load_environment(folder)
+        alone, beside = (fitted_lights(environment, walls=walls) for walls in (False, True))
+        assert environment.photo is not None
+        walls = None
+        if (surround := beside.surround) is not None:
+            points, normals = (values.reshape(-1, 3) for values in world_surface(environment))
+            lamps = replace(beside.lights, ambient=np.zeros(3))
+            light = wall_exposures(points, normals, surround.low, surround.high) @ surround.radiance
+            light += irradiance(points, normals, lamps)
+            relit = environment.albedo * light.reshape(environment.albedo.shape)
+            walls = psnr(environment.photo, encode_srgb(relit.clip(max=1.0)))
+        found[environment.name] = FitQuality(alone.ambient_psnr, alone.psnr, walls, beside.psnr)
+    return found
+
+
 def study_light(
     folders: Iterable[Path], progress: Progress = QUIET, output: Path | None = None
 ) -> dict[str, LightQuality]:
@@ -108,6 +149,16 @@ def study_light(
     return reports
 
 
+def fits_table(reports: dict[str, FitQuality]) -> str:
+    """The reports as a Markdown table."""
+    titles = ["room against its photo, dB", "ambient light", "with lamps", "beside walls", "the lamps of these alone"]
+    rows = [
+        [name, *("–" if value is None else f"{value:.1f}" for value in asdict(report).values())]
+        for name, report in reports.items()
+    ]
+    return markdown(titles, rows)
+
+
 def table(reports: dict[str, LightQuality]) -> str:
     """The reports as a Markdown table."""
     header = (
@@ -132,7 +183,7 @@ def table(reports: dict[str, LightQuality]) -> str:
         )
         for name, report in reports.items()
     ]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
+    return markdown(header, rows)
 
 
 def _scene(folder: Path, names_light: bool, colours: Literal["photo", "albedo"]) -> Scene:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colonnade.common.errors import UserError
+from colonnade.environment.panorama import read_radiance
 from colonnade.lab.evaluation.light import files
 from colonnade.lab.evaluation.light.probe import Probe
 from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS, Lamp, Thing, Window
@@ -26,7 +26,7 @@ def test_every_room_is_stored() -> None:
         for frame in room.frames:
             assert files.truth(name, frame).shape == (FRAME[1], FRAME[0], 3)
         for panorama in ("panorama", "around"):
-            assert files.read_hdr(files.stored(name) / f"{panorama}.hdr").shape[2] == 3
+            assert read_radiance(files.stored(name) / f"{panorama}.hdr").shape[2] == 3
         total += sum(file.stat().st_size for file in files.stored(name).iterdir())
     assert PHOTO[0] % FRAME[0] == 0
     assert total <= BUDGET
@@ -37,15 +37,9 @@ def test_a_panorama_keeps_its_radiance(scale: float, seed: int, tmp_path_factory
     radiance = np.random.default_rng(seed).random((4, 8, 3)) * scale
     radiance[0, 0] = 0.0
     file = tmp_path_factory.mktemp("hdr") / "a.hdr"
-    files.write_hdr(file, radiance)
-    found = files.read_hdr(file)
+    files.write_panorama(file, radiance)
+    found = read_radiance(file)
     assert np.all(np.abs(found - radiance) <= radiance.max(axis=2, keepdims=True) / 128)
-
-
-def test_another_file_is_no_panorama(tmp_path: Path) -> None:
-    (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\n")
-    with pytest.raises(UserError, match=r"a\.hdr is no panorama"):
-        files.read_hdr(tmp_path / "a.hdr")
 
 
 def test_an_object_has_its_material_and_its_place(tmp_path: Path) -> None:
