@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
@@ -20,9 +21,10 @@ from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
 from colonnade.mesh.gltf_document import GltfDocument
 from colonnade.mesh.gltf_draco import DRACO, DracoPrimitives, PrimitiveArrays
+from colonnade.mesh.gltf_metal import as_metal, metal_of
 from colonnade.mesh.gltf_textures import GltfTextures
 from colonnade.mesh.losses import Losses, extension_loss
-from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, gltf_losses, unused_extensions
+from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, gltf_losses, metal_factors, unused_extensions
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, joined
 from colonnade.mesh.texture import MAX_UV
@@ -60,14 +62,14 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     textures = GltfTextures(document, references, losses)
     compressed = DracoPrimitives(document)
     used: set[int] = set()
-    parts = []
+    parts: list[_Part] = []
     for node, matrix in _nodes(document, losses):
         mesh = document.entry("meshes", node["mesh"])
         for primitive in mesh.get("primitives", []):
             part = _primitive(document, primitive, matrix, len(materials) - 1, losses, textures, compressed)
             if part is not None:
                 parts.append(part)
-                used.add(int(part[1]))
+                used.add(part.material)
     found = list(materials)
     for index in sorted(used - {len(materials) - 1}):
         material = document.entry("materials", index)
@@ -78,13 +80,10 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     textures.reader.count_losses()
     if not parts:
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-    surface = joined([part for part, _ in parts])
-    materials, numbers = _textured(tuple(found), parts, textures)
-    face_materials = np.concatenate(
-        [np.full(len(part.faces), number) for (part, _), number in zip(parts, numbers, strict=True)]
-    )
+    surface = joined([part.surface for part in parts])
+    materials, face_materials = _materials_of(tuple(found), parts, textures)
     two_sided = [bool(material.get("doubleSided", False)) for material in document.json.get("materials", [])] + [True]
-    single_sided = np.concatenate([np.full(len(part.faces), not two_sided[number]) for part, number in parts])
+    single_sided = np.concatenate([np.full(len(part.surface.faces), not two_sided[part.material]) for part in parts])
     colours = surface.colours
     if colours is not None:
         colours = colours * np.array([material.albedo for material in materials])[face_materials][:, None]
@@ -98,19 +97,43 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     )
 
 
-def _textured(
-    materials: tuple[MeshMaterial, ...], parts: list[tuple[RawSurface, int]], textures: GltfTextures
-) -> tuple[tuple[MeshMaterial, ...], list[int]]:
-    """The materials, with further ones for parts that show their texture, and the material of each part."""
+@dataclass(frozen=True)
+class _Part:
+    """A primitive.
+
+    Attributes:
+        surface: Its triangles, in the scene's space.
+        material: Its number in the file.
+        metal: Faces that are metal by a map, bool [m], and their roughness; None without a map.
+    """
+
+    surface: RawSurface
+    material: int
+    metal: tuple[NDArray[np.bool_], float] | None = None
+
+
+def _materials_of(
+    materials: tuple[MeshMaterial, ...], parts: list[_Part], textures: GltfTextures
+) -> tuple[tuple[MeshMaterial, ...], Indices]:
+    """The materials, with further ones for parts that show their texture, and for metal; that of each face."""
     found, numbers = list(materials), []
-    for part, number in parts:
-        use = None if part.uvs is None else textures.uses[number]
+
+    def number_of(material: MeshMaterial) -> int:
+        if material not in found:
+            found.append(material)
+        return found.index(material)
+
+    for part in parts:
+        use = None if part.surface.uvs is None else textures.uses[part.material]
+        material, number = materials[part.material], part.material
         if use is not None:
-            material = replace(materials[number], texture=use.texture)
-            number = found.index(material) if material in found else len(found)
-            found += [material] if number == len(found) else []
-        numbers.append(number)
-    return tuple(found), numbers
+            material = replace(material, texture=use.texture)
+            number = number_of(material)
+        own = np.full(len(part.surface.faces), number)
+        if part.metal is not None and part.metal[0].any() and material.kind == "diffuse":
+            own[part.metal[0]] = number_of(as_metal(material, part.metal[1]))
+        numbers.append(own)
+    return tuple(found), np.concatenate(numbers)
 
 
 def _check_extensions(document: GltfDocument) -> None:
@@ -198,8 +221,8 @@ def _primitive(
     losses: Losses,
     textures: GltfTextures,
     compressed: DracoPrimitives,
-) -> tuple[RawSurface, int] | None:
-    """The triangles of a primitive in the scene's space, and their material; None for points and lines."""
+) -> _Part | None:
+    """A primitive; None for points and lines."""
     mode, attributes = primitive.get("mode", _TRIANGLES), primitive.get("attributes", {})
     if mode == _POINTS or mode in _LINE_MODES:
         losses.add(lost.POINTS if mode == _POINTS else lost.LINES)
@@ -264,17 +287,23 @@ def _primitive(
     if uvs is not None:
         losses.add(lost.TEXTURED_COLOURS, len(faces) if shows_colours else 0)
         shows_colours = False
-    return (
-        RawSurface(
-            vertices=fixed_order.product(positions, linear.T) + matrix[:3, 3],
-            faces=faces,
-            normals=None if normals is None else normals[faces],
-            colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
-            uvs=None if uvs is None else uvs[faces],
-            alphas=None if alphas is None else alphas[faces],
-        ),
-        int(material),
+    surface = RawSurface(
+        vertices=fixed_order.product(positions, linear.T) + matrix[:3, 3],
+        faces=faces,
+        normals=None if normals is None else normals[faces],
+        colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
+        uvs=None if uvs is None else uvs[faces],
+        alphas=None if alphas is None else alphas[faces],
     )
+    metal = textures.metal_of(int(material)) if material != default else None
+    places = None if metal is None else attribute(metal.coordinates, 2)
+    if metal is None or places is None or not (np.abs(places) <= MAX_UV).all():
+        return _Part(surface, int(material))
+    edges = surface.vertices[faces[:, 1:]] - surface.vertices[faces[:, :1]]
+    areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    factors = metal_factors(document.entry("materials", material))
+    texture = textures.reader.textures[metal.texture]
+    return _Part(surface, int(material), metal_of(texture, metal.uvs(places)[faces], factors, areas))
 
 
 def _corners(document: GltfDocument, arrays: PrimitiveArrays, count: int) -> Indices:

@@ -52,6 +52,7 @@ class GltfTextures:
     def __init__(self, document: GltfDocument, references: References, losses: Losses) -> None:
         self._document, self._references, self._losses = document, references, losses
         self._uses: dict[int, TextureUse | None] = {}
+        self._metals: dict[int, TextureUse | None] = {}
         self._read: dict[tuple[int, Wrap, Wrap, bool], int | None] = {}
         self.reader = TextureReader(losses)
 
@@ -72,7 +73,16 @@ class GltfTextures:
         Raises:
             UserError: The texture does not exist, or its transform is not valid.
         """
-        info = gltf_surface(material).get("baseColorTexture")
+        return self._use(gltf_surface(material).get("baseColorTexture"))
+
+    def metal_of(self, number: int) -> TextureUse | None:
+        """As `use_of`, of the metallic-roughness map of a material."""
+        if number not in self._metals:
+            surface = gltf_surface(self._document.entry("materials", number))
+            self._metals[number] = self._use(surface.get("metallicRoughnessTexture"))
+        return self._metals[number]
+
+    def _use(self, info: Any) -> TextureUse | None:
         if not isinstance(info, Mapping):
             return None
         index = self._index_of(info)

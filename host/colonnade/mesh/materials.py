@@ -3,7 +3,7 @@
 | | glTF | MTL |
 |---|---|---|
 | albedo | base colour factor, linear | `Kd`, sRGB but of Blender; for glass `Tf` if given |
-| mirror | metallic factor of at least ½, without a metallic-roughness texture | `Pm` of at least ½, or `illum` 3 or 5 |
+| mirror | metallic factor of at least ½; faces of a map (`gltf_metal`) | `Pm` of at least ½, or `illum` 3 or 5 |
 | roughness of a mirror | roughness factor | `Pr` |
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
@@ -118,6 +118,12 @@ def gltf_surface(material: Mapping[str, Any]) -> Mapping[str, Any]:
         named = (("diffuseFactor", "baseColorFactor"), ("diffuseTexture", "baseColorTexture"))
         return found | {name: older[old] for old, name in named if old in older}
     return {"metallicFactor": 0.0} if surface is None else surface
+
+
+def metal_factors(material: Mapping[str, Any]) -> tuple[float, float]:
+    """The factors of metallic and roughness of a material from a glTF file's JSON."""
+    surface = gltf_surface(material)
+    return _number(surface.get("metallicFactor"), 1.0), _number(surface.get("roughnessFactor"), 1.0)
 
 
 def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:

@@ -81,6 +81,10 @@ class Texture:
         """Linear colours at texture coordinates, float64 [n, 2]: bilinear between pixels' centres, float64 [n, 3]."""
         return self._filtered(uvs, self.pixels, _LINEAR)
 
+    def codes(self, uvs: Floats) -> Floats:
+        """The pixels' codes, 0 to 255, at texture coordinates, filtered as the colours, float64 [n, 3]."""
+        return self._filtered(uvs, self.pixels, np.arange(256.0))
+
     def alphas(self, uvs: Floats) -> Floats:
         """Alpha at texture coordinates, float64 [n, 2], filtered as the colours, 0 to 1, float64 [n]."""
         if self.alpha is None:

@@ -1,0 +1,72 @@
+"""Metallic-roughness maps of glTF files: faces that are metal by them, and their roughness."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from textured_files import gltf
+
+from colonnade.common.srgb import linear_from_srgb
+from colonnade.mesh.gltf_metal import metal_of
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.texture import Texture
+
+
+def packed(roughness: int, metallic: int) -> np.ndarray:
+    """A map of one value in a picture of 2x2 pixels."""
+    return np.full((2, 2, 3), (255, roughness, metallic), np.uint8)
+
+
+def surface(**more: object) -> list[dict[str, object]]:
+    return [{"pbrMetallicRoughness": {"metallicRoughnessTexture": {"index": 0}, **more}}]
+
+
+@pytest.mark.parametrize(
+    ("roughness", "metallic", "factors", "kind", "expected"),
+    [
+        (128, 255, {}, "mirror", 0.5),
+        (255, 255, {"roughnessFactor": 0.76}, "mirror", 0.75),
+        (0, 200, {}, "mirror", 0.0),
+        (128, 100, {}, "diffuse", 0.0),
+        (128, 255, {"metallicFactor": 0.4}, "diffuse", 0.0),
+    ],
+)
+def test_a_map_makes_metal(
+    tmp_path: Path, roughness: int, metallic: int, factors: dict[str, float], kind: str, expected: float
+) -> None:
+    texture = {"baseColorTexture": {"index": 0}} if metallic == 255 else {}
+    mesh = load_mesh(gltf(tmp_path, packed(roughness, metallic), materials=surface(**texture, **factors)))
+    (material,) = (mesh.materials[index] for index in mesh.face_materials)
+    assert (material.kind, material.roughness) == (kind, expected)
+    # A picture of one colour is no texture
+    green = linear_from_srgb(np.array(roughness / 255)) if texture else 1.0
+    np.testing.assert_allclose(material.albedo, (1.0, green, 1.0), atol=1e-3)
+    assert any("a face is metal or diffuse, with one roughness" in line for line in mesh.notes)
+
+
+def test_without_positions_or_picture_the_surface_is_diffuse(tmp_path: Path) -> None:
+    plain = {"attributes": {"POSITION": 0}, "material": 0}
+    for changes in ({"meshes": [{"primitives": [plain]}]}, {"images": [{"uri": "missing.png"}]}):
+        mesh = load_mesh(gltf(tmp_path, packed(128, 255), materials=surface(), **changes))
+        assert [material.kind for material in mesh.materials] == ["diffuse"]
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_faces_are_metal_where_the_map_is(seed: int) -> None:
+    """The left half of a map is metal, in two shades of roughness; faces lie in one half each."""
+    random = np.random.default_rng(seed)
+    pixels = np.zeros((64, 64, 3), np.uint8)
+    pixels[:, :32, 2] = 255
+    pixels[:32, :, 1], pixels[32:, :, 1] = 64, 192
+    corners = random.uniform(0.05, 0.4, (20, 3, 2)) + (random.integers(0, 2, 20)[:, None] * (0.5, 0.0))[:, None]
+    areas = random.uniform(0.1, 1.0, 20)
+    is_metal, roughness = metal_of(Texture("a", pixels), corners, (1.0, 1.0), areas)
+    np.testing.assert_array_equal(is_metal, corners[:, 0, 0] < 0.5)
+    # All of them lie in the upper half
+    assert roughness == (0.25 if is_metal.any() else 0.0)
+    lower, rough = metal_of(Texture("a", pixels), corners + np.array([0, 0.5]), (1.0, 1.0), areas)
+    assert rough == (0.75 if lower.any() else 0.0)
