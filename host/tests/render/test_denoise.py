@@ -82,7 +82,7 @@ def run(folder: Path, gather: int, *options: str) -> tuple[int, str]:
 
 def test_the_command_filters_the_object(tmp_path: Path) -> None:
     pictures = {}
-    for name, options in (("raw", ("1",)), ("filtered", ("1", "--denoise")), ("truth", ("256",))):
+    for name, options in (("raw", ("1",)), ("filtered", ("1", "--denoise")), ("truth", ("64",))):
         output_file = str(tmp_path / f"{name}.png")
         status, output = run(tmp_path, 1, "--backend", "model", "--output", output_file, "--samples", *options)
         assert status == 0, output
