@@ -1,5 +1,7 @@
 // Exact integer arithmetic of the datapaths (docs/numbers.md, "Rounding").
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 
@@ -8,18 +10,20 @@ namespace colonnade {
 using Wide = __int128;
 using UnsignedWide = unsigned __int128;
 
+/// The unsigned integer of a signed one's size.
+template <class Integer> using UnsignedOf = std::conditional_t<sizeof(Integer) == sizeof(Wide), UnsignedWide, std::uint64_t>;
+
 /// Number of bits of x; 0 for 0.
 inline int bitLength(UnsignedWide x) {
     const auto high = static_cast<std::uint64_t>(x >> 64), low = static_cast<std::uint64_t>(x);
     return high ? 128 - __builtin_clzll(high) : low ? 64 - __builtin_clzll(low) : 0;
 }
 
-inline UnsignedWide magnitude(Wide x) { return x < 0 ? -static_cast<UnsignedWide>(x) : static_cast<UnsignedWide>(x); }
+template <class Integer> UnsignedOf<Integer> magnitude(Integer x) { return x < 0 ? -static_cast<UnsignedOf<Integer>>(x) : static_cast<UnsignedOf<Integer>>(x); }
 
 /// x · 2^bits, modulo the integer's range.
 template <class Integer> Integer shiftLeft(Integer x, int bits) {
-    using Unsigned = std::conditional_t<sizeof(Integer) == sizeof(Wide), UnsignedWide, std::uint64_t>;
-    return bits >= static_cast<int>(8 * sizeof(Integer)) ? Integer(0) : static_cast<Integer>(static_cast<Unsigned>(x) << bits);
+    return bits >= static_cast<int>(8 * sizeof(Integer)) ? Integer(0) : static_cast<Integer>(static_cast<UnsignedOf<Integer>>(x) << bits);
 }
 
 /// The low `bits` bits of x as a signed number, as in a register of that width.
@@ -29,6 +33,11 @@ inline Wide wrapped(Wide x, int bits) { return shiftLeft<Wide>(x, 128 - bits) >>
 template <class Integer> Integer floorShift(Integer x, int bits) {
     if (bits <= 0) return shiftLeft(x, -bits);
     return bits >= static_cast<int>(8 * sizeof(Integer)) ? (x < 0 ? Integer(-1) : Integer(0)) : x >> bits;
+}
+
+/// floorShift(x, bits) of one of several numbers whose magnitudes or complements have no other bits than `all`, where the result fits 64 bits.
+inline std::int64_t shiftToFit(Wide x, int bits, UnsignedWide all) {
+    return all >> 62 == 0 ? floorShift(static_cast<std::int64_t>(x), bits) : static_cast<std::int64_t>(floorShift(x, bits));
 }
 
 /// x / 2^bits rounded to nearest, ties to even; a left shift for negative `bits`.
@@ -52,7 +61,9 @@ struct Normalised {
 inline Normalised normalise(UnsignedWide x, int bits) {
     const int exponent = bitLength(x);
     const int drop = exponent - bits;
-    return {static_cast<std::uint64_t>(drop >= 0 ? x >> drop : x << -drop), exponent};
+    if (exponent > 64) return {static_cast<std::uint64_t>(drop >= 0 ? x >> drop : x << -drop), exponent};
+    const auto low = static_cast<std::uint64_t>(x);
+    return {low == 0 ? 0 : drop >= 0 ? low >> drop : low << -drop, exponent};
 }
 
 /// floor(numerator * 2^digits / denominator) for mantissas of at most 32 bits; 0 for a zero denominator.
@@ -61,13 +72,11 @@ inline std::uint64_t divide(std::uint64_t numerator, std::uint64_t denominator, 
     return (numerator << digits) / denominator;
 }
 
-/// floor(sqrt(radicand)), bit by bit.
+/// floor(sqrt(radicand)): that of floating point, corrected.
 inline std::uint64_t squareRoot(std::uint64_t radicand) {
-    std::uint64_t root = 0;
-    for (int bit = 31; bit >= 0; --bit) {
-        const std::uint64_t trial = root | (std::uint64_t(1) << bit);
-        if (static_cast<UnsignedWide>(trial) * trial <= radicand) root = trial;
-    }
+    auto root = std::min<std::uint64_t>(0xffffffff, static_cast<std::uint64_t>(std::sqrt(static_cast<double>(radicand))));
+    while (root * root > radicand) --root;
+    while (root < 0xffffffff && (root + 1) * (root + 1) <= radicand) ++root;
     return root;
 }
 

@@ -58,8 +58,10 @@ struct MapRay {
 
 /// Scales a vector so that its components fit `bits` bits and a sign, as if one of them had at least `length` bits; returns the right shift.
 inline int blockScale(const WideVector& v, int bits, Vector& scaled, int length = 0) {
-    for (const Wide component : v) length = std::max(length, bitLength(UnsignedWide(component < 0 ? ~component : component)));
-    for (int a = 0; a < 3; ++a) scaled[a] = static_cast<std::int64_t>(floorShift(v[a], length - bits));
+    UnsignedWide all = 0;
+    for (const Wide component : v) all |= UnsignedWide(component ^ (component >> 127));
+    length = std::max(length, bitLength(all));
+    for (int a = 0; a < 3; ++a) scaled[a] = shiftToFit(v[a], length - bits, all);
     return length - bits;
 }
 

@@ -84,9 +84,10 @@ struct Field {
 
     std::int64_t read(const std::uint8_t* record) const {
         std::uint64_t bits = 0;
-        for (int bit = 0; bit < width; ++bit) {
-            const int position = offset + bit;
-            bits |= static_cast<std::uint64_t>((record[position / 8] >> (position % 8)) & 1) << bit;
+        for (int bit = 0; bit < width;) {
+            const int position = offset + bit, shift = position % 8, count = std::min(8 - shift, width - bit);
+            bits |= static_cast<std::uint64_t>((record[position / 8] >> shift) & ((1u << count) - 1)) << bit;
+            bit += count;
         }
         if (isSigned && width < 64 && (bits >> (width - 1))) bits |= ~std::uint64_t(0) << width;
         return static_cast<std::int64_t>(bits);

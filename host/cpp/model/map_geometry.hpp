@@ -81,7 +81,7 @@ protected:
 
     /// A component of the ray's position at s.
     std::int64_t positionAt(const MapRay& ray, int axis, std::int64_t s) const {
-        return ray.position[axis] + static_cast<std::int64_t>(floorShift<Wide>(Wide(ray.direction[axis]) * s, f_));
+        return ray.position[axis] + floorShift(ray.direction[axis] * s, f_);
     }
 
     PlaneDistance planeDistance(const MapRay& ray, const PlaneWord& plane, int id) const {
@@ -94,7 +94,7 @@ protected:
     }
 
     /// Distance of the ray from a plane at s.
-    std::int64_t distanceAt(const PlaneDistance& depth, std::int64_t s) const { return depth.value + static_cast<std::int64_t>(floorShift<Wide>(Wide(depth.slope) * s, f_)); }
+    std::int64_t distanceAt(const PlaneDistance& depth, std::int64_t s) const { return depth.value + floorShift(depth.slope * s, f_); }
 
     /// Converts a distance to w's units.
     std::int64_t toW(std::int64_t value, const PlaneDistance& depth) const { return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent); }

@@ -30,22 +30,20 @@ struct Ray {
     std::uint64_t limitId;
 
     /// The object's axis that component `permuted` of the ray's frame is on.
-    int objectAxis(int permuted) const { return (axis + 1 + permuted) % 3; }
+    int objectAxis(int permuted) const {
+        const int next = axis + 1 + permuted;
+        return next < 3 ? next : next - 3;
+    }
 };
 
-/// A ray's entry to and exit from a slab, vertex units.
-struct Crossing {
-    Wide tNear, tFar;
+/// A ray's entry to and exit from a slab along one axis, vertex units.
+template <class Integer> struct Crossing {
+    Integer tNear, tFar;
 };
 
-/// Intersects the slab low..high on one axis; `pad` widens it on both sides. The dominant axis needs no reciprocal.
-inline Crossing crossDominant(Wide low, Wide high, Wide origin, bool negative, Wide pad) {
-    return negative ? Crossing{origin - high - pad, origin - low + pad} : Crossing{low - origin - pad, high - origin + pad};
-}
-
-inline Crossing crossSheared(Wide low, Wide high, Wide origin, bool negative, Wide pad, std::int64_t reciprocal, int drop) {
-    const Crossing distance = crossDominant(low, high, origin, negative, pad);
-    return {floorShift<Wide>(distance.tNear * reciprocal, drop), floorShift<Wide>(distance.tFar * reciprocal, drop) + 1};
+/// Intersects the slab low..high on one axis; `pad` widens it on both sides.
+template <class Integer> Crossing<Integer> crossSlab(Integer low, Integer high, Integer origin, bool negative, Integer pad) {
+    return negative ? Crossing<Integer>{origin - high - pad, origin - low + pad} : Crossing<Integer>{low - origin - pad, high - origin + pad};
 }
 
 /// The object's bounding box, vertex units.
@@ -53,7 +51,7 @@ struct Bounds {
     Vector low, high;
 };
 
-inline std::int64_t boxOrigin(Wide origin, const Numbers& n) { return static_cast<std::int64_t>(nearestEven(origin, n.gridFraction)); }
+template <class Integer> std::int64_t boxOrigin(Integer origin, const Numbers& n) { return static_cast<std::int64_t>(nearestEven(origin, n.gridFraction)); }
 
 /// The axis of largest magnitude; ties go to the lowest axis.
 inline int dominantAxis(const WideVector& direction) {
@@ -61,6 +59,52 @@ inline int dominantAxis(const WideVector& direction) {
     for (int other = 1; other < 3; ++other)
         if (magnitude(direction[other]) > magnitude(direction[axis])) axis = other;
     return axis;
+}
+
+/// Intersects a ray of known direction with the object's box and advances it to its entry. `Integer` holds the products of positions.
+template <class Integer> void enterBox(Ray& ray, const RayRequest& request, const Bounds& bounds, const Numbers& n) {
+    std::array<Integer, 3> origin;
+    for (int a = 0; a < 3; ++a) origin[a] = static_cast<Integer>(request.origin[ray.objectAxis(a)]);
+    const Integer pad = n.boxPad(), maximum = (Integer(1) << n.entryBits) - 1;
+    const auto saturate = [&](Integer distance) { return clamp<Integer>(distance, -maximum, maximum); };
+    const auto slack = [&](Integer distance) { return distance > 0 ? distance >> n.entrySlackShift : Integer(0); };
+    const auto cross = [&](int a, Integer width) {
+        const int axis = ray.objectAxis(a);
+        return crossSlab<Integer>(bounds.low[axis], bounds.high[axis], boxOrigin(origin[a], n), ray.negative[a], width);
+    };
+    const Crossing<Integer> along = cross(2, pad);
+    Integer tNear = std::max<Integer>(0, along.tNear), tFar = along.tFar;
+    const Integer sidePad = pad + (tNear >> n.vertexBits);
+    for (int a = 0; a < 2; ++a) {
+        const Crossing<Integer> side = cross(a, sidePad);
+        const int drop = n.reciprocalFraction - ray.exponent[a];
+        const Integer sideTNear = saturate(floorShift<Integer>(side.tNear * ray.reciprocal[a], drop)), sideTFar = saturate(floorShift<Integer>(side.tFar * ray.reciprocal[a], drop) + 1);
+        tNear = std::max(tNear, sideTNear - slack(sideTNear));
+        tFar = std::min(tFar, saturate(sideTFar + slack(sideTFar)));
+    }
+    ray.enters = tNear <= tFar;
+    if (!ray.enters) return;
+    if (n.gridFraction < 0) tNear = (tNear >> -n.gridFraction) << -n.gridFraction;
+    ray.tEntry = static_cast<std::int64_t>(tNear);
+
+    // Advance the origin to the entry point
+    const Integer entrySteps = floorShift<Integer>(tNear, -n.gridFraction);
+    const auto inReach = [&](Integer position) {
+        const Integer half = floorShift<Integer>(Integer(1) << (n.vertexBits - 1), -n.gridFraction);
+        return static_cast<std::int64_t>(clamp<Integer>(position, -half, 3 * half));
+    };
+    for (int a = 0; a < 2; ++a) ray.origin[a] = inReach(origin[a] + nearestEven<Integer>(ray.shear[a] * tNear, n.vertexBits + 1));
+    ray.origin[2] = inReach(ray.negative[2] ? origin[2] - entrySteps : origin[2] + entrySteps);
+    for (int a = 0; a < 3; ++a) ray.boxOrigin[a] = boxOrigin(ray.origin[a], n);
+    ray.tMax = static_cast<std::int64_t>(clamp<Integer>(static_cast<Integer>(request.tMax) - entrySteps, 0, n.maxT()));
+}
+
+/// Whether 64 bits hold the numbers of `enterBox`: not in wide formats, or from far away.
+inline bool isNarrow(const RayRequest& request, const Numbers& n) {
+    UnsignedWide all = 0;
+    for (const Wide position : request.origin) all |= magnitude(position);
+    const int bits = bitLength(all), unitBits = std::max(bits - n.gridFraction, n.vertexBits) + 3;
+    return std::max({bits, bitLength(magnitude(request.tMax)), unitBits + n.reciprocalFraction, n.shearFraction + n.entryBits, n.gridFraction + n.entryBits, n.gridBits}) < 60;
 }
 
 inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Numbers& n) {
@@ -71,11 +115,7 @@ inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Num
 
     // Shear factors and reciprocals
     const Normalised dominant = normalise(magnitude(request.direction[ray.axis]), n.mantissaBits);
-    WideVector origin;
-    for (int a = 0; a < 3; ++a) {
-        origin[a] = request.origin[ray.objectAxis(a)];
-        ray.negative[a] = request.direction[ray.objectAxis(a)] < 0;
-    }
+    for (int a = 0; a < 3; ++a) ray.negative[a] = request.direction[ray.objectAxis(a)] < 0;
     for (int a = 0; a < 2; ++a) {
         const Wide component = request.direction[ray.objectAxis(a)];
         const Normalised minor = normalise(magnitude(component), n.mantissaBits);
@@ -94,38 +134,8 @@ inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Num
             ray.exponent[a] = exponent;
         }
     }
-
-    // Intersect the object's box
-    const Wide pad = n.boxPad(), maximum = (Wide(1) << n.entryBits) - 1;
-    const auto saturate = [&](Wide distance) { return clamp<Wide>(distance, -maximum, maximum); };
-    const auto slack = [&](Wide distance) { return distance > 0 ? distance >> n.entrySlackShift : Wide(0); };
-    const auto low = [&](int a) { return Wide(bounds.low[ray.objectAxis(a)]); };
-    const auto high = [&](int a) { return Wide(bounds.high[ray.objectAxis(a)]); };
-    const Crossing along = crossDominant(low(2), high(2), boxOrigin(origin[2], n), ray.negative[2], pad);
-    Wide tNear = std::max<Wide>(0, along.tNear), tFar = along.tFar;
-    const Wide sidePad = pad + (tNear >> n.vertexBits);
-    for (int a = 0; a < 2; ++a) {
-        const Crossing side = crossSheared(low(a), high(a), boxOrigin(origin[a], n), ray.negative[a], sidePad, ray.reciprocal[a],
-                                           n.reciprocalFraction - ray.exponent[a]);
-        const Wide sideTNear = saturate(side.tNear), sideTFar = saturate(side.tFar);
-        tNear = std::max(tNear, sideTNear - slack(sideTNear));
-        tFar = std::min(tFar, saturate(sideTFar + slack(sideTFar)));
-    }
-    ray.enters = tNear <= tFar;
-    if (!ray.enters) return ray;
-    if (n.gridFraction < 0) tNear = (tNear >> -n.gridFraction) << -n.gridFraction;
-    ray.tEntry = static_cast<std::int64_t>(tNear);
-
-    // Advance the origin to the entry point
-    const Wide entrySteps = floorShift<Wide>(tNear, -n.gridFraction);
-    const auto inReach = [&](Wide position) {
-        const Wide half = floorShift<Wide>(Wide(1) << (n.vertexBits - 1), -n.gridFraction);
-        return static_cast<std::int64_t>(clamp<Wide>(position, -half, 3 * half));
-    };
-    for (int a = 0; a < 2; ++a) ray.origin[a] = inReach(origin[a] + nearestEven<Wide>(Wide(ray.shear[a]) * tNear, n.vertexBits + 1));
-    ray.origin[2] = inReach(ray.negative[2] ? origin[2] - entrySteps : origin[2] + entrySteps);
-    for (int a = 0; a < 3; ++a) ray.boxOrigin[a] = boxOrigin(ray.origin[a], n);
-    ray.tMax = static_cast<std::int64_t>(clamp<Wide>(request.tMax - entrySteps, 0, n.maxT()));
+    if (isNarrow(request, n)) enterBox<std::int64_t>(ray, request, bounds, n);
+    else enterBox<Wide>(ray, request, bounds, n);
     return ray;
 }
 

@@ -78,9 +78,9 @@ struct Illumination {
 /// Scales a vector so that its largest component has `bits` magnitude bits; returns the right shift.
 inline int blockNormalise(const WideVector& v, int bits, Vector& scaled) {
     UnsignedWide all = 0;
-    for (const Wide component : v) all = std::max(all, magnitude(component));
+    for (const Wide component : v) all |= magnitude(component);
     const int shift = bitLength(all) - bits;
-    for (int a = 0; a < 3; ++a) scaled[a] = static_cast<std::int64_t>(floorShift(v[a], shift));
+    for (int a = 0; a < 3; ++a) scaled[a] = shiftToFit(v[a], shift, all);
     return shift;
 }
 

@@ -31,10 +31,15 @@ public:
 
             // If the ray is in front of all planes of a tile, one step passes the whole tile
             int nearest = 0;
+            std::int64_t nearestW = 0;
             bool isInFrontOfAll = !state.isBehind;
-            for (int i = 0; i < info.count; ++i) {
-                isInFrontOfAll = isInFrontOfAll && distanceAt(depths[i], s0) >= 0 && distanceAt(depths[i], s1) >= 0;
-                if (toW(distanceAt(depths[i], s1), depths[i]) < toW(distanceAt(depths[nearest], s1), depths[nearest])) nearest = i;
+            for (int i = 0; i < info.count && info.count > 1; ++i) {
+                const std::int64_t atExit = distanceAt(depths[i], s1), w = toW(atExit, depths[i]);
+                isInFrontOfAll = isInFrontOfAll && atExit >= 0 && distanceAt(depths[i], s0) >= 0;
+                if (i == 0 || w < nearestW) {
+                    nearest = i;
+                    nearestW = w;
+                }
             }
             if (info.count == 1 || isInFrontOfAll) {
                 const auto [x, y] = pixelAt(ray, tile, info.count == 1 ? s0 : s1);
@@ -122,7 +127,7 @@ private:
         const std::int64_t inverse = reciprocal(rate.mantissa), low = (std::int64_t(pixel) >> sizes_.tileLog << sizes_.tileLog) << (f_ - mapLog);
         const std::int64_t width = std::int64_t(1) << (f_ - mapLog + sizes_.tileLog);
         const std::int64_t way = result.isNegative ? ray.position[axis] - low : low + width - ray.position[axis];
-        const auto guardedS = [&](std::int64_t length) { return static_cast<std::int64_t>(std::min<Wide>(maxGuardedS(), floorShift<Wide>(Wide(length) * inverse << guardBits, rate.exponent - 1))); };
+        const auto guardedS = [&](std::int64_t length) { return std::min(maxGuardedS(), floorShift((length * inverse) << guardBits, rate.exponent - 1)); };
         result.next = guardedS(way);
         result.tile = guardedS(width);
         return result;

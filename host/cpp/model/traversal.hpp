@@ -15,8 +15,8 @@ struct Hit {
 
 /// tMax in vertex units, rounded up and padded: the largest `tNear` of a box that may contain a closer hit.
 inline std::int64_t tMaxUnits(std::int64_t tMax, const Numbers& n) {
-    const Wide units = floorShift<Wide>(tMax, n.gridFraction) + 1 + n.boxPad();
-    return static_cast<std::int64_t>(std::min<Wide>(units, largest(n.boxDistanceBits)));
+    const std::int64_t units = floorShift(tMax, n.gridFraction) + 1 + n.boxPad();
+    return std::min(units, (std::int64_t(1) << (n.boxDistanceBits - 1)) - 1);
 }
 
 /// A child box that the ray hits.
@@ -37,7 +37,7 @@ struct RelativeNode {
     std::int64_t pad, origin, tMax;
 
     RelativeNode(const Ray& ray, const Node& node, std::int64_t tMaxInUnits, const Numbers& n) {
-        const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1;
+        const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1, maxBase = (std::int64_t(1) << (n.nodeBits - 1)) - 1;
         std::array<std::int64_t, 3> corner, span;
         for (int a = 0; a < 3; ++a) {
             const int axis = ray.objectAxis(a);
@@ -51,8 +51,8 @@ struct RelativeNode {
             const int finest = axisExponent + ray.exponent[a] - n.stepFraction, lowest = std::max(finest, exponent - n.stepReach);
             step[a] = ray.reciprocal[a] >> (n.reciprocalFraction - n.stepFraction + lowest - finest);
             const std::int64_t product = corner[a] * ray.reciprocal[a];
-            const Wide exact = (ray.negative[a] ? -product : product) - shiftLeft<Wide>(z, drop);
-            const auto base = static_cast<std::int64_t>(clamp<Wide>(floorShift<Wide>(exact, lowest + drop), -largest(n.nodeBits) - 1, largest(n.nodeBits)));
+            const std::int64_t exact = (ray.negative[a] ? -product : product) - shiftLeft(z, drop);
+            const std::int64_t base = clamp(floorShift(exact, lowest + drop), -maxBase - 1, maxBase);
             const std::int64_t pad = (((step[a] + 1) << n.boxPadLog) >> axisExponent) + 1;
             scale[a] = lowest - (exponent - n.nearFraction);
             const std::int64_t roundUp = scale[a] < 0 ? (std::int64_t(1) << -scale[a]) - 1 : 0;
@@ -60,15 +60,12 @@ struct RelativeNode {
             far[a] = base + pad + 1 + roundUp - (ray.negative[a] ? maxPlane * step[a] : 0);
         }
         pad = std::int64_t(1) << std::max(0, n.boxPadLog + n.nearFraction - exponent);
-        origin = saturate(floorShift<Wide>(-z, exponent - n.nearFraction), n);
-        tMax = saturate(floorShift<Wide>(tMaxInUnits - z, exponent - n.nearFraction), n);
+        const std::int64_t maxNear = (std::int64_t(1) << (n.nearBits - 1)) - 1;
+        origin = scaled(-z, n.nearFraction - exponent, maxNear);
+        tMax = scaled(tMaxInUnits - z, n.nearFraction - exponent, maxNear);
     }
 
-    static std::int64_t saturate(Wide t, const Numbers& n) {
-        return static_cast<std::int64_t>(clamp<Wide>(t, -largest(n.nearBits) - 1, largest(n.nearBits)));
-    }
-
-    /// t · 2^scale, rounded down and saturated: `saturate(floorShift<Wide>(t, -scale))` in 64 bits, since children need it most.
+    /// t · 2^scale, rounded down and saturated to −high − 1 … high.
     static std::int64_t scaled(std::int64_t t, int scale, std::int64_t high) {
         const std::int64_t low = -high - 1;
         if (scale <= 0) return clamp(t >> std::min(-scale, 63), low, high);
@@ -85,7 +82,7 @@ struct RelativeNode {
 /// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
 inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, 4>& entered, std::uint64_t& tests) {
     const RelativeNode relative(ray, node, tMaxUnits(tMax, n), n);
-    const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1, high = largest(n.nearBits);
+    const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1, high = (std::int64_t(1) << (n.nearBits - 1)) - 1;
     const std::array<int, 3> axes = {ray.objectAxis(0), ray.objectAxis(1), ray.objectAxis(2)};
     int count = 0;
     for (int slot = 0; slot < n.arity; ++slot) {
@@ -132,7 +129,7 @@ template <class Product> bool testTriangle(const Ray& ray, const std::array<Vect
     const bool anyNegative = edges[0] < 0 || edges[1] < 0 || edges[2] < 0, anyPositive = edges[0] > 0 || edges[1] > 0 || edges[2] > 0;
     if (anyNegative == anyPositive) return false;
 
-    std::array<UnsignedWide, 3> areas;
+    std::array<UnsignedOf<Product>, 3> areas;
     for (int i = 0; i < 3; ++i) areas[i] = magnitude(edges[i]);
     const int drop = bitLength(areas[0] + areas[1] + areas[2]) - n.weightBits;
     std::array<std::int64_t, 3> weights;
