@@ -22,9 +22,9 @@ from colonnade.maps.planes import PlaneProjection
 Encode = Callable[[Environment], AttributeImage]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EncodedEnvironment:
-    """An environment and its encoded maps."""
+    """An environment and its encoded maps; compared by identity."""
 
     environment: Environment
     image: AttributeImage

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colonnade.common.types import Floats
-from colonnade.registers.shadow_window import surface_points
+from colonnade.registers.shadow_window import MARGIN, surface_points
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
@@ -59,28 +61,51 @@ def occlusion_tolerance(view: View, encoded: EncodedEnvironment, extent: Extent)
     Distances are measured along the dominant axis of a ray. The tolerance follows from the error of the plane map at
     the surfaces around the object, which is the error of the surface that it stands on.
     """
-    environment = encoded.environment
-    decoded = encoded.depth
     assert view.view_to_mesh is not None
-    linear, origin = view.view_to_mesh[:, :3], view.view_to_mesh[:, 3]
-    directions = environment.camera.directions(environment.width, environment.height) @ linear.T
-    points = directions * environment.depth[..., None] + origin
     margin = SURROUNDINGS * extent.edge
-    near = ((points >= extent.low - margin) & (points <= extent.high + margin)).all(axis=2)
-    with np.errstate(invalid="ignore"):
-        errors = (np.abs(decoded - environment.depth) * np.abs(directions).max(axis=2))[near]
+    near = np.float64([extent.low - margin, extent.high + margin])
+    error = _surface_error(encoded, view.view_to_mesh.tobytes(), near.tobytes())
     distance = float(np.abs(extent.centre - view.origin).max())
     low, high = MIN_FRACTION * distance, max(MAX_EDGES * extent.edge, MIN_FRACTION * distance)
-    if errors.size < MIN_PIXELS:
-        return high
-    return float(np.clip(FACTOR * np.percentile(errors, PERCENTILE), low, high))
+    return high if error is None else float(np.clip(FACTOR * error, low, high))
+
+
+@lru_cache(maxsize=1)  # frames of a moving camera have the same
+def _surface_error(encoded: EncodedEnvironment, pose: bytes, near: bytes) -> float | None:
+    """A percentile of the errors of the plane map in a box, mesh units; None if it has few pixels.
+
+    Args:
+        encoded: The room.
+        pose: `View.view_to_mesh`, float64 [3, 4].
+        near: Bounds of the box, mesh space, float64 [2, 3].
+    """
+    environment, decoded = encoded.environment, encoded.depth
+    view_to_mesh, (low, high) = np.frombuffer(pose).reshape(3, 4), np.frombuffer(near).reshape(2, 3)
+    linear, origin = view_to_mesh[:, :3], view_to_mesh[:, 3]
+    directions = environment.camera.directions(environment.width, environment.height) @ linear.T
+    points = directions * environment.depth[..., None] + origin
+    counts = _inside(points, low, high)
+    with np.errstate(invalid="ignore"):
+        errors = np.abs(decoded[counts] - environment.depth[counts]) * np.abs(directions[counts]).max(axis=1)
+    return None if errors.size < MIN_PIXELS else float(np.percentile(errors, PERCENTILE))
 
 
 def may_hide(view: View, encoded: EncodedEnvironment, extent: Extent, tolerance: float) -> bool:
     """Whether in some pixel the room is nearer than the end of the object's box by more than a tolerance."""
-    environment = encoded.environment
-    points = surface_points(view, environment, encoded.depth)
-    return bool((_margin_of_box_end(view.origin, points, extent) > tolerance).any())
+    points = surface_points(view, encoded.environment, encoded.depth)
+    # What hides the object is between the camera and the end of its box; few points are
+    margin = MARGIN * extent.edge
+    low, high = np.minimum(view.origin, extent.low) - margin, np.maximum(view.origin, extent.high) + margin
+    between = points[_inside(points, low, high)]
+    return bool((_margin_of_box_end(view.origin, between, extent) > tolerance).any())
+
+
+def _inside(points: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
+    """Whether points, float64 [..., 3], are in a box; axis by axis, since a reduction over an axis of three is slow."""
+    inside = np.ones(points.shape[:-1], dtype=bool)
+    for axis in range(3):
+        inside &= (points[..., axis] >= low[axis]) & (points[..., axis] <= high[axis])
+    return inside
 
 
 def _margin_of_box_end(origin: Floats, points: Floats, extent: Extent) -> Floats:
@@ -101,7 +126,6 @@ def _margin_of_box_end(origin: Floats, points: Floats, extent: Extent) -> Floats
     parallel = directions == 0
     first = np.where(parallel, np.where(inside, -np.inf, np.inf), np.minimum(low, high))
     last = np.where(parallel, np.where(inside, np.inf, -np.inf), np.maximum(low, high))
-    # A reduction over an axis of three is slow
     enters = np.maximum(np.maximum(first[..., 0], first[..., 1]), first[..., 2])
     leaves = np.minimum(np.minimum(last[..., 0], last[..., 1]), last[..., 2])
     x, y, z = (np.abs(directions[..., axis]) for axis in range(3))
