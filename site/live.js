@@ -13,8 +13,13 @@ let state = null;
 let camera = null;
 let isWanted = false;
 let isBusy = false;
+/** The wait for a camera that rests, milliseconds, and its timer. */
+const REST = 250;
+let rest = 0;
+/** Fewer samples are not shown: their mean is beside the pixels' middle. */
+const SHOWN_SAMPLES = 4;
 const times = [];
-/** What tests read: frames so far, their version, and the time of the last. */
+/** What tests read: frames so far, and the version of the last. */
 const page = (window.colonnade = { frames: 0, version: 0 });
 
 // Vectors
@@ -68,9 +73,10 @@ const actions = {
 
 // Frames
 
-/** Asks for a picture of the camera; while one is on its way, for the next one after it. */
+/** Asks for a picture of the camera; while one is on its way, for the next one after it. Then the camera rests. */
 async function draw() {
   isWanted = true;
+  clearTimeout(rest);
   if (isBusy) return;
   isBusy = true;
   try {
@@ -83,15 +89,26 @@ async function draw() {
   } finally {
     isBusy = false;
   }
+  rest = setTimeout(accumulate, REST);
 }
 
-async function frame() {
-  const address = camera ? `frame?camera=${[...camera.position, ...camera.target].join()}` : "frame";
-  const response = await fetch(address);
+/** Further passes of a camera that rests, one after the other; another page's camera ends them. */
+async function accumulate(before = 0) {
+  if (isBusy) return;
+  const figures = await frame(true).catch(() => null);
+  if (figures && !isBusy && figures.samples > before && figures.samples < figures.passes) rest = setTimeout(accumulate, 0, figures.samples);
+}
+
+/** Shows a picture, of the first sample or of those so far; returns its figures, or nothing if it came too late. */
+async function frame(isStill = false) {
+  const address = new URLSearchParams({ ...(camera && { camera: [...camera.position, ...camera.target].join() }), ...(isStill && { still: 1 }) });
+  const response = await fetch(`frame?${address}`);
   if (!response.ok) return fail(await response.text());
   const figures = JSON.parse(response.headers.get("X-Frame"));
   const { width, height } = figures;
   const pixels = new Uint8ClampedArray(await response.arrayBuffer());
+  if (isStill && isBusy) return;
+  if (isStill && figures.samples < SHOWN_SAMPLES) return figures;
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   picture.putImageData(new ImageData(pixels, width, height), 0, 0);
   page.version = figures.version;
@@ -99,16 +116,18 @@ async function frame() {
   while (times[0] < performance.now() - 1000) times.shift();
   if (state) fail(state.error);
   showFigures(figures);
-  document.body.dataset.frames = page.frames += 1;
+  Object.assign(document.body.dataset, { frames: (page.frames += 1), samples: figures.samples });
+  return figures;
 }
 
-function showFigures({ width, height, milliseconds, rays }) {
+function showFigures({ width, height, milliseconds, rays, samples, passes }) {
   const position = (camera ?? state?.camera)?.position.map((value) => value.toFixed(3)).join(", ");
   const rows = [
     ["size", `${width} × ${height}`],
     ["triangles", state?.triangles.toLocaleString("en")],
-    ["rays, one sample a pixel", rays.toLocaleString("en")],
-    ["time of the model", `${milliseconds} ms`],
+    ["samples a pixel", `${samples} of ${passes}`],
+    ["rays of a pass", rays.toLocaleString("en")],
+    ["time of a pass", `${milliseconds.toFixed(1)} ms`],
     ["frames in the last second", times.length],
     ["time of packing", state && `${state.milliseconds.toFixed(0)} ms`],
     ["camera", position],

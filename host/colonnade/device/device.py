@@ -174,6 +174,15 @@ class ModelDevice(Device):
         self._model = self._set = self._frame = None
 
     @property
+    def frame(self) -> Frame:
+        """The last frame as the model has it.
+
+        Raises:
+            UserError: None was started.
+        """
+        return self._last[0]
+
+    @property
     def _last(self) -> tuple[Frame, Pixels | None]:
         if self._frame is None:
             raise UserError("no frame was started: start one before its result is read")

@@ -110,11 +110,12 @@ class _Handler(BaseHTTPRequestHandler):
         camera = None
         if "camera" in query:
             camera = _camera([float(text) for text in query["camera"][0].split(",")])
-        frame = self.server.session.frame(camera)
+        session = self.server.session
+        frame = session.still(camera) if "still" in query else session.frame(camera)
         height, width, _ = frame.pixels.shape
         pixels = np.full((height, width, 4), 255, np.uint8)
         pixels[..., :3] = frame.pixels
-        figures = {"version": frame.version, "milliseconds": round(frame.milliseconds, 1), "rays": frame.rays}
+        figures = {name: getattr(frame, name) for name in ("version", "milliseconds", "rays", "samples", "passes")}
         headers = {"X-Frame": json.dumps(figures | {"width": width, "height": height})}
         self._answer(200, pixels.tobytes(), "application/octet-stream", headers)
 

@@ -13,20 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import notes
+from colonnade.common.accumulation import Accumulation
 from colonnade.common.errors import UserError
+from colonnade.common.image_io import encode_srgb
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import manifest_for
 from colonnade.device.device import ModelDevice
 from colonnade.device.scene import DeviceScene
 from colonnade.maps.encoders import Encoder
-from colonnade.scene.model import Camera
+from colonnade.render.composite import composited
+from colonnade.scene.model import Camera, Scene
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import place
 from colonnade.viewer.camera_table import save_camera
 
 #: Seconds between two looks at the files.
 _INTERVAL = 0.02
+#: Samples a pixel of a camera that rests, unless the scene names several.
+STILL_SAMPLES = 16
+#: Counters of rays.
+_RAYS = ("raysPrimary", "raysShadow", "raysReflection", "raysRefraction", "raysGather")
 
 
 @dataclass(frozen=True)
@@ -44,19 +51,35 @@ class ViewCamera:
 
 @dataclass(frozen=True)
 class ViewFrame:
-    """A frame of one sample.
+    """A picture of the scene.
 
     Attributes:
         pixels: sRGB, uint8 [height, width, 3].
         version: That of the scene.
-        milliseconds: Time of registers, model and framebuffer.
-        rays: Rays of all kinds.
+        milliseconds: Time of registers, model and picture, of the last pass.
+        rays: Rays of all kinds, of the last pass.
+        samples: Samples a pixel in it.
+        passes: Those of a camera that rests.
     """
 
     pixels: NDArray[np.uint8]
     version: int
     milliseconds: float
     rays: int
+    samples: int
+    passes: int
+
+
+@dataclass
+class _Rest:
+    """The passes of a camera that rests: those to come, and the sums of the others."""
+
+    camera: ViewCamera | None
+    version: int
+    scene: DeviceScene
+    coming: list[Scene]
+    sums: Accumulation | None = None
+    rays: int = 0
 
 
 class Session:
@@ -93,6 +116,7 @@ class Session:
         self._state: dict[str, Any] = {"version": 0}
         self._error = ""
         self._ends = False
+        self._rest: _Rest | None = None
         self._load()
 
     def state(self, version: int | None = None, timeout: float = 0.0) -> dict[str, Any]:
@@ -108,7 +132,7 @@ class Session:
             return self._state | {"error": self._error}
 
     def frame(self, camera: ViewCamera | None = None) -> ViewFrame:
-        """Render a frame of the scene that was last right.
+        """Render a frame of one sample of the scene that was last right.
 
         Args:
             camera: In place of the scene's own.
@@ -118,16 +142,51 @@ class Session:
         """
         with self._rendering:
             begun = time.perf_counter()
-            scene, version = self._scene, self._state["version"]
-            if camera is not None:
-                scene = scene.with_camera(_moved(scene.scene.camera, camera))
-            registers = scene.registers(self.size, composited=True)
-            self._device.set_frame(registers, scene.frame_photo(self.size))
-            self._device.start()
-            counters = self._device.counters()
-            pixels = self._device.pixels()
-            rays = sum(counters[f"rays{kind}"] for kind in ("Primary", "Shadow", "Reflection", "Refraction"))
-            return ViewFrame(pixels, version, 1e3 * (time.perf_counter() - begun), rays)
+            scene = self._seen_by(camera)
+            rays = self._render(scene, scene.scene, scene.frame_photo(self.size))
+            pixels, passes = self._device.pixels(), _samples_of(scene.scene)
+            return ViewFrame(pixels, self._state["version"], 1e3 * (time.perf_counter() - begun), rays, 1, passes)
+
+    def still(self, camera: ViewCamera | None = None) -> ViewFrame:
+        """Render the next pass of a camera that rests: the picture has one sample more than that of the last call.
+
+        The last picture is that of `colonnade render` with as many samples, without its filter of noise; further calls
+        give it again. Another camera or version of the scene begins anew.
+
+        Args:
+            camera: In place of the scene's own.
+
+        Raises:
+            UserError: The camera is out of the hardware's range.
+        """
+        with self._rendering:
+            begun = time.perf_counter()
+            rest, version = self._rest, self._state["version"]
+            if rest is None or (rest.camera, rest.version) != (camera, version):
+                scene = self._seen_by(camera)
+                coming = scene.scene.with_samples(_samples_of(scene.scene)).passes(scene.scene.motion.exposure(1))
+                rest = self._rest = _Rest(camera, version, scene, coming)
+            if rest.coming:
+                rest.rays = self._render(rest.scene, rest.coming[0])
+                sums = Accumulation.of_frame(self._device.frame)
+                rest.sums = sums if rest.sums is None else rest.sums + sums
+                del rest.coming[0]
+            assert rest.sums is not None
+            picture = composited(rest.sums, rest.scene.photo, rest.scene.strength)
+            pixels, samples = encode_srgb(picture), rest.sums.samples
+            passes = samples + len(rest.coming)
+            return ViewFrame(pixels, version, 1e3 * (time.perf_counter() - begun), rest.rays, samples, passes)
+
+    def _seen_by(self, camera: ViewCamera | None) -> DeviceScene:
+        scene = self._scene
+        return scene if camera is None else scene.with_camera(_moved(scene.scene.camera, camera))
+
+    def _render(self, scene: DeviceScene, sample: Scene, photo: NDArray[np.uint8] | None = None) -> int:
+        """Render a pass on the device; returns the number of its rays."""
+        self._device.set_frame(scene.registers(self.size, sample, composited=True), photo)
+        self._device.start()
+        counters = self._device.counters()
+        return sum(counters.get(kind, 0) for kind in _RAYS)
 
     def save(self, camera: ViewCamera) -> None:
         """Write a camera into the scene file.
@@ -183,6 +242,8 @@ class Session:
             paths = list(dict.fromkeys(mesh.path for mesh in meshes if mesh.path is not None))
             self._files, self._seen = self._files + paths, self._seen + _stamps(paths)
             scene = DeviceScene.of(description, self._manifest, size=self.size, encoder=self._encoder)
+        if description.frame.denoise:
+            lines.append("the page does not filter noise (frame.denoise)")
         # It is refused here if the hardware cannot show it, and not in every frame
         scene = self._still(scene)
         scene.registers(self.size, composited=True)
@@ -236,6 +297,12 @@ def _stamps(files: Sequence[Path]) -> list[tuple[int, int]]:
         else:
             stamps.append((status.st_mtime_ns, status.st_size))
     return stamps
+
+
+def _samples_of(scene: Scene) -> int:
+    """Samples a pixel of a camera that rests."""
+    named = scene.frame.samples or 1
+    return named if named > 1 else STILL_SAMPLES
 
 
 def _moved(camera: Camera, to: ViewCamera) -> Camera:

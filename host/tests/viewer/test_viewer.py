@@ -17,7 +17,7 @@ import colonnade
 from colonnade.common.errors import UserError
 from colonnade.viewer.camera_table import save_camera
 from colonnade.viewer.server import ViewServer
-from colonnade.viewer.session import Session, ViewCamera
+from colonnade.viewer.session import STILL_SAMPLES, Session, ViewCamera
 
 SIZE = (48, 36)
 FRAMING = """# A scene
@@ -75,6 +75,21 @@ def test_the_page_shows_what_render_shows_and_saves_its_camera(server: ViewServe
     written = file.read_text().splitlines()
     assert [line for line in written if line in lines] == lines
     assert set(written) - set(lines) == {"position = [1.25, 0.5, 4.0]", "target = [0.0, 0.125, 0.0]"}
+
+
+def test_a_camera_that_rests_gathers_the_samples_of_render(server: ViewServer, file: Path) -> None:
+    """Another camera and another version of the file begin anew."""
+    session = server.session
+    assert session.still().samples == 1
+    last = [session.still(MOVED) for _ in range(STILL_SAMPLES + 1)]
+    assert [frame.samples for frame in last] == [*range(1, STILL_SAMPLES + 1), STILL_SAMPLES]
+    assert last[-1].passes == STILL_SAMPLES
+    session.save(MOVED)
+    assert session.state(last[-1].version, 5.0)["version"] > last[-1].version
+    assert session.still().samples == 1
+    whole = colonnade.Scene.load(file).render(config="tiny", size=SIZE, samples=STILL_SAMPLES).pixels
+    np.testing.assert_array_equal(last[-1].pixels, whole)
+    assert (pixels_of(server, "?still=1") != pixels_of(server)).any()
 
 
 def test_the_last_picture_stays_while_the_file_is_wrong(server: ViewServer, file: Path) -> None:

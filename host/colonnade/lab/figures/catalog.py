@@ -184,6 +184,7 @@ def catalog() -> dict[str, Entry]:
         _verify("equality", "small", "--no-reference", "--size", "320x240"),
         Entry("fpga", "fpga", {"": ("tools/soc-fpga",)}, report="out/fpga/report.json"),
         Entry("simulators", "small", {"": ("tools/simulators", f"--json={REPORT}")}),
+        Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}),
         _study("ablation"),
         _study("scaling"),
         _study("mixed-precision", "ASAP7"),

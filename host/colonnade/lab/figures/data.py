@@ -25,7 +25,7 @@ _DEFAULTS = "tiny"
 #: What the figures depend on, as arguments of git.
 SOURCES = (
     *("build.sbt", "configs", "host", "project", "scenes", "software", "src", "tools/light"),
-    *("tools/room-frames", "tools/simulators", "tools/soc-fpga"),
+    *("tools/room-frames", "tools/simulators", "tools/soc-fpga", "tools/view-frames"),
     *(":!host/colonnade/lab/figures", ":!host/colonnade/lab/report", ":!host/tests", ":!host/locks", ":!src/test"),
 )
 

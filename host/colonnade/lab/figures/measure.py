@@ -98,7 +98,7 @@ def _report(entry: Entry, command: tuple[str, ...]) -> Any:
         program, *arguments = _expanded(command, report)
         programs: dict[str, list[object]] = {
             "colonnade": [Path(sys.executable).parent / "colonnade"],
-            **{tool: [sys.executable, tool] for tool in ("tools/room-frames", "tools/simulators")},
+            **{tool: [sys.executable, tool] for tool in ("tools/room-frames", "tools/simulators", "tools/view-frames")},
         }
         started = programs.get(program, [root / program])
         done = processes.run([*started, *arguments], cwd=root, stdout=None, stderr=None)

@@ -94,10 +94,28 @@ def simulators(data: Data) -> str:
     return markdown(["by", "simulator", "cycles", "cycles per second"], rows)
 
 
+def view(data: Data) -> str:
+    """Rates and waits of `colonnade view`, by scene."""
+    found = data.result("view")
+    head = ["scene", "frames a second", "processor time a frame", "that is, on one core", "saved file", "start"]
+    rows = [
+        [
+            f"`{row['scene']}`",
+            f"{row['rate']:.1f}",
+            f"{1e3 * row['processor']:.0f} ms",
+            f"{1 / row['processor']:.1f}",
+            *(f"{row[wait]:.1f} s" for wait in ("reload", "start", "rest")),
+        ]
+        for row in found["scenes"]
+    ]
+    return markdown([*head, f"{found['samples']} samples"], rows)
+
+
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "rates": rates,
     "utilisation": utilisation,
     "scaling": scaling,
     "ablation": ablation,
     "simulators": simulators,
+    "view": view,
 }

@@ -203,6 +203,10 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         "simulators": {
             "simulators": [{"by": "cocotb", "simulator": "Verilator 5", "cycles": 900, "cycles_per_second": 7489.8}]
         },
+        "view": {
+            "samples": 16,
+            "scenes": [{"scene": "a", "rate": 9.0, "processor": 0.05, "reload": 0.1, "start": 1.0, "rest": 2.0}],
+        },
     }
     (tmp_path / "docs" / "data").mkdir(parents=True)
     for name, result in results.items():
