@@ -22,16 +22,38 @@ export function lightOf({ right, down, forward }, [x, y, z]) {
 }
 
 /** The pixel of a place in the world, and its depth. */
-export function project({ position, right, down, forward, focal, width, height }, place) {
+export function project({ position, right, down, forward, focal, focalY = focal, width, height, centre = [width / 2, height / 2] }, place) {
   const offset = place.map((value, axis) => value - position[axis]);
   const along = (direction) => direction.reduce((sum, value, axis) => sum + value * offset[axis], 0);
   const depth = along(forward);
-  return { x: width / 2 + (focal * along(right)) / depth, y: height / 2 + (focal * along(down)) / depth, depth };
+  return { x: centre[0] + (focal * along(right)) / depth, y: centre[1] + (focalY * along(down)) / depth, depth };
 }
 
-/** The camera of a room's maps: `lens` has its focal length in heights of the frame. */
-export function roomCamera({ camera: { lens, ...axes } }, width, height) {
-  return { ...axes, focal: lens[0] * height, width, height, isOfMaps: true };
+/** Of a camera in a room, from that of the maps: degrees around the object, its distance's factor, a shift in metres. */
+export const ROOM_START = { roomAzimuth: 0, roomElevation: 0, roomDistance: 1, roomX: 0, roomY: 0 };
+
+/** Whether an orbit has the camera of a room's maps, which is that of its photo. */
+export const isAtMaps = (orbit) => Object.entries(ROOM_START).every(([name, value]) => orbit[name] === value);
+
+/** A camera in a room: that of the maps, moved around the object; `lens` has fx, cx, cy, fy in heights of the frame. */
+export function roomCamera({ camera: { lens, position, right, down, forward }, object }, width, height, orbit) {
+  const [focal, x, y, focalY] = lens.map((value) => value * height);
+  const size = { focal, focalY, centre: [x, y], width, height };
+  if (isAtMaps(orbit)) return { position, right, down, forward, ...size, isOfMaps: true };
+  const up = [0, 1, 0];
+  const moved = (vector) => rotated(rotated(vector, right, -orbit.roomElevation), up, orbit.roomAzimuth);
+  const axes = Object.fromEntries(Object.entries({ right, down, forward }).map(([name, axis]) => [name, moved(axis)]));
+  const away = moved(position.map((value, axis) => orbit.roomDistance * (value - object.position[axis])));
+  const place = away.map((value, axis) => object.position[axis] + value + orbit.roomX * axes.right[axis] - orbit.roomY * axes.down[axis]);
+  return { position: place, ...axes, ...size };
+}
+
+/** A vector after a rotation around a unit axis, degrees (Rodrigues). */
+function rotated(vector, axis, degrees) {
+  const [c, s] = [Math.cos, Math.sin].map((f) => f((degrees * Math.PI) / 180));
+  const along = axis.reduce((sum, value, i) => sum + value * vector[i], 0);
+  const across = [0, 1, 2].map((i) => axis[(i + 1) % 3] * vector[(i + 2) % 3] - axis[(i + 2) % 3] * vector[(i + 1) % 3]);
+  return vector.map((value, i) => c * value + s * across[i] + (1 - c) * along * axis[i]);
 }
 
 /** The pose of an object that stands in a room: turned by degrees, its lowest point at `low`, from 0 to 1 of the cube. */

@@ -171,14 +171,14 @@ export class Library {
   }
 
   /** Sets the camera: position, and columns right, down and forward of its rotation; focal length and centre in pixels. */
-  setCamera({ position, right, down, forward, focal, width, height, centre = [width / 2, height / 2] }) {
+  setCamera({ position, right, down, forward, focal, focalY = focal, width, height, centre = [width / 2, height / 2] }) {
     const camera = new DataView(new ArrayBuffer(104));
     position.forEach((value, axis) => camera.setBigInt64(8 * axis, BigInt(Math.round(value * FRACTION)), true));
     for (let row = 0; row < 3; ++row)
       [right, down, forward].forEach((axis, column) =>
         camera.setInt32(24 + 4 * (3 * row + column), Math.round(axis[row] * 2 ** 30), true),
       );
-    [focal, focal, ...centre].forEach((value, i) => camera.setBigInt64(64 + 8 * i, BigInt(Math.round(value * FRACTION)), true));
+    [focal, focalY, ...centre].forEach((value, i) => camera.setBigInt64(64 + 8 * i, BigInt(Math.round(value * FRACTION)), true));
     camera.setUint32(96, width, true);
     camera.setUint32(100, height, true);
     this.withArrays([new Uint8Array(camera.buffer)], (pointer) => this.checkView(this.wasm.colonnade_view_set_camera(this.view, pointer)));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mouse, touch and keys on the picture: orbit, zoom, pan, and a click that is none of them.
 
-/** `actions`: orbit(degrees, degrees), zoom(factor), pan(x, y) in heights of the stage, click(event), done(). */
+/** `actions`: orbit(degrees, degrees, event), zoom(factor), pan(x, y) in heights of the stage, click(event), done(). */
 export function listen(stage, actions) {
   const pointers = new Map();
   let moved = 0;
@@ -24,7 +24,7 @@ export function listen(stage, actions) {
       actions.zoom(length(before) / Math.max(1, length(event)));
       actions.pan(-x / 2 / height, y / 2 / height);
     } else if (event.shiftKey || event.buttons === 2) actions.pan(-x / height, y / height);
-    else actions.orbit(-0.4 * x, 0.4 * y);
+    else actions.orbit(-0.4 * x, 0.4 * y, event);
     actions.done();
   });
   stage.addEventListener("pointerup", (event) => {
@@ -39,11 +39,13 @@ export function listen(stage, actions) {
     actions.done();
   };
   stage.addEventListener("wheel", wheel, { passive: false });
-  stage.addEventListener("keydown", ({ key }) => {
+  stage.addEventListener("keydown", (event) => {
+    const { key } = event;
     const steps = { ArrowLeft: [5, 0], ArrowRight: [-5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] };
-    if (steps[key]) actions.orbit(...steps[key]);
+    if (steps[key]) actions.orbit(...steps[key], event);
     else if (key === "+" || key === "-") actions.zoom(key === "+" ? 0.9 : 1 / 0.9);
     else return;
+    event.preventDefault();
     actions.done();
   });
 }

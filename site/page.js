@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: controls, orbit, dropped files, the ray of a pixel.
 
-import { cameraOf, roomCamera } from "./camera.js";
+import { ROOM_START, START, cameraOf, isAtMaps, roomCamera } from "./camera.js";
 import { hasRegister } from "./design.js";
+import { droppedFiles, roomFiles } from "./files.js";
 import { listen } from "./orbit.js";
 import { element, fillTable, listDesigns, showCosts, showFigures, showRays, showTimes } from "./panels.js";
 import { draw, raysOf } from "./path.js";
-import { Renderer } from "./renderer.js";
+import { Renderer, bytesOf } from "./renderer.js";
 import { readState, writeState } from "./state.js";
 import { materialOf, poseIn, viewOf } from "./view.js";
+import { placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
 
 const MOST_WORKERS = 8;
 const COARSE = 4;
+/** A level surface so near to a double click counts, pixels of the maps. */
+const STAND_WITHIN = 40;
 /** The frame of the RTL. */
 const RTL = { design: "tiny", width: 64, height: 48 };
 
@@ -33,7 +37,6 @@ async function unpack(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-const bytesOf = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
 
 /** The room of the state, if the hardware has its maps. */
 const roomOf = () => (data.rooms[state.room]?.views[state.design] ? data.rooms[state.room] : null);
@@ -125,13 +128,14 @@ function fail(text) {
 }
 
 function showNotes() {
-  const notes = [...page.mesh.notes];
+  const notes = [...page.mesh.notes, ...(roomOf()?.notes ?? [])];
   if (packed.dropped) notes.push(`${packed.dropped.toLocaleString("en")} faces without area, or there twice, are left out`);
   if (packed.reversed) notes.push(`${packed.reversed.toLocaleString("en")} closed parts did not point outward, and do now`);
   if (packed.flipped) notes.push(`normals of ${packed.flipped.toLocaleString("en")} faces pointed to their back and are negated`);
   if (page.mesh.hasColours && !hasRegister(manifest, "materials[0].hasCornerColours")) notes.push("this hardware has no corner colours: the mesh has one colour");
   if (state.room && !roomOf())
     notes.push(manifest.attributes ? "the page has rooms for presets only" : "this hardware has no maps of a room");
+  if (roomOf() && !isAtMaps(state)) notes.push("the camera is not that of the photo: the room is drawn from its maps");
   if (materialOf(scene()) !== state.material) notes.push("this hardware has neither mirrors nor glass");
   element("notes").replaceChildren(
     ...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })),
@@ -150,7 +154,8 @@ async function openDesign() {
 }
 
 /** The pixels of a room's photo. */
-async function photoOf({ photo, width, height }) {
+async function photoOf({ photo, picture: own, width, height }) {
+  if (own) return own;
   const picture = await createImageBitmap(new Blob([bytesOf(photo)], { type: "image/jpeg" }));
   const context = new OffscreenCanvas(width, height).getContext("2d");
   context.drawImage(picture, 0, 0);
@@ -204,8 +209,35 @@ async function readFile(name, bytes, files) {
   forget();
 }
 
+// A visitor's room
+
+/** Makes a room of a photo and its depth, and shows it; if it cannot be made, the room stays what it was. */
+async function openRoom(found, files) {
+  const settings = { degrees: form.elements.degrees.valueAsNumber, millimetres: form.elements.step.valueAsNumber };
+  const { template, design } = templateFor(data.rooms, state.design);
+  const room = await visitorRoom(renderer, data.manifests[design], template, found, files, settings);
+  if (!data.rooms[found.photo]) form.elements.room.add(new Option(found.photo));
+  data.rooms[found.photo] = page.room = room;
+  Object.assign(state, { design, room: found.photo, ...ROOM_START, azimuth: START.azimuth });
+  await changeDesign();
+}
+
+/** Stands the object of a visitor's room on the surface at a pixel. */
+stage.addEventListener("dblclick", (event) => {
+  const room = roomOf();
+  if (!room?.files || !isAtMaps(state)) return;
+  const box = picture.canvas.getBoundingClientRect();
+  const place = placeOf(room, ((event.clientX - box.left) / box.width) * room.width, ((event.clientY - box.top) / box.height) * room.height, STAND_WITHIN);
+  then(async () => {
+    Object.assign(room, placedRoom(room, data.rooms.living, place));
+    await changeDesign();
+  });
+});
+
 async function openFiles(list) {
   const files = new Map(await Promise.all([...list].map(async (file) => [file.name, new Uint8Array(await file.arrayBuffer())])));
+  const isMesh = [...files.keys()].some((name) => /\.(obj|ply|glb|gltf)$/i.test(name));
+  if (!isMesh && [...files.keys()].some((name) => /\.(jpe?g|png|webp|npy)$/i.test(name))) return void (await then(() => openRoom(roomFiles(files), files)));
   const name = [...files.keys()].find((each) => /\.(obj|ply|glb|gltf)$/i.test(each)) ?? [...files.keys()][0];
   if (name !== undefined) await then(() => readFile(name, files.get(name), files));
 }
@@ -218,7 +250,10 @@ function fill() {
   for (const name of ["design", "room", "material", "light", "bounces", "pixel"]) form.elements[name].value = state[name];
   for (const name of ["colour", "background"]) form.elements[name].value = `#${state[name]}`;
   for (const name of ["shadows", "photo"]) form.elements[name].checked = Boolean(state[name]);
-  form.elements.photo.disabled = roomOf() === null;
+  form.elements.photo.disabled = roomOf() === null || !isAtMaps(state);
+  form.elements.drag.disabled = roomOf() === null;
+  element("home").hidden = roomOf() === null || isAtMaps(state);
+  for (const label of document.querySelectorAll(".lens")) label.hidden = !roomOf()?.files;
   showCosts(data.studies, state.design);
   for (const name of ["background", "light"]) form.elements[name].disabled = roomOf() !== null;
   element("mesh").textContent = state.mesh;
@@ -235,6 +270,8 @@ function show() {
 }
 
 form.addEventListener("input", ({ target }) => {
+  if (target.name === "drag") return;
+  if (target.name === "degrees" || target.name === "step") return void then(() => openRoom(roomOf().files.found, roomOf().files.files));
   if (target.name === "precision") {
     state.design = data.studies[0].points[target.value].design;
     return void then(changeDesign);
@@ -247,8 +284,9 @@ form.addEventListener("input", ({ target }) => {
   if (traced && target.name !== "pixel") follow();
 });
 form.addEventListener("submit", (event) => event.preventDefault());
-element("open").onclick = () => element("file").click();
-element("file").onchange = ({ target }) => openFiles(target.files);
+for (const id of ["open", "open-room"]) element(id).onclick = () => element("file").click();
+element("file").onchange = ({ target }) => openFiles(target.files).then(() => (target.value = ""));
+element("home").onclick = () => then(() => Object.assign(state, ROOM_START));
 element("teapot").onclick = () => then(openTeapot);
 element("link").onclick = async ({ target }) => {
   await navigator.clipboard?.writeText(location.href).catch(() => {});
@@ -271,20 +309,37 @@ stage.addEventListener("dragleave", () => stage.classList.remove("dropping"));
 stage.addEventListener("drop", (event) => {
   event.preventDefault();
   stage.classList.remove("dropping");
-  openFiles(event.dataTransfer.files);
+  droppedFiles(event.dataTransfer).then(openFiles).catch((error) => fail(error.message));
 });
 
 // Orbit
 
 listen(stage, {
-  orbit(azimuth, elevation) {
+  orbit(azimuth, elevation, event) {
+    const room = roomOf();
+    if (room && (form.elements.drag.value === "camera" || event?.altKey || event?.ctrlKey)) {
+      state.roomAzimuth = ((((state.roomAzimuth + azimuth + 180) % 360) + 360) % 360) - 180;
+      state.roomElevation = Math.max(-89, Math.min(89, state.roomElevation + elevation));
+      return showNotes();
+    }
     state.azimuth = (((state.azimuth + azimuth) % 360) + 360) % 360;
     state.elevation = Math.max(-89, Math.min(89, state.elevation + elevation));
   },
   zoom(factor) {
+    if (roomOf()) {
+      state.roomDistance = Math.max(0.2, Math.min(5, state.roomDistance * factor));
+      return showNotes();
+    }
     state.distance = Math.max(1.8, Math.min(40, state.distance * factor));
   },
   pan(x, y) {
+    const room = roomOf();
+    if (room) {
+      const depth = state.roomDistance * Math.hypot(...room.camera.position.map((value, axis) => value - room.object.position[axis]));
+      state.roomX += (x * depth) / room.camera.lens[0];
+      state.roomY += (y * depth) / room.camera.lens[0];
+      return showNotes();
+    }
     const height = 2 * state.distance * Math.tan((20 * Math.PI) / 180);
     state.x += x * height;
     state.y += y * height;
@@ -296,7 +351,8 @@ listen(stage, {
     const y = Math.floor(((event.clientY - box.top) / box.height) * height);
     if (x < 0 || y < 0 || x >= width || y >= height) return;
     const { azimuth, elevation, distance, x: panX, y: panY } = state;
-    state.follow = [x, y, width, height, azimuth, elevation, distance, panX, panY].map((value) => Math.round(value * 1000) / 1000).join();
+    const moved = roomOf() && !isAtMaps(state) ? Object.keys(ROOM_START).map((name) => state[name]) : [];
+    state.follow = [x, y, width, height, azimuth, elevation, distance, panX, panY, ...moved].map((value) => Math.round(value * 1000) / 1000).join();
     keepLink();
     follow();
   },
@@ -308,8 +364,9 @@ stage.addEventListener("pointerdown", () => (element("hint").hidden = true));
 
 /** The followed pixel, the frame that it is of, and the frame's orbit. */
 function followed() {
-  const [x, y, width, height, azimuth, elevation, distance, panX, panY] = state.follow.split(",").map(Number);
-  return { x, y, width, height, orbit: { azimuth, elevation, distance, x: panX, y: panY } };
+  const [x, y, width, height, azimuth, elevation, distance, panX, panY, ...moved] = state.follow.split(",").map(Number);
+  const inRoom = Object.entries(ROOM_START).map(([name, value], index) => [name, moved[index] ?? value]);
+  return { x, y, width, height, orbit: { azimuth, elevation, distance, x: panX, y: panY, ...Object.fromEntries(inRoom) } };
 }
 
 async function follow() {
@@ -344,7 +401,7 @@ function drawPath() {
   canvas.height = Math.round(box.height * devicePixelRatio);
   if (!rays) return;
   const room = roomOf();
-  const camera = room ? roomCamera(room, box.width, box.height) : cameraOf(state, box.width, box.height);
+  const camera = room ? roomCamera(room, box.width, box.height, state) : cameraOf(state, box.width, box.height);
   draw(overlay, camera, poseIn(scene(), room, state), rays, 2 ** manifest.config.geometry.vertexBits - 1, chosen);
 }
 
@@ -445,14 +502,17 @@ async function start() {
   element("about").textContent = `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
   renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));
   page.renderer = renderer;
-    const wanted = state.mesh;
+  const wanted = state.mesh;
   const followed = state.follow;
+  const isLost = state.room !== "" && !(state.room in data.rooms);
+  if (isLost) state.room = "";
   await openDesign();
   await openTeapot();
+  if (isLost) page.mesh.notes.push("the link is of a room that it does not hold: drop photo and depth again");
   if (wanted !== "teapot.ply") {
     page.mesh.notes.push(`the link is of ${wanted}, which a link does not hold: drop the file; this is the teapot`);
-    showNotes();
   }
+  showNotes();
   state.follow = followed;
   if (followed) await follow();
   show();

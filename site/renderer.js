@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Workers that share frames: each renders every n-th band of rows.
 
+/** Bytes, or those of base64. */
+export const bytesOf = (text) => (typeof text === "string" ? Uint8Array.from(atob(text), (character) => character.charCodeAt(0)) : text);
+
 export class Renderer {
   constructor(source, count) {
     this.url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
@@ -75,6 +78,11 @@ export class Renderer {
     } finally {
       worker.terminate();
     }
+  }
+
+  /** Encodes a room of a photo and its depth (worker.js). */
+  room(request) {
+    return this.ask(this.workers[0], "room", request);
   }
 
   trace(view, x, y) {

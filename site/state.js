@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a link holds: mesh, design, material, light, camera, size of a pixel, and the pixel that is followed.
 
-import { START } from "./camera.js";
+import { ROOM_START, START } from "./camera.js";
 
 export const DEFAULTS = {
   mesh: "teapot.ply",
@@ -16,6 +16,7 @@ export const DEFAULTS = {
   bounces: 4,
   pixel: 1,
   ...START,
+  ...ROOM_START,
   follow: "",
 };
 
@@ -27,12 +28,14 @@ export function readState(hash) {
     const isNumber = typeof DEFAULTS[name] === "number";
     if (isNumber && !Number.isFinite(Number(text))) continue;
     if (["colour", "background"].includes(name) && !/^[0-9a-f]{6}$/.test(text)) continue;
-    if (name === "follow" && !/^(-?[\d.]+(,-?[\d.]+){8})?$/.test(text)) continue;
+    if (name === "follow" && !/^(-?[\d.]+(,-?[\d.]+){8}((,-?[\d.]+){5})?)?$/.test(text)) continue;
     if (name === "material" && !["diffuse", "mirror", "glass"].includes(text)) continue;
     state[name] = isNumber ? Number(text) : text;
   }
   state.elevation = Math.max(-89, Math.min(89, state.elevation));
   state.distance = Math.max(1.8, Math.min(40, state.distance));
+  state.roomElevation = Math.max(-89, Math.min(89, state.roomElevation));
+  state.roomDistance = Math.max(0.2, Math.min(5, state.roomDistance));
   state.pixel = [1, 2, 4].includes(state.pixel) ? state.pixel : 1;
   return state;
 }

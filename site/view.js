@@ -2,8 +2,9 @@
 // Views: what a frame of the state is, from the open mesh and its packed form for a design. `scene` has state, mesh,
 // manifest and packed.
 
-import { CUBE, START, cameraOf, lightOf, poseOf, roomCamera } from "./camera.js";
+import { CUBE, START, cameraOf, isAtMaps, lightOf, poseOf, roomCamera } from "./camera.js";
 import { decode } from "./photo.js";
+import { roomRegisters } from "./roomview.js";
 
 const LIGHT = [1.2, 1.6, 1.5];
 const GLASS = 1.5;
@@ -23,6 +24,7 @@ function registersOf(scene, room) {
   const rgb = (name, colour) => Object.fromEntries([..."rgb"].map((channel, i) => [`${name}.${channel}`, Math.round(colour[i] * white)]));
   const registers = {
     ...(room ? {} : rgb("background", colourOf(state.background))),
+    ...(room?.encoded ? roomRegisters(room, manifest) : {}),
     ...rgb("materials[0].albedo", colourOf(state.colour).map((value) => value / (material === "diffuse" ? (room?.headroom ?? 1) : 1))),
     "bounds.low.x": packed.lowX, "bounds.low.y": packed.lowY, "bounds.low.z": packed.lowZ,
     "bounds.high.x": packed.highX, "bounds.high.y": packed.highY, "bounds.high.z": packed.highZ,
@@ -50,17 +52,17 @@ export function poseIn({ manifest, packed }, room, orbit) {
   return room ? poseOf(room, orbit.azimuth - START.azimuth, packed.lowY / (2 ** manifest.config.geometry.vertexBits - 1)) : CUBE;
 }
 
-/** A frame in a room, or without one. In a room the camera is that of the maps, and an orbit turns the object. */
+/** A frame in a room, or without one. In a room an orbit turns the object, and moves the camera from that of the maps. */
 export function viewOf(scene, room, width, height, orbit) {
   const registers = registersOf(scene, room);
   if (room)
     return {
       file: String(room.height / height),
-      camera: roomCamera(room, width, height),
+      camera: roomCamera(room, width, height, orbit),
       object: poseIn(scene, room, orbit),
       lights: [],
       registers,
-      inPhoto: Boolean(scene.state.photo),
+      inPhoto: Boolean(scene.state.photo) && isAtMaps(orbit),
     };
   const light = { position: lightOf(cameraOf(START, width, height), LIGHT), colour: [0.9, 0.9, 0.9].map((value) => value * scene.state.light) };
   return { file: "plain", camera: cameraOf(orbit, width, height), lights: [light], registers };

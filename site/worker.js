@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A worker with a model of its own. The first one packs meshes, and gives their records to the others.
 
+import { readDepth } from "./depth.js";
+import { codesOf, encodeStill } from "./encoder.js";
 import { Library } from "./library.js";
 import { readMesh } from "./meshes.js";
 import { composite, encode, resizedPhoto } from "./photo.js";
+import { prepareRoom } from "./room.js";
 import { renderRtl } from "./rtl.js";
 
 const BAND = 4;
@@ -50,6 +53,15 @@ export function serve(scope) {
     load({ records }) {
       library.load(records);
       return {};
+    },
+    /** Encodes the room of a photo and its depth, for the maps of a design (room.js). */
+    async room({ manifest, photo, whole, lens, pose, depth, step }) {
+      const begin = performance.now();
+      const { depth: filled, normals, albedo, ...room } = prepareRoom({ photo, whole, lens, pose, depth: await readDepth(depth.name, depth.bytes, step) });
+      const prepared = performance.now();
+      const encoded = encodeStill(library.wasm, manifest, codesOf({ ...room, albedo, normals, depth: filled }));
+      const milliseconds = [prepared - begin, performance.now() - prepared];
+      return { ...room, encoded, milliseconds };
     },
     writes({ view }) {
       start(view);
@@ -102,8 +114,9 @@ export function serve(scope) {
 
   /** A view: the name of its file, and what replaces the file's poses and registers. */
   function start({ file, camera, object, lights, registers }) {
-    if (opened !== file) library.openView(files[file]);
-    opened = file;
+    // A room's view that has moved its camera does not go back to that of the maps
+    if (opened?.file !== file || (camera.isOfMaps && !opened.isOfMaps)) library.openView(files[file]);
+    opened = { file, isOfMaps: Boolean(camera.isOfMaps) };
     if (!camera.isOfMaps) library.setCamera(camera);
     if (object) library.setObject(object);
     lights.forEach(({ position, colour }, index) => library.setLight(index, position, colour));

@@ -12,8 +12,11 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
 #: Modules after those that they import.
-WORKER = ("design", "library", "meshes", "photo", "rtl", "worker")
-PAGE = ("camera", "design", "photo", "path", "panels", "orbit", "renderer", "state", "view", "page")
+WORKER = ("design", "library", "meshes", "photo", "depth", "normals", "encoder", "room", "rtl", "worker")
+PAGE = (
+    *("camera", "design", "photo", "roomview", "path", "panels", "orbit", "renderer", "state", "view"),
+    *("files", "visitor", "page"),
+)
 
 _IMPORT = re.compile(r'^import [^;]*? from "\./(\w+)\.js";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=async |function |class |const |let )", re.MULTILINE)

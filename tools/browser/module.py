@@ -1,4 +1,4 @@
-"""Compiles the packer, the model and colonnade_view to WebAssembly."""
+"""Compiles the packer, the model, the live encoder and colonnade_view to WebAssembly."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = ROOT / ".cache" / "zig-environment"
 OBJECTS = ROOT / ".cache" / "browser-objects"
 LIBRARY = ROOT / "host" / "cpp" / "library"
+LIVE = ROOT / "host" / "cpp" / "live"
 VIEW = ROOT / "software"
 
 TARGET = ("-target", "wasm32-wasi", "-O2", "-DNDEBUG", "-ffp-contract=off")
@@ -26,13 +27,14 @@ CPP = (
 )
 SOURCES = (
     ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{VIEW / 'include'}")),
+    *(("c++", LIVE / f"{name}.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")) for name in ("live", "kernels")),
     *(
         ("cc", VIEW / "src" / f"{name}.c", ("-std=c11", f"-I{VIEW / 'include'}"))
         for name in ("colonnade_files", "colonnade_view", "colonnade_view_room")
     ),
     ("cc", LIBRARY / "colonnade_view_size.c", ("-std=c11", f"-I{VIEW / 'include'}")),
 )
-HEADERS = (LIBRARY / "colonnade_model.h", VIEW / "include" / "colonnade_view.h")
+HEADERS = (LIBRARY / "colonnade_model.h", LIVE / "live.h", VIEW / "include" / "colonnade_view.h")
 
 
 def compile_module(output: Path) -> None:

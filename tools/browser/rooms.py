@@ -60,7 +60,7 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
 
 
 def _poses(ready: DeviceScene) -> dict[str, Any]:
-    """Camera and object in the world, metres; the camera's focal length and centre are in heights of the frame."""
+    """Camera and object in the world, metres; the camera's fx, cx, cy and fy are in heights of the frame."""
     scene: Scene = ready.scene
     width, height = SIZES[1]
     placed = place(scene, ready.image.header.extent, width, height, ready.environment)
@@ -73,7 +73,7 @@ def _poses(ready: DeviceScene) -> dict[str, Any]:
             "right": right.tolist(),
             "down": (-up).tolist(),
             "forward": (-toward).tolist(),
-            "lens": [value / room.height for value in (room.fx, room.cx, room.cy)],
+            "lens": [value / room.height for value in (room.fx, room.cx, room.cy, room.fy)],
         },
         "object": {
             "position": placed.pose.translate.tolist(),

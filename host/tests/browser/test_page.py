@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
+from colonnade.common.image_io import decode_srgb
+from colonnade.common.srgb import srgb_from_linear
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
@@ -62,7 +65,9 @@ class Tab:
     def wait(self, before: int = 0) -> None:
         """Wait for a whole frame after so many."""
         self.page.wait_for_selector("body[data-frames]")
-        while int(self.page.get_attribute("body", "data-frames") or 0) <= before:
+        end = time.monotonic() + 30
+        while self.frames() <= before:
+            assert time.monotonic() < end, self.page.locator("#error").inner_text() or "no frame came"
             time.sleep(0.02)
 
     def frames(self) -> int:
@@ -162,8 +167,64 @@ def test_a_room_equals_the_host_and_a_drag_turns_the_object(context: BrowserCont
     tab.page.uncheck("input[name=photo]")
     tab.wait(before)
     assert tab.page.evaluate("document.getElementById('picture').toDataURL()") != photographed
+    # Another camera, and back
+    unmoved, before = tab.picture()["triangles"], tab.frames()
+    tab.page.select_option("select[name=drag]", "camera")
+    tab.page.focus("#stage")
+    tab.page.keyboard.press("ArrowRight")
+    tab.wait(before)
+    expect(tab.page.locator("#notes")).to_contain_text("the camera is not that of the photo")
+    picture = tab.picture()
+    frame = host_frame(picture, load_mesh("teapot"), "edge", is_in_room=True)
+    np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
+    np.testing.assert_array_equal(np.reshape(picture["triangles"], frame.triangle.shape), frame.triangle)
+    assert frame.is_object.sum() > 100 and picture["triangles"] != pictures[1]
+    before = tab.frames()
+    tab.page.click("#home")
+    tab.wait(before)
+    assert tab.picture()["triangles"] == unmoved
     tab.page.select_option("select[name=design]", "tiny")
     expect(tab.page.locator("#notes")).to_contain_text("this hardware has no maps of a room")
+    assert tab.is_quiet()
+
+
+def test_a_photo_and_its_depth_are_a_room(context: BrowserContext, tmp_path: Path) -> None:
+    """Relit from its maps it is the photo again, so light, maps, pose and registers agree."""
+    folder = ROOT / "scenes" / "rooms" / "living"
+    tab = Tab(context, "#pixel=4&design=edge&material=mirror")
+    page, before = tab.page, tab.frames()
+    page.set_input_files("#file", [folder / name for name in ("render.png", "depth.png")])
+    expect(page.locator("#notes")).to_contain_text("one white lamp")
+    expect(page.locator("#notes")).to_contain_text("the photo's width is taken as 65°")
+    tab.wait(before)
+    # The room's own degrees, and its maps
+    before = tab.frames()
+    page.fill("input[name=degrees]", "66")
+    tab.wait(before)
+    before = tab.frames()
+    page.uncheck("input[name=photo]")
+    tab.wait(before)
+    picture = tab.picture()
+    size = picture["height"], picture["width"]
+    linear = np.reshape(picture["colours"], (*size, 3)) / 4095
+    photo = decode_srgb(np.asarray(Image.open(folder / "render.png").convert("RGB").resize(size[::-1], Image.BOX)))
+    is_object = np.reshape(picture["triangles"], size) >= 0
+    assert is_object.sum() > 100
+    lit = np.reshape(picture["ratios"], (*size, 3)).min(axis=2) == 4096
+    error = (srgb_from_linear(linear) - srgb_from_linear(photo))[lit & ~is_object]
+    assert lit.mean() > 0.8 and -20 * np.log10(np.sqrt((error**2).mean())) > 24
+    # A double click moves the object, and a photo alone is refused
+    before, hits = tab.frames(), picture["triangles"]
+    page.check("input[name=photo]")
+    tab.wait(before)
+    before = tab.frames()
+    box = page.locator("#picture").bounding_box()
+    assert box is not None
+    page.mouse.dblclick(box["x"] + 0.35 * box["width"], box["y"] + 0.9 * box["height"])
+    tab.wait(before)
+    assert tab.picture()["triangles"] != hits
+    page.set_input_files("#file", folder / "render.png")
+    expect(page.locator("#error")).to_contain_text("render.png is a photo without depth")
     assert tab.is_quiet()
 
 

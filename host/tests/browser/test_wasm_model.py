@@ -1,4 +1,4 @@
-"""The page's WebAssembly equals the host: records, pixels, hits and counters, of the model and of the RTL of tiny."""
+"""The page's WebAssembly equals the host: records, pixels, hits, counters and maps; of the RTL of tiny, too."""
 
 from __future__ import annotations
 
@@ -11,14 +11,20 @@ from pathlib import Path
 import numpy as np
 import playwright
 import pytest
+from PIL import Image
 
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
+from colonnade.environment.depth_normals import normals_of_depth
+from colonnade.environment.load import load_environment
+from colonnade.maps.encoded import layout_of
+from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
 from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.primitives import Geometry, cube, sphere
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
+from colonnade.scene_image.environment import map_sections
 from colonnade.scene_image.packer import pack
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -96,6 +102,47 @@ def test_a_file_is_cleaned_as_by_the_host(tmp_path: Path) -> None:
     assert mesh.notes and len(mesh.faces) == len(ball[1]) + len(box[1])
     check(tmp_path, mesh, "tiny", "object.toml", (64, 48), (vertices, faces))
     assert json.loads((tmp_path / "packed.json").read_text())["reversed"] == 1
+
+
+def test_a_room_is_encoded_as_by_the_host(tmp_path: Path) -> None:
+    """Bytes of all memories, depths and errors of tiles; normals of a depth map with noise and holes."""
+    manifest = Manifest.load(ROOT / "configs" / "golden" / "edge.json")
+    room = load_environment(ROOT / "scenes" / "rooms" / "living")
+    frame, encoder = LiveFrame.of(room), LiveEncoder(layout_of(manifest))
+    for _ in range(STILL_ROUNDS):
+        maps = encoder.encode(frame)
+    small = np.s_[1::4, 1::4]
+    random = np.random.default_rng(7)
+    depth = room.depth[small] * (1 + 0.003 * random.normal(size=room.depth[small].shape))
+    steps = np.where(random.random(depth.shape) < 0.02, 0, np.rint(depth / 0.001)).astype(np.uint16)
+    lens = {name: getattr(room, name) / 4 for name in ("fx", "fy", "cx", "cy")}
+    codes = {"lens": [room.fx, room.fy, room.cx, room.cy], "tolerance": 0.006}
+    job = {
+        "module": str(MODULE),
+        "manifest": json.loads((ROOT / "configs" / "golden" / "edge.json").read_text()),
+        "codes": codes | {"toWorld": room.camera.to_world[:3].ravel().tolist()},
+        "step": 0.001,
+        "lens": lens,
+    }
+    (tmp_path / "job.json").write_text(json.dumps(job))
+    for name in ("albedo", "normals", "depth"):
+        getattr(frame, name).tofile(tmp_path / f"{name}.bin")
+    Image.fromarray(steps).save(tmp_path / "depth.png")
+    subprocess.run([node(), Path(__file__).with_name("room.mjs"), tmp_path], check=True)
+
+    for section in map_sections(maps.image, manifest):
+        assert (tmp_path / section.memory).read_bytes() == section.words.tobytes(), section.memory
+    for name in ("error", "nearest", "furthest"):
+        assert (tmp_path / f"tiles.{name}").read_bytes() == getattr(maps, f"tile_{name}").tobytes()
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["depthUnit"] == maps.image.depth_unit and result["count"] == np.count_nonzero(steps == 0)
+    camera = replace(room.camera, **lens)
+    holes = steps == 0
+    filled = np.where(holes, np.roll(steps, 1, axis=1), steps) * 0.001
+    own = normals_of_depth(np.where(filled > 0, filled, 1.0), holes, camera)
+    derived = np.fromfile(tmp_path / "derived.bin").reshape(own.normals.shape)
+    assert abs(result["noise"] / own.noise - 1) < 0.05
+    assert np.median(np.degrees(np.arccos(np.clip((derived * own.normals).sum(axis=2), -1, 1)))) < 0.1
 
 
 @pytest.mark.matrix

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Encodes a room in WebAssembly, and derives normals, as the page does: node room.mjs FOLDER, which has job.json, the
+// codes of the maps and a depth map. It writes the memories, what the encoder returns beside them, and the normals.
+
+import { readFileSync, writeFileSync } from "node:fs";
+import { fillHoles, readDepth } from "../../../site/depth.js";
+import { encodeStill } from "../../../site/encoder.js";
+import { instantiate } from "../../../site/library.js";
+import { normalsOf } from "../../../site/normals.js";
+
+const folder = process.argv[2];
+const bytes = (name) => Uint8Array.from(readFileSync(`${folder}/${name}`));
+const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
+const codes = { ...job.codes, albedo: bytes("albedo.bin"), normals: bytes("normals.bin"), depth: new Uint32Array(bytes("depth.bin").buffer) };
+const { maps, tiles, ...rest } = encodeStill(await instantiate(readFileSync(job.module)), job.manifest, codes);
+for (const { memory, words } of maps) writeFileSync(`${folder}/${memory}`, words);
+for (const [name, values] of Object.entries(tiles)) writeFileSync(`${folder}/tiles.${name}`, new Uint8Array(values.buffer));
+
+const { width, height, values } = await readDepth("depth.png", bytes("depth.png"), job.step);
+const { holes, count } = fillHoles(values, width);
+const { normals, noise } = normalsOf(values, holes, job.lens, width, height);
+writeFileSync(`${folder}/derived.bin`, new Uint8Array(normals.buffer));
+writeFileSync(`${folder}/result.json`, JSON.stringify({ ...rest, count, noise }));

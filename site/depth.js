@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// Depth of a visitor: PNG of 16 bits and NumPy files, which a browser does not read by itself; crop, size and holes as
+// `colonnade capture` has them (docs/captures.md).
+
+const SIGNATURE = [137, 80, 78, 71, 13, 10, 26, 10];
+const MOST_EDGE = 8192;
+const SAME_SURFACE = 0.05;
+const MOST_HOLES = 0.5;
+
+/** Reads depth, metres: {width, height, values}; 0 is a hole. `step`: metres of a step of a PNG. */
+export async function readDepth(name, bytes, step) {
+  const isPng = SIGNATURE.every((byte, index) => bytes[index] === byte);
+  const isNumpy = bytes[0] === 0x93 && String.fromCharCode(...bytes.subarray(1, 6)) === "NUMPY";
+  if (!isPng && !isNumpy) throw new Error(`${name} is no depth map: it has to be a grey PNG of 16 bits, or a .npy`);
+  let depth;
+  try {
+    depth = isPng ? await readPng(bytes, step) : readNumpy(bytes);
+  } catch (error) {
+    throw new Error(error instanceof Refusal ? `${name} ${error.message}` : `${name} is damaged, or no depth map`);
+  }
+  return depth;
+}
+
+/** What is wrong with a file, for the visitor. */
+class Refusal extends Error {}
+
+function checkSize(width, height) {
+  if (!(width >= 16 && height >= 16 && width <= MOST_EDGE && height <= MOST_EDGE)) throw new Refusal(`is ${width} × ${height}: a depth map has 16 to ${MOST_EDGE} pixels a side`);
+}
+
+async function readPng(bytes, step) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const parts = [];
+  let head;
+  for (let at = 8; at + 12 <= bytes.length; ) {
+    const length = view.getUint32(at);
+    const kind = String.fromCharCode(...bytes.subarray(at + 4, at + 8));
+    if (kind === "IHDR") head = { width: view.getUint32(at + 8), height: view.getUint32(at + 12), bits: bytes[at + 16], colour: bytes[at + 17], interlace: bytes[at + 20] };
+    if (kind === "IDAT") parts.push(bytes.subarray(at + 8, at + 8 + length));
+    at += 12 + length;
+  }
+  const { width, height, bits, colour, interlace } = head;
+  if (colour !== 0 || bits !== 16) throw new Refusal(`has ${colour === 0 ? "grey" : "colours"} of ${bits} bits: depth is grey of 16 bits`);
+  if (interlace !== 0) throw new Refusal("is interlaced: save it without interlacing");
+  checkSize(width, height);
+  const stride = 2 * width;
+  const lines = new Uint8Array(await new Response(new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer());
+  if (lines.length < height * (stride + 1)) throw new Error("truncated");
+  const values = new Float64Array(width * height);
+  let above = new Uint8Array(stride);
+  for (let y = 0; y < height; ++y) {
+    const line = lines.subarray(y * (stride + 1) + 1, (y + 1) * (stride + 1));
+    unfilter(lines[y * (stride + 1)], line, above);
+    for (let x = 0; x < width; ++x) values[y * width + x] = step * (256 * line[2 * x] + line[2 * x + 1]);
+    above = line;
+  }
+  return { width, height, values };
+}
+
+/** Undoes the filter of a line of samples of two bytes. */
+function unfilter(filter, line, above) {
+  for (let i = 0; i < line.length; ++i) {
+    const [left, up, corner] = [i < 2 ? 0 : line[i - 2], above[i], i < 2 ? 0 : above[i - 2]];
+    const distances = [up - corner, left - corner, left + up - 2 * corner].map(Math.abs);
+    const least = Math.min(...distances);
+    const paeth = distances[0] === least ? left : distances[1] === least ? up : corner;
+    line[i] += [0, left, up, (left + up) >> 1, paeth][filter];
+  }
+}
+
+function readNumpy(bytes) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const isLong = bytes[6] > 1;
+  const start = isLong ? 12 : 10;
+  const length = isLong ? view.getUint32(8, true) : view.getUint16(8, true);
+  const head = new TextDecoder("latin1").decode(bytes.subarray(start, start + length));
+  const kind = /'descr': *'([^']+)'/.exec(head)[1];
+  const shape = /'shape': *\((\d+), *(\d+),?\)/.exec(head);
+  const Values = { "<f2": null, "<f4": Float32Array, "<f8": Float64Array }[kind];
+  if (!Values) throw new Refusal(`has samples ${kind}: a .npy of depth has metres as <f4 or <f8`);
+  if (/'fortran_order': *True/.test(head) || !shape) throw new Refusal("is no array of rows and columns");
+  const [height, width] = [Number(shape[1]), Number(shape[2])];
+  checkSize(width, height);
+  const content = bytes.slice(start + length, start + length + width * height * Values.BYTES_PER_ELEMENT);
+  return { width, height, values: Float64Array.from(new Values(content.buffer, 0, width * height)) };
+}
+
+/** The part of a photo that the maps show, its pixels, and their size there: the largest one around the middle. */
+export function cropOf(photo, width, height) {
+  const scale = Math.min(photo.width / width, photo.height / height);
+  return { left: (photo.width - scale * width) / 2, top: (photo.height - scale * height) / 2, scale };
+}
+
+/** Depth in the size of the maps: on one surface linear in inverse depth, else the nearest sample; a hole is 0. */
+export function fitDepth(depth, photo, crop, width, height) {
+  const size = [depth.width, depth.height];
+  const place = (index, start, along, most) => Math.max(0, Math.min(most - 1, (start + (index + 0.5) * crop.scale) * along - 0.5));
+  const result = new Float64Array(width * height);
+  for (let y = 0; y < height; ++y) {
+    const v = place(y, crop.top, size[1] / photo.height, size[1]);
+    const top = Math.min(Math.floor(v), size[1] - 2);
+    for (let x = 0; x < width; ++x) {
+      const u = place(x, crop.left, size[0] / photo.width, size[0]);
+      const left = Math.min(Math.floor(u), size[0] - 2);
+      const at = top * size[0] + left;
+      const corners = [at, at + 1, at + size[0], at + size[0] + 1].map((index) => depth.values[index]);
+      const [s, t] = [u - left, v - top];
+      const isOne = corners.every((value) => value > 0) && Math.max(...corners) <= Math.min(...corners) * (1 + SAME_SURFACE);
+      const weights = [(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t];
+      const nearest = corners[2 * Math.round(t) + Math.round(s)];
+      result[y * width + x] = isOne ? 1 / corners.reduce((sum, value, index) => sum + weights[index] / value, 0) : Number.isFinite(nearest) && nearest > 0 ? nearest : 0;
+    }
+  }
+  return result;
+}
+
+/** Fills holes, in place, from the nearest pixel by steps; returns which they were. */
+export function fillHoles(depth, width) {
+  const holes = Uint8Array.from(depth, (value) => Number(!(value > 0)));
+  const count = holes.reduce((sum, hole) => sum + hole, 0);
+  if (count > MOST_HOLES * depth.length) throw new Error(`${Math.round((100 * count) / depth.length)} % of the depth map have no depth: it needs half of the pixels`);
+  spread(holes, width, (to, from) => (depth[to] = depth[from]));
+  return { holes, count };
+}
+
+/** Calls `copy` for each missing pixel with one of its neighbours that is nearer to a known pixel. */
+export function spread(missing, width, copy) {
+  const known = Uint8Array.from(missing, (value) => 1 - value);
+  let edge = [];
+  for (let i = 0; i < known.length; ++i) if (known[i]) edge.push(i);
+  while (edge.length > 0) {
+    const next = [];
+    for (const from of edge) {
+      const x = from % width;
+      for (const to of [x > 0 ? from - 1 : -1, x < width - 1 ? from + 1 : -1, from - width, from + width]) {
+        if (to < 0 || to >= known.length || known[to]) continue;
+        known[to] = 1;
+        copy(to, from);
+        next.push(to);
+      }
+    }
+    edge = next;
+  }
+}

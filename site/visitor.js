@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// A room of a visitor's files, in the page: the worker makes its maps, this module its view files.
+
+import { readMeta } from "./files.js";
+import { bytesOf } from "./renderer.js";
+import { lensOf, roomView } from "./roomview.js";
+
+/** Edge of the object's cube, as a share of its distance. */
+const OBJECT_SHARE = 0.3;
+
+/** Points of its outline in edges, right and up, which nothing should hide. */
+const OUTLINE = [[0, 1], [-0.5, 0.5], [0.5, 0.5]];
+
+/** The room of the page whose view files are templates, and a design that has maps: the wanted one, if it has. */
+export function templateFor(rooms, wanted) {
+  const template = rooms.living;
+  return { template, design: wanted in template.views ? wanted : "textured" };
+}
+
+/** A room in the form of those of the page; `found` as of roomFiles, `settings` hold where there is no meta.json. */
+export async function visitorRoom(renderer, manifest, template, found, files, { degrees, millimetres }) {
+  const bitmap = await createImageBitmap(new Blob([files.get(found.photo)])).catch(() => {
+    throw new Error(`${found.photo} is no picture that this browser reads`);
+  });
+  const whole = { width: bitmap.width, height: bitmap.height };
+  const meta = found.meta && readMeta(found.meta, whole);
+  if (!meta && !(millimetres > 0 && degrees >= 20 && degrees <= 140)) throw new Error("the photo's width is 20 to 140 degrees, the step of the depth map more than 0 mm");
+  const photo = pixelsOf(bitmap, template.width, template.height);
+  const { lens, pose, step } = meta ?? { lens: lensOf(degrees, whole), pose: null, step: millimetres / 1000 };
+  const depth = { name: found.depth, bytes: files.get(found.depth) };
+  const room = await renderer.room({ manifest, photo, whole, lens, pose, depth, step });
+  const { ignored } = found;
+  if (!meta) room.notes.push(`the photo's width is taken as ${degrees}°, a step of a PNG of depth as ${millimetres} mm`);
+  if (ignored.length > 0) room.notes.push(`${ignored.join(" and ")} ${ignored.length > 1 ? "are" : "is"} not read`);
+  return { ...room, ...placedRoom(room, template, placeOf(room)), picture: photo, files: { found, files } };
+}
+
+/** What the page needs of a room whose object stands at its place: camera, object and view files. */
+export function placedRoom(room, template, place) {
+  const { pose, lens, width, height } = room;
+  const axis = (column) => pose.rotation.map((row) => row[column]);
+  const scale = place.edge / 2;
+  const object = { position: [place.point[0], place.point[1] + scale, place.point[2]], scale };
+  const viewsOf = (views) => Object.fromEntries(Object.entries(views).map(([factor, text]) => [factor, roomView(bytesOf(text), template.object.scale, room, object, Number(factor))]));
+  return {
+    object,
+    camera: { position: pose.position, right: axis(0), down: axis(1), forward: axis(2), lens: [lens.fx, lens.cx, lens.cy, lens.fy].map((value) => value / height) },
+    maps: room.encoded.maps,
+    views: Object.fromEntries(Object.entries(template.views).map(([design, views]) => [design, viewsOf(views)])),
+    width,
+    height,
+  };
+}
+
+/** The largest part around the middle of a picture with the proportions of the maps, in their size. */
+function pixelsOf(bitmap, width, height) {
+  const scale = Math.min(bitmap.width / width, bitmap.height / height);
+  const part = [(bitmap.width - scale * width) / 2, (bitmap.height - scale * height) / 2, scale * width, scale * height];
+  const context = new OffscreenCanvas(width, height).getContext("2d");
+  context.imageSmoothingQuality = "high";
+  context.drawImage(bitmap, ...part, 0, 0, width, height);
+  return { data: context.getImageData(0, 0, width, height).data, width, height };
+}
+
+/**
+ * Where the object stands: on the level surface nearest to a pixel, at most `within` pixels away; its edge, metres. Without
+ * a pixel: near the middle, where nothing hides it.
+ */
+export function placeOf(room, x, y, within = Infinity) {
+  const { surface, pose, width, height } = room;
+  const isFree = x === undefined;
+  const middle = isFree ? [width / 2, 0.62 * height] : [x, y];
+  const pixelsTo = ({ pixel }, [u, v]) => Math.hypot((pixel % width) - u, Math.floor(pixel / width) - v);
+  const nearest = (points, to) => points.reduce((best, each) => (pixelsTo(each, to) < pixelsTo(best, to) ? each : best));
+  const edgeAt = (point) => OBJECT_SHARE * Math.hypot(...point.map((value, axis) => value - pose.position[axis]));
+  const isHidden = ({ point, distance }) => {
+    const edge = edgeAt(point);
+    const shown = ([across, up]) => point.map((value, axis) => value + edge * (across * pose.rotation[axis][0] + (axis === 1 ? up : 0)));
+    return OUTLINE.some((place) => nearest(surface, pixelOf(room, shown(place))).distance < distance - 0.6 * edge);
+  };
+  const level = surface.filter((each) => each.normal[1] > 0.9 && pixelsTo(each, middle) <= within);
+  const seen = isFree ? level.filter((each) => !isHidden(each)) : level;
+  const { point } = nearest([seen, level, surface].find((points) => points.length > 0), middle);
+  return { point, edge: edgeAt(point) };
+}
+
+/** The pixel of the maps that shows a point. */
+function pixelOf({ pose, lens }, point) {
+  const offset = point.map((value, axis) => value - pose.position[axis]);
+  const [x, y, z] = [0, 1, 2].map((axis) => pose.rotation.reduce((sum, row, i) => sum + row[axis] * offset[i], 0));
+  return [lens.cx + (lens.fx * x) / z, lens.cy + (lens.fy * y) / z];
+}
