@@ -1,8 +1,14 @@
 // ColonnadeAxi of `colonnade generate --axi 8` with the AXI4 ports of an SoC: registers as a slave with 64 bits, as a
-// processor's MMIO port is, and memory as a master with all signals of AXI4.
+// processor's MMIO port is, and memory as a master with all signals of AXI4. With COLONNADE_SCENE defined it has the second
+// master of a design whose scene is in DRAM.
 module colonnade_axi4 #(
     parameter int SLAVE_ID = 4,
     parameter int MASTER_ID = 8
+`ifdef COLONNADE_SCENE
+    ,
+    parameter int SCENE_ID = 2,     // of the design: 1 with one or two banks of records, 2 with four
+    parameter int SCENE_BYTES = 32  // of the design: columnBvhMemory.cache.busBytes
+`endif
 ) (
     input  logic clock,
     input  logic reset,
@@ -35,6 +41,21 @@ module colonnade_axi4 #(
     input  logic [MASTER_ID-1:0] m_axi_bid, m_axi_rid,
     input  logic [1:0]    m_axi_bresp, m_axi_rresp,
     input  logic [63:0]   m_axi_rdata
+`ifdef COLONNADE_SCENE
+    ,
+    output logic [MASTER_ID-1:0] m_axi_scene_arid,
+    output logic [39:0]   m_axi_scene_araddr,
+    output logic [7:0]    m_axi_scene_arlen,
+    output logic [2:0]    m_axi_scene_arsize, m_axi_scene_arprot,
+    output logic [1:0]    m_axi_scene_arburst,
+    output logic          m_axi_scene_arlock,
+    output logic [3:0]    m_axi_scene_arcache, m_axi_scene_arqos,
+    output logic          m_axi_scene_arvalid, m_axi_scene_rready,
+    input  logic          m_axi_scene_arready, m_axi_scene_rvalid, m_axi_scene_rlast,
+    input  logic [MASTER_ID-1:0] m_axi_scene_rid,
+    input  logic [1:0]    m_axi_scene_rresp,
+    input  logic [8*SCENE_BYTES-1:0] m_axi_scene_rdata
+`endif
 );
   // Bursts are refused, and the device has one id, whose answers come in order.
   wire unused = &{1'b0, s_axi_awburst, s_axi_arburst, m_axi_bid, m_axi_rid};
@@ -62,6 +83,15 @@ module colonnade_axi4 #(
   assign {m_axi_awcache, m_axi_arcache} = {2{4'b0011}};
   assign {m_axi_awqos, m_axi_arqos} = '0;
 
+`ifdef COLONNADE_SCENE
+  wire unused_scene = &{1'b0, m_axi_scene_rid};
+  logic [SCENE_ID-1:0] scene_arid;
+  assign m_axi_scene_arid = MASTER_ID'(scene_arid);
+  assign m_axi_scene_arlock = '0;
+  assign m_axi_scene_arcache = 4'b0011;
+  assign m_axi_scene_arqos = '0;
+`endif
+
   ColonnadeAxi colonnade (
       .s_axil_awaddr(awaddr), .s_axil_awprot(3'b010), .s_axil_awvalid(awvalid), .s_axil_awready(awready),
       .s_axil_wdata(wdata), .s_axil_wstrb(wstrb), .s_axil_wvalid(wvalid), .s_axil_wready(wready),
@@ -69,6 +99,9 @@ module colonnade_axi4 #(
       .s_axil_araddr(araddr), .s_axil_arprot(3'b010), .s_axil_arvalid(arvalid), .s_axil_arready(arready),
       .s_axil_rdata(rdata), .s_axil_rresp(rresp), .s_axil_rvalid(rvalid), .s_axil_rready(rready),
       .m_axi_awid(awid), .m_axi_arid(arid), .m_axi_bid(m_axi_bid[0]), .m_axi_rid(m_axi_rid[0]),
+`ifdef COLONNADE_SCENE
+      .m_axi_scene_arid(scene_arid), .m_axi_scene_rid(m_axi_scene_rid[SCENE_ID-1:0]),
+`endif
       .*
   );
 endmodule

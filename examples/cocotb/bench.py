@@ -1,4 +1,4 @@
-"""A bench of ColonnadeAxi in cocotb: loads an image, renders a frame into a memory, and writes its lines to a file."""
+"""A bench of ColonnadeAxi, or of the top with AXI4 ports, in cocotb: a frame in a memory, whose lines go to a file."""
 
 from __future__ import annotations
 
@@ -13,12 +13,38 @@ import cocotb
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, RisingEdge
 from cocotb.utils import get_sim_time
-from cocotbext.axi import AxiBus, AxiLiteBus, AxiLiteMaster, AxiRam
+from cocotbext.axi import AxiBus, AxiLiteBus, AxiLiteMaster, AxiMaster, AxiRam, AxiRamRead, AxiReadBus
 
 PERIOD = 10  # ns
-IMAGE, FRAMEBUFFER, MEMORY = 0x1000, 0x80000, 1 << 20  # bytes
+IMAGE, FRAMEBUFFER, SCENE, MEMORY = 0x1000, 0x80000, 0x100000, 1 << 21  # bytes
+PAGE = 4096  # bytes of register dram.page
 FRAME_DONE, IMAGE_DONE = 1, 2  # interrupts
 START, LOAD = 1, 2  # commands
+
+
+def strobed(data: Any, strobe: int) -> int:
+    """The bytes of a beat with a strobe. The others are unknown in Icarus Verilog, behind the last pixel of a line."""
+    lanes = (lane for lane in range(len(data) // 8) if strobe >> lane & 1)
+    return sum(int(data[8 * lane + 7 : 8 * lane]) << 8 * lane for lane in lanes)
+
+
+def memory_of(dut: Any) -> AxiRam:
+    """A memory on ``m_axi``, and on ``m_axi_scene`` if the design has it."""
+    memory = AxiRam(AxiBus.from_prefix(dut, "m_axi"), dut.clock, dut.reset, size=MEMORY)
+    data = memory.write_if.w_channel
+    receive = data.recv
+
+    async def received() -> Any:
+        beat = await receive()
+        beat.wdata = strobed(beat.wdata, int(beat.wstrb))
+        return beat
+
+    data.recv = received
+    if hasattr(dut, "m_axi_scene_arvalid"):
+        bus = AxiReadBus.from_prefix(dut, "m_axi_scene")
+        bus.r.rid.value = 0  # rready depends on it
+        AxiRamRead(bus, dut.clock, dut.reset, size=MEMORY, mem=memory.mem)
+    return memory
 
 
 class Device:
@@ -30,19 +56,25 @@ class Device:
         self.registers = {register["name"]: register for register in shell["registers"]}
         self.base = shell["deviceBase"]
         fields = manifest["registers"]["fields"]
+        self.addresses = {field["name"]: self.base + 4 * field["address"] for field in fields}
         self.errors = [field["address"] for field in fields if field["name"].startswith("errors.")]
         self.tile = manifest["config"]["frame"]["tileSize"]
         self.dut = dut
-        self.bus = AxiLiteMaster(AxiLiteBus.from_prefix(dut, "s_axil"), dut.clock, dut.reset)
+        self.access: dict[str, int] = {}
+        if hasattr(dut, "s_axil_awvalid"):
+            self.bus = AxiLiteMaster(AxiLiteBus.from_prefix(dut, "s_axil"), dut.clock, dut.reset)
+        else:
+            self.bus = AxiMaster(AxiBus.from_prefix(dut, "s_axi"), dut.clock, dut.reset)
+            self.access = {"size": 2}  # accesses of 4 bytes
 
     async def write(self, address: int, value: int) -> None:
         """Write a word, which the shell must take."""
-        answer = await self.bus.write(address, value.to_bytes(4, "little"))
+        answer = await self.bus.write(address, value.to_bytes(4, "little"), **self.access)
         assert answer.resp == 0, f"the shell refuses a write to {address:#x}"
 
     async def read(self, address: int) -> int:
         """Read a word, which the shell must have."""
-        answer = await self.bus.read(address, 4)
+        answer = await self.bus.read(address, 4, **self.access)
         assert answer.resp == 0, f"the shell refuses a read of {address:#x}"
         return int.from_bytes(answer.data, "little")
 
@@ -74,7 +106,7 @@ async def renders_a_frame(dut: Any) -> None:
     begin = time.process_time()
     cocotb.start_soon(Clock(dut.clock, PERIOD, unit="ns").start())
     device = Device(dut, files["DESIGN"])
-    memory = AxiRam(AxiBus.from_prefix(dut, "m_axi"), dut.clock, dut.reset, size=MEMORY)
+    memory = memory_of(dut)
     dut.reset.value = 1
     await ClockCycles(dut.clock, 10)
     dut.reset.value = 0
@@ -102,9 +134,12 @@ async def renders_a_frame(dut: Any) -> None:
     for address, value in zip(words[16::2], words[17::2], strict=True):
         await device.write(device.base + 4 * address, value)
     assert len(words) == 16 + 2 * count
+    if "dram.page" in device.addresses:
+        memory.write(SCENE, Path(os.environ["SCENE"]).read_bytes())
+        await device.write(device.addresses["dram.page"], SCENE // PAGE)
     stride = -(-width // device.tile) * device.tile * 4
     end = FRAMEBUFFER + stride * height
-    assert end <= MEMORY
+    assert end <= SCENE
     window = {
         "base": FRAMEBUFFER,
         "windowBase": FRAMEBUFFER,

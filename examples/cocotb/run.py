@@ -1,13 +1,13 @@
 """Runs bench.py in Icarus Verilog or Verilator.
 
-usage: run.py icarus|verilator DESIGN IMAGE FRAME OUTPUT [BACKDOOR]
-
 DESIGN is a folder of `colonnade generate --axi BYTES`; IMAGE and FRAME come from `colonnade pack`; OUTPUT receives
 lines of XRGB8888. With a folder of backdoor.py nothing is loaded through the bus.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import os
 import re
 import subprocess
@@ -17,6 +17,8 @@ from pathlib import Path
 from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import get_runner
 
+#: The top with AXI4 ports.
+AXI4 = Path(__file__).resolve().parents[1] / "axi4"
 #: The oldest Verilator of cocotb 2.
 MINIMUM_VERILATOR = (5, 36)
 
@@ -30,29 +32,40 @@ def require_verilator() -> None:
         sys.exit(f"cocotb needs Verilator 5.036 or newer, not {answer.strip()}; run: {advice}")
 
 
-def main(simulator: str, design: Path, image: Path, frame: Path, output: Path, backdoor: Path | None = None) -> None:
+def main(arguments: argparse.Namespace) -> None:
     """Build and run."""
+    simulator, design, backdoor = arguments.simulator, arguments.design, arguments.backdoor
     if simulator == "verilator":
         require_verilator()
+    top = "colonnade_axi4" if arguments.axi4 else "ColonnadeAxi"
     sources = [design / line for line in (design / "filelist.f").read_text().split()]
-    build = output.with_suffix(f".{simulator}")
+    sources += sorted(AXI4.glob("*.sv")) if arguments.axi4 else []
+    sources += [] if backdoor is None else [backdoor / "backdoor.sv"]
+    memory = json.loads((design / "manifest.json").read_text())["config"]["columnBvhMemory"]
+    cache, defines, parameters = memory["cache"], {}, {}
+    if arguments.axi4 and cache is not None:
+        defines = {"COLONNADE_SCENE": 1}
+        parameters = {"SCENE_ID": 2 if memory["banks"] == 4 else 1, "SCENE_BYTES": cache["busBytes"]}
+    build = arguments.output.with_suffix(f".{simulator}")
     runner = get_runner(simulator)
-    extra = [] if backdoor is None else [backdoor / "backdoor.sv"]
     # Icarus Verilog has no bind: the backdoor is a second top module.
-    tops = [word for _ in extra for word in ("-s", "colonnade_backdoor")]
+    tops = [] if backdoor is None else ["-s", "colonnade_backdoor"]
     runner.build(
-        sources=[*sources, *extra],
-        hdl_toplevel="ColonnadeAxi",
+        sources=sources,
+        hdl_toplevel=top,
         build_dir=build,
         build_args=["-g2012", *tops] if simulator == "icarus" else ["-Wno-fatal", "-O3"],
+        defines=defines,
+        parameters=parameters,
         timescale=("1ns", "1ps"),
         log_file=build.with_suffix(".log"),
         always=True,
     )
-    files = {"DESIGN": design, "IMAGE": image, "FRAME": frame, "OUTPUT": output}
+    files = {"DESIGN": design, "IMAGE": arguments.image, "FRAME": arguments.frame, "OUTPUT": arguments.output}
+    files |= {} if arguments.scene is None else {"SCENE": arguments.scene}
     sys.path.insert(0, str(Path(__file__).parent))
     results = runner.test(
-        hdl_toplevel="ColonnadeAxi",
+        hdl_toplevel=top,
         test_module="bench",
         build_dir=build,
         plusargs=[] if backdoor is None else [f"+backdoor={backdoor}"],
@@ -67,7 +80,19 @@ def main(simulator: str, design: Path, image: Path, frame: Path, output: Path, b
         sys.exit("the bench has failed")
 
 
+def path(text: str) -> Path:
+    """A path from any folder."""
+    return Path(text).resolve()
+
+
 if __name__ == "__main__":
-    if len(sys.argv) not in (6, 7) or sys.argv[1] not in ("icarus", "verilator"):
-        sys.exit(__doc__)
-    main(sys.argv[1], *(Path(argument).resolve() for argument in sys.argv[2:]))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("simulator", choices=["icarus", "verilator"])
+    for name in ("design", "image", "frame", "output"):
+        parser.add_argument(name, type=path, metavar=name.upper())
+    parser.add_argument("--backdoor", type=path, metavar="DIR", help="folder of backdoor.py")
+    parser.add_argument("--axi4", action="store_true", help="through the top of examples/axi4")
+    parser.add_argument(
+        "--scene", type=path, metavar="FILE", help="of --dram-image, for a design whose scene is in DRAM"
+    )
+    main(parser.parse_args())

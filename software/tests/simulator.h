@@ -55,13 +55,13 @@ static void *read_file(const char *name, size_t *bytes) {
     return data;
 }
 
-static void expect(enum colonnade_error error, enum colonnade_error expected, const char *what) {
+static inline void expect(enum colonnade_error error, enum colonnade_error expected, const char *what) {
     if (error != expected) {
         fprintf(stderr, "%s: %s, expected %s\n", what, colonnade_error_name(error), colonnade_error_name(expected));
         exit(1);
     }
 }
 
-static uint64_t pages(uint64_t bytes) { return (bytes + PAGE - 1) / PAGE * PAGE; }
+static inline uint64_t pages(uint64_t bytes) { return (bytes + PAGE - 1) / PAGE * PAGE; }
 
 #endif

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from colonnade.common.framebuffer import Frame
 from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
@@ -36,8 +37,10 @@ from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
 from colonnade.registers.target_view import TargetView
+from colonnade.registers.view_file import camera_values, position_values
 from colonnade.render.frames import sequence_scenes
 from colonnade.scene.parser import load_scene
+from colonnade.scene.view import place
 from colonnade.scene_image.device_image import device_image, load_cycles, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.packer import pack
@@ -61,9 +64,17 @@ def design() -> GeneratedDesign:
     return shell_design_for("tiny", ("array.columns=2",), bus_bytes=16)
 
 
+@functools.cache
+def driver_objects() -> list[Path]:
+    """The driver, compiled once."""
+    folder = Path(tempfile.mkdtemp(prefix="colonnade-driver-"))
+    atexit.register(shutil.rmtree, folder)
+    return [compile_c([source], folder / f"{source.stem}.o", "-c") for source in DRIVER]
+
+
 def compile_c(sources: list[Path], program: Path, *options: str) -> Path:
     includes = [f"-I{SOFTWARE / 'include'}", f"-I{program.parent}"]
-    command = ["gcc", *WARNINGS, *SANITIZERS, *includes, *options, *map(str, sources), "-o", str(program)]
+    command = ["gcc", *WARNINGS, *SANITIZERS, *includes, *map(str, sources), *options, "-o", str(program)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return program
@@ -72,7 +83,7 @@ def compile_c(sources: list[Path], program: Path, *options: str) -> Path:
 @pytest.fixture(scope="module")
 def stub(tmp_path_factory: pytest.TempPathFactory) -> Path:
     tests = SOFTWARE / "tests"
-    return compile_c([tests / "stub.c", tests / "shell.c", *DRIVER], tmp_path_factory.mktemp("stub") / "stub")
+    return compile_c([tests / "stub.c", tests / "shell.c", *driver_objects()], tmp_path_factory.mktemp("stub") / "stub")
 
 
 #: Every error has its name, and no access is made that the shell refuses.
@@ -107,16 +118,24 @@ def test_the_driver_compiles_for_a_bare_riscv(tmp_path: Path) -> None:
 
 def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> None:
     (tmp_path / "colonnade_design.h").write_text(design_header(register_table(design), design.manifest))
-    compile_c([SOFTWARE / "examples" / "uio.c", *DRIVER], tmp_path / "uio")
+    linux = [SOFTWARE / "examples" / name for name in ("target.c", "target_uio.c")]
+    for name, options in (("uio", ()), ("viewer", ("-lm",))):
+        program = compile_c([SOFTWARE / "examples" / f"{name}.c", *linux, *driver_objects()], tmp_path / name, *options)
+        done = subprocess.run([program, "uio9", "none", "none"], capture_output=True, text=True)
+        assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
 
 
 @functools.cache
 def compiled_driver(program: str, header: str) -> Path:
-    """A program of the tests with the driver, for the design of a header."""
+    """A program of the tests, or the viewer of the examples, with the driver, for the design of a header."""
     folder = Path(tempfile.mkdtemp(prefix="colonnade-driver-"))
     atexit.register(shutil.rmtree, folder)
     (folder / "colonnade_design.h").write_text(header)
-    return compile_c([SOFTWARE / "tests" / f"{program}.c", *DRIVER], folder / "driver")
+    tests, examples = SOFTWARE / "tests", SOFTWARE / "examples"
+    if program == "viewer":
+        sources = [examples / "viewer.c", examples / "target.c", tests / "target_simulated.c"]
+        return compile_c([*sources, *driver_objects()], folder / "driver", f"-I{examples}", "-lm")
+    return compile_c([tests / f"{program}.c", *driver_objects()], folder / "driver")
 
 
 def run_driver(
@@ -192,6 +211,36 @@ def test_frames_by_the_driver_are_those_of_the_model(tmp_path: Path, case: str) 
     for code, line in zip((0, 1, 2, 0), lines, strict=True):
         take_frame(memory, line, expected, code)
     assert (memory == UNWRITTEN).all()
+
+
+def test_the_viewer_renders_the_orbit_of_its_keys(tmp_path: Path, design: GeneratedDesign) -> None:
+    """Its last frame is the model's, for the camera of the keys."""
+    size, manifest = (24, 16), design.manifest
+    scene = DeviceScene.of(
+        load_scene(toolchain.project_root() / "scenes" / "object.toml"), manifest, load_mesh("torus")
+    )
+    file = scene.view_file(size)
+    files = {"image": scene.device_image(), "view": file}
+    memory, (line,) = run_driver(
+        tmp_path, design, files, "interrupt", "image", "view", "--keys", "xds-q+", program="viewer"
+    )
+    assert line[:4] == ["4", "frames", "of", "24x16,"] and float(line[4]) > 0
+    placed = place(scene.scene, scene.image.header.extent, *size, None)
+    camera, (right, _, back) = placed.camera, placed.camera.axes
+    depth = float((camera.position - placed.pose.translate) @ back)
+    moved = Rotation.from_rotvec([0, 5, 0], degrees=True) * Rotation.from_rotvec(5 * right, degrees=True)
+    middle = camera.position - depth * back
+    axes = moved.apply(camera.axes)
+    target = TargetView(file, manifest)
+    rotation, lens = camera_values(camera)
+    turned = np.round(moved.as_matrix() @ rotation * 2.0**30).astype(int).ravel().tolist()
+    target.set_camera(position_values(middle + 1.1 * depth * axes[2], "camera"), turned, lens, size)
+    expected = framebuffer_bytes(render_model(manifest, scene.image, target.registers()), 0)
+    tile = int(manifest.config["frame"]["tileSize"])
+    stride = -(-size[0] // tile) * tile * 4
+    lines = memory[PAGE : PAGE + stride * size[1]].reshape(size[1], stride)[:, : expected.shape[1]]
+    np.testing.assert_array_equal(lines, expected)
+    assert len(np.unique(lines)) > 20
 
 
 ROOM_SCENE = """

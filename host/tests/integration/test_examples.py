@@ -5,6 +5,7 @@ The bench in C++ is run by ``docs/start/soc.md``.
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -19,11 +20,15 @@ from colonnade.device.simulator_build import build_environment
 
 EXAMPLES = toolchain.project_root() / "examples"
 OVERRIDE = "array.columns=2"
+CACHE = {
+    **{"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2, "sharedMisses": 8},
+    **{"busBytes": 16, "parity": False},
+}
 
 
 @pytest.fixture(scope="module")
 def design() -> GeneratedDesign:
-    return shell_design_for("tiny", (OVERRIDE,), bus_bytes=16)
+    return shell_design_for("tiny", (OVERRIDE,), bus_bytes=8)
 
 
 @pytest.fixture(scope="module")
@@ -34,16 +39,45 @@ def output(design: GeneratedDesign, tmp_path_factory: pytest.TempPathFactory) ->
     return folder
 
 
+def run_example(output: Path, **settings: str) -> str:
+    """What `make -C examples cocotb` prints."""
+    command = [
+        "make",
+        "-C",
+        EXAMPLES,
+        "cocotb",
+        f"OUT={output}",
+        *(f"{name}={value}" for name, value in settings.items()),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, env=build_environment())
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
 @pytest.mark.skipif(shutil.which("iverilog") is None, reason="no iverilog: apt-get install iverilog")
 def test_the_frame_of_an_example_is_that_of_the_model(output: Path) -> None:
-    settings = {"OUT": output, "CONFIG": f"tiny --set {OVERRIDE}", "MESH": "sphere:0", "SIZE": "16x8"}
-    command = ["make", "-C", EXAMPLES, "cocotb", *(f"{name}={value}" for name, value in settings.items())]
-    for backdoor in ("", "1"):
-        arguments = [*command, f"BACKDOOR={backdoor}"]
-        done = subprocess.run(arguments, capture_output=True, text=True, env=build_environment())
-        assert done.returncode == 0, done.stdout + done.stderr
-        assert ("load: " in done.stdout) is not bool(backdoor)
-        assert "0 of 128 pixels differ from model.png" in done.stdout
+    """Through the top with AXI4 ports, and by the backdoor; bytes behind the last pixel of a line are unknown."""
+    settings = {"CONFIG": f"tiny --set {OVERRIDE}", "MESH": "sphere:0", "SIZE": "20x6"}
+    for choice in ("AXI4", "BACKDOOR"):
+        printed = run_example(output, **settings, **{choice: "1"})
+        assert ("load: " in printed) is (choice == "AXI4")
+        assert "0 of 120 pixels differ from model.png" in printed
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("cache", [False, True])
+def test_a_frame_through_the_axi4_top_in_verilator(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cache: bool
+) -> None:
+    """Also of a design whose scene is in DRAM, through the second master."""
+    tools = subprocess.run(
+        [EXAMPLES.parent / "tools" / "verilator-environment"], check=True, capture_output=True, text=True
+    )
+    monkeypatch.setenv("PATH", f"{tools.stdout.strip()}:{os.environ['PATH']}")
+    config = f"tiny --set 'columnBvhMemory.cache={json.dumps(CACHE)}'" if cache else "tiny"
+    settings = {"SIMULATOR": "verilator", "AXI": "8", "AXI4": "1", "MESH": "torus", "SIZE": "32x24"}
+    printed = run_example(tmp_path, CONFIG=config, DRAM="1" if cache else "", **settings)
+    assert "0 of 768 pixels differ from model.png" in printed
 
 
 def test_cocotb_refuses_an_old_verilator(tmp_path: Path) -> None:

@@ -1,0 +1,46 @@
+/* What the examples do on every machine: files, errors, a load and a frame. */
+#include "target.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { ATTEMPTS = 1000000 };
+
+void target_fail(const char *what, const char *why) {
+    fprintf(stderr, "%s: %s\n", what, why);
+    exit(2);
+}
+
+void target_check(const char *what, enum colonnade_error error) {
+    if (error != COLONNADE_OK) target_fail(what, colonnade_error_name(error));
+}
+
+size_t target_read(const char *name, void *to, size_t most) {
+    FILE *file = fopen(name, "rb");
+    if (file == NULL) target_fail(name, "cannot be read");
+    size_t bytes = fread(to, 1, most, file);
+    if (fgetc(file) != EOF) target_fail(name, "larger than the memory of the device");
+    fclose(file);
+    return bytes;
+}
+
+void target_load(struct target *target, struct colonnade *device, const char *name) {
+    target_check("device", colonnade_probe(device, &target->bus, &colonnade_design));
+    colonnade_enable_interrupts(device, COLONNADE_IMAGE_DONE);
+    const uint32_t bytes = target_put(target, name);
+    const uint64_t base = target->base;
+    const struct colonnade_image image = {target->memory, bytes, base, {base, base + target->size}};
+    target_check(name, colonnade_load(device, &image, ATTEMPTS));
+    colonnade_enable_interrupts(device, COLONNADE_FRAME_DONE);
+}
+
+uint32_t target_render(struct target *target, struct colonnade *device, const struct colonnade_frame *frame) {
+    const uint32_t tile = colonnade_design.tile_size, stride = (frame->width + tile - 1) / tile * tile * 4;
+    const uint64_t base = target->base;
+    const struct colonnade_framebuffer framebuffer = {base, stride, COLONNADE_XRGB8888, {base, base + target->size}};
+    colonnade_acknowledge(device, COLONNADE_FRAME_DONE | COLONNADE_ERROR);
+    target_check("start", colonnade_start(device, &framebuffer));
+    target_check("frame", colonnade_wait(device, COLONNADE_FRAME_DONE, ATTEMPTS));
+    target_check("frame", colonnade_result(device));
+    return stride;
+}

@@ -1,0 +1,62 @@
+/* Linux with UIO: map 0 is the registers, map 1 a piece of memory that the device may use. */
+#define _POSIX_C_SOURCE 200809L
+
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "target.h"
+
+enum { REGISTER_BYTES = 0x10000 };
+
+static struct uio {
+    void *registers;
+    int file;
+} uio;
+
+static uint32_t uio_read(void *context, uint32_t address) {
+    return colonnade_mmio_read(((struct uio *)context)->registers, address);
+}
+
+static void uio_write(void *context, uint32_t address, uint32_t value) {
+    colonnade_mmio_write(((struct uio *)context)->registers, address, value);
+}
+
+/* The kernel has disabled the interrupt when it came: enables it, and sleeps until the next one. */
+static void uio_wait(void *context) {
+    int file = ((struct uio *)context)->file;
+    uint32_t value = 1;
+    if (write(file, &value, sizeof value) != sizeof value || read(file, &value, sizeof value) != sizeof value)
+        target_fail("interrupt", "no UIO interrupt");
+}
+
+/* A number of /sys/class/uio/NAME/maps/map1. */
+static uint64_t memory_number(const char *device, const char *what) {
+    const char *name = strrchr(device, '/');
+    char path[256];
+    uint64_t value;
+    snprintf(path, sizeof path, "/sys/class/uio/%s/maps/map1/%s", name == NULL ? device : name + 1, what);
+    FILE *file = fopen(path, "r");
+    if (file == NULL || fscanf(file, "%" SCNx64, &value) != 1)
+        target_fail(path, "cannot be read: the device needs a second map");
+    fclose(file);
+    return value;
+}
+
+void target_open(struct target *target, const char *device) {
+    uio.file = open(device, O_RDWR);
+    if (uio.file < 0) target_fail(device, "cannot be opened");
+    target->base = memory_number(device, "addr");
+    target->size = memory_number(device, "size");
+    uio.registers = mmap(NULL, REGISTER_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, uio.file, 0);
+    target->memory = mmap(NULL, target->size, PROT_READ | PROT_WRITE, MAP_SHARED, uio.file, sysconf(_SC_PAGESIZE));
+    if (uio.registers == MAP_FAILED || target->memory == MAP_FAILED) target_fail(device, "cannot be mapped");
+    target->bus = (struct colonnade_bus){uio_read, uio_write, uio_wait, &uio};
+}
+
+uint32_t target_put(struct target *target, const char *name) {
+    return (uint32_t)target_read(name, target->memory, target->size);
+}
