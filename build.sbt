@@ -49,6 +49,8 @@ lazy val colonnade = (project in file("."))
       case path if path.matches(".*/bin/om-linker(\\.exe)?") => MergeStrategy.discard
       case path                                              => (assembly / assemblyMergeStrategy).value(path)
     },
+    // A black box to copy: it compiles, and has the pins of its Verilog.
+    Test / unmanagedSources += baseDirectory.value / "examples" / "axi4" / "ColonnadeAxi4.scala",
     // Elaboration recurses deeply; a fork also keeps the simulators' memory out of sbt.
     Test / fork := true,
     Test / javaOptions ++= Seq("-Xmx4g", "-Xss16m"),
