@@ -73,7 +73,6 @@ async function update() {
       await render(roomOf() ? COARSE : COARSE * state.pixel, true);
       if (!isChanged) await render(state.pixel, false);
     }
-    fail("");
   } catch (error) {
     fail(error.message);
   } finally {
@@ -177,7 +176,7 @@ async function pack() {
   showNotes();
 }
 
-/** Does one thing after the other, and then renders. */
+/** Does one thing after the other, and then renders; after an error, what was. */
 let queue = Promise.resolve();
 function then(work) {
   queue = queue
@@ -186,7 +185,10 @@ function then(work) {
       await work();
       show();
     })
-    .catch((error) => fail(error.message));
+    .catch((error) => {
+      fail(error.message);
+      update();
+    });
   return queue;
 }
 
@@ -215,7 +217,9 @@ async function readFile(name, bytes, files) {
 async function openRoom(found, files) {
   const settings = { degrees: form.elements.degrees.valueAsNumber, millimetres: form.elements.step.valueAsNumber };
   const { template, design } = templateFor(data.rooms, state.design);
-  const room = await visitorRoom(renderer, data.manifests[design], template, found, files, settings);
+  const hint = element("hint");
+  Object.assign(hint, { hidden: false, textContent: `Making the maps of ${found.photo}…` });
+  const room = await visitorRoom(renderer, data.manifests[design], template, found, files, settings).finally(() => (hint.hidden = true));
   if (!data.rooms[found.photo]) form.elements.room.add(new Option(found.photo));
   data.rooms[found.photo] = page.room = room;
   Object.assign(state, { design, room: found.photo, ...ROOM_START, azimuth: START.azimuth });
@@ -264,6 +268,7 @@ function keepLink() {
 }
 
 function show() {
+  fail("");
   fill();
   keepLink();
   update();

@@ -223,7 +223,9 @@ def test_a_photo_and_its_depth_are_a_room(context: BrowserContext, tmp_path: Pat
     page.mouse.dblclick(box["x"] + 0.35 * box["width"], box["y"] + 0.9 * box["height"])
     tab.wait(before)
     assert tab.picture()["triangles"] != hits
+    before = tab.frames()
     page.set_input_files("#file", folder / "render.png")
+    tab.wait(before)  # the frame after an error leaves it
     expect(page.locator("#error")).to_contain_text("render.png is a photo without depth")
     assert tab.is_quiet()
 
