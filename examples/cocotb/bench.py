@@ -69,14 +69,14 @@ class Device:
 
     async def write(self, address: int, value: int) -> None:
         """Write a word, which the shell must take."""
-        answer = await self.bus.write(address, value.to_bytes(4, "little"), **self.access)
-        assert answer.resp == 0, f"the shell refuses a write to {address:#x}"
+        response = await self.bus.write(address, value.to_bytes(4, "little"), **self.access)
+        assert response.resp == 0, f"the shell refuses a write to {address:#x}"
 
     async def read(self, address: int) -> int:
         """Read a word, which the shell must have."""
-        answer = await self.bus.read(address, 4, **self.access)
-        assert answer.resp == 0, f"the shell refuses a read of {address:#x}"
-        return int.from_bytes(answer.data, "little")
+        response = await self.bus.read(address, 4, **self.access)
+        assert response.resp == 0, f"the shell refuses a read of {address:#x}"
+        return int.from_bytes(response.data, "little")
 
     async def set(self, name: str, value: int) -> None:
         """Write a register of the shell, the low word first."""

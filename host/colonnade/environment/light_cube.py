@@ -100,11 +100,11 @@ class LightCube:
         The fields are, from the highest, a light, the exponent, and the mantissas of red, green and blue.
         """
         fixed = self.texels.reshape(-1, 3) * _ONE
-        most = (1 << _MANTISSA) - 1
+        largest = (1 << _MANTISSA) - 1
         exponents = np.zeros(len(fixed), dtype=np.int64)
         for _ in range(_LAST_EXPONENT):
-            exponents += np.rint(np.ldexp(fixed.max(axis=1), -exponents)) > most
-        mantissas = np.rint(np.ldexp(fixed, -exponents[:, None])).clip(0, most).astype("<u4")
+            exponents += np.rint(np.ldexp(fixed.max(axis=1), -exponents)) > largest
+        mantissas = np.rint(np.ldexp(fixed, -exponents[:, None])).clip(0, largest).astype("<u4")
         words = exponents.astype("<u4") if self.lights is None else exponents.astype("<u4") | self.lights.ravel() << 4
         for channel in range(3):
             words = words << _MANTISSA | mantissas[:, channel]

@@ -63,7 +63,7 @@ def occlusion_tolerance(view: View, encoded: EncodedEnvironment, extent: Extent)
     """
     assert view.view_to_mesh is not None
     margin = SURROUNDINGS * extent.edge
-    near = np.float64([extent.low - margin, extent.high + margin])
+    near = np.stack([extent.low - margin, extent.high + margin])
     error = _surface_error(encoded, view.view_to_mesh.tobytes(), near.tobytes())
     distance = float(np.abs(extent.centre - view.origin).max())
     low, high = MIN_FRACTION * distance, max(MAX_EDGES * extent.edge, MIN_FRACTION * distance)

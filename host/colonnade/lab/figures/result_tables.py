@@ -162,7 +162,10 @@ def gather(data: Data) -> str:
     fo4 = [report["slowest_path"]["fo4"] for report in (without, found["area"])]
     counters = found["pass"]["counters"]
     rows = [
-        ["a column of `edge`, and its part of the array", f"{column:,.0f} kGE; + {more:.1f}, {100 * more / column:.1f} %"],
+        [
+            "a column of `edge`, and its part of the array",
+            f"{column:,.0f} kGE; + {more:.1f}, {100 * more / column:.1f} %",
+        ],
         ["slowest path", f"{fo4[0]:.1f} FO4; with it {fo4[1]:.1f}"],
         [
             "a pass of the scene above, 640×480",

@@ -29,9 +29,9 @@ class SharedLightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.load.valid.poke(false)
 
         // Requests of the last two cycles, by column
-        var asked = Seq.fill(columns)(Seq.fill(2)(Option.empty[Int]))
+        var issued = Seq.fill(columns)(Seq.fill(2)(Option.empty[Int]))
         for (_ <- 0 until 500) {
-          asked = dut.io.ports.zip(asked).map { case (port, Seq(last, before)) =>
+          issued = dut.io.ports.zip(issued).map { case (port, Seq(last, before)) =>
             for (address <- before) {
               val mantissas = port.word.mantissas.channels.map(_.peekInt())
               val fields    =

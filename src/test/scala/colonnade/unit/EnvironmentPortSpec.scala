@@ -103,7 +103,7 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
       val points  = new Packed(new EnvironmentSurface(gathering))
       val rays    = new Packed(new RayRequest(gathering))
       val port    = dut.io
-      val answer  = port.marches.answer
+      val march   = port.marches.answer
       val context = BigInt(1)
       dut.clock.setTimeout(0)
       port.view.enabled.poke(true)
@@ -116,12 +116,12 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
       }.flatten
       for (_ <- 0 until 40) {
         val point = points.pack(points.unpack(BigInt(points.width, random)) + ("context" -> context))
-        answer.valid.poke(true)
-        answer.bits.isHit.poke(true)
+        march.valid.poke(true)
+        march.bits.isHit.poke(true)
         dut.point.poke(point)
-        answer.ready.expect(true)
+        march.ready.expect(true)
         dut.clock.step()
-        answer.valid.poke(false)
+        march.valid.poke(false)
         assert(shaded() == Seq(point))
         port.bounces.get.ray.valid.poke(true)
         port.bounces.get.marches.get.poke(false)
