@@ -45,10 +45,10 @@ class Accumulation:
     unshadowed: float
 
     @staticmethod
-    def of_frame(frame: Frame) -> Accumulation:
+    def of_frame(frame: Frame, white: float = WHITE) -> Accumulation:
         """One sample of each pixel from the device."""
         ratio = None if frame.ratio is None else frame.ratio.astype(np.uint32)
-        return Accumulation.of_pixels(frame.colour.astype(np.uint32), frame.is_object, ratio, WHITE, UNSHADOWED)
+        return Accumulation.of_pixels(frame.colour.astype(np.uint32), frame.is_object, ratio, white, UNSHADOWED)
 
     @staticmethod
     def of_pixels(
@@ -84,6 +84,10 @@ class Accumulation:
             coverage=self.coverage + other.coverage,
         )
 
+    def coated(self, coats: Accumulation) -> Accumulation:
+        """With the colours of the coats of surfaces on those of the object, as many samples of them as of itself."""
+        return replace(self, objects=self.objects + coats.objects * (self.samples / coats.samples))
+
     def same_as(self, other: Accumulation) -> npt.NDArray[np.bool_]:
         """The pixels whose sums are equal, bool [height, width]."""
         same = (self.objects == other.objects) & (self.background == other.background)
@@ -93,7 +97,8 @@ class Accumulation:
 
     def image(self) -> npt.NDArray[np.float64]:
         """The mean colours, linear, float64 [height, width, 3]."""
-        return np.asarray((self.objects + self.background) / self.white / self.samples, dtype=np.float64)
+        means = (self.objects + self.background) / self.white / self.samples
+        return np.asarray(means.clip(max=1.0), dtype=np.float64)
 
     def over(
         self, photo: npt.NDArray[np.float64], strength: npt.NDArray[np.uint8] | None = None
@@ -115,7 +120,7 @@ class Accumulation:
             ratio = part * ratio + (255 - part) * others * (UNSHADOWED if is_exact else self.unshadowed)
             ratio = (ratio + 127) // 255 if is_exact else ratio / 255
         background = shadowed_photo(photo, ratio) / PHOTO_WHITE if is_exact else photo * (ratio / self.unshadowed)
-        return (self.objects / self.white + background) / self.samples
+        return np.asarray(((self.objects / self.white + background) / self.samples).clip(max=1.0))
 
 
 def shadowed_photo(photo: npt.NDArray[np.float64], ratio: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
@@ -143,6 +148,8 @@ class FramePasses:
         errors: Error bits of any pass.
         has_squares: Keep `squares`, for `object_variance`.
         squares: Sums over the squared luminance of the samples that show the object, of 1.0, float64 [height, width].
+        white: The device's number for the colour 1.0.
+        coats: The passes of coats; their counters and errors are also in those of the frame.
     """
 
     first: Frame | None = None
@@ -150,17 +157,28 @@ class FramePasses:
     errors: list[str] = field(default_factory=list)
     has_squares: bool = False
     squares: npt.NDArray[np.float64] | None = None
+    white: float = WHITE
+    coats: FramePasses | None = None
     _sums: Accumulation | None = None
 
-    def add(self, frame: Frame) -> None:
-        """Add the frame of the next pass."""
+    def add(self, frame: Frame, is_coat: bool = False) -> None:
+        """Add the frame of the next pass; those of coats come last."""
+        if is_coat:
+            self.coats = self.coats or FramePasses(has_squares=self.has_squares, white=self.white)
+            self.coats.add(frame)
+            self._count(frame)
+            return
         if self.has_squares:
-            squares = (frame.colour @ LUMINANCE / WHITE) ** 2 * frame.is_object
+            squares = (frame.colour @ LUMINANCE / self.white) ** 2 * frame.is_object
             self.squares = squares if self.squares is None else self.squares + squares
         if self.first is None:
             self.first, self.counters, self.errors = frame, dict(frame.counters), list(frame.errors)
             return
-        self._sums = self.sums + Accumulation.of_frame(frame)
+        self._sums = self.sums + Accumulation.of_frame(frame, self.white)
+        self._count(frame)
+
+    def _count(self, frame: Frame) -> None:
+        """Add the counters and errors of a further pass."""
         for name, value in frame.counters.items():
             before = self.counters[name]
             self.counters[name] = max(before, value) if name == _LEVEL else before + value
@@ -170,7 +188,7 @@ class FramePasses:
     def sums(self) -> Accumulation:
         """Sums over all passes; those of a single one are made when they are needed."""
         assert self.first is not None
-        return self._sums or Accumulation.of_frame(self.first)
+        return self._sums or Accumulation.of_frame(self.first, self.white)
 
     def object_variance(self) -> npt.NDArray[np.float64] | None:
         """The variance of the mean luminance of the object, float64 [height, width]; None of a single pass.
@@ -182,7 +200,7 @@ class FramePasses:
         if sums.samples == 1:
             return None
         count = np.maximum(sums.coverage, 1)
-        mean = sums.objects @ LUMINANCE / WHITE / count
+        mean = sums.objects @ LUMINANCE / self.white / count
         variance = (self.squares / count - mean**2).clip(min=0.0) / np.maximum(count - 1, 1)
         return np.asarray(np.where(sums.coverage == 1, variance.max(), variance))
 

@@ -46,7 +46,7 @@ def scene_cube(
     """The light that rays meet that leave the object, by directions of mesh space; None for a scene that gathers none.
 
     In a room it is the room's light at the middle of the object, elsewhere that of a panorama, or the ambient light.
-    The lights with a radius are marked in it.
+    The lights with a radius are marked in it. Radiance has the scene's `exposure`.
 
     Args:
         scene: With lights and a place for the object, as in `LitRoom`.
@@ -80,10 +80,11 @@ def scene_cube(
         cube = unseen.cube(FINE)
     else:
         cube = LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, 1, 1, 3)))
-    cube = cube.turned(pose.rotation)
+    cube = LightCube(cube.turned(pose.rotation).texels * scene.exposure)
     lost = 1 - cube.texels.clip(max=LARGEST).sum() / max(cube.texels.sum(), 1e-9)
     if lost > _REPORTED_LOSS and progress is not None:
-        progress.note(f"{lost:.0%} of the light is brighter than {LARGEST:g}, the most that a ray brings, and is lost")
+        largest = LARGEST / scene.exposure
+        progress.note(f"{lost:.0%} of the light is brighter than {largest:g}, the most that a texel holds, and is lost")
     return cube.with_lights([disc for light in lights.lights if (disc := _disc(light, point, pose)) is not None])
 
 

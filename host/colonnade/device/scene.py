@@ -162,6 +162,10 @@ class DeviceScene:
         moved = replace(self, scene=replace(self.scene, camera=camera, frame_camera=None))
         return moved if self.environment is None else replace(moved, photo=None, strength=None)
 
+    def coat_passes(self, scene: Scene | None = None, exposure: float = 0.0) -> list[Scene]:
+        """The passes of coats (`Scene.coat_passes`) of another moment of `scene`; None: of `scene` itself."""
+        return (scene or self.scene).coat_passes(self.image.header.materials, exposure)
+
     @property
     def environment(self) -> Environment | None:
         """The room with the colours that rays see; None without a room."""

@@ -78,6 +78,7 @@ ROUGH_METAL = Loss.of("rough metal", "diffuse", "paths.gather = 1 renders blurre
 ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "roughness is not rendered", "rough glasses")
 PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror", "1/2 and above is a mirror")
 PARTLY_GLASS = Loss.of("partly transmissive material", "rounded to opaque or glass", "above 1/2 is glass")
+COATS = Loss.of("glossy material", "matt", "paths.gather = 1 and frame.samples of 2 or more render its reflections")
 HIGHLIGHTS = Loss.of("glossy material", "diffuse", "highlights are not rendered")
 NEGATIVE_SHININESS = Loss.of(
     "material's negative Ns", "taken as 0", "highlights are not rendered", "materials' negative Ns"

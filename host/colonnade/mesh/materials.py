@@ -4,7 +4,7 @@
 |---|---|---|
 | albedo | base colour factor, linear | `Kd`, sRGB but of Blender; for glass `Tf` if given |
 | mirror | metallic factor of at least ½; faces of a map (`gltf_metal`) | `Pm` of at least ½, or `illum` 3 or 5 |
-| roughness of a mirror | roughness factor | `Pr` |
+| roughness of a mirror, or of the coat of a diffuse surface below ½ | roughness factor | `Pr` |
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
 | index of refraction | `KHR_materials_ior` | `Ni` |
@@ -35,7 +35,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 GLASS_IOR = 1.5
 
 #: Roughness up to which a mirror or glass counts as smooth, and below which a diffuse surface counts as glossy.
-SMOOTH_ROUGHNESS, _GLOSSY = 0.1, 0.5
+SMOOTH_ROUGHNESS, GLOSSY = 0.1, 0.5
 #: Roughness up to which a metal is nearer to a mirror than to a diffuse surface of its colour (docs/shading.md).
 MIRROR_ROUGHNESS = 0.35
 #: Roughness up to which a metal is a mirror where light is gathered; beyond, reflections are spread (docs/gather.md).
@@ -47,6 +47,8 @@ _USED_EXTENSIONS = (
     "KHR_materials_emissive_strength",
     "KHR_materials_pbrSpecularGlossiness",
 )
+#: What the coat of a dielectric reflects: between 0.04, where it faces the eye, and 0.09, the mean over a sphere.
+COAT_REFLECTANCE = 0.06
 #: No emission.
 _DARK = (0.0, 0.0, 0.0)
 
@@ -74,7 +76,8 @@ class MeshMaterial:
         kind: diffuse, mirror or glass.
         albedo: Linear, 0 to 1: diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
-        roughness: Of a mirror, 0 to 1: 0 reflects sharply, more is rough metal.
+        roughness: Of a mirror, 0 to 1: 0 reflects sharply, more is rough metal. Of a diffuse surface that of the clear
+            coat on it; 0: it has none.
         has_corner_colours: The surface has the colours of `colonnade.mesh.mesh.Mesh.corner_colours`, times `albedo`.
         texture: The surface has the colours of this one of `colonnade.mesh.mesh.Mesh.textures`, times `albedo`.
         emission: Linear, 0 to 1: the light that a diffuse surface or rough metal emits towards the eye.
@@ -96,17 +99,42 @@ PLAIN = MeshMaterial()
 
 
 def as_rendered(material: MeshMaterial, gathers: bool) -> MeshMaterial:
-    """A material as the device shows it: a mirror with a roughness left has spread reflections.
+    """A material as the device shows it: a mirror or a coat with a roughness left has spread reflections.
 
     Args:
         material: Of a mesh, or of a scene.
-        gathers: The scene gathers light. Otherwise rough metal is a smooth mirror or a diffuse surface.
+        gathers: The scene gathers light. Otherwise rough metal is a smooth mirror or a diffuse surface, and there are
+            no coats.
     """
+    if material.kind == "diffuse" and gathers:
+        is_coated = 0.0 < material.roughness < GLOSSY
+        return replace(material, roughness=max(material.roughness, SHARP_ROUGHNESS) if is_coated else 0.0)
     if material.kind != "mirror":
         return replace(material, roughness=0.0)
     if material.roughness <= (SHARP_ROUGHNESS if gathers else MIRROR_ROUGHNESS):
         return replace(material, roughness=0.0)
     return material if gathers else replace(material, kind="diffuse", roughness=0.0)
+
+
+def microfacet_albedo(roughness: float) -> float:
+    """The share of light that white GGX microfacets reflect at once, the mean over a sphere: a fit, within 0.01."""
+    alpha = roughness**2
+    return 1.0 - alpha**2 / (0.25 + 0.9 * alpha + 0.55 * alpha**2)
+
+
+def in_layer(material: MeshMaterial, is_coat: bool) -> MeshMaterial:
+    """A material, as it is rendered, in one of the two layers of a frame: surfaces without their coats, or these alone.
+
+    Rough metal has the mean of the light that microfacets do not hide from each other.
+    """
+    if not is_coat and material.kind == "mirror" and material.roughness > 0:
+        red, green, blue = (value * microfacet_albedo(material.roughness) for value in material.albedo)
+        return replace(material, albedo=(red, green, blue))
+    if not is_coat:
+        return replace(material, roughness=0.0)
+    reflectance = COAT_REFLECTANCE if material.kind == "diffuse" and material.roughness > 0 else 0.0
+    kind: Kind = "mirror" if reflectance > 0 else "diffuse"
+    return MeshMaterial(kind, (reflectance,) * 3, roughness=material.roughness if reflectance > 0 else 0.0)
 
 
 def gltf_surface(material: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -142,7 +170,7 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
     if metallic >= 0.5:
         emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else _DARK
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
-    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha)
+    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha, roughness=_coat(roughness))
 
 
 def _gltf_alpha(material: Mapping[str, Any], surface: Mapping[str, Any]) -> Alpha | None:
@@ -176,7 +204,8 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
         roughness = _share(first("pr", 0.0))
         emission = _colour(entries.get("ke"), _DARK) if roughness > MIRROR_ROUGHNESS else _DARK
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=roughness)
-    return MeshMaterial("diffuse", colour, emission=_colour(entries.get("ke"), _DARK), alpha=alpha)
+    emission = _colour(entries.get("ke"), _DARK)
+    return MeshMaterial("diffuse", colour, emission=emission, alpha=alpha, roughness=_coat(first("pr", 1.0)))
 
 
 def _first(entries: Mapping[str, Any], key: str, default: float) -> float:
@@ -237,9 +266,7 @@ def _is_lit(material: MeshMaterial) -> bool:
 
 
 def _roughness_losses(kind: str, roughness: float) -> list[tuple[Loss, int]]:
-    """Without those of mirrors, which depend on the scene: `colonnade.mesh.palette.with_rendered_metal`."""
-    if kind == "diffuse":
-        return [(lost.HIGHLIGHTS, 1)] if roughness < _GLOSSY else []
+    """Without those of mirrors and coats, which depend on the scene: `colonnade.mesh.palette.with_rendered_metal`."""
     return [(lost.ROUGH_GLASS, 1)] if kind == "glass" and roughness > SMOOTH_ROUGHNESS else []
 
 
@@ -251,6 +278,11 @@ def unused_extensions(material: Mapping[str, Any]) -> list[str]:
 def _ior(value: float) -> float:
     """Replace values up to 1, which exporters write for an unknown index, by the default."""
     return min(value, 4.0) if value > 1.0 else GLASS_IOR
+
+
+def _coat(roughness: float) -> float:
+    """The roughness of a coat, 0 for none: of a surface that is nearly matt it is not rendered."""
+    return max(_share(roughness), SHARP_ROUGHNESS) if roughness < GLOSSY else 0.0
 
 
 def _share(value: float) -> float:

@@ -155,17 +155,25 @@ def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:
     return replace(material, albedo=(red, green, blue), texture=None)
 
 
-def with_rendered_metal(mesh: Mesh, gathers: bool) -> tuple[Mesh, tuple[str, ...]]:
-    """A mesh whose rough metal is as the device shows it (`as_rendered`), and lines on what that leaves out."""
+def with_rendered_metal(mesh: Mesh, gathers: bool, has_coats: bool = False) -> tuple[Mesh, tuple[str, ...]]:
+    """A mesh whose rough metal and coats are as the device shows them (`as_rendered`), and lines on what is left out.
+
+    Args:
+        mesh: The mesh.
+        gathers: The scene gathers light.
+        has_coats: It also has the passes of coats.
+    """
     found = Losses()
-    materials = tuple(as_rendered(material, gathers) for material in mesh.materials)
+    materials = tuple(
+        as_rendered(material, gathers and (has_coats or material.kind != "diffuse")) for material in mesh.materials
+    )
     if materials == mesh.materials:
         return mesh, ()
     for material, rendered in zip(mesh.materials, materials, strict=True):
         if rendered.kind != material.kind:
             found.add(lost.ROUGH_METAL)
         elif rendered.roughness == 0.0 and material.roughness > SMOOTH_ROUGHNESS:
-            found.add(lost.ROUGH_MIRROR)
+            found.add(lost.COATS if material.kind == "diffuse" else lost.ROUGH_MIRROR)
     return replace(mesh, materials=materials), found.lines(f"mesh {mesh.name}")
 
 

@@ -42,7 +42,7 @@ def check_surfaces(view: View, manifest: Manifest) -> None:
     if view.gather is not None and not manifest.gathers:
         raise UserError("paths.gather asks for gathered light, which this hardware lacks: set frame.gather=true")
     maximum = int(frame["maxBounces"])
-    shiny = [material for material in view.materials if material.kind != "diffuse"]
+    shiny = [material for material in view.materials if material.kind != "diffuse" and material.roughness == 0]
     if shiny and maximum == 0:
         raise UserError(
             f"the scene has {shiny[0].kind}, the hardware supports only diffuse surfaces: raise frame.maxBounces from 0"

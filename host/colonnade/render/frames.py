@@ -6,17 +6,16 @@ import itertools
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from colonnade.common.accumulation import WHITE, FramePasses
+from colonnade.common.accumulation import WHITE, Accumulation, FramePasses
 from colonnade.common.errors import UserError
 from colonnade.common.extras import require_extra
 from colonnade.common.limits import MAX_WAVEFORM_PIXELS
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
-from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
+from colonnade.design.generator import design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.device import require_no_errors
 from colonnade.device.scene import DeviceScene
@@ -31,6 +30,7 @@ from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
 from colonnade.mesh.mesh import Mesh
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
+from colonnade.render.passes import model_passes, rtl_passes
 from colonnade.render.report import FrameReport, frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
@@ -43,6 +43,8 @@ from colonnade.scene_image.inspect import coarse_line
 
 Size = tuple[int, int]
 
+#: The device's number for the colour 1.0 where light is gathered, as a factor: a ray may bring more than the mean.
+_GATHER_EXPOSURE = 0.5
 #: What keyframes cost.
 _BETWEEN = "between keyframes, where their maps show nothing, a frame is its photo without the object's shadow"
 
@@ -77,6 +79,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     scene, note = with_requested_samples(scene, request)
     if scene.frame.denoise and request.backend != "reference":
         request = replace(request, denoise=True)
+    if scene.paths.gather:
+        scene = replace(scene, exposure=_GATHER_EXPOSURE)
     size = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size(size, manifest)
@@ -168,7 +172,8 @@ def _device_frames(
     with progress.step("computing the registers"):
         motion = scene.motion
         poses = [prepared.scene.at(fraction) for fraction in motion.frame_progress(request.frames)]
-        passes = [pose.passes(motion.exposure(request.frames)) for pose in poses]
+        exposure = motion.exposure(request.frames)
+        passes = [[*pose.passes(exposure), *prepared.coat_passes(pose, exposure)] for pose in poses]
         registers = [
             [prepared.registers(size, one, composited=not request.relit) for one in of_frame] for of_frame in passes
         ]
@@ -215,7 +220,7 @@ def _sequence_frames(
             prepared = within_budget(prepared, size, progress)
             samples = prepared.scene.frame.samples
             with progress.step(f"{title}: computing the registers"):
-                passes = prepared.scene.passes()
+                passes = [*prepared.scene.passes(), *prepared.coat_passes()]
                 registers = [prepared.registers(size, one, composited=not request.relit) for one in passes]
             for line in (note, _BETWEEN if every > 1 else None):
                 if line is not None and number == 0:
@@ -311,11 +316,16 @@ def _rendered(
     look = None if request.relit else CameraLook.of(prepared.scene, prepared.photo, size)
     if look is not None and look.note is not None and first == 0:
         progress.note(look.note)
+    white = WHITE * prepared.scene.exposure
+    frames = [
+        (FramePasses(has_squares=request.denoise, white=white), [one.sample.is_coat for one in of_frame])
+        for of_frame in passes
+    ]
     if request.backend == "rtl":
         design = design_for(request.config, request.overrides, progress)
-        rendered = _rtl_frames(design, prepared.image, registers, progress, request.waveform, request.denoise)
+        rendered = rtl_passes(design, prepared.image, registers, frames, progress, request.waveform)
     else:
-        rendered = _model_frames(prepared.manifest, prepared.image, registers, progress, request.denoise)
+        rendered = model_passes(prepared.manifest, prepared.image, registers, frames, progress)
     for number, (of_frame, (rendered_passes, seconds, rate)) in enumerate(zip(passes, rendered, strict=True), first):
         require_no_errors(rendered_passes.frame.errors)
         report = replace(
@@ -323,12 +333,14 @@ def _rendered(
             seconds=seconds,
             simulated_cycles_per_second=rate,
             bytes=None if prepared.maps is None else prepared.maps.image.byte_counts(),
-            samples=len(of_frame),
+            samples=rendered_passes.sums.samples,
         )
         view = prepared.view(size, of_frame[0])
         result = _result(rendered_passes, prepared.image, view, report)
         if request.denoise:
             result = _denoised(result, rendered_passes, view)
+        elif rendered_passes.coats is not None:
+            result = _with_sums(result, result.sums.coated(rendered_passes.coats.sums))
         yield result if request.relit else _composited(result, prepared, look, number)
 
 
@@ -345,63 +357,6 @@ def _check_waveform(request: RenderRequest, size: Size) -> None:
         )
 
 
-#: The passes of a frame, its seconds by step, and the RTL's simulated cycles per second.
-Rendered = tuple[FramePasses, dict[str, float], float | None]
-
-
-def _rtl_frames(
-    design: GeneratedDesign,
-    image: SceneImage,
-    registers: list[list[dict[str, int]]],
-    progress: Progress,
-    waveform: Path | None = None,
-    has_squares: bool = False,
-) -> Iterator[Rendered]:
-    """Render all passes of all frames in one run of the simulator. Each frame reports an equal part of the run time."""
-    from colonnade.device.simulator_build import build_simulator
-    from colonnade.device.verilator import simulate
-
-    begun = time.perf_counter()
-    build_simulator(design, progress, waveform=waveform is not None)
-    built = time.perf_counter()
-    frames = [FramePasses(has_squares=has_squares) for _ in registers]
-    places = iter([frame for frame, of_frame in zip(frames, registers, strict=True) for _ in of_frame])
-    every = [one for of_frame in registers for one in of_frame]
-    rate = simulate(
-        design, image, list(every), lambda frame: next(places).add(frame), progress=progress, waveform=waveform
-    )
-    run = (time.perf_counter() - built) / len(registers)
-    for frame in frames:
-        yield frame, {"build": built - begun, "run": run}, rate
-
-
-def _model_frames(
-    manifest: Manifest,
-    image: SceneImage,
-    registers: list[list[dict[str, int]]],
-    progress: Progress,
-    has_squares: bool = False,
-) -> Iterator[Rendered]:
-    """Render pass by pass with a model that is loaded once."""
-    from colonnade.device.bit_exact import loaded_model, model_frame
-
-    model = loaded_model(manifest, image)
-
-    def one(of_frame: list[dict[str, int]]) -> Rendered:
-        begun = time.perf_counter()
-        passes = FramePasses(has_squares=has_squares)
-        with progress.step("rendering in the model") as report:
-            for index, values in enumerate(of_frame):
-
-                def share(done: int, total: int, before: int = index) -> None:
-                    report((before + done / total) / len(of_frame))
-
-                passes.add(model_frame(model, values, share))
-        return passes, {"run": time.perf_counter() - begun}, None
-
-    yield from map(one, registers)
-
-
 def render_model(scene: Scene, mesh: Mesh, manifest: Manifest, size: Size, progress: Progress = QUIET) -> RenderResult:
     """Render one frame of one sample with the model.
 
@@ -410,7 +365,7 @@ def render_model(scene: Scene, mesh: Mesh, manifest: Manifest, size: Size, progr
     with progress.step("packing the scene"):
         prepared = DeviceScene.of(scene, manifest, mesh, progress=progress)
         registers = prepared.registers(size, composited=True)
-    ((passes, _, _),) = _model_frames(manifest, prepared.image, [[registers]], progress)
+    ((passes, _, _),) = model_passes(manifest, prepared.image, [[registers]], [(FramePasses(), [False])], progress)
     report = frame_report("model", manifest, prepared.image.header, passes.frame)
     return _composited(_result(passes, prepared.image, prepared.view(size), report), prepared)
 
@@ -430,12 +385,18 @@ def _denoised(result: RenderResult, passes: FramePasses, view: View) -> RenderRe
 
     x, y = np.arange(view.width)[None, :, None], np.arange(view.height)[:, None, None]
     position = view.origin + result.t[..., None] * (view.direction + x * view.step_x + y * view.step_y)
-    count = result.sums.coverage[..., None]
-    colours = result.sums.objects / np.maximum(count, 1)
-    filtered = denoised(
-        colours / WHITE, passes.object_variance(), Guide.of(position, result.object_mask & (count[..., 0] > 0))
-    )
-    sums = replace(result.sums, objects=filtered * WHITE * count)
+
+    def filtered(layer: FramePasses) -> Accumulation:
+        sums, count = layer.sums, layer.sums.coverage[..., None]
+        colours = sums.objects / np.maximum(count, 1) / sums.white
+        found = denoised(colours, layer.object_variance(), Guide.of(position, result.object_mask & (count[..., 0] > 0)))
+        return replace(sums, objects=found * sums.white * count)
+
+    sums = filtered(passes)
+    return _with_sums(result, sums if passes.coats is None else sums.coated(filtered(passes.coats)))
+
+
+def _with_sums(result: RenderResult, sums: Accumulation) -> RenderResult:
     return replace(result, sums=sums, image=sums.image())
 
 

@@ -30,7 +30,7 @@ from colonnade.scene.cameras import check_camera
 from colonnade.scene.lit_room import LitRoom, lit_room, scene_room, view_photo
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
-from colonnade.scene.view import make_view
+from colonnade.scene.view import make_view, with_overrides
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
@@ -138,22 +138,29 @@ def traced_frames(
         begun = time.perf_counter()
         lit = replace(room, scene=room.scene.at(pose.motion_progress))
         cube = _light_cube(lit, mesh, layout, options.relit, progress if number == 0 else None)
-        passes = lit.scene.passes(options.exposure)
+        materials = with_overrides(mesh.materials, lit.scene.material)
+        passes = [*lit.scene.passes(options.exposure), *lit.scene.coat_passes(materials, options.exposure)]
         views = [make_view(one, mesh.extent, *size, mesh.materials, room.environment) for one in passes]
         if cube is not None:
             views = [replace(view, gather=replace(view.gather, cube=cube)) for view in views if view.gather is not None]
         first = render_reference(mesh, views[0], progress, backdrop)
-        sums, rays = _accumulated(first), first.rays
-        for view in views[1:]:
+        sums, coat, rays = _accumulated(first, lit.scene.exposure), None, first.rays
+        for view, one in zip(views[1:], passes[1:], strict=True):
             other = render_reference(mesh, view, progress, backdrop)
-            sums += _accumulated(other)
             rays = {kind: count + other.rays[kind] for kind, count in rays.items()}
+            found = _accumulated(other, lit.scene.exposure)
+            if one.sample.is_coat:
+                coat = found if coat is None else coat + found
+            else:
+                sums += found
+        if coat is not None:
+            sums = sums.coated(coat)
         image = composited(sums, photo, room.strength, look, number)
         yield TracedFrame(image, first, sums, rays, time.perf_counter() - begun)
 
 
-def _accumulated(frame: ReferenceResult) -> Accumulation:
-    return Accumulation.of_pixels(frame.image, frame.object_mask, frame.shadow_ratio)
+def _accumulated(frame: ReferenceResult, white: float) -> Accumulation:
+    return Accumulation.of_pixels(frame.image, frame.object_mask, frame.shadow_ratio, white)
 
 
 def _light_cube(

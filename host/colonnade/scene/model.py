@@ -6,7 +6,7 @@ them. Values are checked when a scene is constructed, from a file or in code; un
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -19,7 +19,7 @@ from typing_extensions import Self
 from colonnade.common.errors import UserError
 from colonnade.common.limits import MAX_COORDINATE, MAX_SAMPLES
 from colonnade.environment.model import EnvironmentCamera
-from colonnade.mesh.materials import Kind
+from colonnade.mesh.materials import Kind, MeshMaterial, as_rendered
 from colonnade.scene.samples import CENTRE, MAX_GATHERED, Sample, samples_of_frame
 
 _STRICT = ConfigDict(extra="forbid")
@@ -189,7 +189,7 @@ class Material:
         kind: diffuse, mirror or glass.
         albedo: Diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
-        roughness: Of a mirror, 0 to 1.
+        roughness: Of a mirror, or of the coat of a diffuse surface, 0 to 1.
         flat: Use geometric normals instead of smooth ones.
     """
 
@@ -203,8 +203,8 @@ class Material:
     def _values_are_of_the_kind(self) -> Self:
         if self.ior is not None and self.kind not in (None, "glass"):
             raise ValueError(f"material.ior is for glass, not for a {self.kind} material")
-        if self.roughness is not None and self.kind not in (None, "mirror"):
-            raise ValueError(f"material.roughness is for a mirror, not for a {self.kind} material")
+        if self.roughness is not None and self.kind == "glass":
+            raise ValueError("material.roughness is for mirrors and diffuse surfaces, not for a glass material")
         return self
 
 
@@ -385,7 +385,7 @@ class Scene:
     of its room. ``frame_camera`` is that of a sequence's frame with the maps of another frame: a lens for their size,
     and a pose. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
     fitted to its photo. ``headroom`` scales all lights up and diffuse albedos of the object down
-    (`colonnade.environment.photo_colours`).
+    (`colonnade.environment.photo_colours`). ``exposure`` is the device's number for the radiance 1.0, as a factor.
     """
 
     mesh: MeshSource
@@ -407,6 +407,7 @@ class Scene:
     frame_camera: Annotated[InstanceOf[EnvironmentCamera], WithJsonSchema({})] | None = None
     names_light: bool = True
     headroom: float = 1.0
+    exposure: float = 1.0
 
     def at(self, progress: float) -> Scene:
         """The scene at a progress along its motion."""
@@ -422,10 +423,31 @@ class Scene:
         Args:
             exposure: Progress of the motion while the shutter is open (`Motion.exposure`).
         """
+        return self._passes(samples_of_frame(self.frame.samples or 1, len(self.lights)), exposure)
+
+    def coat_passes(self, materials: Iterable[MeshMaterial], exposure: float = 0.0) -> list[Scene]:
+        """The scene at the samples that show the coats of surfaces alone, a quarter of its samples; [] without coats.
+
+        Args:
+            materials: Of the mesh, with the scene's overrides.
+            exposure: As in `passes`.
+        """
+        rendered = (as_rendered(one, gathers=True) for one in materials)
+        if not self.has_coats or not any(one.kind == "diffuse" and one.roughness > 0 for one in rendered):
+            return []
+        samples = samples_of_frame(max(1, (self.frame.samples or 1) // 4), len(self.lights))
+        return self._passes([replace(sample, is_coat=True) for sample in samples], exposure)
+
+    def _passes(self, samples: Sequence[Sample], exposure: float) -> list[Scene]:
         return [
             replace(self, sample=sample, motion_progress=min(1.0, self.motion_progress + sample.time * exposure))
-            for sample in samples_of_frame(self.frame.samples or 1, len(self.lights))
+            for sample in samples
         ]
+
+    @property
+    def has_coats(self) -> bool:
+        """Whether frames show the coats of glossy surfaces: several samples of gathered light."""
+        return self.paths.gather > 0 and (self.frame.samples or 1) > 1
 
     @property
     def blurs(self) -> list[str]:

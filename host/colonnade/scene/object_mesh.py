@@ -71,7 +71,7 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     Of more colours than the material table holds, after the scene's values have overridden those of the mesh, plain
     ones move to the corners of faces, or else similar ones are merged.
     """
-    mesh, lines = with_rendered_metal(mesh, scene.paths.gather > 0)
+    mesh, lines = with_rendered_metal(mesh, scene.paths.gather > 0, scene.has_coats)
     notes.report(lines)
     if not features.textures:
         mesh, lines = without_textures(mesh)

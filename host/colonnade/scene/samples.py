@@ -26,6 +26,7 @@ class Sample:
         lens: Point of the lens, a disc of radius 1.
         lights: Point of each light's disc of radius 1; missing ones are the centre.
         gather: Sample point of each gathered ray of a path, two bytes (docs/gather.md).
+        is_coat: The pass shows the coats of surfaces alone.
     """
 
     pixel: Point = (0.0, 0.0)
@@ -33,6 +34,7 @@ class Sample:
     lens: Point = (0.0, 0.0)
     lights: tuple[Point, ...] = ()
     gather: tuple[tuple[int, int], ...] = ((128, 128),) * MAX_GATHERED
+    is_coat: bool = False
 
     def light(self, index: int) -> Point:
         """The point of a light's disc."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
-from colonnade.mesh.materials import PLAIN, MeshMaterial, as_rendered
+from colonnade.mesh.materials import PLAIN, MeshMaterial, as_rendered, in_layer
 from colonnade.mesh.mesh import Extent
 from colonnade.scene.cameras import (
     WorldCamera,
@@ -157,7 +157,7 @@ def place(scene: Scene, extent: Extent, width: int, height: int, environment: En
     # In a room, light does not depend on where the scene's camera stands
     axes = first.axes if environment is None else environment.camera_to_world[:, :3].T * [[1.0], [-1.0], [-1.0]]
     lights = tuple(
-        _placed(light, axes, centre, edge, scene.sample.light(index), scene.headroom)
+        _placed(light, axes, centre, edge, scene.sample.light(index), scene.headroom * scene.exposure)
         for index, light in enumerate(scene.lights)
     )
     shift_x, shift_y = scene.sample.pixel
@@ -199,11 +199,15 @@ def make_view(
             for light in placed.lights
         ),
         materials=_dimmed(
-            tuple(as_rendered(one, scene.paths.gather > 0) for one in with_overrides(materials, scene.material)),
+            tuple(
+                in_layer(as_rendered(one, scene.paths.gather > 0), scene.sample.is_coat)
+                for one in with_overrides(materials, scene.material)
+            ),
             scene.headroom,
+            scene.exposure,
         ),
-        ambient=np.array(scene.ambient.colour) * scene.headroom,
-        background=np.array(scene.background.colour),
+        ambient=np.array(scene.ambient.colour) * scene.headroom * scene.exposure,
+        background=np.array(scene.background.colour) * scene.exposure,
         flat=scene.material.flat,
         shadows=scene.light.shadows,
         shadow_offset=None if scene.light.shadow_offset is None else scene.light.shadow_offset * extent.edge,
@@ -247,22 +251,25 @@ def _world_position(light: PointLight, axes: Floats, centre: Floats, edge: float
     return np.asarray(centre + edge * (np.array(light.offset) @ axes))
 
 
-def _placed(
-    light: PointLight, axes: Floats, centre: Floats, edge: float, on_disc: Point, headroom: float
-) -> PlacedLight:
-    """A light in world space; of one with a radius the point ``on_disc``, of a disc that faces `centre`."""
+def _placed(light: PointLight, axes: Floats, centre: Floats, edge: float, on_disc: Point, factor: float) -> PlacedLight:
+    """A light in world space, its intensity times ``factor``.
+
+    Of one with a radius it is the point ``on_disc``, of a disc that faces `centre`.
+    """
     position = _world_position(light, axes, centre, edge)
     if light.radius > 0:
         away = position - centre
         right, up, _ = camera_axes(away if away.any() else axes[2], _UP)
         position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
-    return PlacedLight(position, np.array(light.colour) * headroom, light.falloff)
+    return PlacedLight(position, np.array(light.colour) * factor, light.falloff)
 
 
-def _dimmed(materials: tuple[MeshMaterial, ...], headroom: float) -> tuple[MeshMaterial, ...]:
+def _dimmed(materials: tuple[MeshMaterial, ...], headroom: float, exposure: float) -> tuple[MeshMaterial, ...]:
     """The materials under lights that are brighter by ``headroom``: diffuse surfaces keep their colour."""
 
     def dimmed(material: MeshMaterial) -> MeshMaterial:
+        red, green, blue = (value * exposure for value in material.emission)
+        material = replace(material, emission=(red, green, blue))
         if material.kind != "diffuse" or headroom == 1.0:
             return material
         red, green, blue = (value / headroom for value in material.albedo)

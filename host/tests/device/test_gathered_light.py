@@ -21,11 +21,12 @@ from colonnade.environment.load import load_environment
 from colonnade.maps.cache import encoded_environment
 from colonnade.maps.layout import AttributeLayout
 from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import COAT_REFLECTANCE
 from colonnade.render.frames import render_frames
 from colonnade.render.reference_frames import traced_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.lit_room import LitRoom, lit_room
-from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Paths, Placement, Scene
+from colonnade.scene.model import Background, Camera, Colour, Light, Material, MeshSource, Paths, Placement, Scene
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.samples import samples_of_frame
 from colonnade.scene_image.device_image import device_image
@@ -176,10 +177,45 @@ def test_mirrors_and_glass_in_a_room_are_those_of_the_reference() -> None:
         assert np.median(errors) < limit, "at edges of glass a ray may go elsewhere"
 
 
-def side_lit(path: Path) -> Path:
-    """A panorama whose right half, that of +x, is 20 times as bright as the left one."""
-    pixels = np.full((32, 64, 3), 0.02, np.float32)
-    pixels[:, 32:] *= 20
+@pytest.mark.parametrize("backend", ["model", "reference"])
+def test_rays_that_bring_more_than_white_count_whole(backend: str, tmp_path: Path) -> None:
+    """Half of the directions are 3.2, those of the others dark: an albedo of 0.5 shows a mean of 0.8, not 0.5."""
+    sky = Background(panorama=side_lit(tmp_path / "side.exr", 3.2, 0.0), panorama_exposure=1.0)
+    plain = Material(albedo=(0.5, 0.5, 0.5))
+    scene = replace(SCENE, mesh=MeshSource(name="sphere"), material=plain, background=sky, paths=Paths(gather=1))
+    facing = replace(scene, light=Light(colour=(0.0, 0.0, 0.0)), camera=Camera(direction=(0.0, 0.0, 1.0)))
+    dark = facing.with_samples(16)
+    (result,) = render_frames(RenderRequest(dark, "textured", backend=backend, size=(32, 24)))
+    middle = result.image[10:14, 15:17].mean()
+    assert abs(middle - 0.8) < 0.03
+
+
+@pytest.mark.parametrize("backend", ["model", "reference"])
+def test_a_coat_reflects_the_light_around_without_its_colour(backend: str) -> None:
+    """In a dome of light it adds its reflectance, on black and on red; a frame of one sample has none."""
+    scene = replace(SCENE, mesh=MeshSource(name="sphere"), light=Light(colour=(0.0, 0.0, 0.0)))
+    scene = replace(scene, ambient=Colour((0.8, 0.8, 0.8)), paths=Paths(gather=1))
+    middles = {}
+    for albedo in (0.0, 0.5):
+        for roughness in (0.0, 0.3):
+            for samples in (1, 4):
+                material = Material(kind="diffuse", albedo=(albedo, 0.0, 0.0), roughness=roughness)
+                one = replace(scene, material=material).with_samples(samples)
+                (result,) = render_frames(RenderRequest(one, "textured", backend=backend, size=(32, 24)))
+                middles[albedo, roughness, samples] = result.image[10:14, 14:18].mean(axis=(0, 1))
+                assert result.report.samples == samples
+    for albedo in (0.0, 0.5):
+        without = middles[albedo, 0.0, 4]
+        np.testing.assert_allclose(without, [0.8 * albedo, 0.0, 0.0], atol=0.003)
+        # A smooth coat is as rough as 0.25 and not missing: no roughness is no coat
+        np.testing.assert_allclose(middles[albedo, 0.3, 4] - without, 0.8 * COAT_REFLECTANCE, atol=0.003)
+        np.testing.assert_allclose(middles[albedo, 0.3, 1], middles[albedo, 0.0, 1], atol=1e-9)
+
+
+def side_lit(path: Path, bright: float = 0.4, dim: float = 0.02) -> Path:
+    """A panorama whose right half, that of +x, is brighter than the left one."""
+    pixels = np.full((32, 64, 3), dim, np.float32)
+    pixels[:, 32:] = bright
     output = OpenImageIO.ImageOutput.create(str(path))
     assert output is not None and output.open(str(path), OpenImageIO.ImageSpec(64, 32, 3, "float"))
     output.write_image(pixels)

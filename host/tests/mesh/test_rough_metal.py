@@ -7,7 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MIRROR_ROUGHNESS, SHARP_ROUGHNESS, MeshMaterial, as_rendered, from_gltf, from_mtl
+from colonnade.mesh.materials import (
+    COAT_REFLECTANCE,
+    MIRROR_ROUGHNESS,
+    SHARP_ROUGHNESS,
+    MeshMaterial,
+    as_rendered,
+    from_gltf,
+    from_mtl,
+    in_layer,
+)
 from colonnade.mesh.palette import with_rendered_metal
 
 ROUGHNESS = np.arange(0.1, 0.75, 0.05)
@@ -82,11 +91,29 @@ def test_rough_metal_is_diffuse_without_gathered_light() -> None:
         assert as_rendered(found, gathers=True) == MeshMaterial("mirror", (1.0, 0.8, 0.3), roughness=lobe)
 
 
+def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered() -> None:
+    """In one layer its own colour, in the other its coat; what has none is black there."""
+    for roughness, coat in ((0.0, 0.25), (0.3, 0.3), (0.49, 0.49), (0.5, 0.0), (1.0, 0.0)):
+        surface = {"baseColorFactor": [1.0, 0.8, 0.3, 1.0], "roughnessFactor": roughness, "metallicFactor": 0.0}
+        found = from_gltf({"pbrMetallicRoughness": surface})
+        assert found.roughness == coat == from_mtl({"pr": [str(roughness)]}).roughness
+        matt = MeshMaterial("diffuse", (1.0, 0.8, 0.3))
+        assert as_rendered(found, gathers=False) == matt == in_layer(as_rendered(found, gathers=True), is_coat=False)
+        layer = in_layer(replace(as_rendered(found, gathers=True), has_corner_colours=True), is_coat=True)
+        reflectance = COAT_REFLECTANCE if coat > 0 else 0.0
+        assert layer == MeshMaterial("mirror" if coat > 0 else "diffuse", (reflectance,) * 3, roughness=coat)
+    mirror = in_layer(MeshMaterial("mirror", emission=(1.0, 1.0, 1.0)), is_coat=True)
+    assert (mirror.kind, mirror.albedo, mirror.emission) == ("diffuse", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
 def test_what_rough_metal_loses_is_named() -> None:
     """Without gathered light all of it; with it the blur of nearly smooth mirrors."""
     mesh = load_mesh("cube")
     materials = (*(MeshMaterial("mirror", roughness=roughness) for roughness in (0.05, 0.2, 0.3, 0.5)), MeshMaterial())
     mesh = replace(mesh, materials=materials)
+    glossy = replace(mesh, materials=(MeshMaterial(roughness=0.3),))
+    assert "glossy material is matt" in with_rendered_metal(glossy, True)[1][0]
+    assert with_rendered_metal(glossy, True, has_coats=True) == (glossy, ())
     sharp, diffuse = "slightly rough metals are a perfect mirror", "rough metal is diffuse"
     assert [line.split(": ")[1] for line in with_rendered_metal(mesh, False)[1]] == [f"2 {sharp}", f"1 {diffuse}"]
     assert [line.split(": ")[1] for line in with_rendered_metal(mesh, True)[1]] == [

@@ -6,7 +6,7 @@ by more than `CHANGED` codes. They are the same for all columns.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from colonnade.environment.panorama import read_radiance
 from colonnade.lab.evaluation.light import files
 from colonnade.lab.evaluation.light.mirror_rays import MirrorErrors, mirror_errors
 from colonnade.lab.evaluation.light.probe import ProbeFrame
-from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS
+from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS, PointLight
 from colonnade.lab.evaluation.light.surfaces import RoomSurface
 from colonnade.lab.evaluation.region_metrics import compare_regions
 from colonnade.render.frames import render
@@ -120,7 +120,10 @@ def measure(
         room = ROOMS[name]
         surface = RoomSurface.of(room)
         environment = surface.maps(name, room.camera(), read_picture(files.stored(name) / "photo.webp"))
-        scenes = {light: files.write_scenes(folder / light, name, room, light, environment) for light in files.LIGHTS}
+        lights = surface.lights(room)
+        scenes = {
+            light: files.write_scenes(folder / light, name, room, light, environment, lights) for light in files.LIGHTS
+        }
         loaded = load_environment(folder / files.LIGHTS[0] / name)
         for frame, things in room.frames.items():
             of_frame = {light: own[frame] for light, own in scenes.items()}
@@ -128,7 +131,7 @@ def measure(
                 mirrors = None
                 if any(thing.kind == "mirror" for thing in things):
                     mirrors = mirror_errors(room, things, surface, loaded)
-                result, pictures = _frame(name, frame, environment, of_frame, mirrors)
+                result, pictures = _frame(name, frame, environment, lights, of_frame, mirrors)
             yield f"{name}-{frame}", result, pictures
 
 
@@ -136,15 +139,16 @@ def _frame(
     name: str,
     frame: str,
     environment: Environment,
+    lights: Sequence[PointLight],
     scenes: Mapping[str, Path],
     mirrors: Mapping[str, MirrorErrors] | None,
 ) -> tuple[FrameResult, dict[str, NDArray[np.uint8]]]:
-    room, truth = ROOMS[name], files.truth(name, frame)
+    truth = files.truth(name, frame)
     assert environment.photo is not None
-    things = room.frames[frame]
+    things = ROOMS[name].frames[frame]
     pictures = {"truth": truth, "no object": resized_photo(environment.photo, *FRAME)}
     panoramas = (read_radiance(files.stored(name) / f"{which}.hdr") for which in ("around", "panorama"))
-    image, owners = ProbeFrame(room, things, environment, *panoramas).render()
+    image, owners = ProbeFrame(lights, things, environment, *panoramas).render()
     pictures["probe, rasteriser"] = encode_srgb(image)
     for title, column in columns().items():
         pictures[title] = encode_srgb(_colonnade(scenes, column))

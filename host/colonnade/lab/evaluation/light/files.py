@@ -22,7 +22,7 @@ from colonnade.common.types import Floats
 from colonnade.design.toolchain import project_root
 from colonnade.environment.model import Environment
 from colonnade.environment.panorama import read_radiance
-from colonnade.lab.evaluation.light.rooms import FRAME, KnownRoom, Thing
+from colonnade.lab.evaluation.light.rooms import FRAME, KnownRoom, PointLight, Thing
 from colonnade.lab.evaluation.light.surfaces import pose_of
 from colonnade.lab.evaluation.studies.synthetic_attic import write_room
 from colonnade.mesh.load import load_mesh
@@ -65,10 +65,12 @@ def write_panorama(path: Path, radiance: Floats) -> None:
 LIGHTS = ("lights-0", "panorama-1", "around-1", "photo-1")
 
 
-def write_scenes(folder: Path, name: str, room: KnownRoom, light: str, environment: Environment) -> dict[str, Path]:
+def write_scenes(
+    folder: Path, name: str, room: KnownRoom, light: str, environment: Environment, lights: Sequence[PointLight]
+) -> dict[str, Path]:
     """Write a room's folder, its objects as glTF files, and a scene for each frame; returns the scenes.
 
-    ``light`` is one of `LIGHTS`.
+    ``light`` is one of `LIGHTS`; ``lights`` are the room's, as the objects see them.
     """
     known, gather = light.split("-")
     write_room(folder / name, environment)
@@ -82,7 +84,7 @@ def write_scenes(folder: Path, name: str, room: KnownRoom, light: str, environme
             transform = f"rotate = {_row(pose.rotate)}, scale = {pose.scale:.8f}, translate = {_row(pose.translate)}"
             lines += ["[[object]]", f'mesh = {{path = "{file}"}}', f"transform = {{{transform}}}", ""]
         if known in ("lights", "panorama"):
-            lines += _lights(name, room)
+            lines += _lights(name, lights)
         lines += ["[background]", f'room = "{name}"', 'shadows = "photo"']
         if known in ("panorama", "around"):
             panorama = stored(name) / ("around.hdr" if known == "panorama" else "panorama.hdr")
@@ -93,11 +95,10 @@ def write_scenes(folder: Path, name: str, room: KnownRoom, light: str, environme
     return scenes
 
 
-def _lights(name: str, room: KnownRoom) -> list[str]:
+def _lights(name: str, lights: Sequence[PointLight]) -> list[str]:
     """The emitters as point lights, as bright at the objects, and the mean of all other light."""
     lines = []
-    for emitter in room.emitters:
-        position, colour, radius = emitter.seen_from(np.array(room.place))
+    for position, colour, radius in lights:
         lines += ["[[light]]", f"position = {_row(position)}", f"colour = {_row(colour.clip(max=15.0))}"]
         lines += ["falloff = 1.0", f"radius = {radius:.4f}", ""]
     around = read_radiance(stored(name) / "around.hdr")

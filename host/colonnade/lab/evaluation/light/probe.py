@@ -13,6 +13,7 @@ Embree finds what a rasteriser would: the first surface of each sample, and of e
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,7 @@ from colonnade.common.image_io import decode_srgb
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.environment.model import Environment
-from colonnade.lab.evaluation.light.rooms import FRAME, KnownRoom, Thing
+from colonnade.lab.evaluation.light.rooms import FRAME, PointLight, Thing
 from colonnade.lab.evaluation.light.surfaces import ThingSurface
 from colonnade.reference.embree import RayTracer, Triangles
 
@@ -112,13 +113,18 @@ class ProbeFrame:
     """The frame of some objects in a room."""
 
     def __init__(
-        self, room: KnownRoom, things: tuple[Thing, ...], environment: Environment, around: Floats, panorama: Floats
+        self,
+        lights: Sequence[PointLight],
+        things: tuple[Thing, ...],
+        environment: Environment,
+        around: Floats,
+        panorama: Floats,
     ) -> None:
         """Prepare a frame.
 
         Args:
-            room: The room.
-            things: Its objects.
+            lights: What stands for the emitters of the room.
+            things: The objects.
             environment: Its photo and maps.
             around: What the probe sees without the lights, equirectangular, float64 [height, width, 3].
             panorama: The same with them, for mirrors and glass.
@@ -133,7 +139,7 @@ class ProbeFrame:
         self._tracer = RayTracer(Triangles(vertices, faces))
         self._around, self._panorama = Probe(around), Probe(panorama)
         self._harmonics = self._around.harmonics()
-        self._lights = [emitter.seen_from(np.array(room.place)) for emitter in room.emitters]
+        self._lights = list(lights)
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         self._middle, self._radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
         self._shadow_maps = [self._shadow_map(position) for position, _, _ in self._lights]

@@ -17,9 +17,16 @@ from colonnade.environment.model import EnvironmentCamera
 from colonnade.lab.evaluation.studies.generated_rooms import plan_of
 from colonnade.lab.evaluation.studies.synthetic_attic import Part, attic_parts, camera_at
 from colonnade.scene.model import Vector
+from colonnade.scene.samples import disc_point, square_points
 
 #: Size of a photo and of its maps, and that of the frames that are compared, pixels.
 PHOTO, FRAME = (640, 480), (320, 240)
+
+#: Points of an emitter, for the part of it that can be seen.
+_POINTS = 1024
+
+#: A point light: position, intensity, float64 [3] each, and radius, metres.
+PointLight = tuple[Floats, Floats, float]
 
 Kind = Literal["matt", "metal", "plastic", "mirror", "glass"]
 
@@ -65,9 +72,18 @@ class Lamp:
         """Intensity of a point that lights as it does: light on a surface that faces it at 1 m, over pi."""
         return np.array(self.radiance) * self.radius**2
 
-    def seen_from(self, point: Floats) -> tuple[Floats, Floats, float]:
+    def seen_from(self, point: Floats) -> PointLight:
         """The point light that stands for it: position, intensity, radius."""
         return np.array(self.centre), self.power, self.radius
+
+    def points(self, point: Floats) -> Floats:
+        """Points of its surface, spread evenly as ``point`` sees it, float64 [n, 3]."""
+        towards = unit_vectors((point - np.array(self.centre))[None])[0]
+        right = unit_vectors(np.cross(towards, np.eye(3)[np.abs(towards).argmin()])[None])[0]
+        disc = np.array([disc_point(*one) for one in square_points(_POINTS, 0)])
+        height = np.sqrt((1 - (disc**2).sum(axis=1)).clip(min=0.0))
+        offsets = disc[:, :1] * right + disc[:, 1:] * np.cross(towards, right) + height[:, None] * towards
+        return np.asarray(np.array(self.centre) + self.radius * offsets)
 
 
 @dataclass(frozen=True)
@@ -92,12 +108,18 @@ class Window:
         offsets = np.array([-across - high, across - high, across + high, high - across])
         return np.asarray(np.array(self.centre) + offsets)
 
-    def seen_from(self, point: Floats) -> tuple[Floats, Floats, float]:
+    def seen_from(self, point: Floats) -> PointLight:
         """The point light that stands for it: position, intensity, radius."""
         towards = unit_vectors((point - np.array(self.centre))[None])[0]
         area = self.width * self.height
         power = np.array(self.radiance) * (area * float(towards @ np.array(self.normal)) / np.pi)
         return np.array(self.centre), power, float(np.sqrt(area / np.pi))
+
+    def points(self, point: Floats) -> Floats:
+        """Points that are spread evenly over it, float64 [n, 3]."""
+        first, right, _, up = self.corners()
+        parts = square_points(_POINTS, 0)
+        return np.asarray(first + parts[:, :1] * (right - first) + parts[:, 1:] * (up - first))
 
 
 @dataclass(frozen=True)

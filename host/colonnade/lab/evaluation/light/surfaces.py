@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.environment.model import Environment, EnvironmentCamera
-from colonnade.lab.evaluation.light.rooms import PHOTO, KnownRoom, Thing
+from colonnade.lab.evaluation.light.rooms import PHOTO, KnownRoom, PointLight, Thing
 from colonnade.mesh.load import load_mesh
 from colonnade.reference.embree import RayTracer, SurfacePoints, Triangles
 from colonnade.scene.model import Transform
@@ -19,6 +19,8 @@ from colonnade.scene.object_pose import rotation_matrix
 
 #: Longest edge of a triangle of a room: its paint is that of its corners, in between it is linear.
 _EDGE = 0.04
+#: A point of an emitter can be seen if nothing lies before this part of the way to it.
+_BEFORE = 0.999
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,22 @@ class RoomSurface:
         """The points that rays hit, float64 [n, 3] each, and their faces; a ray must not leave the room."""
         faces = self.tracer.first_hits(origins, directions)
         return self.tracer.surface_points(faces, origins, directions), faces
+
+    def lights(self, room: KnownRoom) -> list[PointLight]:
+        """The emitters of a room as point lights: position, intensity, radius.
+
+        Each is as bright at the objects' place, and has the middle and the area, of the part that can be seen from it.
+        """
+        place, found = np.array(room.place), []
+        for emitter in room.emitters:
+            position, intensity, radius = emitter.seen_from(place)
+            points = emitter.points(place)
+            is_seen = ~self.tracer.occluded(np.broadcast_to(place, points.shape), (points - place) * _BEFORE)
+            seen = float(is_seen.mean())
+            if seen > 0:
+                middle = position + points[is_seen].mean(axis=0) - points.mean(axis=0)
+                found.append((middle, intensity * seen, radius * float(np.sqrt(seen))))
+        return found
 
     def maps(self, name: str, camera: EnvironmentCamera, photo: NDArray[np.uint8]) -> Environment:
         """The maps of a camera, with its photo, uint8 [height, width, 3]."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from colonnade.environment.panorama import read_radiance
 from colonnade.lab.evaluation.light import files
 from colonnade.lab.evaluation.light.probe import Probe
 from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS, Lamp, Thing, Window
-from colonnade.lab.evaluation.light.surfaces import ThingSurface
+from colonnade.lab.evaluation.light.surfaces import RoomSurface, ThingSurface
 from colonnade.mesh.load import load_mesh
 
 #: What the stored pictures may take, bytes.
@@ -60,6 +61,27 @@ def test_a_probe_of_constant_light_lights_all_surfaces_alike() -> None:
     assert np.abs(harmonics[1:]).max() < 0.02
     np.testing.assert_allclose(probe.at(ways), 0.7)
     np.testing.assert_allclose(probe.filtered(ways, 0.4), 0.7)
+
+
+def test_a_light_is_what_the_place_sees_of_its_emitter() -> None:
+    """Half of a window behind a wall: half as bright, in the middle of the other half; a ball has a front."""
+    window, ball = (
+        Window((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), 1.0, 0.8, (5.0, 6.0, 7.0)),
+        Lamp((0.0, 3.0, 0.0), 0.1, (5.0,) * 3),
+    )
+    room = replace(ROOMS["attic"], emitters=(window, ball), place=(0.0, 0.0, 0.0))
+    wall = np.array([[0.0, -9.0, -1.0], [9.0, -9.0, -1.0], [9.0, 9.0, -1.0], [0.0, 9.0, -1.0]])
+    surface = RoomSurface(wall, np.zeros((4, 3)), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    (half, whole), place = surface.lights(room), np.zeros(3)
+    full = window.seen_from(place)
+    np.testing.assert_allclose(half[0], [-0.25, 0.0, -2.0], atol=0.01)
+    np.testing.assert_allclose(half[1] / full[1], 0.5, atol=0.01)
+    assert half[2] == pytest.approx(full[2] * 0.5**0.5, rel=0.01)
+    for one, other in zip(whole, ball.seen_from(place), strict=True):
+        np.testing.assert_allclose(one, other)
+    points = ball.points(place) - ball.centre
+    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 0.1)
+    assert (points[:, 1] < 0).all()
 
 
 @pytest.mark.parametrize("emitter", [Lamp((0.0, 9.0, 0.0), 0.1, (5.0, 6.0, 7.0)), None])
