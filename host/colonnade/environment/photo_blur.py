@@ -30,6 +30,8 @@ def measured_blur(photo: NDArray[np.uint8]) -> float:
     Args:
         photo: sRGB, uint8 [height, width, 3].
     """
+    if min(photo.shape[:2]) <= 2 * _BORDER:
+        return 0.0
     light = photo.mean(axis=2)
     across, down, fine = _gradient(light, _FINE)
     coarse = _gradient(light, _COARSE)[2]

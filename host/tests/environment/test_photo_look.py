@@ -90,5 +90,7 @@ def test_blur_is_measured(name: str, noise: float) -> None:
         assert 0.8 * blur < found < 1.1 * np.hypot(blur, max(own, 0.3))
 
 
-def test_a_picture_without_edges_has_no_blur() -> None:
-    assert measured_blur(np.full((60, 80, 3), 90, np.uint8)) == 0.0
+@pytest.mark.parametrize("size", [(60, 80), (1, 1), (16, 400), (17, 1)])
+def test_small_and_plain_pictures_have_neither(size: tuple[int, int]) -> None:
+    plain = np.full((*size, 3), 90, np.uint8)
+    assert measured_blur(plain) == 0.0 and Grain.of(plain) is None
