@@ -32,7 +32,7 @@ TEXTURES = Loss.of("texture", "not shown", "only textures of the base colour are
 MAPS = {
     "normalTexture": Loss.of("normal map", "not shown", "surfaces have the normals of their corners"),
     "metallicRoughnessTexture": Loss.of(
-        "metallic-roughness map", "not shown", "a face is metal or diffuse, with one roughness"
+        "metallic-roughness map", "averaged", "a face is metal or diffuse, with one roughness"
     ),
     "specularGlossinessTexture": Loss.of("specular-glossiness map", "not shown", "the surface is diffuse"),
     "occlusionTexture": Loss.of("occlusion map", "not shown", "ambient light reaches all surfaces"),
