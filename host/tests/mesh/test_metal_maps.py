@@ -61,7 +61,7 @@ def test_faces_are_metal_where_the_map_is(seed: int) -> None:
     random = np.random.default_rng(seed)
     pixels = np.zeros((64, 64, 3), np.uint8)
     pixels[:, :32, 2] = 255
-    pixels[:32, :, 1], pixels[32:, :, 1] = 64, 192
+    pixels[:32, :32, 1], pixels[32:, :32, 1], pixels[:, 32:, 1] = 64, 192, 255
     corners = random.uniform(0.05, 0.4, (20, 3, 2)) + (random.integers(0, 2, 20)[:, None] * (0.5, 0.0))[:, None]
     areas = random.uniform(0.1, 1.0, 20)
     is_metal, roughness = metal_of(Texture("a", pixels), corners, (1.0, 1.0), areas)
