@@ -144,8 +144,8 @@ public:
         return info;
     }
 
-    CellPlane planeAt(int x, int y) const {
-        const TileInfo info = tileAt(x, y);
+    /// `info`: the planes of the pixel's tile.
+    CellPlane planeAt(const TileInfo& info, int x, int y) const {
         if (info.count == 1) return {info.ids[0], false};
         const int bits = info.count / 2, mask = descriptors_[sizes_.tileOf(x, y)].pointer + bits, cell = sizes_.cellOf(x, y, info.cellLog2);
         return {info.ids[heap_.select(mask, cell, bits)], !heap_.covers(AttributeHeap::wordOf(mask, cell, bits))};
@@ -202,7 +202,9 @@ public:
         return {nx, ny, nz, entry.isIllegal};
     }
     TileInfo tileAt(int x, int y) const { return ids_.tileAt(x, y); }
-    CellPlane cellAt(int x, int y) const { return ids_.planeAt(x, y); }
+    CellPlane cellAt(int x, int y) const { return cellAt(tileAt(x, y), x, y); }
+    /// `info`: `tileAt` of the pixel.
+    CellPlane cellAt(const TileInfo& info, int x, int y) const { return ids_.planeAt(info, x, y); }
     const PlaneWord& planeOf(int id) const { return planes_.at(id); }
     const BoundingPlaneEntry& boundingPlane(int index) const { return boundingPlanes_.at(index); }
 

@@ -81,20 +81,18 @@ protected:
 
     /// A component of the ray's position at s.
     std::int64_t positionAt(const MapRay& ray, int axis, std::int64_t s) const {
-        return ray.position[axis] + floorShift(ray.direction[axis] * s, f_);
+        return ray.position[axis] + (ray.direction[axis] * s >> f_);
     }
 
     PlaneDistance planeDistance(const MapRay& ray, const PlaneWord& plane, int id) const {
         const std::int64_t du = ray.position[0] - (std::int64_t(sizes_.width) << (f_ - mapLog - 1)), dv = ray.position[1] - (std::int64_t(sizes_.height) << (f_ - mapLog - 1));
-        PlaneDistance depth{id, 0, 0, plane.e};
         const int up = planeFraction - f_ - plane.e;
-        depth.value = floorShift<std::int64_t>(ray.position[2], -up) - floorShift<std::int64_t>(plane.a * du + plane.b * dv, f_) - plane.c;
-        depth.slope = floorShift<std::int64_t>(ray.direction[2], -up) - floorShift<std::int64_t>(plane.a * ray.direction[0] + plane.b * ray.direction[1], f_);
-        return depth;
+        return {id, floorShift<std::int64_t>(ray.position[2], -up) - ((plane.a * du + plane.b * dv) >> f_) - plane.c,
+                floorShift<std::int64_t>(ray.direction[2], -up) - ((plane.a * ray.direction[0] + plane.b * ray.direction[1]) >> f_), plane.e};
     }
 
     /// Distance of the ray from a plane at s.
-    std::int64_t distanceAt(const PlaneDistance& depth, std::int64_t s) const { return depth.value + floorShift(depth.slope * s, f_); }
+    std::int64_t distanceAt(const PlaneDistance& depth, std::int64_t s) const { return depth.value + (depth.slope * s >> f_); }
 
     /// Converts a distance to w's units.
     std::int64_t toW(std::int64_t value, const PlaneDistance& depth) const { return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent); }

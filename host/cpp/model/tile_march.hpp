@@ -10,7 +10,11 @@ public:
     /// Largest number of march steps; after that the ray hits the bounding planes.
     static constexpr int maxSteps = 512;
 
-    TileMarch(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers, image.sizes()), image_(image) {}
+    /// Decodes the tiles: an image that is loaded again needs another march.
+    TileMarch(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers, image.sizes()), image_(image) {
+        for (int y = 0; y < sizes_.tileRows; ++y)
+            for (int x = 0; x < sizes_.tileColumns; ++x) tiles_.push_back(image.tileAt(x << sizes_.tileLog, y << sizes_.tileLog));
+    }
 
     /// Marches a ray that starts in front of the camera; true if it hits a plane, and then completes `point`.
     bool marchTiles(const MapRay& ray, const EnvironmentView& view, EnvironmentPoint& point) const {
@@ -24,7 +28,7 @@ public:
         while (true) {
             const std::int64_t tExit = std::min({axes[0].next, axes[1].next, maxGuardedS()});
             const std::int64_t s0 = tEnter >> guardBits, s1 = tExit >> guardBits;
-            const TileInfo info = image_.tileAt(tile[0] << sizes_.tileLog, tile[1] << sizes_.tileLog);
+            const TileInfo& info = tiles_[tile[1] * sizes_.tileColumns + tile[0]];
             point.isIllegal = point.isIllegal || info.isIllegal;
             std::array<PlaneDistance, 4> depths;
             for (int i = 0; i < info.count; ++i) depths[i] = planeDistance(ray, image_.planeOf(info.ids[i]), info.ids[i]);
@@ -42,9 +46,8 @@ public:
                 }
             }
             if (info.count == 1 || isInFrontOfAll) {
-                const auto [x, y] = pixelAt(ray, tile, info.count == 1 ? s0 : s1);
                 ++point.steps;
-                if (testPlane(ray, depths[nearest], s0, s1, x, y, state)) return reportHit(ray, view, state, point);
+                if (testPlane(ray, depths[nearest], s0, s1, {tile, sizes_.tileLog, info.count == 1 ? s0 : s1}, state)) return reportHit(ray, view, state, point);
             } else if (marchCells(ray, info, depths, tile, axes, tEnter, tExit, state, point)) {
                 return reportHit(ray, view, state, point);
             }
@@ -61,32 +64,39 @@ protected:
     const AttributeImage& image_;
 
 private:
+    std::vector<TileInfo> tiles_;
+
     /// Guard bits of accumulated distances along the ray.
     static constexpr int guardBits = 8;
     /// Log2 of the fraction of w by which a ray may be behind a plane and still count as on it.
     static constexpr int surfaceToleranceLog = 8;
 
+    /// The pixel of a ray at s in a square of the map, a tile or a cell: its place in squares of 2^log pixels.
+    struct SquarePoint {
+        std::array<int, 2> square;
+        int log;
+        std::int64_t s;
+    };
+
     /// State of a march. `isBehind`: the ray is behind the visible surfaces.
     struct MarchState {
         bool isBehind;
-        /// The last plane that the ray was in front of, if any, and its last pixel.
+        /// The last plane that the ray was in front of, if any, and the start of that step.
         bool hasPlane;
         PlaneDistance plane;
-        int x, y;
+        SquarePoint first;
         /// Position of the hit along the ray.
         std::int64_t hitS;
     };
 
-    /// Tests the ray from s0 to s1 against a plane, whose first pixel is (x, y); true if it hits this plane, or the last plane in front.
-    bool testPlane(const MapRay& ray, const PlaneDistance& depth, std::int64_t s0, std::int64_t s1, int x, int y, MarchState& state) const {
+    /// Tests the ray from s0 to s1 against a plane, whose first pixel is `first`; true if it hits this plane, or the last plane in front.
+    bool testPlane(const MapRay& ray, const PlaneDistance& depth, std::int64_t s0, std::int64_t s1, const SquarePoint& first, MarchState& state) const {
         const std::int64_t atEntry = distanceAt(depth, s0), atExit = distanceAt(depth, s1);
         if (!state.isBehind && (atEntry < 0 || atExit < 0)) {
             // A plane entered slightly behind it is a hit too: an edge between planes, or a start on the surface
             const bool isNear = -toW(atEntry, depth) < positionAt(ray, 2, s0) >> surfaceToleranceLog, isSame = state.hasPlane && state.plane.id == depth.id;
             if (atEntry >= 0 || isNear || isSame) {
                 state.hitS = atEntry < 0 ? s0 : crossing(depth, s0, s1);
-                state.x = x;
-                state.y = y;
                 return true;
             }
             state.isBehind = true;
@@ -101,8 +111,7 @@ private:
         }
         state.hasPlane = true;
         state.plane = depth;
-        state.x = x;
-        state.y = y;
+        state.first = first;
         return false;
     }
 
@@ -135,13 +144,13 @@ private:
 
     std::int64_t maxGuardedS() const { return (maximum() << guardBits) | ((std::int64_t(1) << guardBits) - 1); }
 
-    /// The pixel at s, clamped to a tile and the map.
-    std::array<int, 2> pixelAt(const MapRay& ray, const std::array<int, 2>& tile, std::int64_t s) const {
+    /// The pixel of a point, clamped to its square and the map.
+    std::array<int, 2> pixelOf(const MapRay& ray, const SquarePoint& point) const {
         std::array<int, 2> pixel;
         const std::array<int, 2> size = {sizes_.width, sizes_.height};
         for (int a = 0; a < 2; ++a) {
-            const int low = tile[a] << sizes_.tileLog, high = std::min(size[a], low + (1 << sizes_.tileLog)) - 1;
-            pixel[a] = static_cast<int>(clamp<std::int64_t>(positionAt(ray, a, s) >> (f_ - mapLog), low, high));
+            const int low = std::min(size[a] - 1, point.square[a] << point.log), high = std::min(size[a], low + (1 << point.log)) - 1;
+            pixel[a] = static_cast<int>(clamp<std::int64_t>(positionAt(ray, a, point.s) >> (f_ - mapLog), low, high));
         }
         return pixel;
     }
@@ -149,7 +158,7 @@ private:
     bool marchCells(const MapRay& ray, const TileInfo& info, const std::array<PlaneDistance, 4>& depths, const std::array<int, 2>& tile, const std::array<AxisSteps, 2>& axes,
                       std::int64_t tEnter, std::int64_t tExit, MarchState& state, EnvironmentPoint& point) const {
         const int cellLog = info.cellLog2, perTile = 1 << (sizes_.tileLog - cellLog);
-        const auto start = pixelAt(ray, tile, tEnter >> guardBits);
+        const auto start = pixelOf(ray, {tile, sizes_.tileLog, tEnter >> guardBits});
         std::array<int, 2> cell;
         std::array<std::int64_t, 2> next, width;
         for (int a = 0; a < 2; ++a) {
@@ -161,15 +170,17 @@ private:
         while (true) {
             const std::int64_t cellExit = std::min({next[0], next[1], tExit});
             const std::array<int, 2> size = {sizes_.width, sizes_.height};
-            std::array<int, 2> corner;
-            for (int a = 0; a < 2; ++a) corner[a] = std::min(size[a] - 1, (tile[a] << sizes_.tileLog) + (cell[a] << cellLog));
-            const CellPlane plane = image_.cellAt(corner[0], corner[1]);
+            std::array<int, 2> corner, square;
+            for (int a = 0; a < 2; ++a) {
+                square[a] = (tile[a] << (sizes_.tileLog - cellLog)) + cell[a];
+                corner[a] = std::min(size[a] - 1, square[a] << cellLog);
+            }
+            const CellPlane plane = image_.cellAt(info, corner[0], corner[1]);
             point.isIllegal = point.isIllegal || plane.isIllegal;
             int slot = 0;
             while (slot < 3 && info.ids[slot] != plane.id) ++slot;
-            const auto [x, y] = pixelIn(ray, corner, cellLog, tEnter >> guardBits);
             ++point.steps;
-            if (testPlane(ray, depths[slot], tEnter >> guardBits, cellExit >> guardBits, x, y, state)) return true;
+            if (testPlane(ray, depths[slot], tEnter >> guardBits, cellExit >> guardBits, {square, cellLog, tEnter >> guardBits}, state)) return true;
             if (cellExit >= tExit || point.steps >= maxSteps) return false;
             tEnter = cellExit;
             const int axis = next[0] <= next[1] ? 0 : 1;
@@ -179,26 +190,14 @@ private:
         }
     }
 
-    /// The pixel at s, clamped to a cell and the map.
-    std::array<int, 2> pixelIn(const MapRay& ray, const std::array<int, 2>& corner, int cellLog, std::int64_t s) const {
-        std::array<int, 2> pixel;
-        const std::array<int, 2> size = {sizes_.width, sizes_.height};
-        for (int a = 0; a < 2; ++a)
-            pixel[a] = static_cast<int>(clamp<std::int64_t>(positionAt(ray, a, s) >> (f_ - mapLog), corner[a], std::min(size[a], corner[a] + (1 << cellLog)) - 1));
-        return pixel;
-    }
-
     /// Completes the point of a hit.
     bool reportHit(const MapRay& ray, const EnvironmentView& view, const MarchState& state, EnvironmentPoint& point) const {
         point.kind = EnvironmentPoint::Kind::map;
         point.isHidden = state.isBehind;
         // A hidden hit takes the last visible pixel of its plane
-        point.x = state.x;
-        point.y = state.y;
-        if (!state.isBehind) {
-            point.x = pixelOf(ray, 0, state.hitS, sizes_.width);
-            point.y = pixelOf(ray, 1, state.hitS, sizes_.height);
-        }
+        const std::array<int, 2> pixel = state.isBehind ? pixelOf(ray, state.first) : std::array<int, 2>{pixelOf(ray, 0, state.hitS, sizes_.width), pixelOf(ray, 1, state.hitS, sizes_.height)};
+        point.x = pixel[0];
+        point.y = pixel[1];
         const std::int64_t w = std::max<std::int64_t>(1, positionAt(ray, 2, state.hitS));
         const Normalised way = normalise(magnitude(state.hitS), f_), depth = normalise(magnitude(w), f_);
         point.travel = static_cast<std::int64_t>(divide(way.mantissa, depth.mantissa, f_));

@@ -51,12 +51,12 @@ def decoded_with_noise(name: str) -> Any:
         photo=None,
     )
     depth = environment.depth * (1 + 0.002 * np.random.default_rng(5).normal(size=environment.depth.shape))
-    image = SimpleNamespace(
+    image: Any = SimpleNamespace(
         depth_unit=float(environment.depth.min()) * 0.9,
         decoded_depth=lambda _: depth,
         planes=SimpleNamespace(bounding=np.ones((8, 3))),
     )
-    return SimpleNamespace(environment=environment, image=image, depth=depth)
+    return EncodedEnvironment(environment, image)
 
 
 class Room:
