@@ -109,6 +109,7 @@ def _gather() -> Entry:
     commands = {
         "area": ("colonnade", "ppa", "--config", "edge", "--set", override, "--liberty", "ASAP7", "--json", REPORT),
         "pass": render("rtl", "--samples", "1"),
+        "whole": render("rtl", "--samples", "1", "--relit"),
         **{f"-{backend}": render(backend, *small, picture) for backend, picture in pictures.items()},
         "compare": ("colonnade", "compare", "--no-dists", *pictures.values(), "--json", REPORT),
     }

@@ -153,6 +153,7 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         "gather": {
             "area": area() | {"levels": {"array": {"kge": area()["levels"]["array"]["kge"] + 6.0}}},
             "pass": {"counters": {"cycles": 50_000, "raysGather": 900}},
+            "whole": {"counters": {"cycles": 90_000, "raysGather": 1900}},
             "compare": {"psnr": 48.0},
         },
         "light": {

@@ -39,17 +39,17 @@ final class EnvironmentRays(config: PathConfig) extends Module {
   val io = IO(new EnvironmentRaysIO(config))
 
   private val column  = io.marches
-  private val answer  = column.answer
+  private val result  = column.answer
   private val rayType = new EnvironmentRay(config)
   private val point   = new EnvironmentSurface(config)
   private val table   = ContextTable(config, UInt(rayType.getWidth.max(point.getWidth).W))
 
   // Rays and points into the table
-  answer.ready := !io.ray.valid
-  when(io.ray.valid || (answer.valid && answer.bits.isHit)) {
+  result.ready := !io.ray.valid
+  when(io.ray.valid || (result.valid && result.bits.isHit)) {
     table.write(
-      Mux(io.ray.valid, io.ray.bits.context, answer.bits.surface.context),
-      Mux(io.ray.valid, io.ray.bits.ray.asUInt, answer.bits.surface.asUInt)
+      Mux(io.ray.valid, io.ray.bits.context, result.bits.surface.context),
+      Mux(io.ray.valid, io.ray.bits.ray.asUInt, result.bits.surface.asUInt)
     )
   }
 
@@ -72,7 +72,7 @@ final class EnvironmentRays(config: PathConfig) extends Module {
   private val isChosen  = RegInit(false.B)
   private val chosen    = Reg(Context(config))
   private val isOffered = RegNext(!isTaken && isChosen && !io.surface.fire, false.B)
-  when(answer.fire && answer.bits.isHit) { hasPoint(answer.bits.surface.context) := true.B }
+  when(result.fire && result.bits.isHit) { hasPoint(result.bits.surface.context) := true.B }
   for (again <- io.again) when(again.valid) { hasPoint(again.bits) := true.B }
   private val others = VecInit(hasPoint.zip(UIntToOH(chosen, config.contexts).asBools).map { case (has, isLast) =>
     has && !(isChosen && isLast)
@@ -87,10 +87,10 @@ final class EnvironmentRays(config: PathConfig) extends Module {
   column.order.ray := entry(rayType.getWidth - 1, 0).asTypeOf(rayType)
   io.surface.valid := isOffered
   io.surface.bits  := entry(point.getWidth - 1, 0).asTypeOf(point)
-  io.miss.valid    := answer.fire && !answer.bits.isHit && !answer.bits.isOcclusionTest
-  io.miss.bits     := answer.bits.surface.context
-  io.visible.valid := answer.fire && !answer.bits.isHit && answer.bits.isOcclusionTest
-  io.visible.bits  := answer.bits.surface.context
+  io.miss.valid    := result.fire && !result.bits.isHit && !result.bits.isOcclusionTest
+  io.miss.bits     := result.bits.surface.context
+  io.visible.valid := result.fire && !result.bits.isHit && result.bits.isOcclusionTest
+  io.visible.bits  := result.bits.surface.context
 
   /** A place for a request of one kind, in front of its taker in the column. */
   private class Waiting(taker: DecoupledIO[EnvironmentRequest], isOfKind: Bool) {
