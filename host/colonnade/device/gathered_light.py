@@ -83,8 +83,8 @@ def scene_cube(
     cube = LightCube(cube.turned(pose.rotation).texels * scene.exposure)
     lost = 1 - cube.texels.clip(max=LARGEST).sum() / max(cube.texels.sum(), 1e-9)
     if lost > _REPORTED_LOSS and progress is not None:
-        largest = LARGEST / scene.exposure
-        progress.note(f"{lost:.0%} of the light is brighter than {largest:g}, the most that a texel holds, and is lost")
+        limit = LARGEST / scene.exposure
+        progress.note(f"{lost:.0%} of the light is brighter than {limit:g}, the most that a texel holds, and is lost")
     return cube.with_lights([disc for light in lights.lights if (disc := _disc(light, point, pose)) is not None])
 
 

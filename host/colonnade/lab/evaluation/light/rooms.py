@@ -54,6 +54,11 @@ class Thing:
     tilt: float = 0.0
     roughness: float = 1.0
 
+    @property
+    def middle(self) -> Floats:
+        """A point in its middle, float64 [3]: objects are about six tenths as high as long."""
+        return np.array(self.foot) + np.array([0.0, 0.3 * self.size, 0.0])
+
 
 @dataclass(frozen=True)
 class Lamp:

@@ -61,18 +61,26 @@ class RoomSurface:
         return self.tracer.surface_points(faces, origins, directions), faces
 
     def lights(self, room: KnownRoom) -> list[PointLight]:
-        """The emitters of a room as point lights: position, intensity, radius.
+        """The emitters of a room as point lights.
 
-        Each is as bright at the objects' place, and has the middle and the area, of the part that can be seen from it.
+        Each is as bright at the objects' place, and has the middle and the area, of the part that the objects see of
+        it, in the mean over their middles.
         """
         place, found = np.array(room.place), []
+        middles = [thing.middle for things in room.frames.values() for thing in things]
         for emitter in room.emitters:
             position, intensity, radius = emitter.seen_from(place)
             points = emitter.points(place)
-            is_seen = ~self.tracer.occluded(np.broadcast_to(place, points.shape), (points - place) * _BEFORE)
+            is_seen = np.array(
+                [
+                    ~self.tracer.occluded(np.broadcast_to(middle, points.shape), (points - middle) * _BEFORE)
+                    for middle in middles
+                ]
+            )
             seen = float(is_seen.mean())
             if seen > 0:
-                middle = position + points[is_seen].mean(axis=0) - points.mean(axis=0)
+                weights = is_seen.mean(axis=0) / is_seen.mean(axis=0).sum()
+                middle = position + weights @ points - points.mean(axis=0)
                 found.append((middle, intensity * seen, radius * float(np.sqrt(seen))))
         return found
 

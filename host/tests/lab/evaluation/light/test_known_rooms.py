@@ -63,13 +63,14 @@ def test_a_probe_of_constant_light_lights_all_surfaces_alike() -> None:
     np.testing.assert_allclose(probe.filtered(ways, 0.4), 0.7)
 
 
-def test_a_light_is_what_the_place_sees_of_its_emitter() -> None:
+def test_a_light_is_what_the_objects_see_of_its_emitter() -> None:
     """Half of a window behind a wall: half as bright, in the middle of the other half; a ball has a front."""
     window, ball = (
         Window((0.0, 0.0, -2.0), (0.0, 0.0, 1.0), 1.0, 0.8, (5.0, 6.0, 7.0)),
         Lamp((0.0, 3.0, 0.0), 0.1, (5.0,) * 3),
     )
-    room = replace(ROOMS["attic"], emitters=(window, ball), place=(0.0, 0.0, 0.0))
+    thing = Thing("sphere", "matt", (0.5,) * 3, (0.0, 0.0, 0.0), 1e-6)
+    room = replace(ROOMS["attic"], emitters=(window, ball), place=(0.0, 0.0, 0.0), frames={"one": (thing,)})
     wall = np.array([[0.0, -9.0, -1.0], [9.0, -9.0, -1.0], [9.0, 9.0, -1.0], [0.0, 9.0, -1.0]])
     surface = RoomSurface(wall, np.zeros((4, 3)), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     (half, whole), place = surface.lights(room), np.zeros(3)
@@ -78,7 +79,7 @@ def test_a_light_is_what_the_place_sees_of_its_emitter() -> None:
     np.testing.assert_allclose(half[1] / full[1], 0.5, atol=0.01)
     assert half[2] == pytest.approx(full[2] * 0.5**0.5, rel=0.01)
     for one, other in zip(whole, ball.seen_from(place), strict=True):
-        np.testing.assert_allclose(one, other)
+        np.testing.assert_allclose(one, other, atol=1e-9)
     points = ball.points(place) - ball.centre
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), 0.1)
     assert (points[:, 1] < 0).all()
