@@ -5,9 +5,10 @@ import { ROOM_START, START, cameraOf, isAtMaps, roomCamera } from "./camera.js";
 import { hasRegister } from "./design.js";
 import { droppedFiles, roomFiles } from "./files.js";
 import { listen } from "./orbit.js";
-import { element, fillTable, listDesigns, showCosts, showFigures, showRays, showTimes } from "./panels.js";
+import { element, listDesigns, showCosts, showFigures, showRays } from "./panels.js";
 import { draw, raysOf } from "./path.js";
-import { Renderer, bytesOf } from "./renderer.js";
+import { Renderer, bytesOf, unpack } from "./renderer.js";
+import { RtlPanel } from "./rtlpanel.js";
 import { readState, writeState } from "./state.js";
 import { materialOf, poseIn, viewOf } from "./view.js";
 import { placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
@@ -16,8 +17,6 @@ const MOST_WORKERS = 8;
 const COARSE = 4;
 /** A level surface so near to a double click counts, pixels of the maps. */
 const STAND_WITHIN = 40;
-/** The frame of the RTL. */
-const RTL = { design: "tiny", width: 64, height: 48 };
 
 const form = element("controls");
 const stage = element("stage");
@@ -30,13 +29,6 @@ let isChanged = false;
 let isRunning = false;
 /** What tests read: the last whole frame. */
 const page = (window.colonnade = { frames: 0, picture: null });
-
-async function unpack(text) {
-  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
 
 /** The room of the state, if the hardware has its maps. */
 const roomOf = () => (data.rooms[state.room]?.views[state.design] ? data.rooms[state.room] : null);
@@ -420,79 +412,9 @@ element("forget").onclick = () => (forget(), keepLink());
 
 // The RTL
 
-async function timePixel() {
-  const button = element("time");
-  button.disabled = true;
-  try {
-    const { x, y, width, height, orbit } = followed();
-    const viewFor = (scene) => {
-      const view = viewOf(scene, null, width, height, orbit);
-      return { ...view, camera: { ...view.camera, width: 1, height: 1, centre: [width / 2 - x, height / 2 - y] } };
-    };
-    const { frame, model } = await byRtl(viewFor, () => {});
-    const { counters } = frame;
-    page.pixelCounters = counters;
-    const isEqual = (await hashOf(frame)) === (await hashOf(model));
-    showTimes(counters, `A frame of this pixel by the RTL of ${RTL.design}; its colour ${isEqual ? "is" : "is not"} the model's`);
-  } catch (error) {
-    fail(error.message);
-  } finally {
-    button.disabled = false;
-  }
-}
-element("time").onclick = timePixel;
-
-/** Renders by RTL and model: a view of the open mesh, packed for the RTL's design. */
-async function byRtl(viewFor, onSlice) {
-  const manifest = data.manifests[RTL.design];
-  const rtl = await unpack(JSON.parse(element("data").textContent).rtl);
-  const opened = { module: page.module, manifest, views: { plain: bytesOf(data.views[RTL.design]) }, maps: [], photo: null };
-  return renderer.aside(opened, page.file, (worker, { packed }) =>
-    renderer.ask(worker, "rtl", { rtl, packed, view: viewFor({ ...scene(), manifest, packed }) }, onSlice),
-  );
-}
-
-async function renderRtl() {
-  const status = element("rtl-status");
-  const [own, models] = ["rtl-frame", "rtl-model"].map((id) => element(id).getContext("2d"));
-  const { width, height } = RTL;
-  element("rtl-start").disabled = true;
-  element("rtl").classList.add("started");
-  try {
-    const begin = performance.now();
-    const viewFor = (scene) => viewOf(scene, null, width, height, state);
-    const answer = await byRtl(viewFor, ({ cycles, pixels }) => {
-      own.putImageData(new ImageData(pixels, width, height), 0, 0);
-      status.textContent = `${cycles.toLocaleString("en")} cycles, ${Math.round(cycles / (performance.now() - begin))} thousand a second`;
-    });
-    await showRtl(answer, own, models);
-  } catch (error) {
-    status.textContent = error.message;
-  } finally {
-    element("rtl-start").disabled = false;
-  }
-}
-
-async function showRtl({ frame, model, framePixels, modelPixels }, own, models) {
-  const { width, height } = RTL;
-  own.putImageData(new ImageData(framePixels, width, height), 0, 0);
-  models.putImageData(new ImageData(modelPixels, width, height), 0, 0);
-  const hashes = await Promise.all([frame, model].map(hashOf));
-  const counters = Object.keys(model.counters).filter((name) => name in frame.counters);
-  const different = counters.filter((name) => frame.counters[name] !== model.counters[name]);
-  page.rtl = { hashes, different, counters: frame.counters };
-  const isEqual = hashes[0] === hashes[1] && different.length === 0;
-  element("rtl-status").textContent = isEqual
-    ? `Equal: ${width * height} pixels with their triangles, ${counters.length} counters. SHA-256 of both: ${hashes[0].slice(0, 16)}…`
-    : `Different: ${hashes.map((hash) => hash.slice(0, 16)).join(" and ")}; counters: ${different.join(", ") || "none"}`;
-  fillTable("rtl-counters", Object.entries(frame.counters).map(([name, value]) => [name, value, model.counters[name] ?? "–"]));
-}
-
-async function hashOf({ colours, triangles }) {
-  const bytes = await new Blob([colours, triangles]).arrayBuffer();
-  return [...new Uint8Array(await crypto.subtle.digest("SHA-256", bytes))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
-}
-element("rtl-start").onclick = renderRtl;
+const panel = new RtlPanel(page, fail, () => ({ data, renderer, state, scene: scene() }));
+element("time").onclick = () => panel.timePixel(followed());
+element("rtl-start").onclick = () => panel.render();
 
 // Start
 

@@ -75,10 +75,11 @@ export function showCosts(studies, chosen) {
   fillTable("costs", lines);
 }
 
-/** The cycles of a frame of one pixel. */
-export function showTimes(counters, caption) {
-  const states = Object.entries(STATES).filter(([name]) => name in counters);
-  fillTable("times", [["cycles of the frame", counters.cycles], ...states.map(([name, label]) => [label, counters[name]])]);
+/** The cycles of frames of one pixel, by what they are of. */
+export function showTimes(frames, caption) {
+  const states = Object.entries(STATES).filter(([name]) => frames.every(({ counters }) => name in counters));
+  const row = (name, label) => [label, ...frames.map(({ counters }) => counters[name])];
+  fillTable("times", [["", ...frames.map(({ of }) => of)], row("cycles", "cycles of the frame"), ...states.map(([name, label]) => row(name, label))]);
   element("times").caption.textContent = caption;
   element("times").hidden = false;
 }

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Workers that share frames: each renders every n-th band of rows.
 
+/** The bytes of a compressed text of the page. */
+export async function unpack(text) {
+  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
 /** Bytes, or those of base64. */
 export const bytesOf = (text) => (typeof text === "string" ? Uint8Array.from(atob(text), (character) => character.charCodeAt(0)) : text);
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import bundle
 import colonnade
+import designs
 import module
 import numpy as np
 import rooms
@@ -18,24 +19,13 @@ import rtl
 import studies
 from colonnade.common.atomic_files import replacing
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
-from colonnade.scene.parser import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT = ROOT / "out" / "browser"
 #: The design whose RTL the page has.
 RTL = "tiny"
-DESIGNS = ("textured", "edge", "lean", "small", "diffuse", "tiny")
-#: Its view file is every mesh's, but for the registers that the page sets: its edge is the cube's.
-SCENE, MESH, SIZE = "object.toml", "cube", (640, 480)
-
-
-def view_file(manifest: Manifest) -> bytes:
-    """The view file of a cube for a design."""
-    scene = load_scene(ROOT / "scenes" / SCENE)
-    return DeviceScene.of(scene, manifest, load_mesh(MESH), size=SIZE).view_file(SIZE)
 
 
 def ply(mesh: Mesh) -> bytes:
@@ -57,18 +47,21 @@ def main() -> None:
     module.compile_module(code)
     rtl_code = module.OBJECTS / f"{RTL}.wasm"
     rtl.compile_rtl(RTL, rtl_code)
-    texts = {name: json.loads((ROOT / "configs" / "golden" / f"{name}.json").read_text("utf-8")) for name in DESIGNS}
+    texts = {
+        name: json.loads((ROOT / "configs" / "golden" / f"{name}.json").read_text("utf-8")) for name in designs.DESIGNS
+    }
     points, found = studies.studies(texts)
     presets = {name: Manifest.from_dict(text) for name, text in texts.items()}
     texts |= points
     manifests = {name: Manifest.from_dict(text) for name, text in texts.items()}
-    views = {name: view_file(manifest) for name, manifest in manifests.items()}
+    views = {name: designs.view_file(manifest) for name, manifest in manifests.items()}
     data = {
         "version": colonnade.__version__,
         "manifests": texts,
         "presets": list(presets),
         "studies": found,
         "rooms": {name: rooms.room_data(name, presets) for name in rooms.PLACEMENTS},
+        "cycles": designs.recorded(texts),
         "views": {name: bundle.base64_text(view) for name, view in views.items()},
     }
     contents = {

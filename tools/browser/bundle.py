@@ -14,8 +14,8 @@ SITE = ROOT / "site"
 #: Modules after those that they import.
 WORKER = ("design", "library", "meshes", "photo", "depth", "normals", "encoder", "room", "rtl", "worker")
 PAGE = (
-    *("camera", "design", "photo", "roomview", "path", "panels", "orbit", "renderer", "state", "view"),
-    *("files", "visitor", "page"),
+    *("camera", "design", "photo", "roomview", "path", "panels", "orbit", "renderer", "state", "recording", "view"),
+    *("files", "visitor", "rtlpanel", "page"),
 )
 
 _IMPORT = re.compile(r'^import [^;]*? from "\./(\w+)\.js";\n', re.MULTILINE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import itertools
 import json
 import shutil
 import time
@@ -111,15 +112,20 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
     context.close()
 
 
-def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, is_in_room: bool = False) -> Any:
-    """The host's frame of the registers that the page wrote; those of the mesh are the host's."""
-    manifest = Manifest.load(ROOT / "configs" / "golden" / f"{design}.json")
+def registers_of(picture: dict[str, Any], manifest: Manifest) -> dict[str, int]:
+    """The registers that the page wrote, by name."""
     words = {address: value for address, value in picture["writes"]}
-    registers = {
+    return {
         register.name: register.decode([words.get(register.address + word, 0) for word in range(register.words)])
         for register in manifest.registers.values()
         if register.access == "rw"
     }
+
+
+def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, is_in_room: bool = False) -> Any:
+    """The host's frame of the registers that the page wrote; those of the mesh are the host's."""
+    manifest = Manifest.load(ROOT / "configs" / "golden" / f"{design}.json")
+    registers = registers_of(picture, manifest)
     image = pack(mesh, manifest)
     own = frame_registers(load_scene(ROOT / "scenes" / "object.toml"), image.header, manifest, 64, 48)
     of_mesh = [name for name in own if name.startswith(("bounds.", "scene.")) or name == "shading.offset"]
@@ -188,21 +194,13 @@ def test_a_room_equals_the_host_and_a_drag_turns_the_object(context: BrowserCont
     assert tab.is_quiet()
 
 
-def test_a_photo_and_its_depth_are_a_room(context: BrowserContext, tmp_path: Path) -> None:
-    """Relit from its maps it is the photo again, so light, maps, pose and registers agree."""
+def test_a_photo_and_its_depth_are_a_room(context: BrowserContext) -> None:
+    """Relit from its maps it is the photo again, and the device sees it as a room of the page."""
     folder = ROOT / "scenes" / "rooms" / "living"
-    tab = Tab(context, "#pixel=4&design=edge&material=mirror")
+    tab = Tab(context, "#pixel=4&design=edge&material=mirror&photo=0")
     page, before = tab.page, tab.frames()
-    page.set_input_files("#file", [folder / name for name in ("render.png", "depth.png")])
-    expect(page.locator("#notes")).to_contain_text("one white lamp")
-    expect(page.locator("#notes")).to_contain_text("the photo's width is taken as 65°")
-    tab.wait(before)
-    # The room's own degrees, and its maps
-    before = tab.frames()
-    page.fill("input[name=degrees]", "66")
-    tab.wait(before)
-    before = tab.frames()
-    page.uncheck("input[name=photo]")
+    page.set_input_files("#file", [folder / name for name in ("render.png", "depth.png", "meta.json")])
+    expect(page.locator("#notes")).to_contain_text("one white lamp", timeout=20_000)
     tab.wait(before)
     picture = tab.picture()
     size = picture["height"], picture["width"]
@@ -213,8 +211,27 @@ def test_a_photo_and_its_depth_are_a_room(context: BrowserContext, tmp_path: Pat
     lit = np.reshape(picture["ratios"], (*size, 3)).min(axis=2) == 4096
     error = (srgb_from_linear(linear) - srgb_from_linear(photo))[lit & ~is_object]
     assert lit.mean() > 0.8 and -20 * np.log10(np.sqrt((error**2).mean())) > 24
+    # The room of the page has this lens, pose and depth: the projection to the maps is in proportion to the object
+    manifest = Manifest.load(ROOT / "configs" / "golden" / "edge.json")
+    own, scale = registers_of(picture, manifest), page.evaluate("colonnade.room.object.scale")
+    before = tab.frames()
+    page.select_option("select[name=room]", "living")
+    tab.wait(before)
+    other = registers_of(tab.picture(), manifest)
+    for i, axis in itertools.product(range(3), "xyz"):
+        assert own[f"environment.rotation[{i}].{axis}"] == other[f"environment.rotation[{i}].{axis}"]
+        ours, theirs = (
+            each[f"environment.matrix[{i}].{axis}"] * 2.0 ** -each["environment.exponent"] for each in (own, other)
+        )
+        assert ours * 0.29 == pytest.approx(theirs * scale, rel=1e-6, abs=1e-12)
+    # Without meta.json
+    before = tab.frames()
+    page.set_input_files("#file", [folder / name for name in ("render.png", "depth.png")])
+    expect(page.locator("#notes")).to_contain_text("the photo's width is taken as 65°", timeout=20_000)
+    expect(page.locator("#notes")).to_contain_text("the vertical is that of the floor")
+    tab.wait(before)
     # A double click moves the object, and a photo alone is refused
-    before, hits = tab.frames(), picture["triangles"]
+    before, hits = tab.frames(), tab.picture()["triangles"]
     page.check("input[name=photo]")
     tab.wait(before)
     before = tab.frames()
@@ -344,6 +361,20 @@ def test_the_precision_has_its_picture_and_its_costs(context: BrowserContext) ->
     expect(page.locator("#study")).to_contain_text("colonnade explore scenes/studies/mixed-precision.toml")
     assert tab.picture()["colours"] != sharp
     assert "design=16b16s32d" in page.evaluate("location.hash")
+    assert tab.is_quiet()
+
+
+def test_recorded_cycles_are_those_of_the_rtl(context: BrowserContext) -> None:
+    """A change of the timing of `tiny` fails here: run tools/browser/record.py."""
+    recording = json.loads((ROOT / "site" / "cycles.json").read_text())["tiny"]
+    longest = max(range(len(recording["values"])), key=lambda index: recording["values"][index][0])
+    x, y = recording["pixels"][longest]
+    tab = Tab(context, f"#pixel=4&design=tiny&follow={x},{y},64,48,24,18,4.6,0,0")
+    tab.page.click("#time")
+    expect(tab.page.locator("#times caption")).to_contain_text("the recording is of the RTL of tiny", timeout=60_000)
+    rows = [row.split("\t") for row in tab.page.locator("#times tbody").inner_text().splitlines()]
+    assert rows[0][1:] == ["tiny", "tiny, recorded"] and len(rows) == 8
+    assert all(ours == recorded for _, ours, recorded in rows[1:])
     assert tab.is_quiet()
 
 
