@@ -57,7 +57,8 @@ class Thing:
     @property
     def middle(self) -> Floats:
         """A point in its middle, float64 [3]: objects are about six tenths as high as long."""
-        return np.array(self.foot) + np.array([0.0, 0.3 * self.size, 0.0])
+        x, y, z = self.foot
+        return np.array([x, y + 0.3 * self.size, z])
 
 
 @dataclass(frozen=True)
