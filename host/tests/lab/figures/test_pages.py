@@ -282,9 +282,9 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| ambient light | 22.0 | 22.0 | 22.0 |" in table(docs, "light-materials")
     assert "| 1 pass | 23.0 dB, 0.75 |" in table(docs, "light-mirrors")
     assert "| rays of Colonnade | 1.2°, 3.0° |" in table(docs, "light-mirrors")
-    assert "| frames a second at 200 MHz | 4,000 | 1,000 | 250 |" in table(docs, "light-cost")
+    assert "| frames a second at 200 MHz | 4,000 | 800 | 200 |" in table(docs, "light-cost")
     # A million rays of 2 nJ
-    assert "| mJ a frame | 2.00 | 8.00 | 32.00 |" in table(docs, "light-cost")
+    assert "| mJ a frame | 2.00 | 10.00 | 40.00 |" in table(docs, "light-cost")
     marched = "| pixels that march | 0 % | 95 % |\n| --- | ---: | ---: |\n| r | 10,000 | 200,000 |"
     assert marched in table(docs, "moved-rooms")
     moved = "| 0.1 m, 3.3° | 40.0, 40.0, 40.0 | 30.2, 30.2, 30.2 | –, –, – | 1.5, 1.5, 1.5 |"
