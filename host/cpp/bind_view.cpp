@@ -61,6 +61,8 @@ public:
         check(colonnade_view_set_light(&view_, index, &light));
     }
 
+    void setSample(std::uint32_t index, std::uint32_t count) { check(colonnade_view_set_sample(&view_, index, count)); }
+
     nb::bytes frame() {
         colonnade_frame frame;
         check(colonnade_view_frame(&view_, writes_.data(), static_cast<std::uint32_t>(writes_.size() / 8), &frame));
@@ -92,6 +94,7 @@ void bind_view(nb::module_& module) {
         .def("set_camera", &TargetView::setCamera, "position"_a, "rotation"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a)
         .def("set_object", &TargetView::setObject, "position"_a, "rotation"_a)
         .def("set_light", &TargetView::setLight, "index"_a, "position"_a, "colour"_a, "reach"_a)
+        .def("set_sample", &TargetView::setSample, "index"_a, "count"_a)
         .def("frame", &TargetView::frame)
         .def("accept", &TargetView::accept)
         .def("forget", &TargetView::forget);

@@ -18,6 +18,7 @@ from colonnade.registers.frame import frame_registers
 from colonnade.registers.target_view import TargetView, rotation_of
 from colonnade.registers.view_file import view_file
 from colonnade.scene.model import Light, MeshSource, Scene
+from colonnade.scene.samples import Point, samples_of_frame
 from colonnade.scene.view import PlacedLight, View, make_view, place
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
@@ -65,12 +66,14 @@ class Poses:
     lens: list[int]
     size: tuple[int, int]
     lights: list[tuple[list[int], list[int], int]]
+    sample: tuple[int, int] = (0, 1)
 
     def give(self, target: TargetView) -> None:
         target.set_object(*self.object)
         target.set_camera(*self.camera, self.lens, self.size)
         for index, light in enumerate(self.lights):
             target.set_light(index, *light)
+        target.set_sample(*self.sample)
 
 
 def rotation(random: np.random.Generator) -> list[int]:
@@ -114,6 +117,17 @@ def random_poses(
     )
 
 
+def random_sample(random: np.random.Generator) -> tuple[int, int]:
+    """Index and number of a frame's passes."""
+    count = 1 << int(random.integers(5))
+    return int(random.integers(count)), count
+
+
+def pixel_shift(index: int, count: int) -> Point:
+    """The host's shift of the rays in a pass, pixels."""
+    return samples_of_frame(count, 0)[index].pixel
+
+
 def whole(values: Any, unit: int) -> list[int]:
     return [round(float(value) * unit) for value in values]
 
@@ -128,7 +142,8 @@ def float_view(design: Design, poses: Poses) -> View:
 
     right, down, forward = (np.array(poses.camera[1]).reshape(3, 3) / ONE).T
     fx, fy, cx, cy = (value / PIXEL for value in poses.lens)
-    direction = forward + (0.5 - cx) / fx * right + (0.5 - cy) / fy * down
+    shift = pixel_shift(*poses.sample)
+    direction = forward + (0.5 + shift[0] - cx) / fx * right + (0.5 + shift[1] - cy) / fy * down
     return dataclasses.replace(
         design.view,
         width=poses.size[0],
@@ -149,8 +164,9 @@ def both(
 ) -> Iterator[tuple[dict[str, int], dict[str, int]]]:
     """Registers of random poses, by the target and in floats."""
     random, target = np.random.default_rng(seed), design.target()
-    for _ in range(count):
-        poses = random_poses(design, random, nearest)
+    samples = [(index, passes) for passes in (1, 2, 4, 8, 16) for index in range(passes)]
+    for number in range(count):
+        poses = dataclasses.replace(random_poses(design, random, nearest), sample=samples[number % len(samples)])
         poses.give(target)
         try:
             expected = float_registers(float_view(design, poses), design.header, design.manifest)

@@ -41,7 +41,8 @@ enum colonnade_error {
     COLONNADE_BAD_POSE,   /* a rotation is none, or a position is beyond 2^28 metres */
     COLONNADE_BAD_LENS,   /* a focal length, a principal point or a size out of bounds */
     COLONNADE_TOO_FAR,    /* camera or light is out of the hardware's range, or the object is too small for the room */
-    COLONNADE_NO_LIGHT    /* the scene has no such light */
+    COLONNADE_NO_LIGHT,   /* the scene has no such light */
+    COLONNADE_NO_SAMPLE   /* no such number of passes, or no such pass */
 };
 
 /* Bits of `interrupt.status` and `interrupt.enable`. */

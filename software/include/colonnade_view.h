@@ -13,15 +13,17 @@ extern "C" {
 enum {
     COLONNADE_VIEW_LIGHTS = 8,
     COLONNADE_VIEW_EDGES = 6, /* half-planes of frame.objectOutline */
-    /* Words that are computed, at most: those of frame, camera, lights, environment and its window. Numbers of more than 32
-     * bits have two. */
+    COLONNADE_VIEW_RAYS = 4,  /* gathered rays of a path */
+    /* Words that are computed, at most: those of frame, camera, lights, environment, its window, and sample points. Numbers
+     * of more than 32 bits have two. */
     COLONNADE_VIEW_FRAME = 7 + 3 * COLONNADE_VIEW_EDGES,
     COLONNADE_VIEW_CAMERA = 2 * 12 + 1,
     COLONNADE_VIEW_LIGHT = 2 * 3 + 5,
     COLONNADE_VIEW_ENVIRONMENT = 2 * 12 + 11,
     COLONNADE_VIEW_WINDOW = 8,
+    COLONNADE_VIEW_GATHER = 2 * COLONNADE_VIEW_RAYS,
     COLONNADE_VIEW_WORDS = COLONNADE_VIEW_FRAME + COLONNADE_VIEW_CAMERA + COLONNADE_VIEW_LIGHTS * COLONNADE_VIEW_LIGHT +
-                           COLONNADE_VIEW_ENVIRONMENT + COLONNADE_VIEW_WINDOW
+                           COLONNADE_VIEW_ENVIRONMENT + COLONNADE_VIEW_WINDOW + COLONNADE_VIEW_GATHER
 };
 
 /* World = rotation * local + position. */
@@ -58,6 +60,7 @@ struct colonnade_view_scene {
     uint32_t max_width, max_height;
     uint32_t exposure; /* of lights, 2^-16 */
     uint32_t frame_address, camera_address, lights_address, environment_address, window_address;
+    uint32_t gather_address; /* 0: the sample points are constant */
     uint32_t lights, constants;
     struct colonnade_factor steps;  /* grid steps in a metre */
     int64_t offset[3];              /* grid position of the mesh's origin, negated, 2^-16 steps */
@@ -73,12 +76,19 @@ struct colonnade_view_scene {
     const uint8_t *tiles, *writes;
 };
 
+/* What differs between the passes of a frame. */
+struct colonnade_sample {
+    int64_t shift[2];                       /* of the rays from the pixels' centres, right and down, 2^-32 pixels */
+    uint8_t points[COLONNADE_VIEW_RAYS][2]; /* `gather.points` */
+};
+
 /* The caller's memory; only the functions below read and write it. It points into the view file. */
 struct colonnade_view {
     struct colonnade_view_scene scene;
     struct colonnade_camera camera;
     struct colonnade_pose object;
     struct colonnade_light lights[COLONNADE_VIEW_LIGHTS];
+    struct colonnade_sample sample;
     uint32_t words[2][COLONNADE_VIEW_WORDS];
     bool is_map_camera; /* in a room: the camera is that of its maps */
     bool accepted;      /* which of `words` the device has */
@@ -98,6 +108,10 @@ enum colonnade_error colonnade_view_set_camera(struct colonnade_view *view, cons
 enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, const struct colonnade_pose *object);
 enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index,
                                               const struct colonnade_light *light);
+
+/* Pass `index` of a frame of 1, 2, 4, 8 or 16 passes: the host's pixel shift and sample points (docs/sampling.md). It holds
+ * until the next call, whatever moves; until the first one a frame has one pass. */
+enum colonnade_error colonnade_view_set_sample(struct colonnade_view *view, uint32_t index, uint32_t count);
 
 /* Computes the registers. `frame` has those that differ from the accepted ones, in `writes`, which has space for `capacity`
  * pairs of words; colonnade_view_most_writes says how many are enough. */

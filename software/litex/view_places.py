@@ -1,6 +1,6 @@
 """Where a view file (docs/view.md) holds its poses, in words of 32 bits."""
 
-OBJECT = 44
-CAMERA = 59
-WIDTH = 82
-LIGHT = 84
+OBJECT = 45
+CAMERA = 60
+WIDTH = 83
+LIGHT = 85

@@ -238,7 +238,7 @@ const char *colonnade_error_name(enum colonnade_error error) {
         "truncated",   "tooLarge",    "misaligned",     "badRegister", "badFormat",  "noFrame",
         "busy",        "timeout",     "busResponse",    "badSection",  "badLength",  "noPhoto",
         "frameInvalid", "noScene",    "notAView",       "badPose",     "badLens",    "tooFar",
-        "noLight",
+        "noLight",     "noSample",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }

@@ -2,7 +2,7 @@
 #include "colonnade_view_parts.h"
 #include "colonnade_words.h"
 
-enum { VERSION = 2, HEADER_WORDS = 12, FIXED_WORDS = 84, LIGHT_WORDS = 11, ROOM_WORDS = 49, TILE_WORDS = 2 };
+enum { VERSION = 3, HEADER_WORDS = 12, FIXED_WORDS = 85, LIGHT_WORDS = 11, ROOM_WORDS = 49, TILE_WORDS = 2 };
 enum { OUTLINE_NORMAL = 2047, WORLD_BITS = 60, ROTATION_BITS = 30, MAC_BITS = 32, SCENE_BITS = 40 };
 
 /* Reads a view file word by word; its length is checked before. */
@@ -69,6 +69,7 @@ static bool read_numbers(struct reader *reader, struct colonnade_view_scene *sce
     scene->lights_address = read_word(reader);
     scene->environment_address = read_word(reader);
     scene->window_address = read_word(reader);
+    scene->gather_address = read_word(reader);
     return is_within(scene->mac_bits, 16, MAC_BITS) && is_within(scene->scene_bits, 16, SCENE_BITS) && is_fraction &&
            is_within(scene->grid_fraction, -12, 19) && is_within(scene->coordinate_bits, 4, 13) &&
            is_within(scene->box_pad_log, 0, 24) && is_within(scene->mantissa_bits, 8, 32) &&
@@ -137,18 +138,23 @@ static enum colonnade_error check_camera(const struct colonnade_view_scene *scen
 }
 
 /* The words that a device of this scene has, block by block. */
+enum { MAX_BLOCKS = 6 };
+
 struct block {
     uint32_t address, place, count;
 };
 
-static int find_blocks(const struct colonnade_view_scene *scene, struct block blocks[5]) {
+static int find_blocks(const struct colonnade_view_scene *scene, struct block blocks[MAX_BLOCKS]) {
     const uint32_t words = colonnade_mac_words(scene);
     blocks[0] = (struct block){scene->frame_address, VIEW_FRAME, COLONNADE_VIEW_FRAME};
     blocks[1] = (struct block){scene->camera_address, VIEW_CAMERA, 12 * words + 1};
     blocks[2] = (struct block){scene->lights_address, VIEW_LIGHTS, (3 * words + 5) * scene->lights};
     blocks[3] = (struct block){scene->environment_address, VIEW_ENVIRONMENT, 12 * words + 11};
     blocks[4] = (struct block){scene->window_address, VIEW_WINDOW, scene->scene_bits + scene->more_grid_bits > 42 ? 8 : 7};
-    return scene->environment_address == 0 ? 3 : scene->window == WINDOW_CONSTANT ? 4 : 5;
+    int count = scene->environment_address == 0 ? 3 : scene->window == WINDOW_CONSTANT ? 4 : 5;
+    if (scene->gather_address != 0)
+        blocks[count++] = (struct block){scene->gather_address, VIEW_GATHER, COLONNADE_VIEW_GATHER};
+    return count;
 }
 
 enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design,
@@ -197,7 +203,7 @@ enum colonnade_error colonnade_view_open(struct colonnade_view *view, const stru
     scene->tiles = reader.bytes + 4 * reader.next;
     scene->writes = scene->tiles + 4 * TILE_WORDS * tiles;
 
-    struct block blocks[5];
+    struct block blocks[MAX_BLOCKS];
     const int block_count = find_blocks(scene, blocks);
     for (int i = 0; i < block_count; ++i)
         if (!colonnade_are_frame_registers(design, blocks[i].address, blocks[i].count)) return COLONNADE_BAD_REGISTER;
@@ -209,6 +215,7 @@ enum colonnade_error colonnade_view_open(struct colonnade_view *view, const stru
     if (error == COLONNADE_OK) error = colonnade_view_set_object(&found, &object);
     for (uint32_t i = 0; error == COLONNADE_OK && i < scene->lights; ++i)
         error = colonnade_view_set_light(&found, i, &lights[i]);
+    if (error == COLONNADE_OK) error = colonnade_view_set_sample(&found, 0, 1);
     if (error == COLONNADE_OK) *view = found;
     return error;
 }
@@ -351,13 +358,15 @@ struct rays {
     int shift; /* of `first` */
 };
 
-/* Directions times fx * fy need no division: (x + 1/2 - cx) * fy * right + (y + 1/2 - cy) * fx * down + fx * fy * forward.
+/* Directions times fx * fy need no division: (x + 1/2 - cx) * fy * right + (y + 1/2 - cy) * fx * down + fx * fy * forward;
+ * the sample's shift moves the centre of a pixel.
  * One division scales them, so that the largest component in the frame is 2^(macBits - 2). */
 static void set_directions(struct colonnade_view *view, const struct colonnade_work *work, struct rays *rays) {
     const struct colonnade_view_scene *scene = &view->scene;
     const struct colonnade_camera *camera = &view->camera;
     const int bits = scene->mac_bits;
-    const int64_t to_x = COLONNADE_PIXEL / 2 - camera->cx, to_y = COLONNADE_PIXEL / 2 - camera->cy;
+    const int64_t to_x = COLONNADE_PIXEL / 2 + view->sample.shift[0] - camera->cx;
+    const int64_t to_y = COLONNADE_PIXEL / 2 + view->sample.shift[1] - camera->cy;
     const int up = 62 - colonnade_bit_length((uint64_t)camera->fx | (uint64_t)camera->fy | colonnade_magnitude(to_x) |
                                              colonnade_magnitude(to_y) | (uint64_t)(camera->width | camera->height) << 32);
     const int64_t fx = camera->fx << up, fy = camera->fy << up;
@@ -581,6 +590,8 @@ static enum colonnade_error compute(struct colonnade_view *view) {
     colonnade_computed(view)[VIEW_FRAME + 1] = view->camera.height;
     set_positions(view, &work);
     for (uint32_t i = 0; i < scene->lights; ++i) set_light(view, i);
+    for (int i = 0; scene->gather_address != 0 && i < COLONNADE_VIEW_GATHER; ++i)
+        colonnade_computed(view)[VIEW_GATHER + i] = view->sample.points[i / 2][i % 2];
     struct rays rays;
     struct box box;
     set_directions(view, &work, &rays);
@@ -591,7 +602,7 @@ static enum colonnade_error compute(struct colonnade_view *view) {
 }
 
 uint32_t colonnade_view_most_writes(const struct colonnade_view *view) {
-    struct block blocks[5];
+    struct block blocks[MAX_BLOCKS];
     const int count = find_blocks(&view->scene, blocks);
     uint32_t most = view->scene.constants;
     for (int i = 0; i < count; ++i) most += blocks[i].count;
@@ -617,7 +628,7 @@ enum colonnade_error colonnade_view_frame(struct colonnade_view *view, uint8_t *
     uint8_t *to = writes;
     if (!is_known)
         for (size_t byte = 0; byte < 8 * (size_t)view->scene.constants; ++byte) *to++ = view->scene.writes[byte];
-    struct block blocks[5];
+    struct block blocks[MAX_BLOCKS];
     const int used = find_blocks(&view->scene, blocks);
     for (int i = 0; i < used; ++i) {
         const struct block block = blocks[i];

@@ -208,7 +208,8 @@ static void set_window(struct colonnade_view *view, const struct lengths *length
     const struct colonnade_view_scene *scene = &view->scene;
     const struct colonnade_camera *camera = &view->camera;
     const uint32_t size[2] = {camera->width, camera->height};
-    const int64_t focal[2] = {camera->fx, camera->fy}, centre[2] = {camera->cx, camera->cy};
+    const int64_t *shift = view->sample.shift;
+    const int64_t focal[2] = {camera->fx, camera->fy}, centre[2] = {camera->cx - shift[0], camera->cy - shift[1]};
     struct region window = {{.is_empty = true}, scene->window == WINDOW_WHOLE};
     if (scene->window == WINDOW_SHADOW) {
         const int32_t margin = ((int32_t)1 << scene->vertex_bits) / MARGIN_PARTS + 1;

@@ -64,6 +64,7 @@ static void run(struct colonnade_view *view, int frames) {
         camera.cy = (int64_t)(next() % 480) << 32 | next();
         check(colonnade_view_set_object(view, &object));
         check(colonnade_view_set_camera(view, &camera));
+        if (i % 16 == 15) check(colonnade_view_set_sample(view, next() % 16, 16));
         for (uint32_t light = 0; light < view->scene.lights; ++light) {
             struct colonnade_light value = {{0}, {next() >> 14, next() >> 14, next() >> 14}, next()};
             const struct colonnade_pose place = make_pose(34);

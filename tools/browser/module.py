@@ -30,7 +30,7 @@ SOURCES = (
     *(("c++", LIVE / f"{name}.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")) for name in ("live", "kernels")),
     *(
         ("cc", VIEW / "src" / f"{name}.c", ("-std=c11", f"-I{VIEW / 'include'}"))
-        for name in ("colonnade_files", "colonnade_view", "colonnade_view_room")
+        for name in ("colonnade_files", "colonnade_view", "colonnade_view_room", "colonnade_view_sample")
     ),
     ("cc", LIBRARY / "colonnade_view_size.c", ("-std=c11", f"-I{VIEW / 'include'}")),
 )

@@ -47,6 +47,10 @@ class TargetView:
         """Change a light: 2^-32 m; linear colour, 2^-16; its reach, 2^-32 m, 0 for a constant intensity."""
         self._view.set_light(index, position, colour, reach)
 
+    def set_sample(self, index: int, count: int) -> None:
+        """Compute pass `index` of a frame of `count` passes, 1, 2, 4, 8 or 16: its pixel shift and sample points."""
+        self._view.set_sample(index, count)
+
     def writes(self) -> list[tuple[int, int]]:
         """Word addresses and values that differ from those of the last accepted frame.
 

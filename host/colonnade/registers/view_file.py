@@ -16,6 +16,7 @@ from colonnade.maps.planes import SLOPE_PIXELS
 from colonnade.registers.occlusion import PERCENTILE
 from colonnade.scene.cameras import WorldCamera
 from colonnade.scene.object_pose import Pose
+from colonnade.scene.samples import MAX_GATHERED
 from colonnade.scene.view import PlacedLight, PlacedScene
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from colonnade.scene_image.header import ImageHeader
 
 MAGIC = b"CLNDVIEW"
-VERSION = 2
+VERSION = 3
 AXES = "xyz"
 
 #: Fraction bits of positions in metres, of rotations, of lenses, of lights' colours, of depths in a tile.
@@ -77,8 +78,13 @@ def window_names() -> list[str]:
     return [*window, *(f"environment.{name}" for name in ("occlusion", "occlusionTolerance", "isMapCamera"))]
 
 
+def gather_names() -> list[str]:
+    """As `frame_names`, the sample points of gathered rays."""
+    return [f"gather.points[{i}].{axis}" for i in range(MAX_GATHERED) for axis in "uv"]
+
+
 def computed_blocks(lights: int, has_room: bool) -> list[list[str]]:
-    """The registers that the target computes, in blocks without a gap."""
+    """The registers that the target computes from poses, in blocks without a gap."""
     room = [environment_names(), window_names()] if has_room else []
     return [frame_names(), camera_names(), light_names(lights), *room]
 
@@ -116,7 +122,8 @@ def view_file(
             *_surface_words(registers, size, room, header, manifest, occlusion),
         ]
     origin = np.array(header.frame.offset) * step
-    return _file(placed, registers, size, header, manifest, (step / placed.pose.scale, origin), words)
+    samples = gather_names() if registers.get("gather.bounces", 0) else []
+    return _file(placed, registers, size, header, manifest, (step / placed.pose.scale, origin), words, samples)
 
 
 def still_file(
@@ -166,7 +173,7 @@ def still_file(
             *_map_words(room, 1 / (metre * step), linear / metre, in_grid(view.view_to_mesh[:, 3])),
             *(*[0] * 12, WINDOW_CONSTANT, 0, 0, 0, 1, 0, 0),
         ]
-    return _file(placed, registers, (view.width, view.height), header, manifest, (step / unit, np.zeros(3)), words)
+    return _file(placed, registers, (view.width, view.height), header, manifest, (step / unit, np.zeros(3)), words, [])
 
 
 def _camera_of(view: View, position: Floats) -> WorldCamera:
@@ -184,20 +191,26 @@ def _file(
     manifest: Manifest,
     grid: tuple[float, Floats],
     room: list[int] | None,
+    samples: list[str],
 ) -> bytes:
-    """The file; `grid`: the target's grid steps in a metre, and its offset; `room`: words from ``isMapCamera`` on."""
+    """The file.
+
+    `grid`: the target's grid steps in a metre, and its offset; `room`: words from ``isMapCamera`` on; `samples`: the
+    registers of sample points, if passes set them.
+    """
     numbers = manifest.numbers
     frame, lights = manifest.config["frame"], placed.lights
     blocks = computed_blocks(len(lights), room is not None)
     addresses = [_address(manifest, block) for block in blocks]
     is_constant = room is not None and room[_WINDOW_WORD] == WINDOW_CONSTANT
-    computed = {name for block in (blocks[:-1] if is_constant else blocks) for name in block}
+    computed = {name for block in (*(blocks[:-1] if is_constant else blocks), samples) for name in block}
     others = {name: value for name, value in registers.items() if name not in computed}
     constants = [pair for name, value in others.items() for pair in manifest.registers[name].encode(value)]
     words = [
         *(numbers[name] for name in _NUMBERS),
         *(int(frame["maxWidth"]), int(frame["maxHeight"]), 1 << COLOUR_FRACTION),
         *(addresses + [0] * 5)[:5],
+        _address(manifest, samples) if samples else 0,
         *(len(lights), len(constants)),
         *_factor(grid[0]),
         *_position(grid[1] * 2.0 ** (16 - POSITION_FRACTION), "the mesh's origin"),

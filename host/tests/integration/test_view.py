@@ -21,7 +21,7 @@ from colonnade.scene_image.packer import pack
 ROOT = toolchain.project_root()
 SOFTWARE = ROOT / "software"
 SOURCES = [SOFTWARE / "tests" / "view.c", *sorted((SOFTWARE / "src").glob("*.c"))]
-VIEW = [SOFTWARE / "src" / name for name in ("colonnade_view.c", "colonnade_view_room.c")]
+VIEW = sorted((SOFTWARE / "src").glob("colonnade_view*.c"))
 WARNINGS = "-std=c11 -Wall -Wextra -Wconversion -Werror -pedantic".split()
 SANITIZERS = "-g -fsanitize=address,undefined -fno-sanitize-recover=all".split()
 RISCV = "riscv64-unknown-elf-gcc"

@@ -10,7 +10,23 @@ from typing import Any
 import numpy as np
 import pytest
 from float_registers import float_projection
-from target_views import COLOUR, EDGES, GOLDEN, HEIGHT, METRE, ONE, PIXEL, POSES, ROOT, WIDTH, looking, rotation, whole
+from target_views import (
+    COLOUR,
+    EDGES,
+    GOLDEN,
+    HEIGHT,
+    METRE,
+    ONE,
+    PIXEL,
+    POSES,
+    ROOT,
+    WIDTH,
+    looking,
+    pixel_shift,
+    random_sample,
+    rotation,
+    whole,
+)
 
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
@@ -101,7 +117,10 @@ class Room:
         return self.environment.points()[row, column] @ self.to_world[:, :3].T + self.to_world[:, 3]
 
     def random_view(self, random: np.random.Generator, target: TargetView, moves_camera: bool) -> View:
-        """Move object and lights, and the camera if asked, in the target and in a view."""
+        """Move object and lights, and the camera if asked, in the target and in a view of one of several passes."""
+        sample = random_sample(random)
+        target.set_sample(*sample)
+        across, below = shift = pixel_shift(*sample)
         middle = self.middle if random.random() < 0.5 else self.surface_point(*random.uniform(0.3, 0.99, 2))
         turned, moved = rotation(random), whole(middle + random.normal(size=3) * (0.6, 0.3, 0.6), METRE)
         pose = Pose(np.array(turned).reshape(3, 3) / ONE, self.scale, np.array(moved) / METRE)
@@ -114,6 +133,7 @@ class Room:
         view = dataclasses.replace(
             self.view,
             origin=pose.to_mesh(self.to_world[:, 3]),
+            shift=shift,
             view_to_mesh=pose.from_view(self.to_world),
             lights=tuple(lights),
         )
@@ -127,7 +147,7 @@ class Room:
         return dataclasses.replace(
             view,
             origin=pose.to_mesh(place),
-            direction=(forward - 79.5 / focal * right - 59.5 / focal * down) @ pose.rotation,
+            direction=(forward + (across - 79.5) / focal * right + (below - 59.5) / focal * down) @ pose.rotation,
             step_x=right / focal @ pose.rotation,
             step_y=down / focal @ pose.rotation,
             is_map_camera=False,

@@ -142,6 +142,9 @@ def test_wrong_poses_are_refused_by_name(small_design: Design) -> None:
         target.set_camera([0, 0, 0], UNIT, LENS, (1921, 120))
     with pytest.raises(ValueError, match="noLight"):
         target.set_light(2, [0, 0, 0], [0, 0, 0])
+    for index, count in ((0, 0), (0, 3), (1, 1), (16, 16), (0, 32), (0, 1 << 31), ((1 << 32) - 1, 8)):
+        with pytest.raises(ValueError, match="noSample"):
+            target.set_sample(index, count)
     assert target.writes() == before, "a refusal changes nothing"
     target.set_camera([(1 << 60) - 1, 0, 0], UNIT, LENS, (160, 120))
     with pytest.raises(ValueError, match="tooFar"):
@@ -172,12 +175,12 @@ def test_other_files_are_refused_by_name(small_design: Design) -> None:
     cases = {
         "notAView": (
             *(b"CLNDFRAM" + file[8:], with_word(2, 1), with_word(12, 15), with_word(12, 65), with_word(13, 73)),
-            *(with_word(14, 52), with_word(14, 1 << 31), with_word(30, 0)),
+            *(with_word(14, 52), with_word(14, 1 << 31), with_word(31, 0)),
         ),
         "otherFormat": (with_word(5, 0),),
-        "truncated": (file[:-4], file + bytes(8), file[:40], with_word(28, int(words[28]) + 1)),
-        "badRegister": (with_word(22, 0), with_word(24, 1 << 30)),
-        "badPose": (with_word(50, 0),),
+        "truncated": (file[:-4], file + bytes(8), file[:40], with_word(29, int(words[29]) + 1)),
+        "badRegister": (with_word(22, 0), with_word(24, 1 << 30), with_word(27, 1)),
+        "badPose": (with_word(51, 0),),
     }
     for name, files in cases.items():
         for changed in files:
