@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // View files of a visitor's room (docs/view.md, "The view file"): those of a room of the page, with other words.
 
-const [LIGHTS, GRID, OBJECT, CAMERA, FIRST_LIGHT] = [27, 29, 44, 59, 84];
+const [LIGHTS, GRID, OBJECT, CAMERA, FIRST_LIGHT] = [28, 30, 45, 60, 85];
 const LIGHT_WORDS = 11;
 const SLOPE_PIXELS = 1024;
 /** In a room's words: the maps' grid, lens and pose, the room's box, its tiles. */
