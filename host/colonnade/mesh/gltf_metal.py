@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.mesh.materials import MIRROR_ROUGHNESS, MeshMaterial
 from colonnade.mesh.texture import Texture
@@ -30,7 +31,7 @@ def metal_of(
         factors: Of metallic and roughness.
         areas: Of the faces, float64 [m].
     """
-    points = np.einsum("pk,mki->mpi", _POINTS, uvs)
+    points = fixed_order.product(_POINTS, uvs)
     values = texture.codes(points.reshape(-1, 2)).reshape(len(uvs), len(_POINTS), 3).mean(axis=1) / 255
     is_metal = np.asarray(values[:, _METALLIC] * factors[0] >= 0.5)
     weights = areas * is_metal
