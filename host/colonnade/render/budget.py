@@ -6,7 +6,7 @@ depend on timing. So a scene and a configuration always give the same number.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from colonnade.design.manifest import Manifest
@@ -41,7 +41,13 @@ class Budget:
     seconds: float
 
     @staticmethod
-    def of(manifest: Manifest, image: SceneImage, registers: Mapping[str, int], seconds: float) -> Budget:
+    def of(
+        manifest: Manifest,
+        image: SceneImage,
+        registers: Mapping[str, int],
+        seconds: float,
+        passes: Callable[[int], int] = int,
+    ) -> Budget:
         """Render a pass of a frame and estimate how many fit.
 
         Args:
@@ -49,11 +55,14 @@ class Budget:
             image: What the device holds.
             registers: Of a pass in the middle of everything.
             seconds: The budget, at `CLOCK`.
+            passes: Those of a frame of so many samples, with those of coats.
         """
         counters = model_frame(loaded_model(manifest, image), registers).counters
         cycles = estimated_cycles(manifest, counters, bool(registers.get("environment.isMapCamera", 1)))
-        fitting = int(min(max(seconds * CLOCK / cycles, 1), MAX_BUDGET_SAMPLES))
-        return Budget(1 << (fitting.bit_length() - 1), cycles, seconds)
+        samples = MAX_BUDGET_SAMPLES
+        while samples > 1 and passes(samples) * cycles > seconds * CLOCK:
+            samples //= 2
+        return Budget(samples, cycles, seconds)
 
     @property
     def note(self) -> str:

@@ -63,7 +63,12 @@ def within_budget(prepared: DeviceScene, size: tuple[int, int], progress: Progre
         return prepared
     with progress.step("estimating the time of a pass"):
         registers = prepared.registers(size, composited=True)
-        budget = Budget.of(prepared.manifest, prepared.image, registers, scene.frame.budget or _SECONDS)
+
+        def passes(samples: int) -> int:
+            return samples + len(prepared.coat_passes(scene.with_samples(samples)))
+
+        seconds = scene.frame.budget or _SECONDS
+        budget = Budget.of(prepared.manifest, prepared.image, registers, seconds, passes)
     hidden = f"; {scene.blurs[0]} shows its middle" if budget.samples == 1 and scene.blurs else ""
     progress.note(budget.note + hidden)
     return replace(prepared, scene=scene.with_samples(budget.samples))

@@ -14,10 +14,11 @@ from click.testing import CliRunner
 from colonnade.cli.main import cli
 from colonnade.common.progress import QUIET
 from colonnade.design.generator import manifest_for
-from colonnade.render.budget import Budget, estimated_cycles, rounded
+from colonnade.device.scene import DeviceScene
+from colonnade.render.budget import CLOCK, Budget, estimated_cycles, rounded
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
-from colonnade.scene.model import FrameSize, Light, MeshSource, Paths, Scene
+from colonnade.scene.model import FrameSize, Light, Material, MeshSource, Paths, Scene
 
 DATA = Path(__file__).parents[3] / "docs" / "data"
 SIZE = (24, 18)
@@ -56,6 +57,16 @@ def test_longer_budgets_give_more_samples() -> None:
     found = [samples(budget) for budget in (1e-6, 1e-4, 1.0, None)]
     assert found == sorted(found) and found[0] == 1 and found[2:] == [16, 16]
     assert set(found) <= {1, 2, 4, 8, 16}
+
+
+def test_passes_of_coats_count() -> None:
+    """16 samples with coats are 20 passes: a budget of 17 has 8 samples, and 16 without coats."""
+    prepared = DeviceScene.of(GATHERS, manifest_for("textured").manifest)
+    cycles = Budget.of(prepared.manifest, prepared.image, prepared.registers(SIZE, composited=True), 1.0).cycles
+    frame = FrameSize(*SIZE, budget=17 * cycles / CLOCK)
+    for roughness, samples in ((1.0, 16), (0.3, 8)):
+        scene = replace(GATHERS, material=Material(roughness=roughness), frame=frame)
+        assert render(RenderRequest(scene, "textured", backend="model")).report.samples == samples
 
 
 def test_what_is_named_wins(capsys: pytest.CaptureFixture[str]) -> None:
