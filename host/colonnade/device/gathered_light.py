@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 #: The device's memory of the light cube.
 MEMORY = "light.cube"
+#: Largest value of the register of the cube's parallax.
+LAST_PARALLAX = 7
 #: Share of the light that the cube cannot hold, from which a note reports it.
 _REPORTED_LOSS = 0.02
 
@@ -60,7 +63,7 @@ def scene_cube(
     """
     if scene.paths.gather == 0:
         return None
-    pose = object_pose(scene, extent, room)
+    pose, distance = object_pose(scene, extent, room), np.inf
     point, lights = pose.to_world(extent.centre), lights_of(scene, extent, room)
     if room is not None and image is not None:
         light = room_light(room, image, lights, point, not relit, unseen, second)
@@ -73,19 +76,28 @@ def scene_cube(
                 f"rays that leave the object meet the light of room {room.name}: {pictures} {light.seen:.0%} of all"
                 f" directions, and its {others} the other {1 - light.seen:.0%}"
             )
-        cube = light.cube
+        cube, distance = light.cube, light.distance / pose.scale
     elif isinstance(unseen, Panorama):
         if progress is not None:
             progress.note("rays that leave the object meet the light of the panorama, which shows all directions")
         cube = unseen.cube(FINE)
     else:
         cube = LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, 1, 1, 3)))
-    cube = LightCube(cube.turned(pose.rotation).texels * scene.exposure)
+    cube = replace(cube.turned(pose.rotation), middle=extent.centre, distance=_shown(distance, extent.edge))
+    cube = replace(cube, texels=cube.texels * scene.exposure)
     lost = 1 - cube.texels.clip(max=LARGEST).sum() / max(cube.texels.sum(), 1e-9)
     if lost > _REPORTED_LOSS and progress is not None:
         limit = LARGEST / scene.exposure
         progress.note(f"{lost:.0%} of the light is brighter than {limit:g}, the most that a texel holds, and is lost")
     return cube.with_lights([disc for light in lights.lights if (disc := _disc(light, point, pose)) is not None])
+
+
+def _shown(distance: float, edge: float) -> float:
+    """The nearest distance that the device's parallax can have, in mesh units as both arguments."""
+    if not np.isfinite(distance):
+        return distance
+    choices = [edge * 2.0**number for number in range(LAST_PARALLAX)]
+    return next((choice for choice in choices if distance < choice * np.sqrt(2.0)), choices[-1])
 
 
 def _disc(light: RoomLight, point: Floats, pose: Pose) -> tuple[Floats, float] | None:
@@ -105,4 +117,8 @@ def with_cube(image: SceneImage, cube: LightCube | None) -> SceneImage:
     others = tuple(section for section in image.attributes if section.memory != MEMORY)
     words = () if cube is None else (LoadSection(MEMORY, cube.words()),)
     light = tuple(LoadedMemory(section.memory, *section.words.shape) for section in words)
-    return replace(image, header=replace(image.header, light=light), attributes=(*others, *words))
+    parallax = 0
+    if cube is not None and np.isfinite(cube.distance):
+        parallax = 1 + round(math.log2(cube.distance / image.header.extent.edge))
+    header = replace(image.header, light=light, parallax=parallax)
+    return replace(image, header=header, attributes=(*others, *words))

@@ -34,10 +34,14 @@ class LightCube:
             with sign s, 1 for a negative one. Rows part the slope of the next axis, columns that of the one after it,
             from -1 to 1.
         lights: Texels in which there is a light, bool [6, n, n]; None: there are none. Their radiance is without it.
+        middle: Where it is collected, in the space of its directions, float64 [3]; None: it is of everywhere.
+        distance: Of what it shows, along the largest component of a direction.
     """
 
     texels: Floats
     lights: NDArray[np.bool_] | None = None
+    middle: Floats | None = None
+    distance: float = np.inf
 
     @staticmethod
     def of(radiance: Callable[[Floats], Floats], size: int = FACE) -> LightCube:
@@ -62,11 +66,19 @@ class LightCube:
             index = index * size + np.clip(np.floor((slope + 1) * (size / 2)), 0, size - 1).astype(np.intp)
         return np.asarray(index, dtype=np.intp)
 
-    def radiance(self, directions: Floats, sees_lights: NDArray[np.bool_] | None = None) -> Floats:
-        """Radiance from directions of any length, float64 [n, 3] each.
+    def radiance(
+        self, directions: Floats, origins: Floats | None = None, sees_lights: NDArray[np.bool_] | None = None
+    ) -> Floats:
+        """Radiance of rays, whose directions have any length, float64 [n, 3] each.
 
-        Where there is a light, it is `MOST` for those that see lights, bool [n]; None: none do.
+        Args:
+            directions: float64 [n, 3].
+            origins: Of the rays, float64 [n, 3]; None: all begin in the middle.
+            sees_lights: Rays that see lights, bool [n], `MOST` where there is one; None: none do.
         """
+        if origins is not None and self.middle is not None and np.isfinite(self.distance):
+            reach = directions * (self.distance / np.abs(directions).max(axis=1))[:, None]
+            directions = reach + np.clip(origins - self.middle, -self.distance, self.distance)
         texels = self.texel_of(directions)
         radiance = self.texels.reshape(-1, 3)[texels]
         if self.lights is None or sees_lights is None:

@@ -74,12 +74,22 @@ def exposure(points: Floats, normals: Floats, position: Floats, falloff: float |
     return np.asarray(cosine * np.minimum(falloff**2 / squared, MAX_FALLOFF))
 
 
-def light_box(environment: Environment) -> tuple[Floats, Floats]:
-    """The corners of the box that may hold lights, world space, float64 [3] each: what the camera sees, and around."""
+def room_box(environment: Environment) -> tuple[Floats, Floats]:
+    """The corners of the box around a room, world space, float64 [3] each: what the camera sees, and around.
+
+    Its lowest level is that of the floor.
+    """
     points, eye = world_surface(environment)[0].reshape(-1, 3), environment.camera_to_world[:, 3]
     low = np.minimum(np.percentile(points, 2, axis=0), eye) - _MARGIN
     high = np.maximum(np.percentile(points, 98, axis=0), eye) + _MARGIN
-    low[1] = np.percentile(points[:, 1], 2) + MIN_HEIGHT
+    low[1] = np.percentile(points[:, 1], 2)
+    return low, high
+
+
+def light_box(environment: Environment) -> tuple[Floats, Floats]:
+    """The corners of the box that may hold lights, world space, float64 [3] each: the room's, above its floor."""
+    low, high = room_box(environment)
+    low[1] += MIN_HEIGHT
     return low, high
 
 

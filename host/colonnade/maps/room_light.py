@@ -9,13 +9,16 @@ import numpy as np
 from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube, face_directions
-from colonnade.environment.lights import RoomLights, irradiance
+from colonnade.environment.lights import RoomLights, irradiance, room_box
 from colonnade.environment.model import Environment
 from colonnade.environment.panorama import Panorama
 from colonnade.environment.seen_light import FINE, SeenLight
 from colonnade.environment.surround import Surround
 from colonnade.maps.decoded_planes import DecodedPlanes
 from colonnade.maps.image import AttributeImage
+
+#: A point is at least so far inside the box around a room, metres.
+_INSIDE = 0.1
 
 
 @dataclass(frozen=True)
@@ -25,10 +28,12 @@ class RoomLight:
     Attributes:
         cube: By directions of world space.
         seen: Share of all directions in which the room's picture shows something, 0 to 1.
+        distance: To the box around the room, along the largest component of a direction, the median, metres.
     """
 
     cube: LightCube
     seen: float
+    distance: float
 
 
 def room_light(
@@ -63,7 +68,20 @@ def room_light(
     else:
         others = unseen.cube(FINE).texels.reshape(-1, 3)
     radiance = np.where(seen.is_seen[:, None], seen.radiance, others)
-    return RoomLight(LightCube(radiance.reshape(directions.shape)), seen.share)
+    return RoomLight(LightCube(radiance.reshape(directions.shape)), seen.share, _distance(environment, point))
+
+
+def _distance(environment: Environment, point: Floats) -> float:
+    """The median of the distances from a point to the box around a room, along the largest component, metres."""
+    directions, weights = face_directions(FINE)
+    low, high = room_box(environment)
+    inside = np.clip(point, low + _INSIDE, high - _INSIDE)
+    with np.errstate(divide="ignore"):
+        steps = (np.where(directions > 0, high - inside, inside - low) / np.abs(directions)).min(axis=-1)
+    distances = (steps * np.abs(directions).max(axis=-1)).ravel()
+    order = np.argsort(distances, kind="stable")
+    shares = np.cumsum(np.broadcast_to(weights, directions.shape[:3]).ravel()[order])
+    return float(distances[order][np.searchsorted(shares, shares[-1] / 2)])
 
 
 def _bounding_light(

@@ -139,7 +139,7 @@ class PathTracer:
                 cube = self._cube()
                 assert cube is not None
                 state.radiance[path[scattered]] += state.weight[path[scattered]] * cube.radiance(
-                    ray_directions[scattered]
+                    ray_directions[scattered], ray_origins[scattered]
                 )
             colour, is_outside = self._trace_background(ray_origins[leaving], ray_directions[leaving], shadows=True)
             state.radiance[path[leaving]] += state.weight[path[leaving]] * colour
@@ -317,7 +317,7 @@ class PathTracer:
         cube, nowhere = self._cube(), np.zeros(len(origins), dtype=np.bool_)
         colours = np.tile(self._view.background, (len(origins), 1))
         if cube is not None:
-            colours = cube.radiance(directions, ~nowhere)
+            colours = cube.radiance(directions, origins, ~nowhere)
         if self._backdrop is None or len(origins) == 0:
             return colours, nowhere
         matrix, shift = self._mesh_to_view()

@@ -88,6 +88,7 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
     if manifest.gathers:
         points = () if view.gather is None else view.gather.points
         result["gather.bounces"] = 0 if view.gather is None else view.gather.bounces
+        result["gather.parallax"] = header.parallax
         result |= {
             f"gather.points[{i}].{axis}": point[a] for i, point in enumerate(points) for a, axis in enumerate("uv")
         }

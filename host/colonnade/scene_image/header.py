@@ -117,6 +117,7 @@ class ImageHeader:
         parts: The objects of a scene with several, by their source faces.
         texture: The textures; None for hardware without.
         light: The memory of the light cube, after all others; empty without gathered light.
+        parallax: Of the light cube, the register `gather.parallax`.
     """
 
     format_hash: str
@@ -139,6 +140,7 @@ class ImageHeader:
     parts: tuple[MeshPart, ...] = ()
     texture: TextureHeader | None = None
     light: tuple[LoadedMemory, ...] = ()
+    parallax: int = 0
 
     @property
     def memories(self) -> tuple[LoadedMemory, ...]:

@@ -65,6 +65,7 @@ def check_header(header: Any) -> None:
     _check_environment(header["room"])
     _check_texture(header["texture"])
     _check_memories(header.get("light", []))
+    _count(header.get("parallax", 0))
 
 
 def _check_tree(tree: Any) -> None:

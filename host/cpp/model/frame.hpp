@@ -17,13 +17,13 @@ struct Pixel {
 };
 
 /// State of a path: throughput (12 fraction bits per channel), accumulated radiance, number of traced reflections and refractions, whether its ray is
-/// inside glass, number of gathered rays, and the direction of its last traced ray.
+/// inside glass, number of gathered rays, and origin and direction of its last ray.
 struct Path {
     Colour throughput, radiance;
     int bounces;
     bool isInside;
     int gathered;
-    WideVector direction;
+    WideVector origin, direction;
 };
 
 class Device : public Tracer {
@@ -74,7 +74,7 @@ public:
         const Ray ray = prepareRay(request, frame_.bounds, numbers_);
         const Hit hit = trace(ray);
         if (!hit.found) return directView(pixel, x, y, request);
-        const Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, request.direction};
+        const Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, request.origin, request.direction};
         const Wide distance = distanceOf(ray, hit);
         if (mayBeHidden(path)) {
             const EnvironmentHit found = findDirectView(x, y, request);
@@ -129,6 +129,7 @@ private:
         const Vector direction = gatherDirection(axis, faceForwardNormal, frame_.gather.points[path.gathered] ^ point, lobe, numbers_);
         ++path.gathered;
         ++counters.raysGather;
+        path.origin = origin;
         path.direction = {direction[0], direction[1], direction[2]};
         return {origin, path.direction, numbers_.unlimited(), ~std::uint64_t(0)};
     }
@@ -162,7 +163,7 @@ private:
 
     /// The light that a path meets where no surface is known: in a frame that gathers the light cube's, else the background.
     Colour lightBehind(const Path& path) const {
-        return frame_.gather.bounces > 0 ? cube_.light(path.direction, path.gathered == 0) : frame_.lighting.background;
+        return frame_.gather.bounces > 0 ? cube_.light(path.origin, path.direction, frame_.gather.parallax, path.gathered == 0, numbers_) : frame_.lighting.background;
     }
 
     /// The colour that a path's ray sees as it leaves the object: of the environment, unless the path has gathered.
@@ -289,7 +290,7 @@ private:
         const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
         const Vector& normal = found.texel.normal;
         const WideVector origin = offSurface(march_->hitPosition(view.origin, found.direction, found.point), normal, frame_.lighting.offset, numbers_);
-        Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, {}};
+        Path path{{one, one, one}, {0, 0, 0}, 0, false, 0, {}, {}};
         const RayRequest request = gatheredRay(origin, {normal[0], normal[1], normal[2]}, normal, nullptr, path, pixelPoint(x, y));
         log.addRay(RayKind::gather, request, numbers_);
         const Ray ray = prepareRay(request, frame_.bounds, numbers_);
@@ -315,6 +316,7 @@ private:
             // The Fresnel reflection starts on the opposite side of the surface to the refracted ray
             reflection.origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
             for (int a = 0; a < 3; ++a) reflection.direction[a] = next.reflection[a];
+            path.origin = reflection.origin;
             path.direction = reflection.direction;
             reflectionColour = leavingRadiance(path, reflection, false);
         }
@@ -328,6 +330,7 @@ private:
             throughput -= reflected;
         }
         request = next.ray;
+        path.origin = request.origin;
         path.direction = request.direction;
         if (path.bounces == frame_.lighting.bounces) return false;
         ++path.bounces;

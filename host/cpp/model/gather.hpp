@@ -11,9 +11,10 @@ struct SamplePoint {
     SamplePoint operator^(const SamplePoint& other) const { return {static_cast<std::uint8_t>(u ^ other.u), static_cast<std::uint8_t>(v ^ other.v)}; }
 };
 
-/// Registers of gathered rays. `bounces`: gathered rays of a path, 0 for none; `points`: the frame's sample point of each of them.
+/// Registers of gathered rays. `bounces`: gathered rays of a path, 0 for none; `points`: the frame's sample point of each of them; `parallax`: the
+/// distance of the light cube's surfaces is 2^(parallax - 1) edges of the object's cube, infinite if it is 0.
 struct Gather {
-    int bounces;
+    int bounces, parallax;
     std::array<SamplePoint, 4> points;
 };
 
@@ -140,18 +141,30 @@ public:
         }
     }
 
-    /// What a ray meets that leaves the object; the lights are seen by paths that have gathered nothing.
-    Colour light(const WideVector& direction, bool seesLights) const {
-        const std::size_t address = addressOf(direction);
+    /// What a ray meets that leaves the object, from an origin in grid steps; the lights are seen by paths that have gathered nothing.
+    Colour light(const WideVector& origin, const WideVector& direction, int parallax, bool seesLights, const Numbers& n) const {
+        const std::size_t address = addressOf(fromMiddle(origin, direction, parallax, n));
         return seesLights && isLight_[address] ? Colour{most, most, most} : texels_[address];
     }
 
 private:
     static constexpr std::int64_t most = 0xffff;
 
-    static std::size_t addressOf(const WideVector& direction) {
+    /// The direction, seen from the middle of the object's cube, of the point that a ray meets; its largest component has 8 bits before the parallax.
+    static Vector fromMiddle(const WideVector& origin, const WideVector& direction, int parallax, const Numbers& n) {
         Vector scaled;
         blockNormalise(direction, 8, scaled);
+        if (parallax == 0) return scaled;
+        std::int64_t major = 0;
+        for (int a = 0; a < 3; ++a) major = std::max(major, scaled[a] < 0 ? -scaled[a] : scaled[a]);
+        for (int a = 0; a < 3; ++a) {
+            const auto offset = static_cast<std::int64_t>(floorShift<Wide>(origin[a] - (Wide(1) << (n.gridBits - 4)), n.gridBits - 12 + parallax));
+            scaled[a] += floorShift(std::clamp<std::int64_t>(offset, -256, 255) * floorShift(major, 4), 4);
+        }
+        return scaled;
+    }
+
+    static std::size_t addressOf(const Vector& scaled) {
         std::array<std::int64_t, 3> size;
         for (int a = 0; a < 3; ++a) size[a] = scaled[a] < 0 ? -scaled[a] : scaled[a];
         const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;

@@ -88,6 +88,7 @@ struct Frame {
         triangleBase = std::min(attributeBase, static_cast<std::size_t>(take("scene.triangleBase")));
         watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
         gather.bounces = static_cast<int>(takeIfThere("gather.bounces"));
+        gather.parallax = static_cast<int>(takeIfThere("gather.parallax"));
         for (std::size_t i = 0; i < gather.points.size(); ++i) {
             const std::string name = entry("gather.points", static_cast<int>(i));
             gather.points[i] = {static_cast<std::uint8_t>(takeIfThere(name + "u")), static_cast<std::uint8_t>(takeIfThere(name + "v"))};

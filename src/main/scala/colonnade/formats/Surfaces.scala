@@ -50,6 +50,9 @@ final class Gather extends Bundle {
   /** Rays that a path gathers, one after the other; 0: none, and the ambient light is that of every surface. */
   val bounces = UInt(Gather.countBits.W)
 
+  /** The surfaces of the light cube are at 2^(parallax - 1) edges of the object's cube from its middle; 0: far away. */
+  val parallax = UInt(Gather.parallaxBits.W)
+
   /** The sample point of each of them in this frame, before that of the pixel. */
   val points = Vec(Gather.maxBounces, new SamplePoint)
 }
@@ -57,6 +60,8 @@ final class Gather extends Bundle {
 object Gather {
   val maxBounces: Int = 4
   val countBits:  Int = NumberFormats.bitLength(maxBounces)
+
+  val parallaxBits: Int = 3
 }
 
 /** The interaction of a ray with a surface. */
