@@ -48,12 +48,12 @@ def with_cube(image: SceneImage, seed: int) -> SceneImage:
 
 
 def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, int]:
-    """Registers with random sample points; material 3 is rough metal."""
+    """Registers with random sample points and near surfaces; material 3 is rough metal."""
     drawn = np.random.default_rng(seed).integers(0, 256, (4, 2))
     points = {f"gather.points[{i}].{axis}": int(drawn[i, a]) for i in range(4) for a, axis in enumerate("uv")}
     rough = {"kind": 3, "lobe.alpha": 52, "lobe.slope": 743, "lobe.peak": 589}
     metal = {f"materials[3].{name}": value for name, value in rough.items()}
-    return registers | points | metal | {"gather.bounces": bounces}
+    return registers | points | metal | {"gather.bounces": bounces, "gather.parallax": seed % 4}
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")

@@ -82,6 +82,8 @@ def test_a_room_lights_the_object_from_its_picture() -> None:
     moved = replace(IN_ROOM, placement=Placement((150.0, 380.0), 0.5))
     words = [DeviceScene.of(scene, manifest, encoder="live").image.attributes[-1].words for scene in (IN_ROOM, moved)]
     assert (words[0] != words[1]).any()
+    near, alone = (DeviceScene.of(scene, manifest, encoder="live").registers((32, 24)) for scene in (IN_ROOM, SCENE))
+    assert near["gather.parallax"] > alone["gather.parallax"] == 0, "a room has walls, ambient light has none"
     still = DeviceScene.of(replace(IN_ROOM, paths=Paths()), manifest, encoder="live").image
     assert all(section.memory != "light.cube" for section in still.attributes)
     assert still.header.light == ()

@@ -83,12 +83,30 @@ def test_a_light_is_where_it_is(direction: list[float], radius: float) -> None:
     directions = unit_vectors(np.random.default_rng(3).normal(size=(2000, 3)))
     angle = np.arccos((directions @ middle).clip(-1, 1))
     sees = np.ones(len(directions), dtype=np.bool_)
-    light = cube.radiance(directions, sees)[:, 0]
+    light = cube.radiance(directions, sees_lights=sees)[:, 0]
     texel = 2 * np.sqrt(2) / FACE  # At least the angle between two corners
     assert (light[angle < radius - texel] == MOST).all() and (light[angle > radius + texel] == 0.25).all()
-    assert cube.radiance(middle[None], sees[:1])[0, 0] == MOST
-    assert (cube.radiance(directions) == 0.25).all() and (cube.radiance(directions, ~sees) == 0.25).all()
+    assert cube.radiance(middle[None], sees_lights=sees[:1])[0, 0] == MOST
+    assert (cube.radiance(directions) == 0.25).all() and (cube.radiance(directions, sees_lights=~sees) == 0.25).all()
     assert (cube.words().view("<u4") >> 25).sum() == np.count_nonzero(cube.lights)
+
+
+def test_a_ray_meets_the_surface_that_it_hits() -> None:
+    """Nearly, in a cube of that size around the middle."""
+    random, middle, size = np.random.default_rng(4), np.array([3.0, -1.0, 0.5]), 2.0
+    texels = face_directions(FACE)[0]
+    cube = LightCube(texels, middle=middle, distance=size)
+    directions, offsets = random.normal(size=(2, 4000, 3))
+    for reach in (0.2, 0.4):
+        origins = middle + offsets * reach
+        inside = np.clip(offsets * reach, -0.99 * size, 0.99 * size)
+        steps = ((size * np.sign(directions) - inside) / directions).min(axis=1)
+        hit = unit_vectors(inside + steps[:, None] * directions)
+        errors = [
+            np.degrees(np.arccos((unit_vectors(found) * hit).sum(axis=1).clip(-1, 1))).mean()
+            for found in (cube.radiance(directions, origins), cube.radiance(directions))
+        ]
+        assert errors[0] < 0.6 * errors[1]
 
 
 @pytest.mark.parametrize("name", ["living", "attic"])

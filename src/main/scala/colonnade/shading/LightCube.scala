@@ -4,8 +4,8 @@ import chisel3._
 import chisel3.util.{Cat, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.formats.{AttributeMemories, CubeTexel}
-import colonnade.numbers.{DigitRecurrence, Normalise}
+import colonnade.formats.{AttributeMemories, CubeTexel, Gather}
+import colonnade.numbers.{DigitRecurrence, Fixed, Normalise, Rounding}
 import colonnade.ray.RayRequest
 
 /** Reads of the light cube: a texel's address, and two cycles later its word. */
@@ -32,7 +32,10 @@ final class LightPort(config: PathConfig) extends Bundle {
 }
 
 final class LightCubeIO(config: PathConfig) extends Bundle {
-  val ray    = Flipped(Valid(new RayRequest(config))) // its context is read in a later cycle
+  val parallax = Input(UInt(Gather.parallaxBits.W))
+
+  /** Its context is read two cycles later or after that, after a reflection three. */
+  val ray    = Flipped(Valid(new RayRequest(config)))
   val port   = Flipped(new LightPort(config))
   val memory = new CubePort
 }
@@ -40,7 +43,8 @@ final class LightCubeIO(config: PathConfig) extends Bundle {
 /** The texel of the light cube in the direction of each context's last ray: docs/gather.md. A ray a cycle. A path that sees
   * lights is told where one is. {{{
   *
-  * ray ─▶ scaled direction ─▶ face and slopes ─▶ table, by context ─▶ memory
+  * ray ─┬▶ scaled direction ─▶ sum ─▶ face and slopes ─▶ table, by context ─▶ memory
+  *      └▶ offset of origin ────┘
   * }}}
   */
 final class LightCube(config: PathConfig) extends Module {
@@ -48,10 +52,15 @@ final class LightCube(config: PathConfig) extends Module {
 
   val io = IO(new LightCubeIO(config))
 
-  private val dir     = RegEnable(VecInit(scaled(io.ray.bits.dir.axes)), io.ray.valid)
-  private val context = RegEnable(io.ray.bits.context, io.ray.valid)
-  private val texels  = ContextTable(config, UInt(addressBits.W))
-  when(RegNext(io.ray.valid, false.B)) { texels.write(context, address(dir)) }
+  private val texels   = ContextTable(config, UInt(addressBits.W))
+  private val contexts = Seq.iterate((io.ray.valid, io.ray.bits.context), 3) { case (valid, context) =>
+    (RegNext(valid, false.B), RegEnable(context, valid))
+  }
+  private val isNext = contexts(1)._1
+  private val dir    = RegEnable(VecInit(scaled(io.ray.bits.dir.axes)), io.ray.valid)
+  private val offset = RegEnable(VecInit(io.ray.bits.origin.axes.map(offsetOf)), io.ray.valid)
+  private val point  = RegEnable(VecInit(fromMiddle(dir, offset)), isNext)
+  when(contexts(2)._1) { texels.write(contexts(2)._2, address(point)) }
 
   // The table is read at once for a reflection, before the next ray enters it, and else when the last ray has
   private val read      = io.port.read
@@ -61,6 +70,10 @@ final class LightCube(config: PathConfig) extends Module {
   private val readsThen = hasRead && !request.isReflection
   private val texel     = texels.read(Mux(readsNow, read.bits.context, request.context), readsNow || readsThen)
   assert(!(readsNow && readsThen), "two contexts are read in a cycle")
+  for ((valid, context) <- contexts.tail) {
+    assert(!(readsNow && valid && context === read.bits.context), "a texel is read before it is known")
+    assert(!(readsThen && valid && context === request.context), "a texel is read before it is known")
+  }
   private val isOfReflection = RegEnable(request.isReflection, hasRead)
   io.memory.read.valid := RegNext(hasRead, false.B)
   io.memory.read.bits  := Mux(isOfReflection, RegEnable(texel, hasRead), texel)
@@ -69,11 +82,23 @@ final class LightCube(config: PathConfig) extends Module {
   private val light      = WireInit(io.memory.word)
   when(!RegEnable(seesLights, io.memory.read.valid)) { light.isLight := false.B }
   io.port.texel := RegEnable(light, comes)
+
+  /** How far from the middle of the object's cube a position is, in 2^-8 of the distance of the surfaces. */
+  private def offsetOf(position: Fixed): SInt = {
+    val numbers = config.numbers
+    val coarse  = Rounding.floor(position.integer, numbers.gridBits - 12 + 1) -& (1 << offsetBits - 2).S
+    val steps   = (coarse >> (io.parallax - 1.U)(Gather.parallaxBits - 1, 0)).asSInt
+    Mux(io.parallax === 0.U, 0.S, Rounding.saturate(steps, offsetBits))
+  }
 }
 
 object LightCube {
   private val faceLog = AttributeMemories.cubeLog
   private val dirBits = 8
+
+  /** Of an offset, with its sign, and of the magnitude by which it is multiplied. */
+  private val offsetBits = 9
+  private val factorBits = 4
 
   val addressBits: Int = 3 + 2 * faceLog
 
@@ -82,6 +107,12 @@ object LightCube {
     val width = dir.head.getWidth
     val zeros = Normalise.countLeadingZeros(dir.map(Normalise.magnitude).reduce(_ | _))._2
     dir.map(component => (component.pad(width + 1) << zeros).asUInt(width, width - dirBits).asSInt)
+  }
+
+  /** The direction, from the middle of the object's cube, of the point that a ray meets. */
+  private def fromMiddle(dir: Seq[SInt], offset: Seq[SInt]): Seq[SInt] = {
+    val major = dir.map(Normalise.magnitude).reduce((a, b) => Mux(a >= b, a, b)) >> (dirBits - factorBits)
+    dir.zip(offset).map { case (component, offset) => component +& Rounding.floor(offset * major, factorBits) }
   }
 
   /** The address of the texel that a direction meets: face, row, column. */

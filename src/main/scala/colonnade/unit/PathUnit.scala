@@ -118,6 +118,7 @@ final class PathUnit(config: PathConfig) extends Module {
     val light    = Module(new LightCube(config)).io
     val leaving  = bounces.get.leaves.get.ray
     val scatters = surfaceRays.fire && isGathered
+    light.parallax  := registers.parallax
     light.ray.valid := leaving.valid || scatters
     light.ray.bits  := Mux(leaving.valid, leaving.bits, surfaceRays.bits)
     assert(!(leaving.valid && scatters), "two rays leave in a cycle")

@@ -63,11 +63,15 @@ object GatherReference {
     if (exponent > 5) (BigInt(1) << (fraction + 6)) - 1 else (power << (fraction + 64)) >> (8 + 64 - exponent)
   }
 
-  /** The address of the texel of the light cube that a direction meets. */
-  def texel(direction: Seq[BigInt]): Int = {
+  /** The address of the texel of the light cube that a ray meets from an origin in grid steps of `gridBits` bits. */
+  def texel(origin: Seq[BigInt], direction: Seq[BigInt], parallax: Int, gridBits: Int): Int = {
     val length = direction.map(_.abs.bitLength).max
-    val scaled =
+    val dir    =
       direction.map(component => (if (length < 8) component << (8 - length) else component >> (length - 8)).toInt)
+    val scaled = dir.zip(origin).map { case (component, position) =>
+      val offset = (position - (BigInt(1) << gridBits - 4)) >> gridBits - 12 + parallax
+      if (parallax == 0) component else component + ((offset.max(-256).min(255) * (dir.map(_.abs).max >> 4)) >> 4).toInt
+    }
     val sizes                     = scaled.map(_.abs)
     val axis                      = sizes.indexOf(sizes.max)
     val major                     = sizes(axis)

@@ -1,5 +1,6 @@
 package colonnade.shading
 
+import chisel3.SInt
 import chiseltest._
 import colonnade.{Simulation, TestConfigs}
 import colonnade.TestParts._
@@ -16,16 +17,26 @@ class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "read the texel of a direction" in
     test(new LightCube(config)).withAnnotations(Simulation.verilator) { dut =>
-      val random                                    = new Random(4)
-      val bits                                      = config.numbers.directionBits
-      val last                                      = Array.fill(4)(0)
+      val random   = new Random(4)
+      val bits     = config.numbers.directionBits
+      val last     = Array.fill(4)(0)
+      var parallax = 0
+      // In the object's cube, about it, and far away
+      def position(): Seq[BigInt] = {
+        val bits = config.numbers.gridBits - 3 + Seq(0, 2, 10)(random.nextInt(3))
+        Seq.fill(3)(BigInt(bits, random) * (if (random.nextBoolean()) 1 else -1))
+      }
       def ray(context: Int, dir: Seq[BigInt]): Unit = {
+        val origin = position()
         dut.io.ray.valid.poke(true)
         dut.io.ray.bits.context.poke(context)
+        dut.io.ray.bits.origin.axes.zip(origin).foreach { case (axis, value) =>
+          axis.raw.asInstanceOf[SInt].poke(value)
+        }
         dut.io.ray.bits.dir.axes.zip(dir).foreach { case (axis, value) => axis.poke(value) }
         dut.clock.step()
         dut.io.ray.valid.poke(false)
-        last(context) = GatherReference.texel(dir)
+        last(context) = GatherReference.texel(origin, dir, parallax, config.numbers.gridBits)
       }
       def direction(): Seq[BigInt] = random.nextInt(4) match {
         case 0 => Seq.fill(3)(BigInt(random.nextInt(5) - 2) << random.nextInt(bits - 3))
@@ -33,8 +44,14 @@ class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
         case _ => Seq.fill(3)(BigInt(bits - 1, random) * (random.nextInt(2) * 2 - 1))
       }
       for (context <- 0 until 4) ray(context, direction())
-      for (_ <- 0 until 2000) {
+      for (number <- 0 until 2000) {
+        if (number % 50 == 0) {
+          dut.clock.step(2)
+          parallax = number / 50 % 8
+          dut.io.parallax.poke(parallax)
+        }
         ray(random.nextInt(4), direction())
+        dut.clock.step()
         val (context, seesLights, isLight) = (random.nextInt(4), random.nextBoolean(), random.nextInt(3) == 0)
         val isReflection                   = random.nextBoolean()
         if (isReflection) dut.clock.step()
