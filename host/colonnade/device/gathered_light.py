@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 #: The device's memory of the light cube.
 MEMORY = "light.cube"
-#: Largest value of the register of the cube's parallax.
-LAST_PARALLAX = 7
+#: Largest value of the register `gather.parallax`.
+LAST_PARALLAX = 3
 #: Share of the light that the cube cannot hold, from which a note reports it.
 _REPORTED_LOSS = 0.02
 
@@ -94,10 +94,8 @@ def scene_cube(
 
 def _shown(distance: float, edge: float) -> float:
     """The nearest distance that the device's parallax can have, in mesh units as both arguments."""
-    if not np.isfinite(distance):
-        return distance
     choices = [edge * 2.0**number for number in range(LAST_PARALLAX)]
-    return next((choice for choice in choices if distance < choice * np.sqrt(2.0)), choices[-1])
+    return next((choice for choice in choices if distance < choice * np.sqrt(2.0)), np.inf)
 
 
 def _disc(light: RoomLight, point: Floats, pose: Pose) -> tuple[Floats, float] | None:

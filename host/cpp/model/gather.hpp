@@ -150,16 +150,15 @@ public:
 private:
     static constexpr std::int64_t most = 0xffff;
 
-    /// The direction, seen from the middle of the object's cube, of the point that a ray meets; its largest component has 8 bits before the parallax.
+    /// The direction, seen from the middle of the object's cube, of the point that a ray meets.
     static Vector fromMiddle(const WideVector& origin, const WideVector& direction, int parallax, const Numbers& n) {
         Vector scaled;
         blockNormalise(direction, 8, scaled);
-        if (parallax == 0) return scaled;
         std::int64_t major = 0;
-        for (int a = 0; a < 3; ++a) major = std::max(major, scaled[a] < 0 ? -scaled[a] : scaled[a]);
+        for (int a = 0; a < 3; ++a) major = std::max(major, (scaled[a] < 0 ? ~scaled[a] : scaled[a]) >> 4);
         for (int a = 0; a < 3; ++a) {
-            const auto offset = static_cast<std::int64_t>(floorShift<Wide>(origin[a] - (Wide(1) << (n.gridBits - 4)), n.gridBits - 12 + parallax));
-            scaled[a] += floorShift(std::clamp<std::int64_t>(offset, -256, 255) * floorShift(major, 4), 4);
+            const auto offset = static_cast<std::int64_t>(floorShift<Wide>(origin[a] - (Wide(1) << (n.gridBits - 4)), n.gridBits - 10 + parallax));
+            scaled[a] = floorShift(4 * scaled[a] + (parallax == 0 ? 0 : std::clamp<std::int64_t>(offset, -64, 63) * major), 3);
         }
         return scaled;
     }

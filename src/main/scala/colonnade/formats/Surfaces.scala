@@ -61,7 +61,7 @@ object Gather {
   val maxBounces: Int = 4
   val countBits:  Int = NumberFormats.bitLength(maxBounces)
 
-  val parallaxBits: Int = 3
+  val parallaxBits: Int = 2
 }
 
 /** The interaction of a ray with a surface. */

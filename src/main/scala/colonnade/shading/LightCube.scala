@@ -83,10 +83,10 @@ final class LightCube(config: PathConfig) extends Module {
   when(!RegEnable(seesLights, io.memory.read.valid)) { light.isLight := false.B }
   io.port.texel := RegEnable(light, comes)
 
-  /** How far from the middle of the object's cube a position is, in 2^-8 of the distance of the surfaces. */
+  /** How far from the middle of the object's cube a position is, in 2^-6 of the distance of the surfaces. */
   private def offsetOf(position: Fixed): SInt = {
     val numbers = config.numbers
-    val coarse  = Rounding.floor(position.integer, numbers.gridBits - 12 + 1) -& (1 << offsetBits - 2).S
+    val coarse  = Rounding.floor(position.integer, numbers.gridBits - 10 + 1) -& (1 << offsetBits - 2).S
     val steps   = (coarse >> (io.parallax - 1.U)(Gather.parallaxBits - 1, 0)).asSInt
     Mux(io.parallax === 0.U, 0.S, Rounding.saturate(steps, offsetBits))
   }
@@ -97,7 +97,7 @@ object LightCube {
   private val dirBits = 8
 
   /** Of an offset, with its sign, and of the magnitude by which it is multiplied. */
-  private val offsetBits = 9
+  private val offsetBits = 7
   private val factorBits = 4
 
   val addressBits: Int = 3 + 2 * faceLog
@@ -111,8 +111,10 @@ object LightCube {
 
   /** The direction, from the middle of the object's cube, of the point that a ray meets. */
   private def fromMiddle(dir: Seq[SInt], offset: Seq[SInt]): Seq[SInt] = {
-    val major = dir.map(Normalise.magnitude).reduce((a, b) => Mux(a >= b, a, b)) >> (dirBits - factorBits)
-    dir.zip(offset).map { case (component, offset) => component +& Rounding.floor(offset * major, factorBits) }
+    val sizes =
+      dir.map(component => Mux(component < 0.S, ~component, component).asUInt(dirBits - 1, dirBits - factorBits))
+    val major = sizes.reduce((a, b) => Mux(a >= b, a, b))
+    dir.zip(offset).map { case (component, offset) => Rounding.floor((component << 2).asSInt +& offset * major, 3) }
   }
 
   /** The address of the texel that a direction meets: face, row, column. */

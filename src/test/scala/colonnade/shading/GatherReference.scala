@@ -69,8 +69,9 @@ object GatherReference {
     val dir    =
       direction.map(component => (if (length < 8) component << (8 - length) else component >> (length - 8)).toInt)
     val scaled = dir.zip(origin).map { case (component, position) =>
-      val offset = (position - (BigInt(1) << gridBits - 4)) >> gridBits - 12 + parallax
-      if (parallax == 0) component else component + ((offset.max(-256).min(255) * (dir.map(_.abs).max >> 4)) >> 4).toInt
+      val offset = (position - (BigInt(1) << gridBits - 4)) >> gridBits - 10 + parallax
+      val factor = dir.map(component => component.max(-1 - component) >> 4).max
+      (4 * component + (if (parallax == 0) 0 else offset.max(-64).min(63).toInt * factor)) >> 3
     }
     val sizes                     = scaled.map(_.abs)
     val axis                      = sizes.indexOf(sizes.max)

@@ -47,7 +47,7 @@ class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
       for (number <- 0 until 2000) {
         if (number % 50 == 0) {
           dut.clock.step(2)
-          parallax = number / 50 % 8
+          parallax = number / 50 % 4
           dut.io.parallax.poke(parallax)
         }
         ray(random.nextInt(4), direction())
