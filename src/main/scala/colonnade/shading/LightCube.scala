@@ -114,7 +114,9 @@ object LightCube {
     val sizes =
       dir.map(component => Mux(component < 0.S, ~component, component).asUInt(dirBits - 1, dirBits - factorBits))
     val major = sizes.reduce((a, b) => Mux(a >= b, a, b))
-    dir.zip(offset).map { case (component, offset) => Rounding.floor((component << 2).asSInt +& offset * major, 3) }
+    dir.zip(offset).map { case (component, offset) =>
+      Rounding.floor(Cat(component, 3.U(2.W)).asSInt +& offset * major, 3)
+    }
   }
 
   /** The address of the texel that a direction meets: face, row, column. */

@@ -71,7 +71,7 @@ object GatherReference {
     val scaled = dir.zip(origin).map { case (component, position) =>
       val offset = (position - (BigInt(1) << gridBits - 4)) >> gridBits - 10 + parallax
       val factor = dir.map(component => component.max(-1 - component) >> 4).max
-      (4 * component + (if (parallax == 0) 0 else offset.max(-64).min(63).toInt * factor)) >> 3
+      (4 * component + 3 + (if (parallax == 0) 0 else offset.max(-64).min(63).toInt * factor)) >> 3
     }
     val sizes                     = scaled.map(_.abs)
     val axis                      = sizes.indexOf(sizes.max)
