@@ -85,8 +85,13 @@ def denoised(colour: Floats, variance: Floats | None, guide: Guide) -> Floats:
     mask = np.pad(guide.mask[box], pad)
     position, normals = boxed(np.where(guide.mask[..., None], guide.position, 0.0)), boxed(guide.normals)
     now = boxed(np.where(guide.mask[..., None], colour, 0.0))
-    spread = _local_variance(now @ LUMINANCE, mask) if variance is None else boxed(variance) * mask
-    for level in range(_LEVELS):
+    if variance is None:
+        # Of a single sample the first level spreads bright points, and the variance is that of what it leaves
+        now, _ = _filtered(now, None, position, normals, mask, 1)
+        spread, levels = _local_variance(now @ LUMINANCE, mask), range(1, _LEVELS)
+    else:
+        spread, levels = boxed(variance) * mask, range(_LEVELS)
+    for level in levels:
         now, spread = _filtered(now, spread, position, normals, mask, 1 << level)
     result = colour.copy()
     inner = np.s_[border:-border, border:-border]
@@ -95,11 +100,11 @@ def denoised(colour: Floats, variance: Floats | None, guide: Guide) -> Floats:
 
 
 def _filtered(
-    colour: Floats, variance: Floats, position: Floats, normals: Floats, mask: NDArray[np.bool_], step: int
+    colour: Floats, variance: Floats | None, position: Floats, normals: Floats, mask: NDArray[np.bool_], step: int
 ) -> tuple[Floats, Floats]:
-    """One level of the wavelet: colours and the variance of their luminance."""
+    """One level of the wavelet: colours and the variance of their luminance. Without one, luminance does not count."""
     light = colour @ LUMINANCE
-    deviation = _COLOUR * np.sqrt(_blurred(variance, mask)) + 1e-4
+    deviation = np.inf if variance is None else _COLOUR * np.sqrt(_blurred(variance, mask)) + 1e-4
     sums, weights, squares = np.zeros_like(colour), np.zeros_like(light), np.zeros_like(light)
     for down in range(-2, 3):
         for across in range(-2, 3):
@@ -117,7 +122,8 @@ def _filtered(
                 weight = weight * facing * np.exp(-off / far - np.abs(there(light) - light) / deviation)
             sums += weight[..., None] * there(colour)
             weights += weight
-            squares += weight**2 * there(variance)
+            if variance is not None:
+                squares += weight**2 * there(variance)
     safe = np.where(weights > 0, weights, 1.0)
     return sums / safe[..., None], squares / safe**2
 

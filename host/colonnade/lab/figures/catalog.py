@@ -118,14 +118,15 @@ def _gather() -> Entry:
 
 def _light() -> Entry:
     """Frames in known rooms against a path tracer, and a pass of the RTL over one of them, with gathered light."""
-    scene = "out/light/panorama-1/attic-rough.toml"
+    scenes = [f"out/light/panorama-{rays}/attic-rough.toml" for rays in (1, 2)]
     # Its meshes need more records than those of the benchmark
     larger = ("--set", "columnBvhMemory.depth=262144")
     hardware = ("--config", "edge", "--set", "frame.gather=true", *larger, "--backend", "rtl")
     options = ("--samples", "1", "--size", "640x480", "--json", REPORT)
     commands = {
         "frames": ("tools/light", "frames", "--json", REPORT),
-        "pass": ("colonnade", "render", scene, *hardware, *options),
+        "pass": ("colonnade", "render", scenes[0], *hardware, *options),
+        "two": ("colonnade", "render", scenes[1], *hardware, *options),
     }
     return Entry("light", "textured", commands)
 

@@ -10,8 +10,8 @@ from colonnade.lab.figures.data import Data
 from colonnade.lab.figures.facts import MEGAHERTZ, facts
 
 Frame = Mapping[str, Any]
-#: Samples of frames whose cost is given, and their passes: a quarter more with coats.
-_PASSES = {1: 1, 4: 5, 16: 20}
+#: Frames whose cost is given: samples, gathered rays of a path, and passes, a quarter more with coats.
+_COSTS = ((1, 1, 1), (4, 1, 5), (16, 1, 20), (16, 2, 20))
 
 
 def _of(data: Data, suffix: str) -> dict[str, Frame]:
@@ -80,12 +80,14 @@ def mirrors(data: Data) -> str:
 def cost(data: Data) -> str:
     """Energy of a frame and frames a second, by samples."""
     found, edge = data.result("light"), facts(data, "edge")
-    cycles, rays = found["pass"]["cycles"], found["pass"]["rays"]["in_box"]
-    nanojoules = edge["njGlitches"]
-    row = [f"{MEGAHERTZ * 1e6 / cycles / passes:,.0f}" for passes in _PASSES.values()]
-    energy = [f"{passes * rays * nanojoules * 1e-6:.2f}" for passes in _PASSES.values()]
-    rows = [["frames a second at 200 MHz", *row], ["mJ a frame", *energy]]
-    return markdown([f"{cycles:,} cycles and {rays:,} in-box rays a pass; samples", *(f"{n}" for n in _PASSES)], rows)
+    rows = []
+    for samples, gather, passes in _COSTS:
+        one = found["pass" if gather == 1 else "two"]
+        cycles, rays = one["cycles"], one["rays"]["in_box"]
+        second, energy = MEGAHERTZ * 1e6 / cycles / passes, passes * rays * edge["njGlitches"] * 1e-6
+        rows.append([f"{samples}, {gather}", f"{cycles:,}", f"{rays:,}", f"{second:,.0f}", f"{energy:.2f}"])
+    titles = ["cycles a pass", "in-box rays a pass", "frames a second at 200 MHz", "mJ a frame"]
+    return markdown(["samples, gathered rays of a path", *titles], rows)
 
 
 def assets(data: Data) -> str:

@@ -63,7 +63,11 @@ def columns() -> dict[str, Column]:
         count = f"{passes} pass{'es' if passes > 1 else ''}"
         found |= {count: Column(passes), f"{count}, filtered": Column(passes, denoise=True)}
     best = Column(PASSES[-1], denoise=True)
-    return found | {"panorama alone": replace(best, light="around"), "photo alone": replace(best, light="photo")}
+    return found | {
+        "16 passes of 2 rays, filtered": replace(best, gather=2),
+        "panorama alone": replace(best, light="around"),
+        "photo alone": replace(best, light="photo"),
+    }
 
 
 @dataclass(frozen=True)
