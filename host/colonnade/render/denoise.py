@@ -26,6 +26,8 @@ _COLOUR, _PLANE = 3.0, 0.1
 _NORMAL = 32
 #: Side of the square over which a single sample's variance is estimated, pixels.
 _WINDOW = 7
+#: A single sample is a bright point if it is so many standard deviations above its neighbours; levels that spread it.
+_POINT, _POINT_LEVELS = 1.5, 3
 
 
 @dataclass(frozen=True)
@@ -85,14 +87,17 @@ def denoised(colour: Floats, variance: Floats | None, guide: Guide) -> Floats:
     mask = np.pad(guide.mask[box], pad)
     position, normals = boxed(np.where(guide.mask[..., None], guide.position, 0.0)), boxed(guide.normals)
     now = boxed(np.where(guide.mask[..., None], colour, 0.0))
+    points = np.zeros_like(now)
     if variance is None:
-        # Of a single sample the first level spreads bright points, and the variance is that of what it leaves
-        now, _ = _filtered(now, None, position, normals, mask, 1)
-        spread, levels = _local_variance(now @ LUMINANCE, mask), range(1, _LEVELS)
+        now, points = _without_points(now, mask)
+        for level in range(_POINT_LEVELS):
+            points, _ = _filtered(points, None, position, normals, mask, 1 << level)
+        spread = _local_variance(now @ LUMINANCE, mask)
     else:
-        spread, levels = boxed(variance) * mask, range(_LEVELS)
-    for level in levels:
+        spread = boxed(variance) * mask
+    for level in range(_LEVELS):
         now, spread = _filtered(now, spread, position, normals, mask, 1 << level)
+    now += points
     result = colour.copy()
     inner = np.s_[border:-border, border:-border]
     result[box] = np.where(guide.mask[box][..., None], now[inner], colour[box])
@@ -139,8 +144,26 @@ def _blurred(values: Floats, mask: NDArray[np.bool_]) -> Floats:
     return np.asarray(total / np.maximum(count, 1))
 
 
+def _without_points(colour: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Colours no brighter than their neighbours are, and what is brighter."""
+    light = colour @ LUMINANCE
+    count, first, second = _moments(light, mask)
+    others = np.maximum(count - mask, 1)
+    mean = (first - mask * light) / others
+    deviation = np.sqrt(((second - mask * light**2) / others - mean**2).clip(min=0.0))
+    usual = colour * np.minimum(1.0, (mean + _POINT * deviation) / np.maximum(light, 1e-9))[..., None]
+    return usual, colour - usual
+
+
 def _local_variance(light: Floats, mask: NDArray[np.bool_]) -> Floats:
     """The variance of the luminance among the neighbours that show the object."""
+    count, first, second = _moments(light, mask)
+    safe = np.maximum(count, 1)
+    return np.asarray((second / safe - (first / safe) ** 2).clip(min=0.0) * mask)
+
+
+def _moments(light: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
+    """Number, sum and sum of squares of the luminance of the pixels around each that show the object."""
     half = _WINDOW // 2
     count, first, second = (np.zeros_like(light) for _ in range(3))
     for down in range(-half, half + 1):
@@ -149,5 +172,4 @@ def _local_variance(light: Floats, mask: NDArray[np.bool_]) -> Floats:
             count += shows
             first += shows * value
             second += shows * value**2
-    safe = np.maximum(count, 1)
-    return np.asarray((second / safe - (first / safe) ** 2).clip(min=0.0) * mask)
+    return count, first, second
