@@ -18,7 +18,7 @@ from colonnade.environment.photo_grain import Grain
 
 SCENES = Path(__file__).parents[3] / "scenes"
 #: Rooms that were rendered without noise, with textures.
-SMOOTH = ("rooms/attic/photo.png", "light/attic/photo.webp", "light/chamber/photo.webp", "light/lean-to/photo.webp")
+SMOOTH = tuple(f"light/{name}/photo.webp" for name in ("attic", "chamber", "lean-to", "parlour")) + ("rooms/attic/photo.png",)
 
 
 @cache
