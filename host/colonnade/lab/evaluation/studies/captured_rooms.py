@@ -23,6 +23,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.depth_normals import normals_of_depth
 from colonnade.environment.repair import filled, holes_of
+from colonnade.lab.common.markdown import markdown
 from colonnade.lab.evaluation.studies.environment_accuracy import compare
 from colonnade.lab.evaluation.studies.probe_spheres import mirror_rays, standing_spheres
 from colonnade.maps.quality import angles
@@ -137,4 +138,4 @@ def table(reports: dict[str, CaptureQuality]) -> str:
         )
         for name, report in reports.items()
     ]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
+    return markdown(header, rows)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.common.types import Floats
+from colonnade.lab.common.markdown import markdown
 from colonnade.lab.evaluation.studies.probe_spheres import (
     PICTURE,
     Rays,
@@ -248,7 +249,7 @@ def table(reports: dict[str, EnvironmentAccuracy]) -> str:
                 f"{sum(kind.rays for kind in kinds):,}",
             )
         )
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
+    return markdown(header, rows)
 
 
 def study_rooms(folders: Iterable[Path]) -> dict[str, EnvironmentAccuracy]:

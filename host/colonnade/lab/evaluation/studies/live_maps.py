@@ -22,6 +22,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.common.temporary import temporary_folder
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
+from colonnade.lab.common.markdown import markdown
 from colonnade.lab.evaluation.studies.generated_rooms import generated_room
 from colonnade.lab.evaluation.studies.synthetic_attic import write_room
 from colonnade.maps.cache import encoded_environment
@@ -232,7 +233,7 @@ def table(reports: Mapping[str, LiveQuality]) -> str:
                 mirror,
             )
         )
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
+    return markdown(header, rows)
 
 
 def path_table(reports: Mapping[str, PathQuality]) -> str:
@@ -249,4 +250,4 @@ def path_table(reports: Mapping[str, PathQuality]) -> str:
         )
         for name, report in reports.items()
     ]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
+    return markdown(header, rows)

@@ -20,6 +20,7 @@ from colonnade.common.temporary import temporary_folder
 from colonnade.common.types import Floats
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
+from colonnade.lab.common.markdown import markdown
 from colonnade.lab.evaluation.environment_march import DeviceMarch
 from colonnade.lab.evaluation.studies.environment_accuracy import are_right
 from colonnade.lab.evaluation.studies.generated_rooms import KINDS, generated_room
@@ -132,4 +133,4 @@ def table(reports: Mapping[int, MovedViews]) -> str:
         )
         for seed, report in reports.items()
     ]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
+    return markdown(header, rows)

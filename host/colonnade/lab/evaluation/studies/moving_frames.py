@@ -25,6 +25,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
 from colonnade.environment.model import Environment, EnvironmentCamera
+from colonnade.lab.common.markdown import markdown
 from colonnade.lab.evaluation.region_metrics import compare_regions, frame_regions
 from colonnade.lab.evaluation.studies.generated_rooms import Furnished, plan_of
 from colonnade.lab.evaluation.studies.moved_views import DEGREES, METRES
@@ -196,4 +197,4 @@ def table(errors: Mapping[str, Mapping[str, FrameError]]) -> str:
         for name, ways in errors.items()
         for way, one in ways.items()
     ]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
+    return markdown(header, rows)

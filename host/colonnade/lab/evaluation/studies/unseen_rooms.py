@@ -21,6 +21,7 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.temporary import temporary_folder
 from colonnade.common.types import Floats
+from colonnade.lab.common.markdown import markdown
 from colonnade.lab.evaluation.studies.environment_accuracy import NEAR_METRES, Comparison, are_right, compare
 from colonnade.lab.evaluation.studies.generated_rooms import KINDS, generated_room
 from colonnade.lab.evaluation.studies.probe_spheres import mirror_rays, standing_spheres
@@ -208,7 +209,7 @@ def table(reports: Mapping[int, RoomQuality]) -> str:
     ]
     if reports:
         rows.append(("worst", "", "", *_cells(list(reports.values())), ""))
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (header, ["---"] * len(header), *rows))
+    return markdown(header, rows)
 
 
 def _cells(reports: list[RoomQuality]) -> tuple[str, ...]:
