@@ -96,7 +96,7 @@ async function draw() {
 async function accumulate(before = 0) {
   if (isBusy) return;
   const figures = await frame(true).catch(() => null);
-  if (figures && !isBusy && figures.samples > before && figures.samples < figures.passes) rest = setTimeout(accumulate, 0, figures.samples);
+  if (figures && !isBusy && figures.samples > before && figures.samples < figures.final) rest = setTimeout(accumulate, 0, figures.samples);
 }
 
 /** Shows a picture, of the first sample or of those so far; returns its figures, or nothing if it came too late. */
@@ -120,14 +120,14 @@ async function frame(isStill = false) {
   return figures;
 }
 
-function showFigures({ width, height, milliseconds, rays, samples, passes }) {
+function showFigures({ width, height, milliseconds, rays, samples, final }) {
   const position = (camera ?? state?.camera)?.position.map((value) => value.toFixed(3)).join(", ");
   const rows = [
     ["size", `${width} × ${height}`],
     ["triangles", state?.triangles.toLocaleString("en")],
-    ["samples a pixel", `${samples} of ${passes}`],
-    ["rays of a pass", rays.toLocaleString("en")],
-    ["time of a pass", `${milliseconds.toFixed(1)} ms`],
+    ["samples a pixel", `${samples} of ${final}`],
+    ["rays of a sample", rays.toLocaleString("en")],
+    ["time of a sample", `${milliseconds.toFixed(1)} ms`],
     ["frames in the last second", times.length],
     ["time of packing", state && `${state.milliseconds.toFixed(0)} ms`],
     ["camera", position],

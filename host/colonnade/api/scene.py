@@ -24,6 +24,7 @@ from colonnade.render.request import Backend, RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene import model
 from colonnade.scene.parser import read_tables, scene_file, scene_of
+from colonnade.scene.passes import of_a_device
 
 Size = tuple[int, int]
 Table = Mapping[str, Any]
@@ -213,8 +214,9 @@ class Scene:
         """
         manifest = manifest_for(config, overrides, progress).manifest
         with _noted():
+            scene = of_a_device(self.description)
             return DeviceScene.of(
-                self.description, manifest, self.mesh, size=size, relit=relit, encoder=encoder, progress=progress
+                scene, manifest, self.mesh, size=size, relit=relit, encoder=encoder, progress=progress
             )
 
     def __repr__(self) -> str:

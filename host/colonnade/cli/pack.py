@@ -78,6 +78,7 @@ def pack(
     from colonnade.design.generator import manifest_for
     from colonnade.device.scene import DeviceScene
     from colonnade.scene.parser import load_scene
+    from colonnade.scene.passes import of_a_device
     from colonnade.scene_image.dram_image import line_layout
     from colonnade.scene_image.file import check_image_file, image_file
     from colonnade.scene_image.inspect import describe, print_report
@@ -102,7 +103,7 @@ def pack(
     if dram_image is not None:
         line_layout(manifest)
     with terminal.step("packing"):
-        prepared = DeviceScene.of(described, manifest, encoder=encoder, progress=terminal)
+        prepared = DeviceScene.of(of_a_device(described), manifest, encoder=encoder, progress=terminal)
         image = prepared.image
         # Everything is encoded before anything is written: a refusal leaves no file
         others: list[tuple[str, Path, bytes]] = []

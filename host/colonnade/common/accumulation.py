@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.framebuffer import Frame
+from colonnade.common.image_io import encode_srgb
 
 #: The device's numbers for the colour 1.0, the shadow ratio 1.0, and the photo's colour 1.0.
 WHITE, UNSHADOWED, PHOTO_WHITE = 4095, 4096, 65535
@@ -88,6 +89,14 @@ class Accumulation:
         """With the colours of the coats of surfaces on those of the object, as many samples of them as of itself."""
         return replace(self, objects=self.objects + coats.objects * (self.samples / coats.samples))
 
+    def pixels(self) -> npt.NDArray[np.uint8]:
+        """`image` as 8-bit sRGB, uint8 [height, width, 3]; of a few whole numbers by a table, which is faster."""
+        values = self.objects + self.background
+        if values.dtype.kind == "f" or values.max() >= values.size:
+            return encode_srgb(self.image())
+        codes = encode_srgb((np.arange(values.max() + 1) / self.white / self.samples).clip(max=1.0))
+        return np.asarray(codes[values])
+
     def same_as(self, other: Accumulation) -> npt.NDArray[np.bool_]:
         """The pixels whose sums are equal, bool [height, width]."""
         same = (self.objects == other.objects) & (self.background == other.background)
@@ -162,7 +171,7 @@ class FramePasses:
     _sums: Accumulation | None = None
 
     def add(self, frame: Frame, is_coat: bool = False) -> None:
-        """Add the frame of the next pass; those of coats come last."""
+        """Add the frame of the next pass; the first one is not of coats."""
         if is_coat:
             self.coats = self.coats or FramePasses(has_squares=self.has_squares, white=self.white)
             self.coats.add(frame)
@@ -189,6 +198,11 @@ class FramePasses:
         """Sums over all passes; those of a single one are made when they are needed."""
         assert self.first is not None
         return self._sums or Accumulation.of_frame(self.first, self.white)
+
+    @property
+    def coated(self) -> Accumulation:
+        """`sums` with those of the coats."""
+        return self.sums if self.coats is None else self.sums.coated(self.coats.sums)
 
     def object_variance(self) -> npt.NDArray[np.float64] | None:
         """The variance of the mean luminance of the object, float64 [height, width]; None of a single pass.

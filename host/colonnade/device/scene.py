@@ -19,6 +19,7 @@ from colonnade.registers.view_file import view_file
 from colonnade.scene.cameras import check_camera
 from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, photo_strength, view_photo
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
+from colonnade.scene.passes import frame_passes
 from colonnade.scene.view import View, make_view, place, with_overrides
 from colonnade.scene_image.device_image import device_image, maps_image
 from colonnade.scene_image.dram_image import dram_image
@@ -162,9 +163,9 @@ class DeviceScene:
         moved = replace(self, scene=replace(self.scene, camera=camera, frame_camera=None))
         return moved if self.environment is None else replace(moved, photo=None, strength=None)
 
-    def coat_passes(self, scene: Scene | None = None, exposure: float = 0.0) -> list[Scene]:
-        """The passes of coats (`Scene.coat_passes`) of another moment of `scene`; None: of `scene` itself."""
-        return (scene or self.scene).coat_passes(self.image.header.materials, exposure)
+    def passes(self, scene: Scene | None = None, exposure: float = 0.0) -> list[Scene]:
+        """The passes of a frame (`frame_passes`) at another moment of `scene`; None: of `scene` itself."""
+        return frame_passes(scene or self.scene, self.image.header.materials, exposure)
 
     @property
     def environment(self) -> Environment | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.registers.view_file import camera_values, position_values, rotation_values
+from colonnade.registers.view_words import camera_values, position_values, rotation_values
 from colonnade.scene.cameras import WorldCamera
 from colonnade.scene.object_pose import Pose
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +31,7 @@ from colonnade.scene.cameras import check_camera
 from colonnade.scene.lit_room import LitRoom, lit_room, scene_room, view_photo
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
+from colonnade.scene.passes import frame_passes
 from colonnade.scene.view import make_view, with_overrides
 
 if TYPE_CHECKING:
@@ -139,28 +141,24 @@ def traced_frames(
         lit = replace(room, scene=room.scene.at(pose.motion_progress))
         cube = _light_cube(lit, mesh, layout, options.relit, progress if number == 0 else None)
         materials = with_overrides(mesh.materials, lit.scene.material)
-        passes = [*lit.scene.passes(options.exposure), *lit.scene.coat_passes(materials, options.exposure)]
-        views = [make_view(one, mesh.extent, *size, mesh.materials, room.environment) for one in passes]
-        if cube is not None:
-            views = [replace(view, gather=replace(view.gather, cube=cube)) for view in views if view.gather is not None]
-        first = render_reference(mesh, views[0], progress, backdrop)
-        sums, coat, rays = _accumulated(first, lit.scene.exposure), None, first.rays
-        for view, one in zip(views[1:], passes[1:], strict=True):
-            other = render_reference(mesh, view, progress, backdrop)
-            rays = {kind: count + other.rays[kind] for kind, count in rays.items()}
-            found = _accumulated(other, lit.scene.exposure)
-            if one.sample.is_coat:
-                coat = found if coat is None else coat + found
-            else:
-                sums += found
-        if coat is not None:
-            sums = sums.coated(coat)
+        passes = frame_passes(lit.scene, materials, options.exposure)
+        first: ReferenceResult | None = None
+        layers: dict[bool, Accumulation] = {}
+        rays: Counter[str] = Counter()
+        for one in passes:
+            view = make_view(one, mesh.extent, *size, mesh.materials, room.environment)
+            if cube is not None and view.gather is not None:
+                view = replace(view, gather=replace(view.gather, cube=cube))
+            found = render_reference(mesh, view, progress, backdrop)
+            first = first or found
+            rays.update(found.rays)
+            sums = Accumulation.of_pixels(found.image, found.object_mask, found.shadow_ratio, lit.scene.exposure)
+            is_coat = one.sample.is_coat
+            layers[is_coat] = layers[is_coat] + sums if is_coat in layers else sums
+        assert first is not None
+        sums = layers[False].coated(layers[True]) if True in layers else layers[False]
         image = composited(sums, photo, room.strength, look, number)
-        yield TracedFrame(image, first, sums, rays, time.perf_counter() - begun)
-
-
-def _accumulated(frame: ReferenceResult, white: float) -> Accumulation:
-    return Accumulation.of_pixels(frame.image, frame.object_mask, frame.shadow_ratio, white)
+        yield TracedFrame(image, first, sums, dict(rays), time.perf_counter() - begun)
 
 
 def _light_cube(

@@ -65,10 +65,11 @@ def within_budget(prepared: DeviceScene, size: tuple[int, int], progress: Progre
         registers = prepared.registers(size, composited=True)
 
         def passes(samples: int) -> int:
-            return samples + len(prepared.coat_passes(scene.with_samples(samples)))
+            return len(prepared.passes(scene.with_samples(samples)))
 
         seconds = scene.frame.budget or _SECONDS
         budget = Budget.of(prepared.manifest, prepared.image, registers, seconds, passes)
-    hidden = f"; {scene.blurs[0]} shows its middle" if budget.samples == 1 and scene.blurs else ""
-    progress.note(budget.note + hidden)
+    hidden = f"; {scene.blurs[0]} shows its middle" if scene.blurs else ""
+    hidden += "; coats do not show" if passes(2) > 2 else ""
+    progress.note(budget.note + (hidden if budget.samples == 1 else ""))
     return replace(prepared, scene=scene.with_samples(budget.samples))

@@ -18,6 +18,7 @@ from colonnade.mesh.palette import (
 )
 from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Scene
+from colonnade.scene.passes import may_show_coats
 from colonnade.scene.view import with_overrides
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     Of more colours than the material table holds, after the scene's values have overridden those of the mesh, plain
     ones move to the corners of faces, or else similar ones are merged.
     """
-    mesh, lines = with_rendered_metal(mesh, scene.paths.gather > 0, scene.has_coats)
+    mesh, lines = with_rendered_metal(mesh, scene.paths.gather > 0, may_show_coats(scene))
     notes.report(lines)
     if not features.textures:
         mesh, lines = without_textures(mesh)

@@ -115,7 +115,7 @@ class _Handler(BaseHTTPRequestHandler):
         height, width, _ = frame.pixels.shape
         pixels = np.full((height, width, 4), 255, np.uint8)
         pixels[..., :3] = frame.pixels
-        figures = {name: getattr(frame, name) for name in ("version", "milliseconds", "rays", "samples", "passes")}
+        figures = {name: getattr(frame, name) for name in ("version", "milliseconds", "rays", "samples", "final")}
         headers = {"X-Frame": json.dumps(figures | {"width": width, "height": height})}
         self._answer(200, pixels.tobytes(), "application/octet-stream", headers)
 

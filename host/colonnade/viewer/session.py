@@ -13,18 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import notes
-from colonnade.common.accumulation import Accumulation
+from colonnade.common.accumulation import FramePasses
 from colonnade.common.errors import UserError
-from colonnade.common.image_io import encode_srgb
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import manifest_for
 from colonnade.device.device import ModelDevice
 from colonnade.device.scene import DeviceScene
 from colonnade.maps.encoders import Encoder
-from colonnade.render.composite import composited
+from colonnade.render.camera_look import CameraLook
+from colonnade.render.host_frame import HostFrame, require_filter
 from colonnade.scene.model import Camera, Scene
 from colonnade.scene.parser import load_scene
+from colonnade.scene.passes import exposed
 from colonnade.scene.view import place
 from colonnade.viewer.camera_table import save_camera
 
@@ -56,10 +57,10 @@ class ViewFrame:
     Attributes:
         pixels: sRGB, uint8 [height, width, 3].
         version: That of the scene.
-        milliseconds: Time of registers, model and picture, of the last pass.
-        rays: Rays of all kinds, of the last pass.
+        milliseconds: Time of registers, model and picture, of the last sample.
+        rays: Rays of all kinds, of the last sample.
         samples: Samples a pixel in it.
-        passes: Those of a camera that rests.
+        final: Those of the picture of a camera that has rested.
     """
 
     pixels: NDArray[np.uint8]
@@ -67,19 +68,19 @@ class ViewFrame:
     milliseconds: float
     rays: int
     samples: int
-    passes: int
+    final: int
 
 
 @dataclass
-class _Rest:
-    """The passes of a camera that rests: those to come, and the sums of the others."""
+class _Picture:
+    """A picture of a camera: the passes that come, the sums of the others, and what they show."""
 
     camera: ViewCamera | None
     version: int
-    scene: DeviceScene
+    frame: HostFrame
     coming: list[Scene]
-    sums: Accumulation | None = None
-    rays: int = 0
+    sums: FramePasses
+    last: ViewFrame | None = None
 
 
 class Session:
@@ -116,7 +117,7 @@ class Session:
         self._state: dict[str, Any] = {"version": 0}
         self._error = ""
         self._ends = False
-        self._rest: _Rest | None = None
+        self._rest: _Picture | None = None
         self._load()
 
     def state(self, version: int | None = None, timeout: float = 0.0) -> dict[str, Any]:
@@ -132,7 +133,7 @@ class Session:
             return self._state | {"error": self._error}
 
     def frame(self, camera: ViewCamera | None = None) -> ViewFrame:
-        """Render a frame of one sample of the scene that was last right.
+        """Render a frame of one sample of the scene that was last right, as `colonnade render --samples 1`.
 
         Args:
             camera: In place of the scene's own.
@@ -141,17 +142,13 @@ class Session:
             UserError: The camera is out of the hardware's range.
         """
         with self._rendering:
-            begun = time.perf_counter()
-            scene = self._seen_by(camera)
-            rays = self._render(scene, scene.scene, scene.frame_photo(self.size))
-            pixels, passes = self._device.pixels(), _samples_of(scene.scene)
-            return ViewFrame(pixels, self._state["version"], 1e3 * (time.perf_counter() - begun), rays, 1, passes)
+            return self._next(self._picture(camera, 1))
 
     def still(self, camera: ViewCamera | None = None) -> ViewFrame:
-        """Render the next pass of a camera that rests: the picture has one sample more than that of the last call.
+        """Render the next sample of a camera that rests: the picture has one more than that of the last call.
 
-        The last picture is that of `colonnade render` with as many samples, without its filter of noise; further calls
-        give it again. Another camera or version of the scene begins anew.
+        The last picture is that of `colonnade render` with as many samples; further calls give it again. Another camera
+        or version of the scene begins anew.
 
         Args:
             camera: In place of the scene's own.
@@ -160,33 +157,40 @@ class Session:
             UserError: The camera is out of the hardware's range.
         """
         with self._rendering:
-            begun = time.perf_counter()
-            rest, version = self._rest, self._state["version"]
-            if rest is None or (rest.camera, rest.version) != (camera, version):
-                scene = self._seen_by(camera)
-                coming = scene.scene.with_samples(_samples_of(scene.scene)).passes(scene.scene.motion.exposure(1))
-                rest = self._rest = _Rest(camera, version, scene, coming)
-            if rest.coming:
-                rest.rays = self._render(rest.scene, rest.coming[0])
-                sums = Accumulation.of_frame(self._device.frame)
-                rest.sums = sums if rest.sums is None else rest.sums + sums
-                del rest.coming[0]
-            assert rest.sums is not None
-            picture = composited(rest.sums, rest.scene.photo, rest.scene.strength)
-            pixels, samples = encode_srgb(picture), rest.sums.samples
-            passes = samples + len(rest.coming)
-            return ViewFrame(pixels, version, 1e3 * (time.perf_counter() - begun), rest.rays, samples, passes)
+            rest = self._rest
+            if rest is None or (rest.camera, rest.version) != (camera, self._state["version"]):
+                rest = self._rest = self._picture(camera, self._samples)
+            if rest.last is None or rest.coming:
+                rest.last = self._next(rest)
+            return rest.last
 
-    def _seen_by(self, camera: ViewCamera | None) -> DeviceScene:
+    def _picture(self, camera: ViewCamera | None, samples: int) -> _Picture:
+        """A picture of so many samples, of which none is rendered."""
         scene = self._scene
-        return scene if camera is None else scene.with_camera(_moved(scene.scene.camera, camera))
+        if camera is not None:
+            scene = scene.with_camera(_moved(scene.scene.camera, camera))
+        scene = replace(scene, scene=scene.scene.with_samples(samples))
+        passes = scene.passes(exposure=scene.scene.motion.exposure(1))
+        denoise = samples > 1 and scene.scene.frame.denoise
+        look = self._look if scene.photo is not None else None
+        frame = HostFrame(scene, self.size, tuple(passes), denoise=denoise, look=look)
+        return _Picture(camera, self._state["version"], frame, passes, frame.no_passes())
 
-    def _render(self, scene: DeviceScene, sample: Scene, photo: NDArray[np.uint8] | None = None) -> int:
-        """Render a pass on the device; returns the number of its rays."""
-        self._device.set_frame(scene.registers(self.size, sample, composited=True), photo)
-        self._device.start()
-        counters = self._device.counters()
-        return sum(counters.get(kind, 0) for kind in _RAYS)
+    def _next(self, picture: _Picture) -> ViewFrame:
+        """Render the next sample of a picture, with the coats after it."""
+        begun, rays, frame, sums = time.perf_counter(), 0, picture.frame, picture.sums
+        coming = [one.sample.is_coat for one in picture.coming]
+        for _ in range([*coming, False].index(False, 1)):
+            one = picture.coming.pop(0)
+            self._device.set_frame(frame.registers(one))
+            self._device.start()
+            self._device.wait()
+            sums.add(self._device.frame, one.sample.is_coat)
+            counters = self._device.counters()
+            rays += sum(counters.get(kind, 0) for kind in _RAYS)
+        pixels = frame.pixels(sums, is_whole=not picture.coming)
+        seconds = time.perf_counter() - begun
+        return ViewFrame(pixels, picture.version, 1e3 * seconds, rays, sums.sums.samples, self._samples)
 
     def save(self, camera: ViewCamera) -> None:
         """Write a camera into the scene file.
@@ -237,20 +241,25 @@ class Session:
         self._seen = _stamps(self._files)
         lines: list[str] = []
         with notes.opened(lines.append):
-            description = load_scene(self.file)
+            description = exposed(load_scene(self.file))
+            samples = description.frame.samples or 1
+            description = description.with_samples(samples if samples > 1 else STILL_SAMPLES)
             meshes = [description.mesh, *(one.mesh for one in description.objects)]
             paths = list(dict.fromkeys(mesh.path for mesh in meshes if mesh.path is not None))
             self._files, self._seen = self._files + paths, self._seen + _stamps(paths)
             scene = DeviceScene.of(description, self._manifest, size=self.size, encoder=self._encoder)
+            look = CameraLook.of(scene.scene, scene.photo, self.size)
+        if look is not None and look.note is not None:
+            lines.append(look.note)
         if description.frame.denoise:
-            lines.append("the page does not filter noise (frame.denoise)")
+            require_filter(description, self._manifest)
         # It is refused here if the hardware cannot show it, and not in every frame
         scene = self._still(scene)
         scene.registers(self.size, composited=True)
         packed = time.perf_counter()
         with self._rendering, self._changed:
             self._device.load(scene.image)
-            self._scene = scene
+            self._scene, self._look, self._samples = scene, look, description.frame.samples or 1
             self._state = self._described(scene) | {
                 "version": self._state["version"] + 1,
                 "notes": lines,
@@ -297,12 +306,6 @@ def _stamps(files: Sequence[Path]) -> list[tuple[int, int]]:
         else:
             stamps.append((status.st_mtime_ns, status.st_size))
     return stamps
-
-
-def _samples_of(scene: Scene) -> int:
-    """Samples a pixel of a camera that rests."""
-    named = scene.frame.samples or 1
-    return named if named > 1 else STILL_SAMPLES
 
 
 def _moved(camera: Camera, to: ViewCamera) -> Camera:

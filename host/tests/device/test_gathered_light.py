@@ -102,7 +102,7 @@ def test_a_new_view_of_the_room_brings_its_light() -> None:
 def test_each_pass_has_points_of_its_own() -> None:
     manifest = manifest_for("textured").manifest
     prepared = DeviceScene.of(SCENE, manifest)
-    passes = prepared.scene.with_samples(16).passes()
+    passes = prepared.passes(prepared.scene.with_samples(16))
     registers = [prepared.registers((32, 24), one) for one in passes]
     assert {values["gather.bounces"] for values in registers} == {2}
     for index in range(4):
@@ -126,7 +126,7 @@ def test_room_pixels_near_the_object_gather_its_light() -> None:
     scene = replace(IN_ROOM, material=Material(albedo=(0.8, 0.1, 0.1))).with_samples(4)
     prepared = DeviceScene.of(scene, design)
     passes = FramePasses()
-    for one in prepared.scene.passes():
+    for one in prepared.passes():
         passes.add(render_model(design, prepared.image, prepared.registers(size, one)))
     room = load_environment(ROOM)
     (traced,) = traced_frames([scene], load_mesh("teapot:4"), room, size, 2)

@@ -37,8 +37,8 @@ from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
 from colonnade.registers.target_view import TargetView
-from colonnade.registers.view_file import camera_values, position_values
-from colonnade.render.frames import sequence_scenes
+from colonnade.registers.view_words import camera_values, position_values
+from colonnade.render.sequence_frames import sequence_scenes
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import place
 from colonnade.scene_image.device_image import device_image, load_cycles, maps_image

@@ -16,7 +16,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
-from colonnade.render.frames import render_model
+from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, MeshSource, Scene
 from colonnade.scene.view import make_view
 

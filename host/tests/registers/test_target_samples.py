@@ -11,7 +11,7 @@ from target_views import GOLDEN, HEIGHT, WIDTH
 from colonnade.design.manifest import Manifest
 from colonnade.device.scene import DeviceScene
 from colonnade.registers.target_view import TargetView
-from colonnade.registers.view_file import camera_names, gather_names, light_names
+from colonnade.registers.view_names import camera_names, gather_names, light_names
 from colonnade.scene.model import Light, MeshSource, Paths, Scene
 from colonnade.scene.samples import samples_of_frame
 
@@ -39,7 +39,7 @@ def test_the_registers_of_all_passes_are_those_of_the_host(prepared: DeviceScene
     assert target.registers() == _pass(target, 0, 1)
     moved = {*camera_names(), *light_names(2)}
     for count in (4, 16):
-        for index, one in enumerate(prepared.scene.with_samples(count).passes()):
+        for index, one in enumerate(prepared.passes(prepared.scene.with_samples(count))):
             found, expected = _pass(target, index, count), prepared.registers(size, one)
             assert found.keys() == expected.keys()
             for name in (name for name in expected if "objectOutline" not in name):

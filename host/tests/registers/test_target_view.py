@@ -16,7 +16,8 @@ from target_views import HEIGHT, LENS, ONE, PIXEL, POSES, ROOT, UNIT, WIDTH, Des
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.registers.target_view import TargetView, rotation_of
-from colonnade.registers.view_file import camera_names, light_names, rotation_values
+from colonnade.registers.view_names import camera_names, light_names
+from colonnade.registers.view_words import rotation_values
 
 
 def test_the_scene_of_the_file_is_that_of_the_host(design: Design) -> None:

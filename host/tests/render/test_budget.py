@@ -15,6 +15,8 @@ from colonnade.cli.main import cli
 from colonnade.common.progress import QUIET
 from colonnade.design.generator import manifest_for
 from colonnade.device.scene import DeviceScene
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import MeshMaterial
 from colonnade.render.budget import CLOCK, Budget, estimated_cycles, rounded
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
@@ -60,13 +62,18 @@ def test_longer_budgets_give_more_samples() -> None:
 
 
 def test_passes_of_coats_count() -> None:
-    """16 samples with coats are 20 passes: a budget of 17 has 8 samples, and 16 without coats."""
+    """16 samples with coats are 20 passes: a budget of 17 has 8 samples, and 16 without coats.
+
+    The passes of the plain mesh with a coat of its own are cheaper.
+    """
     prepared = DeviceScene.of(GATHERS, manifest_for("textured").manifest)
     cycles = Budget.of(prepared.manifest, prepared.image, prepared.registers(SIZE, composited=True), 1.0).cycles
     frame = FrameSize(*SIZE, budget=17 * cycles / CLOCK)
-    for roughness, samples in ((1.0, 16), (0.3, 8)):
+    coated = replace(load_mesh("teapot:2"), materials=(MeshMaterial(roughness=0.3),))
+    for roughness, mesh, samples, passes in ((1.0, None, 16, 16), (0.3, None, 8, 10), (None, coated, 16, 20)):
         scene = replace(GATHERS, material=Material(roughness=roughness), frame=frame)
-        assert render(RenderRequest(scene, "textured", backend="model")).report.samples == samples
+        report = render(RenderRequest(scene, "textured", backend="model", mesh=mesh)).report
+        assert report.samples == samples and report.rays["primary"] == passes * SIZE[0] * SIZE[1]
 
 
 def test_what_is_named_wins(capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,7 +26,7 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.reference.object import PlacedObject
 from colonnade.reference.render import render_reference
 from colonnade.registers.frame import frame_registers
-from colonnade.render.frames import render_model
+from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 from colonnade.scene.view import make_view, with_overrides

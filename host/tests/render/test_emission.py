@@ -15,7 +15,7 @@ from colonnade.mesh.materials import MeshMaterial, from_gltf, from_mtl
 from colonnade.mesh.mesh import Mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
-from colonnade.render.frames import render_model
+from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, MeshSource, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 from colonnade.scene.view import make_view

@@ -20,6 +20,7 @@ from colonnade.common import extras
 from colonnade.common.accumulation import Accumulation
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
+from colonnade.common.progress import Progress
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
@@ -32,9 +33,10 @@ from colonnade.maps.encoded import layout_of
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
 from colonnade.mesh.load import load_mesh
-from colonnade.render import frames as module
+from colonnade.render import sequence_frames as module
 from colonnade.render.composite import composited
 from colonnade.render.frames import render, render_frames
+from colonnade.render.host_frame import HostFrame
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.model import Transform
@@ -182,15 +184,13 @@ def test_between_keyframes_a_frame_has_its_camera_and_photo_and_the_maps_before(
     folder: Path, frames: list[RenderResult], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list[tuple[DeviceScene, dict[str, int]]] = []
-    rendered = module._rendered
+    rendered = module.rendered
 
-    def watched(
-        request: RenderRequest, prepared: DeviceScene, size: object, passes: object, registers: list[Any], *rest: Any
-    ) -> Any:
-        seen.append((prepared, registers[0][0]))
-        return rendered(request, prepared, size, passes, registers, *rest)  # type: ignore[arg-type]
+    def watched(request: RenderRequest, own: list[HostFrame], registers: list[Any], progress: Progress) -> Any:
+        seen.append((own[0].prepared, registers[0][0]))
+        return rendered(request, own, registers, progress)
 
-    monkeypatch.setattr(module, "_rendered", watched)
+    monkeypatch.setattr(module, "rendered", watched)
     request, sequence = request_of(folder, "albedo"), load_sequence(folder / "sequence.toml")
     found = list(render_frames(replace(request, keyframes=2)))
     assert [values["environment.isMapCamera"] for _, values in seen] == [1, 0, 1]

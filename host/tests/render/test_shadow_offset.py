@@ -12,7 +12,7 @@ from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
-from colonnade.render.frames import render_model
+from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Camera, Light, MeshSource, Scene
 from colonnade.scene.view import make_view
 

@@ -19,7 +19,7 @@ from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.texture import Texture
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
-from colonnade.render.frames import render_model
+from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Scene
 from colonnade.scene.view import make_view
 

@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.mesh.load import load_mesh
-from colonnade.scene.model import Camera, Light, MeshSource, Motion, Scene
+from colonnade.mesh.materials import MeshMaterial
+from colonnade.scene.model import Camera, Light, MeshSource, Motion, Paths, Scene
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
+from colonnade.scene.passes import frame_passes
 from colonnade.scene.samples import CENTRE, Sample, disc_point, samples_of_frame, square_points
 from colonnade.scene.view import View, make_view
 
@@ -123,13 +125,21 @@ def test_the_shutter_opens_for_a_part_of_the_interval(shutter: float, frames: in
     progress = motion.frame_progress(frames)
     interval = progress[1] if frames > 1 else 1.0
     for start in progress:
-        times = [one.motion_progress for one in scene.at(start).passes(motion.exposure(frames))]
+        times = [one.motion_progress for one in frame_passes(scene.at(start), exposure=motion.exposure(frames))]
         expected = start + (np.arange(8) + 0.5) / 8 * shutter * interval
         np.testing.assert_allclose(np.sort(times), np.minimum(expected, 1.0), atol=1e-12)
 
 
+@pytest.mark.parametrize(("samples", "kinds"), [(1, "s"), (2, "ssc"), (6, "ssssssc"), (8, "sssscssssc")])
+def test_coats_have_a_pass_after_four_of_surfaces(samples: int, kinds: str) -> None:
+    scene = replace(TEAPOT, paths=Paths(gather=1)).with_samples(samples)
+    passes = frame_passes(scene, (MeshMaterial(), MeshMaterial(roughness=0.3)))
+    assert "".join("c" if one.sample.is_coat else "s" for one in passes) == kinds
+    assert not any(one.sample.is_coat for one in frame_passes(scene, (MeshMaterial(roughness=0.6),)))
+
+
 def test_without_keys_one_pass_is_the_scene() -> None:
-    assert TEAPOT.at(0.25).passes() == [replace(TEAPOT.at(0.25), sample=replace(CENTRE, lights=((0.0, 0.0),)))]
+    assert frame_passes(TEAPOT.at(0.25)) == [replace(TEAPOT.at(0.25), sample=replace(CENTRE, lights=((0.0, 0.0),)))]
     assert TEAPOT.blurs == []
 
 

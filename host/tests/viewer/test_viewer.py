@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.error import HTTPError
@@ -15,6 +16,7 @@ import pytest
 
 import colonnade
 from colonnade.common.errors import UserError
+from colonnade.common.image_io import decode_srgb, write_png
 from colonnade.viewer.camera_table import save_camera
 from colonnade.viewer.server import ViewServer
 from colonnade.viewer.session import STILL_SAMPLES, Session, ViewCamera
@@ -29,6 +31,14 @@ fov = 35.0   # degrees
 # lights
 [[light]]
 offset = [1.0, 1.5, 1.0]
+"""
+GATHERED = """mesh = {name = "teapot:2"}
+background = {room = "attic"}
+object = {stand_at = [200, 320], size = 0.6}
+material = {kind = "diffuse", albedo = [0.3, 0.5, 0.2], roughness = 0.3}
+light = {position = [0.6, 2.2, 0.6], falloff = 1.5}
+paths = {gather = 1}
+frame = {samples = 4, denoise = true}
 """
 MOVED = ViewCamera((1.25, 0.5, 4.0), (0.0, 0.125, -0.0))
 
@@ -83,13 +93,37 @@ def test_a_camera_that_rests_gathers_the_samples_of_render(server: ViewServer, f
     assert session.still().samples == 1
     last = [session.still(MOVED) for _ in range(STILL_SAMPLES + 1)]
     assert [frame.samples for frame in last] == [*range(1, STILL_SAMPLES + 1), STILL_SAMPLES]
-    assert last[-1].passes == STILL_SAMPLES
+    assert last[-1].final == STILL_SAMPLES
     session.save(MOVED)
     assert session.state(last[-1].version, 5.0)["version"] > last[-1].version
     assert session.still().samples == 1
     whole = colonnade.Scene.load(file).render(config="tiny", size=SIZE, samples=STILL_SAMPLES).pixels
     np.testing.assert_array_equal(last[-1].pixels, whole)
     assert (pixels_of(server, "?still=1") != pixels_of(server)).any()
+
+
+def test_a_rest_in_a_photo_is_the_picture_of_render(tmp_path: Path) -> None:
+    """With the exposure and the coats of gathered light, its filter, and the grain of the photo."""
+    shutil.copytree(Path(__file__).parents[3] / "scenes" / "rooms" / "attic", tmp_path / "attic")
+    noise = np.random.RandomState(1).normal(128, 8, (480, 640, 3))
+    write_png(tmp_path / "attic" / "photo.png", decode_srgb(noise.astype(np.uint8)))
+    file = tmp_path / "scene.toml"
+    file.write_text(GATHERED)
+    size, config = (128, 96), "textured"
+    session = Session(file, config, size=size)
+    assert "the object has the photo's grain" in session.state()["notes"][-1]
+    for camera in (None, ViewCamera((0.8, 1.5, 2.4), (0.0, 0.4, 0.0))):
+        scene = colonnade.Scene.load(file)
+        if camera is not None:
+            scene = scene.with_tables(camera={"position": camera.position, "target": camera.target})
+        rest = [session.still(camera) for _ in range(4)]
+        pictures = [(rest[-1], True)] + [(session.frame(), False)] * (camera is None)
+        for picture, denoise in pictures:
+            wanted = scene.with_tables(frame={"samples": picture.samples, "denoise": denoise})
+            result = wanted.render(config=config, size=size, encoder="live")
+            assert result.object_mask.any()
+            np.testing.assert_array_equal(picture.pixels, result.pixels)
+    session.close()
 
 
 def test_the_last_picture_stays_while_the_file_is_wrong(server: ViewServer, file: Path) -> None:

@@ -27,6 +27,7 @@ from colonnade.mesh.mesh import Mesh
 from colonnade.scene.lit_room import scene_room
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
+from colonnade.scene.passes import exposed
 
 #: The library of Yosys's generic gates.
 GENERIC = "yosys"
@@ -240,7 +241,7 @@ def _frames(file: StudyFile) -> list[Frame]:
     found: list[Frame] = []
     for name in workload.scenes:
         try:
-            scene = load_scene(file.path.parent / name)
+            scene = exposed(load_scene(file.path.parent / name))
             samples = scene.frame.samples or 1
             if scene.blurs or samples > 1:
                 key = "frame.samples" if samples > 1 else scene.blurs[0]

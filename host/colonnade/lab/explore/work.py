@@ -37,7 +37,7 @@ def reference(folder: Path, *, scene: Scene, mesh: Mesh, size: Size) -> None:
 
 def picture(folder: Path, *, config: str, overrides: Sequence[str], scene: Scene, mesh: Mesh, size: Size) -> None:
     """Render a frame with the bit-exact model. Error bits are part of the result."""
-    from colonnade.render.frames import render_model
+    from colonnade.render.device_frames import render_model
 
     with _configuration(config) as path:
         manifest: Manifest = manifest_for(str(path), overrides).manifest

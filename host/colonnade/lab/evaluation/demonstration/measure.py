@@ -9,9 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common.accumulation import FramePasses
 from colonnade.common.framebuffer import Frame
-from colonnade.common.image_io import encode_srgb
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import GeneratedDesign
 from colonnade.design.manifest import Manifest
@@ -25,9 +23,12 @@ from colonnade.maps.encoded import layout_of
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.live import LiveEncoder, LiveFrame
 from colonnade.registers.target_view import TargetView
-from colonnade.render.composite import composited
-from colonnade.render.frames import sequence_scenes
+from colonnade.render.camera_look import CameraLook
+from colonnade.render.host_frame import HostFrame
+from colonnade.render.passes import model_passes
+from colonnade.render.sequence_frames import sequence_scenes
 from colonnade.scene.model import Scene
+from colonnade.scene.passes import exposed
 from colonnade.scene_image.device_image import load_cycles
 
 #: Registers are computed so often, and the least time counts.
@@ -107,22 +108,24 @@ def run(
     """
     sequence, manifest = demonstration.sequence, demonstration.design.manifest
     size, encoder, costs = (sequence.content.width, sequence.content.height), _Encoder(demonstration), []
-    scenes = sequence_scenes(sequence, demonstration.scene, manifest, size, encoder, every=every)
+    scene = exposed(demonstration.scene).with_samples(demonstration.samples)
+    scenes = sequence_scenes(sequence, scene, manifest, size, encoder, every=every)
     with progress.step(f"rendering {len(sequence)} frames with maps of every {every}") as report:
         for number, prepared in enumerate(scenes):
-            take(_picture(prepared, size, demonstration.samples))
+            take(_picture(prepared, size, number))
             is_key = number % every == 0
             costs.append(_cost(prepared, size, encoder.milliseconds if is_key else None, demonstration, number))
             report((number + 1) / len(sequence))
     return costs
 
 
-def _picture(prepared: DeviceScene, size: tuple[int, int], samples: int) -> NDArray[np.uint8]:
-    model, passes = loaded_model(prepared.manifest, prepared.image), FramePasses()
-    for scene in prepared.scene.with_samples(samples).passes():
-        passes.add(model_frame(model, prepared.registers(size, scene, composited=True)))
+def _picture(prepared: DeviceScene, size: tuple[int, int], number: int) -> NDArray[np.uint8]:
+    """A picture as `colonnade render --sequence` shows it."""
+    look = CameraLook.of(prepared.scene, prepared.photo, size)
+    frame = HostFrame(prepared, size, tuple(prepared.passes()), look=look, number=number)
+    ((passes, _, _),) = model_passes([frame], [[frame.registers(one) for one in frame.passes]])
     require_no_errors(passes.frame.errors)
-    return encode_srgb(composited(passes.sums, prepared.photo, prepared.strength))
+    return frame.pixels(passes)
 
 
 def _cost(

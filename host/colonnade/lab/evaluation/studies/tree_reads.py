@@ -18,7 +18,7 @@ from colonnade.design.toolchain import project_root
 from colonnade.device.scene import DeviceScene
 from colonnade.lab.common.markdown import markdown
 from colonnade.lab.evaluation.bench import MESHES, geometric_mean
-from colonnade.render.frames import render_model
+from colonnade.render.device_frames import render_model
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.file import SceneImage

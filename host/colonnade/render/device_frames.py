@@ -1,0 +1,121 @@
+"""The frames of a scene's motion by the model or the RTL."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from colonnade.common.progress import QUIET, Progress
+from colonnade.design.generator import design_for
+from colonnade.design.manifest import Manifest
+from colonnade.device.device import require_no_errors
+from colonnade.device.scene import DeviceScene
+from colonnade.mesh.mesh import Mesh
+from colonnade.render.camera_look import CameraLook
+from colonnade.render.host_frame import HostFrame
+from colonnade.render.passes import Registers, model_passes, rtl_passes
+from colonnade.render.report import frame_report
+from colonnade.render.request import RenderRequest
+from colonnade.render.result import RenderResult
+from colonnade.render.samples import within_budget
+from colonnade.scene.model import Scene
+from colonnade.scene_image.inspect import coarse_line
+
+Size = tuple[int, int]
+
+
+def device_frames(
+    request: RenderRequest, scene: Scene, manifest: Manifest, size: Size, note: str | None, progress: Progress
+) -> Iterator[RenderResult]:
+    """Render the frames of a scene's motion.
+
+    Args:
+        request: What to render.
+        scene: Its scene, with the samples of `with_requested_samples`.
+        manifest: The design's manifest.
+        size: Width and height, pixels.
+        note: A line on the samples.
+        progress: Shows the steps.
+    """
+    begun = time.perf_counter()
+    with progress.step("packing the scene"):
+        mesh = None if isinstance(request.mesh, str) else request.mesh
+        relit, encoder = request.relit, request.encoder
+        prepared = DeviceScene.of(scene, manifest, mesh, size=size, relit=relit, encoder=encoder, progress=progress)
+        if (line := coarse_line(prepared.image.header)) is not None:
+            progress.note(line)
+    prepared = within_budget(prepared, size, progress)
+    with progress.step("computing the registers"):
+        poses = [prepared.scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
+        frames = host_frames(request, prepared, size, poses, scene.motion.exposure(request.frames), progress)
+        registers = [[frame.registers(one) for one in frame.passes] for frame in frames]
+        if note is not None:
+            progress.note(note)
+    seconds = {"pack": time.perf_counter() - begun, "build": None}
+    results = rendered(request, frames, registers, progress)
+    if scene.paths.gather and len(poses) > 1:  # Each has a light cube of its own
+        results = itertools.chain.from_iterable(
+            rendered(request, [replace(frame, prepared=prepared.lit_at(pose, relit))], [values], progress)
+            for frame, pose, values in zip(frames, poses, registers, strict=True)
+        )
+    for pose, result in zip(poses, results, strict=True):
+        report = replace(result.report, share=pose.motion_progress, seconds=seconds | dict(result.report.seconds))
+        yield replace(result, report=report)
+
+
+def host_frames(
+    request: RenderRequest,
+    prepared: DeviceScene,
+    size: Size,
+    poses: Sequence[Scene],
+    exposure: float,
+    progress: Progress,
+    first: int = 0,
+) -> list[HostFrame]:
+    """The frames of poses of a scene, numbered from ``first``; the first of all notes what the object gets."""
+    look = None if request.relit else CameraLook.of(prepared.scene, prepared.photo, size)
+    if look is not None and look.note is not None and first == 0:
+        progress.note(look.note)
+    return [
+        HostFrame(
+            prepared, size, tuple(prepared.passes(pose, exposure)), request.relit, request.denoise, look, first + number
+        )
+        for number, pose in enumerate(poses)
+    ]
+
+
+def rendered(
+    request: RenderRequest, frames: Sequence[HostFrame], registers: Sequence[Registers], progress: Progress
+) -> Iterator[RenderResult]:
+    """Render frames that have one image, with the registers of each of their passes."""
+    if request.backend == "rtl":
+        design = design_for(request.config, request.overrides, progress)
+        found = rtl_passes(design, frames, registers, progress, request.waveform)
+    else:
+        found = model_passes(frames, registers, progress)
+    for frame, (passes, seconds, rate) in zip(frames, found, strict=True):
+        require_no_errors(passes.frame.errors)
+        maps, header = frame.prepared.maps, frame.prepared.image.header
+        report = replace(
+            frame_report(request.backend, frame.prepared.manifest, header, passes.frame),
+            seconds=seconds,
+            simulated_cycles_per_second=rate,
+            bytes=None if maps is None else maps.image.byte_counts(),
+            samples=passes.sums.samples,
+        )
+        yield frame.result(passes, report)
+
+
+def render_model(scene: Scene, mesh: Mesh, manifest: Manifest, size: Size, progress: Progress = QUIET) -> RenderResult:
+    """Render one frame of one sample with the model.
+
+    The scene's own mesh is not read, and error bits only appear in the report.
+    """
+    with progress.step("packing the scene"):
+        prepared = DeviceScene.of(scene.with_samples(1), manifest, mesh, progress=progress)
+        frame = HostFrame(prepared, size, tuple(prepared.passes()), look=CameraLook.of(scene, prepared.photo, size))
+        registers = [frame.registers(one) for one in frame.passes]
+    ((passes, _, _),) = model_passes([frame], [registers], progress)
+    return frame.result(passes, frame_report("model", manifest, prepared.image.header, passes.frame))

@@ -1,0 +1,120 @@
+"""A frame that the host adds up: its passes, and the picture that these give (docs/sampling.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.accumulation import WHITE, Accumulation, FramePasses
+from colonnade.common.errors import UserError
+from colonnade.common.framebuffer import Frame
+from colonnade.common.image_io import encode_srgb
+from colonnade.common.types import Floats
+from colonnade.design.manifest import Manifest
+from colonnade.device.scene import DeviceScene
+from colonnade.render.camera_look import CameraLook
+from colonnade.render.composite import composited
+from colonnade.render.report import FrameReport
+from colonnade.render.result import RenderResult
+from colonnade.scene.model import Scene
+
+
+@dataclass(frozen=True)
+class HostFrame:
+    """A frame of the model or the RTL.
+
+    Attributes:
+        prepared: The scene. With gathered light it is `exposed`.
+        size: Width and height, pixels.
+        passes: The scene at each pass; the first one shows surfaces.
+        relit: The frame shows the room under the scene's lights, not its photo.
+        denoise: The noise of gathered light is filtered.
+        look: What the object gets of the photo's camera.
+        number: From 0; each frame has its own grain.
+    """
+
+    prepared: DeviceScene
+    size: tuple[int, int]
+    passes: tuple[Scene, ...]
+    relit: bool = False
+    denoise: bool = False
+    look: CameraLook | None = None
+    number: int = 0
+
+    def registers(self, one: Scene) -> dict[str, int]:
+        """The registers of a pass.
+
+        Raises:
+            UserError: See `DeviceScene.registers`.
+        """
+        return self.prepared.registers(self.size, one, composited=not self.relit)
+
+    def no_passes(self) -> FramePasses:
+        """Where its passes are added."""
+        return FramePasses(has_squares=self.denoise, white=WHITE * self.prepared.scene.exposure)
+
+    def image(self, sums: Accumulation) -> Floats:
+        """The picture of sums, with those of coats: linear, float64 [height, width, 3]."""
+        if self.relit:
+            return sums.image()
+        return composited(sums, self.prepared.photo, self.prepared.strength, self.look, self.number)
+
+    def pixels(self, passes: FramePasses, is_whole: bool = True) -> npt.NDArray[np.uint8]:
+        """The picture of passes, as `RenderResult.pixels` has it; with passes to come it is not filtered."""
+        sums = self._sums(passes) if is_whole else passes.coated
+        if self.relit or self.prepared.photo is None:
+            return sums.pixels()
+        return encode_srgb(self.image(sums))
+
+    def result(self, passes: FramePasses, report: FrameReport) -> RenderResult:
+        """The result of all passes."""
+        frame, image = passes.frame, self.prepared.image
+        source = np.append(image.source_faces.astype(np.int64), -1)
+        sums = self._sums(passes)
+        return RenderResult(
+            image=self.image(sums),
+            object_mask=frame.is_object,
+            hit_triangles=source[np.where(frame.is_object, frame.triangle, -1)],
+            t=self._hits(frame)[0],
+            report=report,
+            sums=sums,
+            ratio=frame.ratio,
+            parts=image.header.parts,
+        )
+
+    def _sums(self, passes: FramePasses) -> Accumulation:
+        """Sums of all passes, with the colours of the object filtered if that is wanted."""
+        if not self.denoise:
+            return passes.coated
+        from colonnade.render.denoise import Guide, denoised
+
+        depth, position = self._hits(passes.frame)
+        shows_object = ~np.isnan(depth)
+
+        def filtered(layer: FramePasses) -> Accumulation:
+            sums, count = layer.sums, layer.sums.coverage[..., None]
+            colours = sums.objects / np.maximum(count, 1) / sums.white
+            found = denoised(colours, layer.object_variance(), Guide.of(position, shows_object & (count[..., 0] > 0)))
+            return replace(sums, objects=found * sums.white * count)
+
+        sums = filtered(passes)
+        return sums if passes.coats is None else sums.coated(filtered(passes.coats))
+
+    def _hits(self, frame: Frame) -> tuple[Floats, Floats]:
+        """Depth and position of the first pass, NaN for a miss, mesh units, float64 [height, width] and with [3]."""
+        view = self.prepared.view(self.size, self.passes[0])
+        x, y = np.arange(view.width)[None, :, None], np.arange(view.height)[:, None, None]
+        rays = view.direction + x * view.step_x + y * view.step_y
+        depth = frame.distance / (self.prepared.image.header.frame.scale * np.abs(rays).max(axis=2))
+        depth = np.where(frame.is_object, depth, np.nan)
+        return depth, view.origin + depth[..., None] * rays
+
+
+def require_filter(scene: Scene, manifest: Manifest) -> None:
+    """Raise a `UserError` if there is no noise to filter, or no depth to guide the filter."""
+    if scene.paths.gather == 0:
+        raise UserError("denoise filters the noise of gathered light: the scene has none, set paths.gather = 1")
+    if not manifest.config["frame"]["hits"]:
+        raise UserError("denoise needs the depth of pixels, which this hardware lacks: set frame.hits=true")

@@ -1,0 +1,124 @@
+"""The scene: its tables, and what it knows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import InstanceOf, WithJsonSchema
+from pydantic.dataclasses import dataclass
+
+from colonnade.common.errors import UserError
+from colonnade.environment.model import EnvironmentCamera
+from colonnade.scene.model.camera import Camera, FrameSize, Motion
+from colonnade.scene.model.light import Background, Colour, Light, Paths, PointLight
+from colonnade.scene.model.objects import Material, MeshSource, Placement, SceneObject, Transform
+from colonnade.scene.model.values import STRICT, Vector
+from colonnade.scene.samples import CENTRE, Sample
+
+
+@dataclass(frozen=True, config=STRICT)
+class Scene:
+    """One object or several, one camera, at least one light.
+
+    With a room, the camera is the room's unless the scene places it, and the world is the room's world, in metres.
+
+    Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass
+    over the frame. ``standing_point`` is the world point on which the object stands, if that is known from another view
+    of its room. ``frame_camera`` is that of a sequence's frame with the maps of another frame: a lens for their size,
+    and a pose. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
+    fitted to its photo. ``headroom`` scales all lights up and diffuse albedos of the object down
+    (`colonnade.environment.photo_colours`). ``exposure`` is the device's number for the radiance 1.0, as a factor.
+    """
+
+    mesh: MeshSource
+    transform: Transform = field(default_factory=Transform)
+    camera: Camera = field(default_factory=Camera)
+    light: Light = field(default_factory=Light)
+    more_lights: tuple[PointLight, ...] = ()
+    material: Material = field(default_factory=Material)
+    ambient: Colour = field(default_factory=lambda: Colour((0.1, 0.1, 0.1)))
+    background: Background = field(default_factory=Background)
+    placement: Placement | None = None  # in a room without a [transform]: the default one
+    objects: tuple[SceneObject, ...] = ()  # in place of mesh, transform, material and placement, which are unused then
+    paths: Paths = field(default_factory=Paths)
+    frame: FrameSize = field(default_factory=FrameSize)
+    motion: Motion = field(default_factory=Motion)
+    motion_progress: float = 0.0
+    sample: Sample = CENTRE
+    standing_point: Vector | None = None
+    frame_camera: Annotated[InstanceOf[EnvironmentCamera], WithJsonSchema({})] | None = None
+    names_light: bool = True
+    headroom: float = 1.0
+    exposure: float = 1.0
+
+    def at(self, progress: float) -> Scene:
+        """The scene at a progress along its motion."""
+        return replace(self, motion_progress=progress)
+
+    def with_samples(self, samples: int) -> Scene:
+        """The scene with so many samples a pixel."""
+        return replace(self, frame=replace(self.frame, samples=samples))
+
+    @property
+    def blurs(self) -> list[str]:
+        """The keys that only several samples show."""
+        keys = {
+            "light.radius": any(light.radius > 0 for light in self.lights),
+            "camera.aperture": self.camera.aperture > 0,
+            "motion.shutter": self.motion.shutter > 0,
+        }
+        return [key for key, is_used in keys.items() if is_used]
+
+    def with_mesh(self, name_or_path: str) -> Scene:
+        """The scene with another mesh, a name or a path relative to the working directory.
+
+        Raises:
+            UserError: The scene has several objects.
+        """
+        self.require_one_object("a mesh replaces that of a single object")
+        return replace(self, mesh=MeshSource(name=name_or_path, crease=self.mesh.crease))
+
+    def with_environment(self, folder: Path) -> Scene:
+        """The scene in the room of a folder."""
+        return replace(self, background=replace(self.background, room=folder))
+
+    @property
+    def places_camera(self) -> bool:
+        """Whether the camera may be elsewhere than that of the room's maps."""
+        return self.frame_camera is not None or self.camera.position is not None or bool(self.motion.camera)
+
+    @property
+    def lights(self) -> tuple[PointLight, ...]:
+        """All lights; the motion moves the first one."""
+        first, end = self.light, self.motion.light
+        if first.position is not None and end is not None:
+            first = replace(first, position=interpolate(first.position, end, self.motion_progress))
+        return first, *self.more_lights
+
+    @property
+    def mesh_source(self) -> str | Path:
+        """The argument for `colonnade.mesh.load.load_mesh`, of a scene of one object.
+
+        Raises:
+            UserError: The scene has several objects.
+        """
+        self.require_one_object("this command is for a scene of one object")
+        return self.mesh.source
+
+    def require_one_object(self, reason: str) -> None:
+        """Refuse a scene with ``[[object]]`` tables.
+
+        Raises:
+            UserError: The message begins with the reason.
+        """
+        if self.objects:
+            raise UserError(f"{reason}, but the scene has {len(self.objects)} [[object]]: use [mesh] and [object]")
+
+
+def interpolate(start: Sequence[float], end: Sequence[float], fraction: float) -> Vector:
+    """Interpolate two points linearly; both ends are exact."""
+    x, y, z = ((1.0 - fraction) * a + fraction * b for a, b in zip(start, end, strict=True))
+    return x, y, z

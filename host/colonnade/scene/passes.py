@@ -1,0 +1,65 @@
+"""The passes of a frame that the host adds up: its samples, and some of coats (docs/sampling.md, docs/gather.md).
+
+`view`, `render`, sequences and the reference have their passes from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from colonnade.common import notes
+from colonnade.mesh.materials import MeshMaterial, as_rendered
+from colonnade.scene.model import Scene
+from colonnade.scene.samples import samples_of_frame
+
+#: The device's number for the colour 1.0 where light is gathered, as a factor: a ray may bring more than the mean.
+_GATHER_EXPOSURE = 0.5
+#: Samples of surfaces for each one of their coats.
+_SAMPLES_OF_A_COAT = 4
+
+
+def exposed(scene: Scene) -> Scene:
+    """The scene with the exposure of frames that the host adds up (docs/gather.md, "Exposure")."""
+    return replace(scene, exposure=_GATHER_EXPOSURE) if scene.paths.gather else scene
+
+
+def of_a_device(scene: Scene) -> Scene:
+    """The scene for frames that a device shows by itself: one sample a pixel; a note names keys that need more."""
+    keys = scene.blurs
+    keys += [f"frame.samples = {scene.frame.samples}"] if (scene.frame.samples or 1) > 1 else []
+    keys += ["frame.denoise"] if scene.frame.denoise else []
+    if keys:
+        named = f"{' and '.join(keys)} {'is' if len(keys) == 1 else 'are'}"
+        notes.report([f"{named} of colonnade render: frames that a device shows by itself have one sample a pixel"])
+    return scene.with_samples(1)
+
+
+def may_show_coats(scene: Scene) -> bool:
+    """Whether frames show the coats of glossy surfaces: gathered light, and not one sample a pixel."""
+    return scene.paths.gather > 0 and scene.frame.samples != 1
+
+
+def frame_passes(scene: Scene, materials: Iterable[MeshMaterial] = (), exposure: float = 0.0) -> list[Scene]:
+    """The scene at each pass of its frame: at its samples, and with coats, one of these alone after every fourth.
+
+    Args:
+        scene: At the beginning of the frame.
+        materials: Of the mesh, with the scene's overrides; without one that has a coat there are no passes of coats.
+        exposure: Progress of the motion while the shutter is open (`Motion.exposure`).
+    """
+    count, lights = scene.frame.samples or 1, len(scene.lights)
+    passes = samples_of_frame(count, lights)
+    if count > 1 and may_show_coats(scene) and any(_has_coat(one) for one in materials):
+        coats = [replace(one, is_coat=True) for one in samples_of_frame(max(1, count // _SAMPLES_OF_A_COAT), lights)]
+        for number, coat in reversed(list(enumerate(coats, 1))):
+            passes.insert(-(-number * count // len(coats)), coat)
+    return [
+        replace(scene, sample=sample, motion_progress=min(1.0, scene.motion_progress + sample.time * exposure))
+        for sample in passes
+    ]
+
+
+def _has_coat(material: MeshMaterial) -> bool:
+    rendered = as_rendered(material, gathers=True)
+    return rendered.kind == "diffuse" and rendered.roughness > 0
