@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +40,12 @@ def record(name: str) -> dict[str, Any]:
         mesh.vertices.astype("<f8").tofile(folder / "vertices")
         mesh.faces.astype("<i4").tofile(folder / "faces")
         files = {part: str(folder / part) for part in ("view", "vertices", "faces")}
-        job = {"module": str(module.OBJECTS / "colonnade.wasm"), "design": name, **frame, **files}
+        job: dict[str, Any] = {"module": str(module.OBJECTS / "colonnade.wasm"), "design": name, **frame, **files}
         job["manifest"] = json.loads((designs.ROOT / "configs" / "golden" / f"{name}.json").read_text("utf-8"))
         (folder / "job").write_text(json.dumps(job))
         command = [str(NODE), str(Path(__file__).with_suffix(".mjs")), str(folder / "job")]
         frames = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    registers = []
+    registers: list[Mapping[str, int]] = []
     for writes in frames:
         words = dict(writes)
         fields = [field for field in manifest.registers.values() if field.access == "rw"]

@@ -37,7 +37,7 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
         ValueError: The designs do not have the same maps.
     """
     scene = load_scene(SCENE)
-    background = replace(scene.background, room=str(ROOT / "scenes" / "rooms" / name))
+    background = replace(scene.background, room=ROOT / "scenes" / "rooms" / name)
     scene = replace(scene, background=background, placement=PLACEMENTS[name])
     views: dict[str, dict[str, str]] = {}
     maps: list[dict[str, Any]] | None = None
@@ -54,6 +54,7 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
         if maps is not None and own != maps:
             raise ValueError(f"the maps of {design} are not those of the other designs")
         maps = own
+    assert ready.photo is not None
     photo = io.BytesIO()
     Image.fromarray(ready.photo).save(photo, "JPEG", quality=88)
     return {"views": views, "maps": maps, "photo": base64_text(photo.getvalue()), **_poses(ready)}
