@@ -155,8 +155,9 @@ class FramePasses:
         sums: Sums over all passes.
         counters: Sums over all passes; of a level the maximum.
         errors: Error bits of any pass.
-        has_squares: Keep `squares`, for `object_variance`.
-        squares: Sums over the squared luminance of the samples that show the object, of 1.0, float64 [height, width].
+        has_squares: Keep `squares`, for the variances.
+        squares: Sums over the squared luminance of the samples that show the object, of 1.0, and of the shadow ratios
+            of the others, float64 [2, height, width].
         white: The device's number for the colour 1.0.
         coats: The passes of coats; their counters and errors are also in those of the frame.
     """
@@ -178,7 +179,9 @@ class FramePasses:
             self._count(frame)
             return
         if self.has_squares:
-            squares = (frame.colour @ LUMINANCE / self.white) ** 2 * frame.is_object
+            ratio = np.zeros_like(frame.colour) if frame.ratio is None else frame.ratio
+            light = np.stack([frame.colour / self.white, ratio / UNSHADOWED]) @ LUMINANCE
+            squares = np.where([frame.is_object, ~frame.is_object], light, 0.0) ** 2
             self.squares = squares if self.squares is None else self.squares + squares
         if self.first is None:
             self.first, self.counters, self.errors = frame, dict(frame.counters), list(frame.errors)
@@ -209,14 +212,25 @@ class FramePasses:
 
         A pixel with one sample of the object has the largest variance of all pixels.
         """
-        assert self.squares is not None
+        return self._variance(0, self.sums.objects / self.white, self.sums.coverage)
+
+    def ratio_variance(self) -> npt.NDArray[np.float64] | None:
+        """As `object_variance`, of the luminance of the shadow ratios of samples that show a room."""
         sums = self.sums
-        if sums.samples == 1:
+        assert sums.ratio is not None
+        return self._variance(1, sums.ratio / sums.unshadowed, sums.samples - sums.coverage)
+
+    def _variance(
+        self, which: int, total: npt.NDArray[Any], samples: npt.NDArray[Any]
+    ) -> npt.NDArray[np.float64] | None:
+        """The variance of the mean of a number of samples in each pixel."""
+        assert self.squares is not None
+        if self.sums.samples == 1:
             return None
-        count = np.maximum(sums.coverage, 1)
-        mean = sums.objects @ LUMINANCE / self.white / count
-        variance = (self.squares / count - mean**2).clip(min=0.0) / np.maximum(count - 1, 1)
-        return np.asarray(np.where(sums.coverage == 1, variance.max(), variance))
+        count = np.maximum(samples, 1)
+        mean = total @ LUMINANCE / count
+        variance = (self.squares[which] / count - mean**2).clip(min=0.0) / np.maximum(count - 1, 1)
+        return np.asarray(np.where(samples == 1, variance.max(), variance))
 
     @property
     def frame(self) -> Frame:

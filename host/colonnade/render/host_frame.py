@@ -99,8 +99,29 @@ class HostFrame:
             found = denoised(colours, layer.object_variance(), Guide.of(position, shows_object & (count[..., 0] > 0)))
             return replace(sums, objects=found * sums.white * count)
 
-        sums = filtered(passes)
+        sums = self._with_smooth_shadow(filtered(passes), passes)
         return sums if passes.coats is None else sums.coated(filtered(passes.coats))
+
+    def _with_smooth_shadow(self, sums: Accumulation, passes: FramePasses) -> Accumulation:
+        """Sums with filtered shadow ratios, where the maps tell what the pixels of the room show."""
+        room, (width, height) = self.prepared.environment, self.size
+        is_lit = room is None or self.relit or self.prepared.photo is None or self.prepared.scene.places_camera
+        if room is None or sums.ratio is None or is_lit:
+            return sums
+        from colonnade.render.denoise import Guide, denoised
+
+        count = (sums.samples - sums.coverage)[..., None]
+        ratio = sums.ratio / np.maximum(count, 1) / sums.unshadowed
+        is_shadowed = (np.abs(ratio - 1) > 0).any(axis=2) & (count[..., 0] > 0)
+        if not is_shadowed.any():
+            return sums
+        rows, columns = (np.flatnonzero(is_shadowed.any(axis=axis)) for axis in (1, 0))
+        mask = np.zeros_like(is_shadowed)
+        mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = True
+        y, x = ((np.arange(size) * 2 + 1) * own // (2 * size) for size, own in ((height, room.height), (width, room.width)))
+        guide = Guide.of(room.points()[y[:, None], x], mask & (count[..., 0] > 0))
+        found = denoised(ratio, passes.ratio_variance(), guide)
+        return replace(sums, ratio=np.rint(found * count * sums.unshadowed).astype(sums.ratio.dtype))
 
     def _hits(self, frame: Frame) -> tuple[Floats, Floats]:
         """Depth and position of the first pass, NaN for a miss, mesh units, float64 [height, width] and with [3]."""

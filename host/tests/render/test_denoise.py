@@ -92,6 +92,22 @@ def test_the_command_filters_the_object(tmp_path: Path) -> None:
     assert error["filtered"] < 0.7 * error["raw"]
 
 
+def test_the_shadow_on_a_photo_is_filtered_and_the_photo_is_not(tmp_path: Path) -> None:
+    scene = Path(__file__).parents[3] / "scenes" / "gathered.toml"
+    pictures = {}
+    for name, options in (("raw", ("1",)), ("filtered", ("1", "--denoise")), ("truth", ("64",))):
+        arguments = ["render", str(scene), "--config", "textured", "--size", "80x60"]
+        output = tmp_path / f"{name}.png"
+        options = ("--backend", "model", "--output", str(output), "--samples", *options)
+        done = CliRunner().invoke(cli, [*arguments, *options])
+        assert done.exit_code == 0, done.output
+        pictures[name] = read_picture(output).astype(float)
+    shadow = np.s_[44:52, 24:56]
+    error = {name: ((picture - pictures["truth"])[shadow] ** 2).mean() for name, picture in pictures.items()}
+    assert error["filtered"] < 0.8 * error["raw"]
+    assert (pictures["filtered"] == pictures["truth"])[:16, :16].all(), "far from the object it is the photo"
+
+
 def test_a_scene_asks_for_the_filter(tmp_path: Path) -> None:
     frame = "[frame]\ndenoise = true\nsamples = 1\nwidth = 64\nheight = 48\n"
     (tmp_path / "own.toml").write_text(SCENE.format(1) + frame)
