@@ -104,23 +104,26 @@ class HostFrame:
 
     def _with_smooth_shadow(self, sums: Accumulation, passes: FramePasses) -> Accumulation:
         """Sums with filtered shadow ratios, where the maps tell what the pixels of the room show."""
-        room, (width, height) = self.prepared.environment, self.size
-        is_lit = room is None or self.relit or self.prepared.photo is None or self.prepared.scene.places_camera
-        if room is None or sums.ratio is None or is_lit:
+        prepared = self.prepared
+        if self.relit or prepared.scene.places_camera or prepared.environment is None or prepared.photo is None:
             return sums
         from colonnade.render.denoise import Guide, denoised
 
+        assert sums.ratio is not None
         count = (sums.samples - sums.coverage)[..., None]
         ratio = sums.ratio / np.maximum(count, 1) / sums.unshadowed
-        is_shadowed = (np.abs(ratio - 1) > 0).any(axis=2) & (count[..., 0] > 0)
-        if not is_shadowed.any():
+        shows_room = count[..., 0] > 0
+        rows, columns = (np.flatnonzero(((ratio != 1).any(axis=2) & shows_room).any(axis=axis)) for axis in (1, 0))
+        if len(rows) == 0:
             return sums
-        rows, columns = (np.flatnonzero(is_shadowed.any(axis=axis)) for axis in (1, 0))
-        mask = np.zeros_like(is_shadowed)
-        mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = True
-        y, x = ((np.arange(size) * 2 + 1) * own // (2 * size) for size, own in ((height, room.height), (width, room.width)))
-        guide = Guide.of(room.points()[y[:, None], x], mask & (count[..., 0] > 0))
-        found = denoised(ratio, passes.ratio_variance(), guide)
+        mask = np.zeros_like(shows_room)
+        around = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        mask[around] = shows_room[around]
+        points = prepared.environment.points()
+        y, x = (
+            (2 * np.arange(size) + 1) * of // (2 * size) for size, of in zip(mask.shape, points.shape, strict=False)
+        )
+        found = denoised(ratio, passes.ratio_variance(), Guide.of(points[y[:, None], x], mask))
         return replace(sums, ratio=np.rint(found * count * sums.unshadowed).astype(sums.ratio.dtype))
 
     def _hits(self, frame: Frame) -> tuple[Floats, Floats]:

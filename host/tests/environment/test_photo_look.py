@@ -18,7 +18,7 @@ from colonnade.environment.photo_grain import Grain
 
 SCENES = Path(__file__).parents[3] / "scenes"
 #: Rooms that were rendered without noise, with textures.
-SMOOTH = tuple(f"light/{name}/photo.webp" for name in ("attic", "chamber", "lean-to", "parlour")) + ("rooms/attic/photo.png",)
+SMOOTH = ("rooms/attic/photo.png", *(f"light/{name}/photo.webp" for name in ("attic", "chamber", "lean-to", "parlour")))
 
 
 @cache
