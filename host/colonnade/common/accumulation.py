@@ -60,13 +60,14 @@ class Accumulation:
         unshadowed: float = 1.0,
     ) -> Accumulation:
         """One sample of each pixel."""
-        shows = is_object[..., None]
-        zero = colour.dtype.type(0)
+        # Products, which take a quarter of the time of `np.where`
+        shows = is_object[..., None].astype(colour.dtype)
+        objects = colour * shows
         return Accumulation(
             samples=1,
-            objects=np.where(shows, colour, zero),
-            background=np.where(shows, zero, colour),
-            ratio=None if ratio is None else np.where(shows, zero, ratio),
+            objects=objects,
+            background=colour - objects,
+            ratio=None if ratio is None else ratio * (1 - shows),
             coverage=is_object.astype(np.int64),
             white=white,
             unshadowed=unshadowed,
@@ -200,7 +201,9 @@ class FramePasses:
     def sums(self) -> Accumulation:
         """Sums over all passes; those of a single one are made when they are needed."""
         assert self.first is not None
-        return self._sums or Accumulation.of_frame(self.first, self.white)
+        if self._sums is None:
+            self._sums = Accumulation.of_frame(self.first, self.white)
+        return self._sums
 
     @property
     def coated(self) -> Accumulation:

@@ -49,7 +49,7 @@ def frame_passes(scene: Scene, materials: Iterable[MeshMaterial] = (), exposure:
         exposure: Progress of the motion while the shutter is open (`Motion.exposure`).
     """
     count, lights = scene.frame.samples or 1, len(scene.lights)
-    passes = samples_of_frame(count, lights)
+    passes = list(samples_of_frame(count, lights))
     if count > 1 and may_show_coats(scene) and any(_has_coat(one) for one in materials):
         coats = [replace(one, is_coat=True) for one in samples_of_frame(max(1, count // _SAMPLES_OF_A_COAT), lights)]
         for number, coat in reversed(list(enumerate(coats, 1))):

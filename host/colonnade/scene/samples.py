@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -47,7 +48,8 @@ PHOTO_SAMPLES = 4
 CENTRE = Sample()
 
 
-def samples_of_frame(count: int, lights: int) -> list[Sample]:
+@lru_cache(maxsize=16)
+def samples_of_frame(count: int, lights: int) -> tuple[Sample, ...]:
     """The samples of a frame; they are the same for every frame with as many passes.
 
     Args:
@@ -56,7 +58,7 @@ def samples_of_frame(count: int, lights: int) -> list[Sample]:
     """
     pixel, time, lens, *others = (square_points(count, dimension) for dimension in range(3 + lights + MAX_GATHERED))
     on_lights, gather = others[:lights], [(points * 256).astype(np.int64) for points in others[lights:]]
-    return [
+    return tuple(
         Sample(
             pixel=(float(pixel[index, 0] - 0.5), float(pixel[index, 1] - 0.5)),
             time=float(time[index, 0]),
@@ -65,7 +67,7 @@ def samples_of_frame(count: int, lights: int) -> list[Sample]:
             gather=tuple((int(points[index, 0]), int(points[index, 1])) for points in gather),
         )
         for index in range(count)
-    ]
+    )
 
 
 def square_points(count: int, dimension: int) -> Floats:

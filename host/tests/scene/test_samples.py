@@ -60,7 +60,7 @@ def test_the_points_of_four_samples_are_fixed() -> None:
 
 
 def test_one_sample_is_the_centre() -> None:
-    assert samples_of_frame(1, 2) == [replace(CENTRE, lights=((0.0, 0.0), (0.0, 0.0)))]
+    assert samples_of_frame(1, 2) == (replace(CENTRE, lights=((0.0, 0.0), (0.0, 0.0))),)
     assert CENTRE.light(5) == (0.0, 0.0)
 
 
