@@ -72,8 +72,8 @@ public:
         });
     }
 
-    std::string setPhoto(std::uint64_t base, std::uint32_t stride, Window window) {
-        const colonnade_photo photo{base, stride, {window.first, window.second}};
+    std::string setPhoto(std::uint64_t base, std::uint32_t stride, Window window, bool hasStrengths) {
+        const colonnade_photo photo{base, stride, {window.first, window.second}, hasStrengths};
         return run([&] { return colonnade_set_photo(&device_, &photo); });
     }
 
@@ -168,7 +168,7 @@ void bind_driver(nb::module_& module) {
         .def("load", &Driver::load, "image"_a, "address"_a, "window"_a, "is_maps"_a)
         .def("set_scene", &Driver::setScene, "address"_a)
         .def("set_frame", &Driver::setFrame, "file"_a)
-        .def("set_photo", &Driver::setPhoto, "base"_a, "stride"_a, "window"_a)
+        .def("set_photo", &Driver::setPhoto, "base"_a, "stride"_a, "window"_a, "has_strengths"_a)
         .def("clear_photo", &Driver::clearPhoto)
         .def("start", &Driver::start, "base"_a, "stride"_a, "format"_a, "window"_a)
         .def("wait", &Driver::waitFor, "events"_a)

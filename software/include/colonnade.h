@@ -33,7 +33,7 @@ enum colonnade_error {
     COLONNADE_BUS_RESPONSE,    /* the memory answered with an error */
     COLONNADE_BAD_SECTION,     /* an image has a section for a memory that the device lacks, or one that is too long */
     COLONNADE_BAD_LENGTH,      /* an image's sections do not fill it */
-    COLONNADE_NO_PHOTO,        /* the device cannot composite a photo */
+    COLONNADE_NO_PHOTO,        /* the device cannot composite a photo, or a photo with strengths */
     COLONNADE_FRAME_INVALID,   /* the device has an error bit: colonnade_device_errors */
     COLONNADE_NO_SCENE,        /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not */
     /* Of colonnade_view.h */
@@ -127,6 +127,7 @@ struct colonnade_photo {
     uint64_t base;
     uint32_t stride; /* bytes */
     struct colonnade_window window;
+    bool has_strengths; /* X is the strength of the object's shadow, 255 a whole one; otherwise all are whole */
 };
 
 /* Finds out whether the device is the one of the design, and fills `device`. Touches nothing but read-only registers.

@@ -315,6 +315,11 @@ extern "C" {
 #define COLONNADE_SHELL__STREAM_ENABLED__VALUE_bp 0
 #define COLONNADE_SHELL__STREAM_ENABLED__VALUE_bw 1
 
+// reg - colonnade_shell::photo_hasStrengths
+#define COLONNADE_SHELL__PHOTO_HASSTRENGTHS__VALUE_bm 0x1
+#define COLONNADE_SHELL__PHOTO_HASSTRENGTHS__VALUE_bp 0
+#define COLONNADE_SHELL__PHOTO_HASSTRENGTHS__VALUE_bw 1
+
 // addrmap - colonnade_shell
 typedef struct __attribute__ ((__packed__)) {
     uint32_t identity;
@@ -364,11 +369,12 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t photo_stride;
     uint32_t photo_enabled;
     uint32_t stream_enabled;
+    uint32_t photo_hasStrengths;
 } colonnade_shell_t;
 
 
 #ifndef __cplusplus
-_Static_assert(sizeof(colonnade_shell_t) == 0x104, "Packing error");
+_Static_assert(sizeof(colonnade_shell_t) == 0x108, "Packing error");
 #endif
 
 #ifdef __cplusplus

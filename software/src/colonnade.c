@@ -134,15 +134,16 @@ static bool frame_bytes(const struct colonnade *device, uint32_t stride, uint32_
 }
 
 enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct colonnade_photo *photo) {
-    /* Shells of version 1.0 lack these registers */
-    bool composites = (get(device, REGISTER(version)) & COLONNADE_SHELL__VERSION__MINOR_bm) != 0 &&
-                      (device->capabilities & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0;
+    /* Shells of version 1.0 lack these registers, those before 1.3 photo.hasStrengths */
+    const uint32_t minor = get(device, REGISTER(version)) & COLONNADE_SHELL__VERSION__MINOR_bm;
+    bool composites = minor != 0 && (device->capabilities & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0;
     if (!composites) return photo == NULL ? COLONNADE_OK : COLONNADE_NO_PHOTO;
     if (photo == NULL) {
         if (!takes_a_frame(device, 0)) return COLONNADE_BUSY;
         set(device, REGISTER(photo_enabled), 0);
         return COLONNADE_OK;
     }
+    if (photo->has_strengths && minor < 3) return COLONNADE_NO_PHOTO;
     if (device->width == 0 || device->height == 0) return COLONNADE_NO_FRAME;
     uint32_t row = device->design->tile_size * 4;
     if (photo->base % row != 0 || photo->stride % row != 0) return COLONNADE_MISALIGNED;
@@ -154,6 +155,7 @@ enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct 
     set_wide(device, REGISTER(photo_windowBase_low), photo->window.base);
     set_wide(device, REGISTER(photo_windowEnd_low), photo->window.end);
     set(device, REGISTER(photo_stride), photo->stride);
+    if (minor >= 3) set(device, REGISTER(photo_hasStrengths), photo->has_strengths);
     set(device, REGISTER(photo_enabled), 1);
     return COLONNADE_OK;
 }

@@ -175,7 +175,8 @@ static void start(struct colonnade *device) {
 static void set_photo(struct colonnade *device) {
     const uint64_t base = take_address();
     const uint32_t stride = take_stride(device, 4);
-    const struct colonnade_photo photo = {base, stride, take_window(base, (uint64_t)stride * device->height)};
+    const struct colonnade_window window = take_window(base, (uint64_t)stride * device->height);
+    const struct colonnade_photo photo = {base, stride, window, take() % 2 != 0};
     colonnade_set_photo(device, take() < 224 ? &photo : NULL);
 }
 

@@ -81,7 +81,7 @@ int main(int argc, char **argv) {
         const struct colonnade_frame frame = set_frame(&device, number);
         const uint64_t end = store(numbered("photo", number), photo_place, &bytes);
         const uint32_t stride = (uint32_t)(bytes / frame.height);
-        const struct colonnade_photo photo = {photo_place, stride, {photo_place, photo_place + bytes}};
+        const struct colonnade_photo photo = {photo_place, stride, {photo_place, photo_place + bytes}, true};
         expect(colonnade_set_photo(&device, &photo), COLONNADE_OK, "set photo");
         if (place == 0) place = end + PAGE;
         const struct colonnade_framebuffer framebuffer = {place, stride, COLONNADE_XRGB8888, {place, place + bytes}};

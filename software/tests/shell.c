@@ -51,6 +51,7 @@ static const struct {
     WIDE(photo_windowEnd, NOT_QUEUED),
     WORD(photo_stride, 24, NOT_QUEUED),
     WORD(photo_enabled, 1, WITH_ENVIRONMENT),
+    WORD(photo_hasStrengths, 1, NOT_QUEUED),
 };
 
 static void require(bool condition, const char *what, const struct shell *shell, uint32_t address, uint32_t value) {

@@ -299,7 +299,7 @@ static void test_scenes(struct shell *shell, struct colonnade *device) {
 }
 
 static void test_photos(struct shell *shell, struct colonnade *device) {
-    struct colonnade_photo photo = {4096, 64, {4096, 4096 + 2 * 64}};
+    struct colonnade_photo photo = {4096, 64, {4096, 4096 + 2 * 64}, false};
     shell->registers[AT(version)] = 0x00010000;
     CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO && colonnade_set_photo(device, NULL) == COLONNADE_OK);
     shell->registers[AT(version)] = 0x00010001;
@@ -320,6 +320,12 @@ static void test_photos(struct shell *shell, struct colonnade *device) {
     shell->registers[AT(status)] = 1;
     CHECK(colonnade_set_photo(device, &photo) == COLONNADE_OK && shell->registers[AT(photo_enabled)] == 1);
     CHECK(shell->registers[AT(photo_base_low)] == 4096 && shell->registers[AT(photo_stride)] == 64);
+    photo.has_strengths = true;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO && shell->registers[AT(photo_hasStrengths)] == 0);
+    shell->registers[AT(version)] = 0x00010003;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_OK && shell->registers[AT(photo_hasStrengths)] == 1);
+    photo.has_strengths = false;
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_OK && shell->registers[AT(photo_hasStrengths)] == 0);
     CHECK(colonnade_set_photo(device, NULL) == COLONNADE_OK && shell->registers[AT(photo_enabled)] == 0);
 }
 

@@ -46,8 +46,11 @@ from colonnade.maps.encoders import Encoder
     help="Also write the records as a design with a cache reads them from DRAM.",
 )
 @click.option("--frame-file", type=FILE, metavar="FILE", help="Also write the registers of a frame, for a driver.")
+@click.option(
+    "--photo-file", type=FILE, metavar="FILE", help="Also write the photo behind the object, for the AXI4 shell."
+)
 @click.option("--view-file", type=FILE, metavar="FILE", help="Also write what a processor needs to move the object.")
-@size_option("Frame size of --frame-file and --view-file, e.g. 640x480.  [default: that of the scene]")
+@size_option("Frame size of --frame-file, --photo-file and --view-file, e.g. 640x480.  [default: that of the scene]")
 @strict_option
 @json_option
 def pack(
@@ -62,13 +65,15 @@ def pack(
     maps_image: Path | None,
     dram_image: Path | None,
     frame_file: Path | None,
+    photo_file: Path | None,
     view_file: Path | None,
     size: str | None,
     json_file: Path | None,
 ) -> None:
     """Pack SCENE, a TOML file, for one configuration, and print its use of each memory."""
-    if size is not None and frame_file is None and view_file is None:
-        raise click.UsageError("--size is that of --frame-file and --view-file", click.get_current_context())
+    if size is not None and frame_file is None and photo_file is None and view_file is None:
+        message = "--size is that of --frame-file, --photo-file and --view-file"
+        raise click.UsageError(message, click.get_current_context())
 
     from colonnade.common import progress
     from colonnade.common.atomic_files import replacing
@@ -86,7 +91,9 @@ def pack(
 
     file = image_file(output)
     check_image_file(file)
-    require_outputs(json_file, device_image, maps_image, dram_image, frame_file, view_file, folders=[file.parent])
+    require_outputs(
+        json_file, device_image, maps_image, dram_image, frame_file, photo_file, view_file, folders=[file.parent]
+    )
     declare_output(file)
     terminal = progress.for_terminal()
     pixels = parse_size(size) if size is not None else None
@@ -115,7 +122,13 @@ def pack(
             others.append(("for DRAM", dram_image, prepared.dram_image()))
         width, height = pixels or (described.frame.width, described.frame.height)
         if frame_file is not None:
-            others.append(("a frame", frame_file, prepared.frame_file((width, height))))
+            registers = prepared.frame_file((width, height), composited=photo_file is not None)
+            others.append(("a frame", frame_file, registers))
+        if photo_file is not None:
+            photo = prepared.photo_file((width, height))
+            if photo is None:
+                raise UserError(f"--photo-file holds the photo behind the object, and {scene} has no photo of its view")
+            others.append(("a photo", photo_file, photo))
         if view_file is not None:
             others.append(("a view", view_file, prepared.view_file((width, height), composited=True)))
     image.save(output)
@@ -123,7 +136,7 @@ def pack(
     for title, path, content in others:
         with replacing(path) as stream:
             stream.write(content)
-        size_of_frame = f", {width}x{height}" if path in (frame_file, view_file) else ""
+        size_of_frame = f", {width}x{height}" if path in (frame_file, photo_file, view_file) else ""
         echo(f"{title:<11} {path}{size_of_frame}")
     print_report(image.header, manifest, echo)
     finish({"file": str(file), **describe(image), "use": memory_use(image.header, manifest)}, json_file)

@@ -14,6 +14,9 @@ from colonnade.common.image_io import encode_srgb
 #: The device's numbers for the colour 1.0, the shadow ratio 1.0, and the photo's colour 1.0.
 WHITE, UNSHADOWED, PHOTO_WHITE = 4095, 4096, 65535
 
+#: The strength of a whole shadow.
+WHOLE = 255
+
 #: Weights of red, green and blue in the luminance (Rec. 709).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -117,7 +120,7 @@ class Accumulation:
 
         Args:
             photo: Linear, float64 [height, width, 3].
-            strength: Of the shadow, uint8 [height, width], 255 the whole one; None: it is whole everywhere.
+            strength: Of the shadow, uint8 [height, width], `WHOLE` the whole one; None: it is whole everywhere.
 
         Returns:
             Linear colours, float64 [height, width, 3]. Each sample that does not show the object shows the photo, times
@@ -126,11 +129,26 @@ class Accumulation:
         assert self.ratio is not None
         ratio, is_exact = self.ratio, self.unshadowed == UNSHADOWED
         if strength is not None:
-            part, others = strength.astype(np.int64)[..., None], (self.samples - self.coverage)[..., None]
-            ratio = part * ratio + (255 - part) * others * (UNSHADOWED if is_exact else self.unshadowed)
-            ratio = (ratio + 127) // 255 if is_exact else ratio / 255
+            unshadowed = (self.samples - self.coverage)[..., None] * (UNSHADOWED if is_exact else self.unshadowed)
+            ratio = weakened(ratio, strength, unshadowed, is_exact)
         background = shadowed_photo(photo, ratio) / PHOTO_WHITE if is_exact else photo * (ratio / self.unshadowed)
         return np.asarray(((self.objects / self.white + background) / self.samples).clip(max=1.0))
+
+
+def weakened(
+    ratio: npt.NDArray[Any], strength: npt.NDArray[np.uint8], unshadowed: npt.NDArray[Any] | int, is_exact: bool = True
+) -> npt.NDArray[Any]:
+    """Shadow ratios with a strength, as the AXI4 shell computes them (docs/bus-shell.md).
+
+    Args:
+        ratio: Shadow ratios, or sums of them, [height, width, 3].
+        strength: Of the shadow, uint8 [height, width]; `WHOLE` is a whole one.
+        unshadowed: The ratio without a shadow, or the sums of it, [height, width, 1].
+        is_exact: Round to the nearest integer.
+    """
+    part = strength.astype(np.int64)[..., None]
+    ratio = part * ratio + (WHOLE - part) * unshadowed
+    return np.asarray((ratio + WHOLE // 2) // WHOLE if is_exact else ratio / WHOLE)
 
 
 def shadowed_photo(photo: npt.NDArray[np.float64], ratio: npt.NDArray[Any]) -> npt.NDArray[np.int64]:

@@ -53,7 +53,7 @@ class Device(ABC):
         Args:
             registers: Values of all rw registers by name: `DeviceScene.registers`.
             photo: In a room: what frames show where the object is not, under the object's shadow. sRGB, uint8 [height,
-                width, 3], in the frame's size.
+                width, 3], in the frame's size; or [height, width, 4] with the strength of the shadow, 255 a whole one.
 
         Raises:
             UserError: No scene is loaded, a frame runs, or the frame is too large.
@@ -214,9 +214,10 @@ def check_photo(photo: Pixels | None, registers: Mapping[str, int]) -> None:
         return
     if not registers.get("environment.enabled", 0):
         raise UserError("a photo shows behind the object of a room, and this frame has none: leave out the photo")
-    wanted = registers["frame.height"], registers["frame.width"], 3
-    if photo.shape != wanted or photo.dtype != np.uint8:
-        raise UserError(f"the photo is {photo.dtype} {list(photo.shape)}, the frame needs uint8 {list(wanted)}")
+    height, width = registers["frame.height"], registers["frame.width"]
+    if photo.shape not in ((height, width, 3), (height, width, 4)) or photo.dtype != np.uint8:
+        found, wanted = f"{photo.dtype} {list(photo.shape)}", f"uint8 {[height, width, 3]}"
+        raise UserError(f"the photo is {found}, the frame needs {wanted}, or 4 channels with strengths of the shadow")
 
 
 def require_no_errors(errors: Sequence[str]) -> None:

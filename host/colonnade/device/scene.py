@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.framebuffer_formats import photo_lines
 from colonnade.common.image_io import resized_photo
 from colonnade.common.progress import QUIET, Progress
 from colonnade.device.gathered_light import scene_cube, with_cube
@@ -190,8 +191,11 @@ class DeviceScene:
         return frame_registers(scene or self.scene, self.image.header, self.manifest, *size, self.maps, shows_room)
 
     def frame_photo(self, size: tuple[int, int]) -> NDArray[np.uint8] | None:
-        """The photo in the size of a frame, sRGB, uint8 [height, width, 3]; None without one."""
-        return None if self.photo is None else resized_photo(self.photo, *size)
+        """The photo in the size of a frame, for `Device.set_frame`, with `strength` if there is one; else None."""
+        if self.photo is None:
+            return None
+        photo = resized_photo(self.photo, *size)
+        return photo if self.strength is None else np.dstack([photo, resized_photo(self.strength, *size)])
 
     def device_image(self) -> bytes:
         """What the AXI4 shell loads (docs/bus-shell.md, "An image"): `image`, without records that lie in DRAM."""
@@ -209,13 +213,18 @@ class DeviceScene:
         """
         return dram_image(self.image, self.manifest)
 
-    def frame_file(self, size: tuple[int, int]) -> bytes:
+    def frame_file(self, size: tuple[int, int], *, composited: bool = False) -> bytes:
         """The registers of a frame, for the driver (docs/driver.md, "In: two files"); arguments as in `registers`.
 
         Raises:
             UserError: See `registers`.
         """
-        return frame_file(self.registers(size), self.manifest)
+        return frame_file(self.registers(size, composited=composited), self.manifest)
+
+    def photo_file(self, size: tuple[int, int]) -> bytes | None:
+        """`frame_photo` as the AXI4 shell reads it (`photo_lines`); None without a photo."""
+        photo = self.frame_photo(size)
+        return None if photo is None else photo_lines(photo, int(self.manifest.config["frame"]["tileSize"])).tobytes()
 
     def view_file(self, size: tuple[int, int], *, composited: bool = False) -> bytes:
         """The file with which a processor computes frames of other poses (`view_file`); arguments as in `registers`.

@@ -56,7 +56,7 @@ def render_shell(
         formats: Codes of `FORMATS`.
         bus: The memory's timing.
         progress: Shows the steps.
-        photo: Composited into the frames, which then have one size: sRGB, uint8 [height, width, 3].
+        photo: Composited into the frames, which then have one size; as in `Device.set_frame`.
         scene_errors: With a cache: for each frame, how many of 1024 beats of the scene's reads fail; none if empty.
 
     Raises:

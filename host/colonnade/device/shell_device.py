@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from colonnade.common.errors import UserError
-from colonnade.common.framebuffer_formats import PIXEL_BYTES
+from colonnade.common.framebuffer_formats import PIXEL_BYTES, photo_lines
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, shell_design_for, shell_manifest_for
@@ -34,7 +34,7 @@ _MEANINGS = {
     "busy": "the device is busy: wait for its frame, or reset it",
     "busResponse": "the memory has answered the device with an error",
     "noFrame": "no frame is set: set its registers before the start",
-    "noPhoto": "the device composites no photo: render without one",
+    "noPhoto": "the device composites no photo, or not the strengths of its shadows: render without them",
 }
 
 
@@ -153,9 +153,10 @@ class ShellDevice(Device):
         if photo is None:
             self._check(self._driver.clear_photo())
             return
-        lines = self._photo_lines(photo)
+        lines = photo_lines(photo, self._design.numbers["tile_size"])
         self._end = self._stored("the photo", self._free, lines.tobytes())
-        self._check(self._driver.set_photo(self._free, lines.shape[1], self._window(self._free, lines.size)))
+        window = self._window(self._free, lines.size)
+        self._check(self._driver.set_photo(self._free, lines.shape[1], window, photo.shape[2] == 4))
 
     def start(self, pixel_format: int = 0, address: int | None = None) -> None:
         """See `Device`.
@@ -269,11 +270,3 @@ class ShellDevice(Device):
                 f"the device's memory of {self.transport.size:,} bytes is too small for {what}:"
                 f" {beyond:,} more are needed"
             )
-
-    def _photo_lines(self, photo: Pixels) -> Pixels:
-        """A photo as XRGB8888, in lines of whole tile rows: uint8 [height, stride]."""
-        height, width, _ = photo.shape
-        tile = self._design.numbers["tile_size"]
-        lines = np.zeros((height, -(-width // tile) * tile, 4), np.uint8)
-        lines[:, :width, :3] = photo[..., ::-1]
-        return lines.reshape(height, -1)

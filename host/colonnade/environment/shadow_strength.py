@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from colonnade.common.accumulation import LUMINANCE
+from colonnade.common.accumulation import LUMINANCE, WHOLE
 from colonnade.common.image_io import decode_srgb
 from colonnade.environment.lights import RoomLights, irradiance, world_surface
 from colonnade.environment.model import Environment
 
-#: The strength of a whole shadow.
-WHOLE = 255
 #: Channels of the photo tell the light from and up to these values.
 _PHOTO_RANGE = (2, 253)
 #: Reflected light below this does not tell the share of the lights.

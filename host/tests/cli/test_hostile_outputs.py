@@ -116,6 +116,9 @@ CASES |= {
     "frame-too-large-after-packing": Case(
         f"{PACK} --output q --frame-file f --size 99999x9", "99999", {"q": lambda path: path.mkdir()}
     ),
+    "photo-without-a-room": Case(
+        f"{PACK} --output q --photo-file f --size 8x8", "no photo of its view", {"q": lambda path: path.mkdir()}
+    ),
     "frame-is-a-pipe": Case(f"{RENDER} --frames 3 --output f.png", "a pipe", {"f_0002.png": fifo}),
     "json-is-plot": Case("bench --plot f --json f", "two outputs"),
     "json-is-image": Case(f"{PACK} --output q.image --json q.image", "two outputs"),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from colonnade.common.accumulation import Accumulation
 from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
-from colonnade.common.image_io import encode_srgb, resized_photo
+from colonnade.common.image_io import encode_srgb
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
@@ -81,6 +82,7 @@ def test_a_room_in_memory_is_that_of_the_model() -> None:
     design = shell_design_for("small", ("array.columns=2", "array.rows=1"), bus_bytes=16)
     manifest = design.manifest
     scene = load_scene(toolchain.project_root() / "scenes" / "room.toml")
+    scene = replace(scene, background=replace(scene.background, shadows="photo"))
     prepared = DeviceScene.of(scene, manifest)
     image, registers = prepared.image, prepared.registers((WIDTH, HEIGHT))
     expected = render_model(manifest, image, registers)
@@ -88,9 +90,10 @@ def test_a_room_in_memory_is_that_of_the_model() -> None:
     (frame,) = render_shell(design, image, [registers], [0], Bus(latency=40, stall=10, seed=3))
     assert_bytes(frame, framebuffer_bytes(expected, 0), PIXEL_BYTES[0])
 
-    photo = resized_photo(prepared.photo, WIDTH, HEIGHT)
+    photo = prepared.frame_photo((WIDTH, HEIGHT))
+    assert photo is not None and photo.shape[2] == 4 and np.ptp(photo[..., 3]) > 50
     frames = render_shell(design, image, [registers] * 3, [0, 1, 2], Bus(latency=40, stall=10, seed=4), photo=photo)
     for code, frame in enumerate(frames):
         assert_bytes(frame, framebuffer_bytes(expected, code, photo), PIXEL_BYTES[code])
-    host = encode_srgb(composited(Accumulation.of_frame(expected), prepared.photo))
+    host = encode_srgb(composited(Accumulation.of_frame(expected), prepared.photo, prepared.strength))
     np.testing.assert_array_equal(frames[0].lines[:, : 4 * WIDTH].reshape(HEIGHT, WIDTH, 4)[..., 2::-1], host)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from colonnade.common.framebuffer import Frame
-from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
+from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes, photo_lines
 from colonnade.common.image_io import resized_photo
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
@@ -317,9 +317,9 @@ def test_frames_of_a_moving_camera_are_those_of_the_model(tmp_path: Path, every:
             registers = prepared.registers(size, composited=True)
             files[f"frame.{number}"] = frame_file(registers, manifest)
         assert registers["environment.isMapCamera"] == int(number % every == 0)
-        photo = resized_photo(prepared.photo, *size)
-        lines = np.zeros((size[1], size[0], 4), np.uint8)
-        lines[..., :3] = photo[..., ::-1]
+        strength = np.arange(size[0] * size[1], dtype=np.uint8).reshape(size[1], size[0])
+        photo = np.dstack([resized_photo(prepared.photo, *size), strength])
+        lines = photo_lines(photo, 16)
         files[f"photo.{number}"] = lines.tobytes()
         frame = render_model(manifest, prepared.image, registers)
         expected.append(framebuffer_bytes(frame, 0, photo))

@@ -58,8 +58,9 @@ final class FramebufferSettings extends Bundle {
 
 /** The camera's photo, XRGB8888 in sRGB, for the pixels that do not show the object. */
 final class PhotoSettings extends Bundle {
-  val isEnabled = Bool()
-  val base      = UInt(Axi.addressBits.W)
-  val stride    = UInt(24.W)
-  val window    = new AddressWindow
+  val isEnabled    = Bool()
+  val hasStrengths = Bool() // X is the strength of the shadow, 255 a whole one
+  val base         = UInt(Axi.addressBits.W)
+  val stride       = UInt(24.W)
+  val window       = new AddressWindow
 }

@@ -83,10 +83,11 @@ final class PhotoCompositor(config: ColonnadeConfig, shell: ShellConfig) extends
   private val places = ShiftRegister(Cat(head.row.tile, head.row.y, head.row.mask), PhotoPixel.latency, moves)
   private val words  = VecInit.tabulate(lanes) { lane =>
     val pixel = Module(new PhotoPixel(config))
-    pixel.enable := moves
-    pixel.format := io.settings.format
-    pixel.word   := pick(Seq.tabulate(beats)(index => head.row.pixels(index * lanes + lane)), beat)
-    pixel.photo  := pick(texels.map(_(lane)), head.lane)
+    pixel.enable      := moves
+    pixel.format      := io.settings.format
+    pixel.hasStrength := photo.hasStrengths
+    pixel.word        := pick(Seq.tabulate(beats)(index => head.row.pixels(index * lanes + lane)), beat)
+    pixel.photo       := pick(texels.map(_(lane)), head.lane)
     pixel.out
   }
 

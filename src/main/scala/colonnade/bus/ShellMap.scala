@@ -33,7 +33,7 @@ object ShellMap {
   val identity:    BigInt = 0x434c4e44 // "CLND"
 
   /** Major and minor version of these registers. A driver refuses another major version. */
-  val version: BigInt = 0x00010002
+  val version: BigInt = 0x00010003
 
   private val byteAddress = 40 // bits
 
@@ -71,7 +71,8 @@ object ShellMap {
     setting("photo.windowEnd", 0xf0, byteAddress, "No photo is read from this address on."),
     setting("photo.stride", 0xf8, 24, "Bytes from a line of the photo to the next."),
     setting("photo.enabled", 0xfc, 1, "1: the photo shows where the object does not."),
-    setting("stream.enabled", 0x100, 1, "1: frames go to the pixel stream, not to the framebuffer.")
+    setting("stream.enabled", 0x100, 1, "1: frames go to the pixel stream, not to the framebuffer."),
+    setting("photo.hasStrengths", 0x104, 1, "1: the photo's highest bytes are strengths of the shadow.")
   )
 
   /** Names of a register's parts, the lowest first. */

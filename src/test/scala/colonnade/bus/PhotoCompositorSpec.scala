@@ -43,14 +43,16 @@ class PhotoCompositorSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  private def shown(photo: Seq[Int], ratio: Seq[Int], format: Int): BigInt = {
+  private def shown(photo: Seq[Int], ratio: Seq[Int], strength: Int, format: Int): BigInt = {
     val linear = photo.zip(ratio).map { case (code, ratio) =>
-      ((SrgbEncoder.decoded(code, PhotoPixel.linearBits).toLong * ratio + one / 2) / one).toInt
+      val mixed = (strength * ratio + (255 - strength) * one + 127) / 255
+      ((SrgbEncoder.decoded(code, PhotoPixel.linearBits).toLong * mixed + one / 2) / one).min(65535).toInt
     }
     packed(linear.map(SrgbEncoder(_, PhotoPixel.linearBits)), linear, format)
   }
 
-  private def photoAt(x: Int, y: Int): Seq[Int] = Seq(7 * x + 31 * y, 13 * x + y * y, 251 * (x ^ y)).map(_ & 255)
+  private def photoAt(x:    Int, y: Int): Seq[Int] = Seq(7 * x + 31 * y, 13 * x + y * y, 251 * (x ^ y)).map(_ & 255)
+  private def strengthAt(x: Int, y: Int): Int      = (37 * x + 101 * y + 255) & 255
 
   private class Bench(dut: CompositorHarness, config: ColonnadeConfig, shell: ShellConfig, random: Random) {
     val tile   = config.frame.tileSize
@@ -60,8 +62,9 @@ class PhotoCompositorSpec extends AnyFlatSpec with ChiselScalatestTester {
     var events = 0
     dut.clock.setTimeout(0)
 
-    def settings(format: Int, first: Int, last: Int): Unit = {
+    def settings(format: Int, first: Int, last: Int, hasStrengths: Boolean = false): Unit = {
       dut.settings.format.poke(format)
+      dut.settings.photo.hasStrengths.poke(hasStrengths)
       dut.settings.photo.isEnabled.poke(true)
       dut.settings.photo.base.poke(base)
       dut.settings.photo.stride.poke(stride)
@@ -71,13 +74,13 @@ class PhotoCompositorSpec extends AnyFlatSpec with ChiselScalatestTester {
 
     for (y <- 0 until 16; x <- 0 until 4 * tile) {
       val Seq(r, g, b) = photoAt(x, y)
-      memory.store(base + y * stride + 4 * x, Seq(BigInt(random.nextInt(256)) << 24 | r << 16 | g << 8 | b))
+      memory.store(base + y * stride + 4 * x, Seq(BigInt(strengthAt(x, y)) << 24 | r << 16 | g << 8 | b))
     }
 
     def row(format: Int): PhotoRow = {
       val share  = Seq(0.0, 0.5, 1.0)(random.nextInt(3))
       val ratios = Seq.fill(tile)(Option.when(random.nextDouble() < share)(Seq.fill(3)(
-        if (random.nextBoolean()) one else random.nextInt(one + 1)
+        if (random.nextBoolean()) one else random.nextInt(2 * one)
       )))
       val words = ratios.map {
         case Some(ratio) => ratio.zipWithIndex.map { case (r, i) => BigInt(r) << (13 * i) }.sum | BigInt(1) << 64
@@ -138,13 +141,15 @@ class PhotoCompositorSpec extends AnyFlatSpec with ChiselScalatestTester {
       val (configuration, shell) = (config(tile), ShellConfig(bus))
       test(new CompositorHarness(configuration, shell)).withAnnotations(Simulation.verilator) { dut =>
         val bench = new Bench(dut, configuration, shell, new Random(bus + tile))
-        for ((format, accepts) <- Seq((0, 1.0), (1, 0.5), (2, 0.3))) {
-          bench.settings(format, 0, 16)
+        for ((format, accepts, hasStrengths) <- Seq((0, 1.0, true), (1, 0.5, false), (2, 0.3, true))) {
+          bench.settings(format, 0, 16, hasStrengths)
           val rows = Seq.fill(40)(bench.row(format))
           for ((row, (x, y, mask, words)) <- rows.zip(bench.run(rows, accepts))) {
             assert((x, y, mask) == ((row.tile, row.y, row.mask)))
             for (i <- 0 until tile if mask.testBit(i)) {
-              val expected = row.ratios(i).fold(row.words(i))(shown(photoAt(tile * x + i, y), _, format))
+              val (at, whole) = (tile * x + i, PhotoPixel.whole)
+              val strength    = if (hasStrengths) strengthAt(at, y) else whole
+              val expected    = row.ratios(i).fold(row.words(i))(shown(photoAt(at, y), _, strength, format))
               assert(words(i) == expected, s"pixel $i of $row in format $format")
             }
           }
