@@ -22,8 +22,11 @@ def texture(values: Any, is_colour: bool) -> dict[str, Any]:
     return {"type": "bitmap", "bitmap": bitmap, "raw": not is_colour, "filter_type": "bilinear"}
 
 
-def material(part: dict[str, Any], index: int, job: Any) -> dict[str, Any]:
-    """The metallic-roughness material of a primitive."""
+def material(part: dict[str, Any], index: int, job: Any, is_mirrored: bool) -> dict[str, Any]:
+    """The metallic-roughness material of a primitive, for its faces with a mirrored texture or the other ones.
+
+    Mitsuba's bitangent does not follow a mirrored texture, so its normal map has the other sign of green.
+    """
     own: dict[str, Any] = {"type": "principled", "specular": 0.5, "base_color": colour(part["base"])}
     own |= {"metallic": part["metallic"], "roughness": part["roughness"]}
     if f"{index}-baseColorTexture" in job:
@@ -33,7 +36,20 @@ def material(part: dict[str, Any], index: int, job: Any) -> dict[str, Any]:
         for key, channel in (("roughness", 1), ("metallic", 2)):
             scaled = np.rint(packed[..., channel : channel + 1] * float(part[key])).astype(np.uint8)
             own[key] = texture(scaled, False)
+    if f"{index}-normalTexture" in job:
+        tilts = job[f"{index}-normalTexture"]
+        tilts = np.where([False, is_mirrored, False], 255 - tilts, tilts).astype(np.uint8)
+        own = {"type": "normalmap", "normalmap": texture(tilts, False), "bsdf": own}
     return {"type": "twosided", "bsdf": own}
+
+
+def sides(vertices: Any, faces: Any, normals: Any, uv: Any) -> list[tuple[bool, Any]]:
+    """Faces whose texture is not mirrored, and those where it is; only parts that have faces."""
+    edges, ways = vertices[faces[:, 1:]] - vertices[faces[:, :1]], uv[faces[:, 1:]] - uv[faces[:, :1]]
+    out = (np.cross(edges[:, 0], edges[:, 1]) * normals[faces].sum(axis=1)).sum(axis=1) >= 0
+    # The texture's v goes down, so its area is negative where it is not mirrored
+    mirrored = (ways[:, 0, 0] * ways[:, 1, 1] - ways[:, 0, 1] * ways[:, 1, 0] > 0) == out
+    return [(bool(side), faces[mirrored == side]) for side in (False, True) if (mirrored == side).any()]
 
 
 def camera(plan: dict[str, Any]) -> mi.Sensor:
@@ -75,7 +91,10 @@ def main() -> None:
             vertices, faces = arrays.pop("vertices"), arrays.pop("faces")
             if "uv" in arrays:
                 arrays["uv"] = arrays["uv"] * [1, -1] + [0, 1]
-            parts[f"part{index}"] = mesh(vertices, faces, material(part, index, job), **arrays)
+            halves = sides(vertices, faces, arrays["normals"], arrays["uv"]) if "uv" in arrays else [(False, faces)]
+            for is_mirrored, own_faces in halves:
+                name = f"part{index}{'mirrored' if is_mirrored else ''}"
+                parts[name] = mesh(vertices, own_faces, material(part, index, job, is_mirrored), **arrays)
         found = picture(mi.load_dict(parts), camera(plan), int(sys.argv[2]))
         np.savez_compressed(own / "truth.npz", picture=found)
         print(own.name, flush=True)

@@ -1,7 +1,7 @@
 """Cuts away what the alpha of materials does not show: the device's surfaces have no alpha.
 
 A face whose texels are all below the cutoff is dropped. One with texels on both sides is split into four, the largest
-first, until its pieces are as small as a texel or the mesh has `_FACES`; what is then left is cut along a line.
+first, until its pieces are as small as a texel or the mesh has `MAX_SPLIT_FACES`; what is then left is cut along a line.
 The alpha of corners multiplies that of the texture. Without one it is linear on a face, so the line is exact.
 Of blended materials the cutoff is 1/2, and faces that are thinner everywhere become tinted panes without refraction.
 """
@@ -22,12 +22,8 @@ from colonnade.mesh.materials import Alpha, MeshMaterial
 from colonnade.mesh.pixel_boxes import PixelCounts, pixel_boxes, unfolded
 from colonnade.mesh.surface import RawSurface
 from colonnade.mesh.texture import Texture
-from colonnade.mesh.topology import subdivide_corners
+from colonnade.mesh.topology import MAX_SPLIT_FACES, SMALLEST_SPLIT, subdivide_corners, triangle_points
 
-#: Faces up to which a mesh is split.
-_FACES = 49152
-#: Edge of the smallest pieces, of the longest edge of the mesh.
-_SMALLEST = 1 / 400
 #: Steps of samples along an edge of a face, at most.
 _STEPS = 32
 #: Samples that are taken at a time.
@@ -75,7 +71,7 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
     whole = [np.flatnonzero(np.array([material.alpha is None for material in surface.materials])[index])]
     textures, materials = list(surface.textures), [replace(material, alpha=None) for material in surface.materials]
     pieces, panes = [], []
-    budget = _FACES - len(index)
+    budget = MAX_SPLIT_FACES - len(index)
     for number, material in enumerate(surface.materials):
         faces = np.flatnonzero(index == number)
         if material.alpha is None or not len(faces):
@@ -124,7 +120,7 @@ def _panes(
     surface: RawSurface, texture: Texture | None, factor: float, faces: Indices
 ) -> tuple[Indices, Floats, Floats]:
     """Of faces that are not opaque, those that can be seen, their alpha and the colour of their texture."""
-    weights = _weights(4)
+    weights = triangle_points(4)
     alpha, colours = np.full((len(faces), len(weights)), factor), np.ones((len(faces), 3))
     if surface.alphas is not None:
         alpha *= fixed_order.product(weights, surface.alphas[faces][..., None])[..., 0]
@@ -182,7 +178,7 @@ class _Cut:
         """The shown parts of faces, of at most so many more."""
         surface = self._surface
         corners = surface.vertices[surface.faces]
-        smallest = float(np.ptp(surface.vertices, axis=0).max()) * _SMALLEST
+        smallest = float(np.ptp(surface.vertices, axis=0).max()) * SMALLEST_SPLIT
         mixed, shown = _Pieces(faces, np.repeat(np.eye(3)[None], len(faces), axis=0)), []
         while True:
             own = fixed_order.product(mixed.weights, corners[mixed.owners])
@@ -262,7 +258,7 @@ class _Cut:
         fraction, exponent = np.frexp(np.maximum(extent, 1.0))
         steps = np.clip(2 ** (exponent - (fraction == 0.5)).astype(np.int64), 2, _STEPS)  # the next power of two
         for count in np.unique(steps[kinds == 0]):
-            weights = _weights(int(count))
+            weights = triangle_points(int(count))
             asked = np.flatnonzero((kinds == 0) & (steps == count))
             for chunk in np.array_split(asked, -(-len(asked) * len(weights) // _SAMPLES) or 1):
                 shown = (self._alphas(pieces[chunk], weights) >= self._least).mean(axis=1)
@@ -294,14 +290,6 @@ class _Cut:
         return _Pieces.joined(*found)
 
 
-def _weights(steps: int) -> Floats:
-    """Weights of the corners at points over a triangle, float64 [n, 3]."""
-    a, b = np.meshgrid(np.arange(steps), np.arange(steps), indexing="ij")
-    inside = a + b < steps
-    first, second = (a[inside] + 1 / 3) / steps, (b[inside] + 1 / 3) / steps
-    return np.stack([first, second, 1 - first - second], axis=1)
-
-
 def _split(surface: RawSurface, pieces: _Pieces) -> RawSurface:
     """The surface of pieces of its faces."""
     owners, weights = pieces.owners, pieces.weights
@@ -326,5 +314,6 @@ def _split(surface: RawSurface, pieces: _Pieces) -> RawSurface:
         source_faces=owners,
         single_sided=None if surface.single_sided is None else surface.single_sided[owners],
         source_count=len(surface.faces),
+        relief=None if surface.relief is None else surface.relief.pieces(owners, weights),
         alphas=None,
     )

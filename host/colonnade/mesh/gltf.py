@@ -21,11 +21,13 @@ from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
 from colonnade.mesh.gltf_document import GltfDocument
 from colonnade.mesh.gltf_draco import DRACO, DracoPrimitives, PrimitiveArrays
-from colonnade.mesh.gltf_metal import as_metal, metal_of
+from colonnade.mesh.gltf_metal import metal_of, of_map
+from colonnade.mesh.gltf_relief import relief_of
 from colonnade.mesh.gltf_textures import GltfTextures
 from colonnade.mesh.losses import Losses, extension_loss
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, gltf_losses, metal_factors, unused_extensions
 from colonnade.mesh.resolver import References
+from colonnade.mesh.roughness import merged_roughness, surface_areas
 from colonnade.mesh.surface import RawSurface, joined
 from colonnade.mesh.texture import MAX_UV
 
@@ -46,6 +48,9 @@ _COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 #: Largest magnitude of a transform's element, in the scene.
 _MAX_TRANSFORM = 1e100
+
+#: Materials of a file up to which those with a map have all of its roughnesses.
+_MAPPED_MATERIALS = 64
 
 _POINTS, _LINE_MODES, _TRIANGLES, _STRIP, _FAN = 0, (1, 2, 3), 4, 5, 6
 
@@ -82,6 +87,8 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     surface = joined([part.surface for part in parts])
     materials, face_materials = _materials_of(tuple(found), parts, textures)
+    areas = surface_areas(surface.vertices, surface.faces, face_materials, len(materials))
+    materials, _ = merged_roughness(materials, areas, max(_MAPPED_MATERIALS, len(found)))
     two_sided = [bool(material.get("doubleSided", False)) for material in document.json.get("materials", [])] + [True]
     single_sided = np.concatenate([np.full(len(part.surface.faces), not two_sided[part.material]) for part in parts])
     colours = surface.colours
@@ -104,12 +111,12 @@ class _Part:
     Attributes:
         surface: Its triangles, in the scene's space.
         material: Its number in the file.
-        metal: Faces that are metal by a map, bool [m], and their roughness; None without a map.
+        metal: Faces that are metal by a map, bool [m], and their roughness, float64 [m]; None without a map.
     """
 
     surface: RawSurface
     material: int
-    metal: tuple[NDArray[np.bool_], float] | None = None
+    metal: tuple[NDArray[np.bool_], Floats] | None = None
 
 
 def _materials_of(
@@ -130,8 +137,10 @@ def _materials_of(
             material = replace(material, texture=use.texture)
             number = number_of(material)
         own = np.full(len(part.surface.faces), number)
-        if part.metal is not None and part.metal[0].any() and material.kind == "diffuse":
-            own[part.metal[0]] = number_of(as_metal(material, part.metal[1]))
+        if part.metal is not None and material.kind == "diffuse":
+            kinds, places = np.unique(np.column_stack(part.metal), axis=0, return_inverse=True)
+            numbered = [number_of(of_map(material, bool(is_metal), float(roughness))) for is_metal, roughness in kinds]
+            own = np.array(numbered)[places.reshape(-1)]
         numbers.append(own)
     return tuple(found), np.concatenate(numbers)
 
@@ -283,6 +292,7 @@ def _primitive(
         )
     if use is not None:
         losses.add(lost.NO_UVS, len(faces) if uvs is None else 0)
+    relief = textures.normals_of(int(material)) if material != default else None
     shows_colours = colours is not None and not (colours == 1.0).all()
     if uvs is not None:
         losses.add(lost.TEXTURED_COLOURS, len(faces) if shows_colours else 0)
@@ -294,16 +304,15 @@ def _primitive(
         colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
         uvs=None if uvs is None else uvs[faces],
         alphas=None if alphas is None else alphas[faces],
+        relief=relief_of(relief, attribute, faces, linear, losses),
     )
     metal = textures.metal_of(int(material)) if material != default else None
     places = None if metal is None else attribute(metal.coordinates, 2)
     if metal is None or places is None or not (np.abs(places) <= MAX_UV).all():
         return _Part(surface, int(material))
-    edges = surface.vertices[faces[:, 1:]] - surface.vertices[faces[:, :1]]
-    areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     factors = metal_factors(document.entry("materials", material))
     texture = textures.reader.textures[metal.texture]
-    return _Part(surface, int(material), metal_of(texture, metal.uvs(places)[faces], factors, areas))
+    return _Part(surface, int(material), metal_of(texture, metal.uvs(places)[faces], factors))
 
 
 def _corners(document: GltfDocument, arrays: PrimitiveArrays, count: int) -> Indices:

@@ -15,7 +15,8 @@ from colonnade.common.types import Floats
 from colonnade.mesh import losses as lost
 from colonnade.mesh.gltf_document import GltfDocument
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.materials import Vector, gltf_surface
+from colonnade.mesh.materials import Vector, gltf_surface, normal_scale
+from colonnade.mesh.relief import NormalMap
 from colonnade.mesh.resolver import References
 from colonnade.mesh.texture import Wrap
 from colonnade.mesh.texture_reader import TextureReader
@@ -53,6 +54,7 @@ class GltfTextures:
         self._document, self._references, self._losses = document, references, losses
         self._uses: dict[int, TextureUse | None] = {}
         self._metals: dict[int, TextureUse | None] = {}
+        self._normals: dict[int, tuple[TextureUse, NormalMap] | None] = {}
         self._read: dict[tuple[int, Wrap, Wrap, bool], int | None] = {}
         self.reader = TextureReader(losses)
 
@@ -81,6 +83,16 @@ class GltfTextures:
             surface = gltf_surface(self._document.entry("materials", number))
             self._metals[number] = self._use(surface.get("metallicRoughnessTexture"))
         return self._metals[number]
+
+    def normals_of(self, number: int) -> tuple[TextureUse, NormalMap] | None:
+        """As `use_of`, of the normal map of a material."""
+        if number not in self._normals:
+            material = self._document.entry("materials", number)
+            use = self._use(material.get("normalTexture"))
+            self._normals[number] = (
+                None if use is None else (use, NormalMap(self.reader.textures[use.texture], normal_scale(material)))
+            )
+        return self._normals[number]
 
     def _use(self, info: Any) -> TextureUse | None:
         if not isinstance(info, Mapping):

@@ -26,8 +26,10 @@ from colonnade.mesh.formats import SUFFIXES, read_surface
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.normal_baking import baked
 from colonnade.mesh.normals import corner_normals
 from colonnade.mesh.palette import MAX_MATERIALS, coloured_materials, corner_coloured_materials
+from colonnade.mesh.relief import Relief
 from colonnade.mesh.swatches import with_swatches
 from colonnade.mesh.texture import Texture
 from colonnade.mesh.topology import Faces, drop_faces, merge_rows, subdivide, subdivide_corners
@@ -115,7 +117,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         raise UserError(f"mesh {path}: {error}") from None
     vertices, faces, normals = surface.vertices, surface.faces, surface.normals
     materials, face_materials, colours = surface.materials, surface.material_index, surface.colours
-    uvs = surface.uvs
+    uvs, relief = surface.uvs, surface.relief
     if colours is not None and corner_colours:
         materials, face_materials, colours = corner_coloured_materials(materials, face_materials, colours)
     else:
@@ -124,6 +126,9 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         losses.add(lost.COLOURS, number)
         colours = None
     for _ in range(subdivisions):
+        if relief is not None:
+            quarters = subdivide_corners(np.repeat(np.eye(3)[None], len(faces), axis=0))
+            relief = relief.pieces(np.repeat(np.arange(len(faces)), 4), quarters)
         vertices, faces = subdivide(vertices, faces)
         normals = None if normals is None else subdivide_corners(unit_vectors(normals))
         colours = None if colours is None else subdivide_corners(colours)
@@ -145,6 +150,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         uvs=uvs,
         single_sided=None if surface.single_sided is None else np.repeat(surface.single_sided, 4**subdivisions),
         sources=None if surface.source_faces is None or subdivisions else (surface.source_faces, surface.source_count),
+        relief=relief,
     )
 
 
@@ -163,6 +169,7 @@ def clean_mesh(
     uvs: Floats | None = None,
     single_sided: npt.NDArray[np.bool_] | None = None,
     sources: tuple[Indices, int] | None = None,
+    relief: Relief | None = None,
 ) -> Mesh:
     """Clean raw vertices and faces.
 
@@ -181,6 +188,7 @@ def clean_mesh(
         uvs: Texture coordinates of the corners, float64 [m, 3, 2]; see `Mesh.corner_uvs`.
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
         sources: The face of the file that each is a part of, int64 [m], and their number; None: themselves.
+        relief: Normal maps, which are baked into the corner normals; None: none.
 
     Raises:
         UserError: A vertex is not finite, the size is out of range, or no face has an area.
@@ -209,6 +217,7 @@ def clean_mesh(
     used, renumbered = np.unique(corners[keep], return_inverse=True)
     vertices, faces = merged[used], renumbered.reshape(-1, 3).astype(np.int32)
     normals, colours, uvs = (None if values is None else values[keep] for values in (normals, colours, uvs))
+    relief = None if relief is None else relief.kept(keep)
     winding = find_winding(vertices, faces)
     if single_sided is not None:
         losses.add(lost.BACKS, int((single_sided[keep] & winding.is_open).sum()))
@@ -219,17 +228,27 @@ def clean_mesh(
         for values in (normals, colours, uvs):
             if values is not None:
                 values[winding.reversed] = values[winding.reversed][:, ::-1]
+        relief = None if relief is None else relief.reversed(winding.reversed)
     shading = corner_normals(vertices, faces, normals, crease)
     losses.add(lost.FLIPPED, shading.flipped)
     losses.add(lost.REPLACED, shading.replaced)
     losses.add(lost.MISSING, shading.missing)
+    sources_kept = source_faces[keep].astype(np.int32)
+    materials_kept = np.zeros(len(faces), dtype=np.uint8) if face_materials is None else face_materials[keep]
+    corners_normals = shading.normals
+    if relief is not None and (relief.index >= 0).any():
+        parts = baked(vertices, faces, shading.normals, relief, losses)
+        colours, uvs = (None if values is None else parts.corners(values) for values in (colours, uvs))
+        sources_kept, materials_kept = sources_kept[parts.owners], materials_kept[parts.owners]
+        vertices, index = merge_rows(parts.vertices)
+        faces, corners_normals = index[parts.faces].astype(np.int32), parts.normals
     return Mesh(
         vertices=vertices,
         faces=faces,
-        corner_normals=shading.normals,
+        corner_normals=corners_normals,
         materials=materials,
-        face_materials=np.zeros(len(faces), dtype=np.uint8) if face_materials is None else face_materials[keep],
-        source_faces=source_faces[keep].astype(np.int32),
+        face_materials=materials_kept,
+        source_faces=sources_kept,
         source_count=source_count,
         name=name,
         notes=losses.lines(label),

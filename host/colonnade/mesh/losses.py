@@ -30,7 +30,6 @@ class Loss:
 TEXTURES = Loss.of("texture", "not shown", "only textures of the base colour are")
 #: Textures of glTF materials by their key.
 MAPS = {
-    "normalTexture": Loss.of("normal map", "not shown", "surfaces have the normals of their corners"),
     "metallicRoughnessTexture": Loss.of(
         "metallic-roughness map", "averaged", "a face is metal or diffuse, with one roughness"
     ),
@@ -48,6 +47,9 @@ DAMAGED_PICTURES = Loss.of(
 )
 LARGE_PICTURES = Loss.of(
     "picture of a texture", "too large", f"a picture may have {MAX_PIXELS:,} pixels", "pictures of textures"
+)
+NO_MAP_UVS = Loss.of(
+    "face with a normal map", "smooth", "it has no texture coordinates of the map", "faces with a normal map"
 )
 NO_UVS = Loss.of(
     "face of a textured material", "untextured", "it has no texture coordinates", "faces of a textured material"
@@ -130,6 +132,11 @@ def shrunk_textures(factor: int) -> Loss:
     return Loss.of(
         "texture", f"kept at 1/{factor} of the width and height", f"a mesh holds {KEPT_TEXTURE_PIXELS:,} pixels"
     )
+
+
+def smooth_normals(degrees: float) -> Loss:
+    """The loss of normal maps with more detail than corner normals show, so many degrees in the root mean square."""
+    return Loss.of("normal map", "smoothed", f"corner normals differ from it by {degrees:.0f} degrees")
 
 
 def unread_properties(names: Sequence[str], has_more: bool) -> Loss:

@@ -47,6 +47,8 @@ _USED_EXTENSIONS = (
     "KHR_materials_emissive_strength",
     "KHR_materials_pbrSpecularGlossiness",
 )
+#: Textures whose readers count what is lost of them.
+_READ_TEXTURES = ("baseColorTexture", "diffuseTexture", "normalTexture")
 #: What the coat of a dielectric reflects: between 0.04, where it faces the eye, and 0.09, the mean over a sphere.
 COAT_REFLECTANCE = 0.06
 #: No emission.
@@ -154,6 +156,11 @@ def metal_factors(material: Mapping[str, Any]) -> tuple[float, float]:
     return _number(surface.get("metallicFactor"), 1.0), _number(surface.get("roughnessFactor"), 1.0)
 
 
+def normal_scale(material: Mapping[str, Any]) -> float:
+    """The scale of the normal map of a material from a glTF file's JSON."""
+    return _number(material.get("normalTexture", {}).get("scale"), 1.0)
+
+
 def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
     """Convert a material from a glTF file's JSON."""
     surface, extensions = gltf_surface(material), material.get("extensions", {})
@@ -170,7 +177,7 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
     if metallic >= 0.5:
         emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else _DARK
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
-    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha, roughness=_coat(roughness))
+    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha, roughness=coat_roughness(roughness))
 
 
 def _gltf_alpha(material: Mapping[str, Any], surface: Mapping[str, Any]) -> Alpha | None:
@@ -205,7 +212,7 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
         emission = _colour(entries.get("ke"), _DARK) if roughness > MIRROR_ROUGHNESS else _DARK
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=roughness)
     emission = _colour(entries.get("ke"), _DARK)
-    return MeshMaterial("diffuse", colour, emission=emission, alpha=alpha, roughness=_coat(first("pr", 1.0)))
+    return MeshMaterial("diffuse", colour, emission=emission, alpha=alpha, roughness=coat_roughness(first("pr", 1.0)))
 
 
 def _first(entries: Mapping[str, Any], key: str, default: float) -> float:
@@ -217,12 +224,12 @@ def _first(entries: Mapping[str, Any], key: str, default: float) -> float:
 def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     """What a picture does not show of a material of a glTF file's JSON, apart from its extensions.
 
-    The texture of the base colour is not counted.
+    The textures of the base colour and of normals are not counted.
     """
     kind, surface, extensions = from_gltf(material).kind, gltf_surface(material), material.get("extensions", {})
     maps = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
     found = [
-        (lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in ("baseColorTexture", "diffuseTexture")
+        (lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in _READ_TEXTURES
     ]
     if any(_colour(material.get("emissiveFactor"), _DARK)) and not _is_lit(from_gltf(material)):
         found.append((lost.EMISSION, 1))
@@ -280,7 +287,7 @@ def _ior(value: float) -> float:
     return min(value, 4.0) if value > 1.0 else GLASS_IOR
 
 
-def _coat(roughness: float) -> float:
+def coat_roughness(roughness: float) -> float:
     """The roughness of a coat, 0 for none: of a surface that is nearly matt it is not rendered."""
     return max(_share(roughness), SHARP_ROUGHNESS) if roughness < GLOSSY else 0.0
 

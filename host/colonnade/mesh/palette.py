@@ -169,11 +169,15 @@ def with_rendered_metal(mesh: Mesh, gathers: bool, has_coats: bool = False) -> t
     )
     if materials == mesh.materials:
         return mesh, ()
+    left_out: dict[lost.Loss, set[MeshMaterial]] = {}
     for material, rendered in zip(mesh.materials, materials, strict=True):
+        smooth = replace(material, roughness=0.0)  # a map gives a material several roughnesses
         if rendered.kind != material.kind:
-            found.add(lost.ROUGH_METAL)
+            left_out.setdefault(lost.ROUGH_METAL, set()).add(smooth)
         elif rendered.roughness == 0.0 and material.roughness > SMOOTH_ROUGHNESS:
-            found.add(lost.COATS if material.kind == "diffuse" else lost.ROUGH_MIRROR)
+            kind = lost.COATS if material.kind == "diffuse" else lost.ROUGH_MIRROR
+            left_out.setdefault(kind, set()).add(smooth)
+    found.update((loss, len(those)) for loss, those in left_out.items())
     return replace(mesh, materials=materials), found.lines(f"mesh {mesh.name}")
 
 

@@ -12,6 +12,7 @@ from colonnade.common.types import Floats, Indices
 from colonnade.mesh.losses import CROSSED, SHORT_FACES, TEXTURED_COLOURS, Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.polygons import triangulate
+from colonnade.mesh.relief import Relief
 from colonnade.mesh.texture import Texture
 
 
@@ -33,6 +34,7 @@ class RawSurface:
         source_count: Faces of the file, if `source_faces` is given.
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
         alphas: Alpha of the corners, which counts for materials with one, 0 to 1, float64 [m, 3]; None: all are opaque.
+        relief: Normal maps of the faces; None: none.
     """
 
     vertices: Floats
@@ -47,6 +49,7 @@ class RawSurface:
     source_count: int = 0
     single_sided: npt.NDArray[np.bool_] | None = None
     alphas: Floats | None = None
+    relief: Relief | None = None
 
     @property
     def material_index(self) -> Indices:
@@ -128,4 +131,5 @@ def joined(parts: Sequence[RawSurface]) -> RawSurface:
         textures=parts[0].textures,
         uvs=filled("uvs", (3, 2), 0.0),
         alphas=filled("alphas", (3,), 1.0),
+        relief=Relief.joined([part.relief for part in parts], [len(part.faces) for part in parts]),
     )

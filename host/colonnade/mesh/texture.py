@@ -93,23 +93,48 @@ class Texture:
 
     def _filtered(self, uvs: Floats, pixels: npt.NDArray[np.uint8], values: Floats) -> Floats:
         """The pixels' values at texture coordinates, float64 [n, ...]."""
-        width, height = self.size
-        at = uvs * (width, height) - (0.0 if self.is_nearest else 0.5)
-        low = np.floor(at)
-        far = at - low
-        column, row = (low[:, axis].astype(np.int64) for axis in range(2))
-        if self.is_nearest:
-            return np.asarray(
-                values[pixels[_wrapped(row, height, self.wrap[1]), _wrapped(column, width, self.wrap[0])]]
-            )
-        columns = [_wrapped(column + step, width, self.wrap[0]) for step in range(2)]
-        rows = [_wrapped(row + step, height, self.wrap[1]) for step in range(2)]
-        found = np.zeros((len(uvs), *pixels.shape[2:]))
-        for x, share_x in ((0, 1 - far[:, 0]), (1, far[:, 0])):
-            for y, share_y in ((0, 1 - far[:, 1]), (1, far[:, 1])):
-                share = (share_x * share_y).reshape(-1, *(1 for _ in pixels.shape[2:]))
-                found += share * values[pixels[rows[y], columns[x]]]
-        return found
+        return sampled(pixels, uvs, self.wrap, self.is_nearest, values)
+
+
+def sampled(
+    pixels: npt.NDArray[np.generic],
+    uvs: Floats,
+    wrap: tuple[Wrap, Wrap],
+    is_nearest: bool = False,
+    values: Floats | None = None,
+) -> Floats:
+    """A picture at texture coordinates: bilinear between pixels' centres, or the pixel there.
+
+    Args:
+        pixels: [height, width, ...].
+        uvs: float64 [n, 2].
+        wrap: What lies beyond the picture, along u and v.
+        is_nearest: No filter.
+        values: The value of each code; None: the pixels are values.
+
+    Returns:
+        float64 [n, ...].
+    """
+    height, width = pixels.shape[:2]
+    at = uvs * (width, height) - (0.0 if is_nearest else 0.5)
+    low = np.floor(at)
+    far = at - low
+    column, row = (low[:, axis].astype(np.int64) for axis in range(2))
+
+    def of(rows: Indices, columns: Indices) -> Floats:
+        found = pixels[rows, columns]
+        return np.asarray(found if values is None else values[found], dtype=np.float64)
+
+    if is_nearest:
+        return of(_wrapped(row, height, wrap[1]), _wrapped(column, width, wrap[0]))
+    columns = [_wrapped(column + step, width, wrap[0]) for step in range(2)]
+    rows = [_wrapped(row + step, height, wrap[1]) for step in range(2)]
+    found = np.zeros((len(uvs), *pixels.shape[2:]))
+    for x, share_x in ((0, 1 - far[:, 0]), (1, far[:, 0])):
+        for y, share_y in ((0, 1 - far[:, 1]), (1, far[:, 1])):
+            share = (share_x * share_y).reshape(-1, *(1 for _ in pixels.shape[2:]))
+            found += share * of(rows[y], columns[x])
+    return found
 
 
 def _wrapped(index: Indices, count: int, wrap: Wrap) -> Indices:

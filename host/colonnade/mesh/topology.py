@@ -9,6 +9,11 @@ from colonnade.common.types import Floats
 
 Faces = npt.NDArray[np.int32]
 
+#: Faces up to which a mesh is split where its maps vary.
+MAX_SPLIT_FACES = 49152
+#: Edge of the smallest parts, of the longest edge of the mesh.
+SMALLEST_SPLIT = 1 / 400
+
 
 def subdivide(vertices: Floats, faces: npt.NDArray[np.int64]) -> tuple[Floats, npt.NDArray[np.int64]]:
     """Split each triangle into four at its edge midpoints; the surface does not change.
@@ -35,6 +40,14 @@ def subdivide_corners(values: Floats) -> Floats:
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     quarters = np.stack([np.stack(corners, 1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))], 1)
     return quarters.reshape(-1, 3, values.shape[2])
+
+
+def triangle_points(steps: int) -> Floats:
+    """Weights of the corners at points that are spread evenly over a triangle, float64 [steps · (steps + 1) / 2, 3]."""
+    a, b = np.meshgrid(np.arange(steps), np.arange(steps), indexing="ij")
+    inside = a + b < steps
+    first, second = (a[inside] + 1 / 3) / steps, (b[inside] + 1 / 3) / steps
+    return np.stack([first, second, 1 - first - second], axis=1)
 
 
 def merge_rows(rows: Floats) -> tuple[Floats, npt.NDArray[np.int64]]:

@@ -16,6 +16,7 @@ from colonnade.mesh.palette import (
     without_emission,
     without_textures,
 )
+from colonnade.mesh.roughness import with_fewer_roughnesses
 from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Scene
 from colonnade.scene.passes import may_show_coats
@@ -70,7 +71,7 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     """The mesh with what a device has, and notes of what it lacks.
 
     Of more colours than the material table holds, after the scene's values have overridden those of the mesh, plain
-    ones move to the corners of faces, or else similar ones are merged.
+    ones move to the corners of faces, or else similar roughnesses, then similar colours are merged.
     """
     mesh, lines = with_rendered_metal(mesh, scene.paths.gather > 0, may_show_coats(scene))
     notes.report(lines)
@@ -90,6 +91,8 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
         mesh = with_corner_albedo(mesh)
     if len(table_entries(mesh.materials)[0]) <= features.materials:
         return mesh
+    mesh, lines = with_fewer_roughnesses(mesh, features.materials)
+    notes.report(lines)
     mesh, line = reduced(mesh, features.materials)
     notes.report([] if line is None else [line])
     return mesh

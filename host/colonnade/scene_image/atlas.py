@@ -83,8 +83,15 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
     textured = [int(number) for number in used if materials[number].texture is not None]
     if mesh.corner_uvs is None or not textured:
         return None
-    parts = [mesh.face_materials == number for number in textured]
-    textures = [mesh.textures[index] for number in textured if (index := materials[number].texture) is not None]
+    # Materials that differ in nothing but their surface share a region
+    sharing: dict[tuple[int, tuple[float, ...]], list[int]] = {}
+    for number in textured:
+        index, albedo = materials[number].texture, np.array(materials[number].albedo)
+        assert index is not None
+        factor = albedo / (headroom if materials[number].kind == "diffuse" else 1.0)
+        sharing.setdefault((index, tuple(factor.tolist())), []).append(number)
+    parts = [np.isin(mesh.face_materials, numbers) for numbers in sharing.values()]
+    textures = [mesh.textures[index] for index, _ in sharing]
     unwrapped = [_unwrapped(mesh.corner_uvs[part], texture) for part, texture in zip(parts, textures, strict=True)]
     lows = [uvs.min(axis=(0, 1)) for uvs in unwrapped]
     highs = [
@@ -92,18 +99,17 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
         for uvs, low, texture in zip(unwrapped, lows, textures, strict=True)
     ]
     pixels = [(high - low) * texture.size for high, low, texture in zip(highs, lows, textures, strict=True)]
-    if len(textured) > (edge // TILE) ** 2:
+    if len(sharing) > (edge // TILE) ** 2:
         raise UserError(
-            f"mesh {mesh.name} has {len(textured):,} textured materials: use at most {(edge // TILE) ** 2:,}"
+            f"mesh {mesh.name} has {len(sharing):,} textured materials: use at most {(edge // TILE) ** 2:,}"
         )
     scale, corners, gains = _enlarged(np.array(pixels), edge)
     colours = np.zeros((edge, edge, 3))
     uvs = np.zeros_like(mesh.corner_uvs)
-    for index, number in enumerate(textured):
+    for index, (_, factor) in enumerate(sharing):
         size = _size(pixels[index] * gains[index] * scale, edge)
         region = Region(lows[index], highs[index], corners[index], (int(size[0]), int(size[1])))
-        factor = np.array(materials[number].albedo) / (headroom if materials[number].kind == "diffuse" else 1.0)
-        tile = _resampled(textures[index], region, pixels[index]) * factor
+        tile = _resampled(textures[index], region, pixels[index]) * np.array(factor)
         (x, y), (width, height) = region.corner, region.size
         right, bottom = x + _tiles(width), y + _tiles(height)
         padding = ((0, bottom - y - height), (0, right - x - width), (0, 0))

@@ -51,7 +51,7 @@ def test_a_mask_is_cut_along_its_outline(tmp_path: Path) -> None:
     """Half of the disc lies in the triangle, whose area is √3/2; no face is lost or shown where the mask is 0."""
     mesh = masked(tmp_path, disc(256), alphaMode="MASK")
     assert area(mesh) == pytest.approx(np.sqrt(3) * np.pi * 0.4**2 / 2, rel=0.01)
-    assert 100 < len(mesh.faces) < coverage._FACES and mesh.notes == ()
+    assert 100 < len(mesh.faces) < coverage.MAX_SPLIT_FACES and mesh.notes == ()
     assert mesh.source_count == 1 and not mesh.source_faces.any()
     assert all(material.alpha is None for material in mesh.materials)
 
@@ -100,7 +100,7 @@ def test_blending_is_rounded_and_noted(tmp_path: Path) -> None:
 
 
 def test_an_outline_with_more_detail_than_faces_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coverage, "_FACES", 500)
+    monkeypatch.setattr(coverage, "MAX_SPLIT_FACES", 500)
     picture = disc(64)
     picture[..., 3] = 255 * np.random.default_rng(1).integers(0, 2, (64, 64))
     mesh = masked(tmp_path, picture, alphaMode="MASK")

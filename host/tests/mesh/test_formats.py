@@ -228,7 +228,6 @@ def test_what_a_gltf_file_loses_is_named(tmp_path: Path) -> None:
         "1 picture of a texture is missing: surfaces have their base colour",
         "1 line primitive is not shown: only faces are rendered",
         "1 point primitive is not shown: only faces are rendered",
-        "1 normal map is not shown: surfaces have the normals of their corners",
         "1 use of the extension KHR_materials_clearcoat is ignored: not supported",
         "2 cameras are not used: the scene file has the camera",
         "1 animation is not played: nodes stand as the file places them",

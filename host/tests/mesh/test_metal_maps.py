@@ -13,6 +13,8 @@ from textured_files import gltf
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.gltf_metal import metal_of
 from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import MeshMaterial, coat_roughness
+from colonnade.mesh.roughness import merged_roughness
 from colonnade.mesh.texture import Texture
 
 
@@ -63,10 +65,24 @@ def test_faces_are_metal_where_the_map_is(seed: int) -> None:
     pixels[:, :32, 2] = 255
     pixels[:32, :32, 1], pixels[32:, :32, 1], pixels[:, 32:, 1] = 64, 192, 255
     corners = random.uniform(0.05, 0.4, (20, 3, 2)) + (random.integers(0, 2, 20)[:, None] * (0.5, 0.0))[:, None]
-    areas = random.uniform(0.1, 1.0, 20)
-    is_metal, roughness = metal_of(Texture("a", pixels), corners, (1.0, 1.0), areas)
+    is_metal, roughness = metal_of(Texture("a", pixels), corners, (1.0, 1.0))
     np.testing.assert_array_equal(is_metal, corners[:, 0, 0] < 0.5)
     # All of them lie in the upper half
-    assert roughness == (0.25 if is_metal.any() else 0.0)
-    lower, rough = metal_of(Texture("a", pixels), corners + np.array([0, 0.5]), (1.0, 1.0), areas)
-    assert rough == (0.75 if lower.any() else 0.0)
+    assert (roughness[is_metal] == 0.25).all()
+    lower, rough = metal_of(Texture("a", pixels), corners + np.array([0, 0.5]), (1.0, 1.0))
+    assert (rough[lower] == 0.75).all() and (lower == is_metal).all()
+
+
+@given(st.lists(st.tuples(st.sampled_from(["diffuse", "mirror"]), st.integers(0, 16)), min_size=1), st.integers(1, 8))
+def test_merged_roughnesses_fit_a_table(parts: list[tuple[str, int]], count: int) -> None:
+    materials = [MeshMaterial(kind, roughness=coat_roughness(r / 16) if kind == "diffuse" else r / 16) for kind, r in parts]
+    weights = np.arange(1.0, 1.0 + len(parts))
+    found, change = merged_roughness(materials, weights, count)
+    kinds = {kind for kind, _ in parts}
+    assert [one.kind for one in found] == [kind for kind, _ in parts]
+    assert len(set(found)) <= max(count, len(kinds))
+    if len(set(materials)) <= count:
+        assert list(found) == materials and change == 0
+    for kind in kinds:  # classes are intervals
+        pairs = sorted((a.roughness or 1, b.roughness or 1) for a, b in zip(materials, found, strict=True) if a.kind == kind)
+        assert kind == "mirror" or [after for _, after in pairs] == sorted(after for _, after in pairs)

@@ -1,7 +1,7 @@
 """glTF files with metallic-roughness materials, by Colonnade and by a path tracer.
 
 Both get a constant environment, one point light and Colonnade's framing camera. The path tracer's meshes and textures
-are read by trimesh, not by Colonnade, so errors of its reader count. Normal maps, occlusion and emission are left out.
+are read by trimesh, not by Colonnade, so errors of its reader count. Occlusion and emission are left out.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def _parts(file: Path) -> list[tuple[dict[str, NDArray[Any]], dict[str, Any]]]:
         for key in ("metallic", "roughness"):
             given = getattr(own, f"{key}Factor", None)
             material[key] = material[key] if given is None else float(given)
-        for key in ("baseColorTexture", "metallicRoughnessTexture"):
+        for key in ("baseColorTexture", "metallicRoughnessTexture", "normalTexture"):
             picture = getattr(own, key, None)
             if picture is not None and "uv" in values:
                 values[key] = np.asarray(picture.convert("RGB"))
