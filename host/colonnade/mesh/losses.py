@@ -75,9 +75,10 @@ COARSE_CUTS = Loss.of("alpha mask", "cut coarsely", "its outline has more detail
 EMISSION = Loss.of(
     "emissive mirror or glass", "not emitting", "only diffuse surfaces do", "emissive mirrors or glasses"
 )
-ROUGH_MIRROR = Loss.of("slightly rough metal", "a perfect mirror", "its reflections are sharp")
+ROUGH_MIRROR = Loss.of("slightly rough metal", "a perfect mirror", "paths.gather = 1 renders blurred reflections")
 ROUGH_METAL = Loss.of("rough metal", "diffuse", "paths.gather = 1 renders blurred reflections")
-ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "roughness is not rendered", "rough glasses")
+ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "paths.gather = 1 renders its roughness", "rough glasses")
+ROUGHEST_GLASS = Loss.of("rough glass", "as rough as 1/2", "no glass is rougher", "rough glasses")
 PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror", "1/2 and above is a mirror")
 PARTLY_GLASS = Loss.of("partly transmissive material", "rounded to opaque or glass", "above 1/2 is glass")
 COATS = Loss.of("glossy material", "matt", "paths.gather = 1 and frame.samples of 2 or more render its reflections")

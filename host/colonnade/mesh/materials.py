@@ -4,7 +4,7 @@
 |---|---|---|
 | albedo | base colour factor, linear | `Kd`, sRGB but of Blender; for glass `Tf` if given |
 | mirror | metallic factor of at least ½; faces of a map (`gltf_metal`) | `Pm` of at least ½, or `illum` 3 or 5 |
-| roughness of a mirror, or of the coat of a diffuse surface below ½ | roughness factor | `Pr` |
+| roughness of mirrors and glass, or of the coat of a diffuse surface below ½ | roughness factor | `Pr` |
 | glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
 | alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
 | index of refraction | `KHR_materials_ior` | `Ni` |
@@ -38,8 +38,10 @@ GLASS_IOR = 1.5
 SMOOTH_ROUGHNESS, GLOSSY = 0.1, 0.5
 #: Roughness up to which a metal is nearer to a mirror than to a diffuse surface of its colour (docs/shading.md).
 MIRROR_ROUGHNESS = 0.35
-#: Roughness up to which a metal is a mirror where light is gathered; beyond, reflections are spread (docs/gather.md).
+#: Roughness from which on metal reflects the light cube where light is gathered, not the room (docs/gather.md).
 SHARP_ROUGHNESS = 0.25
+#: The largest roughness of glass.
+GLASS_ROUGHNESS = 0.5
 #: Extensions of glTF materials that are used.
 _USED_EXTENSIONS = (
     "KHR_materials_transmission",
@@ -78,8 +80,8 @@ class MeshMaterial:
         kind: diffuse, mirror or glass.
         albedo: Linear, 0 to 1: diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
-        roughness: Of a mirror, 0 to 1: 0 reflects sharply, more is rough metal. Of a diffuse surface that of the clear
-            coat on it; 0: it has none.
+        roughness: Of a mirror or glass, 0 to 1: 0 reflects sharply. Of a diffuse surface that of the clear coat on it;
+            0: it has none.
         has_corner_colours: The surface has the colours of `colonnade.mesh.mesh.Mesh.corner_colours`, times `albedo`.
         texture: The surface has the colours of this one of `colonnade.mesh.mesh.Mesh.textures`, times `albedo`.
         emission: Linear, 0 to 1: the light that a diffuse surface or rough metal emits towards the eye.
@@ -95,27 +97,32 @@ class MeshMaterial:
     alpha: Alpha | None = None
     roughness: float = 0.0
 
+    @property
+    def is_rough_metal(self) -> bool:
+        """Whether it spreads the reflections of light cube and lights, and not those of the room."""
+        return self.kind == "mirror" and self.roughness >= SHARP_ROUGHNESS
+
 
 #: Material of meshes without one.
 PLAIN = MeshMaterial()
 
 
 def as_rendered(material: MeshMaterial, gathers: bool) -> MeshMaterial:
-    """A material as the device shows it: a mirror or a coat with a roughness left has spread reflections.
+    """A material as the device shows it: what has a roughness left spreads its reflections, or is seen through blurred.
 
     Args:
         material: Of a mesh, or of a scene.
-        gathers: The scene gathers light. Otherwise rough metal is a smooth mirror or a diffuse surface, and there are
-            no coats.
+        gathers: The scene gathers light. Otherwise rough metal is a smooth mirror or a diffuse surface, glass is
+            smooth, and there are no coats.
     """
     if material.kind == "diffuse" and gathers:
         is_coated = 0.0 < material.roughness < GLOSSY
         return replace(material, roughness=max(material.roughness, SHARP_ROUGHNESS) if is_coated else 0.0)
-    if material.kind != "mirror":
-        return replace(material, roughness=0.0)
-    if material.roughness <= (SHARP_ROUGHNESS if gathers else MIRROR_ROUGHNESS):
-        return replace(material, roughness=0.0)
-    return material if gathers else replace(material, kind="diffuse", roughness=0.0)
+    if gathers:
+        most = GLASS_ROUGHNESS if material.kind == "glass" else 1.0
+        return replace(material, roughness=min(material.roughness, most))
+    is_diffuse = material.kind == "mirror" and material.roughness > MIRROR_ROUGHNESS
+    return replace(material, kind="diffuse" if is_diffuse else material.kind, roughness=0.0)
 
 
 def microfacet_albedo(roughness: float) -> float:
@@ -129,7 +136,9 @@ def in_layer(material: MeshMaterial, is_coat: bool) -> MeshMaterial:
 
     Rough metal has the mean of the light that microfacets do not hide from each other.
     """
-    if not is_coat and material.kind == "mirror" and material.roughness > 0:
+    if not is_coat and material.kind == "glass":
+        return material
+    if not is_coat and material.kind == "mirror":
         red, green, blue = (value * microfacet_albedo(material.roughness) for value in material.albedo)
         return replace(material, albedo=(red, green, blue))
     if not is_coat:
@@ -173,7 +182,7 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
     if _number(transmission, 0.0) > 0.5:
         share = alpha.factor if alpha is not None and alpha.blends else 1.0
         red, green, blue = (1.0 - share + share * value for value in colour)
-        return MeshMaterial("glass", (red, green, blue), _ior(ior))
+        return MeshMaterial("glass", (red, green, blue), _ior(ior), roughness=_share(roughness))
     if metallic >= 0.5:
         emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else _DARK
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
@@ -204,7 +213,8 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
     colour = _colour(entries.get("kd"), PLAIN.albedo)
     model = first("illum", 2.0)
     if first("d", 1.0) < 0.5 or first("tr", 0.0) > 0.5 or model in (4.0, 6.0, 7.0, 9.0):
-        return MeshMaterial("glass", _colour(entries.get("tf"), colour), _ior(first("ni", GLASS_IOR)))
+        tint, roughness = _colour(entries.get("tf"), colour), _share(first("pr", 0.0))
+        return MeshMaterial("glass", tint, _ior(first("ni", GLASS_IOR)), roughness=roughness)
     alpha = Alpha(min(first("d", 1.0), 1.0 - first("tr", 0.0))) if "map_d" in entries else None
     is_metal = first("pm", 0.0) >= 0.5 or model in (3.0, 5.0)
     if is_metal:
@@ -224,9 +234,10 @@ def _first(entries: Mapping[str, Any], key: str, default: float) -> float:
 def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     """What a picture does not show of a material of a glTF file's JSON, apart from its extensions.
 
-    The textures of the base colour and of normals are not counted.
+    The textures of the base colour and of normals are not counted, nor what depends on the scene
+    (`colonnade.mesh.palette.with_rendered_metal`).
     """
-    kind, surface, extensions = from_gltf(material).kind, gltf_surface(material), material.get("extensions", {})
+    surface, extensions = gltf_surface(material), material.get("extensions", {})
     maps = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
     found = [
         (lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in _READ_TEXTURES
@@ -234,12 +245,12 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     if any(_colour(material.get("emissiveFactor"), _DARK)) and not _is_lit(from_gltf(material)):
         found.append((lost.EMISSION, 1))
     transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
-    metallic, roughness = _number(surface.get("metallicFactor"), 1.0), _number(surface.get("roughnessFactor"), 1.0)
+    metallic = _number(surface.get("metallicFactor"), 1.0)
     if 0.0 < transmission < 1.0:
         found.append((lost.PARTLY_GLASS, 1))
     elif 0.0 < metallic < 1.0:
         found.append((lost.PARTLY_METAL, 1))
-    return [*found, *_roughness_losses(kind, roughness)]
+    return found
 
 
 def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
@@ -262,19 +273,12 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         found.append((lost.PARTLY_GLASS if kind == "glass" else lost.BLENDED, 1))
     if kind == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
         found.append((lost.HIGHLIGHTS, 1))
-    if "pr" in entries:
-        found += _roughness_losses(kind, first("pr", 0.0))
     return found
 
 
 def _is_lit(material: MeshMaterial) -> bool:
     """Whether the lights are seen on a surface, and its emission with them."""
     return material.kind == "diffuse" or material.roughness > MIRROR_ROUGHNESS
-
-
-def _roughness_losses(kind: str, roughness: float) -> list[tuple[Loss, int]]:
-    """Without those of mirrors and coats, which depend on the scene: `colonnade.mesh.palette.with_rendered_metal`."""
-    return [(lost.ROUGH_GLASS, 1)] if kind == "glass" and roughness > SMOOTH_ROUGHNESS else []
 
 
 def unused_extensions(material: Mapping[str, Any]) -> list[str]:

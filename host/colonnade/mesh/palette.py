@@ -22,6 +22,9 @@ MAX_MATERIALS = 256
 #: Settings of hardware with textures, for messages.
 TEXTURE_SETTINGS = "geometry.cornerColours=true and geometry.textureBytes=16384"
 
+#: What a material loses whose roughness is not rendered, by kind.
+_WITHOUT_ROUGHNESS = {"diffuse": lost.COATS, "mirror": lost.ROUGH_MIRROR, "glass": lost.ROUGH_GLASS}
+
 #: Steps of the clustering, at most.
 _STEPS = 30
 
@@ -156,7 +159,7 @@ def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:
 
 
 def with_rendered_metal(mesh: Mesh, gathers: bool, has_coats: bool = False) -> tuple[Mesh, tuple[str, ...]]:
-    """A mesh whose rough metal and coats are as the device shows them (`as_rendered`), and lines on what is left out.
+    """A mesh whose rough metal, glass and coats are as the device shows them (`as_rendered`), and lines on the losses.
 
     Args:
         mesh: The mesh.
@@ -175,8 +178,9 @@ def with_rendered_metal(mesh: Mesh, gathers: bool, has_coats: bool = False) -> t
         if rendered.kind != material.kind:
             left_out.setdefault(lost.ROUGH_METAL, set()).add(smooth)
         elif rendered.roughness == 0.0 and material.roughness > SMOOTH_ROUGHNESS:
-            kind = lost.COATS if material.kind == "diffuse" else lost.ROUGH_MIRROR
-            left_out.setdefault(kind, set()).add(smooth)
+            left_out.setdefault(_WITHOUT_ROUGHNESS[material.kind], set()).add(smooth)
+        elif material.kind == "glass" and rendered.roughness < material.roughness:
+            left_out.setdefault(lost.ROUGHEST_GLASS, set()).add(smooth)
     found.update((loss, len(those)) for loss, those in left_out.items())
     return replace(mesh, materials=materials), found.lines(f"mesh {mesh.name}")
 

@@ -51,7 +51,7 @@ class PlacedObject:
     Attributes:
         tracer: Of its triangles.
         kinds: Of each face: `DIFFUSE` (also rough metal), `MIRROR` or `GLASS`, int64 [faces].
-        alpha: Of each face of rough metal the square of its roughness, else 0, float64 [faces].
+        alpha: Of each face of rough metal, mirrors and glass the square of its roughness, else 0, float64 [faces].
         ior: Of each face, float64 [faces].
     """
 
@@ -66,7 +66,7 @@ class PlacedObject:
         textures = [-1 if material.texture is None else material.texture for material in view.materials]
         self._textures = np.array(textures)[index]
         self.alpha: Floats = np.array([material.roughness**2 for material in view.materials])[index]
-        self.kinds = np.where(self.alpha > 0, DIFFUSE, self.kinds)
+        self.kinds[np.array([material.is_rough_metal for material in view.materials])[index]] = DIFFUSE
         self.ior: Floats = np.array([material.ior for material in view.materials])[index]
         is_glass = self.kinds == GLASS
         self._transmittance = view.shadow_transmittance

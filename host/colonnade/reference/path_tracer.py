@@ -14,7 +14,7 @@ from colonnade.environment.lights import MAX_FALLOFF
 from colonnade.reference.bounce import bounce, reflect
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints, SurfaceHits
 from colonnade.reference.object import DIFFUSE, GLASS, MIRROR, ObjectPoints, PlacedObject
-from colonnade.reference.scatter import Bytes, gathered_directions, lobe_shares, sphere_points
+from colonnade.reference.scatter import Bytes, gathered_directions, lobe_shares, microfacet_normals, sphere_points
 
 if TYPE_CHECKING:
     from colonnade.environment.light_cube import LightCube
@@ -121,6 +121,7 @@ class PathTracer:
                 hit_faces[specular],
                 _select(hits, specular),
                 unit_vectors(ray_directions[specular]),
+                words,
                 state,
                 outside,
                 bounces[specular],
@@ -230,6 +231,7 @@ class PathTracer:
         faces: Indices,
         points: ObjectPoints,
         directions: Floats,
+        words: Bytes,
         state: _PathState,
         outside: NDArray[np.bool_],
         bounces_done: Indices,
@@ -238,11 +240,15 @@ class PathTracer:
 
         Updates `state` and `outside` of the paths. Fresnel reflections at glass see only the background.
         """
-        kinds = self._object.kinds[faces]
-        scattered = bounce(
-            directions, points.normals, points.facing, points.front, kinds == GLASS, self._object.ior[faces]
-        )
-        is_tinted = (kinds == MIRROR) | points.front
+        kinds, alpha = self._object.kinds[faces], self._object.alpha[faces]
+        is_tinted, normals = (kinds == MIRROR) | points.front, points.normals.copy()
+        rough = np.flatnonzero(alpha > 0)
+        if self._view.gather is not None and len(rough):
+            # Other sample points than those of the rays that are gathered next
+            number = state.gathered[path[rough]] & 3 ^ np.where(points.front[rough], 3, 2)
+            drawn = sphere_points(words[path[rough]] ^ np.array(self._view.gather.points, np.uint8)[number])
+            normals[rough] = microfacet_normals(normals[rough], directions[rough], drawn, alpha[rough])
+        scattered = bounce(directions, normals, points.facing, points.front, kinds == GLASS, self._object.ior[faces])
         state.weight[path] *= np.where(is_tinted[:, None], points.albedo, 1.0)
         offset = self._object.tracer.offset * points.facing
         split = np.flatnonzero((scattered.fresnel_weights > 0) & (state.gathered[path] == 0))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.types import Floats
+from colonnade.common.vectors import unit_vectors
 
 Bytes = NDArray[np.uint8]
 
@@ -85,6 +86,23 @@ def gathered_directions(axes: Floats, facing: Floats, points: Floats, alpha: Flo
         is_below[:, None], np.where((alpha > 0)[:, None], along - across, -along - across), along + across
     )
     return np.where(np.abs(directions).max(axis=1, keepdims=True) < 1e-9, axes, directions)
+
+
+def microfacet_normals(normals: Floats, directions: Floats, points: Floats, alpha: Floats) -> Floats:
+    """Unit normals of microfacets (Trowbridge and Reitz, GGX) of mirrors and glass, float64 [n, 3].
+
+    Args:
+        normals: Unit shading normals, float64 [n, 3].
+        directions: Of the rays, float64 [n, 3]. A normal that faces away from its ray lies on the other side of the
+            shading normal.
+        points: `sphere_points`, float64 [n, 3].
+        alpha: Squares of the roughness, float64 [n].
+    """
+    lift = 1 - np.einsum("ni,ni->n", points, normals)
+    # Where the point is the normal, so is the microfacet
+    along, across = lift.clip(min=1e-3)[:, None] * normals, alpha[:, None] * np.cross(points, normals)
+    is_away = np.einsum("ni,ni->n", along + across, directions) > 0
+    return unit_vectors(along + np.where(is_away[:, None], -across, across))
 
 
 def lobe_shares(cosines: Floats, alpha: Floats) -> Floats:

@@ -73,8 +73,9 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     Of more colours than the material table holds, after the scene's values have overridden those of the mesh, plain
     ones move to the corners of faces, or else similar roughnesses, then similar colours are merged.
     """
-    mesh, lines = with_rendered_metal(mesh, scene.paths.gather > 0, may_show_coats(scene))
-    notes.report(lines)
+    overridden = replace(mesh, materials=with_overrides(mesh.materials, scene.material))
+    notes.report(with_rendered_metal(overridden, scene.paths.gather > 0, may_show_coats(scene))[1])
+    mesh, _ = with_rendered_metal(mesh, scene.paths.gather > 0, may_show_coats(scene))
     if not features.textures:
         mesh, lines = without_textures(mesh)
         notes.report(lines)

@@ -224,14 +224,17 @@ def make_view(
 def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tuple[MeshMaterial, ...]:
     """Replace values of a mesh's materials by those that the scene gives.
 
-    An albedo replaces corner colours and textures too.
+    An albedo replaces corner colours and textures too, another kind the roughness.
     """
     given = {
         key: value for key in ("kind", "albedo", "ior", "roughness") if (value := getattr(overrides, key)) is not None
     }
     if "albedo" in given:
         given |= {"has_corner_colours": False, "texture": None}
-    return tuple(replace(material, **given) for material in materials)
+    return tuple(
+        replace(material, **({} if material.kind == given.get("kind", material.kind) else {"roughness": 0.0}) | given)
+        for material in materials
+    )
 
 
 def world_positions(scene: Scene, extent: Extent, environment: Environment | None) -> list[Floats]:

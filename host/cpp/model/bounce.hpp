@@ -64,13 +64,13 @@ inline MirrorDirections mirrorAbout(const WideVector& about, const Surface& surf
     return result;
 }
 
-/// Continues a ray at a mirror or glass. The shading normal is the smooth one. The geometric normal replaces it if it faces away from the
-/// ray, or if the direction would leave on the wrong side of the surface.
-inline Bounce bounce(const Surface& surface, const Material& material, bool flat, std::int64_t offset, const Numbers& n) {
+/// Continues a ray at a mirror or glass. The shading normal is the smooth one, or that of a microfacet. The geometric normal replaces it if it faces
+/// away from the ray, or if the direction would leave on the wrong side of the surface.
+inline Bounce bounce(const Surface& surface, const Material& material, bool flat, std::int64_t offset, const Numbers& n, const WideVector* microfacet = nullptr) {
     const WideVector geometric = {surface.faceForwardNormal[0], surface.faceForwardNormal[1], surface.faceForwardNormal[2]};
-    const bool isSmooth = !flat && !isZero(surface.smooth);
-    MirrorDirections directions = mirrorAbout(shadingNormal(surface, flat), surface, material, n);
-    if (isSmooth) {
+    const bool isGeometric = !microfacet && (flat || isZero(surface.smooth));
+    MirrorDirections directions = mirrorAbout(microfacet ? *microfacet : shadingNormal(surface, flat), surface, material, n);
+    if (!isGeometric) {
         const Wide hemisphereCheck = dot(directions.direction, surface.faceForwardNormal);
         if (!directions.isFacing || (directions.isRefraction ? hemisphereCheck >= 0 : hemisphereCheck <= 0)) directions = mirrorAbout(geometric, surface, material, n);
     }

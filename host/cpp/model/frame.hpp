@@ -102,7 +102,7 @@ private:
             const Material& material = frame_.lighting.materialOf(*face);
             const Colour albedo = albedoOf(material, hit, *face);
             if (material.kind == MaterialKind::mirror || material.kind == MaterialKind::glass) {
-                if (!continuePath(surface, material, albedo, path, request, kind)) return total(path, leavingRadiance(path, request));
+                if (!continuePath(surface, material, albedo, point, path, request, kind)) return total(path, leavingRadiance(path, request));
             } else {
                 const bool gathers = path.gathered < frame_.gather.bounces;
                 const Lobe* const lobe = gathers && material.kind == MaterialKind::roughMetal ? &material.lobe : nullptr;
@@ -307,8 +307,11 @@ private:
     }
 
     /// Continues a path at a mirror or glass; false if the next ray sees only the background.
-    bool continuePath(const Surface& surface, const Material& material, const Colour& albedo, Path& path, RayRequest& request, RayKind& kind) {
-        const Bounce next = bounce(surface, material, frame_.lighting.flat, frame_.lighting.offset, numbers_);
+    bool continuePath(const Surface& surface, const Material& material, const Colour& albedo, const SamplePoint& point, Path& path, RayRequest& request, RayKind& kind) {
+        WideVector normal = shadingNormal(surface, frame_.lighting.flat);
+        const bool isRough = frame_.gather.bounces > 0 && material.lobe.alpha != 0;
+        if (isRough) normal = microfacetNormal(normal, surface.dir, frame_.gather.microfacetPoint(path.gathered, surface.backSide) ^ point, material.lobe.alpha, numbers_);
+        const Bounce next = bounce(surface, material, frame_.lighting.flat, frame_.lighting.offset, numbers_, isRough ? &normal : nullptr);
         Colour reflectionColour = frame_.lighting.background;
         const std::int64_t fresnelWeight = path.gathered == 0 ? next.fresnelWeight : 0;
         if (frame_.hasEnvironment && fresnelWeight != 0) {

@@ -16,6 +16,9 @@ struct SamplePoint {
 struct Gather {
     int bounces, parallax;
     std::array<SamplePoint, 4> points;
+
+    /// The point of a rough mirror or of rough glass, for a path that has gathered so many rays.
+    const SamplePoint& microfacetPoint(int gathered, bool backSide) const { return points[(static_cast<std::size_t>(gathered) ^ (backSide ? 2 : 3)) & 3]; }
 };
 
 /// Low bits of a pixel's coordinates that count.
@@ -89,40 +92,74 @@ inline WideVector lobeAxis(const WideVector& about, const Vector& dir, const Num
     return {reflection[0], reflection[1], reflection[2]};
 }
 
+/// An axis as scattered rays see it, with 11 bits, half its length, and a sample point's part along it, in units of the length.
+struct ScatterAxis {
+    Vector axis;
+    std::int64_t length, lift;
+
+    ScatterAxis(const WideVector& about, const Vector& sphere, const Numbers& n) {
+        Vector scaled;
+        blockNormalise(about, n.shadeBits, scaled);
+        for (int a = 0; a < 3; ++a) axis[a] = floorShift(scaled[a], n.shadeBits - 11);
+        length = static_cast<std::int64_t>(squareRoot(static_cast<std::uint64_t>(floorShift(dot(scaled, scaled), 2 * n.shadeBits + 2 - 22))));
+        lift = static_cast<std::int64_t>(floorShift(dot(sphere, axis) + 256, 9));
+    }
+
+    /// The vector across the axis and a sample point, times the length and a width with 7 fraction bits.
+    Vector across(const Vector& sphere, std::int64_t alpha) const {
+        Vector result;
+        for (int a = 0; a < 3; ++a) {
+            const int b = (a + 1) % 3, c = (a + 2) % 3;
+            result[a] = floorShift(alpha * length + 64, 7) * floorShift(sphere[b] * axis[c] - sphere[c] * axis[b], 8);
+        }
+        return result;
+    }
+};
+
+/// The sum of two vectors without its low 11 bits. If it is not on the side of a third one it is negated, or else the difference replaces it. It is
+/// never zero.
+inline Vector onSide(const Vector& along, const Vector& across, const Vector& side, bool isNegated) {
+    Vector direction;
+    Wide sum = 0;
+    for (int a = 0; a < 3; ++a) {
+        direction[a] = floorShift(along[a] + across[a], 11);
+        sum += floorShift(direction[a], 2) * side[a];
+    }
+    if (sum < 0)
+        for (int a = 0; a < 3; ++a) direction[a] = isNegated ? -direction[a] : floorShift(along[a] - across[a], 11);
+    direction[2] |= 1;
+    return direction;
+}
+
 /// The direction of the ray that gathers light at a surface, about an axis of any length: n + |n| · s at a diffuse one, about its normal; for a rough
 /// metal a ray of its lobe. One that points below the surface is negated, or lies on the other side of the lobe's axis. It is never zero.
 inline Vector gatherDirection(const WideVector& about, const Vector& faceForwardNormal, const SamplePoint& point, const Lobe* lobe, const Numbers& n) {
-    Vector scaled, axis;
-    blockNormalise(about, n.shadeBits, scaled);
-    for (int a = 0; a < 3; ++a) axis[a] = floorShift(scaled[a], n.shadeBits - 11);
     const Vector sphere = spherePoint(point);
-    const auto length = static_cast<std::int64_t>(squareRoot(static_cast<std::uint64_t>(floorShift(dot(scaled, scaled), 2 * n.shadeBits + 2 - 22))));
-    Vector along, across;
-    if (lobe) {
-        const auto lift = static_cast<std::int64_t>(floorShift(dot(sphere, axis) + 256, 9));
-        const std::int64_t lowered = floorShift(lobe->alpha * floorShift(lobe->alpha * std::max<std::int64_t>(0, length + lift), 8), 8);
-        const std::int64_t scaleAlong = length - lift - lowered, scaleAcross = floorShift(lobe->alpha * length + 64, 7);
-        for (int a = 0; a < 3; ++a) {
-            const int b = (a + 1) % 3, c = (a + 2) % 3;
-            along[a] = scaleAlong * axis[a];
-            across[a] = scaleAcross * floorShift(sphere[b] * axis[c] - sphere[c] * axis[b], 8);
-        }
-    } else {
-        for (int a = 0; a < 3; ++a) {
-            along[a] = axis[a] << 10;
-            across[a] = length * sphere[a] << 3;
-        }
-    }
-    Vector direction;
-    Wide side = 0;
+    const ScatterAxis frame(about, sphere, n);
+    Vector along, across, side;
+    const std::int64_t lowered = lobe ? floorShift(lobe->alpha * floorShift(lobe->alpha * std::max<std::int64_t>(0, frame.length + frame.lift), 8), 8) : 0;
+    if (lobe) across = frame.across(sphere, lobe->alpha);
     for (int a = 0; a < 3; ++a) {
-        direction[a] = floorShift(along[a] + across[a], 11);
-        side += floorShift(direction[a], 2) * floorShift(faceForwardNormal[a], 4);
+        along[a] = lobe ? (frame.length - frame.lift - lowered) * frame.axis[a] : frame.axis[a] << 10;
+        if (!lobe) across[a] = frame.length * sphere[a] << 3;
+        side[a] = floorShift(faceForwardNormal[a], 4);
     }
-    if (side < 0)
-        for (int a = 0; a < 3; ++a) direction[a] = lobe ? floorShift(along[a] - across[a], 11) : -direction[a];
-    direction[2] |= 1;
-    return direction;
+    return onSide(along, across, side, !lobe);
+}
+
+/// The normal of a microfacet of a rough mirror or of rough glass, of any length. One that faces away from a ray in the direction `dir` lies on the
+/// other side of the normal. `alpha` has 10 fraction bits.
+inline WideVector microfacetNormal(const WideVector& normal, const Vector& dir, const SamplePoint& point, std::int64_t alpha, const Numbers& n) {
+    const Vector sphere = spherePoint(point);
+    const ScatterAxis frame(normal, sphere, n);
+    Vector along, across = frame.across(sphere, alpha), side;
+    for (int a = 0; a < 3; ++a) {
+        along[a] = (frame.length - frame.lift + 1) * frame.axis[a];
+        across[a] = floorShift(across[a], 3);
+        side[a] = ~floorShift(dir[a], n.shadeBits - 8);
+    }
+    const Vector found = onSide(along, across, side, false);
+    return {found[0], found[1], found[2]};
 }
 
 /// The light cube: linear radiance by direction, 12 fraction bits, and where lights are; faces of 16 × 16 texels. The fields of a word are its

@@ -11,7 +11,8 @@ using Colour = std::array<std::int64_t, 3>;
 /// How a surface continues a path.
 enum class MaterialKind : std::uint8_t { diffuse = 0, mirror = 1, glass = 2, roughMetal = 3 };
 
-/// How wide and how bright a rough metal spreads its reflections (docs/gather.md): `alpha` has 8 fraction bits, `slope` 6, `peak` is a logarithm.
+/// How wide and how bright a rough surface spreads its reflections (docs/gather.md): `alpha` has 8 fraction bits at rough metal, 10 at mirrors and glass,
+/// where 0 spreads nothing; `slope` has 6, `peak` is a logarithm.
 struct Lobe {
     std::int64_t alpha, slope, peak;
 };

@@ -48,12 +48,14 @@ def with_cube(image: SceneImage, seed: int) -> SceneImage:
 
 
 def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, int]:
-    """Registers with random sample points and near surfaces; material 3 is rough metal."""
+    """Registers with random sample points and near surfaces; material 3 is rough metal, in some frames all are rough."""
     drawn = np.random.default_rng(seed).integers(0, 256, (4, 2))
     points = {f"gather.points[{i}].{axis}": int(drawn[i, a]) for i in range(4) for a, axis in enumerate("uv")}
     rough = {"kind": 3, "lobe.alpha": 52, "lobe.slope": 743, "lobe.peak": 589}
     metal = {f"materials[3].{name}": value for name, value in rough.items()}
-    return registers | points | metal | {"gather.bounces": bounces, "gather.parallax": seed % 4}
+    widths = {1: 0 if bounces == 1 else 40, 2: 0 if bounces == 2 else 120}
+    facets = {f"materials[{number}].lobe.alpha": width for number, width in widths.items()}
+    return registers | points | metal | facets | {"gather.bounces": bounces, "gather.parallax": seed % 4}
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")

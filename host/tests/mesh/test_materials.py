@@ -27,7 +27,7 @@ def test_gltf_materials() -> None:
     assert from_gltf({"pbrMetallicRoughness": textured}).kind == "diffuse"
     extensions = {"KHR_materials_transmission": {"transmissionFactor": 0.9}, "KHR_materials_ior": {"ior": 1.33}}
     assert from_gltf({"pbrMetallicRoughness": surface, "extensions": extensions}) == MeshMaterial(
-        "glass", (0.5, 0.25, 0.125), 1.33
+        "glass", (0.5, 0.25, 0.125), 1.33, roughness=1.0
     )
 
 

@@ -10,7 +10,6 @@ from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import (
     COAT_REFLECTANCE,
     MIRROR_ROUGHNESS,
-    SHARP_ROUGHNESS,
     MeshMaterial,
     as_rendered,
     from_gltf,
@@ -87,8 +86,8 @@ def test_rough_metal_is_diffuse_without_gathered_light() -> None:
         assert found == MeshMaterial("mirror", (1.0, 0.8, 0.3), roughness=roughness)
         assert from_mtl({"pm": ["1"], "pr": [str(roughness)]}).roughness == roughness
         assert as_rendered(found, gathers=False) == MeshMaterial(kind, (1.0, 0.8, 0.3))
-        lobe = roughness if roughness > SHARP_ROUGHNESS else 0.0
-        assert as_rendered(found, gathers=True) == MeshMaterial("mirror", (1.0, 0.8, 0.3), roughness=lobe)
+        assert as_rendered(found, gathers=True) == found
+        assert found.is_rough_metal == (roughness > 0.25)
 
 
 def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered() -> None:
@@ -106,16 +105,20 @@ def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered() -> None:
     assert (mirror.kind, mirror.albedo, mirror.emission) == ("diffuse", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-def test_what_rough_metal_loses_is_named() -> None:
-    """Without gathered light all of it; with it the blur of nearly smooth mirrors."""
+def test_what_rough_surfaces_lose_is_named() -> None:
+    """Without gathered light all of it; with it what is rougher than glass can be."""
     mesh = load_mesh("cube")
     materials = (*(MeshMaterial("mirror", roughness=roughness) for roughness in (0.05, 0.2, 0.3, 0.5)), MeshMaterial())
-    mesh = replace(mesh, materials=materials)
+    glass = from_gltf({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}}})
+    assert glass.roughness == 1.0 and from_mtl({"d": ["0"], "pr": ["0.2"]}).roughness == 0.2
+    mesh = replace(mesh, materials=(*materials, glass))
     glossy = replace(mesh, materials=(MeshMaterial(roughness=0.3),))
     assert "glossy material is matt" in with_rendered_metal(glossy, True)[1][0]
     assert with_rendered_metal(glossy, True, has_coats=True) == (glossy, ())
     sharp, diffuse = "slightly rough metals are a perfect mirror", "rough metal is diffuse"
-    assert [line.split(": ")[1] for line in with_rendered_metal(mesh, False)[1]] == [f"2 {sharp}", f"1 {diffuse}"]
-    assert [line.split(": ")[1] for line in with_rendered_metal(mesh, True)[1]] == [
-        "1 slightly rough metal is a perfect mirror"
-    ]
+    clear = "1 rough glass is perfectly clear"
+    lines = [line.split(": ")[1] for line in with_rendered_metal(mesh, False)[1]]
+    assert sorted(lines) == sorted([f"2 {sharp}", f"1 {diffuse}", clear])
+    rendered, (line,) = with_rendered_metal(mesh, True)
+    assert line.split(": ")[1] == "1 rough glass is as rough as 1/2"
+    assert [material.roughness for material in rendered.materials] == [0.05, 0.2, 0.3, 0.5, 0.0, 0.5]

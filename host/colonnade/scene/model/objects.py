@@ -61,7 +61,7 @@ class Material:
         kind: diffuse, mirror or glass.
         albedo: Diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
-        roughness: Of a mirror, or of the coat of a diffuse surface, 0 to 1.
+        roughness: Of a mirror or glass, or of the coat of a diffuse surface, 0 to 1.
         flat: Use geometric normals instead of smooth ones.
     """
 
@@ -75,8 +75,6 @@ class Material:
     def _values_are_of_the_kind(self) -> Self:
         if self.ior is not None and self.kind not in (None, "glass"):
             raise ValueError(f"material.ior is for glass, not for a {self.kind} material")
-        if self.roughness is not None and self.kind == "glass":
-            raise ValueError("material.roughness is for mirrors and diffuse surfaces, not for a glass material")
         return self
 
 

@@ -85,15 +85,16 @@ object MaterialKind {
   def isSpecular(kind: UInt): Bool = kind === mirror || kind === glass
 }
 
-/** The spread of the reflections of rough metal: docs/gather.md. */
+/** The spread of the reflections of rough metal: docs/gather.md. Mirrors and glass have `alpha` alone, 0 if they are smooth. */
 final class Lobe extends Bundle {
-  val alpha = UInt(Lobe.alphaBits.W) // the square of the roughness
+  val alpha = UInt(Lobe.alphaBits.W) // the square of the roughness; of mirrors and glass times four
   val slope = UInt(Lobe.slopeBits.W) // how fast it falls with the distance from its axis
   val peak  = UInt(Lobe.peakBits.W)  // 1 / alpha², a logarithm
 }
 
 object Lobe {
   val alphaBits:     Int = 8
+  val facetFraction: Int = 10 // fraction bits of the width at mirrors and glass
   val slopeFraction: Int = 6
   val slopeBits:     Int = 13
   val octaveLog:     Int = 7 // log2 of the steps of a logarithm in an octave
@@ -140,6 +141,6 @@ final class Material(config: ColonnadeConfig) extends Bundle {
   /** Glass: reflectance at normal incidence. */
   val reflectance = ifBounces(FrameRegisters.weight)
 
-  /** Rough metal. */
+  /** Rough metal, mirrors and glass. */
   val lobe = Option.when(config.frame.gather)(new Lobe)
 }

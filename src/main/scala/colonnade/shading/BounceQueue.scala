@@ -13,6 +13,9 @@ final class BounceHit(config: PathConfig) extends Bundle {
   val context  = Context(config)
   val material = UInt(RecordFormats.materialBits.W)
   val backSide = Bool()
+
+  /** The normal is that of a microfacet. */
+  val isRough = Option.when(config.frame.gather)(Bool())
 }
 
 /** Components of vectors that are known early: the geometric normal, turned against the ray, and the ray's direction. */
@@ -38,6 +41,9 @@ final class BounceQueueIO(config: PathConfig) extends Bundle {
   val directions = Vec(3, Flipped(Valid(new BounceDirections(config))))
   val points     = Vec(3, Flipped(Valid(new BouncePoint(config))))
   val albedo     = Flipped(new AlbedoSources(config))
+
+  /** Components of the normals of microfacets, of the rough ones of the hits. */
+  val facets = Option.when(config.frame.gather)(Vec(3, Flipped(Valid(SInt(new ShaderFormats(config.numbers).narrowBits.W)))))
 
   // To and from bounce units, which may answer in any order
   val request = Decoupled(new BounceRequest(config))
@@ -71,18 +77,25 @@ final class BounceQueue(config: PathConfig, places: Int) extends Module {
   private val hits       = queue(io.hit)
   private val directions = io.directions.map(queue(_))
   private val points     = io.points.map(queue(_))
+  private val facets     = io.facets.toSeq.flatten.map(queue(_))
+  private val isRough    = hits.bits.isRough.getOrElse(false.B)
   private val all        = (hits +: directions) ++ points
   private val request    = io.request.bits
   private val hit        = hits.bits
   private val material   = ShadingPipeline.material(config, io.materials, hit.material)
   private val albedo     = new ObjectAlbedo(config, io.albedo, material, true.B, io.request.fire, places)
-  io.request.valid := all.map(_.valid).reduce(_ && _) && albedo.isKnown
+  io.request.valid := all.map(_.valid).reduce(_ && _) && facets.map(_.valid || !isRough).fold(albedo.isKnown)(_ && _)
   all.foreach(_.ready := io.request.fire)
+  facets.foreach(_.ready := io.request.fire && isRough)
 
   request.context           := hit.context
   request.origin            := Vec3.of(points.map(_.bits.origin))
   request.normal            := Vec3.of(points.map(_.bits.normal))
   request.isSmooth          := points.head.bits.isSmooth
+  if (config.frame.gather) when(isRough) {
+    request.normal   := Vec3.of(facets.map(_.bits))
+    request.isSmooth := true.B
+  }
   request.faceForwardNormal := Vec3.of(directions.map(_.bits.faceForwardNormal))
   request.dir               := Vec3.of(directions.map(_.bits.dir))
   request.backSide          := hit.backSide

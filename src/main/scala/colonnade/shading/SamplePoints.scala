@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.{log2Ceil, Valid}
+import chisel3.util.{log2Ceil, Cat, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
 import colonnade.formats.{Gather, PixelPosition, SamplePoint}
@@ -11,6 +11,11 @@ final class SamplePort(config: PathConfig) extends Bundle {
   val read    = Valid(Context(config))
   val point   = Input(new SamplePoint)
   val gathers = Input(Bool())
+  val isOn    = Input(Bool()) // the frame gathers light; constant in it
+
+  /** In the next cycle: the point is for a mirror or glass; for the back of a triangle. */
+  val isBounce = Output(Bool())
+  val backSide = Output(Bool())
 }
 
 /** A context and its pixel. */
@@ -26,7 +31,9 @@ final class SamplePointsIO(config: PathConfig) extends Bundle {
   val port   = Flipped(new SamplePort(config))
 }
 
-/** The sample points of gathered rays: that of the frame for the path's next ray, xor that of the pixel: docs/gather.md. */
+/** The sample points of gathered rays: that of the frame for the path's next ray, xor that of the pixel: docs/gather.md.
+  * Mirrors and glass have those of other rays.
+  */
 final class SamplePoints(config: PathConfig) extends Module {
   val io = IO(new SamplePointsIO(config))
 
@@ -35,9 +42,11 @@ final class SamplePoints(config: PathConfig) extends Module {
   when(io.pixel.valid) { points.write(start.context, SamplePoints.ofPixel(start.pixel)) }
 
   private val read  = io.port.read
-  private val index = io.count(log2Ceil(Gather.maxBounces) - 1, 0)
+  private val use   = Cat(io.port.isBounce, io.port.isBounce && !io.port.backSide)
+  private val index = io.count(log2Ceil(Gather.maxBounces) - 1, 0) ^ use
   private val pixel = points.read(read.bits, read.valid)
   io.port.gathers := io.count < io.gather.bounces
+  io.port.isOn    := io.gather.bounces =/= 0.U
   io.port.point.u := io.gather.points(index).u ^ pixel.u
   io.port.point.v := io.gather.points(index).v ^ pixel.v
 }

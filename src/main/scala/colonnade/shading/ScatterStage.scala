@@ -6,7 +6,7 @@ import colonnade.common.{ModuloSchedule, Timed}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{Lobe, SamplePoint, Vec3}
-import colonnade.numbers.{FoldedSquareRoot, Rounding}
+import colonnade.numbers.{FoldedSquareRoot, Normalise, Rounding}
 
 /** Ports of [[ScatterStage]]. Vectors come and go a component at a time, x first. */
 final class ScatterStageIO(config: PathConfig) extends Bundle {
@@ -15,21 +15,27 @@ final class ScatterStageIO(config: PathConfig) extends Bundle {
   val phase = Input(ModuloSchedule.phase())
   val point = Input(new SamplePoint) // in cycle 0
 
-  /** From cycle 1 and from `LobeAxisStage.axis0` on; and the axis' squared length in the cycle `AngleCycles.square`. */
+  /** From cycle 1 on. At a mirror or glass, which `isBounce` names in the same cycles, the ray's direction counts. */
+  val isBounce          = Input(Bool())
   val faceForwardNormal = Input(SInt((NumberFormats.normalBits + 1).W))
+  val dir               = Input(SInt((formats.shadeBits + 1).W))
+
+  /** From `LobeAxisStage.axis0` on; and its squared length in the cycle `AngleCycles.square`. */
   val axis              = Input(SInt(formats.narrowBits.W))
   val squaredAxis       = Input(UInt(formats.dotBits.W))
 
-  /** In three cycles from `ScatterStage.rough` on, and in the fourth: the width of a lobe; the surface is rough metal. */
+  /** In three cycles from `ScatterStage.rough` on, and in the fourth: the width of a lobe; the surface is rough. */
   val alpha   = Input(UInt(Lobe.alphaBits.W))
   val isRough = Input(Bool())
 
-  val dir = Output(ScatterStage.component) // from cycle `dir0` on
+  val scatter    = Output(ScatterStage.component)     // from cycle `dir0` on
+  val microfacet = Output(SInt(formats.narrowBits.W)) // from cycle `microfacet0` on: it, scaled like a normal
 }
 
 /** The direction of the ray that gathers light at a surface, by a point s of the unit sphere: docs/gather.md. At a diffuse
   * one n + |n| · s about its normal n, with the cosine as its density; at rough metal a ray of the lobe about its axis.
-  * One every three cycles, by a square root and nine multipliers.
+  * At a rough mirror or glass it is the normal of a microfacet. One every three cycles, by a square root and nine
+  * multipliers.
   */
 final class ScatterStage(config: PathConfig) extends Module {
   import ScatterStage._
@@ -79,7 +85,8 @@ final class ScatterStage(config: PathConfig) extends Module {
     select(xyz(first))(axis => now.at(first + axis)((axis + rotation) % 3))
   }
 
-  // Rough metal: the parts along and across its axis
+  // Rough surfaces: the parts along and across the axis
+  private val isFacet = carry(latch(1)(io.isBounce), wide)
   private val lift = {
     val product = latch(xyz(rough - 8))(components(points, rough - 8) * components(axes, rough - 8))
     val sum     = accumulate(xyz(rough - 7), product.at(xyz(rough - 7)).pad(unitBits + axisBits + 4))(_ + _)
@@ -100,7 +107,7 @@ final class ScatterStage(config: PathConfig) extends Module {
   again := Rounding.floor(scaled.items(0).at(rough + 1), Lobe.alphaBits)
   private val less  = latch(rough + 2)(Rounding.floor(scaled.items(1).at(rough + 2), Lobe.alphaBits))
   private val along = latch(wide) {
-    val ofMetal = carry(lowered, wide).at(wide) -& less.at(wide).zext
+    val ofMetal = carry(lowered, wide).at(wide) -& Mux(isFacet.at(wide), -1.S, less.at(wide).zext)
     Mux(io.isRough, Rounding.narrow(ofMetal, lengthBits + 2), (1 << (lengthBits - 1)).S)
   }
   private val across = latch(wide) {
@@ -126,8 +133,9 @@ final class ScatterStage(config: PathConfig) extends Module {
   }
   private val isMetal    = delay(arriving(isRough.at(xyz(wide + 1)), xyz(wide + 1)), xyz(wide + 1), 1)
   private val partAcross = {
-    val now = ofPoint.at(xyz(wide + 2))
-    Mux(isMetal.at(xyz(wide + 2)), now, (now << diffuseShift).asSInt)
+    val now    = ofPoint.at(xyz(wide + 2))
+    val ofLobe = Mux(carry(isFacet, wide + 2).at(xyz(wide + 2)), now >> facetShift, now)
+    Mux(isMetal.at(xyz(wide + 2)), ofLobe, (now << diffuseShift).asSInt)
   }
   private val both = latch(xyz(wide + 2)) {
     val now = ofAxis.at(xyz(wide + 2))
@@ -136,13 +144,13 @@ final class ScatterStage(config: PathConfig) extends Module {
     })
   }
 
-  // If it points below the surface: at rough metal the other side of the axis, else the opposite
+  // If it points below the surface, or away from the ray: at a rough surface the other side of the axis, else the opposite
   private val sideCycle = wide + 3
-  private val geometric = delay(
-    arriving(Rounding.floor(io.faceForwardNormal, NumberFormats.normalBits - sideBits), xyz(1)),
-    xyz(1),
-    sideCycle - 1
-  ).at(xyz(sideCycle))
+  private val geometric = {
+    val upwards = Rounding.floor(io.faceForwardNormal, NumberFormats.normalBits - sideBits)
+    val toEye   = (~Rounding.floor(io.dir, formats.shadeBits - sideBits)).asSInt
+    delay(arriving(Mux(io.isBounce, toEye, upwards), xyz(1)), xyz(1), sideCycle - 1).at(xyz(sideCycle))
+  }
   private val first  = both.at(xyz(sideCycle))
   private val second = Mux(delay(isMetal, xyz(wide + 2), 1).at(xyz(sideCycle)), first(1), -first(0))
   private val sides  = latch(xyz(sideCycle))(Rounding.floor(first(0), sideDropped) * geometric)
@@ -156,7 +164,18 @@ final class ScatterStage(config: PathConfig) extends Module {
     val upwards = Mux(isBelow.at(cycles), now(1), now(0))
     latch(cycles)(Mux(isAt(cycles.last), (upwards.asUInt | 1.U).asSInt, upwards))
   }
-  io.dir := result.at(xyz(dir0))
+  io.scatter := result.at(xyz(dir0))
+
+  // A normal has all of its bits in the longest component
+  private val facet   = Rounding.narrow(result.at(xyz(dir0)), facetBits + 1)
+  private val longest = accumulate(xyz(dir0), Mux(facet < 0.S, 0.S -& facet, facet).asUInt(facetBits - 1, 0))(_ | _)
+  private val zeros   = Normalise.countLeadingZeros(longest.at(dir0 + 3))._2
+  private val shift   = Mux(isAt(dir0 + 3), zeros, latch(dir0 + 3)(zeros).at(Seq(dir0 + 4, dir0 + 5)))
+  private val scaledFacet = latch(xyz(dir0 + 3)) {
+    val now = delay(arriving(facet, xyz(dir0)), xyz(dir0), 3).at(xyz(dir0 + 3))
+    (now << shift).asUInt(facetBits, 0).asSInt
+  }
+  io.microfacet := (scaledFacet.at(xyz(microfacet0)) << (formats.shadeBits - facetBits)).asSInt
 
   private def rounded(x: UInt, bits: Int): UInt = Rounding.floor(x +& (1 << (bits - 1)).U, bits)
 
@@ -176,6 +195,7 @@ object ScatterStage {
   private val axisBits     = 11
   private val lengthBits   = 11
   private val diffuseShift = axisBits - unit
+  private val facetShift   = Lobe.facetFraction - Lobe.alphaBits + 1 // a lobe is twice as wide
   private val rootCycle    = LobeAxisStage.axis0 + 5 + interval * FoldedSquareRoot.intervals(2 * lengthBits, interval)
   private val dropped      = 2 * axisBits - 11 // low bits of the sum
   private val sideBits     = 8                 // of the geometric normal, with its sign, for the side
@@ -186,8 +206,11 @@ object ScatterStage {
 
   private val wide = rough + 3 // its parts along and across the axis are known after this cycle
 
-  /** First cycle of the direction. */
-  val dir0: Int = rough + 12
+  /** First cycle of the direction, and of the normal of a microfacet. */
+  val dir0:        Int = rough + 12
+  val microfacet0: Int = dir0 + 4
+
+  private val facetBits = 12 // magnitude bits of the normal of a microfacet, before it is scaled
 
   /** Width of a component of the direction, signed. */
   val componentBits: Int = 14

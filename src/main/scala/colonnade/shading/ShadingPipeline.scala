@@ -76,6 +76,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   private val isLight    = arriving(isActive && !hit.isBounce, 0, interval - 1)
   private val lightAt6   = carryFlag(isLight, 6)
   private val lightAtEnd = carryFlag(lightAt6, cycles.direct)
+  private val isBounce   = latchFlag(0)(isActive && hit.isBounce)
   private val surface    = Module(new SurfaceStage(config)).io
   private val angle      = Module(new AngleStage(config)).io
   private val bright     = Module(new BrightnessStage(config)).io
@@ -95,18 +96,22 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   bright.angle.isAcute := faces
   bright.falloff       := angle.falloff
 
-  // Rough metal is lit about the direction in which a smooth mirror would reflect
+  // Rough metal is lit about the direction in which a smooth mirror would reflect; a rough mirror or glass has microfacets
   private val roughs = io.sample.map { sample =>
     // Known in the cycle after the entry, for all lights of the hit
     val isNew   = RegNext(enters, false.B)
     val gathers = Mux(isNew, sample.gathers, RegEnable(sample.gathers, isNew))
     val rough   = Wire(new RoughSurface(config))
-    rough.isRough  := isRough(hit.material) && !hit.isEnvironment && gathers
+    rough.isRough  := Mux(hit.isBounce, isRoughBounce, isRough(hit.material) && !hit.isEnvironment && gathers)
     rough.material := hit.material
     Seq.iterate(arriving(rough, 0, interval - 1), cycles.brightness / interval)(now =>
       latch(now.last)(now.at(now.last))
     )
   }
+
+  /** The mirror or glass in the entry is rough, in a frame that gathers. */
+  private def isRoughBounce: Bool =
+    io.sample.fold(false.B)(_.isOn && material(config, io.materials, hit.material).lobe.get.alpha.orR)
 
   private def isRough(number: UInt): Bool =
     material(config, io.materials, number).kind.get === MaterialKind.roughMetal
@@ -120,7 +125,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   if (config.frame.gather) {
     val stage = Module(new LobeAxisStage(config)).io
     stage.phase        := phase
-    stage.isRough      := roughAt(Seq(0)).isRough
+    stage.isRough      := roughAt(Seq(0)).isRough && !hit.isBounce
     stage.dir          := surface.dir
     stage.normal       := surface.normal
     angle.normal       := stage.axis
@@ -129,19 +134,23 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     bright.peak.get    := lobeAt(Seq(cycles.cosine + 8)).peak
   }
 
-  // The rays that gather light
+  // The rays that gather light, and microfacets
   private val scatter = io.sample.map { sample =>
-    sample.read.valid := enters && !entering.isBounce
+    sample.read.valid := enters
     sample.read.bits  := entering.context
+    sample.isBounce   := hit.isBounce
+    sample.backSide   := hit.backSide
     val stage = Module(new ScatterStage(config)).io
     stage.phase             := phase
     stage.point             := sample.point
+    stage.isBounce          := isBounce.at(xyz(1))
     stage.faceForwardNormal := surface.faceForwardNormal
+    stage.dir               := surface.dir
     stage.axis              := angle.normal
     stage.squaredAxis       := angle.squaredNormal
     stage.alpha             := lobeAt(ScatterStage.rough until ScatterStage.rough + 3).alpha
     stage.isRough           := roughAt(Seq(ScatterStage.rough + 3)).isRough
-    stage.dir
+    stage
   }
 
   // Lit surfaces
@@ -163,7 +172,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     carryFlag(arriving(isActive && !hit.isBounce && light === 0.U, 0, interval - 1), ScatterStage.dir0)
   for (components <- assembler.scatter; (component, cycle) <- components.zip(xyz(ScatterStage.dir0))) {
     component.valid := isAt(cycle) && isFirst.at(cycle)
-    component.bits  := scatter.get
+    component.bits  := scatter.get.scatter
   }
   require(
     !config.frame.gather || cycles.direct > xyz(ScatterStage.dir0).last,
@@ -186,7 +195,6 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   lightCount := lightCount + isCounted - assembler.isTaken
 
   // Mirrors and glass
-  private val isBounce    = latchFlag(0)(isActive && hit.isBounce)
   private val bounceAt7   = latchFlag(6)(carryFlag(isBounce, 6).at(6))
   private val bounceQueue = io.bounced.map { bounced =>
     val queue = Module(new BounceQueue(config, bouncePlaces)).io
@@ -197,6 +205,14 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     queue.hit.bits.context  := hit.context
     queue.hit.bits.material := hit.material
     queue.hit.bits.backSide := hit.backSide
+    for (isRough <- queue.hit.bits.isRough; facets <- queue.facets) {
+      val isFacet = carryFlag(latchFlag(0)(isActive && hit.isBounce && isRoughBounce), ScatterStage.microfacet0)
+      isRough := isRoughBounce
+      for ((component, cycle) <- facets.zip(xyz(ScatterStage.microfacet0))) {
+        component.valid := isAt(cycle) && isFacet.at(cycle)
+        component.bits  := scatter.get.microfacet
+      }
+    }
     for ((component, cycle) <- queue.directions.zip(xyz(1))) {
       component.valid                  := isAt(cycle) && isBounce.at(cycle)
       component.bits.faceForwardNormal := surface.faceForwardNormal

@@ -19,24 +19,45 @@ object GatherReference {
     * in units of 1/256; and for the geometric normal.
     */
   def direction(axis: Seq[Int], faceForward: Seq[Int], shadeBits: Int, u: Int, v: Int, alpha: Option[Int]): Seq[Int] = {
-    val square          = axis.map(component => BigInt(component) * component).sum
-    val length          = math.sqrt((square >> (2 * shadeBits + 2 - 22)).toDouble).toLong
-    val narrow          = axis.map(component => (component >> (shadeBits - 11)).toLong)
-    val point           = sphere(u, v).map(_.toLong)
+    val frame           = new Frame(axis, shadeBits, u, v)
     val (along, across) = alpha match {
-      case None        => (narrow.map(_ << 10), point.map(component => (length * component) << 3))
+      case None        => (frame.axis.map(_ << 10), frame.point.map(component => (frame.length * component) << 3))
       case Some(alpha) =>
-        val lift  = narrow.zip(point).map { case (a, b) => a * b }.sum + 256 >> 9
-        val scale = length - lift - ((alpha * ((alpha * (length + lift).max(0)) >> 8)) >> 8)
-        val cross = Seq.tabulate(3) { k =>
-          (point((k + 1) % 3) * narrow((k + 2) % 3) - point((k + 2) % 3) * narrow((k + 1) % 3)) >> 8
-        }
-        (narrow.map(scale * _), cross.map(((alpha * length + 64) >> 7) * _))
+        val less = (alpha * ((alpha * (frame.length + frame.lift).max(0)) >> 8)) >> 8
+        (frame.axis.map((frame.length - frame.lift - less) * _), frame.across(alpha))
     }
-    def sum(sign: Int) = along.zip(across).map { case (a, b) => ((a + sign * b) >> 11).toInt }
-    val above          = sum(1)
-    val side = above.zip(faceForward).map { case (component, geometric) => (component >> 2) * (geometric >> 4) }.sum
-    val Seq(x, y, z) = if (side >= 0) above else if (alpha.isEmpty) above.map(-_) else sum(-1)
+    onSide(along, across, faceForward.map(_ >> 4), isNegated = alpha.isEmpty)
+  }
+
+  /** The normal of a microfacet that a ray in the direction `dir` meets, scaled as the normal is; its width in units of
+    * 1/1024.
+    */
+  def microfacet(normal: Seq[Int], dir: Seq[Int], shadeBits: Int, u: Int, v: Int, alpha: Int): Seq[Int] = {
+    val frame = new Frame(normal, shadeBits, u, v)
+    val along = frame.axis.map((frame.length - frame.lift + 1) * _)
+    val found = onSide(along, frame.across(alpha).map(_ >> 3), dir.map(x => ~(x >> (shadeBits - 8))), isNegated = false)
+    found.map(_ << (shadeBits - found.map(x => BigInt(x).abs.bitLength).max))
+  }
+
+  /** An axis of 11 bits, half its length, and the part of a sample point along it. */
+  private class Frame(about: Seq[Int], shadeBits: Int, u: Int, v: Int) {
+    private val square = about.map(component => BigInt(component) * component).sum
+    val length         = math.sqrt((square >> (2 * shadeBits + 2 - 22)).toDouble).toLong
+    val axis           = about.map(component => (component >> (shadeBits - 11)).toLong)
+    val point          = sphere(u, v).map(_.toLong)
+    val lift           = axis.zip(point).map { case (a, b) => a * b }.sum + 256 >> 9
+
+    def across(alpha: Int): Seq[Long] = Seq.tabulate(3) { k =>
+      val cross = point((k + 1) % 3) * axis((k + 2) % 3) - point((k + 2) % 3) * axis((k + 1) % 3)
+      ((alpha * length + 64) >> 7) * (cross >> 8)
+    }
+  }
+
+  private def onSide(along: Seq[Long], across: Seq[Long], side: Seq[Int], isNegated: Boolean): Seq[Int] = {
+    def sum(sign: Int)  = along.zip(across).map { case (a, b) => ((a + sign * b) >> 11).toInt }
+    val first           = sum(1)
+    val isOnSide        = first.zip(side).map { case (component, side) => (component >> 2) * side }.sum >= 0
+    val Seq(x, y, z)    = if (isOnSide) first else if (isNegated) first.map(-_) else sum(-1)
     Seq(x, y, z | 1)
   }
 

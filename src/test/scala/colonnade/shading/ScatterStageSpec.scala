@@ -8,7 +8,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** Gathered rays have the directions of [[GatherReference]], whose density is the cosine. */
+/** Gathered rays and microfacets have the directions of [[GatherReference]], with the densities that it should have. */
 class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "ScatterStage"
 
@@ -20,39 +20,52 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
         val random    = new Random(mac)
         val count     = 400
         val cases     = Seq.tabulate(count) { index =>
-          val alpha    = if (random.nextBoolean()) Some(random.nextInt(256)) else None
+          val alpha    = if (random.nextInt(3) > 0) Some(random.nextInt(256)) else None
+          val isFacet  = alpha.nonEmpty && random.nextBoolean()
           val (u, v)   = (random.nextInt(256), random.nextInt(256))
           val scale    = (1 << (shadeBits - 9)) * (if (index % 3 == 0) 1 else -1)
           val extremes = GatherReference.sphere(u, v).map(_ * scale) // the point lies along the axis or against it
-          (if (index % 4 == 0) extremes else normal(random, shadeBits), normal(random, 11), u, v, alpha)
+          val axis     = if (index % 4 == 0) extremes else normal(random, shadeBits)
+          ScatterCase(axis, normal(random, 11), normal(random, shadeBits), u, v, alpha, isFacet)
         }
         dut.clock.setTimeout(0)
         def during[T](cycle: Int, first: Int)(use: (Int, Int) => T): Unit = {
           val (operation, axis) = ((cycle - first) / 3, (cycle - first) % 3)
           if (cycle >= first && operation < count) use(operation, axis)
         }
-        for (cycle <- 0 until 3 * count + ScatterStage.dir0 + 3) {
+        for (cycle <- 0 until 3 * count + ScatterStage.microfacet0 + 3) {
           dut.io.phase.poke(cycle % 3)
           during(cycle, 0) { (operation, axis) =>
-            val (_, _, u, v, _) = cases(operation)
+            val ScatterCase(_, _, _, u, v, _, _) = cases(operation)
             // The point is there in one cycle only
             dut.io.point.u.poke(if (axis == 0) u else random.nextInt(256))
             dut.io.point.v.poke(if (axis == 0) v else random.nextInt(256))
           }
-          during(cycle, 1)((operation, axis) => dut.io.faceForwardNormal.poke(cases(operation)._2(axis)))
-          during(cycle, LobeAxisStage.axis0)((operation, axis) => dut.io.axis.poke(cases(operation)._1(axis)))
+          during(cycle, 1) { (operation, axis) =>
+            dut.io.isBounce.poke(cases(operation).isFacet)
+            dut.io.faceForwardNormal.poke(cases(operation).geometric(axis))
+            dut.io.dir.poke(cases(operation).dir(axis))
+          }
+          during(cycle, LobeAxisStage.axis0)((operation, axis) => dut.io.axis.poke(cases(operation).axis(axis)))
           during(cycle, new AngleCycles(config).square) { (operation, axis) =>
-            val square = cases(operation)._1.map(component => BigInt(component) * component).sum
+            val square = cases(operation).axis.map(component => BigInt(component) * component).sum
             dut.io.squaredAxis.poke(if (axis == 0) square else BigInt(0))
           }
-          during(cycle, ScatterStage.rough)((operation, _) => dut.io.alpha.poke(cases(operation)._5.getOrElse(0)))
+          during(cycle, ScatterStage.rough)((operation, _) => dut.io.alpha.poke(cases(operation).alpha.getOrElse(0)))
           during(cycle, ScatterStage.rough + 3) { (operation, axis) =>
-            dut.io.isRough.poke(cases(operation)._5.nonEmpty ^ axis > 0)
+            dut.io.isRough.poke(cases(operation).alpha.nonEmpty ^ axis > 0)
           }
           during(cycle, ScatterStage.dir0) { (operation, axis) =>
-            val (normal, geometric, u, v, alpha) = cases(operation)
+            val ScatterCase(normal, geometric, _, u, v, alpha, isFacet) = cases(operation)
             val expected = GatherReference.direction(normal, geometric, shadeBits, u, v, alpha)(axis)
-            dut.io.dir.expect(expected, s"case $operation")
+            if (!isFacet) dut.io.scatter.expect(expected, s"case $operation")
+          }
+          during(cycle, ScatterStage.microfacet0) { (operation, axis) =>
+            val ScatterCase(normal, _, dir, u, v, alpha, isFacet) = cases(operation)
+            if (isFacet) {
+              val expected = GatherReference.microfacet(normal, dir, shadeBits, u, v, alpha.get)(axis)
+              dut.io.microfacet.expect(expected, s"case $operation")
+            }
           }
           dut.clock.step()
         }
@@ -103,6 +116,26 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
+  "Microfacets" should "have the angles of Trowbridge and Reitz (GGX), and face the ray" in {
+    for (normal <- axes; alpha <- Seq(10, 64, 255)) {
+      val against = normal.map(-_)
+      val cosines = all.map { case (u, v) =>
+        cosine(GatherReference.microfacet(normal, against, 18, u, v, alpha), normal)
+      }.sorted
+      for (share <- Seq(26, 64, 128, 192, 230).map(_ / 256.0)) {
+        val index    = math.rint((1 - share) * cosines.size).toInt
+        val found    = cosines.slice(index - 256, index + 256).sum / 512
+        val expected = 1 / math.sqrt(1 + math.pow(alpha / 1024.0, 2) * share / (1 - share))
+        assert(math.abs(found - expected) <= (if (share > 0.75) 0.003 else 0.001), s"quantile $share of $alpha about $normal")
+      }
+    }
+    val grazing = Seq(131000, 0, -9000) // one facet in ten would face away
+    val away    = all.count { case (u, v) =>
+      cosine(GatherReference.microfacet(axes(2), grazing, 18, u, v, 64), grazing) >= 0
+    }
+    assert(away <= all.size / 200, s"$away facets face away")
+  }
+
   /** A normal whose largest component has `bits` bits. */
   private def normal(random: Random, bits: Int): Seq[Int] = {
     val drawn = Seq.fill(3)(random.nextGaussian())
@@ -110,3 +143,14 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
     drawn.map(x => (x * scale).toInt)
   }
 }
+
+/** A surface, its ray and its sample point; `alpha` is the width of rough metal or of microfacets. */
+final private case class ScatterCase(
+    axis:      Seq[Int],
+    geometric: Seq[Int],
+    dir:       Seq[Int],
+    u:         Int,
+    v:         Int,
+    alpha:     Option[Int],
+    isFacet:   Boolean
+)
