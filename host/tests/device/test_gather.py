@@ -48,7 +48,7 @@ def with_cube(image: SceneImage, seed: int) -> SceneImage:
 
 
 def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, int]:
-    """Registers with random sample points and near surfaces; material 3 is rough metal, in some frames all are rough."""
+    """Random sample points and near surfaces; material 3 is rough metal, in some frames mirrors and glass are rough."""
     drawn = np.random.default_rng(seed).integers(0, 256, (4, 2))
     points = {f"gather.points[{i}].{axis}": int(drawn[i, a]) for i in range(4) for a, axis in enumerate("uv")}
     rough = {"kind": 3, "lobe.alpha": 52, "lobe.slope": 743, "lobe.peak": 589}
