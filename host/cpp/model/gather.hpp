@@ -192,10 +192,10 @@ private:
         Vector scaled;
         blockNormalise(direction, 8, scaled);
         std::int64_t major = 0;
-        for (int a = 0; a < 3; ++a) major = std::max(major, (scaled[a] < 0 ? ~scaled[a] : scaled[a]) >> 4);
+        for (int a = 0; a < 3; ++a) major = std::max(major, (scaled[a] < 0 ? ~scaled[a] : scaled[a]) >> 5);
         for (int a = 0; a < 3; ++a) {
-            const auto offset = static_cast<std::int64_t>(floorShift<Wide>(origin[a] - (Wide(1) << (n.gridBits - 4)), n.gridBits - 10 + parallax));
-            scaled[a] = floorShift(4 * scaled[a] + 3 + (parallax == 0 ? 0 : std::clamp<std::int64_t>(offset, -64, 63) * major), 3);
+            const auto offset = static_cast<std::int64_t>(floorShift<Wide>(origin[a] - (Wide(1) << (n.gridBits - 4)), n.gridBits - 9 + parallax));
+            scaled[a] = floorShift(2 * scaled[a] + 1 + (parallax == 0 ? 0 : (2 * std::clamp<std::int64_t>(offset, -32, 31) + 1) * major), 2);
         }
         return scaled;
     }

@@ -43,7 +43,8 @@ final class BounceQueueIO(config: PathConfig) extends Bundle {
   val albedo     = Flipped(new AlbedoSources(config))
 
   /** Components of the normals of microfacets, of the rough ones of the hits. */
-  val facets = Option.when(config.frame.gather)(Vec(3, Flipped(Valid(SInt(new ShaderFormats(config.numbers).narrowBits.W)))))
+  val facets =
+    Option.when(config.frame.gather)(Vec(3, Flipped(Valid(SInt(new ShaderFormats(config.numbers).narrowBits.W)))))
 
   // To and from bounce units, which may answer in any order
   val request = Decoupled(new BounceRequest(config))
@@ -88,10 +89,10 @@ final class BounceQueue(config: PathConfig, places: Int) extends Module {
   all.foreach(_.ready := io.request.fire)
   facets.foreach(_.ready := io.request.fire && isRough)
 
-  request.context           := hit.context
-  request.origin            := Vec3.of(points.map(_.bits.origin))
-  request.normal            := Vec3.of(points.map(_.bits.normal))
-  request.isSmooth          := points.head.bits.isSmooth
+  request.context  := hit.context
+  request.origin   := Vec3.of(points.map(_.bits.origin))
+  request.normal   := Vec3.of(points.map(_.bits.normal))
+  request.isSmooth := points.head.bits.isSmooth
   if (config.frame.gather) when(isRough) {
     request.normal   := Vec3.of(facets.map(_.bits))
     request.isSmooth := true.B

@@ -83,12 +83,13 @@ final class LightCube(config: PathConfig) extends Module {
   when(!RegEnable(seesLights, io.memory.read.valid)) { light.isLight := false.B }
   io.port.texel := RegEnable(light, comes)
 
-  /** How far from the middle of the object's cube a position is, in 2^-6 of the distance of the surfaces. */
+  /** How far from the middle of the object's cube a position is, in 2^-6 of the distance of the surfaces; it is odd. */
   private def offsetOf(position: Fixed): SInt = {
-    val numbers = config.numbers
-    val coarse  = Rounding.floor(position.integer, numbers.gridBits - 10 + 1) -& (1 << offsetBits - 2).S
-    val steps   = (coarse >> (io.parallax - 1.U)(Gather.parallaxBits - 1, 0)).asSInt
-    Mux(io.parallax === 0.U, 0.S, Rounding.saturate(steps, offsetBits))
+    // The bits that count; the middle has the lowest one of those that change
+    val coarse = Rounding.saturate(Rounding.floor(position.integer, config.numbers.gridBits - 8), offsetBits + 2)
+    val middle = Cat((coarse >> middleLog) -& 1.S, coarse(middleLog - 1, 0)).asSInt
+    val steps  = Rounding.saturate((middle >> (io.parallax - 1.U)(Gather.parallaxBits - 1, 0)).asSInt, offsetBits - 1)
+    Mux(io.parallax === 0.U, 0.S, Cat(steps, 1.U(1.W)).asSInt)
   }
 }
 
@@ -98,7 +99,10 @@ object LightCube {
 
   /** Of an offset, with its sign, and of the magnitude by which it is multiplied. */
   private val offsetBits = 7
-  private val factorBits = 4
+  private val factorBits = 3
+
+  /** Of the middle of the object's cube, where the distance of the surfaces is 2^5. */
+  private val middleLog = 4
 
   val addressBits: Int = 3 + 2 * faceLog
 
@@ -115,7 +119,7 @@ object LightCube {
       dir.map(component => Mux(component < 0.S, ~component, component).asUInt(dirBits - 1, dirBits - factorBits))
     val major = sizes.reduce((a, b) => Mux(a >= b, a, b))
     dir.zip(offset).map { case (component, offset) =>
-      Rounding.floor(Cat(component, 3.U(2.W)).asSInt +& offset * major, 3)
+      Rounding.floor(Cat(component, 1.U(1.W)).asSInt +& offset * major, 2)
     }
   }
 

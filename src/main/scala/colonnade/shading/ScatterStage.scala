@@ -21,8 +21,8 @@ final class ScatterStageIO(config: PathConfig) extends Bundle {
   val dir               = Input(SInt((formats.shadeBits + 1).W))
 
   /** From `LobeAxisStage.axis0` on; and its squared length in the cycle `AngleCycles.square`. */
-  val axis              = Input(SInt(formats.narrowBits.W))
-  val squaredAxis       = Input(UInt(formats.dotBits.W))
+  val axis        = Input(SInt(formats.narrowBits.W))
+  val squaredAxis = Input(UInt(formats.dotBits.W))
 
   /** In three cycles from `ScatterStage.rough` on, and in the fourth: the width of a lobe; the surface is rough. */
   val alpha   = Input(UInt(Lobe.alphaBits.W))
@@ -87,7 +87,7 @@ final class ScatterStage(config: PathConfig) extends Module {
 
   // Rough surfaces: the parts along and across the axis
   private val isFacet = carry(latch(1)(io.isBounce), wide)
-  private val lift = {
+  private val lift    = {
     val product = latch(xyz(rough - 8))(components(points, rough - 8) * components(axes, rough - 8))
     val sum     = accumulate(xyz(rough - 7), product.at(xyz(rough - 7)).pad(unitBits + axisBits + 4))(_ + _)
     latch(rough - 4)(Rounding.floor(sum.at(rough - 4) + (1 << unit).S, unit + 1))
@@ -167,10 +167,10 @@ final class ScatterStage(config: PathConfig) extends Module {
   io.scatter := result.at(xyz(dir0))
 
   // A normal has all of its bits in the longest component
-  private val facet   = Rounding.narrow(result.at(xyz(dir0)), facetBits + 1)
-  private val longest = accumulate(xyz(dir0), Mux(facet < 0.S, 0.S -& facet, facet).asUInt(facetBits - 1, 0))(_ | _)
-  private val zeros   = Normalise.countLeadingZeros(longest.at(dir0 + 3))._2
-  private val shift   = Mux(isAt(dir0 + 3), zeros, latch(dir0 + 3)(zeros).at(Seq(dir0 + 4, dir0 + 5)))
+  private val facet       = Rounding.narrow(result.at(xyz(dir0)), facetBits + 1)
+  private val longest     = accumulate(xyz(dir0), Mux(facet < 0.S, 0.S -& facet, facet).asUInt(facetBits - 1, 0))(_ | _)
+  private val zeros       = Normalise.countLeadingZeros(longest.at(dir0 + 3))._2
+  private val shift       = Mux(isAt(dir0 + 3), zeros, latch(dir0 + 3)(zeros).at(Seq(dir0 + 4, dir0 + 5)))
   private val scaledFacet = latch(xyz(dir0 + 3)) {
     val now = delay(arriving(facet, xyz(dir0)), xyz(dir0), 3).at(xyz(dir0 + 3))
     (now << shift).asUInt(facetBits, 0).asSInt
@@ -197,9 +197,9 @@ object ScatterStage {
   private val diffuseShift = axisBits - unit
   private val facetShift   = Lobe.facetFraction - Lobe.alphaBits + 1 // a lobe is twice as wide
   private val rootCycle    = LobeAxisStage.axis0 + 5 + interval * FoldedSquareRoot.intervals(2 * lengthBits, interval)
-  private val dropped      = 2 * axisBits - 11 // low bits of the sum
-  private val sideBits     = 8                 // of the geometric normal, with its sign, for the side
-  private val sideDropped  = 2                 // low bits of the direction, for the side
+  private val dropped      = 2 * axisBits - 11                       // low bits of the sum
+  private val sideBits    = 8 // of the geometric normal, with its sign, for the side
+  private val sideDropped = 2 // low bits of the direction, for the side
 
   /** First cycle in which it uses the width of a lobe, for the first of three products. */
   val rough: Int = rootCycle + 1

@@ -54,10 +54,10 @@ object GatherReference {
   }
 
   private def onSide(along: Seq[Long], across: Seq[Long], side: Seq[Int], isNegated: Boolean): Seq[Int] = {
-    def sum(sign: Int)  = along.zip(across).map { case (a, b) => ((a + sign * b) >> 11).toInt }
-    val first           = sum(1)
-    val isOnSide        = first.zip(side).map { case (component, side) => (component >> 2) * side }.sum >= 0
-    val Seq(x, y, z)    = if (isOnSide) first else if (isNegated) first.map(-_) else sum(-1)
+    def sum(sign: Int) = along.zip(across).map { case (a, b) => ((a + sign * b) >> 11).toInt }
+    val first          = sum(1)
+    val isOnSide       = first.zip(side).map { case (component, side) => (component >> 2) * side }.sum >= 0
+    val Seq(x, y, z)   = if (isOnSide) first else if (isNegated) first.map(-_) else sum(-1)
     Seq(x, y, z | 1)
   }
 
@@ -90,9 +90,9 @@ object GatherReference {
     val dir    =
       direction.map(component => (if (length < 8) component << (8 - length) else component >> (length - 8)).toInt)
     val scaled = dir.zip(origin).map { case (component, position) =>
-      val offset = (position - (BigInt(1) << gridBits - 4)) >> gridBits - 10 + parallax
-      val factor = dir.map(component => component.max(-1 - component) >> 4).max
-      (4 * component + 3 + (if (parallax == 0) 0 else offset.max(-64).min(63).toInt * factor)) >> 3
+      val offset = (position - (BigInt(1) << gridBits - 4)) >> gridBits - 9 + parallax
+      val factor = dir.map(component => component.max(-1 - component) >> 5).max
+      (2 * component + 1 + (if (parallax == 0) 0 else (2 * offset.max(-32).min(31).toInt + 1) * factor)) >> 2
     }
     val sizes                     = scaled.map(_.abs)
     val axis                      = sizes.indexOf(sizes.max)

@@ -41,7 +41,7 @@ class SamplePointsSpec extends AnyFlatSpec with ChiselScalatestTester {
         val (isBounce, backSide) = (random.nextBoolean(), random.nextBoolean())
         dut.io.port.isBounce.poke(isBounce)
         dut.io.port.backSide.poke(backSide)
-        val ray = if (isBounce) count ^ (if (backSide) 2 else 3) else count
+        val ray    = if (isBounce) count ^ (if (backSide) 2 else 3) else count
         val (u, v) = GatherReference.pixel(pixels(reader)._1, pixels(reader)._2)
         dut.io.port.point.u.expect(u ^ frame(ray)._1)
         dut.io.port.point.v.expect(v ^ frame(ray)._2)

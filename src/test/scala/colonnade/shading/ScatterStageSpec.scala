@@ -126,7 +126,10 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
         val index    = math.rint((1 - share) * cosines.size).toInt
         val found    = cosines.slice(index - 256, index + 256).sum / 512
         val expected = 1 / math.sqrt(1 + math.pow(alpha / 1024.0, 2) * share / (1 - share))
-        assert(math.abs(found - expected) <= (if (share > 0.75) 0.003 else 0.001), s"quantile $share of $alpha about $normal")
+        assert(
+          math.abs(found - expected) <= (if (share > 0.75) 0.003 else 0.001),
+          s"quantile $share of $alpha about $normal"
+        )
       }
     }
     val grazing = Seq(131000, 0, -9000) // one facet in ten would face away
