@@ -4,9 +4,9 @@ import chisel3._
 import chisel3.util.{Cat, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.formats.{AttributeMemories, CubeTexel, Gather}
+import colonnade.formats.{AttributeMemories, CubeTexel, Gather, Vec3}
 import colonnade.numbers.{DigitRecurrence, Fixed, Normalise, Rounding}
-import colonnade.ray.RayRequest
+import colonnade.ray.RayFormats
 
 /** Reads of the light cube: a texel's address, and two cycles later its word. */
 final class CubePort extends Bundle {
@@ -31,11 +31,18 @@ final class LightPort(config: PathConfig) extends Bundle {
   val texel = Input(new CubeTexel)
 }
 
+/** A ray that may leave the object: the direction of a gathered ray, or of a bounce. */
+final class LeavingRay(config: PathConfig) extends Bundle {
+  val context = Context(config)
+  val origin  = Vec3(new Fixed(new RayFormats(config.numbers).scene))
+  val dir     = Vec3(SInt(new BounceFormats(config.numbers).bounceBits.W))
+}
+
 final class LightCubeIO(config: PathConfig) extends Bundle {
   val parallax = Input(UInt(Gather.parallaxBits.W))
 
   /** Its context is read two cycles later or after that, after a reflection three. */
-  val ray    = Flipped(Valid(new RayRequest(config)))
+  val ray    = Flipped(Valid(new LeavingRay(config)))
   val port   = Flipped(new LightPort(config))
   val memory = new CubePort
 }

@@ -7,6 +7,7 @@ import colonnade.config.PathConfig
 import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, UnitPosition}
 import colonnade.ray.{RayRequest, RaySetup}
+import colonnade.numbers.Rounding
 import colonnade.shading.{ColourUnit, CubePort, LightCube, LitSurface, SamplePoints, Shader, ShadowRays, TexturePort}
 
 /** `registers` is constant while a frame runs. */
@@ -120,7 +121,10 @@ final class PathUnit(config: PathConfig) extends Module {
     val scatters = surfaceRays.fire && isGathered
     light.parallax  := registers.parallax
     light.ray.valid := leaving.valid || scatters
-    light.ray.bits  := Mux(leaving.valid, leaving.bits, surfaceRays.bits)
+    val ray = Mux(leaving.valid, leaving.bits, surfaceRays.bits)
+    light.ray.bits.context                                           := ray.context
+    light.ray.bits.origin                                            := ray.origin
+    for ((to, from) <- light.ray.bits.dir.axes.zip(ray.dir.axes)) to := Rounding.narrow(from, to.getWidth)
     assert(!(leaving.valid && scatters), "two rays leave in a cycle")
     light.port :<>= colourUnit.cube.get
     cube :<>= light.memory

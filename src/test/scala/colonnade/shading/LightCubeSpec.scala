@@ -18,7 +18,7 @@ class LightCubeSpec extends AnyFlatSpec with ChiselScalatestTester {
   it should "read the texel of a direction" in
     test(new LightCube(config)).withAnnotations(Simulation.verilator) { dut =>
       val random   = new Random(4)
-      val bits     = config.numbers.directionBits
+      val bits     = new BounceFormats(config.numbers).bounceBits
       val last     = Array.fill(4)(0)
       var parallax = 0
       // In the object's cube, about it, and far away
