@@ -56,18 +56,19 @@ def project_tables() -> dict[str, Any]:
 
 
 def wanted_locks() -> list[Lock]:
-    """The locks: build requirements, .venv with host and laboratory, a Java runtime, `ppa`, and each further group."""
+    """The locks: build requirements, .venv with host and laboratory, a Java runtime, a filter, `ppa`, and each further group."""
     data = project_tables()
     laboratory = tomllib.loads(LABORATORY.read_text(encoding="utf-8"))["project"]
     project = data["project"]
     extras: dict[str, list[str]] = dict(project.get("optional-dependencies", {}))
-    java = extras.pop("java")  # a checkout has a JDK
+    # A checkout has a JDK, and no test needs 88 MB of Open Image Denoise
+    apart = {name: extras.pop(name) for name in ("java", "denoise")}
     groups: dict[str, list[str]] = dict(data.get("dependency-groups", {}))
     build = [*data["build-system"]["requires"], *groups.pop("build", [])]
     # The laboratory also depends on the host itself
     measures = [one for one in laboratory["dependencies"] if not one.startswith(project["name"])]
     host = [*project["dependencies"], *itertools.chain(*extras.values()), *measures]
-    tables = {"build": build, "host": host, "java": java, **laboratory["optional-dependencies"], **groups}
+    tables = {"build": build, "host": host, **apart, **laboratory["optional-dependencies"], **groups}
     return [Lock(name, tuple(table), project["requires-python"]) for name, table in tables.items()]
 
 

@@ -30,6 +30,7 @@ from colonnade.maps.encoders import Encoder
 if TYPE_CHECKING:
     from colonnade.render.report import FrameReport
     from colonnade.render.request import Backend
+    from colonnade.scene.model import Denoiser
 
 
 @click.command(short_help="Render frames with the RTL, its model, or Embree.")
@@ -83,8 +84,11 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--denoise",
-    is_flag=True,
-    help="Filter the noise of gathered light, as the key frame.denoise; not of the reference.",
+    type=click.Choice(["atrous", "oidn"]),
+    is_flag=False,
+    flag_value="atrous",
+    help="Filter the noise of gathered light, as the key frame.denoise; not of the reference. oidn is Open Image"
+    " Denoise.  [default: atrous]",
 )
 @click.option(
     "--output", type=FILE, metavar="FILE", help="Write a PNG picture, or of several frames a .webp animation."
@@ -114,7 +118,7 @@ def render(
     sequence_file: Path | None,
     keyframes: int | None,
     samples: int | None,
-    denoise: bool,
+    denoise: Denoiser | None,
     output: Path | None,
     video_file: Path | None,
     hits_file: Path | None,
@@ -183,7 +187,7 @@ def render(
         relit=relit,
         truth=truth,
         waveform=waveform,
-        denoise=denoise,
+        denoise=denoise or False,
     )
     results = render_frames(request, progress)
     is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"

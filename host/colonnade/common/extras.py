@@ -11,6 +11,7 @@ EXTRAS = {
     "reference": {"embreex": "Linux on x86_64 and macOS", "trimesh": ""},
     "quality": {"flip_evaluator": "Linux on x86_64 and macOS, Python up to 3.13"},
     "panorama": {"OpenImageIO": ""},
+    "denoise": {"pyoidn": ""},
     "capture": {"lzfse": "", "imageio_ffmpeg": ""},
     "integration": {"systemrdl": "", "peakrdl_cheader": "", "peakrdl_html": "", "peakrdl_ipxact": ""},
 }

@@ -49,6 +49,7 @@ class DeviceScene:
         photo: The photo of the frames' view, sRGB, uint8 [rows, columns, 3]; None without one.
         unseen: The light that no photo shows (`LitRoom.unseen`).
         second: Another view of the room (`LitRoom.second`).
+        mesh: The mesh, with the materials that the device shows; None: unknown.
         strength: Of the object's shadow on the photo, uint8 [rows, columns]; None: it is whole.
     """
 
@@ -60,6 +61,7 @@ class DeviceScene:
     unseen: Panorama | Surround | None = None
     strength: NDArray[np.uint8] | None = None
     second: Environment | None = None
+    mesh: Mesh | None = None
 
     @classmethod
     def of(
@@ -111,7 +113,8 @@ class DeviceScene:
             held = None if maps is None else maps.image
             cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.unseen, lit.second, progress)
             image = with_cube(image, cube)
-        return cls(lit.scene, manifest, image, maps, photo, lit.unseen, lit.strength, lit.second)
+        mesh = replace(mesh, materials=materials)
+        return cls(lit.scene, manifest, image, maps, photo, lit.unseen, lit.strength, lit.second, mesh)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
         """The scene in another view of its room: object and lights stay in the world, camera and maps are new.

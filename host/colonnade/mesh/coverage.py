@@ -1,7 +1,7 @@
 """Cuts away what the alpha of materials does not show: the device's surfaces have no alpha.
 
 A face whose texels are all below the cutoff is dropped. One with texels on both sides is split into four, the largest
-first, until its pieces are as small as a texel or the mesh has `MAX_SPLIT_FACES`; what is then left is cut along a line.
+first, until its pieces are as small as a texel or the mesh has `MAX_SPLIT_FACES`. What is left is cut along a line.
 The alpha of corners multiplies that of the texture. Without one it is linear on a face, so the line is exact.
 Of blended materials the cutoff is 1/2, and faces that are thinner everywhere become tinted panes without refraction.
 """

@@ -186,7 +186,8 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
     if metallic >= 0.5:
         emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else _DARK
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
-    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha, roughness=coat_roughness(roughness))
+    coat = coat_roughness(roughness)
+    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha, roughness=coat)
 
 
 def _gltf_alpha(material: Mapping[str, Any], surface: Mapping[str, Any]) -> Alpha | None:
@@ -239,9 +240,7 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     """
     surface, extensions = gltf_surface(material), material.get("extensions", {})
     maps = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
-    found = [
-        (lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in _READ_TEXTURES
-    ]
+    found = [(lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in _READ_TEXTURES]
     if any(_colour(material.get("emissiveFactor"), _DARK)) and not _is_lit(from_gltf(material)):
         found.append((lost.EMISSION, 1))
     transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)

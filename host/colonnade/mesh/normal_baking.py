@@ -23,8 +23,8 @@ from colonnade.mesh.topology import MAX_SPLIT_FACES, SMALLEST_SPLIT, Faces, tria
 
 #: Samples along an edge of a face, of small, larger and the largest meshes, and samples of a mesh at most.
 _STEPS, _SAMPLES = (8, 4, 3), 1 << 22
-#: Mean square of what a linear change on a face may leave of its map, if the face is not split: 1.5 degrees.
-_FLAT = 7e-4
+#: Mean square of the difference between the map and interpolated corners of a face that is not split: 2.5 degrees.
+_FLAT = 2e-3
 #: Faces are split at the same time if their errors are at least this part of the largest one.
 _NEAR = 0.25
 #: Steps of the fit.
@@ -74,7 +74,7 @@ def baked(vertices: Floats, faces: Faces, normals: Floats, relief: Relief, losse
     pieces = pieces[order]
     found, error = _fitted(pieces, sampler, fixed_order.product(pieces.weights, normals[pieces.owners]))
     # A normal that faces the back would be replaced when it is seen
-    front = fixed_order.dot(found, face_normals(pieces.vertices, pieces.faces)[:, None]) > 0
+    front = fixed_order.dot(found, face_normals(pieces.vertices, pieces.faces.astype(np.int32))[:, None]) > 0
     base = unit_vectors(fixed_order.product(pieces.weights, normals[pieces.owners]))
     if error > math.radians(_REPORTED):
         losses.add(lost.smooth_normals(math.degrees(error)), len({id(one.texture) for one in relief.maps}))
@@ -126,7 +126,7 @@ class _Pieces:
         done: list[_Pieces] = []
         while True:
             is_marked = np.isin(rest.edges, marked)
-            hit = is_marked.any(axis=1)
+            hit = np.asarray(is_marked.any(axis=1))
             done.append(rest[~hit])
             if not hit.any():
                 break
@@ -166,12 +166,12 @@ class _Sampler:
         """Whether faces have a map, bool [k]."""
         return np.asarray(self._relief.index[pieces.owners] >= 0)
 
-    def normals(self, pieces: _Pieces, steps: int, width: float | None = None) -> Floats:
-        """Normals of parts at their `triangle_points`, float64 [k, n, 3], at most of unit length.
+    def normals(self, pieces: _Pieces, points: Floats, width: float | None = None) -> Floats:
+        """Normals of parts at points, by weights of their corners, float64 [k, n, 3], at most of unit length.
 
-        They are means over squares so wide; None: as wide as the points are apart.
+        They are means over squares so wide; None: as wide as points that fill a triangle are apart.
         """
-        points, own = triangle_points(steps), self._relief.pieces(pieces.owners, pieces.weights)
+        own = self._relief.pieces(pieces.owners, pieces.weights)
         frames = fixed_order.product(pieces.weights, self._frames[pieces.owners])
         axes = fixed_order.product(points, frames).reshape(-1, len(points), 3, 3)
         tilts = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(own.index), len(points), 3)).copy()
@@ -180,7 +180,7 @@ class _Sampler:
             at = fixed_order.product(points, own.uvs[users])
             texels = np.ptp(own.uvs[users] * one.texture.size, axis=1).max(axis=1, initial=0.0)
             if width is None:
-                spacing = texels / steps
+                spacing = texels / math.sqrt(2 * len(points))
             else:
                 spacing = texels * width / np.sqrt(pieces[users].squares.max(axis=1, initial=0.0))
             levels = np.maximum(np.frexp(np.maximum(spacing, 1.0))[1] - 1, 0)
@@ -188,7 +188,7 @@ class _Sampler:
                 chosen = levels == level
                 tilts[users[chosen]] = one.normals(at[chosen].reshape(-1, 2), int(level)).reshape(-1, len(points), 3)
         length = np.sqrt((tilts**2).sum(axis=2, keepdims=True))
-        return unit_vectors((tilts[..., None] * axes).sum(axis=2)) * length
+        return np.asarray(unit_vectors((tilts[..., None] * axes).sum(axis=2)) * length)
 
 
 def _frames(vertices: Floats, faces: Faces, normals: Floats, relief: Relief) -> Floats:
@@ -205,9 +205,9 @@ def _frames(vertices: Floats, faces: Faces, normals: Floats, relief: Relief) -> 
     area = np.sqrt((np.cross(edge[:, 0], edge[:, 1]) ** 2).sum(axis=1, keepdims=True))
     weighted = np.repeat((unit_vectors(along) * area)[:, None], 3, axis=1).reshape(-1, 3)
     sums = np.stack([np.bincount(group.reshape(-1), weighted[:, axis]) for axis in range(3)], axis=1)
-    tangents = sums[group.reshape(-1)].reshape(-1, 3, 3)
-    given = relief.tangents[..., :3].any(axis=2)
-    tangents = np.where(given[..., None], relief.tangents[..., :3], tangents)
+    tangents = np.asarray(sums[group.reshape(-1)].reshape(-1, 3, 3), dtype=np.float64)
+    given = np.asarray(relief.tangents[..., :3].any(axis=2))
+    tangents = np.asarray(np.where(given[..., None], relief.tangents[..., :3], tangents), dtype=np.float64)
     sides = np.where(given, np.sign(relief.tangents[..., 3]), sides)
     tangents = unit_vectors(tangents - fixed_order.dot(tangents, normals)[..., None] * normals)
     return np.concatenate([tangents, np.cross(normals, tangents) * sides[..., None], normals], axis=2)
@@ -225,15 +225,39 @@ def _split(pieces: _Pieces, sampler: _Sampler, budget: int) -> _Pieces:
         can_split = (errors > 0) & (squares.max(axis=1) > shortest**2)
         chosen = np.flatnonzero(can_split & (errors > _NEAR * errors[can_split].max(initial=0.0)))
         chosen = chosen[np.argsort(-errors[chosen], kind="stable")][: budget // 2]
+        edges = pieces.edges
+        longest = np.take_along_axis(edges, squares.argmax(axis=1)[:, None], axis=1)[:, 0]
+        marked = _closed(edges, longest, longest[chosen])
+        while len(chosen) and np.isin(edges, marked).sum() > budget:
+            chosen = chosen[: len(chosen) // 2]
+            marked = _closed(edges, longest, longest[chosen])
         if not len(chosen):
             break
-        marked = np.take_along_axis(pieces.edges[chosen], squares[chosen].argmax(axis=1)[:, None], axis=1)
         before = len(pieces.faces)
-        hit = np.isin(pieces.edges, marked).any(axis=1)
-        pieces, is_new = pieces.bisected(np.unique(marked))
+        hit = np.isin(edges, marked).any(axis=1)
+        pieces, is_new = pieces.bisected(marked)
         errors = np.concatenate([errors[~hit], _errors(pieces[is_new], sampler, width)])
         budget -= len(pieces.faces) - before
     return pieces
+
+
+def _closed(edges: Indices, longest: Indices, marked: Indices) -> Indices:
+    """Edges to bisect, and the longest ones of all faces that have one: so faces do not become slivers (Rivara 1984).
+
+    Args:
+        edges: Of faces, int64 [k, 3].
+        longest: Of each, int64 [k].
+        marked: Edges to bisect, int64 [e].
+
+    Returns:
+        Ascending, int64 [e'].
+    """
+    marked = np.unique(marked)
+    while True:
+        further = np.union1d(marked, longest[np.isin(edges, marked).any(axis=1)])
+        if len(further) == len(marked):
+            return marked
+        marked = further
 
 
 def _steps(count: int) -> int:
@@ -242,15 +266,13 @@ def _steps(count: int) -> int:
 
 
 def _errors(pieces: _Pieces, sampler: _Sampler, width: float) -> Floats:
-    """Area times the mean square of what a linear change leaves of the normals, 0 where that is little, float64 [k]."""
+    """Area times the mean square of what interpolated corners differ from the map, 0 where little, float64 [k]."""
     errors, users = np.zeros(len(pieces.owners)), np.flatnonzero(sampler.has_map(pieces))
     if not len(users):
         return errors
-    points = triangle_points(steps := _steps(len(users)))
-    found, by_corner = sampler.normals(pieces[users], steps, width), np.ascontiguousarray(points.T)
-    inverse = fixed_order.solve(np.repeat(fixed_order.product(by_corner, points)[None], 3, axis=0), np.eye(3))
-    linear = fixed_order.product(points, fixed_order.product(inverse, fixed_order.product(by_corner, found)))
-    spread = ((found - linear) ** 2).sum(axis=(1, 2)) / len(points)
+    points = triangle_points(_steps(len(users)))
+    found = sampler.normals(pieces[users], np.concatenate([np.eye(3), points]), width)
+    spread = ((found[:, 3:] - fixed_order.product(points, found[:, :3])) ** 2).sum(axis=(1, 2)) / len(points)
     errors[users] = np.where(spread > _FLAT, spread * pieces[users].areas, 0.0)
     return errors
 
@@ -265,8 +287,8 @@ def _fitted(pieces: _Pieces, sampler: _Sampler, base: Floats) -> tuple[Floats, f
     group, has_map = group.reshape(-1), sampler.has_map(pieces)
     touched = np.bincount(group, np.repeat(has_map, 3)) > 0
     users = np.flatnonzero(touched[group].reshape(-1, 3).any(axis=1))
-    own, steps = pieces[users], _steps(len(users))
-    target, points = sampler.normals(own, steps), triangle_points(steps)
+    own, points = pieces[users], triangle_points(_steps(len(users)))
+    target = sampler.normals(own, points)
     places = group.reshape(-1, 3)[users].reshape(-1)
     shares = np.repeat(own.areas[:, None], 3, axis=1).reshape(-1) * float(points[:, 0].sum())
     total = np.bincount(places, shares, len(touched))
@@ -279,9 +301,9 @@ def _fitted(pieces: _Pieces, sampler: _Sampler, base: Floats) -> tuple[Floats, f
         fit += sums / np.where(total > 0, total, 1.0)[:, None]
     fit = unit_vectors(fit)
     normals = np.where(touched[group][:, None], fit[group], unit_vectors(base).reshape(-1, 3)).reshape(base.shape)
-    shown = unit_vectors(fixed_order.product(points, normals[users]))
+    fitted = unit_vectors(fixed_order.product(points, normals[users]))
     # The mean of unit normals is as short as they differ
-    squares = ((target - shown) ** 2).sum(axis=2) + 1.0 - (target**2).sum(axis=2)
+    squares = ((target - fitted) ** 2).sum(axis=2) + 1.0 - (target**2).sum(axis=2)
     areas = own.areas * has_map[users]
     mean = float((squares.mean(axis=1) * areas).sum()) / max(float(areas.sum()), 1e-300)
     return normals, math.sqrt(max(mean, 0.0))

@@ -35,7 +35,9 @@ class NormalMap:
         level[..., :2] *= np.float32(self.scale)
         level[..., 2] = np.maximum(level[..., 2], 0)
         length = np.sqrt(level[..., 0] ** 2 + level[..., 1] ** 2 + level[..., 2] ** 2)[..., None]
-        level = np.where(length > 0, level / np.maximum(length, np.float32(1e-6)), np.float32([0, 0, 1]))
+        level = np.where(
+            length > 0, level / np.maximum(length, np.float32(1e-6)), np.array([0, 0, 1], dtype=np.float32)
+        )
         found = [level]
         while max(level.shape[:2]) > 1:
             level = np.pad(level, ((0, level.shape[0] % 2), (0, level.shape[1] % 2), (0, 0)), mode="edge")

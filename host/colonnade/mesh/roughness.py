@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from colonnade.common.types import Floats, Indices
 from colonnade.mesh.materials import GLOSSY, MeshMaterial, coat_roughness
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.palette import table_entries
+from colonnade.mesh.topology import Faces
 
 
 def merged_roughness(
@@ -51,7 +53,7 @@ def merged_roughness(
         pairs = [
             (cost(first, second), order, place)
             for order, groups in enumerate(kinds.values())
-            for place, (first, second) in enumerate(zip(groups, groups[1:], strict=False))
+            for place, (first, second) in enumerate(pairwise(groups))
         ]
         if not pairs:
             break
@@ -72,7 +74,7 @@ def merged_roughness(
     return tuple(replace(one, roughness=rounded[entry]) for one, entry in zip(materials, index, strict=True)), change
 
 
-def surface_areas(vertices: Floats, faces: Indices, face_materials: Indices, count: int) -> Floats:
+def surface_areas(vertices: Floats, faces: Indices | Faces, face_materials: Indices, count: int) -> Floats:
     """The area of the faces of each of so many materials, float64 [count]."""
     corners = vertices[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -82,7 +84,7 @@ def surface_areas(vertices: Floats, faces: Indices, face_materials: Indices, cou
 def with_fewer_roughnesses(mesh: Mesh, count: int) -> tuple[Mesh, tuple[str, ...]]:
     """A mesh whose materials a table of so many entries holds, if fewer roughnesses suffice, and a line on this."""
     before = len(table_entries(mesh.materials)[0])
-    areas = surface_areas(mesh.vertices, mesh.faces, mesh.face_materials, len(mesh.materials))
+    areas = surface_areas(mesh.vertices, mesh.faces, mesh.face_materials.astype(np.int64), len(mesh.materials))
     materials, change = merged_roughness(mesh.materials, areas, count)
     after = len(table_entries(materials)[0])
     if after == before:

@@ -56,8 +56,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     scene = exposed(scene)
     if scene.frame.denoise and request.backend == "reference":
         progress.note("frame.denoise is of the model and the RTL: frames of the reference are not filtered")
-    elif scene.frame.denoise:
-        request = replace(request, denoise=True)
+    elif not request.denoise:
+        request = replace(request, denoise=scene.frame.denoise)
     size = request.size or (scene.frame.width, scene.frame.height)
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size(size, manifest)
@@ -82,7 +82,7 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
     if request.denoise:
         if request.backend == "reference":
             raise UserError("--denoise is for the rtl and the model backend: give the reference more --samples")
-        require_filter(scene, manifest)
+        require_filter(scene, manifest, request.denoise)
     if request.truth is not None and request.backend != "reference":
         raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
     if request.encoder == "live" and request.backend == "reference":

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from colonnade.common.accumulation import WHITE, Accumulation, FramePasses
 from colonnade.common.errors import UserError
+from colonnade.common.extras import require_extra
 from colonnade.common.framebuffer import Frame
 from colonnade.common.image_io import encode_srgb
 from colonnade.common.types import Floats
@@ -18,7 +19,7 @@ from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport
 from colonnade.render.result import RenderResult
-from colonnade.scene.model import Scene
+from colonnade.scene.model import Denoiser, Scene
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class HostFrame:
         size: Width and height, pixels.
         passes: The scene at each pass; the first one shows surfaces.
         relit: The frame shows the room under the scene's lights, not its photo.
-        denoise: The noise of gathered light is filtered.
+        denoise: The noise of gathered light is filtered, as `FrameSize.denoise`.
         look: What the object gets of the photo's camera.
         number: From 0; each frame has its own grain.
     """
@@ -39,7 +40,7 @@ class HostFrame:
     size: tuple[int, int]
     passes: tuple[Scene, ...]
     relit: bool = False
-    denoise: bool = False
+    denoise: bool | Denoiser = False
     look: CameraLook | None = None
     number: int = 0
 
@@ -53,7 +54,7 @@ class HostFrame:
 
     def no_passes(self) -> FramePasses:
         """Where its passes are added."""
-        return FramePasses(has_squares=self.denoise, white=WHITE * self.prepared.scene.exposure)
+        return FramePasses(has_squares=bool(self.denoise), white=WHITE * self.prepared.scene.exposure)
 
     def image(self, sums: Accumulation) -> Floats:
         """The picture of sums, with those of coats: linear, float64 [height, width, 3]."""
@@ -70,24 +71,23 @@ class HostFrame:
 
     def result(self, passes: FramePasses, report: FrameReport) -> RenderResult:
         """The result of all passes."""
-        frame, image = passes.frame, self.prepared.image
-        source = np.append(image.source_faces.astype(np.int64), -1)
-        sums = self._sums(passes)
+        frame, sums = passes.frame, self._sums(passes)
         return RenderResult(
             image=self.image(sums),
             object_mask=frame.is_object,
-            hit_triangles=source[np.where(frame.is_object, frame.triangle, -1)],
+            hit_triangles=self._faces(frame),
             t=self._hits(frame)[0],
             report=report,
             sums=sums,
             ratio=frame.ratio,
-            parts=image.header.parts,
+            parts=self.prepared.image.header.parts,
         )
 
     def _sums(self, passes: FramePasses) -> Accumulation:
         """Sums of all passes, with the colours of the object filtered if that is wanted."""
         if not self.denoise:
             return passes.coated
+        from colonnade.render import oidn
         from colonnade.render.denoise import Guide, denoised
 
         depth, position = self._hits(passes.frame)
@@ -96,7 +96,13 @@ class HostFrame:
         def filtered(layer: FramePasses) -> Accumulation:
             sums, count = layer.sums, layer.sums.coverage[..., None]
             colours = sums.objects / np.maximum(count, 1) / sums.white
-            found = denoised(colours, layer.object_variance(), Guide.of(position, shows_object & (count[..., 0] > 0)))
+            guide = Guide.of(position, shows_object & (count[..., 0] > 0))
+            if self.denoise == "oidn":
+                mesh = self.prepared.mesh if layer is passes else None
+                albedo = None if mesh is None else oidn.albedo_of(mesh, self._faces(passes.frame), position)
+                found = oidn.filtered(colours, guide, albedo)
+            else:
+                found = denoised(colours, layer.object_variance(), guide)
             return replace(sums, objects=found * sums.white * count)
 
         sums = self._with_smooth_shadow(filtered(passes), passes)
@@ -126,6 +132,11 @@ class HostFrame:
         found = denoised(ratio, passes.ratio_variance(), Guide.of(points[y[:, None], x], mask))
         return replace(sums, ratio=np.rint(found * count * sums.unshadowed).astype(sums.ratio.dtype))
 
+    def _faces(self, frame: Frame) -> npt.NDArray[np.int64]:
+        """The faces of the mesh's file in the first pass, -1 for a miss, int64 [height, width]."""
+        source = np.append(self.prepared.image.source_faces.astype(np.int64), -1)
+        return source[np.where(frame.is_object, frame.triangle, -1)]
+
     def _hits(self, frame: Frame) -> tuple[Floats, Floats]:
         """Depth and position of the first pass, NaN for a miss, mesh units, float64 [height, width] and with [3]."""
         view = self.prepared.view(self.size, self.passes[0])
@@ -136,9 +147,11 @@ class HostFrame:
         return depth, view.origin + depth[..., None] * rays
 
 
-def require_filter(scene: Scene, manifest: Manifest) -> None:
+def require_filter(scene: Scene, manifest: Manifest, denoise: bool | Denoiser) -> None:
     """Raise a `UserError` if there is no noise to filter, or no depth to guide the filter."""
     if scene.paths.gather == 0:
         raise UserError("denoise filters the noise of gathered light: the scene has none, set paths.gather = 1")
     if not manifest.config["frame"]["hits"]:
         raise UserError("denoise needs the depth of pixels, which this hardware lacks: set frame.hits=true")
+    if denoise == "oidn":
+        require_extra("denoise", "the filter oidn")

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
 from colonnade.mesh.mesh import Mesh
-from colonnade.scene.model import Scene
+from colonnade.scene.model import Denoiser, Scene
 
 Backend = Literal["rtl", "model", "reference"]
 BACKENDS: tuple[Backend, ...] = get_args(Backend)
@@ -37,7 +37,7 @@ class RenderRequest:
         truth: Mesh file of the room's real geometry, in its world space; for the reference.
         waveform: VCD file for the signals of one small RTL frame.
         encoder: Of the room's maps and of textures.
-        denoise: Filter the noise of gathered light; of the model and the RTL.
+        denoise: Filter the noise of gathered light, of the model and the RTL, as `FrameSize.denoise`.
     """
 
     scene: Path | Scene
@@ -56,4 +56,4 @@ class RenderRequest:
     truth: Path | None = None
     waveform: Path | None = None
     encoder: Encoder = "offline"
-    denoise: bool = False
+    denoise: bool | Denoiser = False

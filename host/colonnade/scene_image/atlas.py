@@ -106,10 +106,10 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
     scale, corners, gains = _enlarged(np.array(pixels), edge)
     colours = np.zeros((edge, edge, 3))
     uvs = np.zeros_like(mesh.corner_uvs)
-    for index, (_, factor) in enumerate(sharing):
+    for index, (_, colour) in enumerate(sharing):
         size = _size(pixels[index] * gains[index] * scale, edge)
         region = Region(lows[index], highs[index], corners[index], (int(size[0]), int(size[1])))
-        tile = _resampled(textures[index], region, pixels[index]) * np.array(factor)
+        tile = _resampled(textures[index], region, pixels[index]) * np.array(colour)
         (x, y), (width, height) = region.corner, region.size
         right, bottom = x + _tiles(width), y + _tiles(height)
         padding = ((0, bottom - y - height), (0, right - x - width), (0, 0))

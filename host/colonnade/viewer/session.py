@@ -171,7 +171,7 @@ class Session:
             scene = scene.with_camera(_moved(scene.scene.camera, camera))
         scene = replace(scene, scene=scene.scene.with_samples(samples))
         passes = scene.passes(exposure=scene.scene.motion.exposure(1))
-        denoise = samples > 1 and scene.scene.frame.denoise
+        denoise = scene.scene.frame.denoise if samples > 1 else False
         look = self._look if scene.photo is not None else None
         frame = HostFrame(scene, self.size, tuple(passes), denoise=denoise, look=look)
         return _Picture(camera, self._state["version"], frame, passes, frame.no_passes())
@@ -252,7 +252,7 @@ class Session:
         if look is not None and look.note is not None:
             lines.append(look.note)
         if description.frame.denoise:
-            require_filter(description, self._manifest)
+            require_filter(description, self._manifest, description.frame.denoise)
         # It is refused here if the hardware cannot show it, and not in every frame
         scene = self._still(scene)
         scene.registers(self.size, composited=True)

@@ -75,7 +75,8 @@ def test_faces_are_metal_where_the_map_is(seed: int) -> None:
 
 @given(st.lists(st.tuples(st.sampled_from(["diffuse", "mirror"]), st.integers(0, 16)), min_size=1), st.integers(1, 8))
 def test_merged_roughnesses_fit_a_table(parts: list[tuple[str, int]], count: int) -> None:
-    materials = [MeshMaterial(kind, roughness=coat_roughness(r / 16) if kind == "diffuse" else r / 16) for kind, r in parts]
+    values = [coat_roughness(step / 16) if kind == "diffuse" else step / 16 for kind, step in parts]
+    materials = [MeshMaterial(kind, roughness=value) for (kind, _), value in zip(parts, values, strict=True)]
     weights = np.arange(1.0, 1.0 + len(parts))
     found, change = merged_roughness(materials, weights, count)
     kinds = {kind for kind, _ in parts}
@@ -84,5 +85,6 @@ def test_merged_roughnesses_fit_a_table(parts: list[tuple[str, int]], count: int
     if len(set(materials)) <= count:
         assert list(found) == materials and change == 0
     for kind in kinds:  # classes are intervals
-        pairs = sorted((a.roughness or 1, b.roughness or 1) for a, b in zip(materials, found, strict=True) if a.kind == kind)
+        both = zip(materials, found, strict=True)
+        pairs = sorted((a.roughness or 1, b.roughness or 1) for a, b in both if a.kind == kind)
         assert kind == "mirror" or [after for _, after in pairs] == sorted(after for _, after in pairs)

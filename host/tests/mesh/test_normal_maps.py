@@ -65,19 +65,28 @@ def bumpy(seed: int, share: float | None = None) -> tuple[np.ndarray, np.ndarray
     return vertices, faces, unit_vectors(vertices[faces]), relief
 
 
-def split(monkeypatch: pytest.MonkeyPatch, budget: int, seed: int, share: float | None = None) -> tuple[BakedSurface, Losses]:
-    with monkeypatch.context() as patch:
+def split(budget: int, seed: int, share: float | None = None) -> tuple[BakedSurface, Losses]:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(normal_baking, "MAX_SPLIT_FACES", budget)
         losses = Losses()
         return baked(*bumpy(seed, share), losses), losses
 
 
-@settings(max_examples=6)
+def slimness(corners: np.ndarray) -> float:
+    """The largest square of a longest edge, of twice the area of its face."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return float(((edges**2).sum(axis=2).max(axis=1) / areas).max())
+
+
+@settings(max_examples=6, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([90, 500]), st.sampled_from([0.3, 1.0]))
 def test_split_faces_stay_closed(seed: int, budget: int, share: float) -> None:
     vertices, faces, normals, relief = bumpy(seed, share)
-    found, _ = split(pytest.MonkeyPatch(), budget, seed, share)
+    found, _ = split(budget, seed, share)
     assert len(faces) < len(found.faces) <= budget
+    # No part is much thinner than the thinnest face
+    assert slimness(found.vertices[found.faces]) < 4 * slimness(vertices[faces])
     # Every edge has one face on each side, and every corner is a point of the face that it is a part of
     edges = np.concatenate([found.faces[:, [0, 1]], found.faces[:, [1, 2]], found.faces[:, [2, 0]]])
     forward, backward = ({tuple(edge) for edge in ends.tolist()} for ends in (edges, edges[:, ::-1]))
@@ -92,25 +101,26 @@ def test_split_faces_stay_closed(seed: int, budget: int, share: float) -> None:
     np.testing.assert_array_equal(found.normals[free], unit_vectors(found.corners(normals))[free])
 
 
-def test_more_faces_show_more_of_a_map(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_faces_show_more_of_a_map() -> None:
     """Against the map itself, between the corners of the file's faces; what is lost is noted."""
     points = np.random.default_rng(1).dirichlet((1, 1, 1), 400)
     errors = []
     for budget in (80, 4000):
         vertices, faces, normals, relief = bumpy(3)
-        found, losses = split(monkeypatch, budget, 3)
+        found, losses = split(budget, 3)
         frames = normal_baking._frames(vertices, faces, normals, relief)
         face = np.random.default_rng(2).integers(0, len(faces), 400)
         at = np.einsum("kc,kci->ki", points, relief.uvs[face])
         axes = np.einsum("kc,kci->ki", points, frames[face]).reshape(-1, 3, 3)
         truth = unit_vectors(np.einsum("kj,kji->ki", relief.maps[0].normals(at, 0), axes))
-        shown = np.empty_like(truth)
+        baked_normals = np.empty_like(truth)
         for row, (owner, weights) in enumerate(zip(face, points, strict=True)):
             parts = np.flatnonzero(found.owners == owner)
-            inside = np.linalg.solve(found.weights[parts].swapaxes(1, 2), np.broadcast_to(weights, (len(parts), 3))[..., None])
+            places = np.broadcast_to(weights, (len(parts), 3))[..., None]
+            inside = np.linalg.solve(found.weights[parts].swapaxes(1, 2), places)
             part = int(inside[..., 0].min(axis=1).argmax())
-            shown[row] = unit_vectors(inside[part, :, 0] @ found.normals[parts[part]])
-        errors.append(float(np.degrees(np.arccos(np.clip((shown * truth).sum(axis=1), -1, 1))).mean()))
+            baked_normals[row] = unit_vectors(inside[part, :, 0] @ found.normals[parts[part]])
+        errors.append(float(np.degrees(np.arccos(np.clip((baked_normals * truth).sum(axis=1), -1, 1))).mean()))
         (note,) = losses.lines() or ("",)
         assert ("corner normals differ from it by" in note) == (budget == 80 or errors[-1] > 3)
     assert errors[1] < 0.4 * errors[0], errors

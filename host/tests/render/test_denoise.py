@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import sys
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from textured_files import gltf
 
 from colonnade.cli.main import cli
+from colonnade.common import extras
 from colonnade.common.image_io import read_picture
+from colonnade.mesh.load import load_mesh
 from colonnade.render.denoise import Guide, denoised
+from colonnade.render.oidn import albedo_of
 
 HEIGHT, WIDTH = 40, 60
 
@@ -133,3 +140,42 @@ def test_what_cannot_be_filtered_is_refused(
     status, output = run(tmp_path, gather, "--denoise", *options)
     assert status == 2
     assert message in output
+
+
+def test_oidn_sees_the_object_and_its_albedo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a stand-in of its interface: the package has 88 MB."""
+    seen: dict[str, np.ndarray] = {}
+
+    def denoise(colour: np.ndarray, *, hdr: bool, albedo: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        assert hdr and all(one.dtype == np.float32 and one.shape == (48, 64, 3) for one in (colour, albedo, normal))
+        seen.update(colour=colour, albedo=albedo, normal=normal)
+        return np.zeros_like(colour)
+
+    package = ModuleType("pyoidn")
+    package.__spec__, package.denoise = ModuleSpec("pyoidn", None), denoise  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pyoidn", package)
+    output_file = tmp_path / "filtered.png"
+    material = "[material]\nalbedo = [0.2, 0.4, 0.8]\n[background]\ncolour = [1.0, 1.0, 1.0]\n"
+    (tmp_path / "own.toml").write_text(SCENE.format(1) + material + '[frame]\ndenoise = "oidn"\nsamples = 1\n')
+    options = ["--config", "textured", "--size", "64x48", "--backend", "model", "--output", str(output_file)]
+    done = CliRunner().invoke(cli, ["render", str(tmp_path / "own.toml"), *options])
+    assert done.exit_code == 0, done.output
+    is_object = seen["colour"].any(axis=2)
+    np.testing.assert_array_equal(read_picture(output_file), 255 * ~np.repeat(is_object[..., None], 3, axis=2))
+    np.testing.assert_allclose(seen["albedo"], is_object[..., None] * np.float32([0.2, 0.4, 0.8]))
+    assert (np.linalg.norm(seen["normal"][is_object], axis=1) > 0.99).mean() > 0.9
+
+
+def test_the_albedo_of_a_point_is_that_of_its_texture(tmp_path: Path) -> None:
+    mesh = load_mesh(gltf(tmp_path), corner_colours=True)
+    weights = np.random.default_rng(1).dirichlet((1, 1, 1), (2, 3))
+    expected = mesh.textures[0].colours((weights @ np.array([(0, 0), (1, 0), (0, 1)])).reshape(-1, 2)).reshape(2, 3, 3)
+    hits = np.array([[0, 0, 0], [0, 0, -1]])
+    expected[1, 2] = 0
+    np.testing.assert_allclose(albedo_of(mesh, hits, weights @ np.eye(3)), expected, atol=1e-6)
+
+
+def test_without_the_package_oidn_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(extras, "find_spec", lambda _name: None)
+    status, output = run(tmp_path, 1, "--backend", "model", "--denoise", "oidn")
+    assert status == 2 and "pip install 'colonnade[denoise]'" in output

@@ -8,7 +8,7 @@ from colonnade.scene.model.camera import Camera, CameraKey, FrameSize, Motion
 from colonnade.scene.model.light import Background, Colour, Light, Paths, PointLight
 from colonnade.scene.model.objects import Material, MeshSource, Placement, SceneObject, Transform
 from colonnade.scene.model.scene import Scene, interpolate
-from colonnade.scene.model.values import MAX_BOUNCES, MAX_EDGE, MAX_OBJECTS, Vector
+from colonnade.scene.model.values import MAX_BOUNCES, MAX_EDGE, MAX_OBJECTS, Denoiser, Vector
 
 __all__ = [
     "MAX_BOUNCES",
@@ -18,6 +18,7 @@ __all__ = [
     "Camera",
     "CameraKey",
     "Colour",
+    "Denoiser",
     "FrameSize",
     "Light",
     "Material",

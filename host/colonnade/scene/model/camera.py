@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
 from colonnade.common.limits import MAX_SAMPLES
-from colonnade.scene.model.values import STRICT, Diameter, Float, Fraction, RoomPixel, WorldVector
+from colonnade.scene.model.values import STRICT, Denoiser, Diameter, Float, Fraction, RoomPixel, WorldVector
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -129,11 +129,12 @@ class FrameSize:
     Attributes:
         samples: None: `colonnade.render.samples` chooses.
         budget: Seconds of the device at 200 MHz for a frame that gathers light and names no samples. None: a thirtieth.
-        denoise: The noise of gathered light is filtered, in frames of the model and the RTL.
+        denoise: The noise of gathered light is filtered, in frames of the model and the RTL: by the host's own filter,
+            ``atrous`` or true, or by Open Image Denoise, ``oidn``.
     """
 
     width: Annotated[int, Strict(), Ge(1)] = 640
     height: Annotated[int, Strict(), Ge(1)] = 480
     samples: Annotated[int, Strict(), Interval(ge=1, le=MAX_SAMPLES)] | None = None
     budget: Annotated[Float, Interval(ge=1e-6, le=1e3)] | None = None
-    denoise: bool = False
+    denoise: StrictBool | Denoiser = False

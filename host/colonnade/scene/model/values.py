@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from annotated_types import Interval
 from pydantic import BeforeValidator, ConfigDict, Field, Strict
@@ -36,6 +36,8 @@ MapPixel = Annotated[Float, Interval(ge=0.0, le=MAX_EDGE)]
 Text = Annotated[str, Field(min_length=1)]
 File = Annotated[Path, BeforeValidator(_require_text)]
 
+#: Filters of the noise of gathered light: the host's own, and Open Image Denoise.
+Denoiser = Literal["atrous", "oidn"]
 Vector = tuple[float, float, float]
 WorldVector = tuple[Coordinate, Coordinate, Coordinate]
 LinearColour = tuple[Fraction, Fraction, Fraction]
