@@ -56,7 +56,7 @@ def project_tables() -> dict[str, Any]:
 
 
 def wanted_locks() -> list[Lock]:
-    """The locks: build requirements, .venv with host and laboratory, a Java runtime, a filter, `ppa`, and each further group."""
+    """The locks: build requirements, .venv with host and laboratory, extras apart, `ppa`, each further group."""
     data = project_tables()
     laboratory = tomllib.loads(LABORATORY.read_text(encoding="utf-8"))["project"]
     project = data["project"]
