@@ -42,9 +42,8 @@ final class BounceQueueIO(config: PathConfig) extends Bundle {
   val points     = Vec(3, Flipped(Valid(new BouncePoint(config))))
   val albedo     = Flipped(new AlbedoSources(config))
 
-  /** Components of the normals of microfacets, of the rough ones of the hits. */
-  val facets =
-    Option.when(config.frame.gather)(Vec(3, Flipped(Valid(SInt(new ShaderFormats(config.numbers).narrowBits.W)))))
+  /** The normals of microfacets, of the rough ones of the hits. */
+  val facet = Option.when(config.frame.gather)(Flipped(Valid(Vec(3, SInt((ScatterStage.facetBits + 1).W)))))
 
   // To and from bounce units, which may answer in any order
   val request = Decoupled(new BounceRequest(config))
@@ -78,14 +77,14 @@ final class BounceQueue(config: PathConfig, places: Int) extends Module {
   private val hits       = queue(io.hit)
   private val directions = io.directions.map(queue(_))
   private val points     = io.points.map(queue(_))
-  private val facets     = io.facets.toSeq.flatten.map(queue(_))
+  private val facets     = io.facet.map(queue(_))
   private val isRough    = hits.bits.isRough.getOrElse(false.B)
   private val all        = (hits +: directions) ++ points
   private val request    = io.request.bits
   private val hit        = hits.bits
   private val material   = ShadingPipeline.material(config, io.materials, hit.material)
   private val albedo     = new ObjectAlbedo(config, io.albedo, material, true.B, io.request.fire, places)
-  io.request.valid := all.map(_.valid).reduce(_ && _) && facets.map(_.valid || !isRough).fold(albedo.isKnown)(_ && _)
+  io.request.valid := all.map(_.valid).reduce(_ && _) && albedo.isKnown && facets.fold(true.B)(_.valid || !isRough)
   all.foreach(_.ready := io.request.fire)
   facets.foreach(_.ready := io.request.fire && isRough)
 
@@ -93,8 +92,9 @@ final class BounceQueue(config: PathConfig, places: Int) extends Module {
   request.origin   := Vec3.of(points.map(_.bits.origin))
   request.normal   := Vec3.of(points.map(_.bits.normal))
   request.isSmooth := points.head.bits.isSmooth
-  if (config.frame.gather) when(isRough) {
-    request.normal   := Vec3.of(facets.map(_.bits))
+  for (facet <- facets) when(isRough) {
+    val low = new ShaderFormats(config.numbers).shadeBits - ScatterStage.facetBits
+    request.normal   := Vec3.of(facet.bits.map(component => (component << low).asSInt))
     request.isSmooth := true.B
   }
   request.faceForwardNormal := Vec3.of(directions.map(_.bits.faceForwardNormal))

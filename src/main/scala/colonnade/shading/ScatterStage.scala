@@ -15,7 +15,7 @@ final class ScatterStageIO(config: PathConfig) extends Bundle {
   val phase = Input(ModuloSchedule.phase())
   val point = Input(new SamplePoint) // in cycle 0
 
-  /** From cycle 1 on. At a mirror or glass, which `isBounce` names in the same cycles, the ray's direction counts. */
+  /** From cycle 1 on. At a mirror or glass, which `isBounce` names in the first of these cycles, the direction counts. */
   val isBounce          = Input(Bool())
   val faceForwardNormal = Input(SInt((NumberFormats.normalBits + 1).W))
   val dir               = Input(SInt((formats.shadeBits + 1).W))
@@ -24,12 +24,15 @@ final class ScatterStageIO(config: PathConfig) extends Bundle {
   val axis        = Input(SInt(formats.narrowBits.W))
   val squaredAxis = Input(UInt(formats.dotBits.W))
 
-  /** In three cycles from `ScatterStage.rough` on, and in the fourth: the width of a lobe; the surface is rough. */
+  /** In three cycles from `ScatterStage.rough` on, and in the fourth: the width of a lobe; the surface is rough. From the
+    * fourth to the sixth: it is a mirror or glass.
+    */
   val alpha   = Input(UInt(Lobe.alphaBits.W))
   val isRough = Input(Bool())
+  val isFacet = Input(Bool())
 
-  val scatter    = Output(ScatterStage.component)     // from cycle `dir0` on
-  val microfacet = Output(SInt(formats.narrowBits.W)) // from cycle `microfacet0` on: it, scaled like a normal
+  val scatter    = Output(ScatterStage.component)                       // from cycle `dir0` on
+  val microfacet = Output(Vec(3, SInt((ScatterStage.facetBits + 1).W))) // in cycle `facet0`: it, scaled
 }
 
 /** The direction of the ray that gathers light at a surface, by a point s of the unit sphere: docs/gather.md. At a diffuse
@@ -86,8 +89,7 @@ final class ScatterStage(config: PathConfig) extends Module {
   }
 
   // Rough surfaces: the parts along and across the axis
-  private val isFacet = carry(latch(1)(io.isBounce), wide)
-  private val lift    = {
+  private val lift = {
     val product = latch(xyz(rough - 8))(components(points, rough - 8) * components(axes, rough - 8))
     val sum     = accumulate(xyz(rough - 7), product.at(xyz(rough - 7)).pad(unitBits + axisBits + 4))(_ + _)
     latch(rough - 4)(Rounding.floor(sum.at(rough - 4) + (1 << unit).S, unit + 1))
@@ -107,7 +109,7 @@ final class ScatterStage(config: PathConfig) extends Module {
   again := Rounding.floor(scaled.items(0).at(rough + 1), Lobe.alphaBits)
   private val less  = latch(rough + 2)(Rounding.floor(scaled.items(1).at(rough + 2), Lobe.alphaBits))
   private val along = latch(wide) {
-    val ofMetal = carry(lowered, wide).at(wide) -& Mux(isFacet.at(wide), -1.S, less.at(wide).zext)
+    val ofMetal = carry(lowered, wide).at(wide) -& Mux(io.isFacet, -1.S, less.at(wide).zext)
     Mux(io.isRough, Rounding.narrow(ofMetal, lengthBits + 2), (1 << (lengthBits - 1)).S)
   }
   private val across = latch(wide) {
@@ -134,7 +136,7 @@ final class ScatterStage(config: PathConfig) extends Module {
   private val isMetal    = delay(arriving(isRough.at(xyz(wide + 1)), xyz(wide + 1)), xyz(wide + 1), 1)
   private val partAcross = {
     val now    = ofPoint.at(xyz(wide + 2))
-    val ofLobe = Mux(carry(isFacet, wide + 2).at(xyz(wide + 2)), now >> facetShift, now)
+    val ofLobe = Mux(latch(wide + 1)(io.isFacet).at(xyz(wide + 2)), now >> facetShift, now)
     Mux(isMetal.at(xyz(wide + 2)), ofLobe, (now << diffuseShift).asSInt)
   }
   private val both = latch(xyz(wide + 2)) {
@@ -171,11 +173,9 @@ final class ScatterStage(config: PathConfig) extends Module {
   private val longest     = accumulate(xyz(dir0), Mux(facet < 0.S, 0.S -& facet, facet).asUInt(facetBits - 1, 0))(_ | _)
   private val zeros       = Normalise.countLeadingZeros(longest.at(dir0 + 3))._2
   private val shift       = Mux(isAt(dir0 + 3), zeros, latch(dir0 + 3)(zeros).at(Seq(dir0 + 4, dir0 + 5)))
-  private val scaledFacet = latch(xyz(dir0 + 3)) {
-    val now = delay(arriving(facet, xyz(dir0)), xyz(dir0), 3).at(xyz(dir0 + 3))
-    (now << shift).asUInt(facetBits, 0).asSInt
-  }
-  io.microfacet := (scaledFacet.at(xyz(microfacet0)) << (formats.shadeBits - facetBits)).asSInt
+  private val scaledFacet =
+    (delay(arriving(facet, xyz(dir0)), xyz(dir0), 3).at(xyz(dir0 + 3)) << shift).asUInt(facetBits, 0).asSInt
+  io.microfacet := VecInit(Seq(0, 1).map(axis => latch(dir0 + 3 + axis)(scaledFacet).at(facet0)) :+ scaledFacet)
 
   private def rounded(x: UInt, bits: Int): UInt = Rounding.floor(x +& (1 << (bits - 1)).U, bits)
 
@@ -206,11 +206,11 @@ object ScatterStage {
 
   private val wide = rough + 3 // its parts along and across the axis are known after this cycle
 
-  /** First cycle of the direction, and of the normal of a microfacet. */
-  val dir0:        Int = rough + 12
-  val microfacet0: Int = dir0 + 4
+  /** First cycle of the direction, and that of the normal of a microfacet. */
+  val dir0:   Int = rough + 12
+  val facet0: Int = dir0 + 5
 
-  private val facetBits = 12 // magnitude bits of the normal of a microfacet, before it is scaled
+  val facetBits: Int = 12 // magnitude bits of the normal of a microfacet
 
   /** Width of a component of the direction, signed. */
   val componentBits: Int = 14

@@ -120,6 +120,10 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   private def roughAt(cycles: Seq[Int]): RoughSurface =
     select(cycles)(index => roughs.get(cycles(index) / interval).at(cycles(index)))
 
+  /** Whether a hit on a rough mirror or glass is in the pipeline. */
+  private def facetAt(cycles: Seq[Int]): Bool =
+    select(cycles)(index => isFacet.get((cycles(index) - 1) / interval).at(cycles(index)))
+
   private def lobeAt(cycles: Seq[Int]): Lobe = material(config, io.materials, roughAt(cycles).material).lobe.get
 
   if (config.frame.gather) {
@@ -132,6 +136,11 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     bright.isRough.get := roughAt(Seq(cycles.cosine)).isRough
     bright.slope.get   := lobeAt(cycles.cosine + 1 until cycles.cosine + 4).slope
     bright.peak.get    := lobeAt(Seq(cycles.cosine + 8)).peak
+  }
+
+  private val isFacet = Option.when(config.frame.gather) {
+    val flag = latchFlag(0)(isActive && hit.isBounce && isRoughBounce)
+    Seq.iterate(flag, ScatterStage.facet0 / interval + 1)(now => latchFlag(now.last)(now.at(now.last)))
   }
 
   // The rays that gather light, and microfacets
@@ -150,6 +159,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     stage.squaredAxis       := angle.squaredNormal
     stage.alpha             := lobeAt(ScatterStage.rough until ScatterStage.rough + 3).alpha
     stage.isRough           := roughAt(Seq(ScatterStage.rough + 3)).isRough
+    stage.isFacet           := facetAt(ScatterStage.rough + 3 until ScatterStage.rough + 6)
     stage
   }
 
@@ -205,13 +215,10 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     queue.hit.bits.context  := hit.context
     queue.hit.bits.material := hit.material
     queue.hit.bits.backSide := hit.backSide
-    for (isRough <- queue.hit.bits.isRough; facets <- queue.facets) {
-      val isFacet = carryFlag(latchFlag(0)(isActive && hit.isBounce && isRoughBounce), ScatterStage.microfacet0)
-      isRough := isRoughBounce
-      for ((component, cycle) <- facets.zip(xyz(ScatterStage.microfacet0))) {
-        component.valid := isAt(cycle) && isFacet.at(cycle)
-        component.bits  := scatter.get.microfacet
-      }
+    for (isRough <- queue.hit.bits.isRough; facet <- queue.facet) {
+      isRough     := isRoughBounce
+      facet.valid := isAt(ScatterStage.facet0) && facetAt(Seq(ScatterStage.facet0))
+      facet.bits  := scatter.get.microfacet
     }
     for ((component, cycle) <- queue.directions.zip(xyz(1))) {
       component.valid                  := isAt(cycle) && isBounce.at(cycle)

@@ -33,7 +33,7 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
           val (operation, axis) = ((cycle - first) / 3, (cycle - first) % 3)
           if (cycle >= first && operation < count) use(operation, axis)
         }
-        for (cycle <- 0 until 3 * count + ScatterStage.microfacet0 + 3) {
+        for (cycle <- 0 until 3 * count + ScatterStage.facet0 + 3) {
           dut.io.phase.poke(cycle % 3)
           during(cycle, 0) { (operation, axis) =>
             val ScatterCase(_, _, _, u, v, _, _) = cases(operation)
@@ -53,6 +53,7 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
           }
           during(cycle, ScatterStage.rough)((operation, _) => dut.io.alpha.poke(cases(operation).alpha.getOrElse(0)))
           during(cycle, ScatterStage.rough + 3) { (operation, axis) =>
+            dut.io.isFacet.poke(cases(operation).isFacet)
             dut.io.isRough.poke(cases(operation).alpha.nonEmpty ^ axis > 0)
           }
           during(cycle, ScatterStage.dir0) { (operation, axis) =>
@@ -60,11 +61,12 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
             val expected = GatherReference.direction(normal, geometric, shadeBits, u, v, alpha)(axis)
             if (!isFacet) dut.io.scatter.expect(expected, s"case $operation")
           }
-          during(cycle, ScatterStage.microfacet0) { (operation, axis) =>
+          during(cycle, ScatterStage.facet0) { (operation, axis) =>
             val ScatterCase(normal, _, dir, u, v, alpha, isFacet) = cases(operation)
-            if (isFacet) {
-              val expected = GatherReference.microfacet(normal, dir, shadeBits, u, v, alpha.get)(axis)
-              dut.io.microfacet.expect(expected, s"case $operation")
+            if (isFacet && axis == 0) {
+              val expected = GatherReference.microfacet(normal, dir, shadeBits, u, v, alpha.get)
+              for ((component, value) <- dut.io.microfacet.zip(expected))
+                component.expect(value >> (shadeBits - ScatterStage.facetBits), s"case $operation")
             }
           }
           dut.clock.step()
