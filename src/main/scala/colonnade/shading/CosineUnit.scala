@@ -8,7 +8,7 @@ import colonnade.numbers.{Divider, Rounding, SquareRoot}
 /** The brightness of a light on a surface. */
 final class Brightness(numbers: NumberFormats) extends Bundle {
   val cosine  = UInt(new ShaderFormats(numbers).cosineBits.W) // `cosineFraction` fraction bits, from 0 to 1
-  val falloff = Falloff()                                     // see Falloff; meaningless if the cosine is 0
+  val falloff = Falloff()                                     // see Falloff; 1 if the cosine is 0
 }
 
 final class CosineUnitIO(numbers: NumberFormats) extends Bundle {
@@ -67,6 +67,7 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
       dot          := angle.dot
       shiftRight   := exponent(3, 1)
       cosine       := 0.U
+      falloff      := Falloff.one
       reference    := io.falloff.reference
       square       := io.falloff.mantissa
       falloffShift := (numbers.cosineFraction - NumberFormats.lightFraction + guardBits).S -& io.falloff.exponent
@@ -84,7 +85,6 @@ final class CosineUnit(numbers: NumberFormats) extends Module {
       when(divider.io.quotient.fire)(step := CosineStep.shiftCosine)
     }
     is(CosineStep.shiftCosine) {
-      falloff := Falloff.one
       when(shiftRight >= 6.U) {
         shiftRight := shiftRight - 4.U
         cosine     := cosine >> 4
