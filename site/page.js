@@ -250,7 +250,7 @@ function fill() {
   form.elements.drag.disabled = roomOf() === null;
   element("home").hidden = roomOf() === null || isAtMaps(state);
   for (const label of document.querySelectorAll(".lens")) label.hidden = !roomOf()?.files;
-  showCosts(data.studies, state.design);
+  showCosts(data, state.design);
   for (const name of ["background", "light"]) form.elements[name].disabled = roomOf() !== null;
   element("mesh").textContent = state.mesh;
 }
@@ -269,8 +269,8 @@ function show() {
 form.addEventListener("input", ({ target }) => {
   if (target.name === "drag") return;
   if (target.name === "degrees" || target.name === "step") return void then(() => openRoom(roomOf().files.found, roomOf().files.files));
-  if (target.name === "precision") {
-    state.design = data.studies[0].points[target.value].design;
+  if (target.name in data.sliders) {
+    state.design = data.sliders[target.name][target.value].design;
     return void then(changeDesign);
   }
   const value = target.type === "checkbox" ? Number(target.checked) : target.type === "color" ? target.value.slice(1) : target.value;

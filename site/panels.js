@@ -46,7 +46,7 @@ export function showFigures({ width, height, workers, packed, packTime }, { coun
 }
 
 /** The designs to choose from: presets, and the points of studies. */
-export function listDesigns({ presets, studies }) {
+export function listDesigns({ presets, studies, sliders }) {
   const form = element("controls");
   const group = (label, names) => {
     const options = Object.assign(document.createElement("optgroup"), { label });
@@ -54,25 +54,29 @@ export function listDesigns({ presets, studies }) {
     form.elements.design.append(options);
   };
   group("Presets", presets);
-  for (const { title, points } of studies) group(title, points.map(({ design }) => design).filter((name) => !presets.includes(name)));
-  form.elements.precision.max = studies[0].points.length - 1;
+  const listed = new Set(presets);
+  for (const { title, points } of studies) {
+    const names = points.map(({ design }) => design).filter((name) => !listed.has(name));
+    group(title, names);
+    for (const name of names) listed.add(name);
+  }
+  for (const [name, points] of Object.entries(sliders)) form.elements[name].max = points.length - 1;
 }
 
-/** Error, energy, area and rate of the hardware, from the studies that have it. */
-export function showCosts(studies, chosen) {
-  const index = studies[0].points.findIndex(({ design }) => design === chosen);
-  if (index >= 0) element("controls").elements.precision.value = index;
-  element("precision").textContent = index >= 0 ? chosen : "";
-  const lines = [];
-  for (const { title, command, columns, points } of studies) {
-    const point = points.find(({ design }) => design === chosen);
-    if (!point) continue;
-    const known = columns.filter(({ key }) => point.figures[key] !== null);
-    lines.push(...known.map(({ key, label, unit, format }) => [label, `${point.figures[key].toFixed(Number(/[.](\d)/.exec(format)[1]))} ${unit}`]));
-    element("study").textContent = `${title}: ${command}`;
+/** The sliders, and error, energy, area and rate of the hardware, from the first study that has it. */
+export function showCosts({ studies, sliders }, chosen) {
+  for (const [name, points] of Object.entries(sliders)) {
+    const index = points.findIndex(({ design }) => design === chosen);
+    if (index >= 0) element("controls").elements[name].value = index;
+    element(name).textContent = index >= 0 ? points[index].value : "";
   }
-  element("costs").hidden = lines.length === 0;
-  fillTable("costs", lines);
+  const study = studies.find(({ points }) => points.some(({ design }) => design === chosen));
+  element("costs").hidden = !study;
+  if (!study) return;
+  const { figures } = study.points.find(({ design }) => design === chosen);
+  const known = study.columns.filter(({ key }) => figures[key] !== null);
+  fillTable("costs", known.map(({ key, label, unit, format }) => [label, `${figures[key].toFixed(Number(/[.](\d)/.exec(format)[1]))} ${unit}`]));
+  element("study").textContent = `${study.title}: ${study.command}`;
 }
 
 /** The cycles of frames of one pixel, by what they are of. */

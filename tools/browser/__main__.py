@@ -50,7 +50,7 @@ def main() -> None:
     texts = {
         name: json.loads((ROOT / "configs" / "golden" / f"{name}.json").read_text("utf-8")) for name in designs.DESIGNS
     }
-    points, found = studies.studies(texts)
+    points, found, sliders = studies.studies(texts)
     presets = {name: Manifest.from_dict(text) for name, text in texts.items()}
     texts |= points
     manifests = {name: Manifest.from_dict(text) for name, text in texts.items()}
@@ -60,6 +60,7 @@ def main() -> None:
         "manifests": texts,
         "presets": list(presets),
         "studies": found,
+        "sliders": sliders,
         "rooms": {name: rooms.room_data(name, presets) for name in rooms.PLACEMENTS},
         "cycles": designs.recorded(texts),
         "views": {name: bundle.base64_text(view) for name, view in views.items()},

@@ -21,7 +21,7 @@ from colonnade.device.verilator import render_rtl
 from colonnade.mesh.load import load_mesh
 from colonnade.scene_image.packer import pack
 
-PRESETS = ("tiny", "small")
+PRESETS = ("tiny", "small", "edge")
 #: A frame, and its pixels that are recorded.
 SIZE, COLUMNS, ROWS = (64, 48), range(20, 45, 2), range(16, 31, 2)
 COUNTERS = ("cycles", *"contextsRaySetup waitRecord waitUnit contextsBox contextsTriangles contextsShading".split())

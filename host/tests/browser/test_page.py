@@ -348,10 +348,12 @@ def test_controls_and_the_size_of_a_phone(browser: Browser) -> None:
     context.close()
 
 
-def test_the_precision_has_its_picture_and_its_costs(context: BrowserContext) -> None:
+def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) -> None:
     tab = Tab(context, "#pixel=4&design=edge")
     page = tab.page
     expect(page.locator("#costs")).to_contain_text("nJ/ray")
+    for name, value in {"precision": "", "vertexBits": "16", "contexts": "12"}.items():
+        expect(page.locator(f"#{name}")).to_have_text(value)
     sharp = tab.picture()["colours"]
     before = tab.frames()
     page.fill("input[name=precision]", "0")
@@ -361,6 +363,18 @@ def test_the_precision_has_its_picture_and_its_costs(context: BrowserContext) ->
     expect(page.locator("#study")).to_contain_text("colonnade explore scenes/studies/mixed-precision.toml")
     assert tab.picture()["colours"] != sharp
     assert "design=16b16s32d" in page.evaluate("location.hash")
+    before = tab.frames()
+    page.fill("input[name=vertexBits]", "0")
+    expect(page.locator("#vertexBits")).to_have_text("12")
+    expect(page.locator("#precision")).to_have_text("")
+    tab.wait(before)
+    expect(page.locator("#study")).to_contain_text("vertices-contexts.toml")
+    assert tab.picture()["colours"] != sharp
+    before = tab.frames()
+    page.fill("input[name=contexts]", "0")
+    expect(page.locator("#contexts")).to_have_text("4")
+    tab.wait(before)
+    assert tab.picture()["colours"] == sharp, "contexts change no pixel"
     assert tab.is_quiet()
 
 

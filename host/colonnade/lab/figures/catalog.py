@@ -191,6 +191,7 @@ def catalog() -> dict[str, Entry]:
         _study("scaling"),
         _study("mixed-precision", "ASAP7"),
         _study("energy-area", "ASAP7"),
+        _study("vertices-contexts", "ASAP7"),
     )
     return {entry.name: entry for entry in entries}
 

@@ -1,8 +1,9 @@
-"""The tables of ``docs/studies.md``: precision, energy and area."""
+"""The tables of ``docs/studies.md``: precision, energy and area, vertex bits and contexts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from colonnade.lab.common.markdown import markdown
@@ -56,9 +57,9 @@ def savings(data: Data) -> str:
     return markdown(["", "design", "energy per ray saved", "power saved", "area saved", "DISTS loss of a frame"], rows)
 
 
-def energy_area(data: Data) -> str:
-    """Each design of the study of energy and area; bold: on the front."""
-    study = data.result("energy-area")
+def trade(name: str, data: Data) -> str:
+    """Error, rate, area and energy of each design of a study; bold: on the front."""
+    study = data.result(name)
     (library,) = study["libraries"]
     key = f"energy_area.{library}"
     base = next(point for point in study["points"] if point["name"] == study["baseline"])["figures"][key]
@@ -94,5 +95,5 @@ def number(value: float | None, form: str, scale: float = 1.0) -> str:
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "precision": precision,
     "savings": savings,
-    "energy-area": energy_area,
+    **{name: partial(trade, name) for name in ("energy-area", "vertices-contexts")},
 }
