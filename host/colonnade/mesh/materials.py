@@ -119,8 +119,8 @@ def as_rendered(material: MeshMaterial, gathers: bool) -> MeshMaterial:
         is_coated = 0.0 < material.roughness < GLOSSY
         return replace(material, roughness=max(material.roughness, SHARP_ROUGHNESS) if is_coated else 0.0)
     if gathers:
-        most = GLASS_ROUGHNESS if material.kind == "glass" else 1.0
-        return replace(material, roughness=min(material.roughness, most))
+        limit = GLASS_ROUGHNESS if material.kind == "glass" else 1.0
+        return replace(material, roughness=min(material.roughness, limit))
     is_diffuse = material.kind == "mirror" and material.roughness > MIRROR_ROUGHNESS
     return replace(material, kind="diffuse" if is_diffuse else material.kind, roughness=0.0)
 
