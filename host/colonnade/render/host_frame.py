@@ -98,8 +98,9 @@ class HostFrame:
             colours = sums.objects / np.maximum(count, 1) / sums.white
             guide = Guide.of(position, shows_object & (count[..., 0] > 0))
             if self.denoise == "oidn":
-                mesh = self.prepared.mesh if layer is passes else None
-                albedo = None if mesh is None else oidn.albedo_of(mesh, self._faces(passes.frame), position)
+                # Coats have one reflectance
+                mesh, white = self.prepared.mesh if layer is passes else None, np.ones_like(position)
+                albedo = white if mesh is None else oidn.albedo_of(mesh, self._faces(passes.frame), position)
                 found = oidn.filtered(colours, guide, albedo)
             else:
                 found = denoised(colours, layer.object_variance(), guide)

@@ -10,13 +10,13 @@ from colonnade.mesh.mesh import Mesh
 from colonnade.render.denoise import Guide
 
 
-def filtered(colour: Floats, guide: Guide, albedo: Floats | None) -> Floats:
+def filtered(colour: Floats, guide: Guide, albedo: Floats) -> Floats:
     """Filter the colours of the object's pixels; it sees no others.
 
     Args:
         colour: Linear, float64 [height, width, 3].
-        guide: What the pixels show; used with an albedo only.
-        albedo: float64 [height, width, 3]; None: unknown.
+        guide: What the pixels show.
+        albedo: float64 [height, width, 3].
 
     Returns:
         float64 [height, width, 3]; pixels outside the mask are unchanged.
@@ -29,8 +29,7 @@ def filtered(colour: Floats, guide: Guide, albedo: Floats | None) -> Floats:
     def seen(values: Floats) -> NDArray[np.float32]:
         return np.ascontiguousarray(np.where(guide.mask[..., None], values, 0.0), dtype=np.float32)
 
-    more = {} if albedo is None else {"albedo": seen(albedo), "normal": seen(guide.normals)}
-    found = np.asarray(pyoidn.denoise(seen(colour), hdr=True, **more), dtype=np.float64)
+    found = pyoidn.denoise(seen(colour), albedo=seen(albedo), normal=seen(guide.normals), hdr=True)
     return np.where(guide.mask[..., None], np.maximum(found, 0.0), colour)
 
 

@@ -48,8 +48,8 @@ def test_whole_shadows_are_those_of_a_photo_without_strengths_and_strength_0_is_
         np.testing.assert_array_equal(framebuffer_bytes(frame, code, whole), plain)
         assert (framebuffer_bytes(frame, code, photo) != plain).any()
     background = replace(frame, is_object=np.zeros(SHAPE, np.bool_))
-    shown = framebuffer_bytes(background, 0, none).reshape(*SHAPE, 4)
-    np.testing.assert_array_equal(shown[..., 2::-1], colours)
+    written = framebuffer_bytes(background, 0, none).reshape(*SHAPE, 4)
+    np.testing.assert_array_equal(written[..., 2::-1], colours)
 
 
 def test_photos_have_lines_of_whole_tile_rows(photo: np.ndarray) -> None:
