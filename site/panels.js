@@ -68,7 +68,7 @@ export function showCosts({ studies, sliders }, chosen) {
   for (const [name, points] of Object.entries(sliders)) {
     const index = points.findIndex(({ design }) => design === chosen);
     if (index >= 0) element("controls").elements[name].value = index;
-    element(name).textContent = index >= 0 ? points[index].value : "";
+    element(`${name}-value`).textContent = index >= 0 ? points[index].value : "";
   }
   const study = studies.find(({ points }) => points.some(({ design }) => design === chosen));
   element("costs").hidden = !study;

@@ -352,12 +352,15 @@ def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) ->
     tab = Tab(context, "#pixel=4&design=edge")
     page = tab.page
     expect(page.locator("#costs")).to_contain_text("nJ/ray")
-    for name, value in {"precision": "", "vertexBits": "16", "contexts": "12"}.items():
-        expect(page.locator(f"#{name}")).to_have_text(value)
+    for name, place, value in (("vertexBits", "2", "16"), ("contexts", "1", "12")):
+        slider = page.locator(f"input[name={name}]")
+        expect(slider).to_have_value(place)
+        expect(slider).to_have_attribute("max", "2")
+        expect(page.locator(f"#{name}-value")).to_have_text(value)
     sharp = tab.picture()["colours"]
     before = tab.frames()
     page.fill("input[name=precision]", "0")
-    expect(page.locator("#precision")).to_have_text("16b16s32d")
+    expect(page.locator("#precision-value")).to_have_text("16b16s32d")
     tab.wait(before)
     expect(page.locator("#costs")).to_contain_text("PSNR, lowest")
     expect(page.locator("#study")).to_contain_text("colonnade explore scenes/studies/mixed-precision.toml")
@@ -365,14 +368,14 @@ def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) ->
     assert "design=16b16s32d" in page.evaluate("location.hash")
     before = tab.frames()
     page.fill("input[name=vertexBits]", "0")
-    expect(page.locator("#vertexBits")).to_have_text("12")
-    expect(page.locator("#precision")).to_have_text("")
+    expect(page.locator("#vertexBits-value")).to_have_text("12")
+    expect(page.locator("#precision-value")).to_have_text("")
     tab.wait(before)
     expect(page.locator("#study")).to_contain_text("vertices-contexts.toml")
     assert tab.picture()["colours"] != sharp
     before = tab.frames()
     page.fill("input[name=contexts]", "0")
-    expect(page.locator("#contexts")).to_have_text("4")
+    expect(page.locator("#contexts-value")).to_have_text("4")
     tab.wait(before)
     assert tab.picture()["colours"] == sharp, "contexts change no pixel"
     assert tab.is_quiet()
