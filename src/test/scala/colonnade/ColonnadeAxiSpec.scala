@@ -54,7 +54,7 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     val hash = (0 until 8).map(i => f"${host(s"formatHash[$i]")}%08x").mkString
     assert(hash == Manifest(config)("formatHash").str)
     assert(host("frameSize") == (480 << 16 | 640) && host("capabilities") == (4 << 8 | 4))
-    for (unknown <- Seq(0x3c, 0x104, 0x7ffc, 0xfffc)) {
+    for (unknown <- Seq(0x3c, 0x108, 0x7ffc, 0xfffc)) {
       assert(host.read(unknown) == ((BigInt(0), false)))
       assert(!host.write(unknown, 1))
     }
