@@ -49,7 +49,8 @@ def scene_cube(
     """The light that rays meet that leave the object, by directions of mesh space; None for a scene that gathers none.
 
     In a room it is the room's light at the middle of the object, elsewhere that of a panorama, or the ambient light.
-    The lights with a radius are marked in it. Radiance has the scene's `exposure`.
+    The lights with a radius are marked in it, but not fitted ones, whose places are guesses. Radiance has the scene's
+    `exposure`.
 
     Args:
         scene: With lights and a place for the object, as in `LitRoom`.
@@ -89,7 +90,8 @@ def scene_cube(
     if lost > _REPORTED_LOSS and progress is not None:
         limit = LARGEST / scene.exposure
         progress.note(f"{lost:.0%} of the light is brighter than {limit:g}, the most that a texel holds, and is lost")
-    return cube.with_lights([disc for light in lights.lights if (disc := _disc(light, point, pose)) is not None])
+    known = () if scene.fits_lights else lights.lights
+    return cube.with_lights([disc for light in known if (disc := _disc(light, point, pose)) is not None])
 
 
 def _shown(distance: float, edge: float) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import read_picture
 from colonnade.common.progress import QUIET, Progress
@@ -15,6 +16,7 @@ from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
 from colonnade.environment.shadow_strength import shadow_strength
 from colonnade.maps.encoded import layout_of
+from colonnade.scene.model import Colour
 from colonnade.scene.object_pose import object_pose, with_free_placement
 from colonnade.scene.panorama_light import panorama_light
 from colonnade.scene.room_lights import as_vector, lights_of, with_lights
@@ -22,7 +24,9 @@ from colonnade.scene.standing import surface_point
 from colonnade.scene.view import world_positions
 
 if TYPE_CHECKING:
+    from colonnade.common.types import Floats
     from colonnade.design.manifest import Manifest
+    from colonnade.environment.lights import RoomLight
     from colonnade.environment.model import Environment
     from colonnade.environment.panorama import Panorama
     from colonnade.environment.surround import Surround
@@ -31,6 +35,10 @@ if TYPE_CHECKING:
 
 #: Share of the pixels darker than the photo from which a note reports it.
 _REPORTED_CLAMPED = 0.02
+#: Share of a panorama's light that reaches the surfaces near an object, where they gather light from each other.
+_OPEN = 0.85
+#: Radius of a fitted light, as a share of its distance from the object.
+_AREA = 0.2
 
 
 @dataclass(frozen=True)
@@ -127,7 +135,7 @@ def lit_room(
     if room is None:
         return LitRoom(scene, unseen=unseen)
     if not scene.names_light and (around is None or not around.has_lights):
-        scene, walls = _with_fitted_lights(scene, room, max_lights, progress)
+        scene, walls = _with_fitted_lights(scene, room, extent, max_lights, progress)
         unseen = unseen or walls
     if scene.places_camera:
         drawn = scene.background.photo is None or relit
@@ -140,6 +148,8 @@ def lit_room(
                 else "where its maps show nothing, background.photo has no shadow of the object"
             )
         )
+    if scene.paths.gather and around is not None and room.photo is not None and not relit:
+        scene = replace(scene, ambient=Colour(as_vector(_OPEN * np.array(scene.ambient.colour))))
     # Gathered light has the photo's own scale
     colours = _photo_colours(scene, room, extent, relit, 1.0 if scene.paths.gather else None)
     strength = photo_strength(scene, room, extent, relit)
@@ -236,9 +246,13 @@ def _photo_colours(
 
 
 def _with_fitted_lights(
-    scene: Scene, room: Environment, max_lights: int, progress: Progress
+    scene: Scene, room: Environment, extent: Extent, max_lights: int, progress: Progress
 ) -> tuple[Scene, Surround | None]:
-    """The scene with fitted lights; if it gathers light, they are fitted beside that of the room's walls."""
+    """The scene with fitted lights.
+
+    If it gathers light, they are fitted beside that of the room's walls, and have an area: no photo tells their size,
+    and an edge that is too soft shows less than a hard one in a wrong place.
+    """
     from colonnade.environment.fitted_lights import fitted_lights
     from colonnade.environment.light_fit import DEFAULT_LIGHTS
 
@@ -255,4 +269,14 @@ def _with_fitted_lights(
         f"the scene names no light: ambient light and {count} point light{'' if count == 1 else 's'} were fitted to the"
         f" photo of room {room.name}, {fit.psnr:.1f} dB"
     )
-    return with_lights(scene, fit.lights), fit.surround
+    lights = fit.lights
+    if scene.paths.gather:
+        middle = object_pose(scene, extent, room).to_world(extent.centre)
+        lights = replace(lights, lights=tuple(_with_area(light, middle) for light in lights.lights))
+    return replace(with_lights(scene, lights), fits_lights=scene.paths.gather > 0), fit.surround
+
+
+def _with_area(light: RoomLight, point: Floats) -> RoomLight:
+    """A fitted light with an area, as a point sees it."""
+    away = light.position - point
+    return replace(light, radius=round(_AREA * float(np.sqrt(fixed_order.dot(away, away))), 3))

@@ -296,6 +296,10 @@ def test_in_a_room_a_panorama_is_what_the_photo_does_not_show(
     assert 0.1 < (np.abs(one - without) < 1e-9).all(axis=1).mean() < 0.6, "directions of the photo keep its light"
     grey = np.median(one, axis=0)
     assert (np.abs(one - grey) < 0.002).all(axis=1).mean() > 0.3, "the others are the panorama's"
+    named = panorama_scene(tmp_path / "named.exr", 0.5, IN_ROOM)
+    for relit, share in ((False, 0.85), (True, 1.0)):
+        ambient = lit_room(named, room, extent, 2, relit).scene.ambient.colour
+        assert ambient == pytest.approx([share * value for value in IN_ROOM.ambient.colour]), "of the panorama"
     notes = capsys.readouterr().err
     assert "has the exposure" in notes and "and its panorama the other" in notes and "1 light are" in notes
     assert "a fit under the scene's lights, the other" in notes

@@ -15,6 +15,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.device import scene as device_scene
+from colonnade.device.gathered_light import scene_cube
 from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
 from colonnade.lab.evaluation.studies.synthetic_attic import attic, write_attic
@@ -25,7 +26,8 @@ from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.lit_room import lit_room
-from colonnade.scene.model import Background, MeshSource, Scene
+from colonnade.scene.model import Background, MeshSource, Paths, Scene
+from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
 
 SIZE = (96, 72)
@@ -183,6 +185,23 @@ def test_the_truth_has_its_own_colours_where_the_photo_has_none(folder: Path) ->
     changed = np.abs(plain - coloured).max(axis=2) > 0.02
     assert 10 < changed.sum() < 0.1 * changed.size
     assert (coloured[changed][:, 0] > 4 * coloured[changed][:, 1]).mean() > 0.9
+
+
+def test_fitted_lights_have_an_area_that_mirrors_do_not_see(folder: Path) -> None:
+    """Only where light is gathered: other frames have one sample, or the lights of `colonnade light`."""
+    room, extent = load_environment(folder / "attic"), load_mesh("teapot:4").extent
+    scene = Scene(MeshSource("teapot:4"), background=Background(room=folder), names_light=False)
+    hard = lit_room(scene, room, extent, 2, False).scene
+    assert [light.radius for light in hard.lights] == [0.0] * len(hard.lights) and not hard.fits_lights
+    soft = lit_room(replace(scene, paths=Paths(gather=1)), room, extent, 2, False).scene
+    middle = object_pose(soft, extent, room).to_world(extent.centre)
+    for light in soft.lights:
+        assert light.position is not None
+        assert light.radius == pytest.approx(0.2 * np.linalg.norm(np.array(light.position) - middle), abs=1e-3)
+    assert soft.blurs == [], "no key of the scene asks for several samples"
+    for known, marks in ((soft, False), (replace(soft, fits_lights=False), True)):
+        cube = scene_cube(known, extent, room, None, False)
+        assert cube is not None and cube.lights is not None and cube.lights.any() == marks
 
 
 def test_the_light_command_prints_a_scene(folder: Path, tmp_path: Path) -> None:
