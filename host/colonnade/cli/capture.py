@@ -51,7 +51,9 @@ class Direction(_VectorType):
 @click.command(short_help="Convert a phone's or depth camera's recording to a sequence and a room.")
 @click.argument("source", type=FILE)
 @click.option("--output", type=FILE, required=True, metavar="DIR", help="New or empty folder for the result.")
-@click.option("--every", type=click.IntRange(1, 100_000), default=1, show_default=True, help="Take each Nth frame.")
+@click.option(
+    "--every", type=click.IntRange(1, 100_000), default=1, show_default=True, metavar="N", help="Take each Nth frame."
+)
 @click.option("--frames", "only", type=FrameRange(), metavar="A-B", help="Take frames A to B; the first one is 0.")
 @click.option(
     "--up",

@@ -18,6 +18,7 @@ from colonnade.cli.options import FILE, echo, echo_lines, finish, json_option, r
     type=click.IntRange(min=0, max=4),
     default=2,
     show_default=True,
+    metavar="N",
     help="Largest number of point lights; the hardware supports frame.lights.",
 )
 @click.option("--output", type=FILE, metavar="DIR", help="Write light.png: the photo, the fit, and their difference.")

@@ -70,7 +70,7 @@ def pack(
     size: str | None,
     json_file: Path | None,
 ) -> None:
-    """Pack SCENE, a TOML file, for one configuration, and print its use of each memory."""
+    """Pack SCENE, a TOML file or the name of one such as room, for one configuration; print its use of each memory."""
     if size is not None and frame_file is None and photo_file is None and view_file is None:
         message = "--size is that of --frame-file, --photo-file and --view-file"
         raise click.UsageError(message, click.get_current_context())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ from colonnade.cli.options import (
     size_option,
     strict_option,
 )
+from colonnade.common.errors import UserError
 from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
 from colonnade.maps.encoders import Encoder
 
@@ -33,7 +35,29 @@ if TYPE_CHECKING:
     from colonnade.scene.model import Denoiser
 
 
-@click.command(short_help="Render frames with the RTL, its model, or Embree.")
+class _Render(click.Command):
+    """``--denoise`` has an optional value: the word after it is no value if it is the scene."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the words of the command line."""
+        pairs = pairwise([*args, ""])
+        return super().parse_args(
+            ctx,
+            ["--denoise=atrous" if word == "--denoise" and _is_scene(following) else word for word, following in pairs],
+        )
+
+
+def _is_scene(word: str) -> bool:
+    """Whether a word is the name of a scene or of a TOML file."""
+    from colonnade.scene.parser import scene_file
+
+    try:
+        return word.endswith(".toml") or scene_file(word).is_file()
+    except (UserError, OSError, ValueError):
+        return False
+
+
+@click.command(cls=_Render, short_help="Render frames with the RTL, its model, or Embree.")
 @click.argument("scene", type=SCENE)
 @configuration_options
 @click.option(
@@ -87,8 +111,9 @@ if TYPE_CHECKING:
     type=click.Choice(["atrous", "oidn"]),
     is_flag=False,
     flag_value="atrous",
-    help="Filter the noise of gathered light, as the key frame.denoise; not of the reference. oidn is Open Image"
-    " Denoise.  [default: atrous]",
+    metavar="[atrous|oidn]",
+    help="Filter the noise of gathered light, as the key frame.denoise; not of the reference. Without a value by"
+    " atrous, a wavelet; oidn is Open Image Denoise.",
 )
 @click.option(
     "--output", type=FILE, metavar="FILE", help="Write a PNG picture, or of several frames a .webp animation."

@@ -16,12 +16,14 @@ from colonnade.maps.encoders import Encoder
 @configuration_options
 @size_option("Frame size in pixels.  [default: 320x240]")
 @partial(encoder_option, default="live")
-@click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port.  [default: a free one]")
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port of the page.  [default: a free one]"
+)
 @click.option("--open/--no-open", "opens", default=True, show_default=True, help="Open the page in a browser.")
 def view(
     scene: Path, config: str, overrides: tuple[str, ...], size: str | None, encoder: Encoder, port: int, opens: bool
 ) -> None:
-    """Show SCENE in a page at 127.0.0.1, rendered by the bit-exact model.
+    """Show SCENE, a TOML file or the name of one, in a page at 127.0.0.1, rendered by the bit-exact model.
 
     Drag orbits, the wheel zooms, shift and drag pans. The file is loaded again whenever it changes. The key s writes
     the camera into the file, r goes back to that of the file. Ctrl-C ends the command.

@@ -106,7 +106,7 @@ def find(name: str) -> Found:
                 if _is_file(path := folder / f"{stem}{suffix}"):
                     return Found(path, known.subdivisions if known else 0)
     if known is None:
-        raise UserError(f"there is no mesh {name!r}: give a file that exists, or one of {', '.join(names())}")
+        raise UserError(f"no mesh {name}: name a file that exists, or one of {', '.join(names())}")
     if known.download is None:
         raise UserError(f"mesh {name} is not in the folders of {VARIABLE}: {_advice(stems[0])}")
     return Found(_fetch(name, known.download), known.subdivisions)

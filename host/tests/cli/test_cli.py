@@ -76,6 +76,7 @@ def test_module_and_script_are_the_same_command() -> None:
         (("render",), "Missing argument"),
         (("render", "s.toml", "--colour", "red"), "No such option"),
         (("render", "s.toml", "--backend", "gpu"), "gpu"),
+        (("render", "--denoise", "odin", "s.toml"), "'odin' is not one of 'atrous', 'oidn'"),
         (("generate", "--config", "tiny"), "--output DIR or --print"),
         (("compare", "a.png"), "Missing argument"),
     ],
@@ -131,6 +132,13 @@ def test_output_that_cannot_be_written_is_refused_before_rendering(tmp_path: Pat
 
 def test_missing_scene_is_named(tmp_path: Path) -> None:
     assert "none.toml" in refused(run("render", tmp_path / "none.toml", "--config", "tiny", "--backend", "model"))
+
+
+@pytest.mark.parametrize("options", [(), ("oidn",)], ids=["alone", "with its value"])
+@pytest.mark.parametrize("scene", ["none.toml", "first-light"])
+def test_denoise_before_the_scene_has_a_value_or_none(scene: str, options: tuple[str, ...]) -> None:
+    line = refused(run("render", "--denoise", *options, scene, "--backend", "reference"))
+    assert "none.toml" in line if scene == "none.toml" else "--denoise is for the rtl" in line
 
 
 BAD_MESHES = {

@@ -98,7 +98,7 @@ def test_a_missing_mesh_is_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for name, message in (
         (str(tmp_path / "no.obj"), "does not exist"),
         (str(tmp_path), "is a folder"),
-        ("nothing", "there is no mesh 'nothing'"),
+        ("nothing", "no mesh nothing: name a file"),
         ("fandisk", "COLONNADE_MESHES"),
         ("sphere:many", "must be from 0"),
         ("teapot:0", "must be from 1"),

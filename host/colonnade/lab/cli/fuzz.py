@@ -64,7 +64,7 @@ def fuzz(
 
     for kind in kinds:
         if kind not in KINDS:
-            raise UserError(f"unknown kind of corruption {kind!r}: choose from {', '.join(KINDS)}")
+            raise UserError(f"no kind of corruption {kind}: choose from {', '.join(KINDS)}")
     require_outputs(json_file)
     terminal = progress.for_terminal()
 
