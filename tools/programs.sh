@@ -1,6 +1,11 @@
 # Required programs and common functions; the scripts of this folder source this file.
 # Sets `root` (the checkout) and defines: die, python_program, java_program, missing_packages, install_locked.
 
+# -h and --help of a script print the comment at its head.
+case "${1:-}" in
+  -h | --help) sed -n '1d; /^#/!q; s/^# \{0,1\}//p' "$0" && exit ;;
+esac
+
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 sbt_version=1.12.14
 sbt_launcher="$root/.tools/sbt-launch-$sbt_version.jar"

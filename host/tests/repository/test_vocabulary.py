@@ -17,6 +17,7 @@ SCALA = ".scala .hpp .cpp"
 @pytest.fixture
 def vocabulary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """The tool with an empty table."""
+    monkeypatch.syspath_prepend(str(TOOL.parent))
     loader = SourceFileLoader("vocabulary", str(TOOL))
     loader.cache_bytecode = lambda *_: None  # type: ignore[attr-defined]
     tool = module_from_spec(spec_from_loader("vocabulary", loader))  # type: ignore[arg-type]
