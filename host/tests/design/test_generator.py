@@ -58,7 +58,9 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         root / "jdk" / "bin" / "java",
         f'if [ "$1" = -version ]; then echo \'openjdk version "17.0.1"\' >&2; exit; fi\n'
         f'echo "java $*" >>"{root}/runs"\n'
-        'while [ $# -gt 0 ]; do if [ "$1" = --output ]; then output="$2"; fi; shift; done\n'
+        "while [ $# -gt 0 ]; do\n"
+        f'case "$1" in --output) output="$2" ;; {generator.WRITE_ARCHIVE}*) echo >"${{1#*=}}" ;; esac\n'
+        "shift; done\n"
         f'mkdir -p "$output"; cp "{root}/manifest" "$output/manifest.json"; echo "module top;" >"$output/Top.sv"\n',
     )
     monkeypatch.setenv("COLONNADE_HOME", str(root))
@@ -95,6 +97,18 @@ def test_generator_runs_once_and_is_compiled_once(checkout: Path) -> None:
     assert runs(checkout) == ["sbt", "java"]
     assert generator.manifest_for("tiny", ["array.rows=2"]).dir != first.dir
     assert runs(checkout) == ["sbt", "java", "java"]
+
+
+def test_the_first_design_writes_the_archive_of_classes_that_later_runs_read(checkout: Path) -> None:
+    """A manifest needs too few of them."""
+    generator.manifest_for("tiny")
+    for rows in (2, 3):
+        design = generator.design_for("tiny", [f"array.rows={rows}"])
+        assert sorted(path.name for path in design.dir.parent.iterdir() if path.suffix != ".json") == ["design"]
+    manifest, first, second = (line for line in (checkout / "runs").read_text().splitlines() if "java" in line)
+    archive = f"{generator.READ_ARCHIVE}{design.dir.parents[1] / generator.ARCHIVE}"
+    assert generator.ARCHIVE not in manifest
+    assert generator.WRITE_ARCHIVE in first and archive not in first and archive in second
 
 
 def test_changed_sources_are_compiled_again(checkout: Path) -> None:
@@ -138,8 +152,8 @@ DAMAGES: dict[str, tuple[str, Callable[[Path], object]]] = {
     ),
     "Verilog": ("design", lambda entry: halve(entry / "design" / "Top.sv")),
     "seal": ("design", lambda entry: halve(entry / "contents.json")),
-    "class path": ("generator", lambda entry: halve(entry.parent / "classes" / "classpath.json")),
-    "class": ("generator", lambda entry: halve(entry.parent / "classes" / "classes0" / "A.class")),
+    "class path": ("generator", lambda entry: halve(entry.parent / "jars" / "classpath.json")),
+    "class": ("generator", lambda entry: halve(entry.parent / "jars" / "classes0.zip")),
     "library": ("generator", lambda entry: (entry.parents[3] / "lib" / "chisel.jar").unlink()),
 }
 
