@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -12,18 +13,24 @@ from colonnade.device.simulator_build import build_environment
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGES = sorted(path.stem for path in (ROOT / "docs" / "start").glob("*.md"))
-#: The pages that continuous integration has time for; the matrix runs the others.
-IN_EVERY_RUN = ("newcomer", "soc")
 
 #: For the bench of the examples: soon compiled, slow.
-QUICK = "-MAKEFLAGS OPT_FAST=-O0 -MAKEFLAGS OPT_GLOBAL=-O0 --output-split 0 --noassert"
+QUICK = {"VERILATOR_FLAGS": "-MAKEFLAGS OPT_FAST=-O0 -MAKEFLAGS OPT_GLOBAL=-O0 --output-split 0 --noassert"}
 
 
-@pytest.mark.parametrize(
-    "page", [pytest.param(page, marks=() if page in IN_EVERY_RUN else pytest.mark.matrix) for page in PAGES]
-)
-def test_the_commands_of_a_starting_page_print_what_it_says(page: str) -> None:
-    environment = {**os.environ, **build_environment(), "VERILATOR_FLAGS": QUICK}
-    command = [ROOT / "tools" / "starting-pages", page]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+def run_page(page: str, *options: str, environment: Mapping[str, str]) -> None:
+    command = [ROOT / "tools" / "starting-pages", *options, page]
+    done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("page", ["newcomer", "soc"])
+def test_the_commands_of_a_starting_page_print_what_it_says(page: str) -> None:
+    run_page(page, environment=build_environment() | QUICK)
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("page", PAGES)
+def test_a_starting_page_runs_from_its_setup_to_its_last_line(page: str) -> None:
+    """In a clone of the last commit: some ten minutes each."""
+    run_page(page, "--all", environment={})
