@@ -180,8 +180,8 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(autouse=True)
 def quick_simulators(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Build simulators that are soon compiled, but for tests with the marks `matrix` and `long_simulation`."""
-    if not any(request.node.get_closest_marker(mark) for mark in ("matrix", "long_simulation")):
+    """Build simulators that are soon compiled, but for tests with the mark `matrix`."""
+    if request.node.get_closest_marker("matrix") is None:
         monkeypatch.setenv("COLONNADE_QUICK_SIMULATORS", "1")
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from live_maps import live_maps
 
 from colonnade.common.types import Floats
 from colonnade.design.generator import design_for, manifest_for
@@ -53,21 +54,27 @@ TABLE = Scene(
 )
 SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
 
+#: Beside `small`: maps that two columns share, and two marches.
+SHARED = ("physicalAttributeMemory.columnsPerCopy=2", "units.marches=2")
+
+#: Rooms whose maps are those of the offline encoder, which needs 20 seconds for each.
+STILL_ROOMS = ("living", pytest.param("office", marks=pytest.mark.matrix), "attic")
+
 
 @NEEDS_SIMULATOR
 @pytest.mark.parametrize(
     ("kind", "options"),
     [
         ("diffuse", ()),
-        ("mirror", ()),
-        ("glass", ("physicalAttributeMemory.columnsPerCopy=2",)),
+        pytest.param("mirror", (), marks=pytest.mark.matrix),
+        ("glass", SHARED),
     ],
     ids=["diffuse", "mirror", "glass, maps shared by two columns"],
 )
 def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, ...]) -> None:
     """The relit room and the shadow window; two lights, one light, no bounces; a sample; a stalled sink."""
     design = design_for("small", options)
-    held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
+    held = live_maps(ROOMS / "living", design.manifest)
     mesh = load_mesh("teapot:4")
     material = Material(kind=kind, albedo=(0.9, 0.95, 0.9))
     image = with_environment(
@@ -134,18 +141,18 @@ MOVES = (
 
 
 @NEEDS_SIMULATOR
-@pytest.mark.parametrize("kind", ["diffuse", "glass"])
+@pytest.mark.parametrize("kind", [pytest.param("diffuse", marks=pytest.mark.matrix), "glass"])
 def test_hardware_sees_the_rooms_of_the_model_from_any_camera(kind: str) -> None:
     """Relit and in the shadow window, with an object that the room hides; and maps whose registers are any bits."""
-    design = design_for("small", ("units.marches=2",))
-    held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
+    design = design_for("small", SHARED)
+    held = live_maps(ROOMS / "living", design.manifest)
     mesh, material = load_mesh("teapot:4"), Material(kind=kind)
     image = with_environment(
         pack(mesh, design.manifest, with_overrides(mesh.materials, material)), held, design.manifest
     )
     scene = replace(TABLE, material=material)
     registers: list[dict[str, int]] = [
-        frame_registers(moved(scene, held, *move), image.header, design.manifest, 24, 18, held, relit)
+        frame_registers(moved(scene, held, *move), image.header, design.manifest, 18, 14, held, relit)
         for move in MOVES
         for relit in (True, False)
     ]
@@ -181,13 +188,13 @@ def test_a_room_after_an_abort_is_right() -> None:
     """Pixels are in all stages when the watchdog aborts: none is in the next frame."""
     units = ("units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3", "units.marches=2")
     design = design_for("small", ("array.rows=3", *units))
-    held = EncodedEnvironment.load(ROOMS / "living", design.manifest)
+    held = live_maps(ROOMS / "living", design.manifest)
     mesh, material = load_mesh("teapot:4"), Material(kind="glass")
     image = with_environment(
         pack(mesh, design.manifest, with_overrides(mesh.materials, material)), held, design.manifest
     )
     scene = replace(TABLE, material=material, more_lights=(SECOND,))
-    settings = frame_registers(scene, image.header, design.manifest, 40, 30, held, True)
+    settings = frame_registers(scene, image.header, design.manifest, 24, 18, held, True)
     registers = [
         frame for limit in range(20, 300, 40) for frame in (settings | {"frame.watchdogCycles": limit}, settings)
     ]
@@ -208,7 +215,7 @@ def sunken(scene: Scene, held: EncodedEnvironment, extent: Extent) -> Scene:
     return replace(scene, placement=None, transform=Transform(turn, pose.scale, (x, y - 0.15, z)))
 
 
-@pytest.mark.parametrize("room", ["living", "office", "attic"])
+@pytest.mark.parametrize("room", STILL_ROOMS)
 @pytest.mark.parametrize("mesh", ["teapot:8", "bunny"])
 def test_a_standing_object_keeps_its_foot(room: str, mesh: str) -> None:
     """No pixel is lost where object and room are in contact."""
@@ -230,7 +237,7 @@ def test_a_standing_object_keeps_its_foot(room: str, mesh: str) -> None:
 def test_occlusion_is_off_where_the_room_cannot_hide_the_object() -> None:
     """On a free table, and with the scene's key."""
     manifest = manifest_for("small").manifest
-    held = EncodedEnvironment.load(ROOMS / "living", manifest)
+    held = live_maps(ROOMS / "living", manifest)
     header = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest).header
 
     def occlusion(scene: Scene) -> int:
@@ -242,7 +249,7 @@ def test_occlusion_is_off_where_the_room_cannot_hide_the_object() -> None:
     assert occlusion(replace(sunk, background=replace(sunk.background, occlusion=False))) == 0
 
 
-@pytest.mark.parametrize("room", ["living", "office", "attic"])
+@pytest.mark.parametrize("room", STILL_ROOMS)
 def test_a_march_from_the_camera_of_the_maps_sees_what_its_pixels_show(room: str) -> None:
     """Points agree within a millimetre; in tiles of several planes few pixels see another plane."""
     manifest = manifest_for("small").manifest
@@ -262,7 +269,7 @@ def test_a_march_from_the_camera_of_the_maps_sees_what_its_pixels_show(room: str
 @pytest.mark.parametrize("move", MOVES[1:3])
 def test_shadows_lie_within_the_shadow_window_of_another_camera(move: tuple[tuple[float, float, float], float]) -> None:
     manifest = manifest_for("small").manifest
-    held = EncodedEnvironment.load(ROOMS / "living", manifest)
+    held = live_maps(ROOMS / "living", manifest)
     image = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest)
     scene = moved(TABLE, held, *move)
     registers = frame_registers(scene, image.header, manifest, 320, 240, held, relit=False)
@@ -281,7 +288,7 @@ def test_shadows_lie_within_the_shadow_window_of_another_camera(move: tuple[tupl
 @pytest.mark.parametrize("sample", [CENTRE, Sample((0.49, -0.49), lights=((0.6, 0.8),))], ids=["centre", "corner"])
 def test_shadows_lie_within_the_shadow_window(light: Light, sample: Sample) -> None:
     manifest = manifest_for("small").manifest
-    held = EncodedEnvironment.load(ROOMS / "living", manifest)
+    held = live_maps(ROOMS / "living", manifest)
     image = with_environment(pack(load_mesh("teapot:4"), manifest), held, manifest)
     scene = replace(TABLE, light=light, sample=sample)
     registers = frame_registers(scene, image.header, manifest, 320, 240, held, relit=False)

@@ -33,13 +33,16 @@ SKY = Background(colour=(0.2, 0.3, 0.5))
 
 SECTIONS = ("scene.recordCount", "scene.triangleBase", "scene.attributeBase")
 
+#: Configuration and overrides of the narrowest arithmetic.
+NARROW = ("16b16s32d", ("array.rows=1", "array.columns=1"))
+
 #: Name, configuration, overrides, mesh, stalls of the pixel sink.
 CASES = [
     ("tiny", "tiny", (), "teapot:4", Stalls(check_interval=1)),
     ("small, stalled sink", "small", (), "teapot:4", Stalls(40, 7, check_interval=1)),
     ("binary tree, one bank", "tiny", ("geometry.arity=2", "columnBvhMemory.banks=1"), "torus", Stalls(10, 3)),
     ("no tree, slow memory", "tiny", ("geometry.bvh=false", "columnBvhMemory.readLatency=5"), "cube", Stalls()),
-    ("narrow", "16b16s32d", ("array.rows=1", "array.columns=1"), "sphere:2", Stalls()),
+    ("narrow", *NARROW, "sphere:2", Stalls()),
 ]
 
 
@@ -73,7 +76,7 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
 @pytest.mark.parametrize(
     ("precision", "units"),
     [
-        ("16b16s32d", ()),
+        pytest.param("16b16s32d", (), marks=pytest.mark.matrix),
         pytest.param(
             "24b24s64d",
             ("units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
@@ -96,7 +99,7 @@ def test_corner_colours_textures_and_emission_equal_the_model(precision: str, un
     materials += (MeshMaterial(albedo=(0.9, 0.8, 0.7), emission=(0.1, 0.6, 0.2)),)
     index = np.arange(len(mesh.faces), dtype=np.uint8) // 8 % 7
     mixed = replace(textured(coloured(mesh)), materials=materials, face_materials=index)
-    image = pack(mixed, design.manifest)
+    image = pack(mixed, design.manifest, encoder="live")
     scene = replace(TEAPOT, background=SKY, paths=Paths(bounces=2))
     registers = [
         frame_registers(replace(scene, camera=camera), image.header, design.manifest, 48, 37)
@@ -125,19 +128,23 @@ def test_direct_loads_equal_loads_through_the_port(mesh: str) -> None:
         assert past.counters == through.counters
 
 
-#: Name, configuration, material, lights.
+TWO_LIGHTS = (Light(falloff=3.0), Light(offset=(-1.0, 0.5, 2.0), colour=(0.2, 0.4, 0.9)))
+
+#: Name, configuration, overrides, material, lights.
 SHINY = [
-    ("mirror", "small", Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), (Light(),)),
-    ("glass", "small", Material(kind="glass", albedo=(0.9, 1.0, 0.95), ior=1.45), (Light(),)),
-    ("two lights", "small", Material(), (Light(falloff=3.0), Light(offset=(-1.0, 0.5, 2.0), colour=(0.2, 0.4, 0.9)))),
-    ("narrow glass", "16b16s32d", Material(kind="glass", ior=2.4), (Light(falloff=0.5),)),
+    ("mirror", "small", (), Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), (Light(),)),
+    ("glass", "small", (), Material(kind="glass", albedo=(0.9, 1.0, 0.95), ior=1.45), (Light(),)),
+    ("two lights", "small", (), Material(), TWO_LIGHTS),
+    ("narrow glass", *NARROW, Material(kind="glass", ior=2.4), (Light(falloff=0.5),)),
 ]
 
 
 @pytest.mark.parametrize("case", SHINY, ids=lambda case: case[0])
-def test_mirrors_glass_and_lights_equal_the_model(case: tuple[str, str, Material, tuple[Light, ...]]) -> None:
-    _, config, material, lights = case
-    design = design_for(config, ())
+def test_mirrors_glass_and_lights_equal_the_model(
+    case: tuple[str, str, tuple[str, ...], Material, tuple[Light, ...]],
+) -> None:
+    _, config, overrides, material, lights = case
+    design = design_for(config, overrides)
     mesh = load_mesh("teapot:4")
     image = pack(mesh, design.manifest, with_overrides(mesh.materials, material))
     scene = replace(TEAPOT, material=material, light=lights[0], more_lights=lights[1:], background=SKY)

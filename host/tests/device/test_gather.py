@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from live_maps import live_maps
 
 from colonnade.design.generator import design_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
-from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.model import Background, Camera, Colour, Light, Material, MeshSource, Paths, Placement, Scene
@@ -73,7 +73,7 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
     design = design_for("small", (*GATHERS, *options))
     mesh = load_mesh("teapot:4")
     placed = replace(SCENE, placement=Placement((322.0, 306.0), 0.58), background=Background(room=ROOMS / "living"))
-    scene, held = (placed, EncodedEnvironment.load(ROOMS / "living", design.manifest)) if in_room else (SCENE, None)
+    scene, held = (placed, live_maps(ROOMS / "living", design.manifest)) if in_room else (SCENE, None)
     # Faces of four materials beside each other, so that rays go from one to the other
     parts = np.arange(len(mesh.faces)) % 4
     mesh = replace(mesh, face_materials=parts.astype(mesh.face_materials.dtype), materials=4 * mesh.materials[:1])

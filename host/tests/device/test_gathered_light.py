@@ -124,7 +124,7 @@ def test_room_pixels_near_the_object_gather_its_light() -> None:
     """The ratios of the model are those of the reference, in the window and beside it."""
     design, size = manifest_for("textured").manifest, (80, 60)
     scene = replace(IN_ROOM, material=Material(albedo=(0.8, 0.1, 0.1))).with_samples(4)
-    prepared = DeviceScene.of(scene, design)
+    prepared = DeviceScene.of(scene, design, encoder="live")
     passes = FramePasses()
     for one in prepared.passes():
         passes.add(render_model(design, prepared.image, prepared.registers(size, one)))

@@ -103,9 +103,8 @@ def test_a_frame_after_an_abort_is_right() -> None:
 
 def test_counters_account_for_every_context_and_record() -> None:
     """The contexts are those of the path unit: each one is in one state, and each record taken has a reason."""
-    design = design_for(
-        "tiny", ("array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3", *FRAME)
-    )
+    _, config, overrides = SHAPES[0]
+    design = design_for(config, (*overrides, *FRAME))
     image = pack(load_mesh("teapot:3"), design.manifest)
     settings = frame_registers(TEAPOT, image.header, design.manifest, 40, 30)
     frame = render_rtl(design, image, [settings]).frames[0]

@@ -55,7 +55,7 @@ PAGE = 4096
 UNWRITTEN = 0xA5
 CACHE = {
     **{"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2, "sharedMisses": 8},
-    **{"busBytes": 32, "parity": False},
+    **{"busBytes": 32, "parity": True},
 }
 
 
@@ -257,7 +257,7 @@ MAPS = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
 MAP_OVERRIDES = ("array.columns=2", "frame.maxBounces=1", f"physicalAttributeMemory={json.dumps(MAPS)}")
 
 
-@pytest.mark.parametrize("mode", ["interrupt", "poll"])
+@pytest.mark.parametrize("mode", ["interrupt", pytest.param("poll", marks=pytest.mark.matrix)])
 def test_maps_of_another_view_are_loaded_between_frames(tmp_path: Path, mode: str) -> None:
     """The frame after that is the one of a device that has never had others; a soft reset keeps the maps."""
     design = shell_design_for("tiny", MAP_OVERRIDES, bus_bytes=16)
@@ -285,7 +285,10 @@ def test_maps_of_another_view_are_loaded_between_frames(tmp_path: Path, mode: st
     assert (memory == UNWRITTEN).all()
 
 
-@pytest.mark.parametrize(("every", "frames"), [(1, 3), (4, 6)])
+@pytest.mark.parametrize(
+    ("every", "frames"),
+    [pytest.param(1, 3, marks=pytest.mark.matrix), (2, 4), pytest.param(4, 6, marks=pytest.mark.matrix)],
+)
 def test_frames_of_a_moving_camera_are_those_of_the_model(tmp_path: Path, every: int, frames: int) -> None:
     """The first frames of a demonstration: maps of each keyframe, registers from poses or from files, photos."""
     size, design = (48, 36), shell_design_for("tiny", MAP_OVERRIDES, bus_bytes=16)

@@ -174,7 +174,9 @@ def test_few_bounding_planes_are_the_largest() -> None:
     assert np.rint(normals[0]).tolist() == [0, 0, 1]
 
 
-@pytest.mark.parametrize(("name", "mean", "p95"), [("living", 0.1, 0.3), ("office", 0.6, 1.4)])
+@pytest.mark.parametrize(
+    ("name", "mean", "p95"), [("living", 0.1, 0.3), pytest.param("office", 0.6, 1.4, marks=pytest.mark.matrix)]
+)
 def test_surfaces_of_the_rooms(name: str, mean: float, p95: float) -> None:
     environment, layout = load_environment(ROOMS / name), AttributeLayout()
     content = encoded_environment(environment, layout).planes

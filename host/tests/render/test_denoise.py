@@ -103,7 +103,7 @@ def test_the_shadow_on_a_photo_is_filtered_and_the_photo_is_not(tmp_path: Path) 
     scene = Path(__file__).parents[3] / "scenes" / "gathered.toml"
     pictures = {}
     for name, options in (("raw", ("1",)), ("filtered", ("1", "--denoise")), ("truth", ("64",))):
-        arguments = ["render", str(scene), "--config", "textured", "--size", "80x60"]
+        arguments = ["render", str(scene), "--config", "textured", "--size", "80x60", "--encoder", "live"]
         output = tmp_path / f"{name}.png"
         options = ("--backend", "model", "--output", str(output), "--samples", *options)
         done = CliRunner().invoke(cli, [*arguments, *options])

@@ -104,12 +104,10 @@ def test_the_device_shows_the_texture_of_the_reference(config: str) -> None:
 
 def test_more_bytes_keep_more_of_a_texture() -> None:
     mesh = sphere(1024)
-    found = [
-        quality(mesh, "32b32s64d", settings(size), Material(kind="diffuse")) for size in (5632, 8192, 16384, 21632)
-    ]
-    print("dB in 5,632, 8,192, 16,384 and 21,632 bytes: " + ", ".join(f"{one:.1f}" for one in found))
+    found = [quality(mesh, "32b32s64d", settings(size), Material(kind="diffuse")) for size in (5632, 16384, 21632)]
+    print("dB in 5,632, 16,384 and 21,632 bytes: " + ", ".join(f"{one:.1f}" for one in found))
     assert found == sorted(found) and found[-1] > found[0] + 1.0
-    assert found[2] > 38.5, "tiles share no words"
+    assert found[1] > 38.5, "tiles share no words"
 
 
 @pytest.mark.skipif(not os.environ.get("COLONNADE_MESHES"), reason="the duck is in the folders of COLONNADE_MESHES")

@@ -124,7 +124,7 @@ def figures(content: dict[str, Any]) -> dict[str, Any]:
     return {point["name"]: (point["figures"], point["workloads"]) for point in content["points"]}
 
 
-def test_a_study_killed_in_the_middle_continues_and_gives_the_same_numbers(
+def test_a_study_killed_in_the_middle_continues_gives_the_same_numbers_and_is_extended(
     again: Path, explored_study: Explored
 ) -> None:
     running = subprocess.Popen(command(again, "--jobs", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -148,11 +148,8 @@ def test_a_study_killed_in_the_middle_continues_and_gives_the_same_numbers(
     assert "16b16s32d" in (out / "points.csv").read_text()
     assert figures(continued) == explored_study.figures
 
-
-def test_a_study_is_extended(study: Path) -> None:
-    explored(study)
-    study.write_text(study.read_text().replace('["16b16s32d", ', '["16b16s32d", "24b24s32d", '))
-    extended, _ = explored(study)
+    again.write_text(again.read_text().replace('["16b16s32d", ', '["16b16s32d", "24b24s32d", '))
+    extended, _ = explored(again)
     assert [point["name"] for point in extended["points"]] == ["16b16s32d", "24b24s32d", "32b32s64d"]
     assert extended["jobs"]["cached"] == 7
     assert extended["jobs"]["run"] == 3

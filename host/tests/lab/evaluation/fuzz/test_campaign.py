@@ -52,7 +52,6 @@ PIPELINED = (
 
 
 @needs_verilator
-@pytest.mark.long_simulation
 @pytest.mark.parametrize(("config", "frames"), DESIGNS)
 def test_corrupt_frames_equal_the_models_and_leave_no_state(config: str, frames: int) -> None:
     report = campaign.fuzz(design_for(config, ()), frames, seed=1)
@@ -143,7 +142,6 @@ def test_records_of_another_page_are_those_of_its_lines() -> None:
 
 
 @needs_verilator
-@pytest.mark.long_simulation
 def test_a_wrong_model_is_found_and_its_frame_is_reproducible(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = campaign.model_frame
 
