@@ -53,6 +53,13 @@ def _framebuffer(context: click.Context, parameter: click.Parameter, value: str 
     metavar="WxH@ADDRESS",
     help="A display's memory, for the device tree: Linux shows it as a simple-framebuffer.",
 )
+@click.option(
+    "--cells",
+    type=click.IntRange(1, 2),
+    default=1,
+    show_default=True,
+    help="Address and size cells of the device tree's root and bus: 2 on 64-bit boards as a rule.",
+)
 @click.option("--shell-header", type=FILE, metavar="FILE", help="Write only the C header of the shell's registers.")
 def registers(
     config: str,
@@ -62,6 +69,7 @@ def registers(
     base: int,
     interrupt: int,
     framebuffer: tuple[int, int, int] | None,
+    cells: int,
     shell_header: Path | None,
 ) -> None:
     """Write the registers of a design in its AXI4 shell, from the generator's table.
@@ -95,5 +103,5 @@ def registers(
         if framebuffer is not None:
             width, height, address = framebuffer
             display = Display(address, width, height, int(design.manifest.config["frame"]["tileSize"]))
-        files.write_registers(design, output, base, interrupt, display)
+        files.write_registers(design, output, base, interrupt, display, cells)
     echo(f"{output}: {len(listed(output))} files, format {design.manifest.format_hash[:12]}")

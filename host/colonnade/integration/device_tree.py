@@ -28,49 +28,62 @@ class Display:
         """Bytes from a line to the next, XRGB8888."""
         return -(-self.width // self.tile_size) * self.tile_size * 4
 
+    @property
+    def bytes(self) -> int:
+        """Of all lines."""
+        return self.stride * self.height
 
-def device_tree(table: RegisterTable, base: int, interrupt: int, display: Display | None = None) -> str:
-    """The node at the byte address ``base``, in one cell of 32 bits or in two. ``interrupt`` is a cell.
 
-    Interrupt cells and the memory region of images are the board's: edit them. With ``display`` the root also has the
-    framebuffer, and the memory of it is reserved and the device's second region.
+def device_tree(table: RegisterTable, base: int, interrupt: int, display: Display | None = None, cells: int = 1) -> str:
+    """The node at the byte address ``base``.
+
+    Its interrupt cell is the board's, as is the memory region of images without a display: edit them.
+
+    Args:
+        table: The registers.
+        base: Byte address of the device.
+        interrupt: One cell.
+        display: The root also has this framebuffer, and the memory of it is reserved and the device's second region.
+        cells: Of addresses and of sizes, in the node of the bus and in the root: 1, or 2. They are 2 if an address
+            needs it.
     """
-    major = table.version >> 16
-    cells = "two address cells" if base >> 32 else "one address cell"
-    regions = f"<{_address(base)} {SPACE:#x}>"
+    if max(base, display.base if display else 0) >> 32:
+        cells = 2
+    regions = _region(base, SPACE, cells)
     if display is not None:
-        regions += f", <{_address(display.base)} {display.stride * display.height:#x}>"
+        regions += f", {_region(display.base, display.bytes, cells)}"
     node = f"""\
-/* Include it in the node of a bus with {cells} and one size cell. */
+/* Include it in the node of a bus with {_CELLS[cells]}. */
 colonnade@{base:x} {{
-    compatible = "colonnade,axi-{major}", "generic-uio";
+    compatible = "colonnade,axi-{table.version >> 16}", "generic-uio";
     reg = {regions};
     interrupts = <{interrupt}>;
 }};
 """
-    return node if display is None else node + _framebuffer(display)
+    return node if display is None else node + _framebuffer(display, cells)
 
 
-def _framebuffer(display: Display) -> str:
-    """Nodes of the root, in the cells of the display's address."""
-    size = display.stride * display.height
-    cells = 2 if display.base >> 32 else 1
-    region = f"<{_address(display.base)} {size:#x}>"
-    return f"""
-/* Include these in the root: Linux draws its console here until a program maps the framebuffer. */
-reserved-memory {{
+_CELLS = {1: "one address cell and one size cell", 2: "two address cells and two size cells"}
+
+
+def _framebuffer(display: Display, cells: int) -> str:
+    """Nodes of the root."""
+    region = _region(display.base, display.bytes, cells)
+    bus = f"""\
     #address-cells = <{cells}>;
-    #size-cells = <1>;
-    ranges;
+    #size-cells = <{cells}>;
+    ranges;"""
+    return f"""
+/* Include these in the root, which has {_CELLS[cells]}: Linux ignores reserved memory with other cells. */
+reserved-memory {{
+{bus}
     colonnade_pixels: pixels@{display.base:x} {{
         reg = {region};
         no-map;
     }};
 }};
 chosen {{
-    #address-cells = <{cells}>;
-    #size-cells = <1>;
-    ranges;
+{bus}
     framebuffer@{display.base:x} {{
         compatible = "simple-framebuffer";
         reg = {region};
@@ -84,6 +97,7 @@ chosen {{
 """
 
 
-def _address(value: int) -> str:
-    """The cells of an address: one of 32 bits, or two."""
-    return f"{value >> 32:#x} {value & 0xFFFFFFFF:#x}" if value >> 32 else f"{value:#x}"
+def _region(address: int, size: int, cells: int) -> str:
+    """An address and a size, in so many cells each."""
+    words = [number >> 32 * part & 0xFFFFFFFF for number in (address, size) for part in reversed(range(cells))]
+    return f"<{' '.join(f'{word:#x}' for word in words)}>"

@@ -18,7 +18,12 @@ _NOTE = "/* Written by `colonnade registers` with PeakRDL. Do not edit. */\n"
 
 
 def write_registers(
-    design: GeneratedDesign, output: Path, base: int = 0, interrupt: int = 0, display: Display | None = None
+    design: GeneratedDesign,
+    output: Path,
+    base: int = 0,
+    interrupt: int = 0,
+    display: Display | None = None,
+    cells: int = 1,
 ) -> None:
     """Write the folder ``output``: SystemRDL, C headers, HTML pages, IP-XACT, SVD, and a device tree node.
 
@@ -28,6 +33,7 @@ def write_registers(
         base: Byte address of the device, for SVD and device tree.
         interrupt: Its interrupt, for the device tree.
         display: A framebuffer for the device tree.
+        cells: Of its addresses and sizes.
 
     Raises:
         UserError: The folder cannot be replaced.
@@ -46,7 +52,7 @@ def write_registers(
         (folder / "colonnade_registers.h").write_text(c_header("colonnade", (table.shell, table.device), work))
         (folder / "colonnade_design.h").write_text(design_header(table, design.manifest))
         (folder / "colonnade.svd").write_text(svd(table, base))
-        (folder / "colonnade.dtsi").write_text(device_tree(table, base, interrupt, display))
+        (folder / "colonnade.dtsi").write_text(device_tree(table, base, interrupt, display, cells))
         compiler = RDLCompiler()
         compiler.compile_file(str(source))
         top = compiler.elaborate().top

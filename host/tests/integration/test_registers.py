@@ -106,20 +106,23 @@ def test_an_interrupt_beyond_a_cell_of_a_device_tree_is_refused(interrupt: str, 
 
 def test_numbers_of_a_device_tree_fit_their_cells(table: RegisterTable) -> None:
     assert "reg = <0x90000000 0x10000>;" in device_tree(table, BASE, 5)
-    assert "reg = <0x12 0x90000000 0x10000>;" in device_tree(table, 0x12 << 32 | BASE, 2**32 - 1)
+    assert "reg = <0x0 0x90000000 0x0 0x10000>;" in device_tree(table, BASE, 5, cells=2)
+    assert "reg = <0x12 0x90000000 0x0 0x10000>;" in device_tree(table, 0x12 << 32 | BASE, 2**32 - 1)
 
 
-def test_a_framebuffer_of_a_device_tree_compiles(table: RegisterTable, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("cells", "pixels"), [(1, 0x8000_0000), (2, 0x8000_0000), (2, 0x8_0000_0000)])
+def test_a_framebuffer_of_a_device_tree_compiles(table: RegisterTable, tmp_path: Path, cells: int, pixels: int) -> None:
     """By the device tree compiler, without its warnings; a line has whole tile rows of 16 pixels."""
-    display = Display(0x8000_0000, 1000, 600, 16)
-    nodes = device_tree(table, BASE, 5, display)
-    for line in ("stride = <4032>;", "reg = <0x80000000 0x24eA00>;".lower(), 'format = "x8r8g8b8";'):
+    nodes = device_tree(table, BASE, 5, Display(pixels, 1000, 600, 16), cells if pixels < 1 << 32 else 1)
+    region = {1: "0x80000000 0x24ea00", 2: f"{pixels >> 32:#x} {pixels & 0xFFFFFFFF:#x} 0x0 0x24ea00"}[cells]
+    assert nodes.count(f"<{region}>") == 3
+    for line in ("stride = <4032>;", 'format = "x8r8g8b8";'):
         assert line in nodes
     device, root = nodes.split("\n/* Include these in the root")
-    bus = f"soc {{ #address-cells = <1>; #size-cells = <1>; ranges; {device} }};"
-    head = "/dts-v1/; / { #address-cells = <1>; #size-cells = <1>; interrupt-parent = <&pic>; "
+    counts = f"#address-cells = <{cells}>; #size-cells = <{cells}>;"
+    head = f"/dts-v1/; / {{ {counts} interrupt-parent = <&pic>; "
     pic = "pic: pic { interrupt-controller; #interrupt-cells = <1>; #address-cells = <0>; };"
-    (tmp_path / "board.dts").write_text(f"{head} {pic} {bus} /* {root} }};")
+    (tmp_path / "board.dts").write_text(f"{head} {pic} soc {{ {counts} ranges; {device} }}; /* {root} }};")
     if shutil.which("dtc") is None:
         pytest.skip("no dtc: apt-get install device-tree-compiler")
     command = ["dtc", "-O", "dtb", "-o", tmp_path / "board.dtb", tmp_path / "board.dts"]
