@@ -1,8 +1,10 @@
 /* What the examples do on every machine: files, errors, a load and a frame. */
 #include "target.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { ATTEMPTS = 1000000 };
 
@@ -17,15 +19,20 @@ void target_check(const char *what, enum colonnade_error error) {
 
 size_t target_read(const char *name, void *to, size_t most) {
     FILE *file = fopen(name, "rb");
-    if (file == NULL) target_fail(name, "cannot be read");
+    if (file == NULL) target_fail(name, strerror(errno));
     size_t bytes = fread(to, 1, most, file);
-    if (fgetc(file) != EOF) target_fail(name, "larger than the memory of the device");
+    if (fgetc(file) != EOF) {
+        char why[64];
+        snprintf(why, sizeof why, "larger than the %zu bytes that it may have", most);
+        target_fail(name, why);
+    }
     fclose(file);
     return bytes;
 }
 
 void target_load(struct target *target, struct colonnade *device, const char *name) {
     target_check("device", colonnade_probe(device, &target->bus, &colonnade_design));
+    colonnade_acknowledge(device, COLONNADE_FRAME_DONE | COLONNADE_IMAGE_DONE | COLONNADE_ERROR); /* of an earlier program */
     colonnade_enable_interrupts(device, COLONNADE_IMAGE_DONE);
     const uint32_t bytes = target_put(target, name);
     const uint64_t base = target->base;
@@ -34,8 +41,13 @@ void target_load(struct target *target, struct colonnade *device, const char *na
     colonnade_enable_interrupts(device, COLONNADE_FRAME_DONE);
 }
 
+uint32_t target_stride(uint32_t width) {
+    const uint32_t tile = colonnade_design.tile_size;
+    return (width + tile - 1) / tile * tile * 4;
+}
+
 uint32_t target_render(struct target *target, struct colonnade *device, const struct colonnade_frame *frame) {
-    const uint32_t tile = colonnade_design.tile_size, stride = (frame->width + tile - 1) / tile * tile * 4;
+    const uint32_t stride = target_stride(frame->width);
     const uint64_t base = target->base;
     const struct colonnade_framebuffer framebuffer = {base, stride, COLONNADE_XRGB8888, {base, base + target->size}};
     colonnade_acknowledge(device, COLONNADE_FRAME_DONE | COLONNADE_ERROR);

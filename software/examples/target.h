@@ -9,9 +9,10 @@ struct target {
     struct colonnade_bus bus;
     uint64_t base, size; /* memory that the device may use, bytes */
     uint8_t *memory;     /* the same; NULL where this program cannot see it */
+    uint32_t line;       /* bytes of a line of the display that shows the memory; 0: none does */
 };
 
-/* Opens a device, or ends the program with one line. */
+/* Opens a device, or ends the program with one line. If a display shows the memory, no console draws there any more. */
 void target_open(struct target *target, const char *device);
 
 /* Puts a file at the start of the memory; its size in bytes. */
@@ -28,6 +29,9 @@ size_t target_read(const char *name, void *to, size_t most);
 
 /* Loads the device's image from a file; returns when it is there. */
 void target_load(struct target *target, struct colonnade *device, const char *name);
+
+/* Bytes of a line of a frame: whole tile rows. */
+uint32_t target_stride(uint32_t width);
 
 /* Renders the frame that is set to the start of the memory, which the image leaves to it; the bytes of a line. */
 uint32_t target_render(struct target *target, struct colonnade *device, const struct colonnade_frame *frame);

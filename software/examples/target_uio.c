@@ -1,21 +1,29 @@
 /* Linux with UIO: map 0 is the registers, map 1 a piece of memory that the device may use. */
 #define _POSIX_C_SOURCE 200809L
 
+#include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <linux/fb.h>
+#include <linux/kd.h>
+#include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include "target.h"
 
-enum { REGISTER_BYTES = 0x10000 };
+enum { REGISTER_BYTES = 0x10000, DISPLAYS = 8 };
 
 static struct uio {
     void *registers;
     int file;
 } uio;
+
+static int console; /* the terminal that the display shows */
 
 static uint32_t uio_read(void *context, uint32_t address) {
     return colonnade_mmio_read(((struct uio *)context)->registers, address);
@@ -46,14 +54,44 @@ static uint64_t memory_number(const char *device, const char *what) {
     return value;
 }
 
+static void release_console(void) { ioctl(console, KDSETMODE, KD_TEXT); }
+
+static void end(int signal) {
+    release_console();
+    _exit(128 + signal);
+}
+
+/* The display that shows the memory: the bytes of its line, or 0. Its console would draw into images and pictures. */
+static uint32_t take_display(uint64_t base) {
+    for (int number = 0; number < DISPLAYS; ++number) {
+        struct fb_fix_screeninfo display;
+        char name[32];
+        snprintf(name, sizeof name, "/dev/fb%d", number);
+        const int file = open(name, O_RDWR);
+        if (file < 0) continue;
+        const bool is_it = ioctl(file, FBIOGET_FSCREENINFO, &display) == 0 && display.smem_start == base;
+        close(file);
+        if (!is_it) continue;
+        console = open("/dev/tty0", O_RDWR);
+        if (console < 0 || ioctl(console, KDSETMODE, KD_GRAPHICS) != 0) target_fail("/dev/tty0", strerror(errno));
+        const struct sigaction action = {.sa_handler = end};
+        sigaction(SIGINT, &action, NULL);
+        sigaction(SIGTERM, &action, NULL);
+        atexit(release_console);
+        return display.line_length;
+    }
+    return 0;
+}
+
 void target_open(struct target *target, const char *device) {
     uio.file = open(device, O_RDWR);
-    if (uio.file < 0) target_fail(device, "cannot be opened");
+    if (uio.file < 0) target_fail(device, strerror(errno));
     target->base = memory_number(device, "addr");
     target->size = memory_number(device, "size");
     uio.registers = mmap(NULL, REGISTER_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, uio.file, 0);
     target->memory = mmap(NULL, target->size, PROT_READ | PROT_WRITE, MAP_SHARED, uio.file, sysconf(_SC_PAGESIZE));
-    if (uio.registers == MAP_FAILED || target->memory == MAP_FAILED) target_fail(device, "cannot be mapped");
+    if (uio.registers == MAP_FAILED || target->memory == MAP_FAILED) target_fail(device, strerror(errno));
+    target->line = take_display(target->base);
     target->bus = (struct colonnade_bus){uio_read, uio_write, uio_wait, &uio};
 }
 

@@ -40,9 +40,6 @@ static void restore_terminal(void) { tcsetattr(STDIN_FILENO, TCSANOW, &terminal)
 
 /* Keys without Enter and without an echo; as before at the end. */
 static void open_terminal(void) {
-    const struct sigaction action = {.sa_handler = end};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
     if (tcgetattr(STDIN_FILENO, &terminal) != 0) return; /* no terminal: keys come from a file or a pipe */
     struct termios raw = terminal;
     raw.c_lflag &= ~(tcflag_t)(ICANON | ECHO);
@@ -151,9 +148,14 @@ int main(int argc, char **argv) {
     struct target target;
     struct colonnade device;
     target_open(&target, argv[1]);
+    const struct sigaction action = {.sa_handler = end};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    const struct colonnade_camera start = view.camera;
+    if (target.line != 0 && target.line != target_stride(start.width))
+        target_fail(argv[3], "frames are not as wide as the display: give pack its --size");
     target_load(&target, &device, argv[2]);
 
-    const struct colonnade_camera start = view.camera;
     struct orbit orbit = {0, 0, 1};
     struct speed speed = {0, 0, 0};
     if (argc == 4) open_terminal();

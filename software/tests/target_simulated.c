@@ -9,7 +9,7 @@ static void dump(void) { printf("dump memory 0 %d\n", PAGE + MEMORY); }
 
 void target_open(struct target *target, const char *device) {
     waits_for_interrupt = strcmp(device, "interrupt") == 0;
-    *target = (struct target){{bus_read, bus_write, bus_wait, NULL}, PAGE, MEMORY, NULL};
+    *target = (struct target){{bus_read, bus_write, bus_wait, NULL}, PAGE, MEMORY, NULL, 0};
     atexit(dump);
 }
 

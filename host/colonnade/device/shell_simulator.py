@@ -8,6 +8,7 @@ import os
 import subprocess
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NoReturn
 
 from colonnade.common import processes
@@ -38,14 +39,28 @@ class Bus:
     seed: int = 1
 
 
+@dataclass(frozen=True)
+class SharedMemory:
+    """A file that is the memory behind the shell, and that other programs map, too.
+
+    Attributes:
+        path: It has the memory's size, or more.
+        base: Bus address of its first byte, a multiple of 4096 below 2^32.
+    """
+
+    path: Path
+    base: int
+
+
 class SimulatedTransport:
     """A Verilated shell that runs while this object is open; its clock stands still between accesses.
 
     Args:
         design: A design with its shell (`generator.shell_design_for`).
-        size: Bytes of the memory, from bus address 0. Bytes that nobody has written are 0xA5.
+        size: Bytes of the memory.
         bus: The memory's timing.
         progress: Shows the building of the simulator.
+        shared: The memory; without it, one from bus address 0, in which bytes that nobody has written are 0xA5.
 
     Raises:
         RuntimeError: Of any access: the shell breaks a rule of AXI, refuses an access, or leaves the memory.
@@ -55,12 +70,19 @@ class SimulatedTransport:
     SLICE = 1_000_000
 
     def __init__(
-        self, design: GeneratedDesign, size: int = 1 << 26, bus: Bus = Bus(), progress: Progress = QUIET
+        self,
+        design: GeneratedDesign,
+        size: int = 1 << 26,
+        bus: Bus = Bus(),
+        progress: Progress = QUIET,
+        shared: SharedMemory | None = None,
     ) -> None:
-        self.base, self.size, self.patience = 0, size, math.inf
+        self.base, self.size, self.patience = 0 if shared is None else shared.base, size, math.inf
         options = {"bus": read_shell(design.dir)["busBytes"], "memory": size, "latency": bus.latency}
         options |= {"stall": bus.stall, "order": bus.order, "seed": bus.seed}
         arguments = [text for name, value in options.items() for text in (f"--{name}", str(value))]
+        if shared is not None:
+            arguments += ["--base", str(shared.base), "--shared", str(shared.path.resolve())]
         program = build_shell_simulator(design, progress)
         with ExitStack() as stack:
             self._folder = stack.enter_context(temporary_folder())
@@ -88,7 +110,11 @@ class SimulatedTransport:
 
     def wait(self) -> int:
         """Run to the next interrupt that is enabled, a million cycles at most; the number of cycles."""
-        return int(self._ask(f"run {self.SLICE}")[-1])
+        return self.run(self.SLICE)
+
+    def run(self, cycles: int) -> int:
+        """Run so many cycles, or to the next interrupt that is enabled; the number of cycles."""
+        return int(self._ask(f"run {cycles}")[-1])
 
     def store(self, address: int, data: bytes) -> None:
         """See `Transport`."""

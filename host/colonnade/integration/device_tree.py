@@ -29,8 +29,8 @@ class Display:
         return -(-self.width // self.tile_size) * self.tile_size * 4
 
     @property
-    def bytes(self) -> int:
-        """Of all lines."""
+    def size(self) -> int:
+        """Bytes of all lines."""
         return self.stride * self.height
 
 
@@ -51,7 +51,7 @@ def device_tree(table: RegisterTable, base: int, interrupt: int, display: Displa
         cells = 2
     regions = _region(base, SPACE, cells)
     if display is not None:
-        regions += f", {_region(display.base, display.bytes, cells)}"
+        regions += f", {_region(display.base, display.size, cells)}"
     node = f"""\
 /* Include it in the node of a bus with {_CELLS[cells]}. */
 colonnade@{base:x} {{
@@ -68,7 +68,7 @@ _CELLS = {1: "one address cell and one size cell", 2: "two address cells and two
 
 def _framebuffer(display: Display, cells: int) -> str:
     """Nodes of the root."""
-    region = _region(display.base, display.bytes, cells)
+    region = _region(display.base, display.size, cells)
     bus = f"""\
     #address-cells = <{cells}>;
     #size-cells = <{cells}>;

@@ -15,7 +15,7 @@ from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.device import Device, ModelDevice
 from colonnade.device.scene import DeviceScene
 from colonnade.device.shell_device import ShellDevice
-from colonnade.device.shell_simulator import SimulatedTransport
+from colonnade.device.shell_simulator import SharedMemory, SimulatedTransport
 from colonnade.device.transport import LitexTransport, UioTransport
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.model import MeshSource, Scene
@@ -138,12 +138,16 @@ def test_all_transports_make_the_same_accesses_and_the_picture_is_the_models(
 
 
 @NEEDS_SIMULATOR
-def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScene) -> None:
+def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScene, tmp_path: Path) -> None:
+    """Its memory is a file from a bus address on, which has the image when it is loaded."""
     registers = packed.registers(SIZE)
+    memory = tmp_path / "memory"
+    memory.write_bytes(bytes(1 << 14))
+    shell = SimulatedTransport(design, 1 << 14, shared=SharedMemory(memory, 0x5F00_0000))
     other = ModelDevice("small")
     with pytest.raises(UserError, match="packed for another design"):
         other.load(packed.image)
-    for device in (ModelDevice(*CONFIG), ShellDevice(SimulatedTransport(design, 1 << 14), design)):
+    for device in (ModelDevice(*CONFIG), ShellDevice(shell, design)):
         with device:
             with pytest.raises(UserError, match="no scene is loaded"):
                 device.set_frame(registers)
@@ -173,6 +177,8 @@ def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScen
                 device.start()
                 device.wait()
                 assert device.counters()["cycles"] > 0
+    content, stored = device_image(packed.image, design.manifest), memory.read_bytes()
+    assert stored.startswith(content) and any(stored[len(content) :])
 
 
 def test_a_way_without_a_device_is_an_error_and_so_is_an_exception_of_an_access(

@@ -18,12 +18,12 @@ struct DramOptions {
 
 #ifdef DRAM_BUS_BYTES
 /// Layout of the scene: lines of `lineRecords` records at a pitch of `linePitch` bytes, from address 0.
-template <class Top> class Dram {
+template <class Top, class Bytes = std::vector<unsigned char>> class Dram {
 public:
     Dram(Top& top, const DramOptions& options) : Dram(top, options, own_) {}
 
     /// A DRAM whose content is `memory`, which others may change.
-    Dram(Top& top, const DramOptions& options, std::vector<unsigned char>& memory)
+    Dram(Top& top, const DramOptions& options, Bytes& memory)
         : top_(top), options_(options), random_(options.seed), memory_(memory) {}
 
     /// Writes a record, as the host would.
@@ -103,8 +103,8 @@ private:
     Top& top_;
     DramOptions options_;
     std::mt19937 random_;
-    std::vector<unsigned char> own_;
-    std::vector<unsigned char>& memory_;
+    Bytes own_;
+    Bytes& memory_;
     std::deque<Read> reads_;
     std::size_t chosen_ = 0;
     bool offers_ = false, fails_ = false;

@@ -9,7 +9,8 @@
 //   dump FILE ADDRESS BYTES    writes a range of the memory to a file; bytes that were never written are 0xA5
 //   fail BEATS                 so many of 1024 beats of the scene's reads are answered with an error from now on
 //
-// Options: --bus BYTES of the data bus; --memory BYTES of memory, from address 0; --latency CYCLES of an answer; --stall
+// Options: --bus BYTES of the data bus; --memory BYTES of memory, from address --base N (0); --shared FILE, which is the
+// memory, and which other programs may map, too; --latency CYCLES of an answer; --stall
 // PERCENT of cycles in which a channel does not move; --order N of a write's address and data (WriteOrder); --seed N of stalls and of the state at power-up. An access beyond the memory, an answer with an error, or a
 // broken rule of AXI ends the run. Exit status 0, or 3 on an error.
 #include <cstdint>
@@ -27,7 +28,7 @@ namespace {
 
 class Harness {
 public:
-    explicit Harness(std::map<std::string, unsigned>& options) : memory_(top_, options) {
+    Harness(std::map<std::string, unsigned>& options, const std::string& shared) : memory_(top_, options, shared) {
         top_.s_axil_awvalid = top_.s_axil_wvalid = top_.s_axil_bready = top_.s_axil_arvalid = top_.s_axil_rready = 0;
         top_.s_axil_awprot = top_.s_axil_arprot = 0;
         top_.m_axi_bvalid = top_.m_axi_rvalid = top_.m_axi_bresp = top_.m_axi_rresp = top_.m_axi_bid = top_.m_axi_rid = 0;
@@ -120,8 +121,8 @@ private:
     Memory memory_;
 };
 
-void run(const std::string& job, std::map<std::string, unsigned>& options) {
-    Harness harness(options);
+void run(const std::string& job, std::map<std::string, unsigned>& options, const std::string& shared) {
+    Harness harness(options, shared);
     std::ifstream file(job);
     std::istream& stream = job == "-" ? std::cin : file;
     if (job == "-") std::cout << std::unitbuf;
@@ -153,11 +154,12 @@ void run(const std::string& job, std::map<std::string, unsigned>& options) {
 } // namespace
 
 int main(int argc, char** argv) try {
-    std::map<std::string, unsigned> options{{"--bus", 0}, {"--memory", 0}, {"--latency", 1}, {"--stall", 0}, {"--order", 0}, {"--seed", 1}, {"--sequences", 0}};
-    std::string job;
+    std::map<std::string, unsigned> options{{"--bus", 0}, {"--memory", 0}, {"--base", 0}, {"--latency", 1}, {"--stall", 0}, {"--order", 0}, {"--seed", 1}, {"--sequences", 0}};
+    std::string job, shared;
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         if (argument.rfind("--", 0) != 0) job = argument;
+        else if (argument == "--shared" && i + 1 < argc) shared = argv[++i];
         else if (options.count(argument) == 0) throw std::runtime_error("unknown option: " + argument);
         else if (++i < argc) options[argument] = static_cast<unsigned>(std::stoul(argv[i]));
         else throw std::runtime_error(argument + " needs a number");
@@ -165,7 +167,7 @@ int main(int argc, char** argv) try {
     Verilated::randReset(2);
     Verilated::randSeed(static_cast<int>(options["--seed"]));
     if (options["--sequences"] != 0) return runSequences(job, options);
-    run(job, options);
+    run(job, options, shared);
     return 0;
 } catch (const std::exception& problem) {
     std::cerr << "harness: " << problem.what() << '\n';

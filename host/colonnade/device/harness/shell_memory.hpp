@@ -7,11 +7,11 @@
 #include <random>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "VColonnadeAxi.h"
 #include "ports.hpp"
 
+#include "bus_bytes.hpp"
 #include "dram.hpp"
 
 #ifdef DRAM_BUS_BYTES
@@ -33,19 +33,19 @@ struct ScenePins {
 /// Reads of the scene: those of different ids overtake each other where channels stall.
 class Scene {
 public:
-    Scene(VColonnadeAxi& top, const DramOptions& options, std::vector<std::uint8_t>& bytes) : pins_(top), dram_(pins_, options, bytes) {}
+    Scene(VColonnadeAxi& top, const DramOptions& options, BusBytes& bytes) : pins_(top), dram_(pins_, options, bytes) {}
     void offer() { dram_.offer(); }
     void take() { dram_.take(); }
     void fail(unsigned errorsPer1024) { dram_.fail(errorsPer1024); }
 
 private:
     ScenePins pins_;
-    Dram<ScenePins> dram_;
+    Dram<ScenePins, BusBytes> dram_;
 };
 #else
 /// A design without a scene in DRAM.
 struct Scene {
-    Scene(VColonnadeAxi&, const DramOptions&, std::vector<std::uint8_t>&) {}
+    Scene(VColonnadeAxi&, const DramOptions&, BusBytes&) {}
     void offer() {}
     void take() {}
     void fail(unsigned) { throw std::runtime_error("this design reads no scene"); }
@@ -58,15 +58,12 @@ enum class WriteOrder : unsigned { any, addressAfterDataValid, dataAfterAddress,
 /// The memory behind m_axi, whose answers come in order, and behind m_axi_scene.
 class Memory {
 public:
-    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options)
+    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options, const std::string& shared)
         : top_(top), bus_(options["--bus"]), latency_(options["--latency"]), stall_(options["--stall"]),
           order_(static_cast<WriteOrder>(options["--order"] % static_cast<unsigned>(WriteOrder::count))), random_(options["--seed"]),
-          bytes_(options["--memory"], 0xA5), scene_(top, {latency_, stall_, 0, 0, options["--seed"]}, bytes_) {}
+          bytes_(options["--base"], options["--memory"], shared), scene_(top, {latency_, stall_, 0, 0, options["--seed"]}, bytes_) {}
 
-    std::uint8_t* range(std::uint64_t address, std::uint64_t size) {
-        if (address > bytes_.size() || size > bytes_.size() - address) throw std::runtime_error("an access beyond the memory");
-        return &bytes_[address];
-    }
+    std::uint8_t* range(std::uint64_t address, std::uint64_t size) { return bytes_.range(address, size); }
 
     /// Sets the inputs for this cycle. What is offered stays.
     void offer() {
@@ -187,7 +184,7 @@ private:
     unsigned bus_, latency_, stall_;
     WriteOrder order_;
     std::mt19937 random_;
-    std::vector<std::uint8_t> bytes_;
+    BusBytes bytes_;
     Scene scene_;
     std::deque<Burst> writes_, reads_;
     std::deque<Beat> beats_;        // without their address
