@@ -1,8 +1,8 @@
 """Path-traces a room that `colonnade.lab.evaluation.light` describes, with Mitsuba and Open Image Denoise.
 
 Usage: room.py JOB.npz RESULT.npz SAMPLES    run by tools/light in .cache/light-environment. The result has linear
-radiance, float32 [height, width, 3]: of the room without objects `photo`, `panorama`, and `around`, the panorama
-without its emitters; and one picture for each frame.
+radiance, float32 [height, width, 3]: one picture for each frame; and of the room without objects, unless the job is of
+one frame alone, `photo`, `panorama`, and `around`, the panorama without its emitters.
 """
 
 from __future__ import annotations
@@ -24,12 +24,15 @@ PANORAMA = 2
 
 def material(thing: dict[str, Any]) -> dict[str, Any]:
     """The material of an object."""
-    kind, tint = thing["kind"], colour(thing["colour"])
+    kind, tint, lobe = thing["kind"], colour(thing["colour"]), {"distribution": "ggx", "alpha": thing["roughness"] ** 2}
     if kind == "glass":
         return {"type": "dielectric", "int_ior": 1.5}
+    if kind == "rough glass":
+        return {"type": "roughdielectric", "int_ior": 1.5, **lobe}
     own: dict[str, Any] = {
         "matt": {"type": "diffuse", "reflectance": tint},
         "mirror": {"type": "conductor", "material": "none", "specular_reflectance": tint},
+        "rough mirror": {"type": "roughconductor", "material": "none", "specular_reflectance": tint, **lobe},
     }.get(kind) or {
         "type": "principled",
         "base_color": tint,
@@ -100,16 +103,17 @@ def main() -> None:
     """Render all pictures of a job."""
     job, samples, begun = np.load(sys.argv[1]), int(sys.argv[3]), time.monotonic()
     plan = json.loads(str(job["plan"]))
-    room = scene(job, plan, None)
     found = {}
 
     def add(name: str, values: Any) -> None:
         found[name] = values.astype(np.float32)
         print(f"{name}: {time.monotonic() - begun:.0f} s", flush=True)
 
-    add("photo", picture(room, sensor(plan, plan["photo"]), max(1, samples // 4)))
-    for name, hides in (("panorama", False), ("around", True)):
-        add(name, panorama(room, plan["place"], PANORAMA * samples, hides))
+    if plan["has_room"]:
+        room = scene(job, plan, None)
+        add("photo", picture(room, sensor(plan, plan["photo"]), max(1, samples // 4)))
+        for name, hides in (("panorama", False), ("around", True)):
+            add(name, panorama(room, plan["place"], PANORAMA * samples, hides))
     for frame in plan["frames"]:
         add(frame, picture(scene(job, plan, frame), sensor(plan, plan["frame"]), samples))
     np.savez_compressed(sys.argv[2], **found)

@@ -20,8 +20,9 @@ def _of(data: Data, suffix: str) -> dict[str, Frame]:
     return {name.removesuffix(suffix): own for name, own in frames.items() if name.endswith(suffix)}
 
 
-def _columns(frames: Mapping[str, Frame]) -> list[str]:
-    return list(next(iter(frames.values()))["qualities"])
+def _columns(frames: Mapping[str, Frame], with_oidn: bool = False) -> list[str]:
+    """The columns of frames; Open Image Denoise filters the objects alone."""
+    return [name for name in next(iter(frames.values()))["qualities"] if with_oidn or "OIDN" not in name]
 
 
 def _cells(frames: Mapping[str, Frame], column: str, part: str) -> list[str]:
@@ -37,7 +38,7 @@ def _cells(frames: Mapping[str, Frame], column: str, part: str) -> list[str]:
 def objects(data: Data) -> str:
     """PSNR, FLIP and DISTS of the rough objects' pixels."""
     frames = _of(data, "-rough")
-    rows = [[column, *_cells(frames, column, "object")] for column in _columns(frames)[1:]]
+    rows = [[column, *_cells(frames, column, "object")] for column in _columns(frames, with_oidn=True)[1:]]
     return markdown(["objects: dB, FLIP, DISTS", *frames], rows)
 
 
@@ -51,17 +52,17 @@ def rooms(data: Data) -> str:
 
 def materials(data: Data) -> str:
     """PSNR of each object, in the mean of the rooms."""
-    every = [_of(data, "-rough"), _of(data, "-clear")]
+    every = [found for frame in ("rough", "clear", "blurred") if (found := _of(data, f"-{frame}"))]
     kinds = [list(next(iter(frames.values()))["qualities"]["ambient light"]["things"]) for frames in every]
     rows = []
-    for column in _columns(every[0])[1:]:
+    for column in _columns(every[0], with_oidn=True)[1:]:
         cells = [
             f"{_mean([own['qualities'][column]['things'][kind] for own in frames.values()]):.1f}"
             for frames, own_kinds in zip(every, kinds, strict=True)
             for kind in own_kinds
         ]
         rows.append([column, *cells])
-    return markdown(["mean of the rooms, dB", *kinds[0], *kinds[1]], rows)
+    return markdown(["mean of the rooms, dB", *(kind for own in kinds for kind in own)], rows)
 
 
 def mirrors(data: Data) -> str:

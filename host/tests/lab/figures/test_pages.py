@@ -157,7 +157,13 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "compare": {"psnr": 48.0},
         },
         "light": {
-            "frames": {"frames": {"r-rough": compared("matt", "metal"), "r-clear": compared("mirror")}},
+            "frames": {
+                "frames": {
+                    "r-rough": compared("matt", "metal"),
+                    "r-clear": compared("mirror"),
+                    "r-blurred": compared("rough mirror"),
+                }
+            },
             "pass": {"cycles": 50_000, "rays": {"in_box": 1_000_000}},
             "two": {"cycles": 60_000, "rays": {"in_box": 1_100_000}},
         },
@@ -229,7 +235,7 @@ def compared(*kinds: str) -> dict[str, Any]:
     """A frame in a known room."""
     parts = {name: 30.0 for name in ("frame", "object", "room")}
     own = {**parts, **{f"{name}_{key}": 0.125 for name in parts for key in ("flip", "dists")}, "brightness": 0.75}
-    columns = ("no object", "probe, rasteriser", "ambient light", "1 pass")
+    columns = ("no object", "probe, rasteriser", "ambient light", "1 pass", "1 pass, OIDN")
     qualities = {column: {**own, "things": dict.fromkeys(kinds, 20.0 + index)} for index, column in enumerate(columns)}
     errors = {kind: {"rays": 9, "median": 1.25, "high": 3.0} for kind in ("probe", "colonnade")}
     return {"qualities": qualities, "mirrors": errors}
@@ -282,7 +288,9 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "60 kGE; + 3.0, 5.0 %" in table(docs, "gather")
     assert "50,000 cycles, 900 gathered rays" in table(docs, "gather")
     assert "| 1 pass | 30.0, 0.125, 0.125 |" in table(docs, "light-objects")
-    assert "| ambient light | 22.0 | 22.0 | 22.0 |" in table(docs, "light-materials")
+    assert "| matt | metal | mirror | rough mirror |" in table(docs, "light-materials")
+    assert "| 1 pass, OIDN | 24.0 | 24.0 | 24.0 | 24.0 |" in table(docs, "light-materials")
+    assert "OIDN" not in table(docs, "light-mirrors") + table(docs, "light-rooms")
     assert "| 1 pass | 23.0 dB, 0.75 |" in table(docs, "light-mirrors")
     assert "| rays of Colonnade | 1.2°, 3.0° |" in table(docs, "light-mirrors")
     # A million rays of 2 nJ a pass

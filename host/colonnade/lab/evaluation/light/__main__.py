@@ -10,7 +10,7 @@ from colonnade.common import progress
 from colonnade.common.atomic_files import made_folder, write_json
 from colonnade.common.errors import UserError
 from colonnade.common.processes import tool
-from colonnade.lab.evaluation.light.rooms import ROOMS
+from colonnade.lab.evaluation.light.rooms import ROOMS, KnownRoom
 
 
 def main() -> None:
@@ -20,13 +20,20 @@ def main() -> None:
 
 
 def _job(arguments: list[str]) -> None:
-    """ROOM FILE: write what the path tracer needs."""
+    """ROOM[/FRAME] FILE: write what the path tracer needs."""
     from colonnade.lab.evaluation.light.jobs import write_job
 
-    name, file = arguments
+    (name, _, frame), file = arguments[0].partition("/"), arguments[1]
+    room = _room(name)
+    if frame and frame not in room.frames:
+        raise UserError(f"there is no frame {frame} of {name}: choose from {', '.join(room.frames)}")
+    write_job(Path(file), room, frame or None)
+
+
+def _room(name: str) -> KnownRoom:
     if name not in ROOMS:
         raise UserError(f"there is no room {name}: choose from {', '.join(ROOMS)}")
-    write_job(Path(file), ROOMS[name])
+    return ROOMS[name]
 
 
 def _store(arguments: list[str]) -> None:
@@ -38,14 +45,17 @@ def _store(arguments: list[str]) -> None:
 
 
 def _frames(arguments: list[str]) -> None:
-    """FOLDER [--json FILE]: measure all frames; scenes and pictures are in the folder."""
+    """FOLDER [ROOM…] [--json FILE]: measure the frames of rooms, or of all; scenes and pictures are in the folder."""
     from colonnade.lab.evaluation.light import columns, report
 
-    folder = Path(arguments[0])
+    options = arguments.index("--json") if "--json" in arguments else len(arguments)
+    folder, names = Path(arguments[0]), tuple(arguments[1:options]) or tuple(ROOMS)
+    for name in names:
+        _room(name)
     with made_folder(folder):
         results: dict[str, columns.FrameResult] = {}
         strips: dict[str, list[report.Strip]] = {}
-        for name, result, pictures in columns.measure(folder, progress=progress.for_terminal()):
+        for name, result, pictures in columns.measure(folder, names, progress.for_terminal()):
             results[name] = result
             kind = name.rpartition("-")[2]
             strips.setdefault(kind, []).append(report.write_pictures(folder, name, pictures))

@@ -28,6 +28,7 @@ from colonnade.lab.evaluation.light.surfaces import RoomSurface
 from colonnade.lab.evaluation.region_metrics import compare_regions
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
+from colonnade.scene.model import Denoiser
 
 #: The preset that renders.
 CONFIG = "textured"
@@ -36,6 +37,8 @@ CONFIG = "textured"
 CHANGED = 8
 #: Passes of the columns.
 PASSES = (1, 4, 16)
+#: Open Image Denoise, in the names of columns.
+OIDN = "OIDN"
 
 
 @dataclass(frozen=True)
@@ -45,14 +48,14 @@ class Column:
     Attributes:
         passes: Samples of a pixel.
         gather: Gathered rays of a path.
-        denoise: The host filters the picture.
+        denoise: The host's filter of the picture, as that of a scene.
         light: What is known: ``panorama``, the lights, and the panorama of all other light; ``lights``, these alone;
             ``around``, the whole panorama, in which lights are found; ``photo``, nothing.
     """
 
     passes: int
     gather: int = 1
-    denoise: bool = False
+    denoise: bool | Denoiser = False
     light: str = "panorama"
 
 
@@ -62,6 +65,7 @@ def columns() -> dict[str, Column]:
     for passes in PASSES:
         count = f"{passes} pass{'es' if passes > 1 else ''}"
         found |= {count: Column(passes), f"{count}, filtered": Column(passes, denoise=True)}
+        found[f"{count}, {OIDN}"] = Column(passes, denoise="oidn")
     best = Column(PASSES[-1], denoise=True)
     return found | {
         "16 passes of 2 rays, filtered": replace(best, gather=2),

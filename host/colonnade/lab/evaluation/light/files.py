@@ -22,7 +22,7 @@ from colonnade.common.types import Floats
 from colonnade.design.toolchain import project_root
 from colonnade.environment.model import Environment
 from colonnade.environment.panorama import read_radiance
-from colonnade.lab.evaluation.light.rooms import FRAME, KnownRoom, PointLight, Thing
+from colonnade.lab.evaluation.light.rooms import FRAME, GLASSES, METALS, KnownRoom, PointLight, Thing
 from colonnade.lab.evaluation.light.surfaces import pose_of
 from colonnade.lab.evaluation.studies.synthetic_attic import write_room
 from colonnade.mesh.load import load_mesh
@@ -119,12 +119,12 @@ def write_glb(path: Path, thing: Thing) -> None:
     material: dict[str, Any] = {
         "pbrMetallicRoughness": {
             "baseColorFactor": [*thing.colour, 1.0],
-            "metallicFactor": float(thing.kind in ("metal", "mirror")),
+            "metallicFactor": float(thing.kind in METALS),
             "roughnessFactor": thing.roughness,
         }
     }
     used = []
-    if thing.kind == "glass":
+    if thing.kind in GLASSES:
         used = ["KHR_materials_transmission", "KHR_materials_ior"]
         material["extensions"] = {used[0]: {"transmissionFactor": 1.0}, used[1]: {"ior": 1.5}}
     lengths = [values.nbytes for values in arrays]
@@ -164,7 +164,7 @@ def write_glb(path: Path, thing: Thing) -> None:
 
 
 def store(name: str, result: Path) -> None:
-    """Store the pictures that ``tools/path_tracer/room.py`` made of a room."""
+    """Store what ``tools/path_tracer/room.py`` has made of a room."""
     from PIL import Image
 
     folder, made = stored(name), np.load(result)

@@ -13,8 +13,8 @@ from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, KnownRoom, Lamp
 from colonnade.lab.evaluation.light.surfaces import RoomSurface, ThingSurface
 
 
-def write_job(path: Path, room: KnownRoom) -> None:
-    """Write the file that ``tools/light/path_tracer.py`` reads."""
+def write_job(path: Path, room: KnownRoom, frame: str | None = None) -> None:
+    """Write the file that ``tools/path_tracer/room.py`` reads: all pictures of a room, or one frame alone."""
     surface = RoomSurface.of(room)
     arrays: dict[str, Any] = {"vertices": surface.vertices, "faces": surface.faces, "colours": surface.colours}
     emitters: list[dict[str, Any]] = []
@@ -25,9 +25,9 @@ def write_job(path: Path, room: KnownRoom) -> None:
         else:
             arrays[f"emitter{index}"] = emitter.corners()
     frames: dict[str, list[dict[str, Any]]] = {}
-    for name, things in room.frames.items():
+    for name in room.frames if frame is None else (frame,):
         frames[name] = []
-        for index, thing in enumerate(things):
+        for index, thing in enumerate(room.frames[name]):
             own = ThingSurface.of(thing)
             arrays |= {f"{name}{index}-vertices": own.vertices, f"{name}{index}-normals": own.normals}
             frames[name].append({"kind": thing.kind, "colour": thing.colour, "roughness": thing.roughness})
@@ -35,6 +35,7 @@ def write_job(path: Path, room: KnownRoom) -> None:
     plan = {
         "emitters": emitters,
         "frames": frames,
+        "has_room": frame is None,
         "photo": PHOTO,
         "frame": FRAME,
         "place": room.place,

@@ -5,7 +5,8 @@
 - The lights are known. They have GGX highlights and shadow maps of 256x256 texels with percentage-closer filtering of
   7x7 taps, as far apart as the light is large.
 - A contact blob is the ambient light that the object's sphere hides.
-- Glass refracts once and shows the photo where the ray leaves a body as thick as the object is wide, as three.js does.
+- Glass refracts once and shows the photo where the ray leaves a body as thick as the object is wide, as three.js does;
+  rough glass blurs it as three.js does, and reflects the lamps in the probe.
 - Depth hides the object. Four samples a pixel.
 
 Embree finds what a rasteriser would: the first surface of each sample, and of each texel of a shadow map.
@@ -18,12 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from colonnade.common.image_io import decode_srgb
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.environment.model import Environment
-from colonnade.lab.evaluation.light.rooms import FRAME, PointLight, Thing
+from colonnade.lab.evaluation.light.rooms import FRAME, GLASSES, METALS, PointLight, Thing
 from colonnade.lab.evaluation.light.surfaces import ThingSurface
 from colonnade.reference.embree import RayTracer, Triangles
 
@@ -193,13 +195,14 @@ class ProbeFrame:
         """Light from an object's points towards the eye, all float64 [n, 3]."""
         facing = np.einsum("ni,ni->n", normal, -way).clip(1e-3, 1.0)
         reflected = way + 2 * facing[:, None] * normal
-        metal = thing.kind in ("metal", "mirror")
+        metal = thing.kind in METALS
         base = np.array(thing.colour)
         f0 = base if metal else np.full(3, 0.0 if thing.kind == "matt" else _F0)
         smooth = thing.roughness < 0.05
-        specular = (self._panorama if smooth else self._around).filtered(reflected, thing.roughness)
+        has_lamps = smooth or thing.kind in GLASSES  # Otherwise they have highlights
+        specular = (self._panorama if has_lamps else self._around).filtered(reflected, thing.roughness)
         light = specular * _split_sum(f0, thing.roughness, facing)
-        if thing.kind == "glass":
+        if thing.kind in GLASSES:
             fresnel = f0 + (1 - f0) * (1 - facing[:, None]) ** 5
             behind = self._behind(thing, position, normal, way)
             return np.asarray(specular * fresnel + base * (1 - fresnel) * behind)
@@ -217,7 +220,7 @@ class ProbeFrame:
         return light
 
     def _behind(self, thing: Thing, position: Floats, normal: Floats, way: Floats) -> Floats:
-        """The photo where a ray that is refracted once leaves the object."""
+        """The photo where a ray that is refracted once leaves the object, blurred by the roughness."""
         cosine, ratio = np.einsum("ni,ni->n", normal, -way), 1 / _IOR
         inner = np.sqrt(1 - ratio**2 * (1 - cosine**2).clip(min=0.0))
         out = position + thing.size * (ratio * way + (ratio * cosine - inner)[:, None] * normal)
@@ -226,7 +229,8 @@ class ProbeFrame:
         u = (view[:, 0] / view[:, 2] * camera.fx + camera.cx).clip(0, environment.width - 1).astype(int)
         v = (view[:, 1] / view[:, 2] * camera.fy + camera.cy).clip(0, environment.height - 1).astype(int)
         assert environment.photo is not None
-        return np.asarray(decode_srgb(environment.photo)[v, u])
+        width = round(2 ** (np.log2(environment.width) * thing.roughness))
+        return np.asarray(ndimage.uniform_filter(decode_srgb(environment.photo), (width, width, 1))[v, u])
 
     def _shadow_ratio(self, position: Floats, normal: Floats) -> Floats:
         """Light on the room with the objects over light without them, float64 [n, 3]."""

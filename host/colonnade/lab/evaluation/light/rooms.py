@@ -28,7 +28,10 @@ _POINTS = 1024
 #: A point light: position, intensity, float64 [3] each, and radius, metres.
 PointLight = tuple[Floats, Floats, float]
 
-Kind = Literal["matt", "metal", "plastic", "mirror", "glass"]
+Kind = Literal["matt", "metal", "plastic", "mirror", "glass", "rough mirror", "rough glass"]
+#: Kinds of metal, and of glass.
+METALS: tuple[Kind, ...] = ("metal", "mirror", "rough mirror")
+GLASSES: tuple[Kind, ...] = ("glass", "rough glass")
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Thing:
 
     Attributes:
         mesh: Name of a mesh that the repository can make.
-        kind: Its material; metal and plastic are rough.
+        kind: Its material, one of a kind in a frame; metal and plastic are rough.
         colour: Linear base colour.
         foot: Where it stands: the middle of its lowest level.
         size: Longest edge of its bounding box.
@@ -162,7 +165,8 @@ def _things(
     glass: tuple[Vector, float],
     turn: float,
 ) -> Mapping[str, tuple[Thing, ...]]:
-    """The five objects, each at a foot and in a size, in two frames."""
+    """The objects, each at a foot and in a size, in three frames; those of the last are the second's, rough."""
+    tint, white = (0.95, 0.94, 0.92), (1.0, 1.0, 1.0)
     return {
         "rough": (
             Thing("torus:96", "matt", (0.8, 0.8, 0.8), *matt, turn + 15.0, 90.0),
@@ -170,8 +174,12 @@ def _things(
             Thing("sphere:20480", "plastic", (0.2, 0.35, 0.7), *plastic, roughness=0.3),
         ),
         "clear": (
-            Thing("teapot:40", "mirror", (0.95, 0.94, 0.92), *mirror, turn, roughness=0.0),
-            Thing("sphere:20480", "glass", (1.0, 1.0, 1.0), *glass, roughness=0.0),
+            Thing("teapot:40", "mirror", tint, *mirror, turn, roughness=0.0),
+            Thing("sphere:20480", "glass", white, *glass, roughness=0.0),
+        ),
+        "blurred": (
+            Thing("teapot:40", "rough mirror", tint, *mirror, turn, roughness=0.15),
+            Thing("sphere:20480", "rough glass", white, *glass, roughness=0.2),
         ),
     }
 

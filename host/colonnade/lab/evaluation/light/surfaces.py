@@ -64,10 +64,10 @@ class RoomSurface:
         """The emitters of a room as point lights.
 
         Each is as bright at the objects' place, and has the middle and the area, of the part that the objects see of
-        it, in the mean over their middles.
+        it, in the mean over their middles. A place counts once, whatever stands there in which frame.
         """
         place, found = np.array(room.place), []
-        middles = [thing.middle for things in room.frames.values() for thing in things]
+        middles = np.unique([thing.middle for things in room.frames.values() for thing in things], axis=0)
         for emitter in room.emitters:
             position, intensity, radius = emitter.seen_from(place)
             points = emitter.points(place)
