@@ -125,8 +125,8 @@ class Display:
 
     @property
     def size(self) -> int:
-        """Bytes of all lines."""
-        return self.stride * self.height
+        """Bytes of all lines, in whole pages of Linux."""
+        return -(-self.stride * self.height // 4096) * 4096
 
     def content(self, memory: mmap.mmap) -> bytes:
         """Its bytes in the machine's memory."""
@@ -134,7 +134,8 @@ class Display:
 
     def pixels(self, content: bytes) -> NDArray[np.uint8]:
         """Lines of XRGB8888 without what is behind their last pixels, shape (height, 4 · width)."""
-        return np.frombuffer(content, np.uint8).reshape(self.height, self.stride)[:, : 4 * self.width]
+        lines = np.frombuffer(content, np.uint8, self.stride * self.height).reshape(self.height, self.stride)
+        return lines[:, : 4 * self.width]
 
     def colours(self, content: bytes) -> NDArray[np.uint8]:
         """RGB, shape (height, width, 3)."""

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from colonnade.integration.register_table import SPACE, RegisterTable
 
+#: Bytes of a page of Linux.
+PAGE = 4096
+
 
 @dataclass(frozen=True)
 class Display:
@@ -30,8 +33,8 @@ class Display:
 
     @property
     def size(self) -> int:
-        """Bytes of all lines."""
-        return self.stride * self.height
+        """Bytes of all lines, in whole pages, since UIO maps whole ones: what is behind them is not Linux's own."""
+        return -(-self.stride * self.height // PAGE) * PAGE
 
 
 def device_tree(table: RegisterTable, base: int, interrupt: int, display: Display | None = None, cells: int = 1) -> str:

@@ -112,9 +112,9 @@ def test_numbers_of_a_device_tree_fit_their_cells(table: RegisterTable) -> None:
 
 @pytest.mark.parametrize(("cells", "pixels"), [(1, 0x8000_0000), (2, 0x8000_0000), (2, 0x8_0000_0000)])
 def test_a_framebuffer_of_a_device_tree_compiles(table: RegisterTable, tmp_path: Path, cells: int, pixels: int) -> None:
-    """By the device tree compiler, without its warnings; a line has whole tile rows of 16 pixels."""
+    """By its compiler, without warnings; a line has whole tile rows of 16 pixels, the memory whole pages."""
     nodes = device_tree(table, BASE, 5, Display(pixels, 1000, 600, 16), cells if pixels < 1 << 32 else 1)
-    region = {1: "0x80000000 0x24ea00", 2: f"{pixels >> 32:#x} {pixels & 0xFFFFFFFF:#x} 0x0 0x24ea00"}[cells]
+    region = {1: "0x80000000 0x24f000", 2: f"{pixels >> 32:#x} {pixels & 0xFFFFFFFF:#x} 0x0 0x24f000"}[cells]
     assert nodes.count(f"<{region}>") == 3
     for line in ("stride = <4032>;", 'format = "x8r8g8b8";'):
         assert line in nodes
