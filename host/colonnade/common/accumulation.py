@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -89,9 +90,9 @@ class Accumulation:
             coverage=self.coverage + other.coverage,
         )
 
-    def coated(self, coats: Accumulation) -> Accumulation:
-        """With the colours of the coats of surfaces on those of the object, as many samples of them as of itself."""
-        return replace(self, objects=self.objects + coats.objects * (self.samples / coats.samples))
+    def with_layers(self, layers: Iterable[Accumulation]) -> Accumulation:
+        """With the object's colours of other layers on its own, as many samples of them as of itself."""
+        return replace(self, objects=self.objects + sum(one.objects * (self.samples / one.samples) for one in layers))
 
     def pixels(self) -> npt.NDArray[np.uint8]:
         """`image` as 8-bit sRGB, uint8 [height, width, 3]; of a few whole numbers by a table, which is faster."""
@@ -178,7 +179,7 @@ class FramePasses:
         squares: Sums over the squared luminance of the samples that show the object, of 1.0, and of the shadow ratios
             of the others, float64 [2, height, width].
         white: The device's number for the colour 1.0.
-        coats: The passes of coats; their counters and errors are also in those of the frame.
+        layers: The passes of other layers, by name; their counters and errors are also in those of the frame.
     """
 
     first: Frame | None = None
@@ -187,14 +188,13 @@ class FramePasses:
     has_squares: bool = False
     squares: npt.NDArray[np.float64] | None = None
     white: float = WHITE
-    coats: FramePasses | None = None
+    layers: dict[str, FramePasses] = field(default_factory=dict)
     _sums: Accumulation | None = None
 
-    def add(self, frame: Frame, is_coat: bool = False) -> None:
-        """Add the frame of the next pass; the first one is not of coats."""
-        if is_coat:
-            self.coats = self.coats or FramePasses(has_squares=self.has_squares, white=self.white)
-            self.coats.add(frame)
+    def add(self, frame: Frame, layer: str = "surface") -> None:
+        """Add the frame of the next pass of a layer; the first one is of surfaces."""
+        if layer != "surface":
+            self.layers.setdefault(layer, FramePasses(has_squares=self.has_squares, white=self.white)).add(frame)
             self._count(frame)
             return
         if self.has_squares:
@@ -224,9 +224,9 @@ class FramePasses:
         return self._sums
 
     @property
-    def coated(self) -> Accumulation:
-        """`sums` with those of the coats."""
-        return self.sums if self.coats is None else self.sums.coated(self.coats.sums)
+    def whole(self) -> Accumulation:
+        """`sums` with those of the other layers."""
+        return self.sums.with_layers(layer.sums for layer in self.layers.values())
 
     def object_variance(self) -> npt.NDArray[np.float64] | None:
         """The variance of the mean luminance of the object, float64 [height, width]; None of a single pass.

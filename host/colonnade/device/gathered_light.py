@@ -86,10 +86,12 @@ def scene_cube(
         cube = LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, 1, 1, 3)))
     cube = replace(cube.turned(pose.rotation), middle=extent.centre, distance=_shown(distance, extent.edge))
     cube = replace(cube, texels=cube.texels * scene.exposure)
-    lost = 1 - cube.texels.clip(max=LARGEST).sum() / max(cube.texels.sum(), 1e-9)
-    if lost > _REPORTED_LOSS and progress is not None:
+    whole, lost = cube.texels.sum(), (cube.texels - LARGEST).clip(min=0.0).sum()
+    if lost > _REPORTED_LOSS * whole and progress is not None:
         limit = LARGEST / scene.exposure
-        progress.note(f"{lost:.0%} of the light is brighter than {limit:g}, the most that a texel holds, and is lost")
+        progress.note(
+            f"{lost / whole:.0%} of the light is brighter than {limit:g}, the most that a texel holds, and is lost"
+        )
     known = () if scene.fits_lights else lights.lights
     return cube.with_lights([disc for light in known if (disc := _disc(light, point, pose)) is not None])
 

@@ -53,6 +53,13 @@ _USED_EXTENSIONS = (
 _READ_TEXTURES = ("baseColorTexture", "diffuseTexture", "normalTexture")
 #: What the coat of a dielectric reflects: between 0.04, where it faces the eye, and 0.09, the mean over a sphere.
 COAT_REFLECTANCE = 0.06
+#: Roughness from which on a mirror has highlights: that of the device's narrowest lobe.
+HIGHLIGHT_ROUGHNESS = 0.125
+#: The kind of a surface that spreads light cube and lights in a lobe, as the layers of a frame have it (`in_layer`).
+ROUGH_METAL = "rough metal"
+#: The layers of a frame, which are added: surfaces, their coats, and what the marks of lamps do not show.
+Layer = Literal["surface", "coat", "highlight"]
+LAYERS: tuple[Layer, ...] = get_args(Layer)
 #: No emission.
 _DARK = (0.0, 0.0, 0.0)
 
@@ -77,7 +84,7 @@ class MeshMaterial:
     """A surface material.
 
     Attributes:
-        kind: diffuse, mirror or glass.
+        kind: diffuse, mirror or glass; in the layers of a frame also `ROUGH_METAL`.
         albedo: Linear, 0 to 1: diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
         roughness: Of a mirror or glass, 0 to 1: 0 reflects sharply. Of a diffuse surface that of the clear coat on it;
@@ -97,14 +104,9 @@ class MeshMaterial:
     alpha: Alpha | None = None
     roughness: float = 0.0
 
-    @property
-    def is_rough_metal(self) -> bool:
-        """Whether it spreads the reflections of light cube and lights, and not those of the room."""
-        return self.kind == "mirror" and self.roughness >= SHARP_ROUGHNESS
 
-
-#: Material of meshes without one.
-PLAIN = MeshMaterial()
+#: Material of meshes without one, and what is not in a layer.
+PLAIN, BLACK = MeshMaterial(), MeshMaterial(albedo=(0.0, 0.0, 0.0))
 
 
 def as_rendered(material: MeshMaterial, gathers: bool) -> MeshMaterial:
@@ -131,21 +133,22 @@ def microfacet_albedo(roughness: float) -> float:
     return 1.0 - alpha**2 / (0.25 + 0.9 * alpha + 0.55 * alpha**2)
 
 
-def in_layer(material: MeshMaterial, is_coat: bool) -> MeshMaterial:
-    """A material, as it is rendered, in one of the two layers of a frame: surfaces without their coats, or these alone.
+def in_layer(material: MeshMaterial, layer: Layer) -> MeshMaterial:
+    """A material, as it is rendered, in a layer of a frame: `BLACK` if it is not in it.
 
     Rough metal has the mean of the light that microfacets do not hide from each other.
     """
-    if not is_coat and material.kind == "glass":
-        return material
-    if not is_coat and material.kind == "mirror":
+    if material.kind == "mirror":
+        is_sharp = material.roughness < SHARP_ROUGHNESS
         red, green, blue = (value * microfacet_albedo(material.roughness) for value in material.albedo)
-        return replace(material, albedo=(red, green, blue))
-    if not is_coat:
-        return replace(material, roughness=0.0)
-    reflectance = COAT_REFLECTANCE if material.kind == "diffuse" and material.roughness > 0 else 0.0
-    kind: Kind = "mirror" if reflectance > 0 else "diffuse"
-    return MeshMaterial(kind, (reflectance,) * 3, roughness=material.roughness if reflectance > 0 else 0.0)
+        material = replace(material, kind="mirror" if is_sharp else ROUGH_METAL, albedo=(red, green, blue))
+        if layer == "highlight" and is_sharp and material.roughness >= HIGHLIGHT_ROUGHNESS:
+            return replace(material, kind=ROUGH_METAL, emission=_DARK)
+    if layer == "surface":
+        return replace(material, roughness=0.0) if material.kind == "diffuse" else material
+    if layer == "coat" and material.kind == "diffuse" and material.roughness > 0:
+        return MeshMaterial(ROUGH_METAL, (COAT_REFLECTANCE,) * 3, roughness=material.roughness)
+    return BLACK
 
 
 def gltf_surface(material: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
+from colonnade.mesh.materials import ROUGH_METAL
 from colonnade.reference.embree import RayTracer, Triangles
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Kinds of materials as numbers.
 DIFFUSE, MIRROR, GLASS = range(3)
-_KINDS = {"diffuse": DIFFUSE, "mirror": MIRROR, "glass": GLASS}
+_KINDS = {"diffuse": DIFFUSE, "mirror": MIRROR, "glass": GLASS, ROUGH_METAL: DIFFUSE}
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,6 @@ class PlacedObject:
         textures = [-1 if material.texture is None else material.texture for material in view.materials]
         self._textures = np.array(textures)[index]
         self.alpha: Floats = np.array([material.roughness**2 for material in view.materials])[index]
-        self.kinds[np.array([material.is_rough_metal for material in view.materials])[index]] = DIFFUSE
         self.ior: Floats = np.array([material.ior for material in view.materials])[index]
         is_glass = self.kinds == GLASS
         self._transmittance = view.shadow_transmittance

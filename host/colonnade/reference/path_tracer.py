@@ -188,7 +188,7 @@ class PathTracer:
         """
         gather = self._view.gather
         goes_on = np.zeros(len(path), dtype=np.bool_) if gather is None else state.gathered[path] < gather.bounces
-        alpha = np.where(goes_on, self._object.alpha[faces], 0.0)
+        alpha = np.where(goes_on | (gather is None), self._object.alpha[faces], 0.0)
         axes = np.where((alpha > 0)[:, None], reflect(points.normals, unit_vectors(rays)), points.normals)
         # Shadow rays start slightly above the visible side of the surface.
         origins = points.position + self._object.tracer.offset * points.facing

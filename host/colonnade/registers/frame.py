@@ -52,7 +52,7 @@ def frame_registers(
         scene, header.extent, width, height, header.materials, None if environment is None else environment.environment
     )
     registers = registers_of(view, header, manifest, environment, relit)
-    if scene.sample.is_coat:  # The object alone
+    if scene.sample.layer != "surface":  # The object alone
         registers |= dict.fromkeys((name for name in registers if name.startswith("environment.window.")), 0)
     if manifest.config["columnBvhMemory"]["cache"]:
         registers["dram.page"] = 0

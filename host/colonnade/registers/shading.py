@@ -7,14 +7,13 @@ import numpy as np
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.materials import ROUGH_METAL, MeshMaterial
 from colonnade.registers.surface_offset import surface_offset
 from colonnade.scene.view import View
 from colonnade.scene_image.header import ImageHeader
 
 CHANNELS = "rgb"
-KINDS = {"diffuse": 0, "mirror": 1, "glass": 2}
-ROUGH_METAL = 3
+KINDS = {"diffuse": 0, "mirror": 1, "glass": 2, ROUGH_METAL: 3}
 #: Units of the width of reflections, of their slope and of the logarithm of their peak, and of the width of microfacets
 #: at mirrors and glass (docs/gather.md).
 ALPHA_UNIT, SLOPE_UNIT, OCTAVE, FACET_UNIT = 256, 64, 128, 1024
@@ -42,7 +41,7 @@ def check_surfaces(view: View, manifest: Manifest) -> None:
     if view.gather is not None and not manifest.gathers:
         raise UserError("paths.gather asks for gathered light, which this hardware lacks: set frame.gather=true")
     maximum = int(frame["maxBounces"])
-    shiny = [material for material in view.materials if material.kind != "diffuse" and not material.is_rough_metal]
+    shiny = [material for material in view.materials if material.kind in ("mirror", "glass")]
     if shiny and maximum == 0:
         raise UserError(
             f"the scene has {shiny[0].kind}, the hardware supports only diffuse surfaces: raise frame.maxBounces from 0"
@@ -83,7 +82,7 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
         if manifest.texture is not None:
             result[f"materials[{index}].hasTexture"] = int(material.texture is not None)
         if manifest.emission:
-            emission = np.array(material.emission) * (material.kind == "diffuse" or material.is_rough_metal)
+            emission = np.array(material.emission) * (material.kind in ("diffuse", ROUGH_METAL))
             result |= _colour(f"materials[{index}].emission", emission * white, white)
     if manifest.gathers:
         points = () if view.gather is None else view.gather.points
@@ -101,10 +100,10 @@ def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> di
 
 
 def _kind(name: str, material: MeshMaterial, fraction: int, one: int) -> dict[str, int]:
-    result = {f"{name}.kind": ROUGH_METAL if material.is_rough_metal else KINDS[material.kind]}
-    if not material.is_rough_metal and material.roughness > 0:
+    result = {f"{name}.kind": KINDS[material.kind]}
+    if material.kind != ROUGH_METAL and material.roughness > 0:
         result[f"{name}.lobe.alpha"] = min(round(FACET_UNIT * material.roughness**2), ALPHA_UNIT - 1)
-    if material.is_rough_metal:
+    if material.kind == ROUGH_METAL:
         alpha = min(max(round(ALPHA_UNIT * material.roughness**2), 1), ALPHA_UNIT - 1) / ALPHA_UNIT
         result[f"{name}.lobe.alpha"] = round(ALPHA_UNIT * alpha)
         result[f"{name}.lobe.slope"] = round(SLOPE_UNIT * (1 - alpha**2) / (2 * alpha**2))

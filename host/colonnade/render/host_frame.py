@@ -57,14 +57,14 @@ class HostFrame:
         return FramePasses(has_squares=bool(self.denoise), white=WHITE * self.prepared.scene.exposure)
 
     def image(self, sums: Accumulation) -> Floats:
-        """The picture of sums, with those of coats: linear, float64 [height, width, 3]."""
+        """The picture of sums, with those of all layers: linear, float64 [height, width, 3]."""
         if self.relit:
             return sums.image()
         return composited(sums, self.prepared.photo, self.prepared.strength, self.look, self.number)
 
     def pixels(self, passes: FramePasses, is_whole: bool = True) -> npt.NDArray[np.uint8]:
         """The picture of passes, as `RenderResult.pixels` has it; with passes to come it is not filtered."""
-        sums = self._sums(passes) if is_whole else passes.coated
+        sums = self._sums(passes) if is_whole else passes.whole
         if self.relit or self.prepared.photo is None:
             return sums.pixels()
         return encode_srgb(self.image(sums))
@@ -86,7 +86,7 @@ class HostFrame:
     def _sums(self, passes: FramePasses) -> Accumulation:
         """Sums of all passes, with the colours of the object filtered if that is wanted."""
         if not self.denoise:
-            return passes.coated
+            return passes.whole
         from colonnade.render import oidn
         from colonnade.render.denoise import Guide, denoised
 
@@ -98,7 +98,7 @@ class HostFrame:
             colours = sums.objects / np.maximum(count, 1) / sums.white
             guide = Guide.of(position, shows_object & (count[..., 0] > 0))
             if self.denoise == "oidn":
-                # Coats have one reflectance
+                # Other layers are not textured
                 mesh, white = self.prepared.mesh if layer is passes else None, np.ones_like(position)
                 albedo = white if mesh is None else oidn.albedo_of(mesh, self._faces(passes.frame), position)
                 found = oidn.filtered(colours, guide, albedo)
@@ -107,7 +107,7 @@ class HostFrame:
             return replace(sums, objects=found * sums.white * count)
 
         sums = self._with_smooth_shadow(filtered(passes), passes)
-        return sums if passes.coats is None else sums.coated(filtered(passes.coats))
+        return sums.with_layers(filtered(layer) for layer in passes.layers.values())
 
     def _with_smooth_shadow(self, sums: Accumulation, passes: FramePasses) -> Accumulation:
         """Sums with filtered shadow ratios, where the maps tell what the pixels of the room show."""

@@ -45,7 +45,7 @@ def rtl_passes(
 
     def add(frame: Frame) -> None:
         sums, one = next(places)
-        sums.add(frame, one.sample.is_coat)
+        sums.add(frame, one.sample.layer)
 
     every: list[Mapping[str, int]] = [one for of_frame in registers for one in of_frame]
     rate = simulate(design, frames[0].prepared.image, every, add, progress=progress, waveform=waveform)
@@ -70,5 +70,5 @@ def model_passes(
                 def share(done: int, total: int, before: int = index, passes: int = len(of_frame)) -> None:
                     report((before + done / total) / passes)
 
-                sums.add(model_frame(model, values, share), one.sample.is_coat)
+                sums.add(model_frame(model, values, share), one.sample.layer)
         yield sums, {"run": time.perf_counter() - begun}, None

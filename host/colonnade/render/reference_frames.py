@@ -143,7 +143,7 @@ def traced_frames(
         materials = with_overrides(mesh.materials, lit.scene.material)
         passes = frame_passes(lit.scene, materials, options.exposure)
         first: ReferenceResult | None = None
-        layers: dict[bool, Accumulation] = {}
+        layers: dict[str, Accumulation] = {}
         rays: Counter[str] = Counter()
         for one in passes:
             view = make_view(one, mesh.extent, *size, mesh.materials, room.environment)
@@ -153,10 +153,10 @@ def traced_frames(
             first = first or found
             rays.update(found.rays)
             sums = Accumulation.of_pixels(found.image, found.object_mask, found.shadow_ratio, lit.scene.exposure)
-            is_coat = one.sample.is_coat
-            layers[is_coat] = layers[is_coat] + sums if is_coat in layers else sums
+            layer = one.sample.layer
+            layers[layer] = layers[layer] + sums if layer in layers else sums
         assert first is not None
-        sums = layers[False].coated(layers[True]) if True in layers else layers[False]
+        sums = layers.pop("surface").with_layers(layers.values())
         image = composited(sums, photo, room.strength, look, number)
         yield TracedFrame(image, first, sums, dict(rays), time.perf_counter() - begun)
 

@@ -70,6 +70,6 @@ def within_budget(prepared: DeviceScene, size: tuple[int, int], progress: Progre
         seconds = scene.frame.budget or _SECONDS
         budget = Budget.of(prepared.manifest, prepared.image, registers, seconds, passes)
     hidden = f"; {scene.blurs[0]} shows its middle" if scene.blurs else ""
-    hidden += "; coats do not show" if passes(2) > 2 else ""
+    hidden += "; coats and highlights do not show" if passes(2) > 2 else ""
     progress.note(budget.note + (hidden if budget.samples == 1 else ""))
     return replace(prepared, scene=scene.with_samples(budget.samples))

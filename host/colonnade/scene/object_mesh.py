@@ -19,7 +19,7 @@ from colonnade.mesh.palette import (
 from colonnade.mesh.roughness import with_fewer_roughnesses
 from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Scene
-from colonnade.scene.passes import may_show_coats
+from colonnade.scene.passes import may_have_layers
 from colonnade.scene.view import with_overrides
 
 if TYPE_CHECKING:
@@ -74,8 +74,8 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     ones move to the corners of faces, or else similar roughnesses, then similar colours are merged.
     """
     overridden = replace(mesh, materials=with_overrides(mesh.materials, scene.material))
-    notes.report(with_rendered_metal(overridden, scene.paths.gather > 0, may_show_coats(scene))[1])
-    mesh, _ = with_rendered_metal(mesh, scene.paths.gather > 0, may_show_coats(scene))
+    notes.report(with_rendered_metal(overridden, scene.paths.gather > 0, may_have_layers(scene))[1])
+    mesh, _ = with_rendered_metal(mesh, scene.paths.gather > 0, may_have_layers(scene))
     if not features.textures:
         mesh, lines = without_textures(mesh)
         notes.report(lines)

@@ -1,4 +1,4 @@
-"""The passes of a frame that the host adds up: its samples, and some of coats (docs/sampling.md, docs/gather.md).
+"""The passes of a frame that the host adds up: its samples, and some of other layers (docs/gather.md, "Coats").
 
 `view`, `render`, sequences and the reference have their passes from here.
 """
@@ -9,14 +9,14 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from colonnade.common import notes
-from colonnade.mesh.materials import MeshMaterial, as_rendered
+from colonnade.mesh.materials import BLACK, LAYERS, Layer, MeshMaterial, as_rendered, in_layer
 from colonnade.scene.model import Scene
 from colonnade.scene.samples import samples_of_frame
 
 #: The device's number for the colour 1.0 where light is gathered, as a factor: a ray may bring more than the mean.
 _GATHER_EXPOSURE = 0.5
-#: Samples of surfaces for each one of their coats.
-_SAMPLES_OF_A_COAT = 4
+#: Samples of surfaces for each one of another layer.
+_SAMPLES_OF_A_LAYER = 4
 
 
 def exposed(scene: Scene) -> Scene:
@@ -35,31 +35,33 @@ def of_a_device(scene: Scene) -> Scene:
     return scene.with_samples(1)
 
 
-def may_show_coats(scene: Scene) -> bool:
-    """Whether frames show the coats of glossy surfaces: gathered light, and not one sample a pixel."""
+def may_have_layers(scene: Scene) -> bool:
+    """Whether frames show coats and highlights: gathered light, and not one sample a pixel."""
     return scene.paths.gather > 0 and scene.frame.samples != 1
 
 
+def layers_of(materials: Iterable[MeshMaterial]) -> list[Layer]:
+    """The layers beside that of surfaces in which materials, as a mesh has them, are not all black."""
+    rendered = [as_rendered(one, gathers=True) for one in materials]
+    return [layer for layer in LAYERS[1:] if any(in_layer(one, layer) != BLACK for one in rendered)]
+
+
 def frame_passes(scene: Scene, materials: Iterable[MeshMaterial] = (), exposure: float = 0.0) -> list[Scene]:
-    """The scene at each pass of its frame: at its samples, and with coats, one of these alone after every fourth.
+    """The scene at each pass of its frame: at its samples, and one of each other layer after every fourth.
 
     Args:
         scene: At the beginning of the frame.
-        materials: Of the mesh, with the scene's overrides; without one that has a coat there are no passes of coats.
+        materials: Of the mesh, with the scene's overrides: they have the layers.
         exposure: Progress of the motion while the shutter is open (`Motion.exposure`).
     """
     count, lights = scene.frame.samples or 1, len(scene.lights)
     passes = list(samples_of_frame(count, lights))
-    if count > 1 and may_show_coats(scene) and any(_has_coat(one) for one in materials):
-        coats = [replace(one, is_coat=True) for one in samples_of_frame(max(1, count // _SAMPLES_OF_A_COAT), lights)]
-        for number, coat in reversed(list(enumerate(coats, 1))):
-            passes.insert(-(-number * count // len(coats)), coat)
+    if count > 1 and may_have_layers(scene):
+        layers, few = layers_of(materials), samples_of_frame(max(1, count // _SAMPLES_OF_A_LAYER), lights)
+        for number, sample in reversed(list(enumerate(few, 1))):
+            after = -(-number * count // len(few))
+            passes[after:after] = [replace(sample, layer=layer) for layer in layers]
     return [
         replace(scene, sample=sample, motion_progress=min(1.0, scene.motion_progress + sample.time * exposure))
         for sample in passes
     ]
-
-
-def _has_coat(material: MeshMaterial) -> bool:
-    rendered = as_rendered(material, gathers=True)
-    return rendered.kind == "diffuse" and rendered.roughness > 0

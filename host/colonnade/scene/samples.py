@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from colonnade.common.types import Floats
+from colonnade.mesh.materials import Layer
 
 #: A point of a disc of radius 1, or a shift in pixels: right and down.
 Point = tuple[float, float]
@@ -27,7 +28,7 @@ class Sample:
         lens: Point of the lens, a disc of radius 1.
         lights: Point of each light's disc of radius 1; missing ones are the centre.
         gather: Sample point of each gathered ray of a path, two bytes (docs/gather.md).
-        is_coat: The pass shows the coats of surfaces alone.
+        layer: What the pass shows.
     """
 
     pixel: Point = (0.0, 0.0)
@@ -35,7 +36,7 @@ class Sample:
     lens: Point = (0.0, 0.0)
     lights: tuple[Point, ...] = ()
     gather: tuple[tuple[int, int], ...] = ((128, 128),) * MAX_GATHERED
-    is_coat: bool = False
+    layer: Layer = "surface"
 
     def light(self, index: int) -> Point:
         """The point of a light's disc."""

@@ -25,7 +25,6 @@ from colonnade.scene.cameras import (
 )
 from colonnade.scene.model import Material, PointLight, Scene
 from colonnade.scene.object_pose import Pose, object_pose
-from colonnade.scene.samples import Point
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
@@ -156,10 +155,7 @@ def place(scene: Scene, extent: Extent, width: int, height: int, environment: En
         camera = through_lens(camera, scene.camera, centre, scene.sample.lens)
     # In a room, light does not depend on where the scene's camera stands
     axes = first.axes if environment is None else environment.camera_to_world[:, :3].T * [[1.0], [-1.0], [-1.0]]
-    lights = tuple(
-        _placed(light, axes, centre, edge, scene.sample.light(index), scene.headroom * scene.exposure)
-        for index, light in enumerate(scene.lights)
-    )
+    lights = tuple(_placed(scene, index, axes, centre, edge) for index in range(len(scene.lights)))
     shift_x, shift_y = scene.sample.pixel
     corner = camera.corner + shift_x * camera.step_x + shift_y * camera.step_y
     return PlacedScene(pose, replace(camera, corner=corner), lights)
@@ -185,6 +181,9 @@ def make_view(
     """
     placed = place(scene, extent, width, height, environment)
     pose, camera = placed.pose, placed.camera
+    # Highlights are of lights alone
+    has_highlights = scene.sample.layer == "highlight"
+    gathers = scene.paths.gather > 0 and not has_highlights
     return View(
         width=width,
         height=height,
@@ -200,13 +199,13 @@ def make_view(
         ),
         materials=_dimmed(
             tuple(
-                in_layer(as_rendered(one, scene.paths.gather > 0), scene.sample.is_coat)
+                in_layer(as_rendered(one, scene.paths.gather > 0), scene.sample.layer)
                 for one in with_overrides(materials, scene.material)
             ),
             scene.headroom,
             scene.exposure,
         ),
-        ambient=np.array(scene.ambient.colour) * scene.headroom * scene.exposure,
+        ambient=np.array(scene.ambient.colour) * (not has_highlights) * scene.headroom * scene.exposure,
         background=np.array(scene.background.colour) * scene.exposure,
         flat=scene.material.flat,
         shadows=scene.light.shadows,
@@ -217,7 +216,7 @@ def make_view(
         shift=scene.sample.pixel,
         occlusion=scene.background.occlusion,
         is_map_camera=not scene.places_camera,
-        gather=Gather(scene.paths.gather, scene.sample.gather) if scene.paths.gather > 0 else None,
+        gather=Gather(scene.paths.gather, scene.sample.gather) if gathers else None,
     )
 
 
@@ -254,17 +253,22 @@ def _world_position(light: PointLight, axes: Floats, centre: Floats, edge: float
     return np.asarray(centre + edge * (np.array(light.offset) @ axes))
 
 
-def _placed(light: PointLight, axes: Floats, centre: Floats, edge: float, on_disc: Point, factor: float) -> PlacedLight:
-    """A light in world space, its intensity times ``factor``.
+def _placed(scene: Scene, index: int, axes: Floats, centre: Floats, edge: float) -> PlacedLight:
+    """A light of a scene in world space, in the device's numbers.
 
-    Of one with a radius it is the point ``on_disc``, of a disc that faces `centre`.
+    Of one with a radius it is the sample's point of a disc that faces `centre`. In highlights it is without what its
+    mark shows (docs/gather.md), the device's 1.0; fitted lights have no mark.
     """
+    light = scene.lights[index]
     position = _world_position(light, axes, centre, edge)
+    colour = np.array(light.colour) * scene.headroom * scene.exposure
     if light.radius > 0:
-        away = position - centre
+        away, on_disc = position - centre, scene.sample.light(index)
+        if scene.sample.layer == "highlight" and not scene.fits_lights:
+            colour = (colour - light.radius**2 / (light.falloff**2 if light.falloff else away @ away)).clip(min=0.0)
         right, up, _ = camera_axes(away if away.any() else axes[2], _UP)
         position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
-    return PlacedLight(position, np.array(light.colour) * factor, light.falloff)
+    return PlacedLight(position, colour, light.falloff)
 
 
 def _dimmed(materials: tuple[MeshMaterial, ...], headroom: float, exposure: float) -> tuple[MeshMaterial, ...]:

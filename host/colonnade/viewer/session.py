@@ -177,15 +177,15 @@ class Session:
         return _Picture(camera, self._state["version"], frame, passes, frame.no_passes())
 
     def _next(self, picture: _Picture) -> ViewFrame:
-        """Render the next sample of a picture, with the coats after it."""
+        """Render the next sample of a picture, with the passes of other layers after it."""
         begun, rays, frame, sums = time.perf_counter(), 0, picture.frame, picture.sums
-        coming = [one.sample.is_coat for one in picture.coming]
+        coming = [one.sample.layer != "surface" for one in picture.coming]
         for _ in range([*coming, False].index(False, 1)):
             one = picture.coming.pop(0)
             self._device.set_frame(frame.registers(one))
             self._device.start()
             self._device.wait()
-            sums.add(self._device.frame, one.sample.is_coat)
+            sums.add(self._device.frame, one.sample.layer)
             counters = self._device.counters()
             rays += sum(counters.get(kind, 0) for kind in _RAYS)
         pixels = frame.pixels(sums, is_whole=not picture.coming)

@@ -105,7 +105,8 @@ private:
                 if (!continuePath(surface, material, albedo, point, path, request, kind)) return total(path, leavingRadiance(path, request));
             } else {
                 const bool gathers = path.gathered < frame_.gather.bounces;
-                const Lobe* const lobe = gathers && material.kind == MaterialKind::roughMetal ? &material.lobe : nullptr;
+                const bool hasLobe = material.kind == MaterialKind::roughMetal && (gathers || frame_.gather.bounces == 0);
+                const Lobe* const lobe = hasLobe ? &material.lobe : nullptr;
                 const WideVector normal = shadingNormal(surface, frame_.lighting.flat), axis = lobe ? lobeAxis(normal, surface.dir, numbers_) : normal;
                 const Colour colour = emitted(material, light(surface, axis, lobe, albedo, !gathers));
                 if (!gathers) return total(path, colour);

@@ -8,8 +8,11 @@ import numpy as np
 
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials import (
+    BLACK,
     COAT_REFLECTANCE,
+    LAYERS,
     MIRROR_ROUGHNESS,
+    ROUGH_METAL,
     MeshMaterial,
     as_rendered,
     from_gltf,
@@ -87,7 +90,7 @@ def test_rough_metal_is_diffuse_without_gathered_light() -> None:
         assert from_mtl({"pm": ["1"], "pr": [str(roughness)]}).roughness == roughness
         assert as_rendered(found, gathers=False) == MeshMaterial(kind, (1.0, 0.8, 0.3))
         assert as_rendered(found, gathers=True) == found
-        assert found.is_rough_metal == (roughness > 0.25)
+        assert in_layer(found, "surface").kind == (ROUGH_METAL if roughness > 0.25 else "mirror")
 
 
 def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered() -> None:
@@ -97,12 +100,16 @@ def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered() -> None:
         found = from_gltf({"pbrMetallicRoughness": surface})
         assert found.roughness == coat == from_mtl({"pr": [str(roughness)]}).roughness
         matt = MeshMaterial("diffuse", (1.0, 0.8, 0.3))
-        assert as_rendered(found, gathers=False) == matt == in_layer(as_rendered(found, gathers=True), is_coat=False)
-        layer = in_layer(replace(as_rendered(found, gathers=True), has_corner_colours=True), is_coat=True)
-        reflectance = COAT_REFLECTANCE if coat > 0 else 0.0
-        assert layer == MeshMaterial("mirror" if coat > 0 else "diffuse", (reflectance,) * 3, roughness=coat)
-    mirror = in_layer(MeshMaterial("mirror", emission=(1.0, 1.0, 1.0)), is_coat=True)
-    assert (mirror.kind, mirror.albedo, mirror.emission) == ("diffuse", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        assert as_rendered(found, gathers=False) == matt == in_layer(as_rendered(found, gathers=True), "surface")
+        layer = in_layer(replace(as_rendered(found, gathers=True), has_corner_colours=True), "coat")
+        assert layer == (MeshMaterial(ROUGH_METAL, (COAT_REFLECTANCE,) * 3, roughness=coat) if coat > 0 else BLACK)
+        assert in_layer(found, "highlight") == BLACK
+    for roughness in (0.0, 0.1, 0.125, 0.2, 0.25):
+        mirror = MeshMaterial("mirror", roughness=roughness, has_corner_colours=True, emission=(1.0, 1.0, 1.0))
+        layers = [in_layer(mirror, layer) for layer in LAYERS]
+        assert [one.kind == ROUGH_METAL for one in layers] == [roughness == 0.25, False, 0.1 < roughness < 0.25]
+        assert layers[1] == BLACK and not any(layers[2].emission)
+        assert layers[2] == BLACK or layers[2].has_corner_colours
 
 
 def test_what_rough_surfaces_lose_is_named() -> None:

@@ -130,12 +130,25 @@ def test_the_shutter_opens_for_a_part_of_the_interval(shutter: float, frames: in
         np.testing.assert_allclose(np.sort(times), np.minimum(expected, 1.0), atol=1e-12)
 
 
-@pytest.mark.parametrize(("samples", "kinds"), [(1, "s"), (2, "ssc"), (6, "ssssssc"), (8, "sssscssssc")])
-def test_coats_have_a_pass_after_four_of_surfaces(samples: int, kinds: str) -> None:
-    scene = replace(TEAPOT, paths=Paths(gather=1)).with_samples(samples)
-    passes = frame_passes(scene, (MeshMaterial(), MeshMaterial(roughness=0.3)))
-    assert "".join("c" if one.sample.is_coat else "s" for one in passes) == kinds
-    assert not any(one.sample.is_coat for one in frame_passes(scene, (MeshMaterial(roughness=0.6),)))
+@pytest.mark.parametrize(("samples", "kinds"), [(1, "s"), (2, "ssch"), (6, "ssssssch"), (8, "sssschssssch")])
+def test_other_layers_have_a_pass_after_four_of_surfaces(samples: int, kinds: str) -> None:
+    scene, mirror = replace(TEAPOT, paths=Paths(gather=1)).with_samples(samples), MeshMaterial("mirror")
+    for materials in ((MeshMaterial(roughness=0.3), replace(mirror, roughness=0.2)), (MeshMaterial(roughness=0.3),)):
+        layers = "".join(one.sample.layer[0] for one in frame_passes(scene, materials))
+        assert layers == (kinds if len(materials) == 2 else kinds.replace("h", ""))
+    without = (MeshMaterial(roughness=0.6), *(replace(mirror, roughness=roughness) for roughness in (0.0, 0.1, 0.3)))
+    assert {one.sample.layer for one in frame_passes(scene, without)} == {"surface"}
+
+
+@pytest.mark.parametrize(("falloff", "distance"), [(0.0, 3.0), (2.0, 3.0), (2.0, 0.4)])
+def test_highlights_are_of_the_light_that_marks_do_not_show(falloff: float, distance: float) -> None:
+    """Which is that of a disc with the radiance 1 of the device."""
+    x, y, z = object_pose(TEAPOT, EXTENT, None).to_world(EXTENT.centre)
+    light = Light(colour=(2.0, 0.05, 0.0), position=(x, y + distance, z), radius=0.3, falloff=falloff or None)
+    scene = replace(TEAPOT, light=light, exposure=0.5)
+    whole, rest = (view_of(scene, Sample(layer=layer)).lights[0].colour for layer in ("surface", "highlight"))
+    at_object = (falloff / distance) ** 2 if falloff else 1.0
+    np.testing.assert_allclose((whole - rest) * at_object, np.minimum(whole * at_object, (0.3 / distance) ** 2))
 
 
 def test_without_keys_one_pass_is_the_scene() -> None:

@@ -96,7 +96,7 @@ object Lobe {
   val alphaBits:     Int = 8
   val facetFraction: Int = 10 // fraction bits of the width at mirrors and glass
   val slopeFraction: Int = 6
-  val slopeBits:     Int = 13
+  val slopeBits:     Int = 17
   val octaveLog:     Int = 7  // log2 of the steps of a logarithm in an octave
   val peakBits:      Int = octaveLog + 4
   val wholeBits:     Int = 6  // of a share of a light, without its fraction

@@ -12,7 +12,7 @@ final class LobeAxisStageIO(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   val phase   = Input(ModuloSchedule.phase())
-  val isRough = Input(Bool()) // in cycle 0: the surface is rough metal that gathers light
+  val isRough = Input(Bool()) // in cycle 0: the surface is rough metal with a lobe
 
   val dir    = Input(SInt((formats.shadeBits + 1).W)) // from cycle 1 on, as that of [[SurfaceStage]]
   val normal = Input(SInt(formats.narrowBits.W))      // from cycle 7 on, likewise

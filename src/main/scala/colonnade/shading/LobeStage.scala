@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.Cat
+import chisel3.util.{log2Ceil, Cat}
 import colonnade.common.ModuloSchedule
 import colonnade.config.NumberFormats
 import colonnade.formats.Lobe
@@ -40,7 +40,8 @@ final class LobeStage(numbers: NumberFormats, first: Int) extends Module {
       arriving(io.slope.zext, first + 1, first + 3),
       first + 1
     )
-  private val lengthBits = fraction + slopeFraction + Lobe.slopeBits - slopeFraction + 1
+  private val lengthBits = fraction + Lobe.slopeBits + 1
+  private val octaveBits = log2Ceil(lengthBits - fraction - slopeFraction)
   private val length     = latch(first + 5) {
     (product.at(first + 5).asUInt +& (BigInt(1) << (fraction + slopeFraction)).U)(lengthBits - 1, 0)
   }
@@ -52,7 +53,7 @@ final class LobeStage(numbers: NumberFormats, first: Int) extends Module {
     (length.at(first + 6) << zeros)(lengthBits - 2, lengthBits - 1 - octaveLog)
   }
   private val logarithm = latch(first + 7) {
-    Cat(octaves.at(first + 7)(2, 0), 0.U(octaveLog.W)) +& VecInit(Lobe.logarithms.map(_.U))(mantissa.at(first + 7))
+    Cat(octaves.at(first + 7)(octaveBits - 1, 0), 0.U(octaveLog.W)) +& VecInit(Lobe.logarithms.map(_.U))(mantissa.at(first + 7))
   }
 
   // peak / length²

@@ -6,11 +6,11 @@ import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
 import colonnade.formats.{Gather, PixelPosition, SamplePoint}
 
-/** Asks for the sample point of a context, and whether its path has rays left to gather. Both come in the next cycle. */
+/** Asks for the sample point of a context, and whether rough metal is lit by its lobe. Both come in the next cycle. */
 final class SamplePort(config: PathConfig) extends Bundle {
   val read    = Valid(Context(config))
   val point   = Input(new SamplePoint)
-  val gathers = Input(Bool())
+  val hasLobe = Input(Bool()) // the path has rays left to gather, or the frame gathers none
   val isOn    = Input(Bool()) // the frame gathers light; constant in it
 
   /** In the next cycle: the point is for a mirror or glass; for the back of a triangle. */
@@ -45,7 +45,7 @@ final class SamplePoints(config: PathConfig) extends Module {
   private val use   = Cat(io.port.isBounce, io.port.isBounce && !io.port.backSide)
   private val index = io.count(log2Ceil(Gather.maxBounces) - 1, 0) ^ use
   private val pixel = points.read(read.bits, read.valid)
-  io.port.gathers := io.count < io.gather.bounces
+  io.port.hasLobe := io.count < io.gather.bounces || !io.port.isOn
   io.port.isOn    := io.gather.bounces =/= 0.U
   io.port.point.u := io.gather.points(index).u ^ pixel.u
   io.port.point.v := io.gather.points(index).v ^ pixel.v

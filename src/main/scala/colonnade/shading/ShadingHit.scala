@@ -42,7 +42,7 @@ final class LightSlot(config: PathConfig) extends Bundle {
   val isOn    = Bool() // the light is on
 }
 
-/** Whether a surface is rough metal that gathers light, or a rough mirror or glass, and of which material. */
+/** Whether a surface is rough metal with a lobe, or a rough mirror or glass, and of which material. */
 final class RoughSurface(config: PathConfig) extends Bundle {
   val isRough  = Bool()
   val material = UInt(log2Ceil(config.frame.materials.max(2)).W)

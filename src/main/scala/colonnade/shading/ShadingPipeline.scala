@@ -100,9 +100,9 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   private val roughs = io.sample.map { sample =>
     // Known in the cycle after the entry, for all lights of the hit
     val isNew   = RegNext(enters, false.B)
-    val gathers = Mux(isNew, sample.gathers, RegEnable(sample.gathers, isNew))
+    val hasLobe = Mux(isNew, sample.hasLobe, RegEnable(sample.hasLobe, isNew))
     val rough   = Wire(new RoughSurface(config))
-    rough.isRough  := Mux(hit.isBounce, isRoughBounce, isRough(hit.material) && !hit.isEnvironment && gathers)
+    rough.isRough  := Mux(hit.isBounce, isRoughBounce, isRough(hit.material) && !hit.isEnvironment && hasLobe)
     rough.material := hit.material
     Seq.iterate(arriving(rough, 0, interval - 1), cycles.brightness / interval)(now =>
       latch(now.last)(now.at(now.last))

@@ -2,6 +2,7 @@ package colonnade.shading
 
 import chiseltest._
 import colonnade.TestConfigs
+import colonnade.formats.Lobe
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -17,10 +18,12 @@ class LobeStageSpec extends AnyFlatSpec with ChiselScalatestTester {
       test(new LobeStage(numbers, 4)) { dut =>
         val random = new Random(div)
         val one    = 1 << numbers.cosineFraction
+        val slopes = 1 << Lobe.slopeBits
         val cases  = Seq.fill(300) {
           val cosine = if (random.nextBoolean()) random.nextInt(one + 1) else one - random.nextInt(one / 16)
-          (cosine, random.nextInt(8192), random.nextInt(if (random.nextBoolean()) 1100 else 2048))
-        } ++ Seq((one, 8191, 2047), (one, 0, 0), (0, 8191, 0), (0, 8191, 2047))
+          val slope  = random.nextInt(if (random.nextBoolean()) 1 << 13 else slopes)
+          (cosine, slope, random.nextInt(if (random.nextBoolean()) 1100 else 2048))
+        } ++ Seq((one, slopes - 1, 2047), (one, 0, 0), (0, slopes - 1, 0), (0, slopes - 1, 2047))
         dut.clock.setTimeout(0)
         def during(cycle: Int, first: Int)(use: ((Int, Int, Int), Int) => Unit): Unit = {
           val (operation, offset) = ((cycle - first) / 3, (cycle - first) % 3)
@@ -40,14 +43,14 @@ class LobeStageSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
   }
 
-  "Shares" should "be (alpha / (1 - x + alpha² (1 + x)))² within 2 %" in
-    (for (alpha <- 17 to 192 by 7; x <- 0 to 65536 by 97) {
+  "Shares" should "be (alpha / (1 - x + alpha² (1 + x)))² within 2 %, where they are less than 64" in
+    (for (alpha <- 4 to 192 by 4; x <- 0 to 65536 by 97) {
       val a        = alpha / 256.0
       val slope    = math.rint(64 * (1 - a * a) / (2 * a * a)).toInt
       val peak     = math.rint(-256 * math.log(a) / math.log(2)).toInt
       val cosine   = x / 65536.0
-      val expected = math.pow(a / (1 - cosine + a * a * (1 + cosine)), 2)
+      val expected = math.pow(a / (1 - cosine + a * a * (1 + cosine)), 2).min(64)
       val found    = GatherReference.share(x, slope, peak, 16).toDouble / 65536
-      assert(math.abs(found / expected - 1) <= 0.02, s"$alpha at $cosine")
+      assert(math.abs(found - expected) <= 0.02 * expected + 1.0 / 65536, s"$alpha at $cosine")
     })
 }

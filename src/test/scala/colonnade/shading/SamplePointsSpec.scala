@@ -14,7 +14,7 @@ class SamplePointsSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val tiny   = TestConfigs.gathering(TestConfigs.tiny)
   private val config = tiny.copy(units = tiny.units.copy(pathContexts = 5))
 
-  it should "give each context the point of its pixel and of its next ray" in
+  it should "give each context the point of its pixel and of its next ray, and say where rough metal has a lobe" in
     test(new SamplePoints(config)) { dut =>
       val random = new Random(1)
       val frame  = Seq.fill(4)((random.nextInt(256), random.nextInt(256)))
@@ -38,6 +38,8 @@ class SamplePointsSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.clock.step()
         dut.io.port.read.valid.poke(false)
         dut.io.count.poke(count)
+        val bounces = random.nextInt(5)
+        dut.io.gather.bounces.poke(bounces)
         val (isBounce, backSide) = (random.nextBoolean(), random.nextBoolean())
         dut.io.port.isBounce.poke(isBounce)
         dut.io.port.backSide.poke(backSide)
@@ -45,6 +47,8 @@ class SamplePointsSpec extends AnyFlatSpec with ChiselScalatestTester {
         val (u, v) = GatherReference.pixel(pixels(reader)._1, pixels(reader)._2)
         dut.io.port.point.u.expect(u ^ frame(ray)._1)
         dut.io.port.point.v.expect(v ^ frame(ray)._2)
+        dut.io.port.isOn.expect(bounces > 0)
+        dut.io.port.hasLobe.expect(bounces == 0 || count < bounces)
       }
     }
 
