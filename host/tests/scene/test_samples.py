@@ -146,7 +146,10 @@ def test_highlights_are_of_the_light_that_marks_do_not_show(falloff: float, dist
     x, y, z = object_pose(TEAPOT, EXTENT, None).to_world(EXTENT.centre)
     light = Light(colour=(2.0, 0.05, 0.0), position=(x, y + distance, z), radius=0.3, falloff=falloff or None)
     scene = replace(TEAPOT, light=light, exposure=0.5)
-    whole, rest = (view_of(scene, Sample(layer=layer)).lights[0].colour for layer in ("surface", "highlight"))
+    scene = replace(scene, paths=Paths(gather=1))
+    surfaces, highlights = (view_of(scene, Sample(layer=layer)) for layer in ("surface", "highlight"))
+    assert surfaces.gather is not None and highlights.gather is None and not highlights.ambient.any()
+    whole, rest = surfaces.light_colour, highlights.light_colour
     at_object = (falloff / distance) ** 2 if falloff else 1.0
     np.testing.assert_allclose((whole - rest) * at_object, np.minimum(whole * at_object, (0.3 / distance) ** 2))
 
