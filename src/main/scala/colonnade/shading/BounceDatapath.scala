@@ -4,8 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Cat, Mux1H, PriorityEncoder, Reverse}
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.Vec3
-import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.RayFormats
+import colonnade.numbers.Rounding
 
 /** The bounce unit's datapath: rotating vector registers around one multiplier, one adder, and a unit for roots and
   * quotients. [[BounceProgram]] controls it; see `VectorRegister`.
@@ -223,13 +222,10 @@ final class BounceDatapath(config: PathConfig) extends Module {
   }
 
   // Result
-  private val scene                          = new RayFormats(numbers).scene
-  private val Seq(originX, originY, originZ) = origin.map(Fixed(scene, _))
-  private val Seq(x, y, z)                   = dir.map(_.pad(numbers.directionBits))
   io.result.context      := context
   io.result.isRefraction := io.isRefraction
-  io.result.origin       := Vec3.of(originX, originY, originZ)
-  io.result.dir          := Vec3.of(x, y, z)
+  io.result.origin       := Vec3.of(origin)
+  io.result.dir          := Vec3.of(dir)
   io.result.reflection   := Vec3.of(reflection)
   io.result.fresnel.raw  := sum.asUInt(oneBits, 0)
 }

@@ -5,7 +5,6 @@ import colonnade.common.Context
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Vec3}
 import colonnade.numbers.{Fixed, FixedPointFormat}
-import colonnade.ray.RayFormats
 
 /** Widths of reflection and refraction, from the bounds in docs/bounce.md. */
 final class BounceFormats(numbers: NumberFormats) {
@@ -77,14 +76,17 @@ final class BounceRequest(config: PathConfig) extends Bundle {
 
 /** The ray that leaves a mirror or glass. */
 final class BounceResult(config: PathConfig) extends Bundle {
-  private val numbers = config.numbers
+  private val dirType = Vec3(SInt(new BounceFormats(config.numbers).bounceBits.W))
 
   val context      = Context(config)
   val isRefraction = Bool()
-  val origin       = Vec3(new Fixed(new RayFormats(numbers).scene))
-  val dir          = Vec3(SInt(numbers.directionBits.W)) // the direction, of any scale
+
+  /** Of a refracted ray, grid steps. A reflection starts at the origin of its request. */
+  val origin = Vec3(SInt(new ShaderFormats(config.numbers).pointBits.W))
+
+  val dir = dirType.cloneType // the direction, of any scale
 
   /** The direction of a refracted ray's reflection, and its Fresnel term; a term of 0: there is no reflection. */
-  val reflection = Vec3(SInt(new BounceFormats(numbers).bounceBits.W))
+  val reflection = dirType.cloneType
   val fresnel    = FrameRegisters.weight
 }

@@ -4,14 +4,12 @@ import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.common.{Context, ContextTable, ReservedQueue}
 import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.formats.{FrameRegisters, Material, MaterialKind, RecordFormats, Rgb, Vec3}
-import colonnade.numbers.Fixed
-import colonnade.ray.RayFormats
+import colonnade.formats.{FrameRegisters, Material, MaterialKind, Rgb, Vec3}
 
 /** A hit on a mirror or glass. */
 final class BounceHit(config: PathConfig) extends Bundle {
   val context  = Context(config)
-  val material = UInt(RecordFormats.materialBits.W)
+  val material = MaterialIndex(config)
   val backSide = Bool()
 
   /** The normal is that of a microfacet. */
@@ -53,10 +51,10 @@ final class BounceQueueIO(config: PathConfig) extends Bundle {
 
 /** What a path needs besides the bounce. */
 final private class BounceSurface(config: PathConfig) extends Bundle {
-  val material = UInt(RecordFormats.materialBits.W)
+  val material = MaterialIndex(config)
   val backSide = Bool()
   val albedo   = Option.when(config.geometry.cornerColours)(Rgb(FrameRegisters.colour))
-  val origin   = Option.when(config.hasEnvironment)(Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W)))
+  val origin   = Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W)) // of a reflection
 }
 
 /** Hits on mirrors and glass on their way from the [[ShadingPipeline]] to the bounce units, in order, and their bounces on
@@ -110,7 +108,7 @@ final class BounceQueue(config: PathConfig, places: Int) extends Module {
   entry.material := hit.material
   entry.backSide := hit.backSide
   entry.albedo.foreach(_ := albedo.albedo)
-  entry.origin.foreach(_ := VecInit(points.map(_.bits.origin)))
+  entry.origin := VecInit(points.map(_.bits.origin))
   when(io.request.fire)(table.write(hit.context, entry))
   private val context = io.result.bits.context
   private val surface = table.read(context, io.result.valid)
@@ -120,8 +118,8 @@ final class BounceQueue(config: PathConfig, places: Int) extends Module {
   io.bounced.valid := io.result.valid && isRead
   io.result.ready  := io.bounced.ready && isRead
   bounced.bounce   := io.result.bits
+  when(!io.result.bits.isRefraction) { bounced.bounce.origin := Vec3.of(surface.origin) }
   bounced.albedo   := surface.albedo.getOrElse(ofRay.albedo)
   bounced.isTinted := !surface.backSide || ofRay.kind.get === MaterialKind.mirror
-  for (to <- bounced.fresnelOrigin; (axis, from) <- to.axes.zip(surface.origin.get))
-    axis := Fixed(new RayFormats(config.numbers).scene, from)
+  bounced.fresnelOrigin.foreach(_ := Vec3.of(surface.origin))
 }

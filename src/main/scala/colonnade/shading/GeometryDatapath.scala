@@ -33,7 +33,7 @@ final class GeometryDatapath(config: PathConfig) extends Module {
   private val isNegative      = Reg(Bool())
   private val backSide        = Reg(Bool())
   private val context         = Reg(chiselTypeOf(io.request.context))
-  private val material        = Reg(chiselTypeOf(io.request.face.material))
+  private val material        = Reg(MaterialIndex(config))
   private val isEnvironment   = if (config.hasEnvironment) Reg(Bool()) else WireInit(false.B)
 
   private val shifted      = Reg(SInt(formats.vectorBits.W))

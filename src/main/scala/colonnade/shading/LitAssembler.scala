@@ -4,14 +4,14 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.{Context, ReservedQueue}
 import colonnade.config.PathConfig
-import colonnade.formats.{FrameRegisters, Material, RecordFormats, Rgb}
+import colonnade.formats.{FrameRegisters, Material, Rgb}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
 /** A surface to light, before its point is known. */
 final class SurfaceLabel(config: PathConfig) extends Bundle {
   val context  = Context(config)
-  val material = UInt(RecordFormats.materialBits.W)
+  val material = MaterialIndex(config)
 
   /** Of a point of the environment, which has no material. */
   val environment = if (config.hasEnvironment) Some(Valid(Rgb(FrameRegisters.colour))) else None

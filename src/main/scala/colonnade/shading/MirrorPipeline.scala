@@ -3,10 +3,10 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, PriorityEncoder, Reverse}
 import colonnade.common.ModuloSchedule.{interval, xyz}
-import colonnade.common.{Context, ContextTable, ModuloSchedule, ReservedQueue}
+import colonnade.common.{Context, ModuloSchedule, ReservedQueue}
 import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.RayFormats
+import colonnade.formats.Vec3
+import colonnade.numbers.Rounding
 
 /** A hit on a mirror in [[MirrorPipeline]]. */
 final private[shading] class MirrorHit(config: PathConfig) extends Bundle {
@@ -32,7 +32,6 @@ final class MirrorPipeline(config: PathConfig) extends Module {
   private val formats   = new BounceFormats(config.numbers)
   private val shadeBits = formats.shadeBits
   private val dotBits   = 2 * shadeBits + 2
-  private val scene     = new RayFormats(config.numbers).scene
 
   val io = IO(new BounceUnitIO(config)) // `request.bits.isGlass` is false; the ports of glass have no effect
 
@@ -109,14 +108,11 @@ final class MirrorPipeline(config: PathConfig) extends Module {
     entering.normal   := VecInit(MirrorPipeline.normalised(last.faceForwardNormal, shadeBits))
   }
 
-  // Results, with the origins of their requests
-  private val origins = ContextTable(config, Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W)))
-  private val queue   = Module(new ReservedQueue(new MirrorResult(config), MirrorPipeline.places)).io
-  when(io.request.fire) { origins.write(io.request.bits.context, VecInit(io.request.bits.origin.axes)) }
+  // Results
+  private val queue = Module(new ReservedQueue(new MirrorResult(config), MirrorPipeline.places)).io
   queue.in.valid        := ends && !isWrong
   queue.in.bits.context := last.context
   queue.in.bits.dir     := VecInit(latest.map(carry(_, 11).at(11)))
-  queue.in.bits.origin  := origins.read(hitAt(10).context, isAt(10) && isHeld.last)
   queue.out.ready       := io.result.ready
   queue.mayTakeNext     := true.B
   private val result = queue.out.bits
@@ -124,17 +120,14 @@ final class MirrorPipeline(config: PathConfig) extends Module {
   io.result.bits.context      := result.context
   io.result.bits.isRefraction := false.B
   io.result.bits.fresnel.raw  := 0.U
-  for (axis <- 0 until 3) {
-    io.result.bits.origin.axes(axis)     := Fixed(scene, result.origin(axis))
-    io.result.bits.dir.axes(axis)        := result.dir(axis)
-    io.result.bits.reflection.axes(axis) := result.dir(axis)
-  }
+  io.result.bits.origin       := DontCare
+  io.result.bits.dir          := Vec3.of(result.dir)
+  io.result.bits.reflection   := Vec3.of(result.dir)
 }
 
 /** A reflection that waits. */
 final private[shading] class MirrorResult(config: PathConfig) extends Bundle {
   val context = Context(config)
-  val origin  = Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W))
   val dir     = Vec(3, SInt(new BounceFormats(config.numbers).bounceBits.W))
 }
 

@@ -136,10 +136,7 @@ final class SequentialShader(config: PathConfig) extends Shader(config) {
     unit.io.request.bits.isGlass           := material.kind.get === MaterialKind.glass
     unit.io.request.bits.eta               := Mux(surface.backSide, material.etaBack.get, material.etaFront.get)
     unit.io.request.bits.reflectance       := material.reflectance.get
-    for (origin <- bounced.bits.fresnelOrigin) {
-      val origins = surface.origin.axes.map(RegEnable(_, unit.io.request.fire))
-      origin.axes.zip(origins).foreach { case (to, from) => to := Fixed(scene, from) }
-    }
+    bounced.bits.fresnelOrigin.foreach(_ := RegEnable(unit.io.request.bits.origin, unit.io.request.fire))
     when(unit.io.request.fire) {
       albedo   := objectAlbedo
       isTinted := !surface.backSide || material.kind.get === MaterialKind.mirror

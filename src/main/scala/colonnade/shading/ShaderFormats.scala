@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.common.Context
 import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.formats.{RecordFormats, Vec3}
+import colonnade.formats.Vec3
 
 /** Widths inside the shader, from the bounds in docs/numbers.md. */
 final class ShaderFormats(numbers: NumberFormats) {
@@ -112,7 +112,7 @@ final class ShadedSurface(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   val context       = Context(config)
-  val material      = UInt(RecordFormats.materialBits.W)
+  val material      = MaterialIndex(config)
   val isEnvironment = Bool() // the surface belongs to the environment, not to the object
 
   /** Origin of shadow rays and reflections: the hit point, moved off the surface; grid steps. */

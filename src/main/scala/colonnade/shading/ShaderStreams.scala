@@ -6,13 +6,13 @@ import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{Face, FrameRegisters, Rgb, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.{RayFormats, TriangleRay}
-import colonnade.traversal.TriangleHit
+import colonnade.traversal.HitPoint
 
 /** A hit to shade. */
 final class ShadeRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
   val ray     = new TriangleRay(config.numbers)
-  val hit     = new TriangleHit(config)
+  val hit     = new HitPoint(config)
   val face    = new Face(config)
 }
 
@@ -49,5 +49,5 @@ final class BouncedRay(config: PathConfig) extends Bundle {
   val isTinted = Bool() // the path is tinted by the albedo
 
   /** Where there may be an environment: the origin of the Fresnel reflection, off the surface on the ray's side. */
-  val fresnelOrigin = if (config.hasEnvironment) Some(Vec3(new Fixed(new RayFormats(config.numbers).scene))) else None
+  val fresnelOrigin = Option.when(config.hasEnvironment)(bounce.origin.cloneType)
 }

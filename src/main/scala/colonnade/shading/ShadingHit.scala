@@ -4,14 +4,14 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.common.Context
 import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.formats.{FrameRegisters, RecordFormats, Rgb, Vec3}
+import colonnade.formats.{FrameRegisters, Rgb, Vec3}
 
 /** A hit, or a point of the environment, in the [[ShadingPipeline]]. */
 final class ShadingHit(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val context       = Context(config)
-  val material      = UInt(RecordFormats.materialBits.W)
+  val material      = MaterialIndex(config)
   val isEnvironment = Bool()
   val isBounce      = Bool() // its material is a mirror or glass
   val isFlat        = Bool() // shade with the geometric normal
@@ -45,5 +45,10 @@ final class LightSlot(config: PathConfig) extends Bundle {
 /** Whether a surface is rough metal with a lobe, or a rough mirror or glass, and of which material. */
 final class RoughSurface(config: PathConfig) extends Bundle {
   val isRough  = Bool()
-  val material = UInt(log2Ceil(config.frame.materials.max(2)).W)
+  val material = MaterialIndex(config)
+}
+
+/** The number of a material, truncated to the bits that the table needs. */
+object MaterialIndex {
+  def apply(config: PathConfig): UInt = UInt(log2Ceil(config.frame.materials.max(2)).W)
 }

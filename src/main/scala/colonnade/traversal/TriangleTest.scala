@@ -14,16 +14,28 @@ final class TriangleCandidate(config: PartConfig) extends Bundle {
   val ray     = new TriangleRay(config.numbers)
 }
 
-/** The intersection of a ray with a triangle. */
-final class TriangleHit(config: PartConfig) extends Bundle {
+/** Where a ray intersects a triangle. */
+sealed class HitPoint(config: PartConfig) extends Bundle {
   private val formats = new RayFormats(config.numbers)
 
-  val t  = new Fixed(formats.grid)
-  val id = UInt(RecordFormats.idBits(config).W) // packed triangle id
+  val t = new Fixed(formats.grid)
 
   /** Barycentric weights of the vertices, up to a common factor. */
   val weights  = Vec(3, new Fixed(formats.weight))
   val backSide = Bool()
+}
+
+/** The intersection of a ray with a triangle. */
+final class TriangleHit(config: PartConfig) extends HitPoint(config) {
+  val id = UInt(RecordFormats.idBits(config).W) // packed triangle id
+
+  def point: HitPoint = {
+    val point = Wire(new HitPoint(config))
+    point.t        := t
+    point.weights  := weights
+    point.backSide := backSide
+    point
+  }
 }
 
 /** The result of one triangle. Results follow the order of candidates, and of triangles in a record. */

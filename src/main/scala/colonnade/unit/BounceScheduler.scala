@@ -4,7 +4,8 @@ import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.formats.Shading
+import colonnade.formats.{Shading, Vec3}
+import colonnade.numbers.Fixed
 import colonnade.ray.RayRequest
 import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay}
 
@@ -60,46 +61,46 @@ final class BounceScheduler(config: PathConfig) extends Module {
 
   private val incoming = Wire(new PendingBounce(config))
   private val result   = io.in.bits.bounce
-  incoming.update.context  := result.context
-  incoming.update.isFirst  := io.path.map(_.isStraight).getOrElse(DontCare) // unless it is known when it is issued
-  incoming.update.albedo   := io.in.bits.albedo
-  incoming.update.isTinted := io.in.bits.isTinted
-  incoming.update.fresnel  := result.fresnel
-  for (path <- io.path) when(path.isScattered) { incoming.update.fresnel.raw := 0.U }
-  incoming.update.hasSurface.foreach(_ := false.B)
-  incoming.update.showsCube.foreach(_ := false.B)
+  for ((isFirst, path) <- incoming.isFirst.zip(io.path)) isFirst := path.isStraight
+  incoming.albedo                                                := io.in.bits.albedo
+  incoming.isTinted                                              := io.in.bits.isTinted
+  incoming.fresnel                                               := result.fresnel
+  for (path <- io.path) when(path.isScattered) { incoming.fresnel.raw := 0.U }
   incoming.isRefraction := result.isRefraction
   incoming.origin       := result.origin
   incoming.dir          := result.dir
 
-  // The bounce to issue
-  private val bounce = Wire(Decoupled(new PendingBounce(config)))
+  // The bounce to issue, of a context
+  private val bounce  = Wire(Decoupled(new PendingBounce(config)))
+  private val context = WireInit(result.context)
+  private val update  = io.update.bits
   bounce.valid := io.in.valid
   bounce.bits  := incoming
   io.in.ready  := bounce.ready
+  update.hasSurface.foreach(_ := false.B)
+  update.showsCube.foreach(_ := false.B)
   io.environment.foreach(deferBounces)
 
   // Trace its ray as long as the path has bounces left
   private val counts   = Reg(Vec(config.contexts, chiselTypeOf(io.shading.bounces.get)))
-  private val context  = bounce.bits.update.context
   private val isTraced = counts(context) =/= io.shading.bounces.get
   when(bounce.fire && isTraced) { counts(context) := counts(context) + 1.U }
   when(io.start.valid) { counts(io.start.bits) := 0.U }
 
-  bounce.ready                                := io.update.ready && (!isTraced || io.ray.ready)
-  io.update.valid                             := bounce.valid && (!isTraced || io.ray.ready)
-  io.update.bits                              := bounce.bits.update
-  if (io.path.isEmpty) io.update.bits.isFirst := counts(context) === 0.U
-  io.ray.valid                                := bounce.valid && isTraced && io.update.ready
-  io.ray.bits.context                         := context
-  io.ray.bits.isShadow                        := false.B
-  io.ray.bits.origin                          := bounce.bits.origin
-  io.ray.bits.dir                             := bounce.bits.dir
-  io.bounced.valid                            := bounce.fire
-  io.bounced.bits.context                     := context
-  io.bounced.bits.isTraced                    := isTraced
-  io.bounced.bits.isInside                    := bounce.bits.isRefraction === bounce.bits.update.isTinted
-  io.isRefraction                             := bounce.bits.isRefraction
+  bounce.ready             := io.update.ready && (!isTraced || io.ray.ready)
+  io.update.valid          := bounce.valid && (!isTraced || io.ray.ready)
+  update.context           := context
+  update.isFirst           := bounce.bits.isFirst.getOrElse(counts(context) === 0.U)
+  update.albedo            := bounce.bits.albedo
+  update.isTinted          := bounce.bits.isTinted
+  update.fresnel           := bounce.bits.fresnel
+  io.ray.valid             := bounce.valid && isTraced && io.update.ready
+  io.ray.bits              := rayOf(context, bounce.bits.origin, bounce.bits.dir)
+  io.bounced.valid         := bounce.fire
+  io.bounced.bits.context  := context
+  io.bounced.bits.isTraced := isTraced
+  io.bounced.bits.isInside := bounce.bits.isRefraction === bounce.bits.isTinted
+  io.isRefraction          := bounce.bits.isRefraction
   for (leaves <- io.leaves) {
     leaves.ray.valid                               := io.bounced.valid
     leaves.ray.bits                                := io.ray.bits
@@ -110,7 +111,7 @@ final class BounceScheduler(config: PathConfig) extends Module {
 
   /** The bounce from the shader has a Fresnel reflection, which is resolved first. */
   private def hasReflection(environment: DeferredBounceIO): Bool =
-    environment.enabled && incoming.update.fresnel.natural =/= 0.U
+    environment.enabled && incoming.fresnel.natural =/= 0.U
 
   private def deferBounces(environment: DeferredBounceIO): Unit = {
     val bounces    = ContextTable(config, new PendingBounce(config))
@@ -132,26 +133,40 @@ final class BounceScheduler(config: PathConfig) extends Module {
     bounce.valid := isHeld || (io.in.valid && !isDeferred)
     io.in.ready  := Mux(isDeferred, !bounce.fire, bounce.ready && !isHeld)
     when(isHeld) {
-      bounce.bits                                                                  := resumed
-      bounce.bits.update.hasSurface.get                                            := !resumedBy.isBackground
-      for ((to, from) <- bounce.bits.update.showsCube.zip(resumedBy.showsCube)) to := from
+      bounce.bits                                                      := resumed
+      context                                                          := resumedBy.context
+      update.hasSurface.get                                            := !resumedBy.isBackground
+      for ((to, from) <- update.showsCube.zip(resumedBy.showsCube)) to := from
     }
 
     environment.ray.valid                                         := bounce.fire || environment.fresnelReflection.valid
     for (marches <- environment.marches; path <- io.path) marches := isHeld || !path.isScattered
-    val ray = environment.ray.bits
-    ray.context  := Mux(bounce.fire, bounce.bits.update.context, result.context)
-    ray.isShadow := false.B
-    ray.origin   := Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get)
-    ray.dir      := bounce.bits.dir
-    when(!bounce.fire) { ray.dir.axes.zip(result.reflection.axes).foreach { case (to, from) => to := from } }
+    environment.ray.bits                                          := rayOf(
+      Mux(bounce.fire, context, result.context),
+      Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get),
+      Mux(bounce.fire, bounce.bits.dir, result.reflection)
+    )
+  }
+
+  private def rayOf(context: UInt, origin: Vec3[SInt], dir: Vec3[SInt]): RayRequest = {
+    val ray = Wire(new RayRequest(config))
+    ray.context                                             := context
+    ray.isShadow                                            := false.B
+    for ((to, from) <- ray.origin.axes.zip(origin.axes)) to := Fixed(to.format, from)
+    for ((to, from) <- ray.dir.axes.zip(dir.axes)) to       := from
+    ray
   }
 }
 
-/** A bounce to issue: the update of the path, and the next ray. */
+/** A bounce to issue: the update of the path and the next ray, without what is known when it is issued. */
 final private class PendingBounce(config: PathConfig) extends Bundle {
-  val update       = new BounceUpdate(config)
+  private val (update, result) = (new BounceUpdate(config), new BounceResult(config))
+
+  val isFirst      = Option.when(config.frame.gather)(Bool())
+  val albedo       = update.albedo.cloneType
+  val isTinted     = Bool()
+  val fresnel      = update.fresnel.cloneType
   val isRefraction = Bool()
-  val origin       = new BounceResult(config).origin.cloneType
-  val dir          = new BounceResult(config).dir.cloneType
+  val origin       = result.origin.cloneType
+  val dir          = result.dir.cloneType
 }

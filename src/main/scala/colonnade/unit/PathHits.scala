@@ -9,7 +9,7 @@ import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMa
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PreparedRay, RayFormats, TriangleRay}
 import colonnade.shading.Occlusion
-import colonnade.traversal.TriangleHit
+import colonnade.traversal.HitPoint
 
 /** The closest hit of a ray that is to be shaded. */
 final class SurfaceHit(config: PathConfig) extends Bundle {
@@ -90,7 +90,7 @@ final class PathHits(config: PathConfig) extends Module {
 
   // Tables: what the resolution of a hit reads, and what its shading reads
   private val closest = ContextTable(paths, new ClosestHit(config))
-  private val hits    = ContextTable(paths, new TriangleHit(config))
+  private val hits    = ContextTable(paths, new ShadedHit(config))
   private val rays    = ContextTable(paths, new TriangleRay(config.numbers))
   private val writes  = io.rays.fire && !ray.isShadow // nobody shades what a shadow ray hits
   when(writes) { rays.write(ray.context, ray.ray.forTriangles) }
@@ -99,7 +99,10 @@ final class PathHits(config: PathConfig) extends Module {
     entry.id := result.hit.id
     entry.t  := result.hit.t
     closest.write(result.context, entry)
-    hits.write(result.context, result.hit)
+    val shaded = Wire(new ShadedHit(config))
+    shaded.point := result.hit.point
+    shaded.slot  := result.hit.id // its low bits
+    hits.write(result.context, shaded)
   }
 
   // A hit with a surface to shade, or whose distance is measured
@@ -135,15 +138,20 @@ final class PathHits(config: PathConfig) extends Module {
   private val shaded   = hits.read(granted.bits, granted.valid)
   private val response = attributes.response
   private val faces    = new RecordFormats(config).asAttributes(response.bits.record).faces
-  private val slotBits = RecordFormats.faceSlotBits(config)
   trace.hits.valid        := response.valid
   trace.hits.bits.context := response.bits.context
   trace.hits.bits.ray     := rays.read(granted.bits, granted.valid)
-  trace.hits.bits.hit     := shaded
-  trace.hits.bits.face    := (if (slotBits == 0) faces.head else faces(shaded.id(slotBits - 1, 0)))
+  trace.hits.bits.hit     := shaded.point
+  trace.hits.bits.face    := (if (faces.size == 1) faces.head else faces(shaded.slot))
   assert(!trace.hits.valid || trace.hits.ready, "the shader does not accept its hit")
 
   io.events := attributes.events
+}
+
+/** What the shading of a hit needs, besides its record: the point, and which of the record's faces it is on. */
+private final class ShadedHit(config: PathConfig) extends Bundle {
+  val point = new HitPoint(config)
+  val slot  = UInt(RecordFormats.faceSlotBits(config).W)
 }
 
 /** What the resolution of a hit needs. */

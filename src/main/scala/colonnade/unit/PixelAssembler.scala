@@ -28,7 +28,7 @@ final class PixelAssembler(config: PathConfig) extends Module {
   val io = IO(new PixelAssemblerIO(config))
 
   private val pixels   = ContextTable(config, new UnitPosition(config))
-  private val colours  = ContextTable(config, new PathColour(config))
+  private val colours  = ContextTable(config, new PixelColour(config))
   private val isObject = Reg(Vec(config.contexts, Bool()))
   when(io.allocated.valid) {
     pixels.write(io.allocated.bits.context, io.allocated.bits.pixel)
@@ -36,7 +36,12 @@ final class PixelAssembler(config: PathConfig) extends Module {
   }
   private val isPrimaryHit = io.surfaceHit.valid && io.surfaceHit.bits.isPrimary
   when(isPrimaryHit) { isObject(io.surfaceHit.bits.context) := true.B }
-  when(io.colour.valid) { colours.write(io.colour.bits.context, io.colour.bits) }
+  when(io.colour.valid) {
+    val entry = Wire(new PixelColour(config))
+    entry.colour                                                 := io.colour.bits.colour
+    for ((to, from) <- entry.ratio.zip(io.colour.bits.ratio)) to := from
+    colours.write(io.colour.bits.context, entry)
+  }
 
   /** Finished pixels that wait. Many contexts give a pixel a cycle: two wait while one is on its way. */
   private val queueDepth = if (config.isLarge) 3 else 1
@@ -76,4 +81,10 @@ final class PixelAssembler(config: PathConfig) extends Module {
     val read = hits.read(done.bits, retires)
     hit := Mux(finished.bits.isObject, read, 0.U.asTypeOf(new PixelHit(config)))
   }
+}
+
+/** The colour of a pixel, and of the environment that the camera sees directly the shadow ratio. */
+final private class PixelColour(config: PathConfig) extends Bundle {
+  val colour = Rgb(FrameRegisters.colour)
+  val ratio  = Option.when(config.hasEnvironment)(Rgb(FrameRegisters.weight))
 }

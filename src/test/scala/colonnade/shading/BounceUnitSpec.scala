@@ -18,7 +18,7 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val simulation = Simulation.verilator
 
   private def peek(result: BounceResult): BigInt = pack(
-    (result.isRefraction.peekInt() +: result.origin.axes.map(_.integer.peekInt())) ++
+    (result.isRefraction.peekInt() +: result.origin.axes.map(_.peekInt())) ++
       (result.dir.axes ++ result.reflection.axes).map(_.peekInt()) ++
       Seq(result.fresnel.natural.peekInt(), result.context.peekInt())
   )

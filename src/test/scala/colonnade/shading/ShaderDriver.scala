@@ -45,7 +45,6 @@ object ShaderDriver {
     port.ray.origin.zip(hit.origin).foreach { case (to, value) => pokeFixed(to, value) }
     port.ray.shear.zip(hit.shear).foreach { case (to, value) => pokeFixed(to, value) }
     pokeFixed(port.hit.t, hit.t)
-    port.hit.id.poke(0)
     port.hit.weights.zip(hit.weights).foreach { case (to, value) => pokeFixed(to, value) }
     port.hit.backSide.poke(hit.backSide)
     port.face.normals.zip(hit.normals).foreach { case (to, value) => pokeVector(to, value) }

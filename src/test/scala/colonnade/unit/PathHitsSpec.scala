@@ -57,7 +57,7 @@ private class PathHitsHarness(config: ColonnadeConfig) extends Module {
   at.id                       := id
   unit.io.results.bits.hit    := at
   forHit                      := of.forTriangles.asUInt
-  details                     := at.asUInt
+  details                     := at.point.asUInt
   t                           := at.t.integer
   foundRay                    := unit.io.trace.hits.bits.ray.asUInt
   foundHit                    := unit.io.trace.hits.bits.hit.asUInt
