@@ -53,7 +53,10 @@ final class LobeStage(numbers: NumberFormats, first: Int) extends Module {
     (length.at(first + 6) << zeros)(lengthBits - 2, lengthBits - 1 - octaveLog)
   }
   private val logarithm = latch(first + 7) {
-    Cat(octaves.at(first + 7)(octaveBits - 1, 0), 0.U(octaveLog.W)) +& VecInit(Lobe.logarithms.map(_.U))(mantissa.at(first + 7))
+    Cat(
+      octaves.at(first + 7)(octaveBits - 1, 0),
+      0.U(octaveLog.W)
+    ) +& VecInit(Lobe.logarithms.map(_.U))(mantissa.at(first + 7))
   }
 
   // peak / length²
