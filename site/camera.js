@@ -48,6 +48,17 @@ export function roomCamera({ camera: { lens, position, right, down, forward }, o
   return { position: place, ...axes, ...size };
 }
 
+/** A point of a lamp's disc, which faces the object; without a point of the unit disc it is the middle. */
+export function onDisc({ position, radius }, middle, point = [0, 0]) {
+  const unit = (vector) => vector.map((value) => value / Math.hypot(...vector));
+  const cross = (a, b) => [0, 1, 2].map((axis) => a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3]);
+  const away = unit(position.map((value, axis) => value - middle[axis]));
+  const side = Math.hypot(away[0], away[2]) > 1e-9 ? [0, 1, 0] : [0, 0, -1];
+  const right = unit(cross(side, away));
+  const up = cross(away, right);
+  return position.map((value, axis) => value + radius * (point[0] * right[axis] + point[1] * up[axis]));
+}
+
 /** A vector after a rotation around a unit axis, degrees (Rodrigues). */
 function rotated(vector, axis, degrees) {
   const [c, s] = [Math.cos, Math.sin].map((f) => f((degrees * Math.PI) / 180));

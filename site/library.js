@@ -9,7 +9,7 @@ const PACKED = [
 ];
 /** Those of the register map that do not depend on time. */
 const COUNTERS = [
-  "raysPrimary", "raysShadow", "raysReflection", "raysRefraction", "raysInBox", "nodeReads", "boxTests", "triangleTests",
+  "raysPrimary", "raysShadow", "raysReflection", "raysRefraction", "raysGather", "raysInBox", "nodeReads", "boxTests", "triangleTests",
   "hits", "deepestStack",
 ];
 const VIEW_ERRORS = { 20: "no view file", 21: "bad pose", 22: "bad lens", 23: "the camera is too far away", 24: "no such light" };
@@ -105,11 +105,11 @@ export class Library {
     this.withArrays([records], (pointer) => this.check(this.wasm.colonnade_model_load(pointer, count)));
   }
 
-  /** Gives the model the maps of a room: {memory, words, bytes}, words as a Uint8Array, of so many bytes each. */
-  loadMaps(maps) {
-    for (const { memory, words, bytes } of maps)
+  /** Gives the model memories of a room, its maps or light cube: {memory, words, bytes}, words as a Uint8Array, of so many bytes each. */
+  loadMemories(memories) {
+    for (const { memory, words, bytes } of memories)
       this.withArrays([new TextEncoder().encode(memory + "\0"), words], (name, pointer) =>
-        this.check(this.wasm.colonnade_model_load_map(name, pointer, words.length / bytes, bytes)),
+        this.check(this.wasm.colonnade_model_load_memory(name, pointer, words.length / bytes, bytes)),
       );
   }
 
@@ -192,12 +192,18 @@ export class Library {
     this.withArrays([new Uint8Array(pose.buffer)], (pointer) => this.checkView(this.wasm.colonnade_view_set_object(this.view, pointer)));
   }
 
-  /** Sets a light of constant intensity. */
-  setLight(index, position, colour) {
+  /** Sets a light; `reach` is the distance of its intensity, 0 for a constant one. */
+  setLight(index, { position, colour, reach = 0 }) {
     const light = new DataView(new ArrayBuffer(48));
     position.forEach((value, axis) => light.setBigInt64(8 * axis, BigInt(Math.round(value * FRACTION)), true));
     colour.forEach((value, channel) => light.setUint32(24 + 4 * channel, Math.round(value * 2 ** 16), true));
+    light.setBigUint64(40, BigInt(Math.round(reach * FRACTION)), true);
     this.withArrays([new Uint8Array(light.buffer)], (pointer) => this.checkView(this.wasm.colonnade_view_set_light(this.view, index, pointer)));
+  }
+
+  /** Selects a pass of a frame of several ones. */
+  setSample({ index, count }) {
+    this.checkView(this.wasm.colonnade_view_set_sample(this.view, index, count));
   }
 
   /** The writes of the view's frame, all of its registers, and those of `values` by name. */

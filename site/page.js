@@ -6,12 +6,13 @@ import { hasRegister } from "./design.js";
 import { droppedFiles, roomFiles } from "./files.js";
 import { listen } from "./orbit.js";
 import { element, listDesigns, showCosts, showFigures, showRays } from "./panels.js";
+import { radianceOf } from "./lightcube.js";
 import { draw, raysOf } from "./path.js";
 import { Renderer, bytesOf, unpack } from "./renderer.js";
 import { RtlPanel } from "./rtlpanel.js";
 import { readState, writeState } from "./state.js";
-import { materialOf, poseIn, viewOf } from "./view.js";
-import { placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
+import { materialOf, passesOf, poseIn, viewOf } from "./view.js";
+import { kindFor, placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
 
 const MOST_WORKERS = 8;
 const COARSE = 4;
@@ -27,11 +28,15 @@ let data, renderer, manifest, packed, rays, chosen, traced;
 let state = readState(location.hash);
 let isChanged = false;
 let isRunning = false;
-/** What tests read: the last whole frame. */
+let isWorking = false;
+/** What tests read: the last whole frame, the light of its room, and its last pass. */
 const page = (window.colonnade = { frames: 0, picture: null });
 
-/** The room of the state, if the hardware has its maps. */
-const roomOf = () => (data.rooms[state.room]?.views[state.design] ? data.rooms[state.room] : null);
+/** The room of the state, as the hardware has it; null if it has no maps. */
+function roomOf() {
+  const kind = kindFor(data.rooms[state.room], state.design);
+  return kind ? { ...data.rooms[state.room], ...kind } : null;
+}
 
 const scene = () => ({ state, mesh: page.mesh, manifest, packed });
 
@@ -53,17 +58,17 @@ function sizeOf(pixel) {
   return [stage.clientWidth, stage.clientHeight].map((length) => Math.max(8, Math.floor(length * scale)));
 }
 
-/** Renders until the picture is that of the state: coarse at once, then whole, band by band. */
+/** Renders until the picture is that of the state: coarse at once, then whole, band by band, then the sums of passes. */
 async function update() {
-  if (!packed) return;
+  if (!packed || isWorking) return;
   isChanged = true;
   if (isRunning) return void renderer.stop();
   isRunning = true;
   try {
     while (isChanged) {
       isChanged = false;
-      await render(roomOf() ? COARSE : COARSE * state.pixel, true);
-      if (!isChanged) await render(state.pixel, false);
+      const coarse = roomOf() ? COARSE : COARSE * state.pixel;
+      if ((await render(coarse, true)) && !isChanged && (await render(state.pixel, false)) && !isChanged) await rest();
     }
   } catch (error) {
     fail(error.message);
@@ -72,6 +77,22 @@ async function update() {
   }
 }
 
+/** Adds up the passes of the picture while nothing changes. */
+async function rest() {
+  const count = passesOf(scene(), roomOf());
+  const [width, height] = sizeOf(state.pixel);
+  for (let index = 0; index < count; ++index) {
+    const view = (page.pass = viewOf(scene(), roomOf(), width, height, state, { index, count }, data.discs));
+    const frame = await renderer.frame(view, ({ first, last, pixels }) => {
+      if (!isChanged) picture.putImageData(new ImageData(pixels, width, last - first), 0, first);
+    });
+    if (frame === null || isChanged) return;
+    page.samples = index + 1;
+    element("samples").textContent = `pass ${page.samples} of ${count} is added`;
+  }
+}
+
+/** Renders a frame, and shows it; false if another work has stopped it. */
 async function render(pixel, isCoarse) {
   const box = boxOf();
   for (const canvas of [picture.canvas, overlay.canvas]) for (const [name, value] of Object.entries(box)) canvas.style[name] = `${value}px`;
@@ -88,7 +109,7 @@ async function render(pixel, isCoarse) {
     whole.ratios.set(ratios, 3 * width * first);
     whole.triangles.set(triangles, width * first);
   });
-  if (frame === null) return;
+  if (frame === null) return false;
   if (isCoarse) {
     Object.assign(picture.canvas, resized(picture.canvas, width, height));
     picture.drawImage(target.canvas, 0, 0);
@@ -96,9 +117,12 @@ async function render(pixel, isCoarse) {
   } else {
     page.picture = whole;
     showFigures({ width, height, workers: renderer.workers.length, packed, packTime: page.packTime }, frame);
+    page.samples = 0;
+    element("samples").textContent = "one sample a pixel";
     document.body.dataset.frames = page.frames += 1;
   }
   drawPath();
+  return true;
 }
 
 /** Keeps what a canvas shows when its size changes. */
@@ -127,7 +151,11 @@ function showNotes() {
   if (state.room && !roomOf())
     notes.push(manifest.attributes ? "the page has rooms for presets only" : "this hardware has no maps of a room");
   if (roomOf() && !isAtMaps(state)) notes.push("the camera is not that of the photo: the room is drawn from its maps");
-  if (materialOf(scene()) !== state.material) notes.push("this hardware has neither mirrors nor glass");
+  const material = materialOf(scene(), roomOf());
+  if (roomOf() && !roomOf().light) notes.push("this hardware does not gather the light of the room: choose textured");
+  if (roomOf()?.light?.share) notes.push(`the photo shows ${Math.round(100 * roomOf().light.share)} % of the directions around the object; its mean light comes from the others`);
+  if (state.material === "metal" && material === "mirror") notes.push("metal is rough where light is gathered, in a room; here it is a mirror");
+  else if (material !== state.material) notes.push("this hardware has neither mirrors nor glass");
   element("notes").replaceChildren(
     ...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })),
   );
@@ -137,11 +165,14 @@ function showNotes() {
 
 async function openDesign() {
   manifest = data.manifests[state.design] ?? data.manifests[(state.design = "textured")];
+  await completeRoom(data.rooms[state.room]);
   const room = roomOf();
   const files = room ? room.views[state.design] : { plain: data.views[state.design] };
   const views = Object.fromEntries(Object.entries(files).map(([name, text]) => [name, bytesOf(text)]));
   const maps = (room?.maps ?? []).map(({ words, ...map }) => ({ ...map, words: bytesOf(words) }));
-  await renderer.open({ module: page.module, manifest, views, maps, photo: room && (await photoOf(room)) });
+  const light = room?.light ? (room.light.radiance ??= radianceOf(bytesOf(room.light.cube))) : null;
+  Object.assign(page, { light: room?.light, middle: room?.object.position });
+  await renderer.open({ module: page.module, manifest, views, maps, light, photo: room && (await photoOf(room)) });
 }
 
 /** The pixels of a room's photo. */
@@ -161,20 +192,25 @@ async function changeDesign() {
 }
 
 async function pack() {
-  const answer = await renderer.pack(materialOf(scene()) === "glass");
+  const answer = await renderer.pack(materialOf(scene(), roomOf()) === "glass");
   packed = answer.packed;
   page.packTime = answer.milliseconds;
   page.packed = packed;
   showNotes();
 }
 
-/** Does one thing after the other, and then renders; after an error, what was. */
+/** Does one thing after the other, and then renders; after an error, what was. Nothing is rendered meanwhile. */
 let queue = Promise.resolve();
 function then(work) {
   queue = queue
     .then(async () => {
-      await renderer.stop();
-      await work();
+      isWorking = true;
+      try {
+        await renderer.stop();
+        await work();
+      } finally {
+        isWorking = false;
+      }
       show();
     })
     .catch((error) => {
@@ -218,6 +254,15 @@ async function openRoom(found, files) {
   await changeDesign();
 }
 
+/** Makes a visitor's room for the design, if it is another kind of one that has maps. */
+async function completeRoom(room) {
+  if (!room?.files || kindFor(room, state.design)) return;
+  const { template, design } = templateFor(data.rooms, state.design);
+  if (design !== state.design) return;
+  const { found, files, settings } = room.files;
+  Object.assign(room, await visitorRoom(renderer, manifest, template, found, files, settings, room.place));
+}
+
 /** Stands the object of a visitor's room on the surface at a pixel. */
 stage.addEventListener("dblclick", (event) => {
   const room = roomOf();
@@ -225,7 +270,8 @@ stage.addEventListener("dblclick", (event) => {
   const box = picture.canvas.getBoundingClientRect();
   const place = placeOf(room, ((event.clientX - box.left) / box.width) * room.width, ((event.clientY - box.top) / box.height) * room.height, STAND_WITHIN);
   then(async () => {
-    Object.assign(room, placedRoom(room, data.rooms.living, place));
+    const own = data.rooms[state.room];
+    Object.assign(own, placedRoom(own, templateFor(data.rooms, state.design).template, place));
     await changeDesign();
   });
 });
@@ -245,9 +291,10 @@ const openTeapot = () => readFile("teapot.ply", page.teapot, new Map());
 function fill() {
   for (const name of ["design", "room", "material", "light", "bounces", "pixel"]) form.elements[name].value = state[name];
   for (const name of ["colour", "background"]) form.elements[name].value = `#${state[name]}`;
-  for (const name of ["shadows", "photo"]) form.elements[name].checked = Boolean(state[name]);
+  for (const name of ["shadows", "photo", "gather"]) form.elements[name].checked = Boolean(state[name]);
   form.elements.photo.disabled = roomOf() === null || !isAtMaps(state);
   form.elements.drag.disabled = roomOf() === null;
+  form.elements.gather.disabled = !roomOf()?.light;
   element("home").hidden = roomOf() === null || isAtMaps(state);
   for (const label of document.querySelectorAll(".lens")) label.hidden = !roomOf()?.files;
   showCosts(data, state.design);
@@ -276,7 +323,7 @@ form.addEventListener("input", ({ target }) => {
   const value = target.type === "checkbox" ? Number(target.checked) : target.type === "color" ? target.value.slice(1) : target.value;
   state[target.name] = ["light", "bounces", "pixel"].includes(target.name) ? Number(value) : value;
   if (target.name === "design" || target.name === "room") then(changeDesign);
-  else if (target.name === "material") then(pack);
+  else if (["material", "gather"].includes(target.name)) then(pack);
   else show();
   if (traced && target.name !== "pixel") follow();
 });

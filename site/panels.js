@@ -8,7 +8,7 @@ export const element = (id) => document.getElementById(id);
 /** Counters of the register map, in words. */
 const NAMES = {
   raysPrimary: "primary rays", raysShadow: "shadow rays", raysReflection: "reflected rays", raysRefraction: "refracted rays",
-  raysInBox: "rays in the box", nodeReads: "nodes read", boxTests: "boxes tested", triangleTests: "triangles tested",
+  raysGather: "gathered rays",  raysInBox: "rays in the box", nodeReads: "nodes read", boxTests: "boxes tested", triangleTests: "triangles tested",
   hits: "hits", deepestStack: "deepest stack",
 };
 /** Where the cycles of a pixel alone go: counters of `tiny` that count each context's cycles in a state. */

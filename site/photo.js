@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A room's photo, and the object in it (docs/background.md): the photo of each pixel times its ratio of light.
-
-const ONE = 4096;
+// sRGB, and a room's photo in the size of a frame.
 
 export const decode = (code) => (code <= 0.04045 * 255 ? code / 255 / 12.92 : ((code / 255 + 0.055) / 1.055) ** 2.4);
 export const encode = (value) => Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
@@ -19,16 +17,4 @@ export function resizedPhoto({ data, width, height }, factor) {
         result[3 * (size[0] * y + x) + channel] = Math.floor(sum / factor ** 2 + 0.5);
       }
   return result;
-}
-
-/** Replaces the pixels without the object, RGBA, by those of the photo; `first` is the photo's first pixel. */
-export function composite(pixels, { ratios, triangles }, photo, first) {
-  for (let i = 0; i < triangles.length; ++i) {
-    if (triangles[i] >= 0) continue;
-    for (let channel = 0; channel < 3; ++channel) {
-      const code = photo[3 * (first + i) + channel];
-      const ratio = ratios[3 * i + channel];
-      pixels[4 * i + channel] = ratio === ONE ? code : encode((decode(code) * ratio) / ONE);
-    }
-  }
 }

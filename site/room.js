@@ -30,9 +30,10 @@ function quantile(values, share) {
 
 /**
  * What the device and the page need of a room. `photo` has the pixels of the maps' part, RGBA, `whole` the photo's size;
- * `lens` is that of the photo; `pose` from view space to the world, or null: it is that of the floor.
+ * `lens` is that of the photo; `pose` from view space to the world, or null: it is that of the floor. `gathers`: the light
+ * of the photo is gathered, so the room's lights have its scale.
  */
-export function prepareRoom({ photo, whole, depth, lens, pose }) {
+export function prepareRoom({ photo, whole, depth, lens, pose, gathers }) {
   const { width, height } = photo;
   if (Math.abs(depth.width * whole.height - depth.height * whole.width) > 0.03 * depth.width * whole.height)
     throw new Error(`the depth map is ${depth.width} × ${depth.height}, the photo ${whole.width} × ${whole.height}: both have to show the same part of the room`);
@@ -51,8 +52,23 @@ export function prepareRoom({ photo, whole, depth, lens, pose }) {
   });
   const colours = linearOf(photo.data);
   const light = fitLight(world, colours, found.position, notes);
-  const { albedo, headroom } = photoColours(colours, filled, normals, raysOfLens(own, width, height), found, light);
-  return { width, height, lens: own, pose: found, depth: filled, normals, albedo, light, headroom, noise, surface: world, notes };
+  const { albedo, headroom } = photoColours(colours, filled, normals, raysOfLens(own, width, height), found, light, gathers ? 1 : MOST_HEADROOM);
+  const seen = gathers ? seenOf(filled, normals, colours, raysOfLens(own, width, height), found, width, height) : null;
+  return { width, height, lens: own, pose: found, depth: filled, normals, albedo, light, headroom, noise, surface: world, seen, notes };
+}
+
+/** Points, normals and colours of every second pixel across and down, in the world, for lightcube.js. */
+function seenOf(depth, normals, colours, rays, pose, width, height) {
+  const [points, turnedNormals, seenColours] = range(3).map(() => new Float32Array(3 * (width >> 1) * (height >> 1)));
+  let at = 0;
+  for (let y = 0; y + 1 < height; y += 2)
+    for (let x = 0; x + 1 < width; x += 2, at += 3) {
+      const pixel = 3 * (y * width + x);
+      points.set(turned(pose.rotation, range(3).map((axis) => rays[pixel + axis] * depth[pixel / 3])).map((value, axis) => value + pose.position[axis]), at);
+      turnedNormals.set(turned(pose.rotation, normals.subarray(pixel, pixel + 3)), at);
+      seenColours.set(colours.subarray(pixel, pixel + 3), at);
+    }
+  return { points, normals: turnedNormals, colours: seenColours };
 }
 
 /** Points and normals of a grid of pixels, view space. */
@@ -149,7 +165,7 @@ function fitLight(world, colours, eye, notes) {
 }
 
 /** The colours with which the room, relit, is its photo: sRGB codes of photo / light, at most 1 by the headroom. */
-function photoColours(colours, depth, normals, rays, pose, { ambient, lamp }) {
+function photoColours(colours, depth, normals, rays, pose, { ambient, lamp }, most) {
   const result = new Float64Array(colours.length);
   const brightest = new Float64Array(depth.length);
   for (let i = 0; i < depth.length; ++i) {
@@ -158,6 +174,6 @@ function photoColours(colours, depth, normals, rays, pose, { ambient, lamp }) {
     for (let channel = 0; channel < 3; ++channel) result[3 * i + channel] = colours[3 * i + channel] / light;
     brightest[i] = Math.max(...result.subarray(3 * i, 3 * i + 3));
   }
-  const headroom = Math.max(1, Math.min(MOST_HEADROOM, 15 / Math.max(ambient, lamp.colour), quantile(brightest, 1 - CLAMPED)));
+  const headroom = Math.max(1, Math.min(most, 15 / Math.max(ambient, lamp.colour), quantile(brightest, 1 - CLAMPED)));
   return { albedo: Uint8Array.from(result, (value) => encode(Math.min(1, value / headroom))), headroom };
 }

@@ -51,12 +51,12 @@ export function lensOf(degrees, { width, height }) {
 
 /**
  * The view file of a room of a visitor. `template`: that of a room of the page, of the same design and size of a frame,
- * whose object has `templateScale`; `room` as of prepareRoom, with `encoded`; `object` has position and scale, metres.
+ * whose object has `templateScale`; `room` as of prepareRoom, with `encoded` and `lamp`, its light in the device's numbers; `object` has position and scale, metres.
  */
 export function roomView(template, templateScale, room, object, factor) {
   const bytes = template.slice();
   const words = new Words(bytes);
-  const { lens, pose, encoded, light, headroom } = room;
+  const { lens, pose, encoded, lamp } = room;
   const ratio = templateScale / object.scale;
   words.setFactor(GRID, words.getFactor(GRID) * ratio);
   words.setWide(OBJECT, object.position);
@@ -65,9 +65,9 @@ export function roomView(template, templateScale, room, object, factor) {
   words.setRotation(CAMERA + 6, pose.rotation);
   const own = [lens.fx, lens.fy, lens.cx, lens.cy];
   words.setWide(CAMERA + 15, own.map((value) => value / factor));
-  words.setWide(FIRST_LIGHT, light.lamp.position);
-  words.set(FIRST_LIGHT + 6, Array(3).fill(Math.round(light.lamp.colour * headroom * 2 ** 16)));
-  words.setWide(FIRST_LIGHT + 9, [light.lamp.reach]);
+  words.setWide(FIRST_LIGHT, lamp.position);
+  words.set(FIRST_LIGHT + 6, lamp.colour.map((value) => Math.round(value * 2 ** 16)));
+  words.setWide(FIRST_LIGHT + 9, [lamp.reach]);
   const at = FIRST_LIGHT + LIGHT_WORDS * words.get(LIGHTS);
   const metres = words.getFactor(at + METRES) / ratio;
   words.set(at, [1]);
@@ -90,7 +90,8 @@ export function roomView(template, templateScale, room, object, factor) {
 }
 
 /** Registers that the view file has as constants, and that are the visitor's room's. */
-export function roomRegisters({ encoded, light, headroom }, { numbers }) {
-  const ambient = Math.min(2 ** numbers.lightBits - 1, Math.round(light.ambient * headroom * 2 ** numbers.lightFraction));
-  return { "ambient.r": ambient, "ambient.g": ambient, "ambient.b": ambient, "environment.boundingPlanes": encoded.boundingPlanes };
+export function roomRegisters({ encoded, ambient, light }, { numbers }) {
+  const code = Math.min(2 ** numbers.lightBits - 1, Math.round(ambient * 2 ** numbers.lightFraction));
+  const gathered = light ? { "gather.parallax": light.parallax, "environment.boundingPlanes": 0 } : { "environment.boundingPlanes": encoded.boundingPlanes };
+  return { "ambient.r": code, "ambient.g": code, "ambient.b": code, "shading.lights": 1, ...gathered };
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a link holds: mesh, design, material, light, camera, size of a pixel, and the pixel that is followed.
+// What a link holds: mesh, design, room, material, light, camera, size of a pixel, and the pixel that is followed.
 
 import { ROOM_START, START } from "./camera.js";
 
@@ -8,6 +8,7 @@ export const DEFAULTS = {
   design: "textured",
   room: "",
   photo: 1,
+  gather: 1,
   material: "diffuse",
   colour: "d8c8b0",
   background: "182028",
@@ -29,7 +30,7 @@ export function readState(hash) {
     if (isNumber && !Number.isFinite(Number(text))) continue;
     if (["colour", "background"].includes(name) && !/^[0-9a-f]{6}$/.test(text)) continue;
     if (name === "follow" && !/^(-?[\d.]+(,-?[\d.]+){8}((,-?[\d.]+){5})?)?$/.test(text)) continue;
-    if (name === "material" && !["diffuse", "mirror", "glass"].includes(text)) continue;
+    if (name === "material" && !["diffuse", "metal", "mirror", "glass"].includes(text)) continue;
     state[name] = isNumber ? Number(text) : text;
   }
   state.elevation = Math.max(-89, Math.min(89, state.elevation));

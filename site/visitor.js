@@ -2,23 +2,32 @@
 // A room of a visitor's files, in the page: the worker makes its maps, this module its view files.
 
 import { readMeta } from "./files.js";
+import { parallaxOf, seenLight } from "./lightcube.js";
 import { bytesOf } from "./renderer.js";
 import { lensOf, roomView } from "./roomview.js";
 
 /** Edge of the object's cube, as a share of its distance. */
 const OBJECT_SHARE = 0.3;
+/** Radius of the lamp, as a share of its distance from the object, where light is gathered. */
+const LAMP_SHARE = 0.2;
 
 /** Points of its outline in edges, right and up, which nothing should hide. */
 const OUTLINE = [[0, 1], [-0.5, 0.5], [0.5, 0.5]];
 
+/** What a room has for a design (tools/browser/rooms.py); undefined if it has nothing. */
+export const kindFor = (room, design) => room?.kinds.find(({ views }) => design in views);
+
 /** The room of the page whose view files are templates, and a design that has maps: the wanted one, if it has. */
 export function templateFor(rooms, wanted) {
-  const template = rooms.living;
-  return { template, design: wanted in template.views ? wanted : "textured" };
+  const design = kindFor(rooms.living, wanted) ? wanted : "textured";
+  return { template: { ...rooms.living, ...kindFor(rooms.living, design) }, design };
 }
 
-/** A room in the form of those of the page; `found` as of roomFiles, `settings` hold where there is no meta.json. */
-export async function visitorRoom(renderer, manifest, template, found, files, { degrees, millimetres }) {
+/**
+ * A room in the form of those of the page, for designs like one; `found` as of roomFiles, `settings` hold where there is
+ * no meta.json; `place`: where the object stands, if it is known.
+ */
+export async function visitorRoom(renderer, manifest, template, found, files, { degrees, millimetres }, place) {
   const bitmap = await createImageBitmap(new Blob([files.get(found.photo)])).catch(() => {
     throw new Error(`${found.photo} is no picture that this browser reads`);
   });
@@ -28,28 +37,41 @@ export async function visitorRoom(renderer, manifest, template, found, files, { 
   const photo = pixelsOf(bitmap, template.width, template.height);
   const { lens, pose, step } = meta ?? { lens: lensOf(degrees, whole), pose: null, step: millimetres / 1000 };
   const depth = { name: found.depth, bytes: files.get(found.depth) };
-  const room = await renderer.room({ manifest, photo, whole, lens, pose, depth, step });
+  const room = await renderer.room({ manifest, photo, whole, lens, pose, depth, step, gathers: template.light !== null });
   const { ignored } = found;
   if (!meta) room.notes.push(`the photo's width is taken as ${degrees}°, a step of a PNG of depth as ${millimetres} mm`);
   if (ignored.length > 0) room.notes.push(`${ignored.join(" and ")} ${ignored.length > 1 ? "are" : "is"} not read`);
-  return { ...room, ...placedRoom(room, template, placeOf(room)), picture: photo, files: { found, files } };
+  return { ...room, ...placedRoom(room, template, place ?? placeOf(room)), picture: photo, files: { found, files, settings: { degrees, millimetres } } };
 }
 
-/** What the page needs of a room whose object stands at its place: camera, object and view files. */
+/** What the page needs of a room whose object stands at its place: camera, object, light and view files. */
 export function placedRoom(room, template, place) {
-  const { pose, lens, width, height } = room;
+  const { pose, lens, width, height, headroom, encoded } = room;
   const axis = (column) => pose.rotation.map((row) => row[column]);
   const scale = place.edge / 2;
   const object = { position: [place.point[0], place.point[1] + scale, place.point[2]], scale };
-  const viewsOf = (views) => Object.fromEntries(Object.entries(views).map(([factor, text]) => [factor, roomView(bytesOf(text), template.object.scale, room, object, Number(factor))]));
+  const exposure = template.light?.exposure ?? 1;
+  const { position, colour, reach } = room.light.lamp;
+  const lamp = { position, colour: Array(3).fill(colour * headroom * exposure), reach };
+  const viewsOf = (views) => Object.fromEntries(Object.entries(views).map(([factor, text]) => [factor, roomView(bytesOf(text), template.object.scale, { ...room, lamp }, object, Number(factor))]));
+  const views = Object.fromEntries(Object.entries(template.views).map(([design, views]) => [design, viewsOf(views)]));
+  const ambient = room.light.ambient * headroom * exposure;
+  const light = template.light && { exposure, ...lightAt(room, object, lamp, exposure) };
   return {
+    place,
     object,
     camera: { position: pose.position, right: axis(0), down: axis(1), forward: axis(2), lens: [lens.fx, lens.cx, lens.cy, lens.fy].map((value) => value / height) },
-    maps: room.encoded.maps,
-    views: Object.fromEntries(Object.entries(template.views).map(([design, views]) => [design, viewsOf(views)])),
+    kinds: [{ views, maps: encoded.maps, headroom, encoded, ambient, light }],
     width,
     height,
   };
+}
+
+/** The light that an object meets, in the device's numbers: that of the photo, and the lamp with an area. */
+function lightAt({ seen, pose }, { position, scale }, lamp, exposure) {
+  const { radiance, share } = seenLight(seen, position);
+  const radius = LAMP_SHARE * Math.hypot(...lamp.position.map((value, axis) => value - position[axis]));
+  return { radiance: radiance.map((value) => value * exposure), share, parallax: parallaxOf(seen, pose.position, position, 2 * scale), lamps: [{ ...lamp, radius }] };
 }
 
 /** The largest part around the middle of a picture with the proportions of the maps, in their size. */

@@ -4,40 +4,40 @@
 import { readDepth } from "./depth.js";
 import { codesOf, encodeStill } from "./encoder.js";
 import { Library } from "./library.js";
+import { cubeWords } from "./lightcube.js";
 import { readMesh } from "./meshes.js";
-import { composite, encode, resizedPhoto } from "./photo.js";
+import { resizedPhoto } from "./photo.js";
 import { prepareRoom } from "./room.js";
 import { renderRtl } from "./rtl.js";
+import { Sums, codeOf } from "./sums.js";
 
 const BAND = 4;
-
-/** Linear codes of the device to sRGB. */
-function curveOf(bits) {
-  const white = 2 ** bits - 1;
-  return Uint8ClampedArray.from({ length: white + 1 }, (_, code) => encode(code / white));
-}
 
 /** Answers messages {id, call, …} with {id, …}; of a frame, with its bands, until another frame begins. */
 export function serve(scope) {
   let library;
-  let curve;
+  let white;
   let raw;
   let files;
   let opened;
   let photos;
+  let radiance;
+  let current;
+  let sums;
   let frame = 0;
   const pause = () => new Promise((resolve) => setTimeout(resolve));
 
   const calls = {
-    /** `views`: view files by name; `maps` and `photo`: those of a room, the photo as RGBA. */
-    async open({ module, manifest, views, maps, photo }) {
+    /** `views`: view files by name; `maps`, `photo` and `light`: those of a room, the photo as RGBA, the light as in lightcube.js. */
+    async open({ module, manifest, views, maps, photo, light }) {
       library ??= await Library.from(module);
       library.open(manifest);
-      library.loadMaps(maps);
+      library.loadMemories(maps);
       files = views;
       opened = null;
       photos = photo ? Object.fromEntries(Object.keys(views).map((factor) => [factor, resizedPhoto(photo, Number(factor))])) : {};
-      curve = curveOf(manifest.numbers.colourBits);
+      white = 2 ** manifest.numbers.colourBits - 1;
+      radiance = light;
       return {};
     },
     read({ name, bytes, files }) {
@@ -55,9 +55,9 @@ export function serve(scope) {
       return {};
     },
     /** Encodes the room of a photo and its depth, for the maps of a design (room.js). */
-    async room({ manifest, photo, whole, lens, pose, depth, step }) {
+    async room({ manifest, depth, step, ...photo }) {
       const begin = performance.now();
-      const { depth: filled, normals, albedo, ...room } = prepareRoom({ photo, whole, lens, pose, depth: await readDepth(depth.name, depth.bytes, step) });
+      const { depth: filled, normals, albedo, ...room } = prepareRoom({ ...photo, depth: await readDepth(depth.name, depth.bytes, step) });
       const prepared = performance.now();
       const encoded = encodeStill(library.wasm, manifest, codesOf({ ...room, albedo, normals, depth: filled }));
       const milliseconds = [prepared - begin, performance.now() - prepared];
@@ -67,19 +67,23 @@ export function serve(scope) {
       start(view);
       return { writes: library.frame(view.registers) };
     },
+    /** A part of a frame, or of one of its passes: bands are the sums so far. */
     async frame({ view, part, parts }, post) {
       const own = ++frame;
       const begin = performance.now();
-      const { camera } = view;
+      const { camera, sample } = view;
       start(view);
+      if (!sample?.index) sums = new Sums(camera.width * camera.height, white * view.exposure, view.inPhoto ? photos[view.file] : null);
+      ++sums.samples;
       for (let first = BAND * part; first < camera.height; first += BAND * parts) {
         await pause();
         if (own !== frame) return { isStopped: true };
+        if (current !== view) start(view);
         const last = Math.min(first + BAND, camera.height);
         const rows = library.rows(first, last, camera.width);
-        const pixels = shown(rows.colours);
-        if (view.inPhoto) composite(pixels, rows, photos[view.file], first * camera.width);
-        post({ first, last, pixels, ...rows });
+        sums.add(rows, first * camera.width);
+        const pixels = sums.shown(first * camera.width, last * camera.width);
+        post({ first, last, pixels, ...(sample ? {} : rows) });
       }
       return { counters: library.counters(), milliseconds: performance.now() - begin };
     },
@@ -108,19 +112,23 @@ export function serve(scope) {
   /** Linear colours as a browser draws them. */
   function shown(colours) {
     const pixels = new Uint8ClampedArray((4 * colours.length) / 3).fill(255);
-    for (let i = 0; i < pixels.length / 4; ++i) for (let channel = 0; channel < 3; ++channel) pixels[4 * i + channel] = curve[colours[3 * i + channel]];
+    for (let i = 0; i < pixels.length / 4; ++i) for (let channel = 0; channel < 3; ++channel) pixels[4 * i + channel] = codeOf(colours[3 * i + channel] / white);
     return pixels;
   }
 
   /** A view: the name of its file, and what replaces the file's poses and registers. */
-  function start({ file, camera, object, lights, registers }) {
+  function start(view) {
+    const { file, camera, object, lights, registers, sample } = view;
     // A room's view that has moved its camera does not go back to that of the maps
     if (opened?.file !== file || (camera.isOfMaps && !opened.isOfMaps)) library.openView(files[file]);
     opened = { file, isOfMaps: Boolean(camera.isOfMaps) };
     if (!camera.isOfMaps) library.setCamera(camera);
     if (object) library.setObject(object);
-    lights.forEach(({ position, colour }, index) => library.setLight(index, position, colour));
+    if (radiance) library.loadMemories([{ memory: "light.cube", words: cubeWords(radiance, object.rotation), bytes: 4 }]);
+    lights.forEach((light, index) => library.setLight(index, light));
+    library.setSample(sample ?? { index: 0, count: 1 });
     library.start(library.frame(registers));
+    current = view;
   }
 
   scope.onmessage = async ({ data: { id, call, ...parameters } }) => {

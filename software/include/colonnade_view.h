@@ -109,7 +109,7 @@ enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, cons
 enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index,
                                               const struct colonnade_light *light);
 
-/* Pass `index` of a frame of 1, 2, 4, 8 or 16 passes: the host's pixel shift and sample points (docs/sampling.md). It holds
+/* Pass `index` of a frame of 1, 2, 4, ... 64 passes: the host's pixel shift and sample points (docs/sampling.md). It holds
  * until the next call, whatever moves; until the first one a frame has one pass. */
 enum colonnade_error colonnade_view_set_sample(struct colonnade_view *view, uint32_t index, uint32_t count);
 

@@ -62,6 +62,7 @@ def main() -> None:
         "studies": found,
         "sliders": sliders,
         "rooms": {name: rooms.room_data(name, presets) for name in rooms.PLACEMENTS},
+        "discs": rooms.discs(),
         "cycles": designs.recorded(texts),
         "views": {name: bundle.base64_text(view) for name, view in views.items()},
     }

@@ -12,10 +12,25 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
 #: Modules after those that they import.
-WORKER = ("design", "library", "meshes", "photo", "depth", "normals", "encoder", "room", "rtl", "worker")
+WORKER = (
+    *("design", "library", "lightcube", "meshes", "photo", "sums", "depth", "normals", "encoder", "room", "rtl"),
+    "worker",
+)
 PAGE = (
-    *("camera", "design", "photo", "roomview", "path", "panels", "orbit", "renderer", "state", "recording", "view"),
-    *("files", "visitor", "rtlpanel", "page"),
+    *(
+        "camera",
+        "design",
+        "photo",
+        "lightcube",
+        "roomview",
+        "path",
+        "panels",
+        "orbit",
+        "renderer",
+        "state",
+        "recording",
+    ),
+    *("view", "files", "visitor", "rtlpanel", "page"),
 )
 
 _IMPORT = re.compile(r'^import [^;]*? from "\./(\w+)\.js";\n', re.MULTILINE)

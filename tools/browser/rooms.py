@@ -1,4 +1,4 @@
-"""The rooms of the page: their maps, and the view file of each design and size of a frame."""
+"""The rooms of the page: their maps and light, and the view file of each design and size of a frame."""
 
 from __future__ import annotations
 
@@ -8,17 +8,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from bundle import base64_text
 from colonnade.design.manifest import Manifest
 from colonnade.device.scene import DeviceScene
+from colonnade.environment.light_cube import LightCube
+from colonnade.environment.surround import Surround
+from colonnade.maps.room_light import room_light
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.model import Placement, Scene
+from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
+from colonnade.scene.passes import exposed
+from colonnade.scene.room_lights import lights_of
+from colonnade.scene.samples import samples_of_frame
 from colonnade.scene.view import place
 from colonnade.scene_image.environment import map_memories
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
+#: Of designs that gather no light; others have lights that are fitted to the photo, and the light of the room.
 SCENE = ROOT / "scenes" / "room.toml"
 #: Where the object stands in each room.
 PLACEMENTS = {
@@ -28,10 +37,20 @@ PLACEMENTS = {
 #: Sizes of frames, in the order of the sizes of a pixel.
 SIZES = {1: (640, 480), 2: (320, 240), 4: (160, 120)}
 MESH = "cube"
+#: Passes of a frame that gathers light, and the lights of a room that have points of their discs.
+PASSES, LIGHTS = 64, 2
 
 
 def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
-    """A room with a cube in it for each design that has maps. In the page other meshes stand on the cube's floor.
+    """A room with a cube in it for each design that has maps. In the page other meshes stand on the cube's floor."""
+    groups = [{design: one for design, one in manifests.items() if one.gathers == gathers} for gathers in (True, False)]
+    kinds = [_kind(name, group) for group in groups]
+    rooms = [kind.pop("room") for kind in kinds]
+    return {**rooms[0], "kinds": kinds}
+
+
+def _kind(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
+    """What designs have that all gather light, or all do not; "room" is the same for both.
 
     Raises:
         ValueError: The designs do not have the same maps.
@@ -44,6 +63,8 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     for design, manifest in manifests.items():
         if manifest.attributes is None:
             continue
+        if manifest.gathers:
+            scene = exposed(replace(scene, names_light=False, paths=replace(scene.paths, gather=1)))
         ready = DeviceScene.of(scene, manifest, load_mesh(MESH), encoder="live")
         views[design] = {str(pixel): base64_text(ready.view_file(size)) for pixel, size in SIZES.items()}
         own = [
@@ -57,7 +78,37 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     assert ready.photo is not None
     photo = io.BytesIO()
     Image.fromarray(ready.photo).save(photo, "JPEG", quality=88)
-    return {"views": views, "maps": maps, "photo": base64_text(photo.getvalue()), **_poses(ready)}
+    light = _light(ready) if ready.scene.paths.gather else None
+    room = {"photo": base64_text(photo.getvalue()), **_poses(ready)}
+    return {"views": views, "maps": maps, "headroom": ready.scene.headroom, "light": light, "room": room}
+
+
+def discs() -> list[list[list[float]]]:
+    """The points of lights' discs in each pass of a frame that gathers light."""
+    return [[list(point) for point in sample.lights] for sample in samples_of_frame(PASSES, LIGHTS)]
+
+
+def _light(ready: DeviceScene) -> dict[str, Any]:
+    """The light around the object in a room: a cube in the axes of the world, and lamps, in the device's numbers."""
+    scene, maps, extent = ready.scene, ready.maps, ready.image.header.extent
+    assert maps is not None and isinstance(ready.unseen, Surround)
+    lights = lights_of(scene, extent, maps.environment)
+    middle = object_pose(scene, extent, maps.environment).to_world(extent.centre)
+    cube = room_light(maps.environment, maps.image, lights, middle, True, ready.unseen).cube
+    lamps = [
+        {
+            "position": light.position.tolist(),
+            "colour": (np.asarray(light.colour) * scene.headroom * scene.exposure).tolist(),
+            "reach": light.falloff or 0,
+            "radius": light.radius,
+        }
+        for light in lights.lights
+    ]
+    return {
+        "cube": base64_text(LightCube(cube.texels * scene.exposure).words().tobytes()),
+        "exposure": scene.exposure,
+        "lamps": lamps,
+    }
 
 
 def _poses(ready: DeviceScene) -> dict[str, Any]:
@@ -80,7 +131,6 @@ def _poses(ready: DeviceScene) -> dict[str, Any]:
             "position": placed.pose.translate.tolist(),
             "scale": placed.pose.scale,
         },
-        "headroom": scene.headroom,
         "width": width,
         "height": height,
     }

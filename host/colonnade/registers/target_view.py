@@ -48,7 +48,7 @@ class TargetView:
         self._view.set_light(index, position, colour, reach)
 
     def set_sample(self, index: int, count: int) -> None:
-        """Compute pass `index` of a frame of `count` passes, 1, 2, 4, 8 or 16: its pixel shift and sample points."""
+        """Compute pass `index` of a frame of `count` passes, 1, 2, 4, … 64: its pixel shift and sample points."""
         self._view.set_sample(index, count)
 
     def writes(self) -> list[tuple[int, int]]:

@@ -45,7 +45,7 @@ struct Library {
     std::unique_ptr<Packed> packed;
     std::vector<std::uint8_t> records;
     std::string error;
-    std::array<double, 10> counters;
+    std::array<double, 11> counters;
     std::vector<RayStep> steps;
     std::vector<colonnade_step> result;
 
@@ -184,7 +184,12 @@ const char* colonnade_model_load(const std::uint8_t* records, std::uint32_t coun
     return nullptr;
 }
 
-const char* colonnade_model_load_map(const char* memory, const std::uint8_t* words, std::uint32_t count, std::uint32_t bytes) {
+const char* colonnade_model_load_memory(const char* memory, const std::uint8_t* words, std::uint32_t count, std::uint32_t bytes) {
+    if (memory == std::string("light.cube")) {
+        if (bytes != LightCube::wordBytes) return "words of the light cube have 4 bytes";
+        library->device->loadCube(words, count);
+        return nullptr;
+    }
     if (library->mapSizes.empty()) return "this design has no memory for a room";
     if (!library->maps) library->maps = std::make_unique<AttributeImage>(AttributeSizes(library->mapSizes), library->mapLayouts);
     library->maps->load(memory, words, count, bytes);
@@ -249,7 +254,7 @@ const std::uint8_t* colonnade_model_records(void) { return library->records.data
 
 const double* colonnade_model_counters(void) {
     const Counters& from = library->device->counters;
-    const std::array<std::uint64_t, 10> values{from.raysPrimary, from.raysShadow, from.raysReflection, from.raysRefraction, from.raysInBox,
+    const std::array<std::uint64_t, 11> values{from.raysPrimary, from.raysShadow, from.raysReflection, from.raysRefraction, from.raysGather,  from.raysInBox,
                                                from.nodeReads,   from.boxTests,   from.triangleTests,  from.hits,           from.deepestStack};
     std::copy(values.begin(), values.end(), library->counters.begin());
     return library->counters.data();

@@ -52,8 +52,8 @@ const char *colonnade_model_pack(const double *vertices, uint32_t vertex_count, 
 /* Loads records in place of a packed mesh. */
 const char *colonnade_model_load(const uint8_t *records, uint32_t count);
 
-/* Loads one of the memories of a room's maps, by its name in the manifest: `count` words of `bytes` bytes. */
-const char *colonnade_model_load_map(const char *memory, const uint8_t *words, uint32_t count, uint32_t bytes);
+/* Loads one of the memories of a room's maps, or the light cube, by its name in the manifest: `count` words of `bytes` bytes. */
+const char *colonnade_model_load_memory(const char *memory, const uint8_t *words, uint32_t count, uint32_t bytes);
 
 /* Writes registers, pairs of word address and value, low byte first, and starts a frame. */
 const char *colonnade_model_start(const uint8_t *writes, uint32_t count);
@@ -68,8 +68,8 @@ uint32_t colonnade_model_trace(uint32_t x, uint32_t y, const struct colonnade_st
 /* The records of the packed mesh. */
 const uint8_t *colonnade_model_records(void);
 
-/* Counters of the frame that the model has: primary, shadow, reflected, refracted and in-box rays, nodes read, boxes tested,
- * triangles tested, hits, deepest stack. */
+/* Counters of the frame that the model has: primary, shadow, reflected, refracted, gathered and in-box rays, nodes read, boxes
+ * tested, triangles tested, hits, deepest stack. */
 const double *colonnade_model_counters(void);
 
 #ifdef __cplusplus

@@ -9,6 +9,7 @@ import json
 import shutil
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +22,17 @@ from colonnade.common.image_io import decode_srgb
 from colonnade.common.srgb import srgb_from_linear
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
+from colonnade.device.gathered_light import with_cube
 from colonnade.device.scene import DeviceScene
+from colonnade.environment.light_cube import LightCube
+from colonnade.environment.seen_light import FINE
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.registers.frame import frame_registers
+from colonnade.scene.cameras import camera_axes
 from colonnade.scene.parser import load_scene
+from colonnade.scene.passes import exposed
+from colonnade.scene.samples import samples_of_frame
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 
@@ -122,8 +129,14 @@ def registers_of(picture: dict[str, Any], manifest: Manifest) -> dict[str, int]:
     }
 
 
-def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, is_in_room: bool = False) -> Any:
-    """The host's frame of the registers that the page wrote; those of the mesh are the host's."""
+def host_frame(
+    picture: dict[str, Any], mesh: Mesh, design: str, is_in_room: bool = False, light: LightCube | None = None
+) -> Any:
+    """The host's frame of the registers that the page wrote; those of the mesh are the host's.
+
+    Args:
+        light: Around the object, in its axes, of a room whose light is gathered.
+    """
     manifest = Manifest.load(ROOT / "configs" / "golden" / f"{design}.json")
     registers = registers_of(picture, manifest)
     image = pack(mesh, manifest)
@@ -131,11 +144,12 @@ def host_frame(picture: dict[str, Any], mesh: Mesh, design: str, is_in_room: boo
     of_mesh = [name for name in own if name.startswith(("bounds.", "scene.")) or name == "shading.offset"]
     assert len(of_mesh) == 11 and {name: registers[name] for name in of_mesh} == {name: own[name] for name in of_mesh}
     if is_in_room:
-        maps = DeviceScene.of(
-            load_scene(ROOT / "scenes" / "room.toml"), manifest, load_mesh("cube"), encoder="live"
-        ).maps
+        scene = load_scene(ROOT / "scenes" / "room.toml")
+        if light is not None:
+            scene = exposed(replace(scene, names_light=False, paths=replace(scene.paths, gather=1)))
+        maps = DeviceScene.of(scene, manifest, load_mesh("cube"), encoder="live").maps
         assert maps is not None
-        image = with_environment(image, maps, manifest)
+        image = with_cube(with_environment(image, maps, manifest), light)
     return render_model(manifest, image, registers)
 
 
@@ -194,6 +208,38 @@ def test_a_room_equals_the_host_and_a_drag_turns_the_object(context: BrowserCont
     assert tab.is_quiet()
 
 
+def test_a_room_lights_the_object_and_passes_are_added(context: BrowserContext) -> None:
+    """The light cube turns with the object; passes have the host's samples, and the points of its lights' discs."""
+    tab = Tab(context, "#pixel=4&room=living&material=metal&azimuth=64")
+    page = tab.page
+    picture = tab.picture()
+    angle = np.radians(64 - 24)
+    rotation = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    light = page.evaluate("({ lamps: colonnade.light.lamps, radiance: [...colonnade.light.radiance] })")
+    cube = LightCube(np.reshape(light["radiance"], (6, FINE, FINE, 3))).turned(rotation)
+    frame = host_frame(picture, load_mesh("teapot"), "textured", is_in_room=True, light=cube)
+    assert frame.is_object.sum() > 100 and frame.ratio.min() < 3500
+    np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
+    np.testing.assert_array_equal(np.reshape(picture["ratios"], frame.ratio.shape), frame.ratio)
+
+    expect(page.locator("#samples")).to_have_text("pass 64 of 64 is added", timeout=30_000)
+    view, middle = page.evaluate("[colonnade.pass, colonnade.middle]")
+    writes = page.evaluate("colonnade.renderer.writes(colonnade.pass)")
+    sample = samples_of_frame(64, len(light["lamps"]))[63]
+    registers = registers_of(writes, Manifest.load(ROOT / "configs" / "golden" / "textured.json"))
+    assert [registers[f"gather.points[0].{axis}"] for axis in "uv"] == list(sample.gather[0])
+    for lamp, placed, point in zip(light["lamps"], view["lights"], sample.lights, strict=True):
+        right, up, _ = camera_axes(np.subtract(lamp["position"], middle), (0, 1, 0))
+        expected = lamp["position"] + lamp["radius"] * (point[0] * right + point[1] * up)
+        np.testing.assert_allclose(placed["position"], expected, atol=1e-12)
+    lit, before = page.evaluate("document.getElementById('picture').toDataURL()"), tab.frames()
+    page.uncheck("input[name=gather]")
+    tab.wait(before)
+    assert page.evaluate("document.getElementById('picture').toDataURL()") != lit
+    expect(page.locator("#notes")).to_contain_text("here it is a mirror")
+    assert tab.is_quiet()
+
+
 def test_a_photo_and_its_depth_are_a_room(context: BrowserContext) -> None:
     """Relit from its maps it is the photo again, and the device sees it as a room of the page."""
     folder = ROOT / "scenes" / "rooms" / "living"
@@ -244,6 +290,13 @@ def test_a_photo_and_its_depth_are_a_room(context: BrowserContext) -> None:
     page.set_input_files("#file", folder / "render.png")
     tab.wait(before)  # the frame after an error leaves it
     expect(page.locator("#error")).to_contain_text("render.png is a photo without depth")
+    # Its light, in hardware that gathers it
+    before = tab.frames()
+    page.select_option("select[name=design]", "textured")
+    expect(page.locator("#notes")).to_contain_text("of the directions around the object", timeout=20_000)
+    tab.wait(before)
+    share, parallax = page.evaluate("[colonnade.light.share, colonnade.light.parallax]")
+    assert 0.1 < share < 0.6 and parallax in (2, 3)
     assert tab.is_quiet()
 
 

@@ -13,10 +13,14 @@ import playwright
 import pytest
 from PIL import Image
 
+from colonnade.common.accumulation import UNSHADOWED, Accumulation
+from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.environment.depth_normals import normals_of_depth
+from colonnade.environment.light_cube import LightCube
 from colonnade.environment.load import load_environment
+from colonnade.environment.seen_light import FINE
 from colonnade.maps.encoded import layout_of
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
 from colonnade.mesh.load import clean_mesh, load_mesh
@@ -143,6 +147,46 @@ def test_a_room_is_encoded_as_by_the_host(tmp_path: Path) -> None:
     derived = np.fromfile(tmp_path / "derived.bin").reshape(own.normals.shape)
     assert abs(result["noise"] / own.noise - 1) < 0.05
     assert np.median(np.degrees(np.arccos(np.clip((derived * own.normals).sum(axis=2), -1, 1)))) < 0.1
+
+
+def test_the_light_cube_and_the_sums_of_passes_are_those_of_the_host(tmp_path: Path) -> None:
+    random = np.random.default_rng(3)
+    fine = LightCube(random.gamma(0.5, 1.0, (6, FINE, FINE, 3))).words()
+    (tmp_path / "fine.bin").write_bytes(fine.tobytes())
+    words = fine.view("<u4").ravel()
+    mantissas = np.stack([words >> shift & 127 for shift in (14, 7, 0)], axis=1)
+    cube = LightCube((mantissas << (words[:, None] >> 21 & 15)).reshape(6, FINE, FINE, 3) / 4096)
+    rotation = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    photo = random.integers(0, 256, (4, 5, 3), dtype=np.uint8)
+    (tmp_path / "photo.bin").write_bytes(photo.tobytes())
+    white, passes = 2047.5, []
+    for _ in range(3):
+        colour, ratio = random.integers(0, 4096, (4, 5, 3)), random.integers(2000, 4600, (4, 5, 3))
+        shows = random.random((4, 5)) < 0.5
+        shows[0], ratio[0, :2] = False, UNSHADOWED
+        passes.append((colour, ratio, shows))
+    as_rows = [
+        {
+            "colours": colour.ravel().tolist(),
+            "ratios": ratio.ravel().tolist(),
+            "triangles": (shows - 1.0).ravel().tolist(),
+        }
+        for colour, ratio, shows in passes
+    ]
+    job = {"rotation": rotation.tolist(), "pixels": 20, "white": white, "passes": as_rows}
+    (tmp_path / "job.json").write_text(json.dumps(job))
+    subprocess.run([node(), Path(__file__).with_name("light.mjs"), tmp_path], check=True)
+    assert (tmp_path / "words.bin").read_bytes() == cube.turned(rotation).words().tobytes()
+
+    sums = [
+        Accumulation.of_pixels(colour.astype(np.uint32), shows, ratio.astype(np.uint32), white, UNSHADOWED)
+        for colour, ratio, shows in passes
+    ]
+    total = sums[0] + sums[1] + sums[2]
+    for name, expected in (("plain", total.pixels()), ("over", encode_srgb(total.over(decode_srgb(photo))))):
+        found = np.fromfile(tmp_path / f"{name}.bin", dtype=np.uint8).reshape(4, 5, 4)
+        assert np.abs(found[..., :3].astype(int) - expected).max() <= 1
+        assert (found[0, :2, :3] == photo[0, :2]).all() or name == "plain"
 
 
 @pytest.mark.matrix

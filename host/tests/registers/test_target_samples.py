@@ -15,7 +15,7 @@ from colonnade.registers.view_names import camera_names, gather_names, light_nam
 from colonnade.scene.model import Light, MeshSource, Paths, Scene
 from colonnade.scene.samples import samples_of_frame
 
-COUNTS = (1, 2, 4, 8, 16)
+COUNTS = (1, 2, 4, 8, 16, 32, 64)
 SCENE = Scene(
     MeshSource(name="teapot:3"),
     light=Light(falloff=2.5),
