@@ -124,7 +124,7 @@ def _is_scene(word: str) -> bool:
     "--waveform",
     type=FILE,
     metavar="FILE",
-    help="Write a VCD waveform of the device, its first column and first render unit; for small frames.",
+    help="Write a VCD waveform of the device, its first column and first traversal unit; for small frames.",
 )
 @strict_option
 @json_option

@@ -123,7 +123,7 @@ def simulate(
         stalls: Random stalls; None: no stalls.
         progress: Shows the steps.
         through_port: Load records through the load port, one per cycle, and not directly into the memories.
-        waveform: VCD file for the signals of the device, its first column and that column's first render unit.
+        waveform: VCD file for the signals of the device, its first column and that column's first traversal unit.
 
     Returns:
         Simulated clock cycles per second of host time, without loading.

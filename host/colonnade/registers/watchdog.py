@@ -23,7 +23,7 @@ TRIANGLE_CYCLES = 24
 #: A design without a tree visits all records.
 TREE_VISITS = 128
 
-#: A read from DRAM, behind those of all other render units.
+#: A read from DRAM, behind those of all other requesters.
 DRAM_CYCLES = 2000
 
 #: A step of the march through an environment, without the lookups of the other units; steps in a tile, cells included.

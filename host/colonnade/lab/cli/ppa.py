@@ -84,11 +84,11 @@ def ppa(
 ) -> None:
     """Synthesise each unit of a configuration separately with Yosys, and sum the units.
 
-    The areas of a render unit, a column and the array are sums over their units. Memories are black boxes with an area
-    per bit; queues are flip-flops. Without --liberty the gates are Yosys's generic ones, without delays. Results are
-    cached per unit: a second run takes seconds.
+    The areas of a traversal unit, a column and the array are sums over their units. Memories are black boxes with an
+    area per bit; queues are flip-flops. Without --liberty the gates are Yosys's generic ones, without delays. Results
+    are cached per unit: a second run takes seconds.
 
-    For power the RTL renders a frame, and the inputs of one render unit are replayed on its gate netlist.
+    For power the RTL renders a frame, and the inputs of one traversal unit are replayed on its gate netlist.
     """
     from colonnade.common.frame_size import parse_size
 

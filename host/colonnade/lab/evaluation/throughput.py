@@ -14,7 +14,7 @@ UNITS = {
     "shader": "busyShader",
 }
 
-#: Counters of context cycles by the context's state, summed over all render units. The remainder is `COMPLETION`.
+#: Counters of context cycles by the context's state, summed over the array. The remainder is `COMPLETION`.
 CONTEXT_CYCLES = {
     "idle": "idleContexts",
     "ray set-up": "contextsRaySetup",
@@ -31,8 +31,8 @@ COMPLETION = "completion"
 #: Ports of a column: each bank reads one record per cycle, each stream delivers one pixel per cycle.
 PORTS = ("memory banks", "pixel streams")
 
-#: Share of the context cycles in which the context has a pixel. It is never reported as the bottleneck.
-RENDER_UNIT = "render unit"
+#: Share of the context cycles of path units in which the context has a pixel. It is never reported as the bottleneck.
+PATH_UNIT = "path unit"
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Shape:
     """Number of instances in a whole design.
 
     Attributes:
-        units: Render units.
+        units: Traversal units.
         triangle_units: Triangle units.
         contexts: Contexts of the path units.
         columns: Columns, each with a path unit and a pixel stream.
@@ -79,7 +79,7 @@ def figures(report: Mapping[str, Any]) -> dict[str, Any]:
     counters, cycles = report["counters"], report["cycles"]
     shape = Shape.of(report["config"])
     use = utilisation(counters, cycles, shape)
-    resources = {name: share for name, share in use.items() if name != RENDER_UNIT}
+    resources = {name: share for name, share in use.items() if name != PATH_UNIT}
     rate = report["rays_per_cycle_in_box"]
     return {
         "utilisation": use,
@@ -104,7 +104,7 @@ def utilisation(counters: Mapping[str, int], cycles: int, shape: Shape) -> dict[
         "shader": shape.columns,
     }
     return {
-        RENDER_UNIT: 1.0 - _ratio(counters["idleContexts"], cycles * shape.contexts),
+        PATH_UNIT: 1.0 - _ratio(counters["idleContexts"], cycles * shape.contexts),
         **{unit: _ratio(counters[counter], cycles * instances[unit]) for unit, counter in UNITS.items()},
         "memory banks": _ratio(counters["recordReads"], cycles * shape.banks),
         "pixel streams": _ratio(counters["raysPrimary"], cycles * shape.columns),

@@ -54,7 +54,7 @@ CYCLES = (
     ),
 )
 AREA = (
-    Column("unit_kge", "render unit", "kGE", "lower", ".1f", "logic and memories of a render unit"),
+    Column("unit_kge", "traversal unit", "kGE", "lower", ".1f", "logic and memories of a traversal unit"),
     Column("array_kge", "array", "kGE", "lower", ",.0f", "logic and memories of the array, without the scene memory"),
     Column("array_mm2", "array at 28 nm", "mm²", "lower", ".2f", "the same at 28 nm"),
     Column("fo4", "slowest path", "FO4", "lower", ".0f", "slowest path between registers, without wires"),

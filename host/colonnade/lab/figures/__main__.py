@@ -10,7 +10,7 @@ from pathlib import Path
 from colonnade.common.errors import UserError
 from colonnade.common.processes import tool
 from colonnade.design.toolchain import project_root
-from colonnade.lab.figures import pages
+from colonnade.lab.figures import pages, pictures
 from colonnade.lab.figures.catalog import catalog, selected
 from colonnade.lab.figures.data import commands_of, problems
 from colonnade.lab.figures.measure import measure, require_libraries
@@ -26,7 +26,7 @@ def main() -> None:
         for entry in catalog().values():
             print(f"{entry.name}: {'; '.join(commands_of(entry))}")
     elif parts == ("check",):
-        found = [*problems(docs), *pages.problems(docs)]
+        found = [*problems(docs), *pages.problems(docs), *pictures.problems(docs)]
         for problem in found:
             print(f"figures: {problem}", file=sys.stderr)
         raise SystemExit(1 if found else 0)
@@ -34,6 +34,7 @@ def main() -> None:
         if parts != ("pages",):
             _measure(parts, docs, again)
         pages.write(docs)
+        pictures.write(docs)
 
 
 def _measure(parts: tuple[str, ...], docs: Path, again: bool) -> None:

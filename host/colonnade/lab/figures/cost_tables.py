@@ -52,7 +52,7 @@ def _energies(unit: Report) -> list[str]:
 
 
 def totals(data: Data) -> str:
-    """Area of render unit, column and array of `edge`, and of the chip."""
+    """Area of traversal unit, column and array of `edge`, and of the chip."""
     rows = []
     for level in LEVEL_NAMES:
         for library, report in _edge(data).items():
@@ -93,7 +93,7 @@ def paths(data: Data) -> str:
     rows = []
     for library, report in _edge(data).items():
         slowest, whole = report["slowest_path"], (report["render_unit_paths"] or {}).get("register_to_register")
-        found = [(f"within one unit: {slowest['unit']}", slowest), ("across units of a render unit", whole)]
+        found = [(f"within one unit: {slowest['unit']}", slowest), ("across units of a traversal unit", whole)]
         for title, path in found:
             if path:
                 row = [title, LIBRARIES[library], f"{path['ns']:.3f}", f"{path['fo4']:.1f}"]

@@ -20,14 +20,9 @@ from colonnade.design.toolchain import project_root
 from colonnade.lab.common.parallel import processors
 from colonnade.lab.figures.catalog import LIBRARIES, REPORT, Entry
 from colonnade.lab.figures.data import Data, commands_of, commit, declare_measured, is_current, problem_of, text_of
-from colonnade.lab.report.fields import plot_fields
-from colonnade.lab.report.stages import plot_stages
 
 #: Keys of reports that no page shows, or that the data file has itself.
 _LEFT_OUT = frozenset({"cells", "flop_tables", "picture", "config", "config_hash", "command", "commit", "is_modified"})
-
-#: The pictures of entries, by the function that draws them from a report.
-_PICTURES = {"bench-edge": plot_stages, "scaling": plot_fields, "ablation": plot_fields}
 
 
 def require_libraries(entries: Sequence[Entry]) -> None:
@@ -75,9 +70,6 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
         raise UserError(f"{entry.name}: the report of {text_of(next(iter(entry.commands.values())))}: {problem}")
     (docs / "data").mkdir(parents=True, exist_ok=True)
     write_json(docs / "data" / f"{entry.name}.json", content)
-    if entry.name in _PICTURES:
-        (docs / "pictures").mkdir(exist_ok=True)
-        _PICTURES[entry.name](reports[""], docs / "pictures" / f"{entry.name.partition('-')[0]}.png")
     declare_measured(docs, entry.name)
     print(f"figures: {entry.name} took {seconds:,.0f} s", flush=True)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from colonnade.lab.common.markdown import markdown
-from colonnade.lab.evaluation.throughput import RENDER_UNIT
+from colonnade.lab.evaluation.throughput import PATH_UNIT
 from colonnade.lab.figures.data import Data
 from colonnade.lab.report.fields import LABELS, base_of, rate_of, varied_points
 
@@ -39,8 +39,8 @@ def utilisation(data: Data) -> str:
     meshes = data.result("bench-edge")["meshes"]
     shares = next(iter(meshes.values()))["utilisation"]
     rows = [[name, *(_percent(share) for share in mesh["utilisation"].values())] for name, mesh in meshes.items()]
-    limits = {name: [mesh["limits"].get(name) for mesh in meshes.values()] for name in shares if name != RENDER_UNIT}
-    means = ["" if name == RENDER_UNIT else _least(limits[name]) for name in shares]
+    limits = {name: [mesh["limits"].get(name) for mesh in meshes.values()] for name in shares if name != PATH_UNIT}
+    means = ["" if name == PATH_UNIT else _least(limits[name]) for name in shares]
     return markdown(["mesh", *shares], [*rows, ["lowest limit, rays per cycle", *means]])
 
 

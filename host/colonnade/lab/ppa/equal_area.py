@@ -71,7 +71,7 @@ class Clock:
 
 
 def fastest_clock(report: Mapping[str, Any]) -> Clock | None:
-    """The clock by the slowest path within a unit or across the units of a render unit; None without a liberty.
+    """The clock by the slowest path within a unit or across the units of a traversal unit; None without a liberty.
 
     Args:
         report: Of `colonnade.lab.ppa.measure.measure`.

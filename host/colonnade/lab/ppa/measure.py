@@ -62,7 +62,7 @@ def measure(
                 count = hierarchy.instances(module, level)
                 units[name] = _unit(level, module, count, netlists, hierarchy.parts(module), tech)
             finished(level.name, name, units[name])
-    with progress.step("timing the whole render unit"):
+    with progress.step("timing the whole traversal unit"):
         whole = _timing(Netlist(netlists, LEVELS[0].top, tech.library), tech) if tech.library else None
     power = None
     if tech.library and operation:
@@ -178,7 +178,7 @@ def _is_timed(unit: Mapping[str, Any]) -> bool:
 
 
 def _levels(units: Mapping[str, Mapping[str, Any]], rows: int, columns: int, boxes: Sequence[Memory]) -> dict[str, Any]:
-    """Gates and memory bits of a render unit, a column and the array; each includes the level below."""
+    """Gates and memory bits of a traversal unit, a column and the array; each includes the level below."""
     levels: dict[str, Any] = {}
     below, bits_below, area_below, memory_below = 0.0, 0, 0.0, 0.0
     for level, copies in zip(LEVEL_NAMES, (0, rows, columns), strict=True):

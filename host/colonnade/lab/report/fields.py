@@ -19,12 +19,12 @@ PANELS = 3
 
 #: Axis labels of fields; other fields are labelled by their key.
 LABELS = {
-    "array.rows": "rows (render units per column)",
+    "array.rows": "rows (traversal units per column)",
     "array.columns": "columns",
-    "array.contexts": "contexts per render unit",
+    "array.contexts": "contexts per traversal unit",
     "units.pathContexts": "contexts per path unit",
     "columnBvhMemory.banks": "memory banks per column",
-    "columnBvhMemory.recordBuffers": "record buffers per render unit",
+    "columnBvhMemory.recordBuffers": "record buffers per traversal unit",
 }
 
 MARKERS = "osD^vP*X"

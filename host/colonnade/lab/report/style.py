@@ -64,4 +64,4 @@ def figure(path: Path, width: float, height: float, rows: int = 1, columns: int 
 def array_name(config: dict[str, Any]) -> str:
     """The size of an array, for titles."""
     array = config["array"]
-    return f"{array['rows']}×{array['columns']} render units, {array['contexts']} contexts"
+    return f"{array['rows']}×{array['columns']} traversal units, {array['contexts']} contexts"

@@ -18,7 +18,7 @@ def test_utilisation_is_averaged_over_instances(rtl_report: MakeReport) -> None:
     figures = throughput.figures(rtl_report(0.5))
     assert figures["utilisation"] == pytest.approx(
         {
-            "render unit": 0.9,
+            "path unit": 0.9,
             "ray set-up": 0.1,
             "box unit": 0.8,
             "triangle unit": 0.2,

@@ -266,12 +266,12 @@ def test_without_data_a_table_is_written_all_the_same(tmp_path: Path, name: str)
 
 def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| bunny | 12 | 100 | 50 | **1.00** | box unit, 80 % | 100 | **1.00** |" in table(docs, "rates")
-    assert "| rows (render units per column) | 4 | 2.00 | 2.00 | 2.00 |" in table(docs, "scaling")
+    assert "| rows (traversal units per column) | 4 | 2.00 | 2.00 | 2.00 |" in table(docs, "scaling")
     assert "| bunny | 12 | 1.000 | 1.250 |" in table(docs, "ablation")
     # 5.53 mm² for 11.06: half of 1 / 0.208; 50 FO4 of 14 ps: 1,429 MHz
     assert "| `edge` | 40 | 11.06 | 50 | 1,429 | 2.00 | 2.00 | 2.40 |" in table(docs, "presets-cost")
     assert "| `edge`, 200 MHz | 200 | 11.06 | 18 |" in table(docs, "designs")
-    assert "| `words` | BoxUnit | render unit | 2 × 128 × 80 | 123 | 0.006 |" in table(docs, "memories")
+    assert "| `words` | BoxUnit | traversal unit | 2 × 128 × 80 | 123 | 0.006 |" in table(docs, "memories")
     assert "`few`" not in table(docs, "memories")
     assert "43,000 LUTs | – | 50 MHz, routed" in table(docs, "presets")
     assert "| mean | 2,000 frames per second at 200 MHz | 100,000 |" in table(docs, "rooms")

@@ -52,7 +52,7 @@ _MODULE = re.compile(r"^module (\w+)", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Level:
-    """A level of the hierarchy: render unit, column or array.
+    """A level of the hierarchy: traversal unit, column or array.
 
     Attributes:
         name: Name in reports.
@@ -69,7 +69,7 @@ class Level:
 
 ARRAY = Level("array", "Colonnade", DEVICE, "rest of Colonnade")
 
-#: The levels, the lowest first. A render unit is a traversal unit of a column.
+#: The levels, the lowest first. Reports name the first one `render_unit`.
 LEVELS = (
     Level("render_unit", "TraversalUnit", TRACE, "contexts"),
     Level("column", "Column", (*PATHS, *COLUMN), "rest of Column"),

@@ -25,7 +25,7 @@ class Frame:
         begin: First counted cycle.
         end: The cycle after the last one.
         counts: Numbers of pixels, rays (primary and shadow), in-box rays and hits of the column.
-        traced: In-box rays of the render unit.
+        traced: In-box rays of the traversal unit.
         shares: The render unit's part of the power of each replayed module.
         records_share: The render unit's part of the reads of records.
     """
@@ -64,7 +64,7 @@ def frame_of(recordings: Mapping[str, Recording]) -> Frame:
     begin, end = positions.index(True), len(pixels) - pixels[::-1].index(True)
     traced = sum(unit.of(_IN_BOX)[begin:end])
     if not traced:
-        raise UserError("the recorded render unit traces no ray: use more --cycles, or a larger --size")
+        raise UserError("the recorded traversal unit traces no ray: use more --cycles, or a larger --size")
     in_box = sum(recordings["PathHits"].fires(_COLUMN_RAYS)[begin:end])
     shadow = sum(paths.of(_SHADOW)[begin:end])
     counts = {

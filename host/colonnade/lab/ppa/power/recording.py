@@ -1,9 +1,9 @@
 """Records the ports of modules while the RTL renders a frame, for a replay on their gate netlists.
 
-A recorder for each module is bound into the simulation: to the render unit itself, and to the column for modules that
-follow paths. It writes inputs and outputs just before each clock edge, from the cycle in which ``io_start`` starts the
-frame. Of several render units, the one that finds no recording yet makes it: the simulator evaluates them in the order
-of their rows.
+A recorder for each module is bound into the simulation: to the traversal unit itself, and to the column for modules
+that follow paths. It writes inputs and outputs just before each clock edge, from the cycle in which ``io_start`` starts
+the frame. Of several traversal units, the one that finds no recording yet makes it: the simulator evaluates them in the
+order of their rows.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ class Stimulus:
 
 
 def whole_frame(rows: int) -> tuple[int, int]:
-    """A frame size at which each render unit of a column with `rows` units works for about ten thousand cycles."""
+    """A frame size at which each traversal unit of a column with `rows` units works for about ten thousand cycles."""
     width = 4 * round(6 * rows**0.5)
     return width, width * 3 // 4
 
@@ -167,7 +167,7 @@ def record(
     Args:
         config: Configuration, before `overrides`.
         overrides: Changes to the configuration, ``key.path=value``.
-        modules: Ports in Yosys's JSON of the modules: a render unit, and others of its column.
+        modules: Ports in Yosys's JSON of the modules: a traversal unit, and others of its column.
         stimulus: The workload.
         progress: Shows the steps.
     """

@@ -5,7 +5,7 @@ give the transitions without glitches. Flip-flops and memories start at zero, as
 compared with the recorded ones in every cycle; the data of a stream only where the stream is valid.
 
 The simulator is ``gates.cpp``. Icarus Verilog was too slow: it took more than four minutes and a gigabyte to
-elaborate the 150,000 gates of a render unit.
+elaborate the 150,000 gates of a traversal unit.
 """
 
 from __future__ import annotations
