@@ -61,26 +61,38 @@ static void end(int signal) {
     _exit(128 + signal);
 }
 
-/* The display that shows the memory: the bytes of its line, or 0. Its console would draw into images and pictures. */
-static uint32_t take_display(uint64_t base) {
+/* Whether a display shows a part of the memory; `line` is that of one that begins there. colonnade.device.console is the
+ * same rule in Python. */
+static bool is_displayed(struct target *target) {
+    bool is_shown = false;
     for (int number = 0; number < DISPLAYS; ++number) {
         struct fb_fix_screeninfo display;
         char name[32];
         snprintf(name, sizeof name, "/dev/fb%d", number);
-        const int file = open(name, O_RDWR);
+        const int file = open(name, O_RDONLY);
+        if (file < 0 && (errno == EACCES || errno == EPERM))
+            target_fail(name, "cannot be opened, and may show the device's memory: run as root");
         if (file < 0) continue;
-        const bool is_it = ioctl(file, FBIOGET_FSCREENINFO, &display) == 0 && display.smem_start == base;
+        const bool is_known = ioctl(file, FBIOGET_FSCREENINFO, &display) == 0;
         close(file);
-        if (!is_it) continue;
-        console = open("/dev/tty0", O_RDWR);
-        if (console < 0 || ioctl(console, KDSETMODE, KD_GRAPHICS) != 0) target_fail("/dev/tty0", strerror(errno));
-        const struct sigaction action = {.sa_handler = end};
-        sigaction(SIGINT, &action, NULL);
-        sigaction(SIGTERM, &action, NULL);
-        atexit(release_console);
-        return display.line_length;
+        const uint64_t start = display.smem_start;
+        if (!is_known || start >= target->base + target->size || target->base >= start + display.smem_len) continue;
+        is_shown = true;
+        if (start == target->base) target->line = display.line_length;
     }
-    return 0;
+    return is_shown;
+}
+
+/* Keeps the console from drawing into images and pictures until the program ends. */
+static void set_console_aside(void) {
+    if (access("/sys/class/tty/tty0", F_OK) != 0) return; /* a kernel without consoles on displays */
+    console = open("/dev/tty0", O_RDWR);
+    if (console < 0 || ioctl(console, KDSETMODE, KD_GRAPHICS) != 0) target_fail("/dev/tty0", strerror(errno));
+    const struct sigaction action = {.sa_handler = end};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGHUP, &action, NULL);
+    atexit(release_console);
 }
 
 void target_open(struct target *target, const char *device) {
@@ -91,7 +103,8 @@ void target_open(struct target *target, const char *device) {
     uio.registers = mmap(NULL, REGISTER_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, uio.file, 0);
     target->memory = mmap(NULL, target->size, PROT_READ | PROT_WRITE, MAP_SHARED, uio.file, sysconf(_SC_PAGESIZE));
     if (uio.registers == MAP_FAILED || target->memory == MAP_FAILED) target_fail(device, strerror(errno));
-    target->line = take_display(target->base);
+    target->line = 0;
+    if (is_displayed(target)) set_console_aside();
     target->bus = (struct colonnade_bus){uio_read, uio_write, uio_wait, &uio};
 }
 

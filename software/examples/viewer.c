@@ -151,6 +151,7 @@ int main(int argc, char **argv) {
     const struct sigaction action = {.sa_handler = end};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGHUP, &action, NULL);
     const struct colonnade_camera start = view.camera;
     if (target.line != 0 && target.line != target_stride(start.width))
         target_fail(argv[3], "frames are not as wide as the display: give pack its --size");

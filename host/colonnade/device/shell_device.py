@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ class ShellDevice(Device):
     framebuffer.
 
     Args:
-        transport: The way to it; closed with the device.
+        transport: The way to it; closed with the device, and if this fails.
         design: Its design with the shell: `shell_manifest_for`, or a folder of ``colonnade generate --axi``.
 
     Raises:
@@ -57,14 +58,17 @@ class ShellDevice(Device):
 
         self.manifest = design.manifest
         self.transport = transport
-        self._table = register_table(design)
-        self._design = DriverDesign.of(self._table, design.manifest)
-        self._paced = PacedTransport(transport)
-        self._driver: Any = _core.Driver(
-            self._paced, list(self._design.format_words), dict(self._design.numbers), list(self._design.maps)
-        )
-        self._check(self._driver.probe())
-        self._driver.enable_interrupts(_FRAME_DONE | _IMAGE_DONE)
+        with ExitStack() as on_error:
+            on_error.callback(transport.close)
+            self._table = register_table(design)
+            self._design = DriverDesign.of(self._table, design.manifest)
+            self._paced = PacedTransport(transport)
+            self._driver: Any = _core.Driver(
+                self._paced, list(self._design.format_words), dict(self._design.numbers), list(self._design.maps)
+            )
+            self._check(self._driver.probe())
+            self._driver.enable_interrupts(_FRAME_DONE | _IMAGE_DONE)
+            on_error.pop_all()
         self._free: int | None = None
         self._size = (0, 0)
         self._placed: tuple[int, int, int] | None = None
@@ -90,7 +94,8 @@ class ShellDevice(Device):
 
     @classmethod
     def uio(cls, path: str = "/dev/uio0", config: str = "small", overrides: Sequence[str] = ()) -> ShellDevice:
-        """A device on the bus of this machine, by Linux' UIO (`UioTransport`).
+        """A device on the bus of this machine, by Linux' UIO (`UioTransport`): until `close`, the console does not draw
+        where a display shows the device's memory.
 
         Args:
             path: The UIO device.
@@ -100,7 +105,8 @@ class ShellDevice(Device):
         Raises:
             UserError: There is no device, or one of another design.
         """
-        return cls(UioTransport(path), shell_manifest_for(config, overrides))
+        design = shell_manifest_for(config, overrides)
+        return cls(UioTransport(path), design)
 
     @classmethod
     def litex(

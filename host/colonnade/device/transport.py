@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Protocol
 
 from colonnade.common.errors import UserError, reason_of
+from colonnade.device.console import ConsoleGuard
 
 #: Bytes of the shell's registers.
 REGISTER_BYTES = 0x10000
@@ -53,7 +54,8 @@ class Transport(Protocol):
 class UioTransport:
     """A device on this machine's bus, by the kernel's UIO: map 0 has the registers, map 1 memory for the device.
 
-    docs/driver.md, "Linux", has the kernel's side. The memory is mapped uncached by ``uio_pdrv_genirq``.
+    docs/driver.md, "Linux", has the kernel's side. The memory is mapped uncached by ``uio_pdrv_genirq``. While a
+    display shows it, the console does not draw there (`ConsoleGuard`).
 
     Args:
         path: Such as ``/dev/uio0``.
@@ -61,7 +63,7 @@ class UioTransport:
         page: Distance of the maps in the file, bytes.
 
     Raises:
-        UserError: The device cannot be opened, or lacks a map.
+        UserError: The device cannot be opened or lacks a map, or the console draws into its memory.
     """
 
     def __init__(
@@ -74,12 +76,17 @@ class UioTransport:
         self.patience = 10.0
         try:
             self._file = os.open(path, os.O_RDWR | os.O_SYNC)
+        except OSError as error:
+            raise UserError(f"{path} cannot be opened: {reason_of(error)}") from None
+        try:
             self._registers = mmap.mmap(self._file, REGISTER_BYTES)
             self._memory = mmap.mmap(self._file, self.size, offset=page)
         except (OSError, ValueError) as error:
+            os.close(self._file)
             raise UserError(f"{path} cannot be mapped: {error}") from None
         self._words = memoryview(self._registers).cast("I")
         self._has_interrupt = True
+        self._console = ConsoleGuard(self.base, self.size)
 
     def read32(self, address: int) -> int:
         """See `Transport`."""
@@ -111,6 +118,7 @@ class UioTransport:
 
     def close(self) -> None:
         """See `Transport`."""
+        self._console.close()
         with contextlib.suppress(OSError, BufferError):
             self._words.release()
             self._registers.close()
