@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import stat
@@ -89,6 +90,16 @@ def read_json(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: str
     return parse_json(read_input(path, what, maximum, missing), f"{what} {path}")
 
 
+def text_of(data: bytes) -> str:
+    """The text of a file: UTF-16 if it begins with a mark of it, else UTF-8, with a mark or without.
+
+    Bytes that are not UTF-8, as of names in another encoding, stay apart as surrogates.
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace")
+    return data.removeprefix(codecs.BOM_UTF8).decode("utf-8", "surrogateescape")
+
+
 def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
     """Parse a JSON document, whose strings may have ``max_text`` characters.
 
@@ -97,7 +108,7 @@ def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
             nested too deeply.
     """
     try:
-        text = data.decode("utf-8") if isinstance(data, bytes) else data
+        text = data.decode("utf-8-sig") if isinstance(data, bytes) else data
         value = json.loads(
             text,
             object_pairs_hook=_object,

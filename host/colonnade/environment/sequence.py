@@ -172,7 +172,7 @@ def load_sequence(path: Path) -> Sequence:
     """
     content = read_input(path, "the sequence", MAX_CAPTURE_TEXT_BYTES, f"sequence {path} does not exist")
     try:
-        data: dict[str, Any] = tomllib.loads(content.decode("utf-8"))
+        data: dict[str, Any] = tomllib.loads(content.decode("utf-8-sig"))
     except RecursionError:
         raise UserError(f"sequence {path} is nested too deeply: {MAX_DEPTH} levels at most") from None
     except ValueError as error:  # invalid TOML or UTF-8, or too many digits

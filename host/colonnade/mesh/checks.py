@@ -7,7 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from colonnade.common.errors import UserError
+from colonnade.mesh.materials import USED_EXTENSIONS
 
+DRACO = "KHR_draco_mesh_compression"
+#: Extensions whose content is read, and checked.
+READ_EXTENSIONS = (
+    *USED_EXTENSIONS,
+    DRACO,
+    "KHR_mesh_quantization",
+    "KHR_lights_punctual",
+    "KHR_texture_transform",
+    "KHR_texture_basisu",
+    "EXT_texture_webp",
+    "EXT_texture_avif",
+)
 #: Elements of an accessor, at most.
 _MAX_ELEMENTS = 100_000_000
 
@@ -61,6 +74,8 @@ def _check_types(value: Any, where: str, fail: Callable[[str], UserError]) -> No
             raise fail(f"{where}.{key} is not a list of whole numbers")
         if key == "attributes" and not all(map(_is_whole, entry.values())):
             raise fail(f"{where}.{key} has a value that is not a whole number")
+        if key == "extensions":
+            entry = {name: entry[name] for name in READ_EXTENSIONS if name in entry}
         if key != "extras":
             _check_types(entry, f"{where}.{key}", fail)
 
@@ -73,6 +88,11 @@ def check_gltf(document: Any, path: Path) -> None:
 
     if not isinstance(document, Mapping):
         raise fail("its JSON is not an object")
+    asset = document.get("asset", {})
+    version = asset.get("version") if isinstance(asset, Mapping) else None
+    # Files of version 1, whose lists are objects, need not name it
+    if str(version).startswith("1") or (version is None and isinstance(document.get("nodes"), Mapping)):
+        raise UserError(f"mesh {path}: it is glTF of version 1: export it as glTF 2.0")
     for key in _LISTS:
         entries = document.get(key, [])
         if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):

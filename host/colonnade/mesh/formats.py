@@ -53,6 +53,5 @@ def read_surface(path: Path) -> MeshFile:
 
         surface = read_stl(content, path, losses)
     if len(surface.faces) == 0:
-        lost = "; ".join(losses.lines()) or "it holds no polygons"
-        raise UserError(f"mesh {path} has no faces: {lost}")
+        raise UserError(f"mesh {path} has no faces: {'; '.join(losses.lines()) or 'it holds no polygons'}")
     return MeshFile(surface, losses)

@@ -19,8 +19,9 @@ from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
+from colonnade.mesh.checks import DRACO, READ_EXTENSIONS
 from colonnade.mesh.gltf_document import GltfDocument
-from colonnade.mesh.gltf_draco import DRACO, DracoPrimitives, PrimitiveArrays
+from colonnade.mesh.gltf_draco import DracoPrimitives, PrimitiveArrays
 from colonnade.mesh.gltf_metal import metal_of, of_map
 from colonnade.mesh.gltf_relief import relief_of
 from colonnade.mesh.gltf_textures import GltfTextures
@@ -31,18 +32,6 @@ from colonnade.mesh.roughness import merged_roughness, surface_areas
 from colonnade.mesh.surface import RawSurface, joined
 from colonnade.mesh.texture import MAX_UV
 
-#: Required extensions that are read, or whose loss is reported.
-_KNOWN_EXTENSIONS = (
-    DRACO,
-    "KHR_mesh_quantization",
-    "KHR_materials_transmission",
-    "KHR_materials_ior",
-    "KHR_lights_punctual",
-    "KHR_texture_transform",
-    "KHR_texture_basisu",
-    "EXT_texture_webp",
-    "EXT_texture_avif",
-)
 #: Extensions that compress the mesh, and are not supported.
 _COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
@@ -152,7 +141,7 @@ def _check_extensions(document: GltfDocument) -> None:
             raise document.error(
                 f"its meshes are compressed (it requires the glTF extension {name}): export it without compression"
             )
-        if name not in _KNOWN_EXTENSIONS:
+        if name not in READ_EXTENSIONS:
             raise document.error(f"it requires the glTF extension {name}, which is not supported: export it without")
 
 

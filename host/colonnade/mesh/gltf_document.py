@@ -52,6 +52,9 @@ class GltfDocument:
 
     def _chunks(self, data: bytes) -> tuple[bytes, bytes | None]:
         """The JSON of a binary file, and the chunk after it."""
+        version = struct.unpack_from("<I", data, 4)[0] if len(data) >= 12 else 0
+        if version == 1:
+            raise UserError(f"{self._path} cannot be read as a mesh: it is glTF of version 1: export it as glTF 2.0")
         chunks: list[tuple[bytes, bytes]] = []
         at = 12
         while at + 8 <= len(data) and len(chunks) < 2:

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy.typing as npt
 
+from colonnade.mesh.checks import DRACO
 from colonnade.mesh.draco import DracoMesh, decode_draco
 from colonnade.mesh.gltf_document import GltfDocument
-
-#: Name of the extension.
-DRACO = "KHR_draco_mesh_compression"
 
 
 @dataclass(frozen=True)

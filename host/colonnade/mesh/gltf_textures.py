@@ -24,8 +24,8 @@ from colonnade.mesh.texture_reader import TextureReader
 _WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 #: Filter of a sampler without interpolation.
 _NEAREST = 9728
-#: Extensions of a texture whose pictures have formats that are read, or not.
-_WEBP, _UNREAD = "EXT_texture_webp", ("KHR_texture_basisu", "EXT_texture_avif")
+#: Extension of a texture whose picture has a format that is read.
+_WEBP = "EXT_texture_webp"
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class GltfTextures:
         if _WEBP in extensions:
             source = extensions[_WEBP].get("source", source)
         if source is None:
-            self._losses.add(lost.PICTURE_FORMATS, any(name in extensions for name in _UNREAD))
+            self._losses.add(lost.PICTURE_FORMATS if extensions else lost.NO_PICTURES)
             return None
         sampler = self._document.entry("samplers", entry["sampler"]) if "sampler" in entry else {}
         wrap_u, wrap_v = (_WRAPS.get(sampler.get(key, 10497), "repeat") for key in ("wrapS", "wrapT"))

@@ -87,6 +87,7 @@ NEGATIVE_SHININESS = Loss.of(
     "material's negative Ns", "taken as 0", "highlights are not rendered", "materials' negative Ns"
 )
 CLIPPED_COLOURS = Loss.of("colour of a vertex", "clipped", "colours are from 0 to 1", "colours of vertices")
+DARK_COLOURS = Loss.of("colour of a vertex", "black", "colours are finite numbers", "colours of vertices")
 SOME_COLOURS = Loss.of("colour of a vertex", "not shown", "not all vertices have one", "colours of vertices")
 NO_MATERIALS = Loss.of("file of materials", "missing", "faces have the default material", "files of materials")
 UNKNOWN_MATERIALS = Loss.of("material name", "not defined", "faces have the default material")

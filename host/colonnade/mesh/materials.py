@@ -5,7 +5,7 @@
 | albedo | base colour factor, linear | `Kd`, sRGB but of Blender; for glass `Tf` if given |
 | mirror | metallic factor of at least ½; faces of a map (`gltf_metal`) | `Pm` of at least ½, or `illum` 3 or 5 |
 | roughness of mirrors and glass, or of the coat of a diffuse surface below ½ | roughness factor | `Pr` |
-| glass | transmission factor above ½ | `d` below ½, `Tr` above ½, or `illum` 4, 6, 7 or 9 |
+| glass | transmission factor above ½ | `d` below ½, else `Tr` from ½ to 1, or `illum` 4, 6, 7 or 9 |
 | alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
 | index of refraction | `KHR_materials_ior` | `Ni` |
 | emission of a diffuse surface | emissive factor times `KHR_materials_emissive_strength`, at most 1 | `Ke`, as `Kd` |
@@ -43,7 +43,7 @@ SHARP_ROUGHNESS = 0.25
 #: The largest roughness of glass.
 GLASS_ROUGHNESS = 0.5
 #: Extensions of glTF materials that are used.
-_USED_EXTENSIONS = (
+USED_EXTENSIONS = (
     "KHR_materials_transmission",
     "KHR_materials_ior",
     "KHR_materials_emissive_strength",
@@ -216,10 +216,10 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
 
     colour = _colour(entries.get("kd"), PLAIN.albedo)
     model = first("illum", 2.0)
-    if first("d", 1.0) < 0.5 or first("tr", 0.0) > 0.5 or model in (4.0, 6.0, 7.0, 9.0):
+    if _opacity(entries) < 0.5 or model in (4.0, 6.0, 7.0, 9.0):
         tint, roughness = _colour(entries.get("tf"), colour), _share(first("pr", 0.0))
         return MeshMaterial("glass", tint, _ior(first("ni", GLASS_IOR)), roughness=roughness)
-    alpha = Alpha(min(first("d", 1.0), 1.0 - first("tr", 0.0))) if "map_d" in entries else None
+    alpha = Alpha(_opacity(entries)) if "map_d" in entries else None
     is_metal = first("pm", 0.0) >= 0.5 or model in (3.0, 5.0)
     if is_metal:
         roughness = _share(first("pr", 0.0))
@@ -227,6 +227,12 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=roughness)
     emission = _colour(entries.get("ke"), _DARK)
     return MeshMaterial("diffuse", colour, emission=emission, alpha=alpha, roughness=coat_roughness(first("pr", 1.0)))
+
+
+def _opacity(entries: Mapping[str, Any]) -> float:
+    """The opacity of a material of an MTL file: `d`, else 1 - `Tr`; `Tr` of 1 is opaque, as MeshLab writes it."""
+    transparency = _first(entries, "tr", 0.0)
+    return _first(entries, "d", 1.0 if transparency >= 1.0 else 1.0 - transparency)
 
 
 def _first(entries: Mapping[str, Any], key: str, default: float) -> float:
@@ -270,7 +276,7 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     found = [(lost.TEXTURE_OBJ, len(maps))]
     if any(_colour(entries.get("ke"), _DARK)) and not _is_lit(from_mtl(entries)):
         found.append((lost.EMISSION, 1))
-    opacity = min(first("d", 1.0), 1.0 - first("tr", 0.0))
+    opacity = _opacity(entries)
     if 0.0 < opacity < 1.0 and "tf" not in entries:
         found.append((lost.PARTLY_GLASS if kind == "glass" else lost.BLENDED, 1))
     if kind == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
@@ -285,7 +291,7 @@ def _is_lit(material: MeshMaterial) -> bool:
 
 def unused_extensions(material: Mapping[str, Any]) -> list[str]:
     """The extensions of a glTF material that are not used."""
-    return [name for name in material.get("extensions", {}) if name not in _USED_EXTENSIONS]
+    return [name for name in material.get("extensions", {}) if name not in USED_EXTENSIONS]
 
 
 def _ior(value: float) -> float:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from colonnade.common.errors import UserError
+from colonnade.common.input_files import text_of
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
@@ -22,15 +23,25 @@ from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial, from_mtl, mtl_losses
 from colonnade.mesh.obj_textures import MtlTextures, TextureMap, uvs_of
 from colonnade.mesh.resolver import References
-from colonnade.mesh.surface import RawSurface, from_polygons
+from colonnade.mesh.surface import RawSurface, from_polygons, linear_colours
 from colonnade.mesh.texture import MAX_UV, Texture
 
 #: Statements of curves, surfaces and their parameter space.
 _CURVES = ("curv", "curv2", "surf")
 #: Keywords of colours in MTL files; the filter `Tf` is a share of the light.
 _COLOURS = ("kd", "ke")
+#: Statements of names, in which # begins no comment.
+_NAMES = re.compile("usemtl|mtllib|newmtl|map_.*|bump|disp|decal|refl|norm", re.IGNORECASE)
 #: Corners that all have a position and a normal.
 _COMPLETE = re.compile(r"[^\s/]+/[^\s/]+/[^\s/]+(?: [^\s/]+/[^\s/]+/[^\s/]+)*")
+
+
+def _statement(line: str) -> tuple[str, str]:
+    """The keyword of a line, and what follows it without a comment."""
+    keyword, _, rest = line.strip().partition(" ")
+    if "#" in line and not _NAMES.fullmatch(keyword):
+        keyword, _, rest = re.sub(r"(?<!\S)#.*", "", line).strip().partition(" ")
+    return keyword, rest
 
 
 class _Statements:
@@ -50,7 +61,7 @@ class _Statements:
         groups: set[str] = set()
         index, material = {"": 0}, 0
         for line in text.splitlines():
-            keyword, _, rest = line.strip().partition(" ")
+            keyword, rest = _statement(line)
             if keyword == "v":
                 self.vertices.append(rest)
             elif keyword == "f":
@@ -79,8 +90,7 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
     Raises:
         UserError: A face names a vertex or a normal that does not exist, or an MTL file is invalid.
     """
-    text = re.sub(r"\\\r?\n", " ", data.decode("utf-8", "replace")).replace("\t", " ")
-    file = _Statements(re.sub(r"#[^\r\n]*", "", text))
+    file = _Statements(re.sub(r"\\\r?\n", " ", text_of(data)).replace("\t", " "))
     vertices, vertex_colours = _vertices(file.vertices, losses)
     normals = _rows(file.normals, 3)[:, :3]
     sizes, corners, corner_normals, corner_uvs = _corners(file, path)
@@ -152,7 +162,7 @@ def _vertices(lines: Sequence[str], losses: Losses) -> tuple[Floats, Floats | No
         losses.add(lost.SOME_COLOURS, coloured)
         return values[:, :3], None
     losses.add(lost.ALPHA, int((values[:, 6] < 1.0).sum()) if values.shape[1] > 6 else 0)
-    return values[:, :3], linear_from_srgb(np.clip(np.nan_to_num(values[:, 3:6]), 0.0, 1.0))
+    return values[:, :3], linear_colours(values[:, 3:6], None, losses)
 
 
 def _indices(words: Sequence[str]) -> tuple[list[int], list[int | None], list[int | None]]:
@@ -211,11 +221,13 @@ def _materials(
 ) -> tuple[tuple[MeshMaterial, ...], Indices, list[TextureMap | None], tuple[Texture, ...]]:
     """The materials of the faces, that of each face, int64, their texture maps, and the textures."""
     defined: dict[str, Mapping[str, Any]] = {}
+    is_missing = False
     for names in file.libraries:
         library = references.materials(names)
         libraries = [library] if library is not None else [references.materials(name) for name in names.split()]
         missing = sum(content is None for content in libraries)
         losses.add(lost.NO_MATERIALS, 1 if missing == len(libraries) else missing)
+        is_missing |= missing > 0
         for content in libraries:
             defined |= {} if content is None else parse_mtl(content)
     used = np.array(file.face_materials, dtype=np.int64)
@@ -228,13 +240,13 @@ def _materials(
             materials[index], maps[index] = textures.textured(from_mtl(defined[name]), defined[name])
             losses.update(mtl_losses(defined[name]))
             losses.add(lost.NEGATIVE_SHININESS, any(word.startswith("-") for word in defined[name].get("ns", [])))
-        elif name and defined:
+        elif name and (defined or not is_missing):
             losses.add(lost.UNKNOWN_MATERIALS)
     textures.reader.count_losses()
     return tuple(materials), used, maps, tuple(textures.reader.textures)
 
 
-def parse_mtl(data: bytes) -> dict[str, dict[str, Sequence[Any]]]:
+def parse_mtl(text: str) -> dict[str, dict[str, Sequence[Any]]]:
     """The materials of an MTL file by name: the words after each keyword, in lower case; of `_COLOURS` linear numbers.
 
     The format leaves the space of its colours open. Viewers take them as sRGB: three.js' MTLLoader and F3D decode them,
@@ -243,9 +255,10 @@ def parse_mtl(data: bytes) -> dict[str, dict[str, Sequence[Any]]]:
     """
     materials: dict[str, dict[str, Sequence[Any]]] = {}
     current: dict[str, Sequence[Any]] = {}
-    is_linear = re.match(rb"\s*#\s*Blender\b", data) is not None
-    for line in re.sub(r"#[^\r\n]*", "", data.decode("utf-8", "replace")).splitlines():
-        keyword, *words = line.split() or [""]
+    is_linear = re.match(r"\s*#\s*Blender\b", text) is not None
+    for line in text.replace("\t", " ").splitlines():
+        keyword, rest = _statement(line)
+        words = rest.split()
         if keyword.lower() == "newmtl":
             current = materials.setdefault(" ".join(words), {})
         elif keyword.lower() in _COLOURS and not is_linear:

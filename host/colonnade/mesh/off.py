@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from colonnade.common.errors import UserError
+from colonnade.common.input_files import text_of
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.surface import RawSurface, from_polygons
+from colonnade.mesh.surface import RawSurface, from_polygons, linear_colours
 
 #: The keyword of the header: texture coordinates, colours and normals of the vertices.
 _KEYWORD = re.compile(r"(ST)?(C)?(N)?OFF")
@@ -27,7 +28,9 @@ def read_off(data: bytes, path: Path, losses: Losses) -> RawSurface:
     Raises:
         UserError: The file is invalid or truncated, or a face names a vertex that does not exist.
     """
-    text = re.sub(r"#[^\r\n]*", "", data.decode("utf-8", "replace"))
+    text = re.sub(r"#[^\r\n]*", "", text_of(data))
+    # Some programs write the counts right after the keyword, as those of ModelNet40
+    text = re.sub(r"\A(\s*[A-Z]*OFF)(?=[0-9])", r"\1 ", text)
     lines = [words for line in text.splitlines() if (words := line.split())]
     keyword = _KEYWORD.fullmatch(lines[0][0]) if lines else None
     if keyword is None or "BINARY" in lines[0]:
@@ -72,7 +75,7 @@ def read_off(data: bytes, path: Path, losses: Losses) -> RawSurface:
         sizes,
         losses,
         corner_normals=values[flat, 3:6] if has_normals else None,
-        vertex_colours=_linear(values[:, columns - 3 :]) if has_colours else None,
+        vertex_colours=linear_colours(values[:, columns - 3 :], None, losses) if has_colours else None,
         polygon_colours=np.array(colours) if any(colour[0] >= 0 for colour in colours) else None,
     )
 
@@ -81,9 +84,8 @@ def _colour(words: list[str]) -> tuple[float, float, float]:
     """The linear colour after a face's corners: three or four numbers; NaN for none."""
     if len(words) < 3:
         return np.nan, np.nan, np.nan
-    red, green, blue = _linear(np.array([[float(word) for word in words[:3]]]), all("." not in word for word in words))[
-        0
-    ]
+    white = 255.0 if all("." not in word for word in words) else 1.0
+    red, green, blue = linear_from_srgb(np.clip(np.nan_to_num([float(word) for word in words[:3]]) / white, 0.0, 1.0))
     return red, green, blue
 
 
@@ -95,9 +97,3 @@ def _is_transparent(words: list[str]) -> bool:
 def _white(colours: Floats) -> float:
     """The largest value of colours without a type: that of bytes, or 1."""
     return 255.0 if bool((colours > 1.0).any()) else 1.0
-
-
-def _linear(colours: Floats, is_whole: bool | None = None) -> Floats:
-    """Colours from sRGB: bytes if they are whole numbers, else from 0 to 1."""
-    white = _white(colours) if is_whole is None else 255.0 if is_whole else 1.0
-    return linear_from_srgb(np.clip(np.nan_to_num(colours) / white, 0.0, 1.0))

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from colonnade.common.errors import UserError
-from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
@@ -24,7 +23,7 @@ from colonnade.mesh.materials import PLAIN
 from colonnade.mesh.ply_elements import AsciiReader, BinaryReader, Columns, Element, ListColumn, read_header
 from colonnade.mesh.ply_textures import textured_polygons
 from colonnade.mesh.resolver import References
-from colonnade.mesh.surface import RawSurface, from_polygons
+from colonnade.mesh.surface import RawSurface, from_polygons, linear_colours
 
 #: Names of a colour and its alpha.
 _COLOURS = (
@@ -63,7 +62,7 @@ def read_ply(data: bytes, path: Path, references: References, losses: Losses) ->
     corners = next((face[name] for name in _CORNERS if isinstance(face.get(name), ListColumn)), None)
     sizes = np.zeros(0, dtype=np.int64) if corners is None else corners.sizes
     flat = np.zeros(0, dtype=np.int64) if corners is None else _whole(corners.values)
-    polygon_colours = None if face_element is None else _colours(face_element, face)
+    polygon_colours = None if face_element is None else _colours(face_element, face, losses)
     if isinstance(strips := content.get("tristrips", (None, {}))[1].get("vertex_indices"), ListColumn):
         triangles = np.array(_unrolled(strips), dtype=np.int64).reshape(-1, 3)
         flat, sizes = np.append(flat, triangles), np.append(sizes, np.full(len(triangles), 3))
@@ -88,7 +87,7 @@ def read_ply(data: bytes, path: Path, references: References, losses: Losses) ->
         for one in element.properties
         if element.rows and name != "edge" and one.name not in read | set(_colour_names(columns) or ())
     ]
-    if unread:
+    if unread and len(sizes):
         losses.add(lost.unread_properties(unread[:_NAMED], len(unread) > _NAMED), len(unread))
     return from_polygons(
         vertices,
@@ -96,7 +95,7 @@ def read_ply(data: bytes, path: Path, references: References, losses: Losses) ->
         sizes,
         losses,
         corner_normals=None if normals is None else normals[flat],
-        vertex_colours=_colours(*content["vertex"]),
+        vertex_colours=_colours(*content["vertex"], losses),
         polygon_colours=polygon_colours,
         materials=(PLAIN,) if textured is None else textured.materials,
         polygon_materials=None if textured is None else textured.polygon_materials,
@@ -122,26 +121,26 @@ def _colour_names(columns: Columns) -> tuple[str, ...] | None:
     return next((names for names in _COLOURS if _stacked(columns, names[:3]) is not None), None)
 
 
-def _white(element: Element, name: str) -> float:
-    """The largest value of a property of colours."""
+def _white(element: Element, name: str) -> float | None:
+    """The largest value of a property of colours; None for real numbers."""
     kind = next(one.kind for one in element.properties if one.name == name)
-    return {"u1": 255.0, "u2": 65535.0}.get(kind, 1.0 if kind.startswith("f") else 255.0)
+    return {"u1": 255.0, "u2": 65535.0}.get(kind, None if kind.startswith("f") else 255.0)
 
 
-def _colours(element: Element, columns: Columns) -> Floats | None:
+def _colours(element: Element, columns: Columns, losses: Losses) -> Floats | None:
     """Linear colours [rows, 3] of an element; None without."""
     names = _colour_names(columns)
     colours = None if names is None else _stacked(columns, names[:3])
     if names is None or colours is None or not len(colours):
         return None
-    return linear_from_srgb(np.clip(np.nan_to_num(colours) / _white(element, names[0]), 0.0, 1.0))
+    return linear_colours(colours, _white(element, names[0]), losses)
 
 
 def _transparent(element: Element, columns: Columns) -> int:
     """Rows of an element with an alpha below that of an opaque one."""
     names = _colour_names(columns)
     alpha = None if names is None else columns.get(names[3])
-    return int((alpha < _white(element, names[3])).sum()) if names and isinstance(alpha, np.ndarray) else 0
+    return int((alpha < (_white(element, names[3]) or 1.0)).sum()) if names and isinstance(alpha, np.ndarray) else 0
 
 
 def _unrolled(strips: ListColumn) -> list[tuple[int, int, int]]:

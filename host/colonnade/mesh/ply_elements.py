@@ -126,6 +126,11 @@ class AsciiReader:
                 if at >= len(words):
                     raise _truncated(self._path, element)
                 if one.count_kind:
+                    if not words[at].isdigit():
+                        raise UserError(
+                            f"mesh {self._path}: a list of {element.name} begins with {words[at].decode('latin-1')},"
+                            " not with its number of values: rows may have more values than the header states"
+                        )
                     size = int(words[at])
                     at += 1
                     if not 0 <= size <= len(words) - at:

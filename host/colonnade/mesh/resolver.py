@@ -7,11 +7,11 @@ import re
 from pathlib import Path
 
 from colonnade.common.errors import UserError
-from colonnade.common.input_files import exists, read_input
+from colonnade.common.input_files import exists, read_input, text_of
 from colonnade.common.limits import MAX_MESH_BYTES, MAX_PICTURE_BYTES, MAX_TEXT_BYTES
 
 #: A line of an MTL file with numbers, which must be finite.
-_NUMBERS = re.compile(rb"(?im)^[ \t]*(k[asde]|tf|ni|ns|d|tr|illum|p[rmsc]\w*)[ \t]+(.*)$")
+_NUMBERS = re.compile(r"(?im)^[ \t]*(k[asde]|tf|ni|ns|d|tr|illum|p[rmsc]\w*)[ \t]+(.*)$")
 
 
 class References:
@@ -20,14 +20,16 @@ class References:
     def __init__(self, mesh: Path) -> None:
         self._folder = mesh.parent
 
-    def materials(self, name: str) -> bytes | None:
-        """The checked content of an MTL file; None if it is missing.
+    def materials(self, name: str) -> str | None:
+        """The checked text of an MTL file; None if it is missing.
 
         Raises:
             UserError: The file cannot be read, is outside the folder, or has a number that is negative or not finite.
         """
         path = self._find(name)
-        return None if path is None else _checked_mtl(read_input(path, "the materials", MAX_TEXT_BYTES * 16), path)
+        if path is None:
+            return None
+        return _checked_mtl(text_of(read_input(path, "the materials", MAX_TEXT_BYTES * 16)), path)
 
     def buffer(self, name: str) -> bytes | None:
         """The content of a glTF buffer; None if it is missing.
@@ -65,16 +67,17 @@ class References:
         return None
 
 
-def _checked_mtl(data: bytes, path: Path) -> bytes:
+def _checked_mtl(text: str, path: Path) -> str:
     """Refuse an MTL file with a number that is negative or not finite; Ns may be negative."""
-    for line in _NUMBERS.finditer(data):
+    for line in _NUMBERS.finditer(text):
         for word in line[2].split():
             try:
                 number = float(word)
             except ValueError:
                 break
-            if not math.isfinite(number) or (number < 0 and line[1].lower() != b"ns"):
-                row = data.count(b"\n", 0, line.start()) + 1
-                text = line[0].decode("latin-1").strip()
-                raise UserError(f"{path}, line {row}: {text}: a material's numbers must be finite and not negative")
-    return data
+            if not math.isfinite(number) or (number < 0 and line[1].lower() != "ns"):
+                row = text.count("\n", 0, line.start()) + 1
+                raise UserError(
+                    f"{path}, line {row}: {line[0].strip()}: a material's numbers must be finite and not negative"
+                )
+    return text

@@ -27,7 +27,7 @@ def read_stl(data: bytes, path: Path, losses: Losses) -> RawSurface:
     """
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= _HEADER else 0
     is_binary = len(data) >= _HEADER and len(data) == _HEADER + _FACET * count
-    if not is_binary and data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:4096].lower():
+    if not is_binary and _is_ascii(data):
         facets, corners = (len(re.findall(word, data)) for word in (rb"(?i)\bfacet\s+normal\b", rb"(?i)\bvertex\b"))
         if corners != 3 * facets or len(re.findall(rb"(?i)\bendsolid\b", data)) == 0:
             raise UserError(
@@ -35,6 +35,8 @@ def read_stl(data: bytes, path: Path, losses: Losses) -> RawSurface:
                 f" {'no' if b'endsolid' not in data.lower() else 'an'} endsolid"
             )
         words = re.findall(rb"(?i)\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
+        if facets == 0:
+            raise UserError(f"mesh {path} has no faces: its solids hold no facets")
         if len(words) != corners:
             raise UserError(f"mesh {path}: a vertex has fewer than 3 numbers")
         vertices = np.array(words).astype(np.float64).reshape(-1, 3)
@@ -50,3 +52,9 @@ def read_stl(data: bytes, path: Path, losses: Losses) -> RawSurface:
             raise UserError(f"mesh {path} has no faces: its header states none")
         vertices = np.ascontiguousarray(records[:, 12:48]).view("<f4").reshape(-1, 3).astype(np.float64)
     return RawSurface(vertices, np.arange(len(vertices), dtype=np.int64).reshape(-1, 3))
+
+
+def _is_ascii(data: bytes) -> bool:
+    """Whether a file that is not whole as a binary one is text: some binary files begin with solid, too."""
+    head = data[:4096].lower()
+    return head.lstrip().startswith(b"solid") and (b"facet" in head or b"endsolid" in head)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
-from colonnade.mesh.losses import CROSSED, SHORT_FACES, TEXTURED_COLOURS, Losses
+from colonnade.mesh.losses import CLIPPED_COLOURS, CROSSED, DARK_COLOURS, SHORT_FACES, TEXTURED_COLOURS, Losses
 from colonnade.mesh.materials import PLAIN, MeshMaterial
 from colonnade.mesh.polygons import triangulate
 from colonnade.mesh.relief import Relief
@@ -108,6 +109,22 @@ def from_polygons(
         textures=textures,
         uvs=None if corner_uvs is None else corner_uvs[split.corners],
     )
+
+
+def linear_colours(colours: Floats, white: float | None, losses: Losses) -> Floats:
+    """Linear colours of sRGB ones, float64 [n, 3]; what is clipped, or no number, is counted.
+
+    Args:
+        colours: float64 [n, 3].
+        white: Their largest value; None: 255 if one of them is above 2, else 1.
+        losses: Counts the colours that change.
+    """
+    finite = np.isfinite(colours)
+    if white is None:
+        white = 255.0 if bool((colours[finite] > 2.0).any()) else 1.0
+    losses.add(DARK_COLOURS, int((~finite).any(axis=1).sum()))
+    losses.add(CLIPPED_COLOURS, int((finite & ((colours < 0.0) | (colours > white))).any(axis=1).sum()))
+    return linear_from_srgb(np.clip(np.where(finite, colours, 0.0) / white, 0.0, 1.0))
 
 
 def joined(parts: Sequence[RawSurface]) -> RawSurface:

@@ -70,7 +70,7 @@ def read_tables(file: Path) -> dict[str, Any]:
     """
     content = read_input(file, "the scene", missing=f"scene file {file} does not exist")
     try:
-        return tomllib.loads(content.decode("utf-8"))
+        return tomllib.loads(content.decode("utf-8-sig"))
     except RecursionError:
         raise UserError(f"scene {file} is nested too deeply: {MAX_DEPTH} levels at most") from None
     except ValueError as error:  # invalid TOML or UTF-8, or too many digits

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,11 @@ from colonnade.common.errors import UserError
 from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.topology import subdivide
 
+#: An ASCII file whose rows of faces have a value that its header does not state.
+PLY = (
+    b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n%s\nend_header\n"
+    b"0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2 0.5\n3 0 1 2 0.5\n"
+)
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
@@ -83,6 +89,16 @@ def test_midpoints_keep_the_surface() -> None:
         ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|but the file has"),
         ("huge.obj", b"v 0 0 0\nv 1e200 0 0\nv 0 1 0\nf 1 2 3\n", "scale it down"),
         ("picture.png", b"x", "suffix of a mesh file"),
+        ("old.glb", b"glTF" + struct.pack("<4I", 1, 24, 4, 0) + b"{}  ", "glTF of version 1: export it as glTF 2.0"),
+        ("old.gltf", b'{"nodes": {"a": {}}}', "glTF of version 1: export it as glTF 2.0"),
+        ("named.gltf", b'{"asset": {"version": "1.1"}}', "glTF of version 1: export it as glTF 2.0"),
+        ("empty.stl", b"solid a\nendsolid a\n", "no faces: its solids hold no facets"),
+        ("cloud.ply", PLY % b"property float w\nelement face 0\nproperty list uchar int vertex_indices", "no polygons"),
+        (
+            "extra.ply",
+            PLY % b"property float w\nelement face 2\nproperty list uchar int vertex_indices",
+            "than the header",
+        ),
     ],
 )
 def test_bad_files_are_refused_in_one_line(tmp_path: Path, file: str, content: bytes, message: str) -> None:

@@ -37,6 +37,8 @@ def test_mtl_materials() -> None:
     assert from_mtl({"illum": ["3"]}) == MeshMaterial("mirror", PLAIN.albedo)
     assert from_mtl({"d": ["0.1"], "ni": ["1.0"], "tf": ["1", "0.5", "2"]}) == MeshMaterial("glass", (1.0, 0.5, 1.0))
     assert from_mtl({"tr": ["0.8"], "ni": ["1.45"]}) == MeshMaterial("glass", PLAIN.albedo, 1.45)
+    assert from_mtl({"tr": ["1.0"]}) == PLAIN  # as MeshLab writes opaque ones
+    assert from_mtl({"tr": ["0.9"], "d": ["1"]}) == PLAIN
     assert from_mtl({"kd": "noise", "d": ["nan"], "illum": []}) == PLAIN
 
 
@@ -83,6 +85,26 @@ def test_colours_of_mtl_files_are_srgb_but_of_blender(tmp_path: Path, head: str,
     found = {material.albedo: material.emission for material in load_mesh(tmp_path / "m.obj").materials}
     half, quarter = (0.5, 0.25) if is_linear else linear_from_srgb(np.array([0.5, 0.25])).tolist()
     assert found == {(half, quarter, 1.0): (half, 0.0, 0.0), (0.8, 1.0, 1.0): (0.0, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "gbk"])
+def test_names_stay_apart_in_any_encoding(tmp_path: Path, encoding: str) -> None:
+    colours, names = ("1 0 0", "0 1 0", "0 0 1"), ("铁 #1", "铁 #2", "木")
+    materials = "".join(f"newmtl {name}\nKd {colour} # sRGB\n" for name, colour in zip(names, colours, strict=True))
+    faces = "".join(f"usemtl {name}\nf 1 2 3 # {name}\nf 1 2 4\nf 2 3 4\n" for name in names)
+    (tmp_path / "a.mtl").write_bytes(materials.encode(encoding))
+    (tmp_path / "a.obj").write_bytes(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nmtllib a.mtl\n{faces}".encode(encoding))
+    mesh = load_mesh(tmp_path / "a.obj")
+    assert mesh.notes == () and {material.albedo for material in mesh.materials} >= {(1, 0, 0), (0, 1, 0), (0, 0, 1)}
+
+
+def test_names_without_materials_are_noted(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n")
+    assert (
+        load_mesh(tmp_path / "a.obj")
+        .notes[0]
+        .endswith("1 material name is not defined: faces have the default material")
+    )
 
 
 def test_files_without_materials_have_the_default(tmp_path: Path) -> None:

@@ -77,6 +77,31 @@ def test_colours_that_are_not_colours_are_refused_or_noted(tmp_path: Path) -> No
     assert any("2 colours of vertices are clipped: colours are from 0 to 1" in note for note in notes)
 
 
+def test_colours_of_text_files_are_bytes_or_shares_or_noted(tmp_path: Path) -> None:
+    def read(red: str) -> tuple[list[float], tuple[str, ...]]:
+        (tmp_path / "a.obj").write_text(
+            "".join(f"v {at} {red} 0 0\n" for at in ("0 0 0", "1 0 0", "0 1 0")) + "f 1 2 3"
+        )
+        mesh = load_mesh(tmp_path / "a.obj", corner_colours=True)
+        assert mesh.corner_colours is not None
+        return mesh.corner_colours[0, :, 0].tolist(), tuple(note.partition(".obj: ")[2] for note in mesh.notes)
+
+    assert read("51") == read("0.2") == (pytest.approx([0.0331] * 3, abs=1e-4), ())
+    assert read("1.5") == ([1.0] * 3, ("3 colours of vertices are clipped: colours are from 0 to 1",))
+    assert read("nan") == ([0.0] * 3, ("3 colours of vertices are black: colours are finite numbers",))
+
+
+def test_what_unread_extensions_hold_is_not_checked(tmp_path: Path) -> None:
+    content = document(tmp_path)
+    content["textures"] = [{"extensions": {"MSFT_texture_dds": {"source": 0}}}]
+    content["extensionsRequired"] = ["KHR_materials_emissive_strength", "KHR_materials_pbrSpecularGlossiness"]
+    content["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": {"mode": "ATTRIBUTES"}}
+    assert "1 picture of a texture is not readable" in loaded(tmp_path, content)[0]
+    content["extensionsRequired"] = ["EXT_meshopt_compression"]
+    with pytest.raises(UserError, match=r"its meshes are compressed .*EXT_meshopt_compression"):
+        loaded(tmp_path, content)
+
+
 def test_a_negative_emission_is_refused(tmp_path: Path) -> None:
     content = document(tmp_path)
     content["materials"][0]["emissiveFactor"] = [-1, 0, 0]
