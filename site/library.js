@@ -154,6 +154,7 @@ export class Library {
 
   /** Opens a view file. Its device has the word addresses of the manifest. */
   openView(file) {
+    if (!file) throw new Error("this design has no such view");
     const registers = this.manifest.registers.fields.filter((field) => field.access === "rw");
     const design = new Uint32Array(64);
     for (let i = 0; i < 8; ++i) design[i] = parseInt(this.manifest.formatHash.slice(8 * i, 8 * i + 8), 16);

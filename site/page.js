@@ -28,7 +28,8 @@ let data, renderer, manifest, packed, rays, chosen, traced;
 let state = readState(location.hash);
 let isChanged = false;
 let isRunning = false;
-let isWorking = false;
+/** Works that wait or run: the state may be ahead of design, room and mesh. */
+let works = 0;
 /** What tests read: the last whole frame, the light of its room, and its last pass. */
 const page = (window.colonnade = { frames: 0, picture: null });
 
@@ -60,15 +61,15 @@ function sizeOf(pixel) {
 
 /** Renders until the picture is that of the state: coarse at once, then whole, band by band, then the sums of passes. */
 async function update() {
-  if (!packed || isWorking) return;
+  if (!packed || works > 0) return;
   isChanged = true;
   if (isRunning) return void renderer.stop();
   isRunning = true;
   try {
-    while (isChanged) {
+    while (isChanged && works === 0) {
       isChanged = false;
       const coarse = roomOf() ? COARSE : COARSE * state.pixel;
-      if ((await render(coarse, true)) && !isChanged && (await render(state.pixel, false)) && !isChanged) await rest();
+      if ((await render(coarse, true)) && (await render(state.pixel, false))) await rest();
     }
   } catch (error) {
     fail(error.message);
@@ -76,6 +77,9 @@ async function update() {
     isRunning = false;
   }
 }
+
+/** Whether the frame that is next is still wanted. */
+const goesOn = () => !isChanged && works === 0;
 
 /** Adds up the passes of the picture while nothing changes. */
 async function rest() {
@@ -86,13 +90,13 @@ async function rest() {
     const frame = await renderer.frame(view, ({ first, last, pixels }) => {
       if (!isChanged) picture.putImageData(new ImageData(pixels, width, last - first), 0, first);
     });
-    if (frame === null || isChanged) return;
+    if (frame === null || !goesOn()) return;
     page.samples = index + 1;
     element("samples").textContent = `pass ${page.samples} of ${count} is added`;
   }
 }
 
-/** Renders a frame, and shows it; false if another work has stopped it. */
+/** Renders a frame, and shows it; false if no other one may follow. */
 async function render(pixel, isCoarse) {
   const box = boxOf();
   for (const canvas of [picture.canvas, overlay.canvas]) for (const [name, value] of Object.entries(box)) canvas.style[name] = `${value}px`;
@@ -122,7 +126,7 @@ async function render(pixel, isCoarse) {
     document.body.dataset.frames = page.frames += 1;
   }
   drawPath();
-  return true;
+  return goesOn();
 }
 
 /** Keeps what a canvas shows when its size changes. */
@@ -202,21 +206,16 @@ async function pack() {
 /** Does one thing after the other, and then renders; after an error, what was. Nothing is rendered meanwhile. */
 let queue = Promise.resolve();
 function then(work) {
+  ++works;
   queue = queue
     .then(async () => {
-      isWorking = true;
-      try {
-        await renderer.stop();
-        await work();
-      } finally {
-        isWorking = false;
-      }
-      show();
+      await renderer.stop();
+      await work();
     })
-    .catch((error) => {
-      fail(error.message);
-      update();
-    });
+    .then(
+      () => (--works, show()),
+      (error) => (--works, fail(error.message), update()),
+    );
   return queue;
 }
 
@@ -345,7 +344,7 @@ window.addEventListener("hashchange", () => {
     const isOther = design !== state.design || room !== state.room;
     if (isOther) await openDesign();
     if (isOther || material !== state.material) await pack();
-    if (state.follow) await follow();
+    if (state.follow) await followRay();
   });
 });
 stage.addEventListener("dragover", (event) => (event.preventDefault(), stage.classList.add("dropping")));
@@ -413,7 +412,12 @@ function followed() {
   return { x, y, width, height, orbit: { azimuth, elevation, distance, x: panX, y: panY, ...Object.fromEntries(inRoom) } };
 }
 
-async function follow() {
+/** Follows the ray of the state's pixel, after what is being done, unless more is to be done then. */
+function follow() {
+  queue = queue.then(() => works === 0 && followRay()).catch((error) => fail(error.message));
+}
+
+async function followRay() {
   if (!packed || !state.follow) return;
   const { x, y, width, height, orbit } = followed();
   const view = viewOf(scene(), roomOf(), width, height, orbit);
@@ -488,7 +492,7 @@ async function start() {
   }
   showNotes();
   state.follow = followed;
-  if (followed) await follow();
+  if (followed) await followRay();
   show();
   new ResizeObserver(() => update()).observe(stage);
 }

@@ -89,17 +89,21 @@ export function poseIn({ manifest, packed }, room, orbit) {
 export function viewOf(scene, room, width, height, orbit, sample = null, discs = []) {
   const registers = registersOf(scene, room);
   const points = sample ? discs[sample.index] : [];
-  if (room)
+  if (room) {
+    const inPhoto = Boolean(scene.state.photo) && isAtMaps(orbit);
+    // Where there is no photo, the room is the device's
+    const window = inPhoto ? {} : { "environment.window.x0": 0, "environment.window.y0": 0, "environment.window.x1": width, "environment.window.y1": height };
     return {
       file: String(room.height / height),
       camera: roomCamera(room, width, height, orbit),
       object: poseIn(scene, room, orbit),
       lights: (room.light?.lamps ?? []).map((lamp, index) => ({ ...lamp, position: onDisc(lamp, room.object.position, points[index]) })),
-      registers,
+      registers: { ...registers, ...window },
       sample,
       exposure: room.light?.exposure ?? 1,
-      inPhoto: Boolean(scene.state.photo) && isAtMaps(orbit),
+      inPhoto,
     };
+  }
   const light = { position: lightOf(cameraOf(START, width, height), LIGHT), colour: [0.9, 0.9, 0.9].map((value) => value * scene.state.light) };
   return { file: "plain", camera: cameraOf(orbit, width, height), lights: [light], registers, sample, exposure: 1 };
 }

@@ -120,7 +120,9 @@ export function serve(scope) {
   function start(view) {
     const { file, camera, object, lights, registers, sample } = view;
     // A room's view that has moved its camera does not go back to that of the maps
-    if (opened?.file !== file || (camera.isOfMaps && !opened.isOfMaps)) library.openView(files[file]);
+    const isOther = opened?.file !== file || (camera.isOfMaps && !opened.isOfMaps);
+    current = opened = null; // until all is well
+    if (isOther) library.openView(files[file]);
     opened = { file, isOfMaps: Boolean(camera.isOfMaps) };
     if (!camera.isOfMaps) library.setCamera(camera);
     if (object) library.setObject(object);

@@ -7,7 +7,7 @@
 #define COLONNADE_PIXEL ((int64_t)1 << 32) /* of a lens */
 
 /* Contents of `environment.window`. */
-enum { WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE, WINDOW_CONSTANT };
+enum { WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE, WINDOW_CONSTANT, WINDOW_NEAR }; /* shadow and near may both be */
 
 /* Places in the computed words. */
 enum {

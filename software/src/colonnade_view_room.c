@@ -211,7 +211,7 @@ static void set_window(struct colonnade_view *view, const struct lengths *length
     const int64_t *shift = view->sample.shift;
     const int64_t focal[2] = {camera->fx, camera->fy}, centre[2] = {camera->cx - shift[0], camera->cy - shift[1]};
     struct region window = {{.is_empty = true}, scene->window == WINDOW_WHOLE};
-    if (scene->window == WINDOW_SHADOW) {
+    if (scene->window == WINDOW_SHADOW || scene->window == (WINDOW_SHADOW | WINDOW_NEAR)) {
         const int32_t margin = ((int32_t)1 << scene->vertex_bits) / MARGIN_PARTS + 1;
         int32_t corners[8][3], in_world[8][3];
         find_corners(scene, lengths, 0, margin, corners);
@@ -222,6 +222,13 @@ static void set_window(struct colonnade_view *view, const struct lengths *length
             const struct region shadow = find_shadow(lengths, i, &box, corners, in_world);
             unite(&window, &shadow);
         }
+    }
+    if ((scene->window & WINDOW_NEAR) != 0 && !window.is_whole) { /* within an edge of the cube from the box */
+        int32_t corners[8][3];
+        struct region near = {{.is_empty = true}, false};
+        find_corners(scene, lengths, 0, (int32_t)1 << scene->vertex_bits, corners);
+        near.is_whole = !include_corners(&near.extent, corners);
+        unite(&window, &near);
     }
     uint32_t *words = colonnade_computed(view) + VIEW_WINDOW;
     for (int i = 0; i < 2; ++i) {

@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from colonnade.maps.encoded import EncodedEnvironment
     from colonnade.scene_image.header import ImageHeader
 
-#: Contents of `environment.window`; the last one: it and occlusion are constant. The largest error of a tile, 2^-16 m.
-WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE, WINDOW_CONSTANT = range(4)
+#: Contents of `environment.window`; constant: so is occlusion. Shadows, and surfaces near the object, may be added up.
+WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE, WINDOW_CONSTANT, WINDOW_NEAR = range(5)
+#: The largest error of a tile, 2^-16 m.
 MAX_TILE_ERROR = (1 << 24) - 1
 #: Fraction bits of a depth in a tile.
 DEPTH_FRACTION = 10
@@ -64,7 +65,8 @@ def surface_words(
     """What window and occlusion of a moving object need."""
     environment, depth = room.environment, room.depth
     low, high = _bounds(environment, depth, size)
-    shadowed = WINDOW_SHADOW if registers["shading.shadows"] else WINDOW_NONE
+    changed = WINDOW_SHADOW if registers["shading.shadows"] else WINDOW_NONE
+    changed += WINDOW_NEAR if registers.get("gather.bounces", 0) else WINDOW_NONE
     window = [registers[name] for name in window_names()[:4]]
     limit = (1 << manifest.registers["environment.occlusionTolerance"].width) - 1 >> more_grid_bits(manifest)
     tile = int(manifest.config["physicalAttributeMemory"]["tileSize"])
@@ -72,7 +74,7 @@ def surface_words(
     return [
         *position_words(low, "the room"),
         *position_words(high, "the room"),
-        WINDOW_WHOLE if window == [0, 0, *size] or registers.get("gather.bounces", 0) else shadowed,
+        WINDOW_WHOLE if window == [0, 0, *size] else changed,
         int(occlusion),
         round(header.extent.edge * grid_step(header, manifest)),
         *(limit, tile, tiles.shape[1], tiles.shape[0]),

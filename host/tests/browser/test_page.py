@@ -401,6 +401,37 @@ def test_controls_and_the_size_of_a_phone(browser: Browser) -> None:
     context.close()
 
 
+def test_changes_that_come_faster_than_pictures(context: BrowserContext) -> None:
+    """Designs, rooms, materials and rays while frames and other works run: no error, and the last state is shown."""
+    tab = Tab(context, "#pixel=4")
+    page = tab.page
+    before = page.evaluate(
+        """async () => {
+          const form = document.getElementById("controls"), error = document.getElementById("error");
+          window.errors = [];
+          const note = () => error.hidden || errors.push(error.textContent);
+          new MutationObserver(note).observe(error, { childList: true });
+          const designs = ["edge", "textured", "diffuse", "lean"], rooms = ["office", "living", ""];
+          const choices = Object.entries({ design: designs, room: rooms, material: ["glass", "metal"] });
+          for (let index = 0; index < 24; ++index) {
+            const [name, values] = choices[index % 3];
+            form.elements[name].value = values[Math.floor(index / 3) % values.length];
+            form.elements[name].dispatchEvent(new Event("input", { bubbles: true }));
+            const key = new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true });
+            document.getElementById("stage").dispatchEvent(key);
+            await new Promise((resolve) => setTimeout(resolve, 37 * (index % 5)));
+          }
+          return colonnade.frames;
+        }"""
+    )
+    tab.wait(before)
+    expect(page.locator("#samples")).to_have_text("pass 4 of 4 is added")
+    assert page.evaluate("errors") == []
+    frame = host_frame(tab.picture(), load_mesh("teapot"), "lean", is_in_room=True)
+    np.testing.assert_array_equal(np.reshape(tab.picture()["colours"], frame.colour.shape), frame.colour)
+    assert tab.is_quiet()
+
+
 def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) -> None:
     tab = Tab(context, "#pixel=4&design=edge")
     page = tab.page

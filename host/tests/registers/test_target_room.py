@@ -41,9 +41,10 @@ from colonnade.registers.occlusion import may_hide, occlusion_tolerance
 from colonnade.registers.shadow_window import EMPTY, shadow_window
 from colonnade.registers.target_view import TargetView
 from colonnade.registers.view_file import view_file
+from colonnade.registers.view_room import WINDOW_NEAR, WINDOW_SHADOW, WINDOW_WORD
 from colonnade.scene.model import Background, Light, MeshSource, Scene, Transform
 from colonnade.scene.object_pose import Pose
-from colonnade.scene.view import View, make_view, place
+from colonnade.scene.view import Gather, View, make_view, place
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 
@@ -162,13 +163,17 @@ def room(request: pytest.FixtureRequest) -> Room:
 
 
 def room_views(
-    room: Room, seed: int, count: int = max(20, POSES // 10), moves_camera: bool = False
+    room: Room, seed: int, count: int = max(20, POSES // 10), moves_camera: bool = False, gathers: bool = False
 ) -> Iterator[tuple[dict[str, int], View]]:
     """Registers by the target, and the view, of random poses."""
-    random, target = np.random.default_rng(seed), TargetView(room.file, room.manifest)
+    words = np.frombuffer(room.file, dtype="<u4").copy()
+    window = 85 + 11 * words[28] + WINDOW_WORD
+    assert words[window] == WINDOW_SHADOW
+    words[window] += WINDOW_NEAR * gathers
+    random, target = np.random.default_rng(seed), TargetView(words.tobytes(), room.manifest)
     for _ in range(count):
         view = room.random_view(random, target, moves_camera)
-        yield target.registers(), view
+        yield target.registers(), dataclasses.replace(view, gather=Gather(1, ()) if gathers else None)
 
 
 MOVES = pytest.mark.parametrize("moves_camera", [False, True], ids=["of the maps", "another"])
@@ -199,9 +204,10 @@ def test_the_projection_to_the_maps_is_the_float_one(room: Room, moves_camera: b
             assert abs(found[name] - expected[name]) <= 1
 
 
-def test_the_window_contains_that_of_the_pixels(room: Room) -> None:
+@pytest.mark.parametrize("gathers", [False, True])
+def test_the_window_contains_that_of_the_pixels(room: Room, gathers: bool) -> None:
     shares = []
-    for found, view in room_views(room, 7):
+    for found, view in room_views(room, 7, gathers=gathers):
         x0, y0, x1, y1 = (found[f"environment.window.{edge}"] for edge in EDGES)
         a0, b0, a1, b1 = shadow_window(view, room.environment, room.depth, room.header.extent)
         if (a0, b0, a1, b1) != EMPTY:
