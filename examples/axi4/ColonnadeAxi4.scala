@@ -7,9 +7,7 @@ import chisel3._
   * @param hasAttributes
   *   with `lock`, `cache`, `prot` and `qos`
   */
-class Axi4Pins(idBits: Int, addressBits: Int, hasAttributes: Boolean) extends Bundle {
-  private val dataBits = 64
-
+class Axi4Pins(idBits: Int, addressBits: Int, dataBytes: Int, hasAttributes: Boolean) extends Bundle {
   private def attribute(bits: Int): Option[UInt] = Option.when(hasAttributes)(Output(UInt(bits.W)))
 
   val awid    = Output(UInt(idBits.W))
@@ -24,8 +22,8 @@ class Axi4Pins(idBits: Int, addressBits: Int, hasAttributes: Boolean) extends Bu
   val awvalid = Output(Bool())
   val awready = Input(Bool())
 
-  val wdata  = Output(UInt(dataBits.W))
-  val wstrb  = Output(UInt((dataBits / 8).W))
+  val wdata  = Output(UInt((8 * dataBytes).W))
+  val wstrb  = Output(UInt(dataBytes.W))
   val wlast  = Output(Bool())
   val wvalid = Output(Bool())
   val wready = Input(Bool())
@@ -48,23 +46,27 @@ class Axi4Pins(idBits: Int, addressBits: Int, hasAttributes: Boolean) extends Bu
   val arready = Input(Bool())
 
   val rid    = Input(UInt(idBits.W))
-  val rdata  = Input(UInt(dataBits.W))
+  val rdata  = Input(UInt((8 * dataBytes).W))
   val rresp  = Input(UInt(2.W))
   val rlast  = Input(Bool())
   val rvalid = Input(Bool())
   val rready = Output(Bool())
 }
 
-/** The top `colonnade_axi4`, for systems in Chisel. The default widths are those of Rocket Chip's MMIO and slave ports. */
-class ColonnadeAxi4(slaveIdBits: Int = 4, masterIdBits: Int = 8)
-    extends BlackBox(Map("SLAVE_ID" -> slaveIdBits, "MASTER_ID" -> masterIdBits)) {
+/** The top `colonnade_axi4`, for systems in Chisel. The default widths are those of Rocket Chip's MMIO and slave ports.
+  *
+  * @param masterBytes
+  *   `--axi` of the design
+  */
+class ColonnadeAxi4(slaveIdBits: Int = 4, masterIdBits: Int = 8, masterBytes: Int = 8)
+    extends BlackBox(Map("SLAVE_ID" -> slaveIdBits, "MASTER_ID" -> masterIdBits, "MASTER_BYTES" -> masterBytes)) {
   override def desiredName = "colonnade_axi4"
 
   val io = IO(new Bundle {
     val clock = Input(Clock())
     val reset = Input(Bool())
     val irq   = Output(Bool())
-    val s_axi = Flipped(new Axi4Pins(slaveIdBits, 32, hasAttributes = false))
-    val m_axi = new Axi4Pins(masterIdBits, 40, hasAttributes = true)
+    val s_axi = Flipped(new Axi4Pins(slaveIdBits, 32, 8, hasAttributes = false))
+    val m_axi = new Axi4Pins(masterIdBits, 40, masterBytes, hasAttributes = true)
   })
 }

@@ -1,9 +1,10 @@
-// ColonnadeAxi of `colonnade generate --axi 8` with the AXI4 ports of an SoC: registers as a slave with 64 bits, as a
+// ColonnadeAxi of `colonnade generate --axi BYTES` with the AXI4 ports of an SoC: registers as a slave with 64 bits, as a
 // processor's MMIO port is, and memory as a master with all signals of AXI4. With COLONNADE_SCENE defined it has the second
 // master of a design whose scene is in DRAM.
 module colonnade_axi4 #(
     parameter int SLAVE_ID = 4,
-    parameter int MASTER_ID = 8
+    parameter int MASTER_ID = 8,
+    parameter int MASTER_BYTES = 8  // of the design: --axi
 `ifdef COLONNADE_SCENE
     ,
     parameter int SCENE_ID = 2,     // of the design: 1 with one or two banks of records, 2 with four
@@ -35,12 +36,12 @@ module colonnade_axi4 #(
     output logic          m_axi_awlock, m_axi_arlock,
     output logic [3:0]    m_axi_awcache, m_axi_arcache, m_axi_awqos, m_axi_arqos,
     output logic          m_axi_awvalid, m_axi_wvalid, m_axi_wlast, m_axi_bready, m_axi_arvalid, m_axi_rready,
-    output logic [63:0]   m_axi_wdata,
-    output logic [7:0]    m_axi_wstrb,
+    output logic [8*MASTER_BYTES-1:0] m_axi_wdata,
+    output logic [MASTER_BYTES-1:0] m_axi_wstrb,
     input  logic          m_axi_awready, m_axi_wready, m_axi_bvalid, m_axi_arready, m_axi_rvalid, m_axi_rlast,
     input  logic [MASTER_ID-1:0] m_axi_bid, m_axi_rid,
     input  logic [1:0]    m_axi_bresp, m_axi_rresp,
-    input  logic [63:0]   m_axi_rdata
+    input  logic [8*MASTER_BYTES-1:0] m_axi_rdata
 `ifdef COLONNADE_SCENE
     ,
     output logic [MASTER_ID-1:0] m_axi_scene_arid,

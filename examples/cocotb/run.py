@@ -43,9 +43,11 @@ def main(arguments: argparse.Namespace) -> None:
     sources += [] if backdoor is None else [backdoor / "backdoor.sv"]
     memory = json.loads((design / "manifest.json").read_text())["config"]["columnBvhMemory"]
     cache, defines, parameters = memory["cache"], {}, {}
+    if arguments.axi4:
+        parameters = {"MASTER_BYTES": json.loads((design / "shell.json").read_text())["busBytes"]}
     if arguments.axi4 and cache is not None:
         defines = {"COLONNADE_SCENE": 1}
-        parameters = {"SCENE_ID": 2 if memory["banks"] == 4 else 1, "SCENE_BYTES": cache["busBytes"]}
+        parameters |= {"SCENE_ID": 2 if memory["banks"] == 4 else 1, "SCENE_BYTES": cache["busBytes"]}
     build = arguments.output.with_suffix(f".{simulator}")
     runner = get_runner(simulator)
     # Icarus Verilog has no bind: the backdoor is a second top module.

@@ -11,14 +11,15 @@ _COUNTS = ("error_count", "counter_count", "tile_size", "posted_writes")
 
 
 def design_header(table: RegisterTable, manifest: Manifest) -> str:
-    """Format hash, addresses of registers, and names of errors and counters. Needs ``colonnade.h`` of the driver."""
+    """Format hash, addresses of registers, and names of errors and counters. Needs ``colonnade.h`` of the driver.
+
+    Its members are in the order of ``struct colonnade_design``, without names, which C++ has since 2020.
+    """
     design = DriverDesign.of(table, manifest)
     words = [f"{word:#010x}u" for word in design.format_words]
     names = [*design.errors.items(), *design.counters.items()]
     numbers = [
-        f"    .{name} = {value if name in _COUNTS else f'{value:#x}'},"
-        for name, value in design.numbers.items()
-        if value or name not in ("scene_page", "invalidate")
+        f"    {value if name in _COUNTS else f'{value:#x}'}, /* {name} */" for name, value in design.numbers.items()
     ]
     maps = [f"{{{width}, {depth}}}" for width, depth in design.maps]
     lines = [
@@ -33,10 +34,11 @@ def design_header(table: RegisterTable, manifest: Manifest) -> str:
         "};",
         "",
         "static const struct colonnade_design colonnade_design = {",
-        f"    .format_hash = {{{', '.join(words[:4])},",
-        f"                    {', '.join(words[4:])}}},",
+        f"    {{{', '.join(words[:4])},",
+        f"     {', '.join(words[4:])}}}, /* format_hash */",
         *numbers,
-        *([f"    .map_count = {len(maps)},", f"    .maps = {{{', '.join(maps)}}},"] if maps else []),
+        f"    {len(maps)}, /* map_count */",
+        f"    {{{', '.join(maps or ['{0, 0}'])}}}, /* maps */",
         "};",
         "",
         "#endif",

@@ -12,6 +12,7 @@ import pytest
 
 from colonnade.common.errors import UserError
 from colonnade.design.generator import GeneratedDesign, shell_design_for
+from colonnade.device import console
 from colonnade.device.device import Device, ModelDevice
 from colonnade.device.scene import DeviceScene
 from colonnade.device.shell_device import ShellDevice
@@ -26,6 +27,12 @@ SIZE = (20, 6)
 #: `test_shell.py` has the same design: its simulator is built once.
 CONFIG = ("tiny", ("array.columns=2",))
 INTERRUPT_STATUS, CONTROL = 0x48, 0x40
+
+
+@pytest.fixture(autouse=True)
+def no_display(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Displays of this machine are not those of the devices here."""
+    monkeypatch.setattr(console, "ROOT", tmp_path)
 
 
 @pytest.fixture(scope="module")

@@ -78,7 +78,7 @@ def test_a_frame_through_the_axi4_top_in_verilator(
     )
     monkeypatch.setenv("PATH", f"{tools.stdout.strip()}:{os.environ['PATH']}")
     config = f"tiny --set 'columnBvhMemory.cache={json.dumps(CACHE)}'" if cache else "tiny"
-    settings = {"SIMULATOR": "verilator", "AXI": "8", "AXI4": "1", "MESH": "torus", "SIZE": "32x24"}
+    settings = {"SIMULATOR": "verilator", "AXI4": "1", "MESH": "torus", "SIZE": "32x24"}
     printed = run_example(tmp_path, CONFIG=config, DRAM="1" if cache else "", **settings)
     assert "0 of 768 pixels differ from model.png" in printed
 

@@ -96,6 +96,19 @@ def test_all_files_are_there(folder: Path) -> None:
     assert f"colonnade@{BASE:x}" in (folder / "colonnade.dtsi").read_text()
 
 
+@pytest.mark.parametrize("compiler", ["gcc -std=c11", "g++ -std=c++17", "g++ -std=c++20"])
+def test_all_headers_compile_without_a_library(folder: Path, tmp_path: Path, compiler: str) -> None:
+    """As a SoC's own program includes them, in C++ too."""
+    names = ("colonnade_design.h", "colonnade_registers.h", "colonnade_shell.h", "colonnade_view.h")
+    source = tmp_path / ("program.cpp" if "++" in compiler else "program.c")
+    use = "unsigned word(void);\nunsigned word(void) { return colonnade_design.maps[0].words; }"
+    source.write_text("".join(f'#include "{name}"\n' for name in names) + use)
+    command = [*compiler.split(), "-ffreestanding", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only"]
+    includes = [f"-I{toolchain.project_root() / 'software' / 'include'}", f"-I{folder}"]
+    done = subprocess.run([*command, *includes, source], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("interrupt", ["4294967296", "999999999999999999999999999999", "-1"])
 def test_an_interrupt_beyond_a_cell_of_a_device_tree_is_refused(interrupt: str, tmp_path: Path) -> None:
     done = CliRunner().invoke(cli, ["registers", "--interrupt", interrupt, "--output", str(tmp_path / "out")])
