@@ -6,7 +6,7 @@
 | ``albedo.png`` | reflectance, grey or colour; derived from the photo if it is missing |
 | ``normal.png`` | n * 0.5 + 0.5 in view space; derived from depth if it is missing |
 | ``depth.npy`` or ``depth.png`` | metres along z, or 16-bit grey in steps of ``depth_step`` metres; optional |
-| ``photo.png`` or ``render.png`` | the camera's picture of the room, sRGB; optional |
+| `PHOTOS` | the camera's picture of the room, sRGB; optional |
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ DEFAULT_DEPTH_STEP = 0.001
 MAX_DEPTH_STEP = 1e3
 #: Largest width or height of a map, pixels, limited by the hardware's plane coefficients.
 MAX_EDGE = 4096
-_NEEDS = "meta.json, albedo.png or a photo, and normal.png or a depth map"
+#: Names of the photo.
+PHOTOS = ("photo.png", "photo.jpg", "photo.jpeg", "photo.webp", "render.png")
+_NEEDS = f"meta.json, albedo.png or a photo ({', '.join(PHOTOS)}), and normal.png or a depth map"
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def load_environment(path: Path, camera_height: float | None = None) -> Environm
         files.find(folder, ("albedo.png",)),
         files.find(folder, ("normal.png",)),
         files.find(folder, ("depth.npy", "depth.png")),
-        files.find(folder, ("photo.png", "render.png")),
+        files.find(folder, PHOTOS),
         _depth_step(meta, meta_file),
         encoding,
     )

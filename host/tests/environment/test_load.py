@@ -258,6 +258,8 @@ def test_photo_depth_and_pose_alone_are_a_room(tmp_path: Path) -> None:
     folder = tmp_path / "attic"
     shutil.copytree(ROOMS / "attic", folder)
     remove("albedo.png", "normal.png")(folder)
+    Image.open(folder / "photo.png").save(folder / "photo.jpg", quality=99)
+    remove("photo.png")(folder)
     room = load_environment(folder)
     assert [note for note in room.notes if "no normal.png" in note]
     assert [note for note in room.notes if "no albedo.png" in note]

@@ -117,6 +117,14 @@ def test_the_reference_is_composited_as_the_device_is(folder: Path, light: str) 
     assert decibels(reference, relit[1]) < 40
 
 
+def test_what_a_room_lacks_is_noted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    room = replace(load_environment(folder / "dark"), notes=("its depth is estimated",))
+    lit_room(
+        Scene(MeshSource("cube"), background=Background(room=folder / "dark")), room, load_mesh("cube").extent, 1, False
+    )
+    assert "colonnade: room dark: its depth is estimated\n" in capsys.readouterr().err
+
+
 def test_the_colours_of_a_room_can_be_chosen(folder: Path) -> None:
     """Without shadows a room that is relit in the photo's colours is the photo."""
     photo = decode_srgb(attic(*SIZE).environment.photo)
