@@ -15,6 +15,9 @@ from colonnade.common.atomic_files import kind_of
 from colonnade.common.errors import UserError, reason_of
 from colonnade.common.limits import MAX_DEPTH, MAX_DIGITS, MAX_TEXT, MAX_TEXT_BYTES
 
+#: The first bytes of what Git leaves in place of a large file.
+_POINTER = b"version https://git-lfs.github.com/spec/"
+
 
 def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: str | None = None) -> bytes:
     """Read an input file.
@@ -26,7 +29,7 @@ def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: st
         missing: the error message for a missing file.
 
     Raises:
-        UserError: The file is missing, not regular, too large, unreadable, or a declared output.
+        UserError: The file is missing, not regular, too large, unreadable, a pointer of Git LFS, or a declared output.
     """
     refused = require_regular(path, what, missing)
     try:
@@ -41,6 +44,8 @@ def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: st
         raise UserError(f"cannot read {what} {path}: {reason_of(error)}") from None
     if status.st_size > maximum or len(data) > maximum:
         raise UserError(f"{what} {path} is too large: it may have {maximum:,} bytes")
+    if data.startswith(_POINTER):
+        raise UserError(f"{what} {path} is a pointer of Git LFS, not the file itself: get it by git lfs pull")
     ledger.add_input(path, status)
     return data
 

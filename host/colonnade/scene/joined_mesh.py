@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colonnade.common import fixed_order
+from colonnade.common import fixed_order, notes
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials import PLAIN
 from colonnade.mesh.mesh import Mesh, MeshPart
 from colonnade.mesh.palette import MAX_MATERIALS
 from colonnade.mesh.texture import Texture
-from colonnade.scene.model import Scene, SceneObject
+from colonnade.scene.model import Material, Scene, SceneObject
 from colonnade.scene.object_pose import Pose, footprint_of, free_placement, rotation_matrix, standing_pose
 from colonnade.scene.standing import surface_point
 from colonnade.scene.view import with_overrides
@@ -39,10 +40,23 @@ def joined_mesh(scene: Scene, environment: Environment | None, corner_colours: b
         key = f"{described.mesh.source} {described.mesh.crease}"
         if key not in loaded:
             loaded[key] = load_mesh(described.mesh.source, described.mesh.crease, corner_colours)
+            report_replaced(loaded[key], described.material)
         mesh = replace(loaded[key], materials=with_overrides(loaded[key].materials, described.material))
         poses.append(_pose(described, mesh, environment, f"object {number}", taken))
         meshes.append(_flat(mesh) if described.material.flat else mesh)
     return _joined(meshes, poses)
+
+
+def report_replaced(mesh: Mesh, overrides: Material) -> None:
+    """Note the colours and textures of a mesh that the albedo of a scene replaces."""
+    own = [
+        one for one in mesh.materials if one.texture is not None or one.has_corner_colours or one.albedo != PLAIN.albedo
+    ]
+    if own and overrides.albedo is not None:
+        count = "the material has" if len(own) == 1 else f"{len(own)} materials have"
+        notes.report(
+            [f"mesh {mesh.name}: {count} the albedo of the scene, not that of the file: leave out material.albedo"]
+        )
 
 
 def _pose(

@@ -17,7 +17,7 @@ from colonnade.mesh.palette import (
     without_textures,
 )
 from colonnade.mesh.roughness import with_fewer_roughnesses
-from colonnade.scene.joined_mesh import joined_mesh
+from colonnade.scene.joined_mesh import joined_mesh, report_replaced
 from colonnade.scene.model import Scene
 from colonnade.scene.passes import may_have_layers
 from colonnade.scene.view import with_overrides
@@ -64,7 +64,9 @@ def object_mesh(scene: Scene, environment: Environment | None = None, corner_col
     """
     if scene.objects:
         return joined_mesh(scene, environment, corner_colours)
-    return load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours)
+    mesh = load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours)
+    report_replaced(mesh, scene.material)
+    return mesh
 
 
 def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:

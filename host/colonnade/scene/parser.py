@@ -17,6 +17,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.input_files import check_values, read_input
 from colonnade.common.limits import MAX_COORDINATE, MAX_DEPTH
 from colonnade.design.toolchain import project_root
+from colonnade.mesh.formats import SUFFIXES
 from colonnade.scene.model import MAX_EDGE, MAX_OBJECTS, MeshSource, Scene
 
 if sys.version_info >= (3, 11):
@@ -68,6 +69,8 @@ def read_tables(file: Path) -> dict[str, Any]:
     Raises:
         UserError: The file is missing, or is not TOML.
     """
+    if file.suffix.lower() in SUFFIXES:
+        raise UserError(f"{file} is a mesh, not a scene: give it by mesh.path of a scene, or as --mesh of as-authored")
     content = read_input(file, "the scene", missing=f"scene file {file} does not exist")
     try:
         return tomllib.loads(content.decode("utf-8-sig"))

@@ -89,6 +89,7 @@ def test_midpoints_keep_the_surface() -> None:
         ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "cannot be read|but the file has"),
         ("huge.obj", b"v 0 0 0\nv 1e200 0 0\nv 0 1 0\nf 1 2 3\n", "scale it down"),
         ("picture.png", b"x", "suffix of a mesh file"),
+        ("lfs.glb", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "is a pointer of Git LFS"),
         ("old.glb", b"glTF" + struct.pack("<4I", 1, 24, 4, 0) + b"{}  ", "glTF of version 1: export it as glTF 2.0"),
         ("old.gltf", b'{"nodes": {"a": {}}}', "glTF of version 1: export it as glTF 2.0"),
         ("named.gltf", b'{"asset": {"version": "1.1"}}', "glTF of version 1: export it as glTF 2.0"),

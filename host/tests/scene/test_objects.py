@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.hits import read_hits, write_hits
 from colonnade.common.image_io import encode_srgb
@@ -21,9 +22,24 @@ from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Material, MeshSource, Scene, SceneObject, Transform
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
 from colonnade.scene.standing import Footprint, free_place, surface_point
+
+
+def test_colours_that_the_scene_replaces_are_noted(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl a\nKd 1 0 0\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    lines: list[str] = []
+    with notes.opened(lines.append):
+        for material in (Material(kind="mirror"), Material(albedo=(1.0, 1.0, 1.0))):
+            assert lines == []
+            object_mesh(Scene(MeshSource(path=tmp_path / "a.obj"), material=material))
+    assert lines == [
+        "mesh a: the material has the albedo of the scene, not that of the file: leave out material.albedo"
+    ]
+
 
 TWO = """
 [[object]]

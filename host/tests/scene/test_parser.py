@@ -87,6 +87,12 @@ def test_mistakes_are_named(tmp_path: Path, text: str, message: str) -> None:
     assert "\n" not in str(caught.value) and "scene.toml" in str(caught.value)
 
 
+def test_a_mesh_is_no_scene_and_a_mark_is_no_text(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"a\.GLB is a mesh, not a scene: give it by mesh\.path"):
+        load_scene(tmp_path / "a.GLB")
+    assert load_scene(write(tmp_path, '\ufeff[mesh]\nname = "cube"')).mesh.name == "cube"
+
+
 def test_a_room_with_several_lights_is_read(tmp_path: Path) -> None:
     text = """
     [mesh]
