@@ -16,15 +16,20 @@ from colonnade.common.errors import UserError, reason_of
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Iterator[IO[bytes]]:
+def replacing(path: Path, is_edited: bool = False) -> Iterator[IO[bytes]]:
     """Write ``path`` through a temporary file in the same folder, so that it is never partly written.
 
+    Args:
+        path: The file.
+        is_edited: It is an input that the command edits.
+
     Raises:
-        UserError: ``path`` cannot be an output (see `check_writable`), is an input of this command, or the disk is
+        UserError: ``path`` cannot be an output (see `check_writable`), is an input that is not edited, or the disk is
             full. An existing file is then unchanged.
     """
     check_writable(path)
-    ledger.check_write(path)
+    if not is_edited:
+        ledger.check_write(path)
     temporary: Path | None = None
     try:
         handle, name = tempfile.mkstemp(prefix=".colonnade.", dir=path.parent)

@@ -29,7 +29,7 @@ def save_camera(file: Path, position: Sequence[float], target: Sequence[float]) 
         UserError: The file cannot be read or replaced, or has another camera that forbids this one.
     """
     try:
-        document = tomlkit.parse(read_input(file, "the scene").decode("utf-8"))
+        document = tomlkit.parse(read_input(file, "the scene").decode("utf-8-sig"))
     except (TOMLKitError, ValueError) as error:
         raise UserError(f"scene {file} is not TOML: {error}") from None
     if "camera" not in document:
@@ -43,5 +43,5 @@ def save_camera(file: Path, position: Sequence[float], target: Sequence[float]) 
     for name, values in (("position", position), ("target", target)):
         camera[name] = [round(float(value), _DIGITS) + 0.0 for value in values]
     scene_of(document.unwrap(), f"scene {file}", file.parent)
-    with replacing(file) as stream:
+    with replacing(file, is_edited=True) as stream:
         stream.write(tomlkit.dumps(document).encode("utf-8"))

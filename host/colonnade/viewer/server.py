@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import sys
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -60,6 +61,11 @@ class ViewServer(ThreadingHTTPServer):
         """Serve and watch the scene, in threads that end with the program or by `stop`."""
         threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True).start()
         threading.Thread(target=self.session.watch, daemon=True).start()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a page that was closed."""
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
 
     def stop(self) -> None:
         """End the threads, and release the session."""
@@ -141,7 +147,7 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             work()
         except UserError as error:
-            self._answer(422, str(error).encode())
+            self._answer(422, str(error).encode(errors="replace"))
         except (ValueError, KeyError, TypeError):
             self._answer(400, b"six numbers describe a camera")
 

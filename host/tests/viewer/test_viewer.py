@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import colonnade
+from colonnade.common import ledger
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import decode_srgb, write_png
 from colonnade.viewer.camera_table import save_camera
@@ -171,7 +172,8 @@ def test_requests_of_others_are_refused(server: ViewServer, file: Path) -> None:
 def test_a_camera_in_every_form_of_a_table_is_saved(tmp_path: Path, before: str, after: str) -> None:
     file = tmp_path / "scene.toml"
     file.write_text(before)
-    save_camera(file, (1, 2, 3), (0, 0, 0.123456))
+    with ledger.opened():  # as of the command, which has read the scene
+        save_camera(file, (1, 2, 3), (0, 0, 0.123456))
     assert after in file.read_text()
     camera = colonnade.Scene.load(file).description.camera
     assert camera.position == (1, 2, 3) and camera.target == (0, 0, 0.1235)
