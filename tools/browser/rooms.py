@@ -66,7 +66,9 @@ def _kind(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
         if manifest.gathers:
             scene = exposed(replace(scene, names_light=False, paths=replace(scene.paths, gather=1)))
         ready = DeviceScene.of(scene, manifest, load_mesh(MESH), encoder="live")
-        views[design] = {str(pixel): base64_text(ready.view_file(size, composited=True)) for pixel, size in SIZES.items()}
+        views[design] = {
+            str(pixel): base64_text(ready.view_file(size, composited=True)) for pixel, size in SIZES.items()
+        }
         own = [
             {"memory": part.memory, "bytes": part.words.shape[1], "words": base64_text(part.words.tobytes())}
             for part in ready.image.attributes

@@ -127,8 +127,9 @@ def lit_room(
     """
     scene = with_free_placement(scene, extent, room)
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
-    for note in () if room is None else room.notes:
-        progress.note(f"room {room.name}: {note}")
+    if room is not None:
+        for note in room.notes:
+            progress.note(f"room {room.name}: {note}")
     around = panorama_light(scene, extent, room, max_lights, progress)
     second = _second_view(scene, progress)
     unseen: Panorama | Surround | None = None
