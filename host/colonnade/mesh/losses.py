@@ -81,6 +81,7 @@ ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "paths.gather = 1 render
 ROUGHEST_GLASS = Loss.of("rough glass", "as rough as 1/2", "no glass is rougher", "rough glasses")
 PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror", "1/2 and above is a mirror")
 PARTLY_GLASS = Loss.of("partly transmissive material", "rounded to opaque or glass", "above 1/2 is glass")
+LAMPS = Loss.of("slightly rough surface", "without highlights", "frame.samples of 2 or more render those of lamps")
 COATS = Loss.of("glossy material", "matt", "paths.gather = 1 and frame.samples of 2 or more render its reflections")
 HIGHLIGHTS = Loss.of("glossy material", "diffuse", "highlights are not rendered")
 NEGATIVE_SHININESS = Loss.of(

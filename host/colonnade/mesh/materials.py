@@ -51,15 +51,18 @@ USED_EXTENSIONS = (
 )
 #: Textures whose readers count what is lost of them.
 _READ_TEXTURES = ("baseColorTexture", "diffuseTexture", "normalTexture")
-#: What the coat of a dielectric reflects: between 0.04, where it faces the eye, and 0.09, the mean over a sphere.
+#: What coats reflect, and glass of lights: between 0.04, where it faces the eye, and 0.09, the mean over a sphere.
 COAT_REFLECTANCE = 0.06
-#: Roughness from which on a mirror has highlights: that of the device's narrowest lobe.
+#: Roughness from which on mirrors and glass have highlights: that of the device's narrowest lobe.
 HIGHLIGHT_ROUGHNESS = 0.125
 #: The kind of a surface that spreads light cube and lights in a lobe, as the layers of a frame have it (`in_layer`).
 ROUGH_METAL = "rough metal"
 #: The layers of a frame, which are added: surfaces, their coats, and what the marks of lamps do not show.
-Layer = Literal["surface", "coat", "highlight"]
+Layer = Literal["surface", "coat", "highlight", "glass highlight"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
+#: The layers of lights alone, and the radiance of a lamp that surfaces already show in the device's numbers, by its
+#: mark: what a mirror brings is at most 1, and glass reflects so little of the mark that all of it counts.
+MARKS: Mapping[Layer, float] = {"highlight": 1.0, "glass highlight": 16.0}
 #: No emission.
 _DARK = (0.0, 0.0, 0.0)
 
@@ -146,7 +149,9 @@ def in_layer(material: MeshMaterial, layer: Layer) -> MeshMaterial:
             return replace(material, kind=ROUGH_METAL, emission=_DARK)
     if layer == "surface":
         return replace(material, roughness=0.0) if material.kind == "diffuse" else material
-    if layer == "coat" and material.kind == "diffuse" and material.roughness > 0:
+    is_coated = layer == "coat" and material.kind == "diffuse" and material.roughness > 0
+    has_highlights = layer == "glass highlight" and material.kind == "glass"
+    if is_coated or (has_highlights and material.roughness >= HIGHLIGHT_ROUGHNESS):
         return MeshMaterial(ROUGH_METAL, (COAT_REFLECTANCE,) * 3, roughness=material.roughness)
     return BLACK
 

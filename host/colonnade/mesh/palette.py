@@ -13,7 +13,7 @@ from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.materials import SMOOTH_ROUGHNESS, MeshMaterial, as_rendered
+from colonnade.mesh.materials import BLACK, MARKS, SMOOTH_ROUGHNESS, MeshMaterial, as_rendered, in_layer
 from colonnade.mesh.mesh import Mesh
 
 #: Limit of the 8-bit material index of a face.
@@ -158,20 +158,18 @@ def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:
     return replace(material, albedo=(red, green, blue), texture=None)
 
 
-def with_rendered_metal(mesh: Mesh, gathers: bool, has_coats: bool = False) -> tuple[Mesh, tuple[str, ...]]:
+def with_rendered_metal(mesh: Mesh, gathers: bool, has_layers: bool = False) -> tuple[Mesh, tuple[str, ...]]:
     """A mesh whose rough metal, glass and coats are as the device shows them (`as_rendered`), and lines on the losses.
 
     Args:
         mesh: The mesh.
         gathers: The scene gathers light.
-        has_coats: It also has the passes of coats.
+        has_layers: It also has the passes of coats and highlights.
     """
     found = Losses()
     materials = tuple(
-        as_rendered(material, gathers and (has_coats or material.kind != "diffuse")) for material in mesh.materials
+        as_rendered(material, gathers and (has_layers or material.kind != "diffuse")) for material in mesh.materials
     )
-    if materials == mesh.materials:
-        return mesh, ()
     left_out: dict[lost.Loss, set[MeshMaterial]] = {}
     for material, rendered in zip(mesh.materials, materials, strict=True):
         smooth = replace(material, roughness=0.0)  # a map gives a material several roughnesses
@@ -181,6 +179,8 @@ def with_rendered_metal(mesh: Mesh, gathers: bool, has_coats: bool = False) -> t
             left_out.setdefault(_WITHOUT_ROUGHNESS[material.kind], set()).add(smooth)
         elif material.kind == "glass" and rendered.roughness < material.roughness:
             left_out.setdefault(lost.ROUGHEST_GLASS, set()).add(smooth)
+        if gathers and not has_layers and any(in_layer(rendered, layer) != BLACK for layer in MARKS):
+            left_out.setdefault(lost.LAMPS, set()).add(smooth)
     found.update((loss, len(those)) for loss, those in left_out.items())
     return replace(mesh, materials=materials), found.lines(f"mesh {mesh.name}")
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
-from colonnade.mesh.materials import PLAIN, MeshMaterial, as_rendered, in_layer
+from colonnade.mesh.materials import MARKS, PLAIN, MeshMaterial, as_rendered, in_layer
 from colonnade.mesh.mesh import Extent
 from colonnade.scene.cameras import (
     WorldCamera,
@@ -181,8 +181,7 @@ def make_view(
     """
     placed = place(scene, extent, width, height, environment)
     pose, camera = placed.pose, placed.camera
-    # Highlights are of lights alone
-    has_highlights = scene.sample.layer == "highlight"
+    has_highlights = scene.sample.layer in MARKS
     gathers = scene.paths.gather > 0 and not has_highlights
     return View(
         width=width,
@@ -257,15 +256,16 @@ def _placed(scene: Scene, index: int, axes: Floats, centre: Floats, edge: float)
     """A light of a scene in world space, in the device's numbers.
 
     Of one with a radius it is the sample's point of a disc that faces `centre`. In highlights it is without what its
-    mark shows (docs/gather.md), the device's 1.0; fitted lights have no mark.
+    mark shows (docs/gather.md); fitted lights have no mark.
     """
     light = scene.lights[index]
     position = _world_position(light, axes, centre, edge)
     colour = np.array(light.colour) * scene.headroom * scene.exposure
     if light.radius > 0:
         away, on_disc = position - centre, scene.sample.light(index)
-        if scene.sample.layer == "highlight" and not scene.fits_lights:
-            colour = (colour - light.radius**2 / (light.falloff**2 if light.falloff else away @ away)).clip(min=0.0)
+        if scene.sample.layer in MARKS and not scene.fits_lights:
+            of_mark = MARKS[scene.sample.layer] * light.radius**2 / (light.falloff**2 if light.falloff else away @ away)
+            colour = (colour - of_mark).clip(min=0.0)
         right, up, _ = camera_axes(away if away.any() else axes[2], _UP)
         position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
     return PlacedLight(position, colour, light.falloff)

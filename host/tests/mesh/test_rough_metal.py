@@ -107,9 +107,13 @@ def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered() -> None:
     for roughness in (0.0, 0.1, 0.125, 0.2, 0.25):
         mirror = MeshMaterial("mirror", roughness=roughness, has_corner_colours=True, emission=(1.0, 1.0, 1.0))
         layers = [in_layer(mirror, layer) for layer in LAYERS]
-        assert [one.kind == ROUGH_METAL for one in layers] == [roughness == 0.25, False, 0.1 < roughness < 0.25]
+        assert [one.kind == ROUGH_METAL for one in layers] == [roughness == 0.25, False, 0.1 < roughness < 0.25, False]
         assert layers[1] == BLACK and not any(layers[2].emission)
         assert layers[2] == BLACK or layers[2].has_corner_colours
+        glass = MeshMaterial("glass", (0.5, 0.0, 0.0), roughness=roughness, has_corner_colours=True)
+        untinted = MeshMaterial(ROUGH_METAL, (COAT_REFLECTANCE,) * 3, roughness=roughness)
+        highlight = untinted if roughness > 0.1 else BLACK
+        assert [in_layer(glass, layer) for layer in LAYERS] == [glass, BLACK, BLACK, highlight]
 
 
 def test_what_rough_surfaces_lose_is_named() -> None:
@@ -121,12 +125,15 @@ def test_what_rough_surfaces_lose_is_named() -> None:
     mesh = replace(mesh, materials=(*materials, glass))
     glossy = replace(mesh, materials=(MeshMaterial(roughness=0.3),))
     assert "glossy material is matt" in with_rendered_metal(glossy, True)[1][0]
-    assert with_rendered_metal(glossy, True, has_coats=True) == (glossy, ())
+    assert with_rendered_metal(glossy, True, has_layers=True) == (glossy, ())
     # Roughnesses of one material, as a map gives it, count once
     sharp, diffuse = "1 slightly rough metal is a perfect mirror", "1 rough metal is diffuse"
     clear = "1 rough glass is perfectly clear"
     lines = [line.split(": ")[1] for line in with_rendered_metal(mesh, False)[1]]
     assert sorted(lines) == sorted([sharp, diffuse, clear])
-    rendered, (line,) = with_rendered_metal(mesh, True)
-    assert line.split(": ")[1] == "1 rough glass is as rough as 1/2"
+    few = "2 slightly rough surfaces are without highlights"
+    roughest = "1 rough glass is as rough as 1/2"
+    assert sorted(line.split(": ")[1] for line in with_rendered_metal(mesh, True)[1]) == [roughest, few]
+    rendered, (line,) = with_rendered_metal(mesh, True, has_layers=True)
+    assert line.split(": ")[1] == roughest
     assert [material.roughness for material in rendered.materials] == [0.05, 0.2, 0.3, 0.5, 0.0, 0.5]

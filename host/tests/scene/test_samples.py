@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.materials import MARKS, MeshMaterial
 from colonnade.scene.model import Camera, Light, MeshSource, Motion, Paths, Scene
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
@@ -130,28 +130,41 @@ def test_the_shutter_opens_for_a_part_of_the_interval(shutter: float, frames: in
         np.testing.assert_allclose(np.sort(times), np.minimum(expected, 1.0), atol=1e-12)
 
 
-@pytest.mark.parametrize(("samples", "kinds"), [(1, "s"), (2, "ssch"), (6, "ssssssch"), (8, "sssschssssch")])
+@pytest.mark.parametrize(("samples", "kinds"), [(1, "s"), (2, "sschg"), (6, "sssssschg"), (8, "sssschgsssschg")])
 def test_other_layers_have_a_pass_after_four_of_surfaces(samples: int, kinds: str) -> None:
     scene, mirror = replace(TEAPOT, paths=Paths(gather=1)).with_samples(samples), MeshMaterial("mirror")
-    for materials in ((MeshMaterial(roughness=0.3), replace(mirror, roughness=0.2)), (MeshMaterial(roughness=0.3),)):
-        layers = "".join(one.sample.layer[0] for one in frame_passes(scene, materials))
-        assert layers == (kinds if len(materials) == 2 else kinds.replace("h", ""))
-    without = (MeshMaterial(roughness=0.6), *(replace(mirror, roughness=roughness) for roughness in (0.0, 0.1, 0.3)))
+    every = {
+        "c": MeshMaterial(roughness=0.3),
+        "h": replace(mirror, roughness=0.2),
+        "g": MeshMaterial("glass", roughness=0.2),
+    }
+    for left_out in ("", "h", "hg"):
+        layers = "".join(
+            one.sample.layer[0] for one in frame_passes(scene, [every[key] for key in every if key not in left_out])
+        )
+        assert layers == "".join(kind for kind in kinds if kind not in left_out)
+    without = (
+        MeshMaterial(roughness=0.6),
+        MeshMaterial("glass", roughness=0.1),
+        *(replace(mirror, roughness=roughness) for roughness in (0.0, 0.1, 0.3)),
+    )
     assert {one.sample.layer for one in frame_passes(scene, without)} == {"surface"}
 
 
 @pytest.mark.parametrize(("falloff", "distance"), [(0.0, 3.0), (2.0, 3.0), (2.0, 0.4)])
 def test_highlights_are_of_the_light_that_marks_do_not_show(falloff: float, distance: float) -> None:
-    """Which is that of a disc with the radiance 1 of the device."""
+    """Which is that of a disc with the radiance 1 of the device, or of all of the mark's in glass."""
     x, y, z = object_pose(TEAPOT, EXTENT, None).to_world(EXTENT.centre)
     light = Light(colour=(2.0, 0.05, 0.0), position=(x, y + distance, z), radius=0.3, falloff=falloff or None)
     scene = replace(TEAPOT, light=light, exposure=0.5)
     scene = replace(scene, paths=Paths(gather=1))
-    surfaces, highlights = (view_of(scene, Sample(layer=layer)) for layer in ("surface", "highlight"))
-    assert surfaces.gather is not None and highlights.gather is None and not highlights.ambient.any()
-    whole, rest = surfaces.light_colour, highlights.light_colour
-    at_object = (falloff / distance) ** 2 if falloff else 1.0
-    np.testing.assert_allclose((whole - rest) * at_object, np.minimum(whole * at_object, (0.3 / distance) ** 2))
+    surfaces, *others = (view_of(scene, Sample(layer=layer)) for layer in ("surface", *MARKS))
+    assert surfaces.gather is not None
+    whole, at_object = surfaces.light_colour, (falloff / distance) ** 2 if falloff else 1.0
+    for highlights, mark in zip(others, (1.0, 16.0), strict=True):
+        assert highlights.gather is None and not highlights.ambient.any()
+        of_mark = (whole - highlights.light_colour) * at_object
+        np.testing.assert_allclose(of_mark, np.minimum(whole * at_object, mark * (0.3 / distance) ** 2))
 
 
 def test_without_keys_one_pass_is_the_scene() -> None:
