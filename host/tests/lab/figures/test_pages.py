@@ -235,7 +235,14 @@ def compared(*kinds: str) -> dict[str, Any]:
     """A frame in a known room."""
     parts = {name: 30.0 for name in ("frame", "object", "room")}
     own = {**parts, **{f"{name}_{key}": 0.125 for name in parts for key in ("flip", "dists")}, "brightness": 0.75}
-    columns = ("no object", "probe, rasteriser", "ambient light", "1 pass", "1 pass, OIDN")
+    columns = (
+        "no object",
+        "probe, rasteriser",
+        "ambient light",
+        "1 pass",
+        "1 pass, OIDN",
+        "photo alone, no gathered light",
+    )
     qualities = {column: {**own, "things": dict.fromkeys(kinds, 20.0 + index)} for index, column in enumerate(columns)}
     errors = {kind: {"rays": 9, "median": 1.25, "high": 3.0} for kind in ("probe", "colonnade")}
     return {"qualities": qualities, "mirrors": errors}

@@ -13,22 +13,28 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common.accumulation import LUMINANCE
+from colonnade.common.accumulation import LUMINANCE, FramePasses
 from colonnade.common.image_io import decode_srgb, encode_srgb, read_picture, resized_photo
 from colonnade.common.progress import QUIET, Progress
-from colonnade.common.types import Floats
+from colonnade.design.generator import manifest_for
+from colonnade.device.device import require_no_errors
+from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
 from colonnade.environment.panorama import read_radiance
 from colonnade.lab.evaluation.light import files
 from colonnade.lab.evaluation.light.mirror_rays import MirrorErrors, mirror_errors
 from colonnade.lab.evaluation.light.probe import ProbeFrame
-from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS, PointLight
+from colonnade.lab.evaluation.light.rooms import FRAME, ROOMS, PointLight
 from colonnade.lab.evaluation.light.surfaces import RoomSurface
 from colonnade.lab.evaluation.region_metrics import compare_regions
-from colonnade.render.frames import render
+from colonnade.render.device_frames import host_frames
+from colonnade.render.host_frame import HostFrame
+from colonnade.render.passes import model_passes
 from colonnade.render.request import RenderRequest
 from colonnade.scene.model import Denoiser
+from colonnade.scene.parser import load_scene
+from colonnade.scene.passes import exposed
 
 #: The preset that renders.
 CONFIG = "textured"
@@ -70,6 +76,7 @@ def columns() -> dict[str, Column]:
     return found | {
         "16 passes of 2 rays, filtered": replace(best, gather=2),
         "panorama alone": replace(best, light="around"),
+        "photo alone, no gathered light": Column(4, gather=0, light="photo"),
         "photo alone": replace(best, light="photo"),
     }
 
@@ -106,13 +113,11 @@ class FrameResult:
     Attributes:
         pixels: Those of the objects, and of the room that changes.
         qualities: By column.
-        rays: Rays of a pass of 640x480 pixels that enter the objects' box.
         mirrors: Errors of mirror rays, of the probe and of Colonnade; None without a mirror.
     """
 
     pixels: tuple[int, int]
     qualities: Mapping[str, Quality]
-    rays: int
     mirrors: Mapping[str, MirrorErrors] | None = None
 
 
@@ -158,9 +163,7 @@ def _frame(
     panoramas = (read_radiance(files.stored(name) / f"{which}.hdr") for which in ("around", "panorama"))
     image, owners = ProbeFrame(lights, things, environment, *panoramas).render()
     pictures["probe, rasteriser"] = encode_srgb(image)
-    for title, column in columns().items():
-        pictures[title] = encode_srgb(_colonnade(scenes, column))
-    whole = render(_request(scenes, Column(1), PHOTO))
+    pictures |= _colonnade(scenes)
     is_object = owners >= 0
     difference = np.abs(truth.astype(int) - pictures["no object"]).max(axis=2)
     regions = {"frame": np.ones_like(is_object), "object": is_object, "room": ~is_object & (difference > CHANGED)}
@@ -172,16 +175,26 @@ def _frame(
         if title != "truth"
     }
     pixels = (int(is_object.sum()), int(regions["room"].sum()))
-    return FrameResult(pixels, qualities, int(whole.report.rays["in_box"] or 0), mirrors), pictures
+    return FrameResult(pixels, qualities, mirrors), pictures
 
 
-def _request(scenes: Mapping[str, Path], column: Column, size: tuple[int, int] = FRAME) -> RenderRequest:
-    scene = scenes[f"{column.light}-{column.gather}"]
-    return RenderRequest(scene, CONFIG, backend="model", size=size, samples=column.passes, denoise=column.denoise)
-
-
-def _colonnade(scenes: Mapping[str, Path], column: Column) -> Floats:
-    return render(_request(scenes, column)).image
+def _colonnade(scenes: Mapping[str, Path]) -> dict[str, NDArray[np.uint8]]:
+    """The pictures of all columns; those that differ in their filter alone have the same passes, rendered once."""
+    manifest, pictures = manifest_for(CONFIG).manifest, {}
+    passes: dict[Column, tuple[HostFrame, FramePasses]] = {}
+    for title, column in columns().items():
+        unfiltered = replace(column, denoise=False)
+        if unfiltered not in passes:
+            scene = load_scene(scenes[f"{column.light}-{column.gather}"]).with_samples(column.passes)
+            prepared = DeviceScene.of(exposed(scene), manifest, size=FRAME)
+            request = RenderRequest(scene, CONFIG, backend="model", denoise=column.gather > 0)
+            (frame,) = host_frames(request, prepared, FRAME, [prepared.scene], 0.0, QUIET)
+            ((sums, _, _),) = model_passes([frame], [[frame.registers(one) for one in frame.passes]])
+            require_no_errors(sums.errors)
+            passes[unfiltered] = frame, sums
+        frame, sums = passes[unfiltered]
+        pictures[title] = replace(frame, denoise=column.denoise).pixels(sums)
+    return pictures
 
 
 def _quality(

@@ -62,7 +62,7 @@ def write_panorama(path: Path, radiance: Floats) -> None:
 
 
 #: The scenes of a frame: what is known of the light (see `columns.Column`), and the gathered rays of a path.
-LIGHTS = ("lights-0", "panorama-1", "panorama-2", "around-1", "photo-1")
+LIGHTS = ("lights-0", "panorama-1", "panorama-2", "around-1", "photo-0", "photo-1")
 
 
 def write_scenes(
