@@ -1,9 +1,10 @@
-"""Caches encoded environments, because encoding takes seconds."""
+"""Caches the encoded maps of environments, each by itself, because encoding takes seconds."""
 
 from __future__ import annotations
 
 import functools
 import hashlib
+from collections.abc import Callable
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,21 @@ from colonnade.common import cache
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.environment.model import Environment
 from colonnade.maps.encoders import Encoder
-from colonnade.maps.image import AttributeImage, encode_environment
+from colonnade.maps.image import AttributeImage, Words, encode_environment
 from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import encode_still
 
 #: File name in a cache entry.
 FILE = "room.npz"
+
+#: The arrays of an environment that a part of its maps is made of. So other lights, which change the colours that a
+#: room reflects, leave its normals and surfaces.
+_INPUTS = {
+    "albedo": ("albedo",),
+    "normals": ("normals",),
+    "planes": ("depth", "normals"),
+    "bounding": ("depth", "normals", "albedo"),
+}
 
 
 def encoded_environment(
@@ -36,20 +46,29 @@ def encoded_environment(
         return encode_still(environment, layout)
     rooms = folder or cache_directory(project_root()) / "rooms"
 
-    def make(entry: Path) -> None:
-        _write(entry / FILE, encode_environment(environment, layout))
+    def keep(part: str, make: Callable[[], Words]) -> Words:
+        def write(entry: Path) -> None:
+            words: dict[str, Any] = make()
+            np.savez(entry / FILE, **words)
 
-    return _read(cache.entry(rooms / _key(environment, layout), make, "room") / FILE, layout)
+        with np.load(cache.entry(rooms / _key(part, environment, layout), write, "room") / FILE) as stored:
+            return {name: stored[name] for name in stored.files}
+
+    return encode_environment(environment, layout, keep)
 
 
-def _key(environment: Environment, layout: AttributeLayout) -> str:
-    """Hash of the encoders' inputs and of their source files."""
+def _key(part: str, environment: Environment, layout: AttributeLayout) -> str:
+    """Hash of the inputs of a part of the maps, and of the encoders' source files."""
     digest = hashlib.sha256(encoder_sources())
-    camera = environment.camera
-    digest.update(repr((astuple(layout), camera.fx, camera.fy, camera.cx, camera.cy)).encode())
-    for array in (environment.albedo, environment.normals, environment.depth, camera.to_world):
+    digest.update(repr((part, astuple(layout))).encode())
+    for name in _INPUTS[part]:
+        array = getattr(environment, name)
         digest.update(repr(array.shape).encode())
         digest.update(np.ascontiguousarray(array).tobytes())
+    if "depth" in _INPUTS[part]:
+        camera = environment.camera
+        digest.update(repr((camera.fx, camera.fy, camera.cx, camera.cy)).encode())
+        digest.update(np.ascontiguousarray(camera.to_world).tobytes())
     return digest.hexdigest()[:32]
 
 
@@ -62,21 +81,3 @@ def encoder_sources() -> bytes:
     for file in [*sorted(here.glob("*.py")), *common]:
         digest.update(file.read_bytes())
     return digest.digest()
-
-
-def _read(file: Path, layout: AttributeLayout) -> AttributeImage:
-    with np.load(file) as stored:
-        memories: dict[str, dict[str, Any]] = {}
-        for name in stored.files:
-            part, _, memory = name.partition(".")
-            if memory:
-                memories.setdefault(part, {})[memory] = stored[name]
-        return AttributeImage.from_memories(layout, memories, float(stored["depth_unit"]))
-
-
-def _write(file: Path, image: AttributeImage) -> None:
-    arrays: dict[str, Any] = {
-        f"{part}.{name}": words for part, group in image.memories().items() for name, words in group.items()
-    }
-    with file.open("wb") as stream:
-        np.savez(stream, depth_unit=np.float64(image.depth_unit), **arrays)

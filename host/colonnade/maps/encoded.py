@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
 from colonnade.maps.cache import encoded_environment
 from colonnade.maps.encoders import Encoder
@@ -33,15 +31,6 @@ class EncodedEnvironment:
     def depth(self) -> Floats:
         """Depth as the device decodes it, metres along z: float64 [height, width]."""
         return self.image.decoded_depth(PlaneProjection.of(self.environment, self.image.depth_unit))
-
-    @staticmethod
-    def load(folder: Path, manifest: Manifest) -> EncodedEnvironment:
-        """Load a room's folder and encode its maps for a design.
-
-        Raises:
-            UserError: The folder is not a room, or the design has no memory for maps of this size.
-        """
-        return EncodedEnvironment.of(load_environment(folder), manifest)
 
     @staticmethod
     def of(environment: Environment, manifest: Manifest, encoder: Encoder | Encode = "offline") -> EncodedEnvironment:

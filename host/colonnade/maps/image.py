@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,13 +12,17 @@ from numpy.typing import NDArray
 from colonnade.common.errors import UserError
 from colonnade.environment.model import Environment
 from colonnade.maps.layout import AttributeLayout
-from colonnade.maps.plane_encoder import encode_planes
+from colonnade.maps.plane_encoder import depth_unit_of, encode_bounding, encode_surfaces
 from colonnade.maps.plane_map import PlaneMap
 from colonnade.maps.planes import PlaneProjection
 from colonnade.maps.slic import SlicMap, encode_slic
 from colonnade.maps.two_level import TwoLevelMap
 from colonnade.maps.two_level_encoder import encode_two_level
 from colonnade.maps.vectors import AlbedoSpace, NormalSpace, VectorSpace
+
+#: The words of a part of the maps by memory, and what makes them or takes them from a cache, by the name of the part.
+Words = dict[str, NDArray[Any]]
+Keep = Callable[[str, Callable[[], Words]], Words]
 
 #: Bytes per pixel of a source map: three components of 8 bits.
 SOURCE_BYTES_PER_PIXEL = 3
@@ -94,8 +98,15 @@ class AttributeImage:
         return NormalSpace(self.layout.field_bits)
 
 
-def encode_environment(environment: Environment, layout: AttributeLayout) -> AttributeImage:
+def encode_environment(
+    environment: Environment, layout: AttributeLayout, keep: Keep = lambda _, make: make()
+) -> AttributeImage:
     """Encode an environment's maps in the layout's encoding.
+
+    Args:
+        environment: The environment.
+        layout: Sizes of the memories.
+        keep: Makes the words of ``albedo``, ``normals``, ``planes`` and ``bounding``.
 
     Raises:
         UserError: The maps' size differs from the layout's.
@@ -106,12 +117,16 @@ def encode_environment(environment: Environment, layout: AttributeLayout) -> Att
             f" the hardware holds {layout.width}x{layout.height}: set physicalAttributeMemory.width and height"
         )
     encode = encode_slic if layout.encoding == "slic" else encode_two_level
-    return AttributeImage(
-        layout,
-        encode(environment.albedo, AlbedoSpace(layout.field_bits), layout),
-        encode(environment.normals, NormalSpace(layout.field_bits), layout),
-        encode_planes(environment, layout),
-    )
+
+    def encoded(values: NDArray[np.float64], space: VectorSpace) -> Words:
+        return dict(encode(values, space, layout).memories())
+
+    albedo = keep("albedo", lambda: encoded(environment.albedo, AlbedoSpace(layout.field_bits)))
+    normals = keep("normals", lambda: encoded(environment.normals, NormalSpace(layout.field_bits)))
+    planes = keep("planes", lambda: encode_surfaces(environment, layout))
+    bounding = keep("bounding", lambda: encode_bounding(environment, layout, planes["planes"]))
+    memories = {"albedo": albedo, "normals": normals, "planes": planes | bounding}
+    return AttributeImage.from_memories(layout, memories, depth_unit_of(environment))
 
 
 def memory_words(image: AttributeImage) -> Iterator[tuple[str, NDArray[np.uint8]]]:

@@ -78,7 +78,21 @@ class _Choices:
 
 def encode_planes(environment: Environment, layout: AttributeLayout, rounds: int = _ROUNDS) -> PlaneMap:
     """Encode the plane map of an environment."""
-    projection = PlaneProjection.of(environment, depth_unit=float(environment.depth.min()))
+    words = encode_surfaces(environment, layout, rounds)
+    bounding = encode_bounding(environment, layout, words["planes"])
+    return PlaneMap(**words, **bounding, depth_unit=depth_unit_of(environment))
+
+
+def depth_unit_of(environment: Environment) -> float:
+    """The depth unit of an environment's plane map, metres."""
+    return float(environment.depth.min())
+
+
+def encode_surfaces(
+    environment: Environment, layout: AttributeLayout, rounds: int = _ROUNDS
+) -> dict[str, NDArray[np.unsignedinteger]]:
+    """The words of a plane map but for the bounding planes, by memory; they do not depend on albedos."""
+    projection = PlaneProjection.of(environment, depth_unit_of(environment))
     pixels = sample_pixels(environment, projection)
     planes = fit_planes(environment, projection, layout.infinite_plane)
     for completed_rounds in range(rounds):
@@ -91,10 +105,17 @@ def encode_planes(environment: Environment, layout: AttributeLayout, rounds: int
     table = np.zeros(layout.planes, np.uint64)
     table[: layout.infinite_plane] = words
     descriptors, heap = _written(parts, layout)
-    bounding = pack_bounding_planes(
-        choose_bounding_planes(environment, projection, planes, layout.bounding_planes), projection, layout
-    )
-    return PlaneMap(descriptors, table, heap, bounding, projection.depth_unit)
+    return {"descriptors": descriptors, "planes": table, "heap": heap}
+
+
+def encode_bounding(
+    environment: Environment, layout: AttributeLayout, table: NDArray[np.unsignedinteger]
+) -> dict[str, NDArray[np.unsignedinteger]]:
+    """The words of the bounding planes, which are chosen among the planes of the table."""
+    projection = PlaneProjection.of(environment, depth_unit_of(environment))
+    planes = unpack_planes(table[: layout.infinite_plane])
+    chosen = choose_bounding_planes(environment, projection, planes, layout.bounding_planes)
+    return {"bounding": pack_bounding_planes(chosen, projection, layout)}
 
 
 def _choices(pixels: Samples, planes: NDArray[np.float64], layout: AttributeLayout) -> _Choices:

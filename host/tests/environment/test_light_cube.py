@@ -113,7 +113,7 @@ def test_a_ray_meets_the_surface_that_it_hits() -> None:
 def test_the_light_of_a_room_is_that_of_its_photo(name: str) -> None:
     """In the directions of its pixels it is their colour; the planes have their albedo under the lights."""
     room = load_environment(ROOMS / name)
-    image = encoded_environment(room, AttributeLayout(room.width, room.height))
+    image = encoded_environment(room, AttributeLayout(room.width, room.height), encoder="live")
     middle = room.camera_to_world @ np.append(room.points()[room.height // 2, room.width // 2] * 0.6, 1.0)
     found = room_light(room, image, RoomLights(np.full(3, 0.5)), middle, from_photo=False)
     assert 0.1 < found.seen < 0.7

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from colonnade.common import cache
 from colonnade.common.errors import UserError
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment, EnvironmentCamera
+from colonnade.maps import image as maps_image
 from colonnade.maps.cache import encoded_environment
 from colonnade.maps.image import AttributeImage, encode_environment
 from colonnade.maps.layout import AttributeLayout
@@ -205,31 +207,42 @@ def test_encoding_is_reproducible() -> None:
     assert np.abs(images[0].decoded_albedo() - environment.albedo).mean() < 0.002
 
 
+ENCODERS = ("encode_two_level", "encode_slic", "encode_surfaces", "encode_bounding")
+
+
 @pytest.mark.parametrize("encoding", ["twoLevel", "slic"])
 def test_a_room_is_encoded_once(
     encoding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    environment, layout = boxes(), AttributeLayout(160, 120, encoding)
+    """Each map by itself: one with another albedo has the normals and surfaces of the first."""
+    environment, layout = boxes(96, 64), AttributeLayout(96, 64, encoding)
     first = encoded_environment(environment, layout, tmp_path)
+    kept = list(tmp_path.glob("*/room.npz"))
+    again: list[str] = []
+    for name in ENCODERS:
+        whole = getattr(maps_image, name)
 
-    def refuse(*_: object) -> None:
-        raise AssertionError("encoded again")
+        def count(*arguments: object, name: str = name, whole: Callable[..., object] = whole) -> object:
+            again.append(name)
+            return whole(*arguments)
 
-    with monkeypatch.context() as patch:
-        patch.setattr("colonnade.maps.cache.encode_environment", refuse)
-        assert all_words(encoded_environment(environment, layout, tmp_path)) == all_words(first)
-        for other in (
-            replace(environment, albedo=environment.albedo * 0.5),
-            replace(environment, depth=environment.depth * 1.01),
-        ):
-            with pytest.raises(AssertionError):
-                encoded_environment(other, layout, tmp_path)
-    (kept,) = tmp_path.glob("*/room.npz")
-    kept.write_bytes(b"broken")
+        monkeypatch.setattr(maps_image, name, count)
+    assert all_words(encoded_environment(environment, layout, tmp_path)) == all_words(first)
+    assert again == []
+    vectors = "encode_slic" if encoding == "slic" else "encode_two_level"
+    for other, names in (
+        (replace(environment, albedo=environment.albedo * 0.5), [vectors, "encode_bounding"]),
+        (replace(environment, depth=environment.depth * 1.01), ["encode_surfaces", "encode_bounding"]),
+    ):
+        again.clear()
+        assert all_words(encoded_environment(other, layout, tmp_path)) != all_words(first)
+        assert again == names
+    for file in kept:
+        file.write_bytes(b"broken")
     cache._verified.clear()
     for _ in range(2):
         assert all_words(encoded_environment(environment, layout, tmp_path)) == all_words(first)
-    assert capsys.readouterr().err == "colonnade: the cached room was damaged and is built again\n"
+    assert capsys.readouterr().err == 4 * "colonnade: the cached room was damaged and is built again\n"
 
 
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (5, 3), (16, 16), (33, 2)])
