@@ -32,8 +32,6 @@ from colonnade.quality.image_metrics import psnr
 
 #: Default number of point lights.
 DEFAULT_LIGHTS = 2
-#: Most point lights of a fit.
-MAX_LIGHTS = 4
 #: Positions tried along x, y and z, and the distances of unit intensity, metres.
 _GRID = (7, 5, 7)
 _FALLOFFS = (None, 1.0, 2.0)

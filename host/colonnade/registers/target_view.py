@@ -7,11 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.registers.view_words import camera_values, position_values, rotation_values
-from colonnade.scene.cameras import WorldCamera
-from colonnade.scene.object_pose import Pose
 
 #: x, y, z; rotation row by row.
 Position = Sequence[int]
@@ -84,18 +80,3 @@ def rotation_of(quaternion: Sequence[int]) -> Rotation:
     from colonnade import _core
 
     return tuple(_core.target_rotation(quaternion))
-
-
-def move_object(view: TargetView, pose: Pose) -> None:
-    """Set the object's pose, rounded; its scale is that of the view file."""
-    view.set_object(*_pose(pose.translate, pose.rotation))
-
-
-def move_camera(view: TargetView, camera: WorldCamera, size: tuple[int, int]) -> None:
-    """Set the camera, rounded."""
-    axes, lens = camera_values(camera)
-    view.set_camera(*_pose(camera.position, axes), lens, size)
-
-
-def _pose(position: Floats, rotation: Floats) -> tuple[Position, Rotation]:
-    return position_values(position, "the pose"), rotation_values(rotation)

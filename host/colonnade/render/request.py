@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
@@ -13,7 +13,6 @@ from colonnade.mesh.mesh import Mesh
 from colonnade.scene.model import Denoiser, Scene
 
 Backend = Literal["rtl", "model", "reference"]
-BACKENDS: tuple[Backend, ...] = get_args(Backend)
 
 
 @dataclass(frozen=True)

@@ -115,11 +115,6 @@ class View:
         return self.lights[0].position
 
     @property
-    def light_colour(self) -> Floats:
-        """Colour of the first light, float64 [3]."""
-        return self.lights[0].colour
-
-    @property
     def albedo(self) -> Floats:
         """Albedo of the first material, float64 [3]."""
         return np.array(self.materials[0].albedo)

@@ -51,7 +51,6 @@ public:
 
     /// Depth of w = 1: a power of two, at most the least depth.
     double unit() const { return std::ldexp(1.0, unitLog_ - 16); }
-    int unitLog() const { return unitLog_; }
 
     /// The plane through a block's pixels.
     Plane planeOf(int block) const {

@@ -160,10 +160,10 @@ def test_highlights_are_of_the_light_that_marks_do_not_show(falloff: float, dist
     scene = replace(scene, paths=Paths(gather=1))
     surfaces, *others = (view_of(scene, Sample(layer=layer)) for layer in ("surface", *MARKS))
     assert surfaces.gather is not None
-    whole, at_object = surfaces.light_colour, (falloff / distance) ** 2 if falloff else 1.0
+    whole, at_object = surfaces.lights[0].colour, (falloff / distance) ** 2 if falloff else 1.0
     for highlights, mark in zip(others, (1.0, 16.0), strict=True):
         assert highlights.gather is None and not highlights.ambient.any()
-        of_mark = (whole - highlights.light_colour) * at_object
+        of_mark = (whole - highlights.lights[0].colour) * at_object
         np.testing.assert_allclose(of_mark, np.minimum(whole * at_object, mark * (0.3 / distance) ** 2))
 
 

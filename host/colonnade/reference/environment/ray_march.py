@@ -9,9 +9,8 @@ Du = fx·dx − dz·(u0 − cx), Dv = fy·dy − dz·(v0 − cy) and Dw = −dz�
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,19 +54,6 @@ class RayMarch(Protocol):
 
     def __call__(self, origins: Floats, directions: Floats) -> MarchHits:
         """Hits of the rays on the room."""
-
-
-def march_from_arrays(march: Callable[[Floats, Floats], Mapping[str, Any]]) -> RayMarch:
-    """A `RayMarch` from a function that returns the arrays of `MarchHits` by name. `seen_u`, `seen_v` are optional."""
-
-    def traced(origins: Floats, directions: Floats) -> MarchHits:
-        arrays = march(np.ascontiguousarray(origins), np.ascontiguousarray(directions))
-        u, v, z = (np.asarray(arrays[name], dtype=np.float64) for name in "uvz")
-        seen_u, seen_v = (np.asarray(arrays.get(f"seen_{name}", arrays[name]), dtype=np.float64) for name in "uv")
-        kind, steps = (np.asarray(arrays[name], dtype=np.int64) for name in ("kind", "steps"))
-        return MarchHits(u, v, z, seen_u, seen_v, kind, steps)
-
-    return traced
 
 
 @dataclass(frozen=True)
