@@ -54,7 +54,7 @@ def explore(
     from colonnade.lab.explore.output import check_output
     from colonnade.lab.explore.points import grid_size
     from colonnade.lab.explore.runners import check_address
-    from colonnade.lab.explore.study import load_study
+    from colonnade.lab.explore.study_file import load_study
 
     if scheduler is not None and jobs is not None:
         raise click.UsageError("--jobs is for this machine, the cluster has its own", click.get_current_context())

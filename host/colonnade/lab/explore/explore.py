@@ -20,7 +20,8 @@ from colonnade.lab.explore.results import Results
 from colonnade.lab.explore.runners import ClusterRunner, LocalRunner, Runner
 from colonnade.lab.explore.schedule import Outcome, Schedule
 from colonnade.lab.explore.search import check_search, search_front
-from colonnade.lab.explore.study import FieldValue, StudyFile
+from colonnade.lab.explore.study import FieldValue
+from colonnade.lab.explore.study_file import StudyFile
 
 #: Seconds between two intermediate tables.
 TABLE_SECONDS = 20.0

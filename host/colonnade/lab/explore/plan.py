@@ -21,7 +21,7 @@ from colonnade.lab.explore.frames import Frame, cycles_job, frame_of
 from colonnade.lab.explore.jobs import KINDS, Job, JobFailed, figures_of
 from colonnade.lab.explore.points import Point, config_of
 from colonnade.lab.explore.schedule import Outcome
-from colonnade.lab.explore.study import StudyFile
+from colonnade.lab.explore.study_file import StudyFile
 from colonnade.lab.ppa.library.one_library import library_files
 from colonnade.mesh.mesh import Mesh
 from colonnade.scene.lit_room import scene_room

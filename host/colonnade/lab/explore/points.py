@@ -14,7 +14,8 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.lab.common.parallel import in_order, processors
-from colonnade.lab.explore.study import FieldValue, StudyFile, value_text
+from colonnade.lab.explore.study import FieldValue, value_text
+from colonnade.lab.explore.study_file import StudyFile
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from typing import Any
 
 from colonnade.common.progress import QUIET, Progress
 from colonnade.lab.explore.figures import Column
-from colonnade.lab.explore.study import FieldValue, Search, StudyFile, value_text
+from colonnade.lab.explore.study import FieldValue, Search, value_text
+from colonnade.lab.explore.study_file import StudyFile
 
 _CONDITION = re.compile(r"\s*([\w.]+)\s*(>=|<=)\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?)\s*")
 

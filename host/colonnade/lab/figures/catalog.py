@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from colonnade.design.toolchain import project_root
-from colonnade.lab.explore.study import load_study
+from colonnade.lab.explore.study_file import load_study
 
 #: Stands for the file that a command writes its report to.
 REPORT = "REPORT"

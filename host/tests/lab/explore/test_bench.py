@@ -16,7 +16,7 @@ from colonnade.lab.explore import frames, jobs
 from colonnade.lab.explore.bench import bench
 from colonnade.lab.explore.explore import Exploration
 from colonnade.lab.explore.jobs import RESULT, Content, Job, JobFailed
-from colonnade.lab.explore.study import load_study
+from colonnade.lab.explore.study_file import load_study
 
 STUDY = """title = "Two meshes"
 combine = "list"

@@ -30,7 +30,7 @@ from colonnade.lab.explore import runners
 from colonnade.lab.explore.explore import Exploration
 from colonnade.lab.explore.jobs import entry_of
 from colonnade.lab.explore.output import Output, check_output
-from colonnade.lab.explore.study import load_study
+from colonnade.lab.explore.study_file import load_study
 
 STUDY = """title = "Try <b>"
 baseline = "32b32s64d"

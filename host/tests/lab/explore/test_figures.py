@@ -15,7 +15,8 @@ from colonnade.common.errors import UserError
 from colonnade.lab.explore.figures import Column, area_figures, columns, front, point_figures
 from colonnade.lab.explore.render_index import index_rows, sensitivity
 from colonnade.lab.explore.search import check_search, parse_condition, search_front
-from colonnade.lab.explore.study import FieldValue, StudyFile, load_study
+from colonnade.lab.explore.study import FieldValue
+from colonnade.lab.explore.study_file import StudyFile, load_study
 
 COST = Column("cost", "cost", "", "lower", ".1f", "")
 GAIN = Column("gain", "gain", "", "higher", ".1f", "")

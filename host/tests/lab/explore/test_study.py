@@ -13,7 +13,7 @@ from colonnade.lab.explore.figures import columns
 from colonnade.lab.explore.plan import Plan
 from colonnade.lab.explore.points import grid_size, manifests_of, point_of, points_of
 from colonnade.lab.explore.search import check_search
-from colonnade.lab.explore.study import StudyFile, line_of, load_study
+from colonnade.lab.explore.study_file import StudyFile, line_of, load_study
 
 STUDY = """title = "Try"
 baseline = "32b32s64d"
