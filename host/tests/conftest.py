@@ -4,13 +4,16 @@ frame."""
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from colonnade.design.manifest import Manifest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 MakeManifest = Callable[..., Manifest]
 
@@ -183,6 +186,20 @@ def quick_simulators(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
     """Build simulators that are soon compiled, but for tests with the mark `matrix`."""
     if request.node.get_closest_marker("matrix") is None:
         monkeypatch.setenv("COLONNADE_QUICK_SIMULATORS", "1")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Chromium, if the machine has one."""
+    from playwright.sync_api import sync_playwright
+
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
+        pytest.skip("no Chromium: install it with `apt-get install chromium`")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,6 @@ import base64
 import gzip
 import itertools
 import json
-import shutil
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from colonnade.common.image_io import decode_srgb
 from colonnade.common.srgb import srgb_from_linear
@@ -38,22 +37,10 @@ from colonnade.scene_image.packer import pack
 
 ROOT = Path(__file__).resolve().parents[3]
 FILE = ROOT / "out" / "browser" / "index.html"
-PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 #: A tetrahedron with a colour at each vertex.
 OBJ = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\nl 1 2\n"
 
 pytestmark = pytest.mark.skipif(not FILE.is_file(), reason="the page is not built: run `make browser`")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
-    if program is None:
-        pytest.skip("no Chromium: install it with `apt-get install chromium`")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 class Tab:

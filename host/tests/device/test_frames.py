@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from equal_frames import assert_equal
 
 from colonnade.common.errors import UserError
-from colonnade.common.framebuffer import Frame
 from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
@@ -44,14 +44,6 @@ CASES = [
     ("no tree, slow memory", "tiny", ("geometry.bvh=false", "columnBvhMemory.readLatency=5"), "cube", Stalls()),
     ("narrow", *NARROW, "sphere:2", Stalls()),
 ]
-
-
-def assert_equal(rtl: Frame, model: Frame) -> None:
-    assert rtl.errors == model.errors == []
-    np.testing.assert_array_equal(rtl.colour, model.colour)
-    np.testing.assert_array_equal(rtl.triangle, model.triangle)
-    np.testing.assert_array_equal(rtl.distance, model.distance)
-    assert {name: rtl.counters[name] for name in model.counters} == model.counters
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])

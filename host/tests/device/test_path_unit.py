@@ -5,10 +5,9 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 
-import numpy as np
 import pytest
+from equal_frames import assert_equal
 
-from colonnade.common.framebuffer import Frame
 from colonnade.design.generator import design_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
@@ -53,14 +52,6 @@ SHAPES = [
 ]
 
 
-def _assert_equal(rtl: Frame, model: Frame) -> None:
-    assert rtl.errors == model.errors == []
-    np.testing.assert_array_equal(rtl.colour, model.colour)
-    np.testing.assert_array_equal(rtl.triangle, model.triangle)
-    np.testing.assert_array_equal(rtl.distance, model.distance)
-    assert {name: rtl.counters[name] for name in model.counters} == model.counters
-
-
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape[0])
 def test_a_path_unit_renders_what_the_model_renders(shape: tuple[str, str, tuple[str, ...]]) -> None:
     """Diffuse under two lights, mirror, and glass seen from inside, while memory and sink stall at random."""
@@ -78,7 +69,7 @@ def test_a_path_unit_renders_what_the_model_renders(shape: tuple[str, str, tuple
         stalls = Stalls(percent=20, memory_percent=40, seed=3, check_interval=16)
         simulated = render_rtl(design, image, registers, stalls)
         for frame, settings in zip(simulated.frames, registers, strict=True):
-            _assert_equal(frame, render_model(design.manifest, image, settings))
+            assert_equal(frame, render_model(design.manifest, image, settings))
         assert simulated.frames[0].is_object.any()
 
 
@@ -98,7 +89,7 @@ def test_a_frame_after_an_abort_is_right() -> None:
         aborted = [frame.errors == ["watchdog"] for frame in frames[::2]]
         assert sum(aborted) > len(aborted) // 2, "the limits are too long"
         for frame in frames[1::2]:
-            _assert_equal(frame, expected)
+            assert_equal(frame, expected)
 
 
 def test_counters_account_for_every_context_and_record() -> None:
