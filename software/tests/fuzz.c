@@ -238,7 +238,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     design.invalidate = (kind & 1) != 0 ? DEVICE_BASE + 4 : 0;
     shell = (struct shell){.design = &design};
     shell.registers[AT(identity)] = 0x434C4E44;
-    shell.registers[AT(version)] = (kind & 2) != 0 ? 0x00010002 : 0x00010000;
+    shell.registers[AT(version)] = (kind & 2) == 0 ? 0x00010000 : (kind & 16) == 0 ? 0x00010002 : 0x00010003;
     shell.registers[AT(capabilities)] = (kind & 6) == 6 ? COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm : 0;
     shell.registers[AT(frameSize)] = 64u << 16 | 64u;
     for (size_t i = 0; i < 8; ++i) shell.registers[AT(formatHash_0) + i] = design.format_hash[i];

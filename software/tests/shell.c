@@ -121,6 +121,8 @@ void shell_write(void *context, uint32_t address, uint32_t value) {
     const size_t i = find(shell, address, value);
     const uint32_t status = shell->registers[AT(status)];
     const bool changes = (status & (QUEUED | RESETTING)) == 0;
+    if (address == 4 * AT(photo_hasStrengths))
+        require((shell->registers[AT(version)] & 0xFFFF) >= 3, "no register of this version", shell, address, value);
     require(words[i].bits == 32 || value >> words[i].bits == 0, "the value does not fit", shell, address, value);
     switch (words[i].access) {
     case READ_ONLY:
