@@ -230,7 +230,15 @@ def _mesh(mesh: MeshLike, crease: float | None) -> tuple[dict[str, Any], Mesh | 
         return table | {"path": str(mesh)}, None
     if isinstance(mesh, str):
         return table | {"name": mesh}, None
-    vertices, faces = mesh if isinstance(mesh, tuple) else (mesh.vertices, mesh.faces)
+    if isinstance(mesh, tuple) and len(mesh) == 2:
+        vertices, faces = mesh
+    elif hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        vertices, faces = mesh.vertices, mesh.faces
+    else:
+        raise UserError(
+            f"the mesh is a {type(mesh).__name__}: give a name, a file, a pair (vertices, faces), or an object that has"
+            " both, as trimesh.Scene.to_mesh() returns"
+        )
     points, corners = np.array(vertices, dtype=np.float64), np.array(faces)
     for name, array in (("vertices", points), ("faces", corners)):
         if array.ndim != 2 or array.shape[1] != 3:

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, get_args
 
+import numpy as np
+
+from colonnade.common.errors import UserError
+from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
 from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
 from colonnade.mesh.mesh import Mesh
@@ -37,6 +41,9 @@ class RenderRequest:
         waveform: VCD file for the signals of one small RTL frame.
         encoder: Of the room's maps and of textures.
         denoise: Filter the noise of gathered light, of the model and the RTL, as `FrameSize.denoise`.
+
+    Raises:
+        UserError: A value is none of these.
     """
 
     scene: Path | Scene
@@ -56,3 +63,24 @@ class RenderRequest:
     waveform: Path | None = None
     encoder: Encoder = "offline"
     denoise: bool | Denoiser = False
+
+    def __post_init__(self) -> None:
+        choices: dict[str, tuple[Any, ...]] = {
+            "backend": BACKENDS,
+            "encoder": get_args(Encoder),
+            "denoise": (False, True, *get_args(Denoiser)),
+        }
+        for name, known in choices.items():
+            if getattr(self, name) not in known:
+                raise UserError(f"{name} is {getattr(self, name)!r}: it must be one of {', '.join(map(str, known))}")
+        for name, most in (("frames", MAX_FRAMES), ("samples", MAX_SAMPLES)):
+            count = getattr(self, name)
+            if count is not None and not (_is_whole(count) and 1 <= count <= most):
+                raise UserError(f"{name} is {count!r}: it must be a whole number from 1 to {most:,}")
+        size: Any = self.size
+        if size is not None and not (isinstance(size, list | tuple) and len(size) == 2 and all(map(_is_whole, size))):
+            raise UserError(f"size is {size!r}: it must be width and height, whole numbers of pixels")
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)

@@ -15,7 +15,7 @@ from colonnade.mesh.mesh import MeshPart
 from colonnade.render.report import FrameReport
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RenderResult:
     """A rendered frame. Of several samples a pixel, mask, hits, depths and ratios are those of the first pass.
 
@@ -39,6 +39,10 @@ class RenderResult:
     sums: Accumulation
     ratio: npt.NDArray[np.uint16] | None = None
     parts: tuple[MeshPart, ...] = ()
+
+    def __repr__(self) -> str:
+        height, width, _ = self.image.shape
+        return f"<RenderResult of {width}x{height} pixels by {self.report.backend}>"
 
     @property
     def pixels(self) -> npt.NDArray[np.uint8]:

@@ -72,6 +72,11 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
         r"vertices have the shape \[4, 2\]": lambda: colonnade.Scene((np.zeros((4, 2)), [[0, 1, 2]])),
         r"a vertex that does not exist: there are 4": lambda: colonnade.Scene((square, [[0, 1, 4]])),
         r"faces are float64": lambda: colonnade.Scene((square, [[0.0, 1.0, 2.0]])),
+        r"the mesh is a Scene: give a name, a file, a pair": lambda: colonnade.Scene(trimesh.Scene()),
+        r"backend is 'gpu': it must be one of rtl, model, reference": lambda: colonnade.Scene("cube").render("gpu"),
+        r"encoder is 'fast': it must be": lambda: colonnade.Scene("cube").render(encoder="fast"),
+        r"samples is 0: it must be a whole number": lambda: colonnade.Scene("cube").render(samples=0),
+        r"size is \(4.5, 3\): it must be": lambda: colonnade.Scene("cube").render(size=(4.5, 3)),
         r"has a mesh of its own: leave out \[mesh\]": lambda: colonnade.Scene(
             (square, [[0, 1, 2]]), object=[{"mesh": {"name": "cube"}}]
         ),
