@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import re
+from numbers import Integral
+from typing import Any
 
 from colonnade.common.errors import UserError
+
+
+def is_whole(value: Any) -> bool:
+    """Whether a value is a whole number, of Python or numpy."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def parse_size(text: str) -> tuple[int, int]:

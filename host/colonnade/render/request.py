@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-import numpy as np
-
 from colonnade.common.errors import UserError
+from colonnade.common.frame_size import is_whole
 from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
 from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
@@ -75,12 +74,5 @@ class RenderRequest:
                 raise UserError(f"{name} is {getattr(self, name)!r}: it must be one of {', '.join(map(str, known))}")
         for name, most in (("frames", MAX_FRAMES), ("samples", MAX_SAMPLES)):
             count = getattr(self, name)
-            if count is not None and not (_is_whole(count) and 1 <= count <= most):
+            if count is not None and not (is_whole(count) and 1 <= count <= most):
                 raise UserError(f"{name} is {count!r}: it must be a whole number from 1 to {most:,}")
-        size: Any = self.size
-        if size is not None and not (isinstance(size, list | tuple) and len(size) == 2 and all(map(_is_whole, size))):
-            raise UserError(f"size is {size!r}: it must be width and height, whole numbers of pixels")
-
-
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
