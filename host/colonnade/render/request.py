@@ -72,7 +72,7 @@ class RenderRequest:
         for name, known in choices.items():
             if getattr(self, name) not in known:
                 raise UserError(f"{name} is {getattr(self, name)!r}: it must be one of {', '.join(map(str, known))}")
-        for name, most in (("frames", MAX_FRAMES), ("samples", MAX_SAMPLES)):
+        for name, maximum in (("frames", MAX_FRAMES), ("samples", MAX_SAMPLES)):
             count = getattr(self, name)
-            if count is not None and not (is_whole(count) and 1 <= count <= most):
-                raise UserError(f"{name} is {count!r}: it must be a whole number from 1 to {most:,}")
+            if count is not None and not (is_whole(count) and 1 <= count <= maximum):
+                raise UserError(f"{name} is {count!r}: it must be a whole number from 1 to {maximum:,}")
