@@ -15,10 +15,11 @@ _NUMBERS = re.compile(r"(?im)^[ \t]*(k[asde]|tf|ni|ns|d|tr|illum|p[rmsc]\w*)[ \t
 
 
 class References:
-    """Reads regular files in the mesh's folder and its subfolders."""
+    """Reads regular files in the mesh's folder and its subfolders; names are relative to it or to an MTL file's."""
 
     def __init__(self, mesh: Path) -> None:
-        self._folder = mesh.parent
+        self._parent = mesh.parent.resolve()
+        self._folders = [self._parent]
 
     def materials(self, name: str) -> str | None:
         """The checked text of an MTL file; None if it is missing.
@@ -29,6 +30,7 @@ class References:
         path = self._find(name)
         if path is None:
             return None
+        self._folders.append(path.parent)
         return _checked_mtl(text_of(read_input(path, "the materials", MAX_TEXT_BYTES * 16)), path)
 
     def buffer(self, name: str) -> bytes | None:
@@ -50,20 +52,22 @@ class References:
         return None if path is None else read_input(path, "the texture", MAX_PICTURE_BYTES)
 
     def _find(self, name: str) -> Path | None:
-        parent = self._folder.resolve()
         outside = False
-        for candidate in (name.strip(), name.strip().lstrip("/"), re.split(r"[/\\]", name)[-1].strip()):
-            try:
-                path = (parent / candidate).resolve()
-                if not candidate or not exists(path):
+        written = name.strip()
+        of_windows = written.replace("\\", "/")
+        for candidate in (written, of_windows, of_windows.lstrip("/"), of_windows.split("/")[-1].strip()):
+            for folder in self._folders:
+                try:
+                    path = (folder / candidate).resolve()
+                    if not candidate or not exists(path):
+                        continue
+                except (OSError, ValueError, RuntimeError):
                     continue
-            except (OSError, ValueError, RuntimeError):
-                continue
-            if path.is_relative_to(parent):
-                return path
-            outside = True
+                if path.is_relative_to(self._parent):
+                    return path
+                outside = True
         if outside:
-            raise UserError(f"{name}, which a mesh references, is outside its folder {parent}: copy it there")
+            raise UserError(f"{name}, which a mesh references, is outside its folder {self._parent}: copy it there")
         return None
 
 

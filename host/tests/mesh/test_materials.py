@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
 from colonnade.common.errors import UserError
@@ -96,6 +97,17 @@ def test_names_stay_apart_in_any_encoding(tmp_path: Path, encoding: str) -> None
     (tmp_path / "a.obj").write_bytes(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nmtllib a.mtl\n{faces}".encode(encoding))
     mesh = load_mesh(tmp_path / "a.obj")
     assert mesh.notes == () and {material.albedo for material in mesh.materials} >= {(1, 0, 0), (0, 1, 0), (0, 0, 1)}
+
+
+def test_files_of_windows_and_pictures_beside_the_materials_are_found(tmp_path: Path) -> None:
+    (tmp_path / "materials" / "maps").mkdir(parents=True)
+    Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "materials" / "maps" / "red.png")
+    (tmp_path / "materials" / "a.mtl").write_text("newmtl a\nKd 1 1 1\nmap_Kd maps\\red.png\n")
+    faces = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n"
+    (tmp_path / "a.obj").write_text(f"mtllib materials\\a.mtl\n{faces}")
+    mesh = load_mesh(tmp_path / "a.obj", corner_colours=True)
+    assert mesh.notes == () and mesh.corner_colours is not None
+    assert mesh.corner_colours[0] == pytest.approx(np.array([[1.0, 0.0, 0.0]] * 3))
 
 
 def test_names_without_materials_are_noted(tmp_path: Path) -> None:
