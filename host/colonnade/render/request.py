@@ -65,7 +65,7 @@ class RenderRequest:
 
     def __post_init__(self) -> None:
         choices: dict[str, tuple[Any, ...]] = {
-            "backend": BACKENDS,
+            "backend": get_args(Backend),
             "encoder": get_args(Encoder),
             "denoise": (False, True, *get_args(Denoiser)),
         }
