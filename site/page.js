@@ -2,32 +2,29 @@
 // The page: controls, orbit, dropped files, the ray of a pixel.
 
 import { ROOM_START, START, cameraOf, isAtMaps, roomCamera } from "./camera.js";
-import { hasRegister } from "./design.js";
 import { droppedFiles, roomFiles } from "./files.js";
 import { listen } from "./orbit.js";
-import { element, listDesigns, showCosts, showFigures, showRays } from "./panels.js";
+import { element, listDesigns, showCosts, showRays } from "./panels.js";
 import { radianceOf } from "./lightcube.js";
+import { notesOf } from "./notes.js";
 import { draw, raysOf } from "./path.js";
+import { Picture } from "./picture.js";
 import { Renderer, bytesOf, unpack } from "./renderer.js";
 import { RtlPanel } from "./rtlpanel.js";
 import { readState, writeState } from "./state.js";
-import { materialOf, passesOf, poseIn, viewOf } from "./view.js";
+import { materialOf, poseIn, viewOf } from "./view.js";
 import { kindFor, placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
 
 const MOST_WORKERS = 8;
-const COARSE = 4;
 /** A level surface so near to a double click counts, pixels of the maps. */
 const STAND_WITHIN = 40;
 
 const form = element("controls");
 const stage = element("stage");
-const picture = element("picture").getContext("2d");
 const overlay = element("overlay").getContext("2d");
 
-let data, renderer, manifest, packed, rays, chosen, traced;
+let data, renderer, picture, manifest, packed, rays, chosen, traced;
 let state = readState(location.hash);
-let isChanged = false;
-let isRunning = false;
 /** Works that wait or run: the state may be ahead of design, room and mesh. */
 let works = 0;
 /** What tests read: the last whole frame, the light of its room, and its last pass. */
@@ -41,128 +38,13 @@ function roomOf() {
 
 const scene = () => ({ state, mesh: page.mesh, manifest, packed });
 
-/** The picture's box on the stage, in its pixels: in a room it has the room's proportions. */
-function boxOf() {
-  const [width, height] = [stage.clientWidth, stage.clientHeight];
-  const room = roomOf();
-  const scale = room ? Math.min(width / room.width, height / room.height) : 1;
-  const size = room ? [room.width * scale, room.height * scale] : [width, height];
-  return { left: (width - size[0]) / 2, top: (height - size[1]) / 2, width: size[0], height: size[1] };
-}
-
-/** The size of a frame, pixels, at so many of the screen's, or of the room's maps, for each. */
-function sizeOf(pixel) {
-  const room = roomOf();
-  if (room) return [room.width / pixel, room.height / pixel];
-  const { maxWidth, maxHeight } = manifest.config.frame;
-  const scale = Math.min(1, maxWidth / stage.clientWidth, maxHeight / stage.clientHeight) / pixel;
-  return [stage.clientWidth, stage.clientHeight].map((length) => Math.max(8, Math.floor(length * scale)));
-}
-
-/** Renders until the picture is that of the state: coarse at once, then whole, band by band, then the sums of passes. */
-async function update() {
-  if (!packed || works > 0) return;
-  isChanged = true;
-  if (isRunning) return void renderer.stop();
-  isRunning = true;
-  try {
-    while (isChanged && works === 0) {
-      isChanged = false;
-      const coarse = roomOf() ? COARSE : COARSE * state.pixel;
-      if ((await render(coarse, true)) && (await render(state.pixel, false))) await rest();
-    }
-  } catch (error) {
-    fail(error.message);
-  } finally {
-    isRunning = false;
-  }
-}
-
-/** Whether the frame that is next is still wanted. */
-const goesOn = () => !isChanged && works === 0;
-
-/** Adds up the passes of the picture while nothing changes. */
-async function rest() {
-  const count = passesOf(scene(), roomOf());
-  const [width, height] = sizeOf(state.pixel);
-  for (let index = 0; index < count; ++index) {
-    const view = (page.pass = viewOf(scene(), roomOf(), width, height, state, { index, count }, data.discs));
-    const frame = await renderer.frame(view, ({ first, last, pixels }) => {
-      if (!isChanged) picture.putImageData(new ImageData(pixels, width, last - first), 0, first);
-    });
-    if (frame === null || !goesOn()) return;
-    page.samples = index + 1;
-    element("samples").textContent = `pass ${page.samples} of ${count} is added`;
-  }
-}
-
-/** Renders a frame, and shows it; false if no other one may follow. */
-async function render(pixel, isCoarse) {
-  const box = boxOf();
-  for (const canvas of [picture.canvas, overlay.canvas]) for (const [name, value] of Object.entries(box)) canvas.style[name] = `${value}px`;
-  const [width, height] = sizeOf(pixel);
-  const view = viewOf(scene(), roomOf(), width, height, state);
-  const target = new OffscreenCanvas(width, height).getContext("2d");
-  const whole = { width, height, view, colours: new Uint16Array(3 * width * height), ratios: new Uint16Array(3 * width * height), triangles: new Int32Array(width * height) };
-  if (!isCoarse) Object.assign(picture.canvas, resized(picture.canvas, width, height));
-  const frame = await renderer.frame(view, ({ first, last, pixels, colours, ratios, triangles }) => {
-    const rows = new ImageData(pixels, width, last - first);
-    if (isCoarse) target.putImageData(rows, 0, first);
-    else if (!isChanged) picture.putImageData(rows, 0, first);
-    whole.colours.set(colours, 3 * width * first);
-    whole.ratios.set(ratios, 3 * width * first);
-    whole.triangles.set(triangles, width * first);
-  });
-  if (frame === null) return false;
-  if (isCoarse) {
-    Object.assign(picture.canvas, resized(picture.canvas, width, height));
-    picture.drawImage(target.canvas, 0, 0);
-    page.first ??= performance.now();
-  } else {
-    page.picture = whole;
-    showFigures({ width, height, workers: renderer.workers.length, packed, packTime: page.packTime }, frame);
-    page.samples = 0;
-    element("samples").textContent = "one sample a pixel";
-    document.body.dataset.frames = page.frames += 1;
-  }
-  drawPath();
-  return goesOn();
-}
-
-/** Keeps what a canvas shows when its size changes. */
-function resized(canvas, width, height) {
-  if (canvas.width === width && canvas.height === height) return {};
-  const before = new OffscreenCanvas(canvas.width, canvas.height);
-  before.getContext("2d").drawImage(canvas, 0, 0);
-  canvas.width = width;
-  canvas.height = height;
-  picture.imageSmoothingEnabled = true;
-  picture.drawImage(before, 0, 0, width, height);
-  return {};
-}
-
 function fail(text) {
   element("error").textContent = text;
   element("error").hidden = text === "";
 }
 
 function showNotes() {
-  const notes = [...page.mesh.notes, ...(roomOf()?.notes ?? [])];
-  if (packed.dropped) notes.push(`${packed.dropped.toLocaleString("en")} faces without area, or there twice, are left out`);
-  if (packed.reversed) notes.push(`${packed.reversed.toLocaleString("en")} closed parts did not point outward, and do now`);
-  if (packed.flipped) notes.push(`normals of ${packed.flipped.toLocaleString("en")} faces pointed to their back and are negated`);
-  if (page.mesh.hasColours && !hasRegister(manifest, "materials[0].hasCornerColours")) notes.push("this hardware has no corner colours: the mesh has one colour");
-  if (state.room && !roomOf())
-    notes.push(manifest.attributes ? "the page has rooms for presets only" : "this hardware has no maps of a room");
-  if (roomOf() && !isAtMaps(state)) notes.push("the camera is not that of the photo: the room is drawn from its maps");
-  const material = materialOf(scene(), roomOf());
-  if (roomOf() && !roomOf().light) notes.push("this hardware does not gather the light of the room: choose textured");
-  if (roomOf()?.light?.share) notes.push(`the photo shows ${Math.round(100 * roomOf().light.share)} % of the directions around the object; its mean light comes from the others`);
-  if (state.material === "metal" && material === "mirror") notes.push("metal is rough where light is gathered, in a room; here it is a mirror");
-  else if (material !== state.material) notes.push("this hardware has neither mirrors nor glass");
-  element("notes").replaceChildren(
-    ...notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })),
-  );
+  element("notes").replaceChildren(...notesOf(scene(), roomOf()).map((note) => Object.assign(document.createElement("li"), { textContent: note })));
 }
 
 // Meshes and designs
@@ -182,9 +64,9 @@ async function openDesign() {
 /** The pixels of a room's photo. */
 async function photoOf({ photo, picture: own, width, height }) {
   if (own) return own;
-  const picture = await createImageBitmap(new Blob([bytesOf(photo)], { type: "image/jpeg" }));
+  const bitmap = await createImageBitmap(new Blob([bytesOf(photo)], { type: "image/jpeg" }));
   const context = new OffscreenCanvas(width, height).getContext("2d");
-  context.drawImage(picture, 0, 0);
+  context.drawImage(bitmap, 0, 0);
   const { data } = context.getImageData(0, 0, width, height);
   return { data, width, height };
 }
@@ -214,7 +96,7 @@ function then(work) {
     })
     .then(
       () => (--works, show()),
-      (error) => (--works, fail(error.message), update()),
+      (error) => (--works, fail(error.message), picture.update()),
     );
   return queue;
 }
@@ -309,7 +191,7 @@ function show() {
   fail("");
   fill();
   keepLink();
-  update();
+  picture.update();
 }
 
 form.addEventListener("input", ({ target }) => {
@@ -389,7 +271,7 @@ listen(stage, {
   },
   click(event) {
     const box = picture.canvas.getBoundingClientRect();
-    const [width, height] = sizeOf(state.pixel);
+    const [width, height] = picture.size(state.pixel);
     const x = Math.floor(((event.clientX - box.left) / box.width) * width);
     const y = Math.floor(((event.clientY - box.top) / box.height) * height);
     if (x < 0 || y < 0 || x >= width || y >= height) return;
@@ -444,7 +326,7 @@ function listRays() {
 
 function drawPath() {
   const canvas = overlay.canvas;
-  const box = boxOf();
+  const box = picture.box();
   canvas.width = Math.round(box.width * devicePixelRatio);
   canvas.height = Math.round(box.height * devicePixelRatio);
   if (!rays) return;
@@ -480,6 +362,8 @@ async function start() {
   element("about").textContent = `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
   renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));
   page.renderer = renderer;
+  const now = () => ({ scene: scene(), room: roomOf(), discs: data.discs, isReady: Boolean(packed) && works === 0 });
+  picture = new Picture({ renderer, page, now, drawn: drawPath, fail });
   const wanted = state.mesh;
   const followed = state.follow;
   const isLost = state.room !== "" && !(state.room in data.rooms);
@@ -494,7 +378,7 @@ async function start() {
   state.follow = followed;
   if (followed) await followRay();
   show();
-  new ResizeObserver(() => update()).observe(stage);
+  new ResizeObserver(() => picture.update()).observe(stage);
 }
 
 start().catch((error) => fail(error.message));

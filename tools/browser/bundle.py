@@ -17,20 +17,8 @@ WORKER = (
     "worker",
 )
 PAGE = (
-    *(
-        "camera",
-        "design",
-        "photo",
-        "lightcube",
-        "roomview",
-        "path",
-        "panels",
-        "orbit",
-        "renderer",
-        "state",
-        "recording",
-    ),
-    *("view", "files", "visitor", "rtlpanel", "page"),
+    *("camera", "design", "photo", "lightcube", "roomview", "path", "panels", "orbit", "renderer", "state"),
+    *("recording", "view", "notes", "picture", "files", "visitor", "rtlpanel", "page"),
 )
 
 _IMPORT = re.compile(r'^import [^;]*? from "\./(\w+)\.js";\n', re.MULTILINE)
