@@ -29,8 +29,10 @@ def of_a_device(scene: Scene) -> Scene:
     keys = scene.blurs
     keys += [f"frame.samples = {scene.frame.samples}"] if (scene.frame.samples or 1) > 1 else []
     keys += ["frame.denoise"] if scene.frame.denoise else []
+    gathers = may_have_layers(scene)
+    keys += ["the samples, coats and highlights of paths.gather"] if gathers else []
     if keys:
-        named = f"{' and '.join(keys)} {'is' if len(keys) == 1 else 'are'}"
+        named = f"{' and '.join(keys)} {'is' if len(keys) == 1 and not gathers else 'are'}"
         notes.report([f"{named} of colonnade render: frames that a device shows by itself have one sample a pixel"])
     return scene.with_samples(1)
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.mesh.load import load_mesh
@@ -17,7 +18,7 @@ from colonnade.mesh.materials import MARKS, MeshMaterial
 from colonnade.scene.model import Camera, Light, MeshSource, Motion, Paths, Scene
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
-from colonnade.scene.passes import frame_passes
+from colonnade.scene.passes import frame_passes, of_a_device
 from colonnade.scene.samples import CENTRE, Sample, disc_point, samples_of_frame, square_points
 from colonnade.scene.view import View, make_view
 
@@ -192,3 +193,21 @@ def test_wrong_values_are_one_line(tmp_path: Path, text: str, message: str) -> N
     (tmp_path / "scene.toml").write_text(f'[mesh]\nname = "teapot:2"\n{text}\n')
     with pytest.raises(UserError, match=message):
         load_scene(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize(
+    ("frame", "gather", "named"),
+    [
+        ({"samples": 1}, 1, None),
+        ({}, 0, None),
+        ({"samples": 4}, 0, "frame.samples = 4 is"),
+        ({}, 1, "the samples, coats and highlights of paths.gather are"),
+        ({"samples": 4}, 1, "frame.samples = 4 and the samples, coats and highlights of paths.gather are"),
+    ],
+)
+def test_what_a_device_does_not_show_by_itself_is_named(frame: dict[str, int], gather: int, named: str | None) -> None:
+    scene = replace(TEAPOT, paths=Paths(bounces=1, gather=gather), frame=replace(TEAPOT.frame, **frame))
+    lines: list[str] = []
+    with notes.opened(lines.append):
+        assert of_a_device(scene).frame.samples == 1
+    assert [line.partition(" of colonnade render")[0] for line in lines] == ([] if named is None else [named])
