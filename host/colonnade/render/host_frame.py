@@ -101,7 +101,9 @@ class HostFrame:
                 # Other layers are not textured
                 mesh, white = self.prepared.mesh if layer is passes else None, np.ones_like(position)
                 albedo = white if mesh is None else oidn.albedo_of(mesh, self._faces(passes.frame), position)
-                found = oidn.filtered(colours, guide, albedo)
+                # Beside a photo without noise it would leave the pattern of several samples
+                around = self.image(sums) if passes.sums.samples == 1 else np.zeros_like(position)
+                found = oidn.filtered(colours, around, guide, albedo)
             else:
                 found = denoised(colours, layer.object_variance(), guide)
             return replace(sums, objects=found * sums.white * count)

@@ -10,11 +10,12 @@ from colonnade.mesh.mesh import Mesh
 from colonnade.render.denoise import Guide
 
 
-def filtered(colour: Floats, guide: Guide, albedo: Floats) -> Floats:
-    """Filter the colours of the object's pixels; it sees no others.
+def filtered(colour: Floats, around: Floats, guide: Guide, albedo: Floats) -> Floats:
+    """Filter the colours of the object's pixels.
 
     Args:
         colour: Linear, float64 [height, width, 3].
+        around: What it sees outside the mask, linear, float64 [height, width, 3].
         guide: What the pixels show.
         albedo: float64 [height, width, 3].
 
@@ -26,10 +27,10 @@ def filtered(colour: Floats, guide: Guide, albedo: Floats) -> Floats:
     if not guide.mask.any():
         return colour
 
-    def seen(values: Floats) -> NDArray[np.float32]:
-        return np.ascontiguousarray(np.where(guide.mask[..., None], values, 0.0), dtype=np.float32)
+    def seen(values: Floats, outside: Floats | float = 0.0) -> NDArray[np.float32]:
+        return np.ascontiguousarray(np.where(guide.mask[..., None], values, outside), dtype=np.float32)
 
-    found = pyoidn.denoise(seen(colour), albedo=seen(albedo), normal=seen(guide.normals), hdr=True)
+    found = pyoidn.denoise(seen(colour, around), albedo=seen(albedo), normal=seen(guide.normals), hdr=True)
     return np.where(guide.mask[..., None], np.maximum(found, 0.0), colour)
 
 

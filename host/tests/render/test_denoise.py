@@ -160,8 +160,9 @@ def test_oidn_sees_the_object_and_its_albedo(tmp_path: Path, monkeypatch: pytest
     options = ["--config", "textured", "--size", "64x48", "--backend", "model", "--output", str(output_file)]
     done = CliRunner().invoke(cli, ["render", str(tmp_path / "own.toml"), *options])
     assert done.exit_code == 0, done.output
-    is_object = seen["colour"].any(axis=2)
+    is_object = seen["albedo"].any(axis=2)
     np.testing.assert_array_equal(read_picture(output_file), 255 * ~np.repeat(is_object[..., None], 3, axis=2))
+    np.testing.assert_allclose(seen["colour"][~is_object], 1.0, err_msg="it sees what is around")
     np.testing.assert_allclose(seen["albedo"], is_object[..., None] * np.float32([0.2, 0.4, 0.8]))
     assert (np.linalg.norm(seen["normal"][is_object], axis=1) > 0.99).mean() > 0.9
 
