@@ -101,7 +101,7 @@ class View:
     flat: bool
     shadows: bool
     shadow_offset: float | None = None
-    shadow_transmittance: float = 0.6
+    shadow_transmittance: float = 0.3
     bounces: int = 4
     view_to_mesh: Floats | None = None
     shift: tuple[float, float] = (0.0, 0.0)

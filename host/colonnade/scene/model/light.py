@@ -111,5 +111,5 @@ class Paths:
     """
 
     bounces: Annotated[int, Strict(), Interval(ge=0, le=MAX_BOUNCES)] = 4
-    shadow_transmittance: Fraction = 0.6
+    shadow_transmittance: Fraction = 0.3
     gather: Annotated[int, Strict(), Interval(ge=0, le=MAX_GATHERED)] = 0
