@@ -142,6 +142,8 @@ from colonnade.device.console import ConsoleGuard
 from colonnade.device import console
 console._shows = lambda *_: True
 console.ROOT = console.Path(sys.argv[1])
+for number in (signal.SIGTERM, signal.SIGHUP):  # nohup ignores one
+    signal.signal(number, signal.SIG_DFL)
 fcntl.ioctl = lambda file, request, mode: os.write(1, b"graphics\\n" if mode else b"text\\n")
 guard = ConsoleGuard(0, 1)
 if os.fork() == 0:

@@ -140,7 +140,8 @@ def test_hardware_without_corner_colours_has_a_colour_a_face(tmp_path: Path) -> 
 
 def test_any_number_of_colours_needs_one_material(tmp_path: Path) -> None:
     mesh = load_mesh(ply(tmp_path / "a.ply", "sphere:4"), corner_colours=True)
-    assert with_materials(Scene(MeshSource(name="sphere:4")), mesh, SurfaceFeatures(1, corner_colours=True)) is mesh
+    ready = with_materials(Scene(MeshSource(name="sphere:4")), mesh, SurfaceFeatures(1, corner_colours=True))
+    assert ready.materials == mesh.materials and ready.corner_colours is mesh.corner_colours
     header = pack(mesh, coloured()).header
     registers = frame_registers(Scene(MeshSource(name="sphere:4")), header, coloured(), *SIZE)
     assert registers["materials[0].hasCornerColours"] == 1 and "materials[0].hasCornerColours" in coloured().registers
