@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "binding.hpp"
+#include "mesh/texture.hpp"
 #include "mesh/winding.hpp"
 #include "packer/records.hpp"
 #include "packer/surface_offset.hpp"
@@ -138,6 +139,24 @@ nb::tuple cornerNormals(const Rows<double>& vertices, const Rows<std::int32_t>& 
     return nb::make_tuple(arrayOf<double>(result.normals, {result.normals.size(), 3, 3}), result.flipped, result.replaced, result.missing);
 }
 
+template <class Pixel>
+Pixels<double> sampled(const nb::ndarray<const Pixel, nb::ndim<3>, nb::c_contig, nb::device::cpu>& pixels, const nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& uvs,
+                   int wrapU, int wrapV, bool isNearest, const std::optional<Column<double>>& values) {
+    const auto extent = [&](std::size_t axis) { return static_cast<std::int64_t>(pixels.shape(axis)); };
+    if (pixels.size() == 0 || (values && (sizeof(Pixel) > 1 || values->shape(0) < 256))) throw std::invalid_argument("there are no pixels, or too few values");
+    const mesh::Picture<Pixel> picture{pixels.data(), extent(0), extent(1), extent(2), static_cast<mesh::Wrap>(wrapU), static_cast<mesh::Wrap>(wrapV), isNearest};
+    double* out;
+    auto result = makeArray<double>({uvs.shape(0), pixels.shape(2)}, out);
+    const double *table = values ? values->data() : nullptr, *uv = uvs.data();
+    nb::gil_scoped_release release;
+    for (std::size_t i = 0; i < uvs.shape(0); ++i, uv += 2, out += picture.channels)
+        if (table)
+            picture.sample(uv, [table](Pixel code) { return table[static_cast<std::uint8_t>(code)]; }, out);
+        else
+            picture.sample(uv, [](Pixel value) { return static_cast<double>(value); }, out);
+    return result;
+}
+
 } // namespace
 
 void bind_packer(nb::module_& module) {
@@ -158,5 +177,7 @@ void bind_packer(nb::module_& module) {
     module.def("drop_faces", &dropFaces, "vertices"_a, "faces"_a);
     module.def("find_winding", &findWinding, "vertices"_a, "faces"_a);
     module.def("crease_normals", &creaseNormals, "vertices"_a, "faces"_a, "least_cosine"_a);
+    module.def("sampled", &sampled<std::uint8_t>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
+    module.def("sampled", &sampled<float>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
     module.def("corner_normals", &cornerNormals, "vertices"_a, "faces"_a, "authored"_a, "least_cosine"_a);
 }

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 FORMATS = {"PNG": b"\x89PNG", "JPEG": b"\xff\xd8\xff", "WEBP": b"RIFF"}
 #: A format of textures, which has no such bytes: the suffix of the file's name decides.
 TARGA = "TGA"
+#: The tag of EXIF data on how a picture is seen, and what its values do.
+_ORIENTATION = 0x0112
+_CHANGES = dict.fromkeys((3, 6, 8), "rotate") | dict.fromkeys((2, 4, 5, 7), "mirror")
 #: Duration of an animation frame.
 FRAME_MILLISECONDS = 50
 
@@ -128,6 +131,15 @@ def read_picture(path: Path) -> NDArray[np.uint8]:
     """Read a picture of 8 or 16 bits per channel as 8-bit sRGB, uint8 [height, width, 3]; alpha is dropped."""
     with opened_picture(path, f"no picture {path}: check the path") as picture:
         return rgb_pixels(picture)
+
+
+def rotation_notes(path: Path) -> list[str]:
+    """A line on a photo whose EXIF data rotate or mirror it, which `read_picture` does not."""
+    orientation = 1
+    with opened_picture(path) as picture, contextlib.suppress(Exception):  # of damaged EXIF data
+        orientation = picture.getexif().get(_ORIENTATION, 1)
+    change = _CHANGES.get(orientation)
+    return [f"{path}: its pixels are used as they lie, its EXIF data {change} them"] if change else []
 
 
 def alpha_pixels(picture: PillowImage) -> NDArray[np.uint8] | None:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.errors import UserError
-from colonnade.common.image_io import read_picture
+from colonnade.common.image_io import read_picture, rotation_notes
 from colonnade.common.input_files import is_folder
 from colonnade.common.types import Floats
 from colonnade.environment import files
@@ -132,7 +132,7 @@ def load_maps(
 
     if photo is not None and maps.photo is not None:
         same_size(photo, maps.photo)
-    notes: list[str] = []
+    notes = rotation_notes(maps.photo) if maps.photo else []
     albedo: Floats | None = None
     if samples is not None:
         encoding = maps.albedo_encoding

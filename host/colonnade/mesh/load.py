@@ -219,8 +219,7 @@ def clean_mesh(
     normals, colours, uvs = (None if values is None else values[keep] for values in (normals, colours, uvs))
     relief = None if relief is None else relief.kept(keep)
     winding = find_winding(vertices, faces)
-    if single_sided is not None:
-        losses.add(lost.BACKS, int((single_sided[keep] & winding.is_open).sum()))
+    has_backs = single_sided is not None and bool((single_sided[keep] & winding.is_open).any())
     if winding.reversed.any():
         losses.add(lost.MIXED, winding.mixed)
         losses.add(lost.INVERTED, winding.inverted)
@@ -251,7 +250,7 @@ def clean_mesh(
         source_faces=sources_kept,
         source_count=source_count,
         name=name,
-        notes=losses.lines(label),
+        notes=losses.lines(label) + ((f"{label}: {lost.BACKS}",) if has_backs else ()),
         corner_colours=colours,
         textures=textures,
         corner_uvs=uvs,

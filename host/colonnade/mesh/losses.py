@@ -94,11 +94,8 @@ NO_MATERIALS = Loss.of("file of materials", "missing", "faces have the default m
 UNKNOWN_MATERIALS = Loss.of("material name", "not defined", "faces have the default material")
 GROUPS = Loss.of("smoothing group", "not used", "edges are smooth up to the crease angle")
 SCENES = Loss.of("further scene", "not shown", "only the default scene is rendered")
-BACKS = Loss(
-    "face of an open single-sided surface is shown from behind",
-    "faces of open single-sided surfaces are shown from behind",
-    "viewers show their front only",
-)
+#: A line without a number, the last one: most open surfaces are single-sided, and few are seen from behind.
+BACKS = "open single-sided surfaces are shown from behind: viewers show their front only"
 SHORT_FACES = Loss.of(
     "face of fewer than three corners", "left out", "it has no area", "faces of fewer than three corners"
 )

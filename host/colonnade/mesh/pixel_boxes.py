@@ -48,8 +48,10 @@ class PixelCounts:
     def __init__(self, marks: npt.NDArray[np.bool_], texture: Texture) -> None:
         """Marks are of the unfolded picture."""
         self._texture = texture
-        self._sums = np.zeros((marks.shape[0] + 1, marks.shape[1] + 1), dtype=np.int64)
-        self._sums[1:, 1:] = marks.cumsum(axis=0, dtype=np.int64).cumsum(axis=1)
+        self._sums = np.zeros((marks.shape[0] + 1, marks.shape[1] + 1), dtype=np.int32)
+        counts = self._sums[1:, 1:]
+        np.cumsum(marks, axis=1, dtype=np.int32, out=counts)
+        np.cumsum(counts, axis=0, out=counts)
 
     def within(self, first: Indices, last: Indices) -> Indices:
         """Marked pixels from the first to the last pixel (x, y), int64 [k]; pixels of a clamped border count once."""

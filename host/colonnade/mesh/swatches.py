@@ -27,6 +27,8 @@ def with_swatches(surface: RawSurface) -> RawSurface:
     for number, texture in enumerate(surface.textures):
         users = [place for place, material in enumerate(surface.materials) if material.texture == number]
         faces = np.flatnonzero(np.isin(index, users))
+        if not len(faces):
+            continue
         first, last = pixel_boxes(uvs[faces], texture)
         plain = _show_one_colour(first, last, texture)
         faces, first, last = faces[plain], first[plain], last[plain]
@@ -42,12 +44,18 @@ def with_swatches(surface: RawSurface) -> RawSurface:
 
 def _show_one_colour(first: Indices, last: Indices, texture: Texture) -> npt.NDArray[np.bool_]:
     """Whether all pixels of boxes are equal, bool [k]."""
+    (left, top), (right, bottom) = wrapped(first, texture).T, wrapped(last, texture).T
     pixels = unfolded(texture.pixels, texture.wrap)
-    changes = np.zeros(len(first), dtype=np.int64)
-    for axis in range(2):
-        differs = (pixels != np.roll(pixels, -1, axis=1 - axis)).any(axis=2)
-        changes += PixelCounts(differs, texture).within(first, last - np.eye(2, dtype=np.int64)[axis])
-    found: npt.NDArray[np.bool_] = changes == 0
+    # Most boxes of a photograph differ at two corners already
+    found: npt.NDArray[np.bool_] = (pixels[top, left] == pixels[bottom, right]).all(axis=1)
+    if found.any():
+        first, last = first[found], last[found]
+        codes = pixels[..., 0] | pixels[..., 1].astype(np.uint32) << 8 | pixels[..., 2].astype(np.uint32) << 16
+        changes = np.zeros(len(first), dtype=np.int64)
+        for axis in range(2):
+            differs = codes != np.roll(codes, -1, axis=1 - axis)
+            changes += PixelCounts(differs, texture).within(first, last - np.eye(2, dtype=np.int64)[axis])
+        found[found] = changes == 0
     return found
 
 

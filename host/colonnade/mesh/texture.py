@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from colonnade.common.image_io import encode_srgb
 from colonnade.common.srgb import linear_from_srgb
-from colonnade.common.types import Floats, Indices
+from colonnade.common.types import Floats
 
 #: What lies beyond the picture: it repeats, it repeats mirrored, or its border goes on.
 Wrap = Literal["repeat", "mirror", "clamp"]
@@ -26,6 +26,8 @@ _LINEAR = linear_from_srgb(np.arange(256) / 255.0)
 #: The same as whole numbers of 16 bits, and the code of each of these.
 _LEVELS = np.rint(_LINEAR * 65535).astype(np.int64)
 _CODES = encode_srgb(np.arange(65536) / 65535)
+#: What lies beyond the picture, as numbers of ``cpp/mesh/texture.hpp``.
+_WRAPS: dict[Wrap, int] = {"repeat": 0, "mirror": 1, "clamp": 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +99,7 @@ class Texture:
 
 
 def sampled(
-    pixels: npt.NDArray[np.generic],
+    pixels: npt.NDArray[np.uint8] | npt.NDArray[np.float32],
     uvs: Floats,
     wrap: tuple[Wrap, Wrap],
     is_nearest: bool = False,
@@ -106,42 +108,20 @@ def sampled(
     """A picture at texture coordinates: bilinear between pixels' centres, or the pixel there.
 
     Args:
-        pixels: [height, width, ...].
+        pixels: uint8 or float32 [height, width, ...].
         uvs: float64 [n, 2].
         wrap: What lies beyond the picture, along u and v.
         is_nearest: No filter.
-        values: The value of each code; None: the pixels are values.
+        values: The value of each code of uint8, float64 [256]; None: the pixels are values.
 
     Returns:
         float64 [n, ...].
     """
+    from colonnade import _core
+
     height, width = pixels.shape[:2]
-    at = uvs * (width, height) - (0.0 if is_nearest else 0.5)
-    low = np.floor(at)
-    far = at - low
-    column, row = (low[:, axis].astype(np.int64) for axis in range(2))
-
-    def of(rows: Indices, columns: Indices) -> Floats:
-        found = pixels[rows, columns]
-        return np.asarray(found if values is None else values[found], dtype=np.float64)
-
-    if is_nearest:
-        return of(_wrapped(row, height, wrap[1]), _wrapped(column, width, wrap[0]))
-    columns = [_wrapped(column + step, width, wrap[0]) for step in range(2)]
-    rows = [_wrapped(row + step, height, wrap[1]) for step in range(2)]
-    found = np.zeros((len(uvs), *pixels.shape[2:]))
-    for x, share_x in ((0, 1 - far[:, 0]), (1, far[:, 0])):
-        for y, share_y in ((0, 1 - far[:, 1]), (1, far[:, 1])):
-            share = (share_x * share_y).reshape(-1, *(1 for _ in pixels.shape[2:]))
-            found += share * of(rows[y], columns[x])
-    return found
-
-
-def _wrapped(index: Indices, count: int, wrap: Wrap) -> Indices:
-    """Pixels beyond the picture, as pixels of it."""
-    if wrap == "clamp":
-        return np.clip(index, 0, count - 1)
-    if wrap == "repeat":
-        return index % count
-    folded = index % (2 * count)
-    return np.minimum(folded, 2 * count - 1 - folded)
+    channels = np.ascontiguousarray(pixels).reshape(height, width, -1)
+    table = None if values is None else np.ascontiguousarray(values, dtype=np.float64)
+    modes = [_WRAPS[axis] for axis in wrap]
+    found: Floats = _core.sampled(channels, np.ascontiguousarray(uvs, dtype=np.float64), *modes, is_nearest, table)
+    return found.reshape(len(uvs), *pixels.shape[2:])

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common import fixed_order
+from colonnade.common import fixed_order, notes
 from colonnade.common.errors import UserError
-from colonnade.common.image_io import read_picture
+from colonnade.common.image_io import read_picture, rotation_notes
 from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
@@ -92,6 +92,7 @@ def view_photo(scene: Scene, room: Environment | None, size: tuple[int, int] | N
     if scene.background.photo is None:
         return None
     photo = read_picture(scene.background.photo)
+    notes.report(rotation_notes(scene.background.photo))
     height, width = photo.shape[:2]
     if size is not None and abs(width * size[1] - height * size[0]) >= max(width, height):
         raise UserError(

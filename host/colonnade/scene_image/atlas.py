@@ -23,6 +23,8 @@ from colonnade.mesh.texture import Texture
 TILE = 16
 #: Samples of the texture along each axis of a texel, at most.
 _MAX_SAMPLES = 8
+#: Samples that are taken at a time.
+_SAMPLES = 1 << 16
 #: Texels around the faces that count as shown: texture coordinates are rounded.
 _MARGIN = 2
 #: Scales that are tried first. Above 1 the filter of the texture smooths it, and a tile holds fewer colours.
@@ -233,8 +235,15 @@ def _resampled(texture: Texture, region: Region, pixels: Floats) -> Floats:
     """The linear colours of a region, float64 [height, width, 3]: means of samples of the texture."""
     width, height = region.size
     samples = int(np.clip(np.ceil(max(pixels / region.size)), 1, _MAX_SAMPLES))
-    v, u = np.mgrid[: height * samples, : width * samples]
-    at = (np.stack([u, v], axis=-1) + 0.5) / samples / region.size
-    colours = texture.colours(region.low + at.reshape(-1, 2) * (region.high - region.low))
-    grid: Floats = colours.reshape(height, samples, width, samples, 3).mean(axis=(1, 3))
-    return grid
+    along = [(np.arange(length * samples) + 0.5) / samples / length for length in region.size]
+    u, v = (low + at * (high - low) for low, high, at in zip(region.low, region.high, along, strict=True))
+    grid = np.zeros((height, width, 3))
+    rows = max(1, _SAMPLES // (len(u) * samples))
+    for first in range(0, height, rows):
+        band = grid[first : first + rows]
+        at = np.stack(np.meshgrid(u, v[first * samples : (first + len(band)) * samples]), axis=-1).reshape(-1, 2)
+        colours = texture.colours(at).reshape(len(band), samples, width, samples, 3)
+        for down in range(samples):
+            for right in range(samples):
+                band += colours[:, down, :, right]
+    return grid / samples**2

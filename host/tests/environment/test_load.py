@@ -128,6 +128,16 @@ def test_a_grey_photo_of_8_or_16_bits_keeps_its_grey(environment: Path) -> None:
         assert photo is not None and photo.shape == (height, width, 3) and (photo == 102).all()
 
 
+def test_a_photo_that_its_exif_data_rotate_is_noted(environment: Path) -> None:
+    height, width = load_environment(environment).depth.shape
+    exif = Image.Exif()
+    for value, count in ((1, 0), (3, 1)):
+        exif[0x0112] = value
+        Image.new("RGB", (width, height)).save(environment / "photo.png", exif=exif)
+        noted = [note for note in load_environment(environment).notes if "EXIF data rotate" in note]
+        assert len(noted) == count
+
+
 def test_holes_take_their_neighbours_depth(environment: Path) -> None:
     depth, _ = corner()
     for k, nothing in enumerate((0.0, -1.0, np.nan, np.inf)):

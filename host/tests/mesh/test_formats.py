@@ -232,7 +232,7 @@ def test_what_a_gltf_file_loses_is_named(tmp_path: Path) -> None:
         "2 cameras are not used: the scene file has the camera",
         "1 animation is not played: nodes stand as the file places them",
         "3 lights are not used: the scene file has the lights",
-        "1 face of an open single-sided surface is shown from behind: viewers show their front only",
+        "open single-sided surfaces are shown from behind: viewers show their front only",
     ]
 
 

@@ -94,7 +94,7 @@ def test_colours_of_text_files_are_bytes_or_shares_or_noted(tmp_path: Path) -> N
 def test_what_unread_extensions_hold_is_not_checked(tmp_path: Path) -> None:
     content = document(tmp_path)
     content["textures"] = [{"extensions": {"MSFT_texture_dds": {"source": 0}}}]
-    content["extensionsRequired"] = ["KHR_materials_emissive_strength", "KHR_materials_pbrSpecularGlossiness"]
+    content["extensionsRequired"] = ["KHR_materials_emissive_strength", "KHR_materials_unlit"]
     content["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": {"mode": "ATTRIBUTES"}}
     assert "1 picture of a texture is not readable" in loaded(tmp_path, content)[0]
     content["extensionsRequired"] = ["EXT_meshopt_compression"]
