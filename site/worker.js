@@ -25,7 +25,11 @@ export function serve(scope) {
   let current;
   let sums;
   let frame = 0;
-  const pause = () => new Promise((resolve) => setTimeout(resolve));
+  // Lets other messages in; timers would wait 4 ms
+  const waiting = [];
+  const channel = new MessageChannel();
+  channel.port1.onmessage = () => waiting.shift()();
+  const pause = () => new Promise((resolve) => (waiting.push(resolve), channel.port2.postMessage(null)));
 
   const calls = {
     /** `views`: view files by name; `maps`, `photo` and `light`: those of a room, the photo as RGBA, the light as in lightcube.js. */
