@@ -18,14 +18,12 @@ export class Sums {
     Object.assign(this, { white, photo, samples: 0 });
     this.objects = new Uint32Array(3 * pixels);
     this.others = new Uint32Array(3 * pixels);
-    this.coverage = new Uint16Array(pixels);
   }
 
   /** Adds rows of the pass that `samples` counts, from the pixel `first` on. */
   add({ colours, ratios, triangles }, first) {
     triangles.forEach((triangle, i) => {
       const isObject = triangle >= 0;
-      this.coverage[first + i] += Number(isObject);
       const [sums, values] = isObject ? [this.objects, colours] : [this.others, this.photo ? ratios : colours];
       for (let channel = 0; channel < 3; ++channel) sums[3 * (first + i) + channel] += values[3 * i + channel];
     });
@@ -41,7 +39,7 @@ export class Sums {
         const [object, other] = [this.objects[at], this.others[at]];
         let code;
         if (!this.photo) code = codeOf((object + other) / this.white / this.samples);
-        else if (this.coverage[i] === 0 && other === unshadowed) code = this.photo[at];
+        else if (object === 0 && other === unshadowed) code = this.photo[at];
         else code = codeOf((object / this.white + (photoLinear[this.photo[at]] * other) / UNSHADOWED) / this.samples);
         pixels[4 * (i - first) + channel] = code;
       }

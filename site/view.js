@@ -84,11 +84,11 @@ export function poseIn({ manifest, packed }, room, orbit) {
 
 /**
  * A frame in a room, or without one. In a room an orbit turns the object, and moves the camera from that of the maps.
- * `sample`: index and count of a pass; `discs`: the points of lights' discs in each pass.
+ * `sample`: index and count of a pass; `discs`: the points of lights' discs in each pass, by the number of passes.
  */
-export function viewOf(scene, room, width, height, orbit, sample = null, discs = []) {
+export function viewOf(scene, room, width, height, orbit, sample = null, discs = {}) {
   const registers = registersOf(scene, room);
-  const points = sample ? discs[sample.index] : [];
+  const points = sample ? discs[sample.count][sample.index] : [];
   if (room) {
     const inPhoto = Boolean(scene.state.photo) && isAtMaps(orbit);
     // Where there is no photo, the room is the device's

@@ -22,6 +22,7 @@ export function serve(scope) {
   let opened;
   let photos;
   let radiance;
+  let lit;
   let current;
   let sums;
   let frame = 0;
@@ -42,6 +43,7 @@ export function serve(scope) {
       photos = photo ? Object.fromEntries(Object.keys(views).map((factor) => [factor, resizedPhoto(photo, Number(factor))])) : {};
       white = 2 ** manifest.numbers.colourBits - 1;
       radiance = light;
+      lit = null;
       return {};
     },
     read({ name, bytes, files }) {
@@ -130,7 +132,10 @@ export function serve(scope) {
     opened = { file, isOfMaps: Boolean(camera.isOfMaps) };
     if (!camera.isOfMaps) library.setCamera(camera);
     if (object) library.setObject(object);
-    if (radiance) library.loadMemories([{ memory: "light.cube", words: cubeWords(radiance, object.rotation), bytes: 4 }]);
+    if (radiance && lit !== String(object.rotation)) {
+      library.loadMemories([{ memory: "light.cube", words: cubeWords(radiance, object.rotation), bytes: 4 }]);
+      lit = String(object.rotation);
+    }
     lights.forEach((light, index) => library.setLight(index, light));
     library.setSample(sample ?? { index: 0, count: 1 });
     library.start(library.frame(registers));

@@ -211,7 +211,7 @@ static void set_window(struct colonnade_view *view, const struct lengths *length
     const int64_t *shift = view->sample.shift;
     const int64_t focal[2] = {camera->fx, camera->fy}, centre[2] = {camera->cx - shift[0], camera->cy - shift[1]};
     struct region window = {{.is_empty = true}, scene->window == WINDOW_WHOLE};
-    if (scene->window == WINDOW_SHADOW || scene->window == (WINDOW_SHADOW | WINDOW_NEAR)) {
+    if ((scene->window & WINDOW_SHADOW) != 0) {
         const int32_t margin = ((int32_t)1 << scene->vertex_bits) / MARGIN_PARTS + 1;
         int32_t corners[8][3], in_world[8][3];
         find_corners(scene, lengths, 0, margin, corners);

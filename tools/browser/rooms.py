@@ -37,8 +37,8 @@ PLACEMENTS = {
 #: Sizes of frames, in the order of the sizes of a pixel.
 SIZES = {1: (640, 480), 2: (320, 240), 4: (160, 120)}
 MESH = "cube"
-#: Passes of a frame that gathers light, and the lights of a room that have points of their discs.
-PASSES, LIGHTS = 64, 2
+#: Passes of a frame without gathered light and with it (site/view.js); lights of a room with points of their discs.
+PASSES, LIGHTS = (4, 64), 2
 
 
 def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
@@ -85,9 +85,12 @@ def _kind(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     return {"views": views, "maps": maps, "headroom": ready.scene.headroom, "light": light, "room": room}
 
 
-def discs() -> list[list[list[float]]]:
-    """The points of lights' discs in each pass of a frame that gathers light."""
-    return [[list(point) for point in sample.lights] for sample in samples_of_frame(PASSES, LIGHTS)]
+def discs() -> dict[int, list[list[list[float]]]]:
+    """The points of lights' discs in each pass of a frame, by the number of its passes."""
+    return {
+        count: [[list(point) for point in sample.lights] for sample in samples_of_frame(count, LIGHTS)]
+        for count in PASSES
+    }
 
 
 def _light(ready: DeviceScene) -> dict[str, Any]:
