@@ -5,8 +5,8 @@
 - Scaladoc, PeakRDL's register pages and the page of tools/browser are copied into the site, from the folders that the
   environment variables COLONNADE_SCALADOC, COLONNADE_REGISTERS and COLONNADE_BROWSER name.
 - Links are written for the repository (``../SECURITY.md``); here they are pointed at the site's pages. Of a link to a
-  source file only the text stays. A link to a file that the repository lacks, and a page that the navigation lacks, are
-  errors. Zensical reports links to anchors that do not exist.
+  source file only the text stays. A link to a file that the repository lacks, a link that is not written inline, and a
+  page that the navigation lacks are errors. Zensical reports links to anchors that do not exist.
 - GitHub's Markdown needs no blank line before a list or a table; Python-Markdown does.
 
 usage: stage.py FOLDER
@@ -42,7 +42,20 @@ _COPIED = (
 _REFERENCES = {"api.md": ("colonnade.api.scene", "colonnade.device.device", "colonnade.device.shell_device")}
 #: Pages of many words that explain little. They are not searched, so that the search finds the guides.
 _UNSEARCHED = ("api/", "changelog.md")
-_LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
+#: An inline link or picture, whose parts may be on several lines of a paragraph; or code, in which there are none.
+_LINK = re.compile(
+    r"""
+      ^[ ]*(?P<fence>```|~~~).*?^[ ]*(?P=fence)
+    | (?P<ticks>`+)(?!`)(?:(?!\n[ ]*\n).)+?(?<!`)(?P=ticks)(?!`)
+    | (?P<picture>!?)\[(?P<text>(?:`[^`]*`|!?\[[^\[\]]*\](?:\([^()]*\))?|[^\[\]`\n]|\n(?![ ]*\n))*)\]
+      \(\s*<?(?P<address>[^()<>\s]+)>?(?P<title>\s+"[^"]*"|\s+'[^']*')?\s*\)
+    """,
+    re.MULTILINE | re.DOTALL | re.VERBOSE,
+)
+#: Links in other forms that GitHub renders: a definition of a reference, and HTML.
+_OTHER_LINK = re.compile(
+    r"^ {0,3}\[[^\]\n]+\]:\s*\S+|<(?:a|img|source)\s[^>]*\b(?:href|src|srcset)\b[^>]*>", re.MULTILINE
+)
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _ITEM = re.compile(r"^([-*+]|\d+\.) ")
 _ROW = re.compile(r"^\|.*\|\s*$")
@@ -82,22 +95,31 @@ class Stage:
         """A page's text with the site's links, and blank lines between paragraphs and what follows them."""
         lines: list[str] = []
         is_code = False
-        for line in (ROOT / source).read_text(encoding="utf-8").split("\n"):
+        for line in self._links((ROOT / source).read_text(encoding="utf-8"), page, source, docs).split("\n"):
             if _FENCE.match(line):
                 is_code = not is_code
-            elif not is_code:
-                line = _LINK.sub(lambda link: self._link(link, page, source, docs), line)
-                if lines and lines[-1].strip() and _begins_block(line, lines[-1]):
-                    lines.append("")
+            elif not is_code and lines and lines[-1].strip() and _begins_block(line, lines[-1]):
+                lines.append("")
             lines.append(line)
         return "\n".join([*lines, *(f"\n::: {module}\n" for module in _REFERENCES.get(page, ()))])
 
+    def _links(self, text: str, page: str, source: str, docs: Path) -> str:
+        """The ``text`` of the repository's file ``source`` with the links of the site's ``page``."""
+
+        def replaced(found: re.Match[str]) -> str:
+            return self._link(found, page, source, docs) if found["address"] else found[0]
+
+        for other in _OTHER_LINK.findall(_LINK.sub("", text)):
+            self.errors.append(f"{source} has a link that is not written inline, [text](address): {other}")
+        return _LINK.sub(replaced, text)
+
     def _link(self, link: re.Match[str], page: str, source: str, docs: Path) -> str:
         """A link of the repository's file ``source`` as one of the site's ``page``, or its text if there is none."""
-        picture, text, address = link.groups()
+        picture, address, title = link["picture"], link["address"], link["title"] or ""
+        text = self._links(link["text"], page, source, docs)
         path, mark, anchor = address.partition("#")
         if not path or "://" in address:
-            return link[0]
+            return f"{picture}[{text}]({address}{title})"
         target = posixpath.normpath(posixpath.join(posixpath.dirname(source), path))
         if not (ROOT / target).is_file():
             if not (ROOT / target).exists():
@@ -110,7 +132,7 @@ class Stage:
             shutil.copyfile(ROOT / target, docs / place)
         if place not in self.sources and not (docs / place).is_file():
             return text
-        return f"{picture}[{text}]({posixpath.relpath(place, posixpath.dirname(page) or '.')}{mark}{anchor})"
+        return f"{picture}[{text}]({posixpath.relpath(place, posixpath.dirname(page) or '.')}{mark}{anchor}{title})"
 
     def _configuration(self) -> str:
         """The configuration, with the generated pages in the navigation."""
