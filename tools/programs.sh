@@ -46,13 +46,11 @@ has() { command -v "$1" >/dev/null 2>&1; }
 # Whether version $1 is $2 or newer.
 at_least() { [ "$(printf '%s\n%s\n' "$2" "$1" | sort -V | head -n 1)" = "$2" ]; }
 
-python_is_new_enough() { at_least "$(python_version "$1")" "$minimum_python"; }
-
-# The interpreter for .venv: the first candidate that is Python 3.10 or newer.
+# The interpreter for .venv: the first candidate that is Python 3.10, or $1, or newer.
 python_program() {
   local candidate
   for candidate in "${PYTHON:-python3}" python3 python3.13 python3.12 python3.11 python3.10 /usr/bin/python3; do
-    if has "$candidate" && python_is_new_enough "$candidate"; then
+    if has "$candidate" && at_least "$(python_version "$candidate")" "${1:-$minimum_python}"; then
       echo "$candidate"
       return
     fi
