@@ -53,10 +53,10 @@ check: setup ## formatters, linters, types, layers, derived files
 docs: setup ## the documentation site in out/site; fails on a broken link
 	@tools/docs
 
-release: setup ## wheels, the generator as a jar, designs of all presets, site, bill of materials and checksums in out/release
+release: ## wheels, the generator as a jar, designs of all presets, site, bill of materials and checksums in out/release
 	@tools/release
 
-release-check: setup ## make the release twice, compare, and use its files in bare systems; as root, long
+release-check: ## make the release twice, compare, and use its files in bare systems; as root, long
 	@tools/release-check
 
 container: ## the image `colonnade`: Debian 12, a checkout that is set up; by podman, buildah or docker

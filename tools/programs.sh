@@ -41,6 +41,9 @@ case "$root" in
   *[:\;\"\'\`\#\$\\\&\|\<\>\(\)\*\?]*) die "the path of the checkout, $root, has a character that Java or CMake does not accept; move the checkout" ;;
 esac
 
+# The arguments as one text, with semicolons between them.
+joined() { printf '%s; ' "$@" | sed 's/; $//'; }
+
 has() { command -v "$1" >/dev/null 2>&1; }
 
 # Whether version $1 is $2 or newer.
@@ -62,6 +65,22 @@ python_is_complete() {
   "$1" -c '
 import ensurepip, os, sys, sysconfig, venv
 sys.exit(not os.path.exists(os.path.join(sysconfig.get_paths()["include"], "Python.h")))' >/dev/null 2>&1
+}
+
+# Sets `pythons` to the interpreters that compile the wheels of a release, one for each module that a wheel holds: for
+# 3.10, for 3.11, and for all later ones. Adds what is missing for a release to `lacks`.
+release_needs() {
+  local names name found changes
+  changes="$(git -C "$root" status --porcelain)"
+  [ -z "$changes" ] || lacks+=("a commit of what git status lists, such as ${changes%%$'\n'*}")
+  pythons=()
+  for names in python3.10 python3.11 "python3.12 python3.13 python3.14"; do
+    found=""
+    for name in $names; do
+      [ -n "$found" ] || ! python_is_complete "$name" || found="$(command -v "$name")"
+    done
+    if [ -n "$found" ]; then pythons+=("$found"); else lacks+=("${names// / or } on PATH with its headers and ensurepip"); fi
+  done
 }
 
 java_program() {

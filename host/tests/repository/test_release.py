@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
@@ -24,6 +26,44 @@ def module(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], ModuleType]:
     monkeypatch.syspath_prepend(str(ROOT / "tools" / "distribution"))
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     return lambda name: __import__(name)
+
+
+LACKS = (
+    "a commit of what git status lists, such as ?? bin/; python3.10 on PATH with its headers and ensurepip; "
+    "python3.12 or python3.13 or python3.14 on PATH with its headers and ensurepip"
+)
+LACKS_OF_CHECK = (
+    "root, for bare systems; the package qemu-user-static; the package binfmt-support; "
+    "a mirror of Debian 12 (bookworm) in apt's sources"
+)
+
+
+@pytest.mark.parametrize(
+    ("program", "line"),
+    [
+        ("release", f"a release needs: {LACKS}"),
+        ("release-check", f"the check of a release needs: {LACKS_OF_CHECK}; {LACKS}"),
+    ],
+)
+def test_all_that_a_release_lacks_is_one_line_before_its_work(program: str, line: str, tmp_path: Path) -> None:
+    """In a checkout without the other programs of tools, and on a machine without most of what these would need."""
+    for folder in ("tools", "bin"):
+        (tmp_path / folder).mkdir()
+    for name in ("programs.sh", program):
+        shutil.copy(ROOT / "tools" / name, tmp_path / "tools")
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    subprocess.run(["git", "add", "tools"], cwd=tmp_path, check=True)
+    who = ("-c", "user.name=a", "-c", "user.email=a@b")
+    subprocess.run(["git", *who, "commit", "-qm", "Tools"], cwd=tmp_path, check=True)
+    for name in ("bash", "cut", "dirname", "env", "getent", "git", "head", "java", "realpath", "sed", "sort"):
+        (tmp_path / "bin" / name).symlink_to(shutil.which(name) or "/bin/false")
+    for name, text in (("id", "echo 1000"), ("mmdebstrap", ""), ("python3.10", "exit 1"), ("python3.11", "exit 0")):
+        (tmp_path / "bin" / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / "bin" / name).chmod(0o755)
+    done = subprocess.run(
+        [tmp_path / "tools" / program], env={"PATH": f"{tmp_path}/bin", "HOME": "/"}, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", f"colonnade: error: {line}\n")
 
 
 def a_jar(file: Path) -> Path:
