@@ -65,7 +65,7 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
         start, scale = scene.transform.translate, scene.transform.scale
         moved = start if motion.translate is None else interpolate(start, motion.translate, progress)
         axis = (0.0, 1.0, 0.0) if environment is not None else scene.camera.up
-        turned = fixed_order.product(rotation_about(axis, motion.turn * progress), rotation)
+        turned = fixed_order.product(rotation_about(axis, motion.degrees * progress), rotation)
         return Pose(turned, scale, np.array(moved) + fixed_order.product(scale * (rotation - turned), extent.centre))
     if motion.translate is not None:
         raise UserError("motion.translate is for an object that does not stand in a room: give motion.stand_at")
@@ -76,7 +76,7 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
         point = surface_point(placement.stand_at, environment, "object.stand_at")
     if motion.stand_at is not None:
         point = (1.0 - progress) * point + progress * surface_point(motion.stand_at, environment, "motion.stand_at")
-    return standing_pose(placement, rotation, extent, point, motion.turn * progress)
+    return standing_pose(placement, rotation, extent, point, motion.degrees * progress)
 
 
 def with_free_placement(scene: Scene, extent: Extent, environment: Environment | None) -> Scene:

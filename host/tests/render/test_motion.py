@@ -95,6 +95,27 @@ def test_without_a_motion_the_object_turns_once(folder: Path) -> None:
         assert same(frame, render(RenderRequest(turned, "small", ROOM, "model", (96, 72), samples=1)))
 
 
+@pytest.mark.parametrize(
+    ("text", "motion"),
+    [
+        (ALONE, "motion.camera = [{position = [1.0, 3.0, 8.0]}]\n"),
+        (ALONE, "motion.translate = [1.0, 0.0, 0.0]\n"),
+        (standing(), "motion.light = [1.0, 2.0, 0.6]\n"),
+        (standing(), "motion.stand_at = [60, 45.5]\n"),
+    ],
+)
+def test_an_object_turns_by_itself_only_where_nothing_else_moves(folder: Path, text: str, motion: str) -> None:
+    extent, room = load_mesh("teapot:2").extent, load_environment(folder / "rooms" / "attic")
+
+    def rotations(motion: str) -> list[NDArray[np.float64]]:
+        scene = load_scene(scene_file(folder, text, motion))
+        return [object_pose(scene.at(share), extent, room if text != ALONE else None).rotation for share in (0.0, 0.3)]
+
+    np.testing.assert_array_equal(*rotations(motion))
+    for turning in ("", "motion.shutter = 0.5\n", f"motion.turn = 360.0\n{motion}"):
+        assert not np.allclose(*rotations(turning))
+
+
 def test_one_frame_is_the_plain_one(folder: Path) -> None:
     file = scene_file(folder, ALONE, "[motion]\nturn = 90.0\ntranslate = [1.0, 0.0, 0.0]\n")
     (only,) = render_frames(RenderRequest(file, "tiny", (), "model", SIZE, 1))

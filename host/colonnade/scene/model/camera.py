@@ -73,7 +73,8 @@ class Motion:
     """The motion of the object, or of all as one, and of the first light over a sequence of frames, from the scene on.
 
     Attributes:
-        turn: Rotation of the object about the vertical through its centre, degrees.
+        turn: Rotation of the object about the vertical through its centre, degrees. None: 360 if nothing else moves,
+            0 otherwise (`degrees`).
         stand_at: Last value of ``object.stand_at``; the object moves straight to that surface point.
         translate: Last value of ``transform.translate``, for an object that does not stand in a room; of several
             objects, the shift of all.
@@ -82,7 +83,7 @@ class Motion:
         shutter: How long each frame is exposed, as a fraction of the interval to the next one.
     """
 
-    turn: Annotated[Float, Interval(ge=-36000.0, le=36000.0)] = 360.0
+    turn: Annotated[Float, Interval(ge=-36000.0, le=36000.0)] | None = None
     stand_at: RoomPixel | None = None
     translate: WorldVector | None = None
     light: WorldVector | None = None
@@ -97,15 +98,23 @@ class Motion:
         return self
 
     @property
+    def degrees(self) -> float:
+        """Rotation of the object, degrees."""
+        return self.turn if self.turn is not None else 360.0 if self._only_turns else 0.0
+
+    @property
     def is_still(self) -> bool:
         """Whether nothing moves."""
-        return self.is_closed and self.turn == 0.0
+        return self.is_closed and self.degrees == 0.0
 
     @property
     def is_closed(self) -> bool:
         """Whether the last state equals the first."""
-        still = self.stand_at is None and self.translate is None and self.light is None and not self.camera
-        return self.turn % 360.0 == 0.0 and still
+        return self._only_turns and self.degrees % 360.0 == 0.0
+
+    @property
+    def _only_turns(self) -> bool:
+        return self.stand_at is None and self.translate is None and self.light is None and not self.camera
 
     def frame_progress(self, frames: int) -> list[float]:
         """Progress of each frame along the motion, evenly spaced from 0.0 to 1.0.
