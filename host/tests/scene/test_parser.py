@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
 from colonnade.common.errors import UserError
 from colonnade.mesh.load import load_mesh
-from colonnade.scene.model import Paths, Placement
-from colonnade.scene.parser import load_scene
+from colonnade.scene.model import MeshSource, Paths, Placement, Scene
+from colonnade.scene.parser import _TABLES, load_scene, tomllib
 
-SCENES = Path(__file__).resolve().parents[3] / "scenes"
+ROOT = Path(__file__).resolve().parents[3]
+SCENES = ROOT / "scenes"
 
 
 def write(folder: Path, text: str) -> Path:
@@ -35,6 +38,21 @@ def test_every_scene_of_the_project_is_read() -> None:
         scene = load_scene(file)
         for mesh in [one.mesh for one in scene.objects] or [scene.mesh]:
             load_mesh(mesh.source)
+
+
+def test_the_page_of_the_scene_file_has_all_keys_and_their_defaults() -> None:
+    """A key without a default stands in the row without a value."""
+    page = (ROOT / "docs" / "host.md").read_text().split("| table of the scene |")[1].split("\n\n")[0]
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines()[2:]]
+    scene = Scene(MeshSource("cube"), placement=Placement())
+    assert [re.findall("`([a-z]+)`", row[0])[0] for row in rows] == _TABLES
+    for row in rows:
+        (name, *_), spans = re.findall("`([a-z]+)`", row[0]), re.findall("`([^`]+)`", "".join(row[2:]))
+        given = tomllib.loads("\n".join(spans))
+        keys = asdict(getattr(scene, {"object": "placement"}.get(name, name)))
+        keys = {key: list(value) if isinstance(value, tuple) else value for key, value in keys.items()}
+        assert given == {key: value for key, value in keys.items() if value not in (None, [], "cube")}, name
+        assert keys.keys() <= set(re.findall("`([a-z_]+)`", row[1])), name
 
 
 def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
