@@ -96,11 +96,12 @@ def _step(header: ImageHeader) -> str:
 
 def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[str]:
     """Describe the image in text lines; a manifest adds the use of its memories."""
-    dropped = header.source_triangles - header.triangles
-    lines = [
-        f"mesh        {one_line(header.mesh)}: {header.triangles:,} triangles"
-        + (f" ({dropped:,} dropped)" if dropped else "")
-    ]
+    triangles, dropped = f"{header.triangles:,} triangles", header.source_triangles - header.triangles
+    if dropped > 0:
+        triangles += f" ({dropped:,} dropped)"
+    elif dropped < 0:
+        triangles += f", {header.source_triangles:,} in the file: normal maps and alpha split faces"
+    lines = [f"mesh        {one_line(header.mesh)}: {triangles}"]
     lines += [
         f"object {number:<4} {one_line(part.name)}: {part.edge * header.frame.scale:,.0f} steps of {_step(header)} long"
         for number, part in enumerate(header.parts, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -218,6 +219,19 @@ def test_reports(make_manifest: MakeManifest) -> None:
         assert use["nodes"] + use["triangles"] + use["attributes"] == use["records"] == image.header.record_count
         assert describe(image)["mesh"]["triangles"] == 12
         assert any("tree" in line for line in report_lines(image.header, manifest))
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        (12, "12 triangles"),
+        (2000, "12 triangles (1,988 dropped)"),
+        (5, "12 triangles, 5 in the file: normal maps and alpha split faces"),
+    ],
+)
+def test_a_report_tells_dropped_faces_from_split_ones(make_manifest: MakeManifest, source: int, said: str) -> None:
+    header = pack(replace(load_mesh("cube"), source_count=source), make_manifest()).header
+    assert report_lines(header)[0] == f"mesh        cube: {said}"
 
 
 def two_sided(mesh: Mesh) -> Mesh:
