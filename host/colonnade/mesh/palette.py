@@ -19,8 +19,8 @@ from colonnade.mesh.mesh import Mesh
 #: Limit of the 8-bit material index of a face.
 MAX_MATERIALS = 256
 
-#: Settings of hardware with textures, for messages.
-TEXTURE_SETTINGS = "geometry.cornerColours=true and geometry.textureBytes=16384"
+#: How to get hardware with textures, for messages.
+TEXTURE_HARDWARE = "take --config textured, or set geometry.cornerColours=true and geometry.textureBytes=16384"
 
 #: What a material loses whose roughness is not rendered, by kind.
 _WITHOUT_ROUGHNESS = {"diffuse": lost.COATS, "mirror": lost.ROUGH_MIRROR, "glass": lost.ROUGH_GLASS}
@@ -146,7 +146,7 @@ def without_textures(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
     count = len({material.texture for material in mesh.materials} - {None})
     line = (
         f"mesh {mesh.name}: {count} {'texture is' if count == 1 else 'textures are'} not shown: surfaces have their"
-        f" mean colour, as the hardware has no textures: set {TEXTURE_SETTINGS}"
+        f" mean colour, as the hardware has no textures: {TEXTURE_HARDWARE}"
     )
     return replace(mesh, materials=materials, textures=(), corner_uvs=None), (line,)
 

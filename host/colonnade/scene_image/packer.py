@@ -20,7 +20,7 @@ from colonnade.design.manifest import Manifest, field_places
 from colonnade.maps.encoders import Encoder
 from colonnade.mesh.materials import MeshMaterial
 from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.palette import TEXTURE_SETTINGS, table_entries
+from colonnade.mesh.palette import TEXTURE_HARDWARE, table_entries
 from colonnade.scene_image.atlas import Atlas, make_atlas, uv_codes
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.header import ImageHeader, ObjectFrame, TreeStatistics
@@ -185,7 +185,7 @@ def _atlas(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], he
     """The atlas of a mesh; None without textures."""
     if manifest.texture is None:
         if any(material.texture is not None for material in materials):
-            raise UserError(f"mesh {mesh.name} has textures, the hardware has none: set {TEXTURE_SETTINGS}")
+            raise UserError(f"mesh {mesh.name} has textures, the hardware has none: {TEXTURE_HARDWARE}")
         return None
     return make_atlas(mesh, materials, headroom, manifest.texture.sizes["width"])
 
