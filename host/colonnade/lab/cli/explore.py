@@ -15,7 +15,7 @@ from colonnade.cli.options import FILE, echo, strict_option
 
 @click.command()
 @click.argument("study", type=FILE)
-@click.option("--output", type=FILE, required=True, metavar="DIR", help="Folder for tables, pictures and report.")
+@click.option("--output", type=FILE, metavar="DIR", help="Folder for tables, pictures and report; not for --check.")
 @click.option(
     "--library",
     "libraries",
@@ -35,7 +35,7 @@ from colonnade.cli.options import FILE, echo, strict_option
 @strict_option
 def explore(
     study: Path,
-    output: Path,
+    output: Path | None,
     libraries: tuple[str, ...],
     jobs: int | None,
     scheduler: str | None,
@@ -60,11 +60,14 @@ def explore(
         raise click.UsageError("--jobs is for this machine, the cluster has its own", click.get_current_context())
     if scheduler is not None:
         check_address(scheduler)
-    check_output(output)
+    if output is not None:
+        check_output(output)
+    elif not only_check:
+        raise click.UsageError("--output DIR is missing; --check does without", click.get_current_context())
     file = load_study(study)
     terminal = progress.for_terminal()
     named = _named(libraries)
-    if only_check:
+    if only_check or output is None:
         exploration = Exploration(file, named, terminal)
         number = len({job.key for point in exploration.points for job in point.all()})
         for point in exploration.points:

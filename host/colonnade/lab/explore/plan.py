@@ -21,6 +21,7 @@ from colonnade.lab.explore.frames import Frame, cycles_job, frame_of
 from colonnade.lab.explore.jobs import KINDS, Job, JobFailed, figures_of
 from colonnade.lab.explore.points import Point, config_of
 from colonnade.lab.explore.schedule import Outcome
+from colonnade.lab.explore.study import quoted
 from colonnade.lab.explore.study_file import StudyFile
 from colonnade.lab.ppa.library.one_library import library_files
 from colonnade.mesh.mesh import Mesh
@@ -85,7 +86,7 @@ class Plan:
             if self.study.power is not None and self.study.power.size is not None:
                 check_size(self.study.power.size, manifest)
         except UserError as error:
-            raise self.file.error(("workload", "size"), f"{point.name}: {error}") from None
+            raise self.file.error(("workload", "size"), f"{quoted(point.name)}: {error}") from None
 
     def references(self) -> dict[str, Job]:
         """Embree's frames, by the frame's name."""

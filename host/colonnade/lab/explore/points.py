@@ -14,7 +14,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.lab.common.parallel import in_order, processors
-from colonnade.lab.explore.study import FieldValue, value_text
+from colonnade.lab.explore.study import FieldValue, quoted, value_text
 from colonnade.lab.explore.study_file import StudyFile
 
 
@@ -69,9 +69,10 @@ def points_of(file: StudyFile) -> list[Point]:
     names = [point.name for point in points]
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
-        raise file.error(("axes",), f"two points are named {twice}")
+        raise file.error(("axes",), f"two points are named {quoted(twice)}")
     if study.baseline is not None and study.baseline not in names:
-        raise file.error(("baseline",), f"baseline: there is no point {study.baseline}; points: {', '.join(names)}")
+        known = ", ".join(map(quoted, names))
+        raise file.error(("baseline",), f"baseline: there is no point {quoted(study.baseline)}; points: {known}")
     return points
 
 
@@ -105,7 +106,7 @@ def manifests_of(file: StudyFile, points: list[Point], progress: Progress = QUIE
     for point in points:
         problem = found[point.name]
         if isinstance(problem, UserError):
-            raise file.error(_origin(file, point, str(problem)), f"{point.name}: {problem}")
+            raise file.error(_origin(file, point, str(problem)), f"{quoted(point.name)}: {problem}")
     return {name: manifest for name, manifest in found.items() if isinstance(manifest, Manifest)}
 
 

@@ -358,6 +358,10 @@ def test_check_lists_the_points_and_writes_nothing(study: Path) -> None:
     result = CliRunner().invoke(cli, ["explore", str(study), "--output", str(study.parent / "out"), "--check"])
     assert result.output.splitlines() == ["16b16s32d", "32b32s64d", "2 points, 7 jobs"]
     assert not (study.parent / "out").exists()
+    assert CliRunner().invoke(cli, ["explore", str(study), "--check"]).output == result.output
+    missing = CliRunner().invoke(cli, ["explore", str(study)])
+    assert missing.exit_code == 2
+    hostile.one_error_line(missing.stderr, "--output DIR is missing; --check does without")
 
 
 @pytest.mark.parametrize(
