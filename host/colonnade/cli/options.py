@@ -110,7 +110,7 @@ def mesh_option(command: Command) -> Command:
 
 
 def strict_option(command: Command) -> Command:
-    """Add ``--strict``, which makes a note on a mesh an error."""
+    """Add ``--strict``, which makes a note on a mesh or a configuration an error."""
 
     def apply(context: click.Context, parameter: click.Parameter, value: bool) -> None:
         from colonnade.common.notes import be_strict
@@ -123,7 +123,8 @@ def strict_option(command: Command) -> Command:
         is_flag=True,
         expose_value=False,
         callback=apply,
-        help="Refuse a mesh of which something is not shown, instead of noting it on standard error.",
+        help="Refuse a mesh of which something is not shown, and hardware of which a part is idle, instead of noting it on"
+        " standard error.",
     )(command)
 
 

@@ -20,11 +20,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from colonnade.common import cache, machine_limits, processes
+from colonnade.common import cache, machine_limits, notes, processes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.config_name import ConfigurationSource, find_configuration
 from colonnade.design.design_folder import check_replaceable, replace_folder
+from colonnade.design.idle_parts import idle_notes
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import cache_directory, find_java, generator_jar, project_root
 
@@ -172,7 +173,9 @@ def _cached(config: str, overrides: Sequence[str], options: tuple[str, ...], pro
 
     entry = cache.entry(state / _key(source, options), make, "design", progress)
     cache.touch(state)
-    return GeneratedDesign(entry / DESIGN, Manifest.load(entry / DESIGN / "manifest.json"))
+    manifest = Manifest.load(entry / DESIGN / "manifest.json")
+    notes.report(idle_notes(manifest.config))
+    return GeneratedDesign(entry / DESIGN, manifest)
 
 
 def _released(root: Path, source: ConfigurationSource) -> GeneratedDesign | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 import threading
 from collections.abc import Callable
@@ -11,15 +12,20 @@ from pathlib import Path
 
 import pytest
 
-from colonnade.common import cache
+from colonnade.common import cache, notes
 from colonnade.common.errors import UserError
 from colonnade.design import generator, toolchain
 from colonnade.design.config_name import find_configuration
+from colonnade.design.idle_parts import idle_notes
 from colonnade.device import compiler
 
 MANIFEST = {
     "version": 1,
-    "config": {"array": {"rows": 1}},
+    "config": {
+        "array": {"rows": 1, "contexts": 8},
+        "units": {"pathContexts": 8, "marches": 1},
+        "physicalAttributeMemory": None,
+    },
     "numbers": {},
     "records": {"bits": 320, "layouts": {}},
     "registers": {"dataBits": 32, "fields": []},
@@ -87,6 +93,32 @@ def release(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def runs(root: Path) -> list[str]:
     log = root / "runs"
     return [line.split()[0] for line in log.read_text().splitlines()] if log.exists() else []
+
+
+@pytest.mark.parametrize("preset", ["tiny", "small", "textured", "fpga", "diffuse", "lean", "edge"])
+def test_no_part_of_a_preset_is_idle(preset: str) -> None:
+    assert idle_notes(json.loads((toolchain.project_root() / "configs" / f"{preset}.json").read_text())) == []
+
+
+@pytest.mark.parametrize(
+    ("config", "overrides", "line"),
+    [
+        (
+            "tiny",
+            ("array.contexts=12",),
+            r"4 of a column's 12 contexts \(array.rows × array.contexts\) are idle at any time, since its path unit has 8"
+            " rays at most: raise units.pathContexts, or set array.contexts=8",
+        ),
+        ("tiny", ("array.rows=9",), "64 of a column's 72 contexts .* or lower array.rows"),
+        ("small", ("units.marches=16", "array.contexts=4", "units.pathContexts=10"), "6 of .* set units.marches=10"),
+    ],
+)
+def test_parts_that_are_idle_at_any_time_are_noted_once(config: str, overrides: tuple[str, ...], line: str) -> None:
+    lines: list[str] = []
+    with notes.opened(lines.append):
+        for _ in range(2):
+            generator.manifest_for(config, overrides)
+    assert len(lines) == 1 and re.fullmatch(line, lines[0])
 
 
 def test_generator_runs_once_and_is_compiled_once(checkout: Path) -> None:

@@ -89,6 +89,12 @@ RENDER_INDEX = (
 )
 
 
+#: A column of studies with a point that has some.
+IDLE = Column(
+    "idle_contexts", "idle contexts", "", None, ",d", "contexts of a column that are idle at any time: units.pathContexts"
+)
+
+
 def columns(has: Mapping[str, bool], libraries: Sequence[str]) -> list[Column]:
     """The figures of a study.
 

@@ -15,6 +15,7 @@ from colonnade import __version__
 from colonnade.common import processes
 from colonnade.common.atomic_files import json_bytes
 from colonnade.common.terminal_text import plain
+from colonnade.design.idle_parts import idle_contexts
 from colonnade.design.toolchain import project_root
 from colonnade.lab.common.file_names import FileNames
 from colonnade.lab.explore import figures, render_index
@@ -52,6 +53,9 @@ class Results:
         columns = figures.columns(plan.has, plan.libraries)
         for entry in entries:
             entry["figures"] = figures.point_figures(entry, plan.has, plan.libraries)
+            entry["figures"][figures.IDLE.key] = idle_contexts(entry["config_values"])
+        if any(entry["figures"][figures.IDLE.key] for entry in entries):
+            columns.append(figures.IDLE)
         index = self._render_index(entries)
         for row in index["rows"] if index else ():
             entry = next(entry for entry in entries if entry["name"] == row["name"])

@@ -5,12 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, cast
 
+import pytest
+
+from colonnade.common import notes
 from colonnade.design.manifest import Manifest
+from colonnade.lab.explore.explore import Exploration
 from colonnade.lab.explore.jobs import KINDS, Job
 from colonnade.lab.explore.plan import Plan, PointJobs
 from colonnade.lab.explore.points import Point
 from colonnade.lab.explore.results import Results, table
-from colonnade.lab.explore.schedule import Outcome
+from colonnade.lab.explore.schedule import Outcome, Tally
+from colonnade.lab.explore.study_file import load_study
 from colonnade.lab.explore.work import PICTURE
 
 NAMES = ("a b", "a/b", "x+", "x*", "A B", "\N{LATIN SMALL LETTER O WITH STROKE}", "\N{SNOWMAN}", "..", 300 * "n")
@@ -44,6 +49,23 @@ def test_each_picture_has_a_file_of_its_own(tmp_path: Path) -> None:
         shown |= {f"{name} of {workload}": entry["workloads"][workload]["picture"] for workload in workloads}
     assert {name: (folder / path).read_text() for name, path in shown.items()} == {name: name for name in shown}
     assert len({path.casefold() for path in shown.values()}) == len(shown) == (len(NAMES) + 1) * len(workloads)
+
+
+@pytest.mark.parametrize(("contexts", "idle"), [("4, 8", None), ("8, 12", [0, 4])])
+def test_a_column_has_idle_contexts_if_a_point_has_some(tmp_path: Path, contexts: str, idle: list[int] | None) -> None:
+    """A column of `tiny` has eight rays at most."""
+    (tmp_path / "cube.toml").write_text('mesh.name = "cube"\n')
+    (tmp_path / "study.toml").write_text(
+        'title = "Idle"\ndesign.config = "tiny"\nworkload.scenes = ["cube.toml"]\ncycles = {}\n'
+        f'axes = {{"array.contexts" = [{contexts}]}}\n'
+    )
+    lines: list[str] = []
+    with notes.opened(lines.append):
+        exploration = Exploration(load_study(tmp_path / "study.toml"), {})
+    study = Results(exploration.plan, tmp_path, "colonnade").study(exploration.points, {}, Tally(), 0.0)
+    assert [point["figures"].get("idle_contexts") for point in study["points"]] == (idle or [None, None])
+    assert ("idle_contexts" in table(study).splitlines()[1]) == (idle is not None)
+    assert len(lines) == (idle is not None)
 
 
 def test_a_table_holds_no_formulas_and_one_line_of_comment() -> None:
