@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from colonnade.common import notes
 from colonnade.design.manifest import Manifest
 
 if TYPE_CHECKING:
@@ -173,6 +174,14 @@ LONGEST = "test_starting_pages.py"
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the longest file, so that no worker is left alone with it at the end."""
     items.sort(key=lambda item: item.path.name != LONGEST)
+
+
+@pytest.fixture
+def told() -> Iterator[list[str]]:
+    """The notes of a test, each once."""
+    lines: list[str] = []
+    with notes.opened(lines.append):
+        yield lines
 
 
 @pytest.fixture(autouse=True)

@@ -53,7 +53,8 @@ class Scene:
     are a list of tables. Values are checked when the scene is made. A scene does not change; `with_tables` makes
     another.
 
-    Notes on what a mesh holds and a picture does not show are Python warnings.
+    Notes on what a mesh holds and a picture does not show, and on light and samples that a scene does not name, are
+    Python warnings, each once for a scene and what `with_tables` makes of it.
 
     Args:
         mesh: A name such as ``teapot`` or ``sphere:80``, a file, arrays, or a ``trimesh.Trimesh``, of which vertices
@@ -128,11 +129,13 @@ class Scene:
         kept = {name: table for name, table in (self.tables | tables).items() if table is not None}
         scene = type(self).__new__(type(self))
         scene._set(kept, self.mesh if "mesh" not in tables else None, self._where, self.folder)
+        scene._notes = self._notes
         return scene
 
     def _set(self, tables: Mapping[str, Any], mesh: Mesh | None, where: str, folder: Path) -> None:
         self.tables = _plain(tables)
         self.mesh, self.folder, self._where = mesh, folder, where
+        self._notes: set[str] = set()
         self.description: model.Scene = scene_of(self.tables, where, folder)
 
     def render(
@@ -177,10 +180,10 @@ class Scene:
         request = RenderRequest(
             self.description, config, backend=backend, size=size, frames=count, mesh=self.mesh, **options
         )
-        with _noted():
+        with _noted(self._notes):
             results = render_frames(request, progress)
         while True:
-            with _noted():
+            with _noted(self._notes):
                 result = next(results, None)
             if result is None:
                 return
@@ -212,8 +215,8 @@ class Scene:
         Raises:
             UserError: The design cannot render the scene.
         """
-        manifest = manifest_for(config, overrides, progress).manifest
-        with _noted():
+        with _noted(self._notes):
+            manifest = manifest_for(config, overrides, progress).manifest
             scene = of_a_device(self.description)
             return DeviceScene.of(
                 scene, manifest, self.mesh, size=size, relit=relit, encoder=encoder, progress=progress
@@ -269,7 +272,7 @@ def _plain(value: Any) -> Any:
 
 
 @contextlib.contextmanager
-def _noted() -> Iterator[None]:
-    """Show notes as warnings."""
-    with notes.opened(lambda line: warnings.warn(line, stacklevel=2)):
+def _noted(earlier: set[str] | None = None) -> Iterator[None]:
+    """Show notes as warnings, but those of before."""
+    with notes.opened(lambda line: warnings.warn(line, stacklevel=2), earlier):
         yield

@@ -23,7 +23,7 @@ from colonnade.cli.pack import pack
 from colonnade.cli.registers import registers
 from colonnade.cli.render import render
 from colonnade.cli.view import view
-from colonnade.common import ledger, machine_limits, notes
+from colonnade.common import ledger, machine_limits, notes, progress
 from colonnade.common.errors import UserError, reason_of
 from colonnade.common.terminal_text import one_line
 
@@ -53,7 +53,7 @@ class OneLineErrors(click.Group):
         """Run a command line and exit with a status: 0 success, 1 internal error, 2 wrong input, 130 interrupted."""
         extra.pop("standalone_mode", None)
         try:
-            with ledger.opened(), notes.opened(lambda line: echo(f"colonnade: note: {line}", err=True)):
+            with ledger.opened(), notes.opened(_note):
                 status = super().main(args, prog_name, standalone_mode=False, **extra)
         except UserError as error:
             _fail(str(error), WRONG_INPUT)
@@ -107,6 +107,11 @@ def _of_laboratory(name: str) -> click.Command:
     command = getattr(import_module(f"colonnade.lab.cli.{name}"), name)
     assert isinstance(command, click.Command)
     return command
+
+
+def _note(line: str) -> None:
+    with progress.hidden():
+        echo(f"colonnade: note: {line}", err=True)
 
 
 def _unexpected(error: BaseException) -> tuple[str, int]:

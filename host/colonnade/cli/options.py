@@ -123,8 +123,8 @@ def strict_option(command: Command) -> Command:
         is_flag=True,
         expose_value=False,
         callback=apply,
-        help="Refuse a mesh of which something is not shown, and hardware of which a part is idle, instead of noting it on"
-        " standard error.",
+        help="Refuse a mesh of which something is not shown, and hardware of which a part is idle, instead of noting it"
+        " on standard error.",
     )(command)
 
 

@@ -1,7 +1,8 @@
-"""Notes on an input: what it holds and a result will not show, or what was repaired.
+"""Notes on an input: what it holds and a result will not show, what was repaired, or what was chosen for it.
 
-The command line opens a block that shows them as lines on standard error; with ``--strict`` they are an error. Outside
-of such a block, as in a program that uses the packages, they are silent, and found at the object that they concern.
+The command line opens a block that shows them as lines on standard error; with ``--strict`` those of `report` are an
+error. Outside of such a block, as in a program that uses the packages, they are silent, and found at the object that
+they concern.
 """
 
 from __future__ import annotations
@@ -20,22 +21,27 @@ class Notes:
     Attributes:
         show: Shows a line.
         is_strict: Notes are errors.
-        shown: Lines shown so far; each is shown once.
+        lines: Those so far; each is shown once.
     """
 
     show: Callable[[str], None]
     is_strict: bool = False
-    shown: set[str] = field(default_factory=set)
+    lines: set[str] = field(default_factory=set)
 
 
 _current: Notes | None = None
 
 
 @contextlib.contextmanager
-def opened(show: Callable[[str], None]) -> Iterator[None]:
-    """Show the notes of the block, in all threads."""
+def opened(show: Callable[[str], None], earlier: set[str] | None = None) -> Iterator[None]:
+    """Show the notes of the block, in all threads.
+
+    Args:
+        show: Shows a line.
+        earlier: Lines of earlier blocks, which are left out; those of this one are added.
+    """
     global _current
-    before, _current = _current, Notes(show)
+    before, _current = _current, Notes(show, lines=set() if earlier is None else earlier)
     try:
         yield
     finally:
@@ -54,11 +60,14 @@ def report(lines: Sequence[str]) -> None:
     Raises:
         UserError: The command is strict, and there is a line.
     """
-    if _current is None or not lines:
-        return
-    if _current.is_strict:
+    if _current is not None and _current.is_strict and lines:
         raise UserError(f"{'; '.join(lines)} (--strict)")
     for line in lines:
-        if line not in _current.shown:
-            _current.shown.add(line)
-            _current.show(line)
+        tell(line)
+
+
+def tell(line: str) -> None:
+    """Show a line on what was chosen, unless it was shown before; no error of a strict command."""
+    if _current is not None and line not in _current.lines:
+        _current.lines.add(line)
+        _current.show(line)

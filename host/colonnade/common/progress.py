@@ -55,6 +55,12 @@ class Progress:
 
 #: Shows nothing but notes.
 QUIET = Progress()
+_of_command: Progress = QUIET
+
+
+def hidden() -> AbstractContextManager[None]:
+    """Hide the display of the command in the block, so that other text can be printed."""
+    return _of_command.paused()
 
 
 class TerminalProgress(Progress):
@@ -199,7 +205,16 @@ def _display() -> RichProgress:
 
 
 def for_terminal() -> Progress:
-    """Bars if standard error is a terminal, else lines; nothing with ``COLONNADE_PROGRESS=off``."""
+    """Bars if standard error is a terminal, else lines; nothing with ``COLONNADE_PROGRESS=off``.
+
+    It is the display of the command, for `hidden`.
+    """
+    global _of_command
+    _of_command = _chosen()
+    return _of_command
+
+
+def _chosen() -> Progress:
     chosen = os.environ.get("COLONNADE_PROGRESS", "on")
     if chosen not in ("on", "off"):
         raise UserError(f"COLONNADE_PROGRESS={chosen} is neither on nor off")

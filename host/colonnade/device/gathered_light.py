@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colonnade.common.progress import Progress
+from colonnade.common import notes
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LARGEST, LightCube
 from colonnade.environment.lights import RoomLight
@@ -44,7 +44,7 @@ def scene_cube(
     relit: bool,
     unseen: Panorama | Surround | None = None,
     second: Environment | None = None,
-    progress: Progress | None = None,
+    is_noted: bool = False,
 ) -> LightCube | None:
     """The light that rays meet that leave the object, by directions of mesh space; None for a scene that gathers none.
 
@@ -60,7 +60,7 @@ def scene_cube(
         relit: The frame shows the room under the scene's lights, not its photo.
         unseen: The light that no photo shows (`LitRoom.unseen`).
         second: Another view of the room (`LitRoom.second`).
-        progress: Notes where the light comes from, and what the cube cannot hold; None: these are known.
+        is_noted: Note what no picture shows, and what the cube cannot hold.
     """
     if scene.paths.gather == 0:
         return None
@@ -68,29 +68,27 @@ def scene_cube(
     point, lights = pose.to_world(extent.centre), lights_of(scene, extent, room)
     if room is not None and image is not None:
         light = room_light(room, image, lights, point, not relit, unseen, second)
-        others = "bounding planes, a fit under the scene's lights,"
-        if unseen is not None:
-            others = "fitted walls" if isinstance(unseen, Surround) else "panorama"
-        pictures = "its picture shows" if second is None else "its two pictures show"
-        if progress is not None:
-            progress.note(
-                f"rays that leave the object meet the light of room {room.name}: {pictures} {light.seen:.0%} of all"
-                f" directions, and its {others} the other {1 - light.seen:.0%}"
+        if is_noted and not isinstance(unseen, Panorama):
+            others = "walls under the scene's lights" if unseen is None else "walls that were fitted"
+            more = "background.panorama" + (" or background.second_view" if second is None else "")
+            notes.tell(
+                f"room {room.name} shows {light.seen:.0%} of the directions from which light comes, the others have"
+                f" that of {others}: {more} shows more"
             )
         cube, distance = light.cube, light.distance / pose.scale
     elif isinstance(unseen, Panorama):
-        if progress is not None:
-            progress.note("rays that leave the object meet the light of the panorama, which shows all directions")
         cube = unseen.cube(FINE)
     else:
         cube = LightCube(np.broadcast_to(np.array(scene.ambient.colour), (6, 1, 1, 3)))
     cube = replace(cube.turned(pose.rotation), middle=extent.centre, distance=_shown(distance, extent.edge))
     cube = replace(cube, texels=cube.texels * scene.exposure)
     whole, lost = cube.texels.sum(), (cube.texels - LARGEST).clip(min=0.0).sum()
-    if lost > _REPORTED_LOSS * whole and progress is not None:
+    if lost > _REPORTED_LOSS * whole and is_noted:
         limit = LARGEST / scene.exposure
-        progress.note(
-            f"{lost / whole:.0%} of the light is brighter than {limit:g}, the most that a texel holds, and is lost"
+        source = "background.panorama_exposure" if isinstance(unseen, Panorama) else "the colours of [light], [ambient]"
+        notes.tell(
+            f"{lost / whole:.0%} of the light is brighter than {limit:g}, the most that a texel holds, and is lost:"
+            f" lower {source}"
         )
     known = () if scene.fits_lights else lights.lights
     return cube.with_lights([disc for light in known if (disc := _disc(light, point, pose)) is not None])

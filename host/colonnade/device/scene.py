@@ -88,7 +88,7 @@ class DeviceScene:
             encoder: Of the room's maps and of textures.
             room: In place of the room in the scene's folder.
             encode: In place of `encoder` for the room's maps.
-            progress: Shows the fit of lights, and notes what was fitted.
+            progress: Shows the fit of lights.
 
         Raises:
             UserError: Mesh or room cannot be read, or the design cannot render them.
@@ -111,7 +111,7 @@ class DeviceScene:
             image = with_environment(image, maps, manifest)
         if manifest.gathers:
             held = None if maps is None else maps.image
-            cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.unseen, lit.second, progress)
+            cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.unseen, lit.second, True)
             image = with_cube(image, cube)
         mesh = replace(mesh, materials=materials)
         return cls(lit.scene, manifest, image, maps, photo, lit.unseen, lit.strength, lit.second, mesh)

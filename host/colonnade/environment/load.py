@@ -157,8 +157,7 @@ def load_maps(
             found = normals_of_depth(depth, holes, camera)
             normals = found.normals
             notes.append(
-                f"there is no normal.png: normals are those of the depth map, whose noise is {found.noise:.2%};"
-                f" {found.on_planes:.0%} of the pixels lie on large planes"
+                f"there is no normal.png: normals are those of the depth map, whose noise is {found.noise:.2%}"
             )
     else:
         assert normals is not None

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from colonnade.common import notes
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import design_for
 from colonnade.design.manifest import Manifest
@@ -45,14 +46,14 @@ def device_frames(
         relit, encoder = request.relit, request.encoder
         prepared = DeviceScene.of(scene, manifest, mesh, size=size, relit=relit, encoder=encoder, progress=progress)
         if (line := coarse_line(prepared.image.header)) is not None:
-            progress.note(line)
+            notes.tell(line)
     prepared = within_budget(prepared, size, progress)
     with progress.step("computing the registers"):
         poses = [prepared.scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
         frames = host_frames(request, prepared, size, poses, scene.motion.exposure(request.frames), progress)
         registers = [[frame.registers(one) for one in frame.passes] for frame in frames]
         if note is not None:
-            progress.note(note)
+            notes.tell(note)
     seconds = {"pack": time.perf_counter() - begun, "build": None}
     results = rendered(request, frames, registers, progress)
     if scene.paths.gather and len(poses) > 1:  # Each has a light cube of its own
@@ -77,7 +78,7 @@ def host_frames(
     """The frames of poses of a scene, numbered from ``first``; the first of all notes what the object gets."""
     look = None if request.relit else CameraLook.of(prepared.scene, prepared.photo, size)
     if look is not None and look.note is not None and first == 0:
-        progress.note(look.note)
+        notes.tell(look.note)
     return [
         HostFrame(
             prepared, size, tuple(prepared.passes(pose, exposure)), request.relit, request.denoise, look, first + number

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.extras import require_extra
 from colonnade.common.limits import MAX_WAVEFORM_PIXELS
@@ -55,7 +56,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     scene, note = with_requested_samples(scene, request)
     scene = exposed(scene)
     if scene.frame.denoise and request.backend == "reference":
-        progress.note("frame.denoise is of the model and the RTL: frames of the reference are not filtered")
+        notes.tell("frame.denoise is of the model and the RTL: frames of the reference are not filtered")
     elif not request.denoise:
         request = replace(request, denoise=scene.frame.denoise)
     size = request.size or (scene.frame.width, scene.frame.height)
@@ -116,5 +117,5 @@ def _reference_frames(
     mesh = None if isinstance(request.mesh, str) else request.mesh
     for index, result in enumerate(reference_frames(poses, manifest, size, progress, options, mesh)):
         if note is not None and index == 0:
-            progress.note(note)
+            notes.tell(note)
         yield result

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from colonnade.common import notes
 from colonnade.common.accumulation import Accumulation
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
@@ -133,13 +134,13 @@ def traced_frames(
     photo = None if options.relit else view_photo(poses[0], maps, size)
     look = CameraLook.of(poses[0], photo, size)
     if look is not None and look.note is not None:
-        progress.note(look.note)
+        notes.tell(look.note)
     room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)
     backdrop = room_backdrop(room, layout, options.truth, progress)
     for number, pose in enumerate(poses):
         begun = time.perf_counter()
         lit = replace(room, scene=room.scene.at(pose.motion_progress))
-        cube = _light_cube(lit, mesh, layout, options.relit, progress if number == 0 else None)
+        cube = _light_cube(lit, mesh, layout, options.relit, number == 0)
         materials = with_overrides(mesh.materials, lit.scene.material)
         passes = frame_passes(lit.scene, materials, options.exposure)
         first: ReferenceResult | None = None
@@ -162,13 +163,13 @@ def traced_frames(
 
 
 def _light_cube(
-    room: LitRoom, mesh: Mesh, layout: AttributeLayout | None, relit: bool, progress: Progress | None
+    room: LitRoom, mesh: Mesh, layout: AttributeLayout | None, relit: bool, is_noted: bool
 ) -> LightCube | None:
     environment = room.environment
     image = None
     if room.scene.paths.gather and environment is not None:
         image = encoded_environment(environment, _layout_for(environment, layout))
-    return scene_cube(room.scene, mesh.extent, environment, image, relit, room.unseen, room.second, progress)
+    return scene_cube(room.scene, mesh.extent, environment, image, relit, room.unseen, room.second, is_noted)
 
 
 def _layout_for(environment: Environment, layout: AttributeLayout | None) -> AttributeLayout:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import Progress
 from colonnade.device.scene import DeviceScene
@@ -56,7 +57,7 @@ def within_budget(prepared: DeviceScene, size: tuple[int, int], progress: Progre
     Args:
         prepared: A scene from `with_requested_samples`, ready for the device.
         size: Width and height of frames, pixels.
-        progress: Shows the pass that is measured, and names the number.
+        progress: Shows the pass that is measured.
     """
     scene = prepared.scene
     if scene.frame.samples is not None:
@@ -71,5 +72,5 @@ def within_budget(prepared: DeviceScene, size: tuple[int, int], progress: Progre
         budget = Budget.of(prepared.manifest, prepared.image, registers, seconds, passes)
     hidden = f"; {scene.blurs[0]} shows its middle" if scene.blurs else ""
     hidden += "; coats and highlights do not show" if passes(2) > 2 else ""
-    progress.note(budget.note + (hidden if budget.samples == 1 else ""))
+    notes.tell(budget.note + (hidden if budget.samples == 1 else ""))
     return replace(prepared, scene=scene.with_samples(budget.samples))

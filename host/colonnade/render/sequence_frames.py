@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.manifest import Manifest
@@ -28,7 +29,10 @@ from colonnade.scene.model import Scene
 Size = tuple[int, int]
 
 #: What keyframes cost.
-_BETWEEN = "between keyframes, where their maps show nothing, a frame is its photo without the object's shadow"
+_BETWEEN = (
+    "between keyframes, where their maps show nothing, a frame is its photo without the object's shadow: --keyframes 1"
+    " gives each frame its own maps"
+)
 
 
 def check_sequence(request: RenderRequest, sequence: Sequence, scene: Scene) -> None:
@@ -78,8 +82,8 @@ def sequence_frames(
                 frames = host_frames(request, prepared, size, [prepared.scene], 0.0, progress, number)
                 registers = [frames[0].registers(one) for one in frames[0].passes]
             for line in (note, _BETWEEN if every > 1 else None):
-                if line is not None and number == 0:
-                    progress.note(line)
+                if line is not None:
+                    notes.tell(line)
             seconds = {"maps": time.perf_counter() - begun}
             (result,) = rendered(request, frames, [registers], progress.of(title))
         except UserError as error:

@@ -120,7 +120,7 @@ def lit_room(
         extent: Bounds of the mesh, for lights relative to it.
         max_lights: Lights of the design.
         relit: The frame shows the room under the scene's lights, not its photo.
-        progress: Shows the fit, and notes what was found.
+        progress: Shows the fit.
 
     Raises:
         UserError: The object cannot stand in the room, or `background.colours` asks for a photo that it lacks;
@@ -130,9 +130,9 @@ def lit_room(
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     if room is not None:
         for note in room.notes:
-            progress.note(f"room {room.name}: {note}")
-    around = panorama_light(scene, extent, room, max_lights, progress)
-    second = _second_view(scene, progress)
+            notes.tell(f"room {room.name}: {note}")
+    around = panorama_light(scene, extent, room, max_lights)
+    second = _second_view(scene)
     unseen: Panorama | Surround | None = None
     if around is not None:
         scene, unseen = around.scene, around.panorama
@@ -141,16 +141,11 @@ def lit_room(
     if not scene.names_light and (around is None or not around.has_lights):
         scene, walls = _with_fitted_lights(scene, room, extent, max_lights, progress)
         unseen = unseen or walls
-    if scene.places_camera:
-        drawn = scene.background.photo is None or relit
-        progress.note(
-            f"the camera is not that of room {room.name}: "
-            + (
-                "its maps are drawn, and what they do not show has the background's colour; background.photo is for a"
-                " photo of this view"
-                if drawn
-                else "where its maps show nothing, background.photo has no shadow of the object"
-            )
+    if scene.places_camera and (scene.background.photo is None or relit):
+        can_have_photo = not relit and not scene.motion.camera
+        notes.tell(
+            f"the camera is not that of room {room.name}: what its maps do not show has background.colour"
+            + (", unless background.photo is a photo of this view" if can_have_photo else "")
         )
     if scene.paths.gather and around is not None and room.photo is not None and not relit:
         scene = replace(scene, ambient=Colour(as_vector(_OPEN * np.array(scene.ambient.colour))))
@@ -159,22 +154,17 @@ def lit_room(
     strength = photo_strength(scene, room, extent, relit)
     if colours is None:
         return LitRoom(scene, room, room, unseen=unseen, strength=strength, second=second)
-    if colours.clamped > _REPORTED_CLAMPED:
-        progress.note(
+    if colours.clamped > _REPORTED_CLAMPED and scene.names_light and scene.paths.gather == 0:
+        notes.tell(
             f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
-            " photo in reflections: "
-            + (
-                "with paths.gather the lights are not scaled up"
-                if scene.paths.gather
-                else "raise the ambient light, or leave out all lights so that they are fitted"
-            )
+            " photo in reflections: raise ambient.colour, or leave out [light] and [ambient], so that they are fitted"
         )
     return LitRoom(
         replace(scene, headroom=colours.headroom), colours.environment, room, colours, unseen, strength, second
     )
 
 
-def _second_view(scene: Scene, progress: Progress) -> Environment | None:
+def _second_view(scene: Scene) -> Environment | None:
     """The second view of a scene's room; None without one, or where nothing gathers its light."""
     folder = scene.background.second_view
     if folder is None:
@@ -183,7 +173,7 @@ def _second_view(scene: Scene, progress: Progress) -> Environment | None:
     if second.photo is None:
         raise UserError(f"background.second_view is {folder}, which has no photo.png or render.png")
     if scene.paths.gather == 0:
-        progress.note(f"the second view {folder} has no effect: the scene gathers no light, set paths.gather = 1")
+        notes.tell(f"the second view {folder} has no effect: the scene gathers no light, set paths.gather = 1")
         return None
     return second
 
@@ -261,17 +251,17 @@ def _with_fitted_lights(
     from colonnade.environment.light_fit import DEFAULT_LIGHTS
 
     if room.photo is None:
-        progress.note(
+        notes.tell(
             f"the scene names no light, and room {room.name} has no photo to fit lights to: one light beside the object"
-            " and ambient light 0.1 are used"
+            " and ambient light 0.1 are used; [[light]] and [ambient] name others"
         )
         return scene, None
     with progress.step("fitting lights to the photo"):
         fit = fitted_lights(room, min(DEFAULT_LIGHTS, max_lights), walls=scene.paths.gather > 0)
     count = len(fit.lights.lights)
-    progress.note(
+    notes.tell(
         f"the scene names no light: ambient light and {count} point light{'' if count == 1 else 's'} were fitted to the"
-        f" photo of room {room.name}, {fit.psnr:.1f} dB"
+        f" photo of room {room.name}; [[light]] and [ambient] name others"
     )
     lights = fit.lights
     if scene.paths.gather:

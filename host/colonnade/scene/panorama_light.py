@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from colonnade.common import notes
 from colonnade.common.accumulation import LUMINANCE
-from colonnade.common.progress import Progress
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
 from colonnade.environment.lights import RoomLight, RoomLights, light_box
@@ -45,9 +45,7 @@ class PanoramaLight:
     has_lights: bool
 
 
-def panorama_light(
-    scene: Scene, extent: Extent, room: Environment | None, max_lights: int, progress: Progress
-) -> PanoramaLight | None:
+def panorama_light(scene: Scene, extent: Extent, room: Environment | None, max_lights: int) -> PanoramaLight | None:
     """Read the panorama of a scene, and find its lights if the scene names none; None for a scene without one.
 
     Args:
@@ -55,7 +53,6 @@ def panorama_light(
         extent: Bounds of the mesh.
         room: Its room; None without one.
         max_lights: Lights of the design.
-        progress: Notes exposure and lights.
 
     Raises:
         UserError: The panorama cannot be read.
@@ -71,33 +68,35 @@ def panorama_light(
     if exposure is None:
         exposure = 1.0 if seen is None else fitted_exposure(panorama, seen)
         if exposure != 1.0:
-            progress.note(
+            notes.tell(
                 f"panorama {name} has the exposure {exposure:g}, fitted to the photo where this shows the same"
                 " directions: background.panorama_exposure sets another one"
             )
     panorama = panorama.scaled(exposure)
+    if scene.names_light and scene.paths.gather == 0:
+        notes.tell(
+            f"panorama {name} has no effect: the scene names its lights and gathers none, leave them out or set"
+            " paths.gather = 1"
+        )
+    elif room is None:
+        notes.tell(f"panorama {name} lights the object, and is not drawn behind it: background.colour is")
     if scene.names_light:
-        if scene.paths.gather == 0:
-            progress.note(
-                f"panorama {name} has no effect: the scene names its lights and gathers none, leave them out or set"
-                " paths.gather = 1"
-            )
         return PanoramaLight(scene, panorama, True)
     found, rest = split_lights(panorama, max_lights)
     if not found and seen is not None:
-        progress.note(f"panorama {name} has no small bright region to be a light")
         return PanoramaLight(scene, rest, False)
     lights = _placed(found, room, point, extent.edge * pose.scale, seen)
     ambient = _mean(rest, seen).clip(max=MAX_INTENSITY)
     scene = with_lights(scene, RoomLights(ambient.round(4), tuple(lights)))
-    count, one_sample = len(lights), (scene.frame.samples or 1) == 1
-    progress.note(
+    count = len(lights)
+    notes.tell(
         f"the scene names no light: ambient light and {count} light{'' if count == 1 else 's'} are those of panorama"
-        f" {name}" + (", which have their area in frames of several samples" if lights and one_sample else "")
+        f" {name}; [[light]] and [ambient] name others"
+        + (", and frame.samples = 16 shows the area of these" if lights and scene.frame.samples == 1 else "")
     )
     brightest = max((float(light.colour.max()) for light in found), default=0.0)
     if brightest > MAX_INTENSITY:
-        progress.note(
+        notes.tell(
             f"a light of panorama {name} is {brightest / MAX_INTENSITY:.1f} times as bright as a light can be, and is"
             " dimmed: lower background.panorama_exposure"
         )

@@ -249,8 +249,8 @@ class Session:
             self._files, self._seen = self._files + paths, self._seen + _stamps(paths)
             scene = DeviceScene.of(description, self._manifest, size=self.size, encoder=self._encoder)
             look = CameraLook.of(scene.scene, scene.photo, self.size)
-        if look is not None and look.note is not None:
-            lines.append(look.note)
+            if look is not None and look.note is not None:
+                notes.tell(look.note)
         if description.frame.denoise:
             require_filter(description, self._manifest, description.frame.denoise)
         # It is refused here if the hardware cannot show it, and not in every frame

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import trimesh
 
 import colonnade
 from colonnade.design.toolchain import project_root
+from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
 
 SIZE = (48, 36)
@@ -88,6 +90,23 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
         colonnade.Scene(coloured)
     with pytest.raises(AttributeError, match="no attribute Scenes"):
         colonnade.Scenes  # noqa: B018
+
+
+def test_what_a_scene_leaves_open_is_a_warning_once_for_it(tmp_path: Path) -> None:
+    """Whatever is rendered of it: frames, a film, or a change."""
+    write_attic(tmp_path / "attic", 96, 72)
+    maps = ("width=96", "height=72", "mapBytes=4096", "planeBytes=4096")
+    options = {"overrides": [f"physicalAttributeMemory.{one}" for one in maps], "size": (96, 72), "encoder": "live"}
+    scene = colonnade.Scene("cube", background={"room": "attic"}, motion={"turn": 60.0}, folder=tmp_path)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        scene.render(**options)
+        said = [str(one.message) for one in caught]
+        assert len(list(scene.frames(2, **options))) == 2
+        scene.with_tables(material={"kind": "mirror"}).render(**options)
+    assert any("were fitted to the photo of room attic" in line for line in said)
+    assert any("4 samples a pixel, the default in a room" in line for line in said)
+    assert [str(one.message) for one in caught] == said
 
 
 @pytest.mark.parametrize("name", ["frames", "room"])

@@ -9,7 +9,7 @@ import pytest
 
 from colonnade.common import progress
 from colonnade.common.errors import UserError
-from colonnade.common.progress import LineProgress, for_terminal
+from colonnade.common.progress import LineProgress, for_terminal, hidden
 
 
 @pytest.fixture(autouse=True)
@@ -67,10 +67,15 @@ def test_can_be_silenced(monkeypatch: pytest.MonkeyPatch) -> None:
         for_terminal()
 
 
-def test_nothing_is_shown_while_paused(capsys: pytest.CaptureFixture[str]) -> None:
-    lines = LineProgress(0.1)
+@pytest.mark.parametrize("is_of_command", [False, True])
+def test_nothing_is_shown_while_paused(
+    is_of_command: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also by code that has not been given the display of its command."""
+    monkeypatch.setattr(progress, "LineProgress", lambda: LineProgress(0.1))
+    lines = for_terminal()
     with lines.step("work"):
-        with lines.paused():
+        with hidden() if is_of_command else lines.paused():
             time.sleep(0.3)
             assert capsys.readouterr().err == ""
         lines.note("something else")

@@ -288,7 +288,7 @@ def test_normals_alone_are_derived(environment: Path) -> None:
     found = load_environment(environment)
     _, truth = corner()
     assert (np.abs(found.normals - truth).max(axis=2) < 0.01).mean() > 0.91
-    assert any("on large planes" in note for note in found.notes)
+    assert any("normals are those of the depth map" in note for note in found.notes)
 
 
 def test_a_room_without_photo_and_albedo_is_refused(environment: Path) -> None:

@@ -26,7 +26,7 @@ from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.lit_room import lit_room
-from colonnade.scene.model import Background, MeshSource, Paths, Scene
+from colonnade.scene.model import Background, Colour, Light, MeshSource, Paths, Scene
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
 
@@ -65,16 +65,14 @@ def decibels(one: RenderResult, other: RenderResult, mask: np.ndarray | None = N
     return psnr(encode_srgb(one.image[where])[None], encode_srgb(other.image[where])[None])
 
 
-def test_a_scene_without_lights_gets_those_of_the_photo(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scene_without_lights_gets_those_of_the_photo(folder: Path, told: list[str]) -> None:
     frame(folder, MIRROR)
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "names no light: ambient light and 1 point light were fitted to the photo of room attic, 3" in line
+    fitted = "the scene names no light: ambient light and 1 point light were fitted to the photo of room attic;"
+    assert told == [f"{fitted} [[light]] and [ambient] name others"]
     for named in (LAMP, "ambient.colour = [0.3, 0.3, 0.3]\n"):
         frame(folder, MIRROR + named)
-        assert capsys.readouterr().err == ""
     frame(folder, MIRROR.replace("attic", "dark"))
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "room dark has no photo to fit lights to: one light beside the object" in line
+    assert len(told) == 2 and "room dark has no photo to fit lights to: one light beside the object" in told[1]
 
 
 def test_found_lights_cast_no_shadow_where_the_photo_has_one(folder: Path) -> None:
@@ -117,12 +115,22 @@ def test_the_reference_is_composited_as_the_device_is(folder: Path, light: str) 
     assert decibels(reference, relit[1]) < 40
 
 
-def test_what_a_room_lacks_is_noted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_photo_that_is_too_bright_for_the_lights_of_a_scene_is_noted(folder: Path, told: list[str]) -> None:
+    """Not with gathered light, and not with fitted lights: nothing that a scene says would help."""
+    room, extent = load_environment(folder / "attic"), load_mesh("cube").extent
+    dim = replace(load_scene(folder / "scene.toml"), ambient=Colour((0.001,) * 3), light=Light(colour=(0.001,) * 3))
+    for scene in (replace(dim, paths=Paths(gather=1)), replace(dim, names_light=False), dim):
+        assert not any("too dark" in line for line in told)
+        lit_room(scene, room, extent, 1, False)
+    assert any("too dark under the scene's lights" in line and "raise ambient.colour" in line for line in told)
+
+
+def test_what_a_room_lacks_is_noted(folder: Path, told: list[str]) -> None:
     room = replace(load_environment(folder / "dark"), notes=("its depth is estimated",))
     lit_room(
         Scene(MeshSource("cube"), background=Background(room=folder / "dark")), room, load_mesh("cube").extent, 1, False
     )
-    assert "colonnade: room dark: its depth is estimated\n" in capsys.readouterr().err
+    assert told[0] == "room dark: its depth is estimated"
 
 
 def test_the_colours_of_a_room_can_be_chosen(folder: Path) -> None:
@@ -224,12 +232,10 @@ def test_the_light_command_prints_a_scene(folder: Path, tmp_path: Path) -> None:
     assert failed.exit_code == 2 and "has no photo.png or render.png" in failed.stderr
 
 
-def test_a_second_view_needs_a_room_a_photo_and_gathered_light(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_second_view_needs_a_room_a_photo_and_gathered_light(folder: Path, told: list[str]) -> None:
     with pytest.raises(UserError, match=r"background.second_view is another view of a room: it needs background.room"):
         frame(folder, 'mesh.name = "cube"\nbackground.second_view = "attic"\n')
     with pytest.raises(UserError, match=r"background.second_view is .*dark, which has no photo.png"):
         frame(folder, MIRROR + LAMP + 'background.second_view = "dark"\n')
     frame(folder, MIRROR + LAMP + 'background.second_view = "attic"\n')
-    assert "has no effect: the scene gathers no light" in capsys.readouterr().err
+    assert "has no effect: the scene gathers no light" in told[-1]

@@ -91,7 +91,12 @@ RENDER_INDEX = (
 
 #: A column of studies with a point that has some.
 IDLE = Column(
-    "idle_contexts", "idle contexts", "", None, ",d", "contexts of a column that are idle at any time: units.pathContexts"
+    "idle_contexts",
+    "idle contexts",
+    "",
+    None,
+    ",d",
+    "contexts of a column that are idle at any time: units.pathContexts",
 )
 
 
