@@ -112,7 +112,8 @@ def test_a_rest_in_a_photo_is_the_picture_of_render(tmp_path: Path) -> None:
     file.write_text(GATHERED)
     size, config = (128, 96), "textured"
     session = Session(file, config, size=size)
-    assert "the object has the photo's grain" in session.state()["notes"][-1]
+    notes = session.state()["notes"]
+    assert "room attic shows" in notes[-2] and "the object has the photo's grain" in notes[-1]
     for camera in (None, ViewCamera((0.8, 1.5, 2.4), (0.0, 0.4, 0.0))):
         scene = colonnade.Scene.load(file)
         if camera is not None:
