@@ -6,18 +6,21 @@ import contextlib
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from colonnade.api.memory_mesh import MeshLike, memory_mesh, mesh_table
 from colonnade.common import notes
+from colonnade.common.arguments import checked
 from colonnade.common.errors import UserError
+from colonnade.common.frame_size import Size
+from colonnade.common.limits import MAX_DEPTH
 from colonnade.common.progress import QUIET, Progress
+from colonnade.design.config_name import Overrides
 from colonnade.design.generator import manifest_for
 from colonnade.device.scene import DeviceScene
 from colonnade.maps.encoders import Encoder
-from colonnade.mesh.load import clean_mesh
 from colonnade.mesh.mesh import Mesh
 from colonnade.render.frames import render_frames
 from colonnade.render.request import Backend, RenderRequest
@@ -26,24 +29,11 @@ from colonnade.scene import model
 from colonnade.scene.parser import read_tables, scene_file, scene_of
 from colonnade.scene.passes import of_a_device
 
-Size = tuple[int, int]
-Table = Mapping[str, Any]
+Table = Annotated[Mapping[str, Any], "a dict, as a table of a scene file"]
+Tables = Annotated[Table | Sequence[Table], "a dict or a list of dicts, as tables of a scene file"]
 
-
-class TriangleMesh(Protocol):
-    """What a scene takes of a mesh of another library, such as a ``trimesh.Trimesh``.
-
-    Attributes:
-        vertices: Numbers [n, 3].
-        faces: Whole numbers [m, 3], counter-clockwise seen from outside.
-    """
-
-    vertices: Any
-    faces: Any
-
-
-#: A name or a file; vertices [n, 3] and faces [m, 3]; or an object that has them.
-MeshLike = str | Path | tuple[ArrayLike, ArrayLike] | TriangleMesh
+#: Options of `Scene.render` and `Scene.frames`: fields of `RenderRequest`.
+_OPTIONS = ("overrides", "samples", "relit", "truth", "encoder", "denoise", "hits", "waveform")
 
 
 class Scene:
@@ -76,16 +66,19 @@ class Scene:
         UserError: A key or a value is invalid; the message names it.
     """
 
+    mesh: Mesh | None  # in memory; None: the tables name it
+
+    @checked
     def __init__(
         self,
         mesh: MeshLike | None = None,
         *,
         crease: float | None = None,
         camera: Table | None = None,
-        light: Table | Sequence[Table] | None = None,
+        light: Tables | None = None,
         material: Table | None = None,
         transform: Table | None = None,
-        object: Table | Sequence[Table] | None = None,
+        object: Tables | None = None,
         ambient: Table | None = None,
         background: Table | None = None,
         paths: Table | None = None,
@@ -98,12 +91,15 @@ class Scene:
             "paths": paths, "ambient": ambient, "background": background, "motion": motion, "frame": frame,
         }  # fmt: skip
         tables = {name: table for name, table in given.items() if table is not None}
-        own = None
         if mesh is not None:
-            tables["mesh"], own = _mesh(mesh, crease)
-        self._set(tables, own, "the scene", Path() if folder is None else Path(folder))
+            tables["mesh"] = mesh_table(mesh) | ({} if crease is None else {"crease": crease})
+        self._set(tables, None, "the scene", Path() if folder is None else Path(folder))
+        if mesh is not None and not isinstance(mesh, str | Path):
+            with _noted():
+                self.mesh = memory_mesh(mesh, crease)
 
     @classmethod
+    @checked
     def load(cls, file: str | Path) -> Scene:
         """Read a scene file.
 
@@ -118,7 +114,7 @@ class Scene:
         scene._set(read_tables(path), None, f"scene {path}", path.parent)
         return scene
 
-    def with_tables(self, **tables: Table | Sequence[Table] | None) -> Scene:
+    def with_tables(self, **tables: Tables | None) -> Scene:
         """The scene with other tables: each replaces that of its name; None removes it.
 
         ``scene.with_tables(camera={"position": (0, 1, 3), "target": (0, 0, 0)})``
@@ -133,11 +129,15 @@ class Scene:
         return scene
 
     def _set(self, tables: Mapping[str, Any], mesh: Mesh | None, where: str, folder: Path) -> None:
-        self.tables = _plain(tables)
+        try:
+            self.tables: dict[str, Any] = _plain(tables, "")
+        except RecursionError:
+            raise UserError(f"{where} is nested too deeply: {MAX_DEPTH} levels at most") from None
         self.mesh, self.folder, self._where = mesh, folder, where
         self._notes: set[str] = set()
         self.description: model.Scene = scene_of(self.tables, where, folder)
 
+    @checked
     def render(
         self, backend: Backend = "model", config: str = "small", size: Size | None = None, **options: Any
     ) -> RenderResult:
@@ -176,7 +176,9 @@ class Scene:
         Raises:
             UserError: See `render`.
         """
-        progress: Progress = options.pop("progress", QUIET)
+        progress = options.pop("progress", QUIET)
+        if unknown := options.keys() - set(_OPTIONS):
+            raise UserError(f"unknown option {min(unknown)}; known here: {', '.join(_OPTIONS)}, progress")
         request = RenderRequest(
             self.description, config, backend=backend, size=size, frames=count, mesh=self.mesh, **options
         )
@@ -189,11 +191,12 @@ class Scene:
                 return
             yield result
 
+    @checked
     def pack(
         self,
         config: str = "small",
         *,
-        overrides: Sequence[str] = (),
+        overrides: Overrides = (),
         size: Size | None = None,
         relit: bool = False,
         encoder: Encoder = "offline",
@@ -226,49 +229,21 @@ class Scene:
         return f"<Scene of {', '.join(self.tables)}>"
 
 
-def _mesh(mesh: MeshLike, crease: float | None) -> tuple[dict[str, Any], Mesh | None]:
-    """The table of a mesh, and the mesh if it is in memory."""
-    table: dict[str, Any] = {} if crease is None else {"crease": crease}
-    if isinstance(mesh, Path):
-        return table | {"path": str(mesh)}, None
-    if isinstance(mesh, str):
-        return table | {"name": mesh}, None
-    if isinstance(mesh, tuple) and len(mesh) == 2:
-        vertices, faces = mesh
-    elif hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
-        vertices, faces = mesh.vertices, mesh.faces
-    else:
-        raise UserError(
-            f"the mesh is a {type(mesh).__name__}: give a name, a file, a pair (vertices, faces), or an object that has"
-            " both, as trimesh.Scene.to_mesh() returns"
-        )
-    points, corners = np.array(vertices, dtype=np.float64), np.array(faces)
-    for name, array in (("vertices", points), ("faces", corners)):
-        if array.ndim != 2 or array.shape[1] != 3:
-            raise UserError(f"the mesh's {name} have the shape {list(array.shape)}: give three numbers each, [n, 3]")
-    if not np.issubdtype(corners.dtype, np.integer):
-        raise UserError(f"the mesh's faces are {corners.dtype}: give whole numbers, indices of vertices")
-    if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
-        raise UserError(f"a face of the mesh names a vertex that does not exist: there are {len(points)}")
-    cleaned = clean_mesh(points, corners.astype(np.int32), "memory", crease=crease)
-    kind = getattr(getattr(mesh, "visual", None), "kind", None)
-    lines = list(cleaned.notes)
-    if kind is not None:
-        lines.append(f"mesh memory: colours or textures ({kind}) are left out: save it as a GLB file to keep them")
-    with _noted():
-        notes.report(lines)
-    return table | {"name": "memory"}, cleaned
+def _plain(value: Any, key: str) -> Any:
+    """Tables without numpy's types, as a file has them.
 
-
-def _plain(value: Any) -> Any:
-    """Tables without numpy's types, as a file has them."""
+    Raises:
+        UserError: A value is none that a file could have.
+    """
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(name): _plain(one, f"{key}.{name}" if key else str(name)) for name, one in value.items()}
     if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
+        return _plain(value.tolist(), key)
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return value
+        return [_plain(one, key) for one in value]
+    if value is None or isinstance(value, bool | int | float | str | Path):
+        return value
+    raise UserError(f"{key} is a {type(value).__name__}: give text, numbers, or a list or a dict of them")
 
 
 @contextlib.contextmanager

@@ -1,17 +1,14 @@
-"""Parses frame sizes such as ``640x480``."""
+"""Frame sizes, and their form on the command line, such as ``640x480``."""
 
 from __future__ import annotations
 
 import re
-from numbers import Integral
-from typing import Any
+from typing import Annotated
 
 from colonnade.common.errors import UserError
 
-
-def is_whole(value: Any) -> bool:
-    """Whether a value is a whole number, of Python or numpy."""
-    return isinstance(value, Integral) and not isinstance(value, bool)
+#: Width and height, pixels.
+Size = Annotated[tuple[int, int], "width and height, whole numbers of pixels"]
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -6,10 +6,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import is_file, parse_json, read_json
 from colonnade.common.limits import MAX_DIGITS, MAX_TEXT
+
+#: Changes to a configuration, applied in order.
+Overrides = Annotated[Sequence[str], "a list of texts of the form key=value"]
 
 #: The preset that a precision such as ``32b32s64d`` modifies.
 PRECISION_PRESET = "small"
@@ -32,7 +36,7 @@ class ConfigurationSource:
     overrides: tuple[str, ...]
 
 
-def find_configuration(name: str, overrides: Sequence[str], root: Path) -> ConfigurationSource:
+def find_configuration(name: str, overrides: Overrides, root: Path) -> ConfigurationSource:
     """Resolve the name of a configuration.
 
     Args:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from colonnade.common.arguments import checked
 from colonnade.common.errors import UserError
-from colonnade.common.frame_size import is_whole
+from colonnade.common.frame_size import Size
 from colonnade.design.manifest import Manifest
 
 
-def check_size(size: tuple[int, int], manifest: Manifest) -> None:
+@checked
+def check_size(size: Size, manifest: Manifest) -> None:
     """Refuse a frame larger than the design's maximum (`frame.maxWidth`, `frame.maxHeight`).
 
     Raises:
         UserError: The size is no pair of whole numbers, or the frame is empty or too large.
     """
-    if not (isinstance(size, list | tuple) and len(size) == 2 and all(map(is_whole, size))):
-        raise UserError(f"size is {size!r}: it must be width and height, whole numbers of pixels")
     if min(size) < 1:
         raise UserError(f"a frame of {size[0]}x{size[1]} has no pixels")
     limits = manifest.config["frame"]

@@ -21,9 +21,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from colonnade.common import cache, machine_limits, notes, processes
+from colonnade.common.arguments import checked
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
-from colonnade.design.config_name import ConfigurationSource, find_configuration
+from colonnade.design.config_name import ConfigurationSource, Overrides, find_configuration
 from colonnade.design.design_folder import check_replaceable, replace_folder
 from colonnade.design.idle_parts import idle_notes
 from colonnade.design.manifest import Manifest
@@ -158,7 +159,8 @@ def source_hash(root: Path) -> str:
     return digest.hexdigest()[:20]
 
 
-def _cached(config: str, overrides: Sequence[str], options: tuple[str, ...], progress: Progress) -> GeneratedDesign:
+@checked
+def _cached(config: str, overrides: Overrides, options: tuple[str, ...], progress: Progress) -> GeneratedDesign:
     root = project_root()
     source = find_configuration(config, overrides, root)
     if options == (MANIFEST_ONLY,) and (released := _released(root, source)) is not None:

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.arguments import checked
+from colonnade.common.frame_size import Size
 from colonnade.common.framebuffer_formats import photo_lines
 from colonnade.common.image_io import resized_photo
 from colonnade.common.progress import QUIET, Progress
+from colonnade.design.frame_limits import check_size
 from colonnade.device.gathered_light import scene_cube, with_cube
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
@@ -19,6 +22,7 @@ from colonnade.registers.frame_file import frame_file
 from colonnade.registers.view_file import view_file
 from colonnade.scene.cameras import check_camera
 from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, photo_strength, view_photo
+from colonnade.scene.model import Camera, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.passes import frame_passes
 from colonnade.scene.view import View, make_view, place, with_overrides
@@ -33,7 +37,6 @@ if TYPE_CHECKING:
     from colonnade.environment.panorama import Panorama
     from colonnade.environment.surround import Surround
     from colonnade.mesh.mesh import Mesh
-    from colonnade.scene.model import Camera, Scene
     from colonnade.scene_image.file import SceneImage
 
 
@@ -70,7 +73,7 @@ class DeviceScene:
         manifest: Manifest,
         mesh: Mesh | None = None,
         *,
-        size: tuple[int, int] | None = None,
+        size: Size | None = None,
         relit: bool = False,
         encoder: Encoder = "offline",
         room: Environment | None = None,
@@ -158,6 +161,7 @@ class DeviceScene:
         scene = fixed_in_world(self.scene, self.image.header.extent, self.environment)
         return replace(self, scene=replace(scene, frame_camera=camera), photo=photo, strength=None)
 
+    @checked
     def with_camera(self, camera: Camera) -> DeviceScene:
         """The scene with another camera, as if its file had it; the image stays.
 
@@ -176,9 +180,8 @@ class DeviceScene:
         """The room with the colours that rays see; None without a room."""
         return None if self.maps is None else self.maps.environment
 
-    def registers(
-        self, size: tuple[int, int], scene: Scene | None = None, *, composited: bool = False
-    ) -> dict[str, int]:
+    @checked
+    def registers(self, size: Size, scene: Scene | None = None, *, composited: bool = False) -> dict[str, int]:
         """The registers of a frame (`frame_registers`).
 
         Args:
@@ -193,8 +196,14 @@ class DeviceScene:
         shows_room = not composited or self.environment is None or self.photo is None
         return frame_registers(scene or self.scene, self.image.header, self.manifest, *size, self.maps, shows_room)
 
-    def frame_photo(self, size: tuple[int, int]) -> NDArray[np.uint8] | None:
-        """The photo in the size of a frame, for `Device.set_frame`, with `strength` if there is one; else None."""
+    @checked
+    def frame_photo(self, size: Size) -> NDArray[np.uint8] | None:
+        """The photo in the size of a frame, for `Device.set_frame`, with `strength` if there is one; else None.
+
+        Raises:
+            UserError: The frame is empty or too large.
+        """
+        check_size(size, self.manifest)
         if self.photo is None:
             return None
         photo = resized_photo(self.photo, *size)
@@ -216,7 +225,8 @@ class DeviceScene:
         """
         return dram_image(self.image, self.manifest)
 
-    def frame_file(self, size: tuple[int, int], *, composited: bool = False) -> bytes:
+    @checked
+    def frame_file(self, size: Size, *, composited: bool = False) -> bytes:
         """The registers of a frame, for the driver (docs/driver.md, "In: two files"); arguments as in `registers`.
 
         Raises:
@@ -224,12 +234,14 @@ class DeviceScene:
         """
         return frame_file(self.registers(size, composited=composited), self.manifest)
 
-    def photo_file(self, size: tuple[int, int]) -> bytes | None:
+    @checked
+    def photo_file(self, size: Size) -> bytes | None:
         """`frame_photo` as the AXI4 shell reads it (`photo_lines`); None without a photo."""
         photo = self.frame_photo(size)
         return None if photo is None else photo_lines(photo, int(self.manifest.config["frame"]["tileSize"])).tobytes()
 
-    def view_file(self, size: tuple[int, int], *, composited: bool = False) -> bytes:
+    @checked
+    def view_file(self, size: Size, *, composited: bool = False) -> bytes:
         """The file with which a processor computes frames of other poses (`view_file`); arguments as in `registers`.
 
         Raises:
@@ -240,7 +252,8 @@ class DeviceScene:
         occlusion = self.scene.background.occlusion
         return view_file(placed, registers, size, self.image.header, self.manifest, self.maps, occlusion)
 
-    def view(self, size: tuple[int, int], scene: Scene | None = None) -> View:
+    @checked
+    def view(self, size: Size, scene: Scene | None = None) -> View:
         """The view of a frame; arguments as in `registers`."""
         header = self.image.header
         return make_view(scene or self.scene, header.extent, *size, header.materials, self.environment)

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from colonnade.common import notes
+from colonnade.common.frame_size import Size
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import design_for
 from colonnade.design.manifest import Manifest
@@ -23,8 +24,6 @@ from colonnade.render.result import RenderResult
 from colonnade.render.samples import within_budget
 from colonnade.scene.model import Scene
 from colonnade.scene_image.inspect import coarse_line
-
-Size = tuple[int, int]
 
 
 def device_frames(

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from colonnade.common import notes
+from colonnade.common.arguments import checked
 from colonnade.common.errors import UserError
 from colonnade.common.extras import require_extra
+from colonnade.common.frame_size import Size
 from colonnade.common.limits import MAX_WAVEFORM_PIXELS
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
@@ -23,8 +25,6 @@ from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import exposed
 
-Size = tuple[int, int]
-
 
 def render(request: RenderRequest, progress: Progress = QUIET) -> RenderResult:
     """Render one frame, the first of `render_frames`."""
@@ -32,6 +32,7 @@ def render(request: RenderRequest, progress: Progress = QUIET) -> RenderResult:
     return result
 
 
+@checked
 def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterator[RenderResult]:
     """Render the frames of a scene's motion. Mesh and environment are loaded once.
 
@@ -59,7 +60,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         notes.tell("frame.denoise is of the model and the RTL: frames of the reference are not filtered")
     elif not request.denoise:
         request = replace(request, denoise=scene.frame.denoise)
-    size = request.size or (scene.frame.width, scene.frame.height)
+    size = (scene.frame.width, scene.frame.height) if request.size is None else request.size
     manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size(size, manifest)
     _check_frames(request, scene, size, manifest)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Literal
 
+from colonnade.common.arguments import check_types
 from colonnade.common.errors import UserError
-from colonnade.common.frame_size import is_whole
+from colonnade.common.frame_size import Size
 from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
+from colonnade.design.config_name import Overrides
 from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
 from colonnade.mesh.mesh import Mesh
@@ -47,9 +48,9 @@ class RenderRequest:
 
     scene: Path | Scene
     config: str
-    overrides: Sequence[str] = ()
+    overrides: Overrides = ()
     backend: Backend = "rtl"
-    size: tuple[int, int] | None = None
+    size: Size | None = None
     frames: int = 1
     samples: int | None = None
     mesh: str | Mesh | None = None
@@ -64,15 +65,8 @@ class RenderRequest:
     denoise: bool | Denoiser = False
 
     def __post_init__(self) -> None:
-        choices: dict[str, tuple[Any, ...]] = {
-            "backend": get_args(Backend),
-            "encoder": get_args(Encoder),
-            "denoise": (False, True, *get_args(Denoiser)),
-        }
-        for name, known in choices.items():
-            if getattr(self, name) not in known:
-                raise UserError(f"{name} is {getattr(self, name)!r}: it must be one of {', '.join(map(str, known))}")
+        check_types(vars(self), type(self))
         for name, maximum in (("frames", MAX_FRAMES), ("samples", MAX_SAMPLES)):
             count = getattr(self, name)
-            if count is not None and not (is_whole(count) and 1 <= count <= maximum):
+            if count is not None and not 1 <= count <= maximum:
                 raise UserError(f"{name} is {count!r}: it must be a whole number from 1 to {maximum:,}")

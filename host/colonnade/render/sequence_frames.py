@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from colonnade.common import notes
 from colonnade.common.errors import UserError
+from colonnade.common.frame_size import Size
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.manifest import Manifest
 from colonnade.device.scene import DeviceScene
@@ -25,8 +26,6 @@ from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.render.samples import within_budget
 from colonnade.scene.model import Scene
-
-Size = tuple[int, int]
 
 #: What keyframes cost.
 _BETWEEN = (

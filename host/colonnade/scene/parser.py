@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
+from colonnade.common.arguments import checked
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import check_values, read_input
 from colonnade.common.limits import MAX_COORDINATE, MAX_DEPTH
@@ -33,6 +34,7 @@ _SCHEMA = TypeAdapter(Scene)
 _JSON_SCHEMA: dict[str, Any] = _SCHEMA.json_schema()
 
 
+@checked
 def scene_file(name: str | Path) -> Path:
     """The file of a scene: a TOML file, or the name of one of the project's scenes, such as ``room``.
 

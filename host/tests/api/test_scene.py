@@ -67,6 +67,10 @@ def test_tables_replace_those_of_their_name_and_none_removes_one() -> None:
 
 def test_what_is_wrong_is_said_in_one_line() -> None:
     square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    cube = colonnade.Scene("cube")
+    ring: list[object] = []
+    ring.append(ring)
+    packed = cube.pack()
     for message, make in {
         r"the scene: camera.fov must be a number from 1 to 150": lambda: colonnade.Scene("cube", camera={"fov": 200}),
         r"the scene: \[mesh\] needs either a name or a path": lambda: colonnade.Scene(),
@@ -75,10 +79,35 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
         r"a vertex that does not exist: there are 4": lambda: colonnade.Scene((square, [[0, 1, 4]])),
         r"faces are float64": lambda: colonnade.Scene((square, [[0.0, 1.0, 2.0]])),
         r"the mesh is a Scene: give a name, a file, a pair": lambda: colonnade.Scene(trimesh.Scene()),
+        r"vertices are no array: give three numbers each": lambda: colonnade.Scene(([[0, 0, 0], [1]], [[0, 1, 2]])),
+        r"vertices are <U1: give numbers": lambda: colonnade.Scene((np.full((4, 3), "1"), [[0, 1, 2]])),
+        r"vertices are complex128: give numbers": lambda: colonnade.Scene((np.array(square) + 1j, [[0, 1, 2]])),
+        r"vertices are masked in part": lambda: colonnade.Scene((np.ma.masked_equal(square, 1), [[0, 1, 2]])),
+        r"cannot be read: RuntimeError: of its own": lambda: colonnade.Scene(Broken()),
+        r"crease is 'x': it must be a number": lambda: colonnade.Scene((square, [[0, 1, 2]]), crease="x"),
+        r"folder is 3: it must be text, or a Path": lambda: colonnade.Scene("cube", folder=3),
+        r"file is None: it must be text, or a Path": lambda: colonnade.Scene.load(None),
+        r"camera is 'x': it must be a dict": lambda: colonnade.Scene("cube", camera="x"),
+        r"camera.position is a set: give text, numbers": lambda: colonnade.Scene(
+            "cube", camera={"position": {1, 2, 3}}
+        ),
+        r"the scene is nested too deeply: 64": lambda: colonnade.Scene("cube", camera={"position": ring}),
+        r"Scene.__init__: got an unexpected keyword argument 'lamp'": lambda: colonnade.Scene("cube", lamp={}),
         r"backend is 'gpu': it must be one of rtl, model, reference": lambda: colonnade.Scene("cube").render("gpu"),
         r"encoder is 'fast': it must be": lambda: colonnade.Scene("cube").render(encoder="fast"),
         r"samples is 0: it must be a whole number": lambda: colonnade.Scene("cube").render(samples=0),
-        r"size is \(4.5, 3\): it must be": lambda: colonnade.Scene("cube").render(size=(4.5, 3)),
+        r"samples is 2.5: it must be a whole number": lambda: cube.render(samples=2.5),
+        r"size is \(4.5, 3\): it must be": lambda: cube.render(size=(4.5, 3)),
+        r"size is array\(\[4, 3\]\): it must be width and height": lambda: cube.render(size=np.array([4, 3])),
+        r"config is None: it must be text": lambda: cube.render(config=None),
+        r"overrides is 'a=1': it must be a list of texts": lambda: cube.pack(overrides="a=1"),
+        r"hits is 'no': it must be true or false": lambda: cube.render(hits="no"),
+        r"denoise is 'yes': it must be true or false, or one of": lambda: cube.render(denoise="yes"),
+        r"progress is 3: it must be a Progress": lambda: cube.render(progress=3),
+        r"unknown option frames; known here: overrides": lambda: cube.render(frames=3),
+        r"size is 3: it must be width and height": lambda: packed.registers(3),
+        r"camera is \{'fov': 3\}: it must be a Camera": lambda: packed.with_camera({"fov": 3}),
+        r"config is \{\}: it must be text": lambda: colonnade.ModelDevice({}),
         r"has a mesh of its own: leave out \[mesh\]": lambda: colonnade.Scene(
             (square, [[0, 1, 2]]), object=[{"mesh": {"name": "cube"}}]
         ),
@@ -107,6 +136,16 @@ def test_what_a_scene_leaves_open_is_a_warning_once_for_it(tmp_path: Path) -> No
     assert any("were fitted to the photo of room attic" in line for line in said)
     assert any("4 samples a pixel, the default in a room" in line for line in said)
     assert [str(one.message) for one in caught] == said
+
+
+class Broken:
+    """A mesh of another library that fails."""
+
+    faces = ((0, 1, 2),)
+
+    @property
+    def vertices(self) -> object:
+        raise RuntimeError("of its own")
 
 
 @pytest.mark.parametrize("name", ["frames", "room"])

@@ -10,6 +10,7 @@ import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from colonnade.common.frame_size import Size
 from colonnade.common.image_io import read_picture, write_png
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import manifest_for
@@ -20,8 +21,6 @@ from colonnade.scene.model import Scene
 
 #: The picture of a result.
 PICTURE = "picture.png"
-
-Size = tuple[int, int]
 
 
 def reference(folder: Path, *, scene: Scene, mesh: Mesh, size: Size) -> None:
