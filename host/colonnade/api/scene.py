@@ -95,7 +95,7 @@ class Scene:
             tables["mesh"] = mesh_table(mesh) | ({} if crease is None else {"crease": crease})
         self._set(tables, None, "the scene", Path() if folder is None else Path(folder))
         if mesh is not None and not isinstance(mesh, str | Path):
-            with _noted():
+            with _noted(self._notes):
                 self.mesh = memory_mesh(mesh, crease)
 
     @classmethod

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 
+from colonnade.common.arguments import checked
 from colonnade.common.errors import UserError
-from colonnade.common.framebuffer_formats import PIXEL_BYTES, photo_lines
+from colonnade.common.framebuffer_formats import FORMATS, PIXEL_BYTES, photo_lines
 from colonnade.common.progress import QUIET, Progress
-from colonnade.design.frame_limits import check_size
+from colonnade.design.config_name import Overrides
 from colonnade.design.generator import GeneratedDesign, shell_design_for, shell_manifest_for
-from colonnade.device.device import Device, Pixels, check_photo, require_format, require_no_errors, rgb_of
+from colonnade.device.device import Device, Pixels, check_frame, exclusive, require_format, require_no_errors, rgb_of
 from colonnade.device.shell_simulator import SimulatedTransport
 from colonnade.device.transport import LitexClient, LitexTransport, PacedTransport, Transport, UioTransport
 from colonnade.integration.driver_design import DriverDesign
@@ -53,10 +54,11 @@ class ShellDevice(Device):
         UserError: There is no device, or one of another design.
     """
 
+    @checked
     def __init__(self, transport: Transport, design: GeneratedDesign) -> None:
         from colonnade import _core
 
-        self.manifest = design.manifest
+        super().__init__(design.manifest)
         self.transport = transport
         with ExitStack() as on_error:
             on_error.callback(transport.close)
@@ -75,8 +77,9 @@ class ShellDevice(Device):
         self._is_running = False
 
     @classmethod
+    @checked
     def simulated(
-        cls, config: str = "small", overrides: Sequence[str] = (), *, memory: int = 1 << 26, progress: Progress = QUIET
+        cls, config: str = "small", overrides: Overrides = (), *, memory: int = 1 << 26, progress: Progress = QUIET
     ) -> ShellDevice:
         """The RTL under Verilator, with a memory behind its bus.
 
@@ -93,7 +96,8 @@ class ShellDevice(Device):
         return cls(SimulatedTransport(design, memory, progress=progress), design)
 
     @classmethod
-    def uio(cls, path: str = "/dev/uio0", config: str = "small", overrides: Sequence[str] = ()) -> ShellDevice:
+    @checked
+    def uio(cls, path: str = "/dev/uio0", config: str = "small", overrides: Overrides = ()) -> ShellDevice:
         """A device on the bus of this machine, by Linux' UIO (`UioTransport`): until `close`, the console does not draw
         where a display shows the device's memory.
 
@@ -109,13 +113,14 @@ class ShellDevice(Device):
         return cls(UioTransport(path), design)
 
     @classmethod
+    @checked
     def litex(
         cls,
         client: LitexClient,
         registers: int,
         memory: tuple[int, int],
         config: str = "small",
-        overrides: Sequence[str] = (),
+        overrides: Overrides = (),
     ) -> ShellDevice:
         """A device in a LiteX SoC, through LiteX's ``RemoteClient`` (`LitexTransport`).
 
@@ -131,6 +136,7 @@ class ShellDevice(Device):
         """
         return cls(LitexTransport(client, registers, *memory), shell_manifest_for(config, overrides))
 
+    @exclusive
     def load(self, image: SceneImage) -> None:
         """See `Device`."""
         require_format(image, self.manifest)
@@ -146,13 +152,13 @@ class ShellDevice(Device):
             self._check(self._driver.set_scene(address))
         self._free = free
 
+    @exclusive
     def set_frame(self, registers: Mapping[str, int], photo: Pixels | None = None) -> None:
         """See `Device`."""
         if self._free is None:
             raise UserError("no scene is loaded: load one before the frame")
         self._require_idle()
-        check_size((registers["frame.width"], registers["frame.height"]), self.manifest)
-        check_photo(photo, registers)
+        check_frame(registers, photo, self.manifest)
         self._check(self._driver.set_frame(frame_file(registers, self.manifest)))
         self._size = registers["frame.width"], registers["frame.height"]
         self._end = self._free
@@ -164,6 +170,7 @@ class ShellDevice(Device):
         window = self._window(self._free, lines.size)
         self._check(self._driver.set_photo(self._free, lines.shape[1], window, photo.shape[2] == 4))
 
+    @exclusive
     def start(self, pixel_format: int = 0, address: int | None = None) -> None:
         """See `Device`.
 
@@ -174,14 +181,17 @@ class ShellDevice(Device):
         width, height = self._size
         if width == 0:
             raise UserError("no frame is set: set its registers before the start")
+        if not 0 <= pixel_format < len(FORMATS):
+            raise UserError(f"pixel_format is {pixel_format}: it must be from 0 to 2, for {', '.join(FORMATS)}")
         tile = self._design.numbers["tile_size"]
         stride = -(-width // tile) * tile * PIXEL_BYTES[pixel_format]
         base = self._end if address is None else address
         self._require_memory("the frame", base, stride * height)
         self._driver.acknowledge(_FRAME_DONE | _ERROR)
         self._check(self._driver.start(base, stride, pixel_format, self._window(base, stride * height)))
-        self._placed, self._is_running = (base, stride, height), True
+        self._placed, self._format, self._is_running = (base, stride, height), pixel_format, True
 
+    @exclusive
     def wait(self, timeout: float | None = None) -> None:
         """See `Device`."""
         self.wait_for_end(timeout)
@@ -193,6 +203,7 @@ class ShellDevice(Device):
             )
         self._check(result)
 
+    @exclusive
     def wait_for_end(self, timeout: float | None = None) -> None:
         """Wait for the end of the frame, also of one with an error.
 
@@ -208,27 +219,41 @@ class ShellDevice(Device):
         self._driver.acknowledge(_FRAME_DONE | _ERROR)
         self._is_running = False
 
+    @exclusive
     def counters(self) -> dict[str, int]:
         """See `Device`."""
         self._require_frame()
         names = self._design.counters
         return {name.removeprefix("counters."): int(self._driver.counter(n)) for n, name in names.items()}
 
+    @exclusive
     def pixels(self) -> Pixels:
         """See `Device`; of a frame in format 0."""
-        return rgb_of(self.lines(), self._size[0])
+        lines = self.lines()
+        if self._format:
+            raise UserError(f"the frame is in {FORMATS[self._format]}, which has no such pixels: read its lines")
+        return rgb_of(lines, self._size[0])
 
+    @exclusive
     def lines(self) -> Pixels:
         """The framebuffer in memory, in any format: uint8 [height, stride]."""
         base, stride, height = self._require_frame()
         return np.frombuffer(self.transport.fetch(base, stride * height), np.uint8).reshape(height, stride)
 
+    @exclusive
     def register(self, name: str) -> int:
-        """The value of a register of the device, by its name in the manifest."""
-        register = self.manifest.registers[name]
+        """The value of a register of the device, by its name in the manifest.
+
+        Raises:
+            UserError: There is no such register.
+        """
+        register = self.manifest.registers.get(name)
+        if register is None:
+            raise UserError(f"there is no register {name}: give the name of one in the manifest of the design")
         first = self._table.device.base + 4 * register.address
         return register.decode([self.transport.read32(first + 4 * word) for word in range(register.words)])
 
+    @exclusive
     def reset(self) -> None:
         """End what runs; the scene stays, the registers do not.
 
@@ -240,8 +265,8 @@ class ShellDevice(Device):
         self._driver.acknowledge(_FRAME_DONE | _IMAGE_DONE | _ERROR)
         self._size, self._placed, self._is_running = (0, 0), None, False
 
-    def close(self) -> None:
-        """See `Device`. A board's frame goes on."""
+    def _release(self) -> None:
+        """A board's frame goes on."""
         self.transport.close()
 
     def _begin(self, timeout: float | None) -> None:
@@ -270,6 +295,10 @@ class ShellDevice(Device):
         return address + -(-len(content) // PAGE_BYTES) * PAGE_BYTES
 
     def _require_memory(self, what: str, address: int, size: int) -> None:
+        if address < self.transport.base:
+            raise UserError(
+                f"{what} at {address:#x} is below the device's memory, which is at {self.transport.base:#x}"
+            )
         beyond = address + size - self.transport.base - self.transport.size
         if beyond > 0:
             raise UserError(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import shutil
+import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,6 +30,7 @@ SIZE = (20, 6)
 #: `test_shell.py` has the same design: its simulator is built once.
 CONFIG = ("tiny", ("array.columns=2",))
 INTERRUPT_STATUS, CONTROL = 0x48, 0x40
+POSITION = "camera.position.x"
 
 
 @pytest.fixture(autouse=True)
@@ -145,6 +149,39 @@ def test_all_transports_make_the_same_accesses_and_the_picture_is_the_models(
 
 
 @NEEDS_SIMULATOR
+@pytest.mark.parametrize("make", [ModelDevice, ShellDevice.simulated])
+def test_threads_that_share_a_device_have_their_own_pictures(
+    make: Callable[..., Device], packed: DeviceScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also of calls one by one, under the lock of the device. Each gives way to the other threads before its start."""
+    sizes = [SIZE, (12, 9), (8, 5)]
+    found: dict[int, list[np.ndarray]] = {0: [], 1: [], 2: []}
+    with make(*CONFIG) as device:
+        expected = [device.render(packed, size) for size in sizes]
+        start = device.start
+        monkeypatch.setattr(device, "start", lambda: (time.sleep(0.02), start(), time.sleep(0.02)))
+
+        def work(number: int) -> None:
+            for _ in range(3):
+                found[number].append(device.render(packed, sizes[number]))
+            with device.lock:
+                device.set_frame(packed.registers(sizes[number]))
+                device.start()
+                device.wait()
+                found[number].append(device.pixels())
+
+        threads = [threading.Thread(target=work, args=(number,)) for number in found]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    for number, picture in enumerate(expected):
+        assert len(found[number]) == 4
+        for one in found[number]:
+            np.testing.assert_array_equal(one, picture)
+
+
+@NEEDS_SIMULATOR
 def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScene, tmp_path: Path) -> None:
     """Its memory is a file from a bus address on, which has the image when it is loaded."""
     registers = packed.registers(SIZE)
@@ -165,9 +202,20 @@ def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScen
                 device.pixels()
             with pytest.raises(UserError, match="a photo shows behind the object of a room"):
                 device.set_frame(registers, np.zeros((6, 20, 3), np.uint8))
+            for message, wrong in {
+                r"register camera.position.x is missing: give": {k: registers[k] for k in {*registers} - {POSITION}},
+                r"register lamp is none of this design": registers | {"lamp": 1},
+                r"register camera.position.x is 1.5: it must be a whole number from -2": registers | {POSITION: 1.5},
+                r"register camera.position.x is None: it must be": registers | {POSITION: None},
+                r"register frame.width is -1: it must be a whole number from 0": registers | {"frame.width": -1},
+                r"size 2000x6 is too large": registers | {"frame.width": 2000},
+                r"registers is 3: it must be a Mapping": 3,
+            }.items():
+                with pytest.raises(UserError, match=message):
+                    device.set_frame(wrong)
+            with pytest.raises(UserError, match="image is None: it must be a SceneImage"):
+                device.load(None)
             if isinstance(device, ShellDevice):
-                with pytest.raises(UserError, match=r"size 4000x6 is too large"):
-                    device.set_frame(registers | {"frame.width": 4000})
                 device.set_frame(packed.registers((64, 60)))
                 with pytest.raises(UserError, match=r"memory of 16,384 bytes is too small for the frame: \d,\d+ more"):
                     device.start()
@@ -181,9 +229,25 @@ def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScen
                 with pytest.raises(UserError, match="no frame is set"):
                     device.start()
                 device.set_frame(registers)
-                device.start()
+                for message, arguments in {
+                    r"pixel_format is 9: it must be from 0 to 2": (9,),
+                    r"the frame at 0x0 is below the device's memory, which is at 0x5f000000": (0, 0),
+                }.items():
+                    with pytest.raises(UserError, match=message):
+                        device.start(*arguments)
+                device.start(1)
                 device.wait()
-                assert device.counters()["cycles"] > 0
+                with pytest.raises(UserError, match="the frame is in rgb565, which has no such pixels: read its lines"):
+                    device.pixels()
+                assert device.counters()["cycles"] == device.register("counters.cycles") > 0
+                with pytest.raises(UserError, match="there is no register lamp"):
+                    device.register("lamp")
+        device.close()
+        for call in (device.start, device.pixels, device.counters, lambda d=device: d.render(packed, SIZE)):
+            with pytest.raises(UserError, match="the device is closed: make another one"):
+                call()
+        with pytest.raises(UserError, match="a device cannot be copied"):
+            copy.copy(device)
     content, stored = device_image(packed.image, design.manifest), memory.read_bytes()
     assert stored.startswith(content) and any(stored[len(content) :])
 
