@@ -147,7 +147,7 @@ public:
 
 private:
     RayRequest requestOf(const Vectors& origins, const Vectors& directions, std::size_t i) const {
-        RayRequest request{{}, {}, numbers_.unlimited(), ~std::uint64_t(0)};
+        RayRequest request{{}, {}, numbers_.unlimited()};
         for (std::size_t a = 0; a < 3; ++a) {
             request.origin[a] = origins(i, a);
             request.direction[a] = directions(i, a);

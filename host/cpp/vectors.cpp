@@ -6,6 +6,7 @@
 //                                                         -> tests count (slot near)*count
 //   triangle axis negative[3] origin[3] shear[2] vertices[9] -> isHit t weights[3] backSide
 //   limit  t                                              -> tMaxUnits
+//   closest tMax count (t id)*count                       -> isHit t id, of the hits of a ray
 //   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat shadows
 //          count, count * (position[3] colour[3] reachMantissa reachExponent)
 //                                                         -> origin[3], count * (direct[3] needsShadowRay)
@@ -49,7 +50,7 @@ Ray readTriangleRay(Query& query) {
 
 void replyRaySetup(Query& query, const Numbers& n) {
     const bool isShadow = query.number() != 0;
-    RayRequest request{query.wideVector(), {}, 0, 0};
+    RayRequest request{query.wideVector(), {}, 0};
     request.direction = query.wideVector();
     request.tMax = isShadow ? static_cast<Wide>(magnitude(request.direction[dominantAxis(request.direction)])) : n.unlimited();
     Bounds bounds{query.vector(), {}};
@@ -92,12 +93,22 @@ void replyTriangle(Query& query, const Numbers& n) {
     const Ray ray = readTriangleRay(query);
     std::array<Vector, 3> vertices;
     for (auto& vertex : vertices) vertex = query.vector();
-    Hit hit{false, n.maxT(), ~std::uint64_t(0), {}, false};
+    Hit hit = Hit::none(n.maxT());
     testTriangle(ray, vertices, 0, n, hit);
     Reply reply;
     reply << hit.found << (hit.found ? hit.t : 0);
     reply.all(hit.weights) << hit.backSide;
     reply.print();
+}
+
+void replyClosest(Query& query) {
+    Hit best = Hit::none(query.number());
+    for (std::int64_t left = query.number(); left > 0; --left) {
+        const std::int64_t t = query.number();
+        const auto id = static_cast<std::uint64_t>(query.number());
+        if (best.isReplacedBy(t, id)) best = {true, t, id, {}, false};
+    }
+    (Reply() << best.found << best.t << static_cast<Wide>(best.id)).print();
 }
 
 Surface readSurface(Query& query, const Numbers& n) {
@@ -240,6 +251,7 @@ int main() try {
         if (kind == "setup") replyRaySetup(query, numbers);
         else if (kind == "box") replyBox(query, numbers);
         else if (kind == "triangle") replyTriangle(query, numbers);
+        else if (kind == "closest") replyClosest(query);
         else if (kind == "shade") replyShade(query, numbers);
         else if (kind == "cornercolour") replyCornerColour(query, numbers);
         else if (kind == "lightenvironment") replyEnvironmentLight(query, numbers);

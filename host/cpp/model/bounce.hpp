@@ -78,7 +78,7 @@ inline Bounce bounce(const Surface& surface, const Material& material, bool flat
     Bounce result{};
     result.isRefraction = directions.isRefraction;
     result.reflection = directions.reflection;
-    result.ray = {offSurface(surface.point, surface.faceForwardNormal, directions.isRefraction ? -offset : offset, n), {}, n.unlimited(), ~std::uint64_t(0)};
+    result.ray = {offSurface(surface.point, surface.faceForwardNormal, directions.isRefraction ? -offset : offset, n), {}, n.unlimited()};
     for (int a = 0; a < 3; ++a) result.ray.direction[a] = directions.direction[a];
     if (directions.isRefraction && !surface.backSide) {
         const std::int64_t one = std::int64_t(1) << n.lightFraction;

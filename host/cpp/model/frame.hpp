@@ -58,7 +58,7 @@ public:
     const Frame& frame() const { return frame_; }
 
     RayRequest primaryRay(std::int64_t x, std::int64_t y) const {
-        RayRequest request{frame_.cameraPosition, {}, numbers_.unlimited(), ~std::uint64_t(0)};
+        RayRequest request{frame_.cameraPosition, {}, numbers_.unlimited()};
         for (int a = 0; a < 3; ++a)
             request.direction[a] = floorShift<Wide>(frame_.cameraDirection[a], -frame_.stepShift) + Wide(x) * frame_.stepX[a] + Wide(y) * frame_.stepY[a];
         return request;
@@ -132,7 +132,7 @@ private:
         ++counters.raysGather;
         path.origin = origin;
         path.direction = {direction[0], direction[1], direction[2]};
-        return {origin, path.direction, numbers_.unlimited(), ~std::uint64_t(0)};
+        return {origin, path.direction, numbers_.unlimited()};
     }
 
     Wide distanceOf(const Ray& ray, const Hit& hit) const { return floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t; }

@@ -13,7 +13,6 @@ using WideVector = std::array<Wide, 3>;
 struct RayRequest {
     WideVector origin, direction;
     Wide tMax;
-    std::uint64_t limitId;
 };
 
 /// A prepared ray in its permuted frame (x', y', then the dominant axis z'). docs/numbers.md, section 2, defines the fields.
@@ -27,7 +26,6 @@ struct Ray {
     std::array<int, 2> exponent;
     std::int64_t tEntry;
     std::int64_t tMax;
-    std::uint64_t limitId;
 
     /// The object's axis that component `permuted` of the ray's frame is on.
     int objectAxis(int permuted) const {
@@ -109,7 +107,6 @@ inline bool isNarrow(const RayRequest& request, const Numbers& n) {
 
 inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Numbers& n) {
     Ray ray{};
-    ray.limitId = request.limitId;
     ray.axis = dominantAxis(request.direction);
     if (request.direction[ray.axis] == 0) return ray;
 

@@ -197,7 +197,7 @@ inline Illumination illuminate(const WideVector& origin, const WideVector& norma
         result.direct[channel] = std::min(maxLight, (light.colour[channel] * cosine) >> n.cosineFraction);
     result.needsShadowRay = shadows && facingLight > 0;
     const int dominant = dominantAxis(toLight);
-    result.shadowRay = {origin, toLight, static_cast<Wide>(magnitude(toLight[dominant])), 0};
+    result.shadowRay = {origin, toLight, static_cast<Wide>(magnitude(toLight[dominant]))};
     return result;
 }
 

@@ -26,7 +26,7 @@ class Tracer {
 public:
     /// The closest hit of a prepared ray.
     Hit trace(const Ray& ray) {
-        Hit best{false, ray.tMax, ray.limitId, {}, false};
+        const Hit best = Hit::none(ray.tMax);
         if (!ray.enters) return best;
         ++counters.raysInBox;
         TraceState state{ray, best, false, Occlusion::none};
@@ -39,7 +39,7 @@ public:
     Occlusion occlusion(const Ray& ray) {
         if (!ray.enters) return Occlusion::none;
         ++counters.raysInBox;
-        TraceState state{ray, {false, ray.tMax, ray.limitId, {}, false}, true, Occlusion::none};
+        TraceState state{ray, Hit::none(ray.tMax), true, Occlusion::none};
         run(state);
         return state.occlusion;
     }

@@ -11,6 +11,12 @@ struct Hit {
     std::uint64_t id;
     std::array<std::int64_t, 3> weights;
     bool backSide;
+
+    /// That of a ray that has hit nothing yet: only hits with t < `tMax` count.
+    static Hit none(std::int64_t tMax) { return {false, tMax, 0, {}, false}; }
+
+    /// Whether a triangle that the ray hits at `t` is the closest one so far.
+    bool isReplacedBy(Wide t, std::uint64_t id) const { return t < this->t || (t == this->t && id < this->id); }
 };
 
 /// tMax in vertex units, rounded up and padded: the largest `tNear` of a box that may contain a closer hit.
@@ -110,7 +116,7 @@ inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const 
     return count;
 }
 
-/// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which initially holds the ray's limits.
+/// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which begins as `Hit::none`.
 template <class Product> bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best) {
     std::array<std::int64_t, 3> x, y, z;
     for (int i = 0; i < 3; ++i) {
@@ -141,7 +147,7 @@ template <class Product> bool testTriangle(const Ray& ray, const std::array<Vect
     const Wide quotient = floorShift<Wide>(divide(dividend.mantissa, divisor.mantissa, n.distanceDigits),
                                            n.distanceDigits - (dividend.exponent - divisor.exponent));
     const Wide t = numerator < 0 ? z[0] - quotient : z[0] + quotient;
-    if (t < 0 || t > best.t || (t == best.t && id >= best.id)) return false;
+    if (t < 0 || !best.isReplacedBy(t, id)) return false;
 
     best.found = true;
     best.t = static_cast<std::int64_t>(t);

@@ -20,7 +20,7 @@ final class HitTableIO(config: TraversalConfig) extends Bundle {
   val start  = Flipped(Valid(new TraceStart(config)))
   val result = Flipped(Valid(new TriangleResult(config)))
 
-  /** The ray of `result` is a shadow ray: hits at `tMax` itself, the light, do not count. */
+  /** The ray of `result` is a shadow ray: its hits do not shorten it. */
   val isShadow = Input(Bool())
 
   /** The ray of `result` has a hit, this result included; for a shadow ray only opaque hits count. */

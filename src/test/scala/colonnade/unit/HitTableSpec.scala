@@ -44,17 +44,19 @@ class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
 
-  it should "ignore a shadow ray's hit at tMax, the light" in
-    test(new HitTable(TestConfigs.tiny)) { dut =>
-      val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-      driver.begin(context = 1, tMax = 100, isShadow = true)
-      driver.offer(1, driver.result(t = 100, id = 0))
-      driver.check()
-      assert(!driver.hasHit(1))
-      driver.offer(1, driver.result(t = 99, id = 9))
-      driver.check()
-      assert(driver.hasHit(1))
-    }
+  for (isShadow <- Seq(false, true); tMax <- Seq(BigInt(100), BigInt(2).pow(TestConfigs.tiny.numbers.gridBits - 1) - 1))
+    it should s"ignore a hit at tMax $tMax, as the model does, isShadow $isShadow" in
+      test(new HitTable(TestConfigs.tiny)) { dut =>
+        val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
+        driver.begin(context = 1, tMax, isShadow)
+        driver.offer(1, driver.result(t = tMax, id = 0))
+        driver.check()
+        assert(!driver.hasHit(1))
+        driver.checkModel()
+        driver.offer(1, driver.result(t = tMax - 1, id = 9))
+        driver.check()
+        assert(driver.hasHit(1))
+      }
 
   it should "let a shadow ray pass transmissive triangles, and record them" in
     test(new HitTable(TestConfigs.tiny)) { dut =>
@@ -95,8 +97,10 @@ private object HitTableSpec {
   final case class Trace(tMax: BigInt, isShadow: Boolean, results: Vector[Result] = Vector.empty) {
     private val within = results.filter(result => result.isHit && result.t < tMax)
 
-    /** Only opaque triangles end a shadow ray. */
-    def hits: Vector[Result] = within.filter(hit => !isShadow || !hit.isTransmissive)
+    /** Results that end the ray if they are below tMax: of a shadow ray opaque triangles only. */
+    val ending: Vector[Result] = results.filter(result => result.isHit && !(isShadow && result.isTransmissive))
+
+    def hits: Vector[Result] = ending.filter(_.t < tMax)
 
     def occlusion: Occlusion.Type =
       if (hits.nonEmpty) Occlusion.opaque else if (within.nonEmpty) Occlusion.transmissive else Occlusion.none
@@ -113,6 +117,9 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
   private val farthest = (BigInt(1) << (config.numbers.gridBits - 1)) - 1
   private val random   = new Random(seed)
   private val traces   = Array.fill(contexts)(Option.empty[Trace])
+
+  /** Rays that the table has agreed with. */
+  private val checked = Seq.newBuilder[Trace]
 
   /** Pairs of a tMax in grid steps and what the table's readers get; the model checks them at the end. */
   private val tMaxUnits = Seq.newBuilder[(BigInt, BigInt)]
@@ -152,8 +159,19 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
       step()
       check()
     }
+    checkModel()
     val (asked, found) = tMaxUnits.result().distinct.unzip
     assert(found == Model.answers(config, asked.map(Seq(_)), "limit").map(_.head))
+  }
+
+  /** Checks that the model has the closest hits of all rays so far. */
+  def checkModel(): Unit = {
+    val rays    = checked.result().distinct
+    val queries = rays.map { ray =>
+      Seq(ray.tMax, BigInt(ray.ending.size)) ++ ray.ending.flatMap(hit => Seq(hit.t, hit.id))
+    }
+    val closest = rays.map(ray => ray.best.fold(Seq[BigInt](0, ray.tMax, 0))(hit => Seq(1, hit.t, hit.id)))
+    assert(Model.answers(config, queries, "closest") == closest)
   }
 
   /** Checks every ray; the outcome of a context comes one cycle later. */
@@ -168,6 +186,7 @@ private class HitTableDriver(dut: HitTable, config: ColonnadeConfig, seed: Int) 
     dut.clock.step()
     outcome.hasHit.expect(ray.hits.nonEmpty, s"context $context, $ray")
     if (ray.isShadow) outcome.occlusion.expect(ray.occlusion)
+    checked += ray
     for (hit <- ray.best if !ray.isShadow) {
       assert(outcome.hit.t.peekRaw() == hit.t, s"context $context, $ray")
       assert(outcome.hit.id.peekInt() == hit.id, s"context $context, $ray")
