@@ -69,7 +69,7 @@ def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, i
     ids=["one column", "in a room", "many paths in a room"],
 )
 def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_room: bool) -> None:
-    """All kinds of materials; no, one and four gathered rays; a stalled sink."""
+    """All kinds of materials, also where no bounce is traced; no, one and four gathered rays; a stalled sink."""
     design = design_for("small", (*GATHERS, *options))
     mesh = load_mesh("teapot:4")
     placed = replace(SCENE, placement=Placement((322.0, 306.0), 0.58), background=Background(room=ROOMS / "living"))
@@ -85,8 +85,12 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
         image = with_environment(image, held, design.manifest)
     size = (48, 36)
     still = frame_registers(scene, image.header, design.manifest, *size, held)
-    mirrors = frame_registers(replace(scene, paths=Paths(bounces=1)), image.header, design.manifest, *size, held)
-    registers = [gathering(still, bounces, bounces) for bounces in (0, 1, 4)] + [gathering(mirrors, 2, 9)]
+    untraced, mirrors = (
+        frame_registers(replace(scene, paths=Paths(bounces=bounces)), image.header, design.manifest, *size, held)
+        for bounces in (0, 1)
+    )
+    registers = [gathering(still, bounces, bounces) for bounces in (0, 1, 4)]
+    registers += [gathering(mirrors, 2, 9), gathering(untraced, 1, 5)]
     if held is not None:
         for settings in registers[1::2]:
             settings["environment.boundingPlanes"] = 0  # Mirrors and glass see the cube
@@ -99,7 +103,7 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
         if held is not None:
             np.testing.assert_array_equal(frame.ratio, model.ratio)
         assert {name: frame.counters[name] for name in model.counters} == model.counters
-    none, one, four, _ = simulated.frames
+    none, one, four, *_ = simulated.frames
     assert none.counters["raysGather"] == 0 < one.counters["raysGather"] < four.counters["raysGather"]
     assert (one.colour != none.colour).any(axis=2)[one.is_object].mean() > 0.3
     if one.ratio is not None and none.ratio is not None and four.ratio is not None:

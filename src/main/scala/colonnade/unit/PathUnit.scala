@@ -130,7 +130,12 @@ final class PathUnit(config: PathConfig) extends Module {
     cube :<>= light.memory
   }
 
-  // Control: the state of every context
+  // Control: the state of every context. A path may end in the light cube two cycles after its last ray has left, not
+  // one: a choice among many contexts takes a cycle, and so does a slice before one among few
+  private val bounced = {
+    val now = bounces.map(_.bounced).getOrElse(0.U.asTypeOf(controller.bounced))
+    if (config.frame.gather && !config.isLarge) TimingSlice.valid(now) else now
+  }
   controller.allocation :<>= primaryRays.control
   controller.trace :<>= trace.control
   controller.pixel :<>= assembler.control
@@ -138,10 +143,10 @@ final class PathUnit(config: PathConfig) extends Module {
   controller.shaded.bits.context         := lit.bits.context
   controller.shaded.bits.needsShadowRays := lit.bits.needsShadowRays
   for ((to, from) <- controller.shaded.bits.isOfEnvironment.zip(lit.bits.isOfEnvironment)) to := from
-  controller.bounced           := bounces.map(_.bounced).getOrElse(0.U.asTypeOf(controller.bounced))
-  controller.fetchFailed       := trace.attributeError
-  controller.accumulated.valid := colourUnit.colour.valid
-  controller.accumulated.bits  := colourUnit.colour.bits.context
+  controller.bounced                                                                          := bounced
+  controller.fetchFailed                                                                      := trace.attributeError
+  controller.accumulated.valid                                                                := colourUnit.colour.valid
+  controller.accumulated.bits := colourUnit.colour.bits.context
   bounces.foreach(_.start := primaryRays.start)
   environment.foreach(_.control :<>= controller.environment.get)
   io.isIdle := controller.idleCount === config.contexts.U && assembler.isIdle
