@@ -52,10 +52,12 @@ def frame_commands(manifest: Manifest, registers: Mapping[str, int], pixel_file:
 
 
 def parse_output(lines: Iterable[str]) -> list[FrameOutput]:
-    """The output of the harness by frame; the last frame of a failed run may lack registers."""
+    """The output of the harness by frame; the last frame of a failed run may lack registers.
+
+    Other lines are skipped, such as those of an assertion of the hardware.
+    """
     frames: list[FrameOutput] = []
-    for line in lines:
-        words = line.split()
+    for words in filter(None, map(str.split, lines)):
         if words[0] == "simulated":
             frames.append(FrameOutput(int(words[1]), float(words[2])))
         elif words[0] == "value":

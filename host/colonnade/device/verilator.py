@@ -187,7 +187,7 @@ def run_program(command: list[str], folder: Path, report: Report) -> list[str]:
     """Run the harness in `folder` and return the lines of its output, which ``folder/results`` also holds.
 
     Raises:
-        RuntimeError: The exit status is not 0.
+        RuntimeError: The exit status is not 0. The message names the first assertion of the hardware that failed.
     """
     messages: deque[str] = deque(maxlen=5)
     with (folder / "results").open("w") as output:
@@ -199,9 +199,11 @@ def run_program(command: list[str], folder: Path, report: Report) -> list[str]:
                     report(float(line.split()[1]))
                 else:
                     messages.append(line.strip())
-        if process.returncode != 0:
-            raise RuntimeError(f"the simulated hardware failed (status {process.returncode}): {'; '.join(messages)}")
-    return (folder / "results").read_text().splitlines()
+    lines = (folder / "results").read_text().splitlines()
+    if process.returncode != 0:
+        messages.extend([line for line in lines if "%Error" in line][:1])
+        raise RuntimeError(f"the simulated hardware failed (status {process.returncode}): {'; '.join(messages)}")
+    return lines
 
 
 def _frame(manifest: Manifest, registers: Mapping[str, int], pixel_file: Path, output: FrameOutput) -> Frame:

@@ -26,7 +26,7 @@ from colonnade.lab.evaluation.fuzz.corruption import KINDS, corrupt_case
 from colonnade.lab.evaluation.fuzz.dram import as_read
 from colonnade.lab.evaluation.fuzz.environments import environment_cases
 from colonnade.lab.evaluation.fuzz.registers import EXCLUDED, INTERVALS
-from colonnade.lab.evaluation.fuzz.simulator import SimulatedFrame
+from colonnade.lab.evaluation.fuzz.simulator import SimulatedFrame, run_cases
 from colonnade.scene_image.dram_image import dram_image, line_layout
 
 needs_verilator = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
@@ -155,6 +155,17 @@ def test_a_wrong_model_is_found_and_its_frame_is_reproducible(monkeypatch: pytes
     assert found and all("108 colours" in " ".join(one["differences"]) for one in found)
     again = campaign.fuzz(design, 1, seed=found[-1]["seed"], kinds=(found[-1]["kind"],))["disagreements"]
     assert again == found[-1:]
+
+
+def test_an_assertion_of_the_hardware_is_the_difference(tmp_path: Path) -> None:
+    """A simulator that stops at one prints it between the results."""
+    manifest, program = manifest_for("tiny").manifest, tmp_path / "simulator"
+    cause = "%Error: A.sv:1: Assertion failed in TOP: too early"
+    program.write_text(f"#!/bin/sh\nprintf '%s\\n' '{cause}' '' '%Error: A.sv:1: Verilog $stop'\nexit 134\n")
+    program.chmod(0o755)
+    case = legal_cases(manifest)[0]
+    failed = run_cases(program, manifest, [case], len(case.image.records))
+    assert failed == ([], f"the simulated hardware failed (status 134): {cause}")
 
 
 @pytest.mark.parametrize("kind", KINDS)
