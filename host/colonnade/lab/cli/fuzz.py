@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     "kinds",
     multiple=True,
     metavar="KIND",
-    help="Kind of corruption: records, registers, both or maps. Repeatable.  [default: all]",
+    help="Kind of corruption: records, registers, both, maps or gather. Repeatable.  [default: all]",
 )
 @json_option
 @click.pass_context
@@ -79,6 +79,8 @@ def fuzz(
     for name, counts in report["kinds"].items():
         table.print(name, *counts.values())
     click.echo(f"{frames:,} corrupt frames; {report['legal_failures']} of the legal frames after them differ")
+    if (gathered := report["gathered"]) is not None:
+        click.echo(f"{gathered['corrupt']:,} corrupt and {gathered['legal']:,} legal frames gathered light")
     finish({"config": config, "overrides": list(overrides), **report}, json_file)
     if report["disagreements"]:
         context.exit(1)

@@ -20,6 +20,7 @@ from colonnade.lab.evaluation.fuzz.compare import differences
 from colonnade.lab.evaluation.fuzz.corruption import KINDS, Kind, corrupt_case
 from colonnade.lab.evaluation.fuzz.dram import as_read, with_failed_reads
 from colonnade.lab.evaluation.fuzz.environments import environment_cases
+from colonnade.lab.evaluation.fuzz.gathered import with_any_light
 from colonnade.lab.evaluation.fuzz.simulator import SimulatedFrame, run_cases
 
 #: Corrupt frames per simulator run.
@@ -63,6 +64,7 @@ class _Campaign:
         self.rows = max(len(case.image.records) for case in self.cases)
         self._expected: dict[str, Frame] = {}
         self.legal_failures = 0
+        self.gathered = Counter[str]()
 
     def plan(self, seed: int, kind: Kind) -> _Planned:
         return _Planned(seed, kind, *corrupt_case(seed, kind, self.cases, self.manifest))
@@ -94,6 +96,8 @@ class _Campaign:
     def _outcome(
         self, plan: _Planned, corrupt: SimulatedFrame, legal: SimulatedFrame
     ) -> tuple[str, Disagreement | None]:
+        for name, frame in (("corrupt", corrupt.frame), ("legal", legal.frame)):
+            self.gathered[name] += frame.counters.get("raysGather", 0) > 0
         expected = self.expected(plan.legal)
         found = [f"the next frame: {difference}" for difference in differences(legal, expected)]
         self.legal_failures += bool(found)
@@ -110,6 +114,11 @@ class _Campaign:
 
 def _failed(plan: _Planned, found: tuple[str, ...]) -> tuple[str, Disagreement]:
     return "disagree", Disagreement(plan.seed, plan.kind.name, plan.change, found)
+
+
+def all_cases(manifest: Manifest) -> tuple[Case, ...]:
+    """The legal frames of a design, with and without a room."""
+    return with_any_light(legal_cases(manifest) + environment_cases(manifest), manifest)
 
 
 def fuzz(
@@ -131,20 +140,23 @@ def fuzz(
         found: Called with each disagreement.
 
     Returns:
-        ``{"seed", "frames", "kinds": {name: {outcome: frames}}, "legal_failures", "disagreements", "seconds"}``
+        ``{"seed", "frames", "kinds": {name: {outcome: frames}}, "gathered": {"corrupt": frames, "legal": frames},
+        "legal_failures", "disagreements", "seconds"}``, where ``gathered`` counts frames that trace gathered rays; it
+        is None if the design cannot.
 
     Raises:
         UserError: The design has nothing of these kinds.
     """
     begun = time.perf_counter()
-    cases = legal_cases(design.manifest) + environment_cases(design.manifest)
+    cases = all_cases(design.manifest)
     selected = [
         kind
         for name, kind in KINDS.items()
         if (not kinds or name in kinds) and any(kind.applies(case) for case in cases)
     ]
     if not selected:
-        raise UserError(f"the design has no {' or '.join(kinds)} to corrupt: it has neither rooms nor textures")
+        need = "maps need a room or textures, gather needs frame.gather=true"
+        raise UserError(f"the design has no {' or '.join(kinds)} to corrupt: {need}")
     campaign = _Campaign(design, cases, progress)
     counts = {kind.name: Counter[str]() for kind in selected}
     failed: list[Disagreement] = []
@@ -162,6 +174,9 @@ def fuzz(
         "seed": seed,
         "frames": frames,
         "kinds": {name: {outcome: count[outcome] for outcome in OUTCOMES} for name, count in counts.items()},
+        "gathered": {name: campaign.gathered[name] for name in ("corrupt", "legal")}
+        if design.manifest.gathers
+        else None,
         "legal_failures": campaign.legal_failures,
         "disagreements": [asdict(disagreement) for disagreement in failed],
         "seconds": time.perf_counter() - begun,

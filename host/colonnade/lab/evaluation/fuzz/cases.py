@@ -11,7 +11,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.mesh import Mesh
 from colonnade.mesh.texture import Texture
-from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene
+from colonnade.scene.model import Background, Camera, Colour, Light, Material, MeshSource, Paths, Scene
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene_image.file import SceneImage
 
@@ -21,8 +21,8 @@ SIZE = (12, 9)
 #: Far more cycles than a legal frame of this size takes.
 WATCHDOG_CYCLES = 400_000
 
-#: Names of the scenes whose corners have colours, or positions in a texture.
-COLOURED, TEXTURED = "corner colours", "texture"
+#: Names of the scenes whose corners have colours, or positions in a texture, and whose surfaces gather light.
+COLOURED, TEXTURED, GATHERED = "corner colours", "texture", "gathered light"
 
 SKY = Background(colour=(0.2, 0.3, 0.5))
 
@@ -40,6 +40,11 @@ class Case:
     name: str
     image: SceneImage
     registers: Mapping[str, int]
+
+    @property
+    def gathers(self) -> bool:
+        """Whether the frame gathers light (docs/gather.md)."""
+        return self.registers.get("gather.bounces", 0) > 0
 
 
 def legal_cases(manifest: Manifest) -> tuple[Case, ...]:
@@ -66,6 +71,10 @@ def _scenes(manifest: Manifest) -> Iterator[tuple[str, Scene]]:
         mirror, glass = Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Material(kind="glass", ior=1.45)
         yield "mirror", replace(cube, material=mirror, paths=Paths(bounces=3))
         yield "glass", replace(sphere, material=glass, paths=Paths(bounces=4))
+    if manifest.gathers:
+        lamp, ambient = Light(falloff=3.0, radius=0.5), Colour((0.3, 0.2, 0.3))
+        near, paths = Camera(direction=(0.3, 1.0, 0.5), framing=1.5), Paths(bounces=1, gather=4)
+        yield GATHERED, replace(torus, camera=near, light=lamp, ambient=ambient, paths=paths)
 
 
 def _case(name: str, scene: Scene, manifest: Manifest) -> Case:
@@ -74,6 +83,8 @@ def _case(name: str, scene: Scene, manifest: Manifest) -> Case:
         mesh = coloured(mesh)
     if name == TEXTURED:
         mesh = textured(mesh)
+    if name == GATHERED:
+        mesh = patchwork(mesh, manifest)
     prepared = DeviceScene.of(scene, manifest, mesh)
     return Case(name, prepared.image, prepared.registers(SIZE) | {"frame.watchdogCycles": WATCHDOG_CYCLES})
 
@@ -93,3 +104,17 @@ def textured(mesh: Mesh) -> Mesh:
     positions = ((mesh.vertices - mesh.extent.low) / mesh.extent.edge)[:, :2]
     materials = tuple(replace(material, texture=0) for material in mesh.materials)
     return replace(mesh, materials=materials, textures=(texture,), corner_uvs=positions[mesh.faces])
+
+
+def patchwork(mesh: Mesh, manifest: Manifest) -> Mesh:
+    """The mesh with faces of all kinds of materials beside each other, so that rays go from one to the other.
+
+    Where the design has textures, each material has one, and where it has emission, some.
+    """
+    mesh = mesh if manifest.texture is None else textured(mesh)
+    plain = replace(mesh.materials[0], emission=(0.1, 0.2, 0.0)) if manifest.emission else mesh.materials[0]
+    surfaces = [("diffuse", 0.0), ("mirror", 0.6), ("mirror", 0.2), ("glass", 0.4)]
+    materials = tuple(replace(plain, kind=kind, roughness=roughness) for kind, roughness in surfaces)
+    materials = materials[: int(manifest.config["frame"]["materials"])]
+    parts = np.arange(len(mesh.faces)) % len(materials)
+    return replace(mesh, materials=materials, face_materials=parts.astype(mesh.face_materials.dtype))

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from colonnade.common.types import Bytes
 from colonnade.design.manifest import Field, Manifest, value_range
 from colonnade.design.toolchain import project_root
+from colonnade.device.gathered_light import MEMORY as LIGHT_CUBE
 from colonnade.device.scene import DeviceScene
-from colonnade.lab.evaluation.fuzz.cases import Case
+from colonnade.lab.evaluation.fuzz.cases import GATHERED, Case, patchwork
 from colonnade.lab.evaluation.fuzz.records import write_field
 from colonnade.lab.evaluation.fuzz.values import random_value
 from colonnade.mesh.load import load_mesh
@@ -32,23 +33,30 @@ def environment_cases(manifest: Manifest) -> tuple[Case, ...]:
     if memory is None or (memory["width"], memory["height"]) != _ROOM_SIZE:
         return ()
     folder = project_root() / "scenes" / "rooms" / "living"
-    mesh = load_mesh("teapot:4")
+    mesh, place = load_mesh("teapot:4"), Placement((322.0, 306.0), 0.58, 25.0)
     scene = Scene(
         MeshSource(name="teapot:4"),
-        placement=Placement((322.0, 306.0), 0.58, 25.0),
+        placement=place,
         light=Light((0.1, 2.2, 1.2), falloff=1.6),
         background=Background(room=folder, colours="albedo"),
     )
     materials = [Material(kind="diffuse")]
     if int(manifest.config["frame"]["maxBounces"]) > 0:
         materials += [Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Material(kind="glass")]
-    cases, maps = [], tuple[LoadSection, ...]()
-    for material in materials:
-        prepared = DeviceScene.of(replace(scene, material=material, paths=Paths(bounces=2)), manifest, mesh)
-        # All cases share the same arrays, so that the simulator loads them once
-        maps = maps or prepared.image.attributes
+    paths = Paths(bounces=2)
+    scenes = [(str(material.kind), replace(scene, material=material, paths=paths), mesh) for material in materials]
+    if manifest.gathers:
+        # Larger, since its surfaces are to gather light, too
+        large = replace(scene, placement=replace(place, size=1.4), paths=replace(paths, gather=2))
+        scenes.append((GATHERED, large, patchwork(mesh, manifest)))
+    cases, shared = [], dict[tuple[str, bytes], LoadSection]()
+    for name, lit, surfaces in scenes:
+        prepared = DeviceScene.of(lit, manifest, surfaces)
+        # Cases share equal arrays, so that the simulator loads them once
+        held = prepared.image.attributes
+        sections = tuple(shared.setdefault((section.memory, section.words.tobytes()), section) for section in held)
         registers = prepared.registers(_SIZE) | {"frame.watchdogCycles": WATCHDOG_CYCLES}
-        cases.append(Case(f"{material.kind} in a room", replace(prepared.image, attributes=maps), registers))
+        cases.append(Case(f"{name} in a room", replace(prepared.image, attributes=sections), registers))
     return tuple(cases)
 
 
@@ -81,9 +89,9 @@ def _pointers(random: np.random.Generator, case: Case, manifest: Manifest) -> tu
     return _with(case, index, words), f"{section.memory}: {len(addresses)} pointers {target}"
 
 
-def _words(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
-    """Overwrite words of one memory with random bits, zeros or ones."""
-    section, index = _section(random, case)
+def corrupt_words(random: np.random.Generator, case: Case, manifest: Manifest, memory: str = "") -> tuple[Case, str]:
+    """Overwrite words of a memory, or of any, with random bits, zeros or ones."""
+    section, index = _section(random, case, memory)
     words, addresses = section.words.copy(), _some(random, len(section.words))
     fill = int(random.integers(3))
     shape = (len(addresses), words.shape[1])
@@ -96,7 +104,7 @@ def _fields(random: np.random.Generator, case: Case, manifest: Manifest) -> tupl
     section, index = _section(random, case)
     layout = _layout(manifest, section.memory)
     if not layout:
-        return _words(random, case, manifest)
+        return corrupt_words(random, case, manifest)
     field = list(layout.values())[int(random.integers(len(layout)))]
     words, addresses = section.words.copy(), _some(random, len(section.words))
     for address in addresses:
@@ -104,7 +112,7 @@ def _fields(random: np.random.Generator, case: Case, manifest: Manifest) -> tupl
     return _with(case, index, words), f"{section.memory}: {len(addresses)} of {field.name}"
 
 
-_MUTATIONS = (_pointers, _pointers, _words, _fields)
+_MUTATIONS = (_pointers, _pointers, corrupt_words, _fields)
 
 
 def _registers(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:
@@ -122,9 +130,9 @@ def _registers(random: np.random.Generator, case: Case, manifest: Manifest) -> t
 
 
 def _section(random: np.random.Generator, case: Case, part: str = "") -> tuple[LoadSection, int]:
-    """A random memory whose name ends with `part`, or any if none does, and its index in the image."""
-    sections = list(enumerate(case.image.attributes))
-    candidates = [(index, section) for index, section in sections if section.memory.endswith(part)] or sections
+    """A random memory whose name ends with `part`, and its index in the image."""
+    sections = enumerate(case.image.attributes)
+    candidates = [(index, section) for index, section in sections if section.memory.endswith(part)]
     index, section = candidates[int(random.integers(len(candidates)))]
     return section, index
 
@@ -144,7 +152,9 @@ def _with(case: Case, index: int, words: Bytes) -> Case:
 
 
 def _layout(manifest: Manifest, memory: str) -> Mapping[str, Field]:
-    """The fields of a memory's words; empty for a heap."""
+    """The fields of a memory's words; empty for a heap and for the light cube."""
+    if memory == LIGHT_CUBE:
+        return {}
     formats = manifest.texture if memory.startswith("texture.") else manifest.attributes
     assert formats is not None
     part, _, name = memory.partition(".")

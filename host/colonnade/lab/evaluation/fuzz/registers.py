@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from colonnade.design.manifest import Manifest, Register, value_range
+from colonnade.device.gathered_light import MEMORY as LIGHT_CUBE
 from colonnade.lab.evaluation.fuzz.cases import Case
 from colonnade.lab.evaluation.fuzz.values import random_value
 from colonnade.scene_image.dram_image import PAGE_BYTES
@@ -52,8 +53,9 @@ def reachable(case: Case, manifest: Manifest) -> Registers:
     """The registers that may change: all writable ones but `EXCLUDED` and those that would show a memory whose words
     the case does not load, which hold those of an earlier frame.
     """
-    shows = {"environment.enabled": case.image.header.room is not None}
-    textured = any(section.memory.startswith("texture.") for section in case.image.attributes)
+    memories = {section.memory for section in case.image.attributes}
+    shows = {"environment.enabled": case.image.header.room is not None, "gather.bounces": LIGHT_CUBE in memories}
+    textured = any(memory.startswith("texture.") for memory in memories)
     return {
         name: register
         for name, register in manifest.registers.items()

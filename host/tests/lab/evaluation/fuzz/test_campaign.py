@@ -101,7 +101,7 @@ def test_inverted_bounds_are_as_empty_for_a_pipeline_as_for_the_model() -> None:
     assert simulated[0].counters["hits"] > 0 and simulated[1].counters["hits"] == 0
 
 
-@pytest.mark.parametrize("config", ["small", "fpga"])
+@pytest.mark.parametrize("config", ["small", "fpga", "textured"])
 def test_every_register_is_reached(config: str) -> None:
     """All but `EXCLUDED`; those of a room in a frame that shows one."""
     manifest = manifest_for(config).manifest
@@ -208,6 +208,7 @@ def test_the_command_reports_and_fails_on_a_disagreement(monkeypatch: pytest.Mon
     disagreement = campaign.Disagreement(7, "records", "cube: record 1 is zeros", ("3 colours",))
     report = {
         "kinds": {"records": dict.fromkeys(campaign.OUTCOMES, 1)},
+        "gathered": {"corrupt": 2, "legal": 3},
         "legal_failures": 0,
         "disagreements": [disagreement],
     }
@@ -222,6 +223,7 @@ def test_the_command_reports_and_fails_on_a_disagreement(monkeypatch: pytest.Mon
     result = CliRunner().invoke(cli, ["fuzz", "--config", "tiny", "--frames", "5", "--json", str(file)])
     assert result.exit_code == 1
     assert "seed 7, records, cube: record 1 is zeros: 3 colours" in result.output
+    assert "2 corrupt and 3 legal frames gathered light" in result.output
     assert json.loads(file.read_text())["disagreements"][0]["seed"] == 7
 
 
