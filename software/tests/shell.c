@@ -68,6 +68,15 @@ static size_t find(const struct shell *shell, uint32_t address, uint32_t value) 
     return i;
 }
 
+struct shell shell_of(const struct colonnade_design *design, uint32_t minor) {
+    struct shell shell = {.design = design};
+    shell.registers[AT(identity)] = 0x434C4E44;
+    shell.registers[AT(version)] = 1u << 16 | minor;
+    shell.registers[AT(frameSize)] = 480u << 16 | 640u;
+    for (size_t i = 0; i < 8; ++i) shell.registers[AT(formatHash_0) + i] = design->format_hash[i];
+    return shell;
+}
+
 uint32_t shell_read(void *context, uint32_t address) {
     struct shell *shell = context;
     ++shell->accesses;

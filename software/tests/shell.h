@@ -20,6 +20,9 @@ struct shell {
     uint32_t outcome;
 };
 
+/* One of version 1.`minor` that has done nothing, for frames of up to 640x480. */
+struct shell shell_of(const struct colonnade_design *design, uint32_t minor);
+
 /* The accesses of `struct colonnade_bus`, with the shell as context. */
 uint32_t shell_read(void *context, uint32_t address);
 void shell_write(void *context, uint32_t address, uint32_t value);

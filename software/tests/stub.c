@@ -2,19 +2,8 @@
  * Prints nothing and returns 0, or the line that failed. Run it under the address sanitizer.
  *
  * usage: stub TEST */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
+#include "check.h"
 #include "shell.h"
-
-#define CHECK(condition) \
-    do { \
-        if (!(condition)) { \
-            fprintf(stderr, "stub.c:%d: %s\n", __LINE__, #condition); \
-            exit(1); \
-        } \
-    } while (0)
 
 static const struct colonnade_design design = {
     .format_hash = {1, 2, 3, 4, 5, 6, 7, 0xFFFFFFFF},
@@ -425,11 +414,8 @@ int main(int argc, char **argv) {
     };
     struct shell *shell = calloc(1, sizeof *shell);
     CHECK(argc == 2 && shell != NULL);
-    *shell = (struct shell){.design = &design, .is_scripted = true};
-    shell->registers[AT(identity)] = 0x434C4E44;
-    shell->registers[AT(version)] = 0x00010002;
-    shell->registers[AT(frameSize)] = 480u << 16 | 640u;
-    for (size_t i = 0; i < 8; ++i) shell->registers[AT(formatHash_0) + i] = design.format_hash[i];
+    *shell = shell_of(&design, 2);
+    shell->is_scripted = true;
     struct colonnade device;
     CHECK(colonnade_probe(&device, bus_of(shell), &design) == COLONNADE_OK);
     size_t test = 0;

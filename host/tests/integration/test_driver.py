@@ -1,19 +1,18 @@
-"""The C driver: errors by name against a stub, frames of a simulated device, and warnings of two compilers."""
+"""The C driver: errors by name, frames of a simulated device, and warnings of three compilers."""
 
 from __future__ import annotations
 
-import atexit
 import functools
 import json
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
+from c_programs import DRIVER, RISCV, SOFTWARE, WARNINGS, compile_c, compile_test, driver_objects, scratch
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -45,11 +44,6 @@ from colonnade.scene_image.device_image import device_image, load_cycles, maps_i
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.packer import pack
 
-SOFTWARE = toolchain.project_root() / "software"
-DRIVER = sorted((SOFTWARE / "src").glob("*.c"))
-WARNINGS = "-std=c11 -O1 -Wall -Wextra -Wconversion -Werror -pedantic".split()
-SANITIZERS = "-g -fsanitize=address,undefined -fno-sanitize-recover=all".split()
-RISCV = "riscv64-unknown-elf-gcc"
 WIDTH, HEIGHT = 44, 33
 PAGE = 4096
 UNWRITTEN = 0xA5
@@ -64,26 +58,14 @@ def design() -> GeneratedDesign:
     return shell_design_for("tiny", ("array.columns=2",), bus_bytes=16)
 
 
-@functools.cache
-def driver_objects() -> list[Path]:
-    """The driver, compiled once."""
-    folder = Path(tempfile.mkdtemp(prefix="colonnade-driver-"))
-    atexit.register(shutil.rmtree, folder)
-    return [compile_c([source], folder / f"{source.stem}.o", "-c") for source in DRIVER]
-
-
-def compile_c(sources: list[Path], program: Path, *options: str) -> Path:
-    includes = [f"-I{SOFTWARE / 'include'}", f"-I{program.parent}"]
-    command = ["gcc", *WARNINGS, *SANITIZERS, *includes, *map(str, sources), *options, "-o", str(program)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return program
-
-
 @pytest.fixture(scope="module")
-def stub(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    tests = SOFTWARE / "tests"
-    return compile_c([tests / "stub.c", tests / "shell.c", *driver_objects()], tmp_path_factory.mktemp("stub") / "stub")
+def stub() -> Path:
+    return compile_test("stub", "shell")
+
+
+def run_silently(*command: str | Path) -> None:
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 #: Every error has its name, and no access is made that the shell refuses.
@@ -103,17 +85,17 @@ TESTS = (
 
 @pytest.mark.parametrize("test", (*TESTS, "refused frame files"))
 def test_the_driver_against_a_shell_that_refuses(stub: Path, test: str) -> None:
-    done = subprocess.run([stub, test], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
+    run_silently(stub, test)
 
 
-@pytest.mark.skipif(shutil.which(RISCV) is None, reason=f"no {RISCV}: apt-get install gcc-riscv64-unknown-elf")
-def test_the_driver_compiles_for_a_bare_riscv(tmp_path: Path) -> None:
+@pytest.mark.parametrize("compiler", ["gcc", "clang", f"{RISCV} -march=rv32im -mabi=ilp32"])
+def test_the_driver_compiles_without_a_warning(compiler: str, tmp_path: Path) -> None:
+    """Without a library, too."""
+    if shutil.which(compiler.split()[0]) is None:
+        pytest.skip(f"no {compiler.split()[0]}")
     for source in DRIVER:
-        machine = ["-march=rv32im", "-mabi=ilp32", "-ffreestanding", f"-I{SOFTWARE / 'include'}"]
-        command = [RISCV, *WARNINGS, *machine, "-c", str(source), "-o", str(tmp_path / f"{source.stem}.o")]
-        done = subprocess.run(command, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
+        command = [*compiler.split(), *WARNINGS, "-O2", "-ffreestanding", f"-I{SOFTWARE / 'include'}", "-c", source]
+        run_silently(*command, "-o", tmp_path / f"{source.stem}.o")
 
 
 def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> None:
@@ -128,8 +110,7 @@ def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> 
 @functools.cache
 def compiled_driver(program: str, header: str) -> Path:
     """A program of the tests, or the viewer of the examples, with the driver, for the design of a header."""
-    folder = Path(tempfile.mkdtemp(prefix="colonnade-driver-"))
-    atexit.register(shutil.rmtree, folder)
+    folder = scratch()
     (folder / "colonnade_design.h").write_text(header)
     tests, examples = SOFTWARE / "tests", SOFTWARE / "examples"
     if program == "viewer":

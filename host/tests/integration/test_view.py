@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from c_programs import DRIVER, NEEDS_RISCV, RISCV, SANITIZERS, SOFTWARE, WARNINGS
 
 from colonnade.design import toolchain
 from colonnade.design.manifest import Manifest
@@ -19,17 +20,10 @@ from colonnade.scene.view import place
 from colonnade.scene_image.packer import pack
 
 ROOT = toolchain.project_root()
-SOFTWARE = ROOT / "software"
-SOURCES = [SOFTWARE / "tests" / "view.c", *sorted((SOFTWARE / "src").glob("*.c"))]
+SOURCES = [SOFTWARE / "tests" / "view.c", *DRIVER]
 VIEW = sorted((SOFTWARE / "src").glob("colonnade_view*.c"))
-WARNINGS = "-std=c11 -Wall -Wextra -Wconversion -Werror -pedantic".split()
-SANITIZERS = "-g -fsanitize=address,undefined -fno-sanitize-recover=all".split()
-RISCV = "riscv64-unknown-elf-gcc"
 MACHINE = ["-march=rv32im", "-mabi=ilp32", "-ffreestanding", "-nostdlib"]
 QEMU = "qemu-riscv32"
-NEEDS_RISCV = pytest.mark.skipif(
-    shutil.which(RISCV) is None, reason=f"no {RISCV}: apt-get install gcc-riscv64-unknown-elf"
-)
 NEEDS_QEMU = pytest.mark.skipif(shutil.which(QEMU) is None, reason=f"no {QEMU}: apt-get install qemu-user")
 
 FRAMES, DAMAGED, COUNTED = 2000, 20000, 10
