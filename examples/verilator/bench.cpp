@@ -158,7 +158,7 @@ public:
         top_.s_axil_bready = 0;
     }
 
-    /// Until the interrupt.
+    /// Until the interrupt, which the driver has enabled.
     void wait() {
         while (!top_.irq) cycle();
     }
@@ -204,7 +204,6 @@ int main(int argc, char** argv) {
     memory.image = readFile(argv[1]);
     if (*context.commandArgsPlusMatch("backdoor=") == 0) {
         const std::uint64_t begin = bus.cycles();
-        colonnade_enable_interrupts(&device, COLONNADE_IMAGE_DONE);
         const auto bytes = static_cast<std::uint32_t>(memory.image.size());
         const colonnade_image image = {memory.image.data(), bytes, kImage, {kImage, kImage + bytes}};
         check("load", colonnade_load(&device, &image, kAttempts));
@@ -219,7 +218,6 @@ int main(int argc, char** argv) {
     memory.framebuffer.resize(std::size_t{stride} * frame.height);
     const colonnade_framebuffer framebuffer = {
         kFramebuffer, stride, COLONNADE_XRGB8888, {kFramebuffer, kFramebuffer + memory.framebuffer.size()}};
-    colonnade_enable_interrupts(&device, COLONNADE_FRAME_DONE);
     const std::uint64_t begin = bus.cycles();
     check("start", colonnade_start(&device, &framebuffer));
     check("wait", colonnade_wait(&device, COLONNADE_FRAME_DONE, kAttempts));

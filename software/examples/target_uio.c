@@ -6,6 +6,7 @@
 #include <inttypes.h>
 #include <linux/fb.h>
 #include <linux/kd.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,11 +34,13 @@ static void uio_write(void *context, uint32_t address, uint32_t value) {
     colonnade_mmio_write(((struct uio *)context)->registers, address, value);
 }
 
-/* The kernel has disabled the interrupt when it came: enables it, and sleeps until the next one. */
+/* The kernel has disabled the interrupt when it came: enables it, and sleeps until the next one, a tenth of a second at
+ * most. */
 static void uio_wait(void *context) {
-    int file = ((struct uio *)context)->file;
+    struct pollfd interrupt = {.fd = ((struct uio *)context)->file, .events = POLLIN};
     uint32_t value = 1;
-    if (write(file, &value, sizeof value) != sizeof value || read(file, &value, sizeof value) != sizeof value)
+    const bool is_enabled = write(interrupt.fd, &value, sizeof value) == sizeof value;
+    if (!is_enabled || (poll(&interrupt, 1, 100) == 1 && read(interrupt.fd, &value, sizeof value) != sizeof value))
         target_fail("interrupt", "no UIO interrupt");
 }
 

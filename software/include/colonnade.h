@@ -56,7 +56,9 @@ enum colonnade_format { COLONNADE_XRGB8888, COLONNADE_RGB565, COLONNADE_LINEAR16
 struct colonnade_bus {
     uint32_t (*read)(void *context, uint32_t address);
     void (*write)(void *context, uint32_t address, uint32_t value);
-    /* Sleeps until an interrupt or for a while; NULL: the driver polls without a pause. */
+    /* Sleeps until the interrupt or for a while; NULL: the driver polls without a pause. Each call is an attempt. The driver
+     * has enabled the events that it waits for, and no others. A handler of the program's own may disable them all, and
+     * acknowledges none. A `wait` without a limit of its own does not return from a device that hangs. */
     void (*wait)(void *context);
     void *context;
 };
@@ -141,7 +143,7 @@ enum colonnade_error colonnade_check_image(const struct colonnade_design *design
 /* Checks an image of maps without a device: all of its sections are for memories of a room's maps, and fill it. */
 enum colonnade_error colonnade_check_maps(const struct colonnade_design *design, const void *data, size_t bytes);
 
-/* Loads an image and waits for its end, `attempts` polls or waits at most. Acknowledges imageDone and error. */
+/* Loads an image and waits for its end, as colonnade_wait does. Acknowledges imageDone and error. */
 enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
 
 /* Loads the maps of another view or room, as colonnade_load does. The scene, textures and registers stay. The registers of
@@ -167,7 +169,8 @@ enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct 
 /* Starts the frame that is set; while one runs, it is queued. What the processor has written to memory before is there. */
 enum colonnade_error colonnade_start(struct colonnade *device, const struct colonnade_framebuffer *framebuffer);
 
-/* Waits until one of `events` has come, `attempts` polls or waits at most. It is not acknowledged. */
+/* Waits until one of `events` has come, `attempts` polls or waits at most. It is not acknowledged. While the bus's `wait`
+ * sleeps, these events alone raise the interrupt; then `interrupt.enable` is as it was before the call. */
 enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, uint32_t attempts);
 
 /* Whether the last frame that ended is valid, and if not, why: its framebuffer's errors first, then the device's. */
@@ -176,10 +179,10 @@ enum colonnade_error colonnade_result(struct colonnade *device);
 /* Clears events in `interrupt.status`; other bits are left out. */
 void colonnade_acknowledge(struct colonnade *device, uint32_t events);
 
-/* Chooses the events that raise the interrupt; other bits are left out. */
+/* Chooses the events that raise the interrupt while the driver does not wait; other bits are left out. */
 void colonnade_enable_interrupts(struct colonnade *device, uint32_t events);
 
-/* Resets the device in any state; the frame registers are 0 then. */
+/* Resets the device in any state, and polls until it is idle, `attempts` times at most; the frame registers are 0 then. */
 enum colonnade_error colonnade_reset(struct colonnade *device, uint32_t attempts);
 
 /* A bit for each error of the last frame, bit n for number n of colonnade_design.h. */

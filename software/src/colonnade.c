@@ -184,12 +184,23 @@ enum colonnade_error colonnade_start(struct colonnade *device, const struct colo
 }
 
 enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, uint32_t attempts) {
-    while ((get(device, REGISTER(interrupt_status)) & events) == 0) {
-        if (attempts-- == 0) return COLONNADE_TIMEOUT;
-        if (device->bus->wait != NULL) device->bus->wait(device->bus->context);
+    const struct colonnade_bus *bus = device->bus;
+    enum colonnade_error error = COLONNADE_OK;
+    bool has_slept = false;
+    uint32_t enabled = 0;
+    while (error == COLONNADE_OK && (get(device, REGISTER(interrupt_status)) & events) == 0) {
+        if (attempts-- == 0) error = COLONNADE_TIMEOUT;
+        else if (bus->wait != NULL) {
+            if (!has_slept) enabled = get(device, REGISTER(interrupt_enable));
+            has_slept = true;
+            /* Before each sleep, since a handler may have cleared it. Another event that stays would end all sleeps */
+            colonnade_enable_interrupts(device, events);
+            bus->wait(bus->context);
+        }
     }
+    if (has_slept) colonnade_enable_interrupts(device, enabled);
     __sync_synchronize();
-    return COLONNADE_OK;
+    return error;
 }
 
 enum colonnade_error colonnade_result(struct colonnade *device) {

@@ -61,7 +61,6 @@ int main(int argc, char **argv) {
     waits_for_interrupt = true;
     struct colonnade device;
     expect(colonnade_probe(&device, &bus, &colonnade_design), COLONNADE_OK, "probe");
-    colonnade_enable_interrupts(&device, COLONNADE_IMAGE_DONE | COLONNADE_FRAME_DONE);
     size_t bytes;
     const uint64_t maps_place = store(argv[1], 0, &bytes), photo_place = maps_place + pages(bytes);
     struct colonnade_image image = {NULL, (uint32_t)bytes, 0, {0, bytes}};

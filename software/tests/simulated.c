@@ -51,7 +51,6 @@ int main(int argc, char **argv) {
     struct colonnade device;
     struct colonnade_frame frame;
     expect(colonnade_probe(&device, &bus, &colonnade_design), COLONNADE_OK, "probe");
-    if (waits_for_interrupt) colonnade_enable_interrupts(&device, COLONNADE_IMAGE_DONE);
 
     /* An image that the device refuses, since the driver does not see it: one word of the format hash differs */
     struct colonnade_image image = {NULL, (uint32_t)image_bytes, PAGE, {PAGE, PAGE + image_bytes}};
@@ -69,7 +68,6 @@ int main(int argc, char **argv) {
 
     expect(colonnade_open_frame(&colonnade_design, frame_data, frame_bytes, &frame), COLONNADE_OK, "frame file");
     expect(colonnade_set_frame(&device, &frame), COLONNADE_OK, "set frame");
-    if (waits_for_interrupt) colonnade_enable_interrupts(&device, COLONNADE_FRAME_DONE);
     uint32_t tile = colonnade_design.tile_size, columns = (frame.width + tile - 1) / tile * tile;
     uint64_t place = PAGE + pages(image_bytes) + PAGE;
     if (argc == 5) {
@@ -92,11 +90,9 @@ int main(int argc, char **argv) {
     if (argc == 7) {
         free(frame_data);
         frame_data = read_file(argv[6], &frame_bytes);
-        if (waits_for_interrupt) colonnade_enable_interrupts(&device, COLONNADE_IMAGE_DONE);
         load_maps(&device, &image, argv[4], argv[5], maps_place);
         expect(colonnade_open_frame(&colonnade_design, frame_data, frame_bytes, &frame), COLONNADE_OK, "second frame file");
         expect(colonnade_set_frame(&device, &frame), COLONNADE_OK, "set a frame of new maps");
-        if (waits_for_interrupt) colonnade_enable_interrupts(&device, COLONNADE_FRAME_DONE);
         const uint64_t bytes = (uint64_t)4 * columns * frame.height;
         render(&device, &(struct colonnade_framebuffer){place, columns * 4, COLONNADE_XRGB8888, {place, place + bytes}},
                "a frame of new maps");

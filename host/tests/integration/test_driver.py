@@ -1,4 +1,4 @@
-"""The C driver: errors by name, frames of a simulated device, and warnings of three compilers."""
+"""The C driver: errors by name, waits, frames of a simulated device, and warnings of three compilers."""
 
 from __future__ import annotations
 
@@ -86,6 +86,11 @@ TESTS = (
 @pytest.mark.parametrize("test", (*TESTS, "refused frame files"))
 def test_the_driver_against_a_shell_that_refuses(stub: Path, test: str) -> None:
     run_silently(stub, test)
+
+
+def test_a_wait_by_interrupts_enables_its_events_and_leaves_the_others_as_they_were() -> None:
+    """No sleep waits for an interrupt that nobody has enabled, and attempts bound the sleeps."""
+    run_silently(compile_test("waits", "shell"))
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang", f"{RISCV} -march=rv32im -mabi=ilp32"])
