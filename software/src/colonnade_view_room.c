@@ -267,12 +267,14 @@ static struct cover find_cover(const struct colonnade_view *view, const struct l
     cover.near_depth = colonnade_scaled(near_depth, &scene->metres, 6 - lengths->unit, limit) - 1;
     cover.far_depth = colonnade_scaled(far_depth, &scene->metres, 6 - lengths->unit, limit) + 1;
     for (int i = 0; i < 2; ++i) {
+        cover.low[i] = 0;
+        cover.high[i] = tiles[i];
+        if (!is_before) continue;
         const int64_t focal = scene->map_lens[i], centre = scene->map_lens[2 + i];
         const int32_t tile = (int32_t)scene->tile_size;
-        const int32_t low = is_before ? find_pixel(extent.low[i], focal, centre) - 1 : 0;
-        const int32_t high = is_before ? find_pixel(extent.high[i], focal, centre) + 1 : INT32_MAX;
-        cover.low[i] = clip(low < 0 ? 0 : low / tile, tiles[i]);
-        cover.high[i] = clip(high < 0 ? 0 : high / tile + 1, tiles[i]);
+        const int32_t low = find_pixel(extent.low[i], focal, centre) - 1, high = find_pixel(extent.high[i], focal, centre) + 1;
+        cover.low[i] = clip(low / tile, tiles[i]);
+        cover.high[i] = high < 0 ? 0 : clip(high / tile + 1, tiles[i]);
     }
     return cover;
 }

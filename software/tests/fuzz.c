@@ -1,45 +1,18 @@
 /* libFuzzer on the driver (tools/driver-fuzz): calls in any order with files that end where their memory ends, against
  * shell.c, which ends the program at an access that the shell refuses. An input chooses the calls, how they go wrong, and
  * how fast the device is. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
+#include "fuzz.h"
 #include "shell.h"
 
 enum { FIRST = 40, END = 60, FRAME_WORDS = END - FIRST, CALLS = 64, MAX_ACCESSES = 1000 };
 
-#define REQUIRE(condition) \
-    do { \
-        if (!(condition)) { \
-            fprintf(stderr, "fuzz.c:%d: broken: %s\n", __LINE__, #condition); \
-            abort(); \
-        } \
-    } while (0)
-
-static const uint8_t *input;
-static size_t left;
 static struct shell shell;
-static uint32_t pace, noise;
-
-static uint32_t take(void) {
-    if (left == 0) return 0;
-    --left;
-    return *input++;
-}
-
-static uint32_t take32(void) {
-    uint32_t value = take() << 24;
-    value |= take() << 16;
-    value |= take() << 8;
-    return value | take();
-}
+static uint32_t pace;
 
 /* How far the device gets between two accesses. */
 static void step(void) {
-    noise = noise * 1664525u + 1013904223u;
-    uint32_t events = noise >> 24 < pace ? noise >> 8 : 0;
-    shell_step(&shell, (noise & 1u << 23) != 0 ? events : events & 0xFF);
+    const uint32_t any = next_noise(), events = any >> 24 < pace ? any >> 8 : 0;
+    shell_step(&shell, (any & 1u << 23) != 0 ? events : events & 0xFF);
 }
 
 static uint32_t bus_read(void *context, uint32_t address) {
@@ -55,6 +28,7 @@ static void bus_write(void *context, uint32_t address, uint32_t value) {
 static void bus_wait(void *context) {
     (void)context;
     step();
+    if ((next_noise() & 1) != 0) shell.registers[AT(interrupt_enable)] = 0; /* by a handler */
 }
 
 static void put(uint8_t *file, size_t size, size_t word, uint32_t value) {
@@ -67,7 +41,7 @@ static uint8_t *make_file(const char *magic, size_t words, size_t *size) {
     const uint32_t wrong = take() % 8, cut = take();
     *size = cut < 192 ? 4 * words : take32() % (4 * words + 8);
     uint8_t *file = calloc(*size == 0 ? 1 : *size, 1);
-    REQUIRE(file != NULL);
+    CHECK(file != NULL);
     memcpy(file, magic, *size < 8 ? *size : 8);
     put(file, *size, 2, 1);
     put(file, *size, 3, (uint32_t)(4 * words));
@@ -103,7 +77,7 @@ static uint64_t take_address(void) {
     static const uint64_t places[] = {0, 4096, 1u << 20, 1ull << 32, 1ull << 40, UINT64_MAX};
     const uint32_t place = take() % 8, offset = take();
     const uint64_t distance = offset < 128 ? offset % 4 * 4096u : take32() % 65536;
-    if (place >= 6) return (uint64_t)take32() << 32 | take32();
+    if (place >= 6) return take64();
     return (offset & 1) != 0 ? places[place] - distance : places[place] + distance;
 }
 
@@ -127,8 +101,8 @@ static void load(struct colonnade *device) {
     const bool maps = take() % 2 != 0;
     const bool is_right = (maps ? colonnade_check_maps : colonnade_check_image)(device->design, file, bytes) == COLONNADE_OK;
     const enum colonnade_error error = (maps ? colonnade_load_maps : colonnade_load)(device, &image, take() % 16);
-    REQUIRE(error != COLONNADE_BUSY || shell.writes == writes);
-    REQUIRE(error != COLONNADE_OK || is_right || image.data == NULL);
+    CHECK(error != COLONNADE_BUSY || shell.writes == writes);
+    CHECK(error != COLONNADE_OK || is_right || image.data == NULL);
     free(file);
 }
 
@@ -140,11 +114,11 @@ static void open_frame(const struct colonnade *device, uint8_t **file, struct co
     struct colonnade_frame before;
     memcpy(&before, frame, sizeof before);
     if (colonnade_open_frame(device->design, read, bytes, frame) == COLONNADE_OK) {
-        REQUIRE(bytes == 64 + 8u * frame->count && frame->count <= FRAME_WORDS && frame->writes == read + 64);
+        CHECK(bytes == 64 + 8u * frame->count && frame->count <= FRAME_WORDS && frame->writes == read + 64);
         free(*file);
         *file = read;
     } else {
-        REQUIRE(memcmp(&before, frame, sizeof before) == 0);
+        CHECK(memcmp(&before, frame, sizeof before) == 0);
         free(read);
     }
 }
@@ -159,7 +133,7 @@ static void set_frame(struct colonnade *device, const struct colonnade_frame *fr
         expected[at[0]] = value;
     }
     if (device->has_scene) expected[(device->design->scene_page - DEVICE_BASE) / 4] = (uint32_t)(device->scene >> 12);
-    REQUIRE(memcmp(expected, shell.device, sizeof expected) == 0);
+    CHECK(memcmp(expected, shell.device, sizeof expected) == 0);
 }
 
 static void start(struct colonnade *device) {
@@ -188,12 +162,12 @@ static void probe(struct colonnade *device, const struct colonnade_bus *bus) {
     struct colonnade before;
     memcpy(&before, device, sizeof before);
     shell.registers[word] ^= take() < 128 ? 0 : 1u << take() % 32;
-    if (colonnade_probe(device, bus, shell.design) != COLONNADE_OK) REQUIRE(memcmp(&before, device, sizeof before) == 0);
+    if (colonnade_probe(device, bus, shell.design) != COLONNADE_OK) CHECK(memcmp(&before, device, sizeof before) == 0);
     shell.registers[word] = value;
 }
 
 static void call(struct colonnade *device, const struct colonnade_bus *bus, uint8_t **file, struct colonnade_frame *frame) {
-    const uint32_t which = take() % 16;
+    const uint32_t which = take() % 16, enabled = shell.registers[AT(interrupt_enable)];
     pace = take();
     pace = pace < 64 ? 0 : pace < 128 ? 2 : pace;
     switch (which) {
@@ -212,9 +186,8 @@ static void call(struct colonnade *device, const struct colonnade_bus *bus, uint
     case 14: probe(device, bus); break;
     default: colonnade_error_name((enum colonnade_error)take32()); break;
     }
+    CHECK(which == 10 || shell.registers[AT(interrupt_enable)] == enabled);
 }
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static struct colonnade_design design = {
@@ -230,28 +203,23 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         .map_count = 2,
         .maps = {{1, 4}, {3, 8}},
     };
-    input = data;
-    left = size;
-    noise = take32();
+    open_input(data, size);
     const uint32_t kind = take();
     design.scene_page = (kind & 1) != 0 ? DEVICE_BASE + 4 * (FIRST + 5) : 0;
     design.invalidate = (kind & 1) != 0 ? DEVICE_BASE + 4 : 0;
-    shell = (struct shell){.design = &design};
-    shell.registers[AT(identity)] = 0x434C4E44;
-    shell.registers[AT(version)] = (kind & 2) == 0 ? 0x00010000 : (kind & 16) == 0 ? 0x00010002 : 0x00010003;
+    shell = shell_of(&design, (kind & 2) == 0 ? 0 : (kind & 16) == 0 ? 2 : 3);
     shell.registers[AT(capabilities)] = (kind & 6) == 6 ? COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm : 0;
     shell.registers[AT(frameSize)] = 64u << 16 | 64u;
-    for (size_t i = 0; i < 8; ++i) shell.registers[AT(formatHash_0) + i] = design.format_hash[i];
 
     const struct colonnade_bus bus = {bus_read, bus_write, (kind & 8) != 0 ? bus_wait : NULL, &shell};
     struct colonnade device;
-    REQUIRE(colonnade_probe(&device, &bus, &design) == COLONNADE_OK && shell.writes == 0);
+    CHECK(colonnade_probe(&device, &bus, &design) == COLONNADE_OK && shell.writes == 0);
     uint8_t *file = NULL;
     struct colonnade_frame frame = {NULL, 0, 16, 16};
     for (int i = 0; i < CALLS && left > 0; ++i) {
         const uint32_t accesses = shell.accesses;
         call(&device, &bus, &file, &frame);
-        REQUIRE(shell.accesses - accesses <= MAX_ACCESSES);
+        CHECK(shell.accesses - accesses <= MAX_ACCESSES);
     }
     free(file);
     return 0;

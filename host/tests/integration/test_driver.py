@@ -1,4 +1,4 @@
-"""The C driver: errors by name, waits, frames of a simulated device, and warnings of three compilers."""
+"""The C driver: errors by name, waits, random inputs, frames of a simulated device, and warnings of three compilers."""
 
 from __future__ import annotations
 
@@ -91,6 +91,12 @@ def test_the_driver_against_a_shell_that_refuses(stub: Path, test: str) -> None:
 def test_a_wait_by_interrupts_enables_its_events_and_leaves_the_others_as_they_were() -> None:
     """No sleep waits for an interrupt that nobody has enabled, and attempts bound the sleeps."""
     run_silently(compile_test("waits", "shell"))
+
+
+@pytest.mark.parametrize("names", [("fuzz", "shell"), ("fuzz_view",)], ids=["driver", "registers from poses"])
+def test_random_inputs_of_the_fuzzers_break_nothing(names: tuple[str, ...]) -> None:
+    """Also without libFuzzer: calls in any order, view files of legal and extreme numbers, tiles of any size."""
+    run_silently(compile_test(*names, options=("-DRUNS=5000", "-lm")))
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang", f"{RISCV} -march=rv32im -mabi=ilp32"])
