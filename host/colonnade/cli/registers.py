@@ -45,7 +45,7 @@ def _framebuffer(context: click.Context, parameter: click.Parameter, value: str 
     type=click.IntRange(0, 2**32 - 1),
     default=0,
     metavar="N",
-    help="Its interrupt, for the device tree: a cell of 32 bits.",
+    help="Its interrupt, for SVD and device tree: a cell of 32 bits.",
 )
 @click.option(
     "--framebuffer",

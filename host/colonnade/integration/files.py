@@ -31,7 +31,7 @@ def write_registers(
         design: Generated with its shell; a manifest is enough.
         output: The folder; an unchanged earlier output is replaced.
         base: Byte address of the device, for SVD and device tree.
-        interrupt: Its interrupt, for the device tree.
+        interrupt: Its interrupt, for SVD and device tree.
         display: A framebuffer for the device tree.
         cells: Of its addresses and sizes.
 
@@ -51,7 +51,7 @@ def write_registers(
         source.write_text(system_rdl("colonnade", (table.shell, table.device)))
         (folder / "colonnade_registers.h").write_text(c_header("colonnade", (table.shell, table.device), work))
         (folder / "colonnade_design.h").write_text(design_header(table, design.manifest))
-        (folder / "colonnade.svd").write_text(svd(table, base))
+        (folder / "colonnade.svd").write_text(svd(table, base, interrupt))
         (folder / "colonnade.dtsi").write_text(device_tree(table, base, interrupt, display, cells))
         compiler = RDLCompiler()
         compiler.compile_file(str(source))

@@ -10,8 +10,8 @@ _ACCESS = {"ro": "read-only", "rw": "read-write", "wo": "write-only"}
 _EFFECT = {"clears": "oneToClear", "sets": "oneToSet"}
 
 
-def svd(table: RegisterTable, base: int) -> str:
-    """The peripheral at the byte address ``base``."""
+def svd(table: RegisterTable, base: int, interrupt: int) -> str:
+    """The peripheral at the byte address ``base``, with its interrupt. Elements are in the order of the schema."""
     device = ET.Element("device", {"schemaVersion": "1.3"})
     _add(device, name="Colonnade", version=f"{table.version >> 16}.{table.version & 0xFFFF}")
     _add(device, description="Array of ray-tracing render units", addressUnitBits=8, width=32, size=32)
@@ -19,6 +19,8 @@ def svd(table: RegisterTable, base: int) -> str:
     _add(peripheral, name="COLONNADE", baseAddress=hex(base))
     block = ET.SubElement(peripheral, "addressBlock")
     _add(block, offset=0, size=hex(SPACE), usage="registers")
+    line = ET.SubElement(peripheral, "interrupt")
+    _add(line, name="COLONNADE", description="An enabled event of interrupt.status", value=interrupt)
     registers = ET.SubElement(peripheral, "registers")
     for part in (table.shell, table.device):
         cluster = ET.SubElement(registers, "cluster")

@@ -75,7 +75,10 @@ def test_system_rdl_has_the_words_of_the_table(folder: Path, table: RegisterTabl
 
 def test_svd_has_the_words_of_the_table(folder: Path, table: RegisterTable) -> None:
     (peripheral,) = ET.parse(folder / "colonnade.svd").getroot().iter("peripheral")
+    assert [element.tag for element in peripheral] == ["name", "baseAddress", "addressBlock", "interrupt", "registers"]
     assert int(peripheral.findtext("baseAddress", ""), 0) == BASE
+    assert peripheral.findtext("interrupt/name") and peripheral.findtext("interrupt/description")
+    assert int(peripheral.findtext("interrupt/value", "")) == 5
     found = {}
     for cluster in peripheral.iter("cluster"):
         for register in cluster.iter("register"):
