@@ -26,10 +26,12 @@ object CoreFile {
        |
        |targets:
        |  default: &default
+       |    description: The files
        |    filesets: [rtl]
        |    toplevel: $top
        |  lint:
        |    <<: *default
+       |    description: Lint by Verilator
        |    default_tool: verilator
        |    tools:
        |      verilator:
@@ -37,6 +39,7 @@ object CoreFile {
        |        verilator_options: [-Wno-fatal]
        |  sim:
        |    <<: *default
+       |    description: Simulation in Icarus Verilog, with a cocotb bench
        |    flow: sim
        |    flow_options:
        |      tool: icarus
@@ -44,6 +47,7 @@ object CoreFile {
        |      timescale: 1ns/1ps
        |  synth:
        |    <<: *default
+       |    description: Synthesis by Yosys, for an ECP5 by default
        |    flow: generic
        |    flow_options:
        |      tool: yosys

@@ -154,6 +154,16 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     all(ConfigIO.presets.map(name => printed.toString.contains(s"$name, "))) shouldBe true
   }
 
+  behavior of "CoreFile"
+
+  it should "describe each target" in inScratch { scratch =>
+    Files.writeString(scratch.resolve("filelist.f"), "Divider.sv\n")
+    CoreFile.write("Divider", scratch)
+    val targets = Files.readString(scratch.resolve(CoreFile.name)).split("\ntargets:\n").last.split("(?m)^  (?=\\w)").tail
+    targets.map(_.takeWhile(_ != ':')) shouldBe Seq("default", "lint", "sim", "synth")
+    targets.flatMap(_.linesIterator.filter(_.startsWith("    description: "))).distinct should have size 4
+  }
+
   behavior of "Emit"
 
   it should "write a file for each module and their list" in inScratch { scratch =>
