@@ -52,6 +52,7 @@ def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: st
 
 def require_regular(path: Path, what: str, missing: str | None = None) -> UserError:
     """Refuse a path that is not a regular file; returns that error for a later check of the opened file."""
+    ledger.add_lookup(path)
     try:
         status = path.stat()
     except (FileNotFoundError, NotADirectoryError):
@@ -68,6 +69,7 @@ def require_regular(path: Path, what: str, missing: str | None = None) -> UserEr
 
 def exists(path: Path) -> bool:
     """Whether the path exists, as any type of file."""
+    ledger.add_lookup(path)
     try:
         return os.path.lexists(path)
     except ValueError:
@@ -84,6 +86,7 @@ def is_folder(path: Path) -> bool:
 
 def is_file(path: Path) -> bool:
     """Whether the path is a regular file; False for an invalid name."""
+    ledger.add_lookup(path)
     try:
         return path.is_file()
     except (OSError, ValueError):

@@ -1,7 +1,8 @@
 """Tracks a command's input and output files: an output never replaces an input or another output.
 
 The command line opens a ledger for each run and declares the outputs before the work starts. Files are compared by
-device and inode, so links and other spellings of a path are recognised.
+device and inode, so links and other spellings of a path are recognised. A ledger also knows every path that was looked
+up, found or not: the result depends on these files.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from colonnade.common.errors import UserError
 
 #: Device and inode.
 Identity = tuple[int, int]
+#: Time of change, nanoseconds, and size of a file; None: it is not there.
+Stamp = tuple[int, int] | None
 
 
 @dataclass
@@ -27,24 +30,26 @@ class Ledger:
         existing: Declared outputs that exist, by identity.
         inputs: Files read so far, by identity.
         written: Resolved paths of the outputs written so far.
+        lookups: Paths that were looked up so far, with their stamps at the first time.
     """
 
     outputs: dict[Path, Path] = field(default_factory=dict)
     existing: dict[Identity, Path] = field(default_factory=dict)
     inputs: dict[Identity, Path] = field(default_factory=dict)
     written: set[Path] = field(default_factory=set)
+    lookups: dict[Path, Stamp] = field(default_factory=dict)
 
 
 _current: Ledger | None = None
 
 
 @contextlib.contextmanager
-def opened() -> Iterator[None]:
+def opened() -> Iterator[Ledger]:
     """Use a new ledger in the block, in all threads."""
     global _current
     before, _current = _current, Ledger()
     try:
-        yield
+        yield _current
     finally:
         _current = before
 
@@ -72,6 +77,21 @@ def add_input(path: Path, status: os.stat_result) -> None:
     if identity in _current.existing:
         raise _replaces_input(_current.existing[identity], path)
     _current.inputs[identity] = path
+
+
+def add_lookup(path: Path) -> None:
+    """Record a path before it is opened, or found missing."""
+    if _current is not None:
+        _current.lookups.setdefault(path, stamp_of(path))
+
+
+def stamp_of(path: Path) -> Stamp:
+    """The stamp of a path, which may be no file name."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size
 
 
 def check_write(path: Path) -> None:

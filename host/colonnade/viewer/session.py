@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common import notes
+from colonnade.common import ledger, notes
 from colonnade.common.accumulation import FramePasses
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
@@ -201,14 +201,14 @@ class Session:
         save_camera(self.file, camera.position, camera.target)
 
     def watch(self) -> None:
-        """Load the scene again whenever its file or its mesh changes, until `end`."""
+        """Load the scene again whenever a file that it reads changes, until `end`."""
         while not self._ends:
             time.sleep(_INTERVAL)
             self.look()
 
     def look(self) -> None:
-        """Load the scene again if its file or its mesh has changed."""
-        if _stamps(self._files) == self._seen:
+        """Load the scene again if a file that it reads has changed, or one that was missing has come."""
+        if all(ledger.stamp_of(path) == stamp for path, stamp in self._lookups.items()):
             return
         try:
             self._load()
@@ -237,16 +237,12 @@ class Session:
     def _load(self) -> None:
         """Read and pack the scene; if it cannot be, the one before stays."""
         begun = time.perf_counter()
-        self._files = [self.file]
-        self._seen = _stamps(self._files)
         lines: list[str] = []
-        with notes.opened(lines.append):
+        with ledger.opened() as files, notes.opened(lines.append):
+            self._lookups = files.lookups  # up to an error, if there is one
             description = exposed(load_scene(self.file))
             samples = description.frame.samples or 1
             description = description.with_samples(samples if samples > 1 else STILL_SAMPLES)
-            meshes = [description.mesh, *(one.mesh for one in description.objects)]
-            paths = list(dict.fromkeys(mesh.path for mesh in meshes if mesh.path is not None))
-            self._files, self._seen = self._files + paths, self._seen + _stamps(paths)
             scene = DeviceScene.of(description, self._manifest, size=self.size, encoder=self._encoder)
             look = CameraLook.of(scene.scene, scene.photo, self.size)
             if look is not None and look.note is not None:
@@ -293,19 +289,6 @@ class Session:
                 "span": float(np.linalg.norm(camera.step_y)) * self.size[1],
             },
         }
-
-
-def _stamps(files: Sequence[Path]) -> list[tuple[int, int]]:
-    """Time and size of files; 0 of one that is not there."""
-    stamps = []
-    for file in files:
-        try:
-            status = file.stat()
-        except OSError:
-            stamps.append((0, 0))
-        else:
-            stamps.append((status.st_mtime_ns, status.st_size))
-    return stamps
 
 
 def _moved(camera: Camera, to: ViewCamera) -> Camera:

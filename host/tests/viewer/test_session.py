@@ -1,0 +1,109 @@
+"""A scene in view is loaded again when a file that it reads changes."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import textured_files
+from PIL import Image
+
+import colonnade
+from colonnade.common.errors import UserError
+from colonnade.viewer.session import Session
+
+SIZE = (48, 36)
+OBJ = """mtllib m.mtl
+usemtl a
+v 0 0 0
+v 1 0 0
+v 0 1 0
+v 0 0 1
+vt 0 0
+vt 1 0
+vt 0 1
+f 1/1 3/2 2/3
+f 1/1 2/2 4/3
+f 1/1 4/2 3/3
+f 2/1 3/2 4/3
+"""
+CAMERA = "camera = {position = [2, 2, 4], target = [0.2, 0.2, 0.2]}\n"
+#: A scene, the file that changes, and another file whose content it gets; None: it was missing.
+CHANGES = {
+    "scene": ('mesh.path = "m.obj"\n', "scene.toml", "other.toml"),
+    "mesh": ('mesh.path = "m.obj"\n', "m.obj", "other.obj"),
+    "materials": ('mesh.path = "m.obj"\n', "m.mtl", "other.mtl"),
+    "texture": ('mesh.path = "m.obj"\n', "t.png", "other.png"),
+    "buffer": ('mesh.path = "a.gltf"\n', "m.bin", "other.bin"),
+    "panorama": ('mesh.path = "m.obj"\nbackground.panorama = "p.png"\n', "p.png", "q.png"),
+    "missing-materials": ('mesh.path = "bare.obj"\n', "late.mtl", "other.mtl"),
+    "room": ('mesh.name = "cube"\nbackground.room = "attic"\n', "attic/albedo.png", "albedo.png"),
+    "room-camera": ('mesh.name = "cube"\nbackground.room = "attic"\n', "attic/meta.json", "meta.json"),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with meshes and what they reference, a panorama and a room, each beside another one."""
+    shutil.copytree(Path(__file__).parents[3] / "scenes" / "rooms" / "attic", tmp_path / "attic")
+    shutil.copyfile(tmp_path / "attic" / "albedo.png", tmp_path / "albedo.png")
+    Image.fromarray(255 - np.array(Image.open(tmp_path / "albedo.png"))).save(tmp_path / "albedo.png")
+    meta = json.loads((tmp_path / "attic" / "meta.json").read_text())
+    (tmp_path / "meta.json").write_text(json.dumps(meta | {"fx": 0.9 * meta["fx"]}))
+    (tmp_path / "m.obj").write_text(OBJ)
+    (tmp_path / "other.obj").write_text(OBJ.replace("v 1 0 0", "v 2 0 0"))
+    (tmp_path / "bare.obj").write_text(OBJ.replace("m.mtl", "late.mtl"))
+    (tmp_path / "m.mtl").write_text("newmtl a\nKd 1 1 1\nmap_Kd t.png\n")
+    (tmp_path / "other.mtl").write_text("newmtl a\nKd 0.25 1 0\n")
+    for name, size, red in (("t", (8, 8), 90), ("other", (8, 8), 240), ("p", (32, 16), 90), ("q", (32, 16), 240)):
+        Image.new("RGB", size, (red, 40, 40)).save(tmp_path / f"{name}.png")
+    (buffer,) = json.loads(textured_files.gltf(tmp_path).read_text())["buffers"]
+    data = base64.b64decode(buffer["uri"].partition(",")[2])
+    (tmp_path / "m.bin").write_bytes(data)
+    (tmp_path / "other.bin").write_bytes((1 - np.eye(3, dtype=np.float32)).tobytes() + data[36:])
+    textured_files.gltf(tmp_path, buffers=[{"uri": "m.bin", "byteLength": len(data)}])
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_change_of_any_file_that_a_scene_reads_shows(folder: Path, name: str) -> None:
+    text, changed, other = CHANGES[name]
+    file = folder / "scene.toml"
+    file.write_text(text + (CAMERA if "room" not in text else ""))
+    (folder / "other.toml").write_text(file.read_text().replace("0.2]", "0.4]"))
+    session = Session(file, "small", size=SIZE)
+    before, version = session.frame().pixels, session.state()["version"]
+    session.look()
+    assert session.state()["version"] == version
+    shutil.copyfile(folder / other, folder / changed)
+    session.look()
+    assert session.state()["version"] == version + 1 and session.state()["error"] == ""
+    assert (session.frame().pixels != before).any()
+    session.close()
+
+
+def test_a_file_that_is_missing_for_a_while_is_seen_again(folder: Path) -> None:
+    file = folder / "scene.toml"
+    file.write_text(f'mesh.path = "m.obj"\n{CAMERA}')
+    session = Session(file, "tiny", size=SIZE)
+    (folder / "m.obj").rename(folder / "away.obj")
+    session.look()
+    assert "m.obj does not exist" in session.state()["error"]
+    (folder / "away.obj").rename(folder / "m.obj")
+    session.look()
+    assert session.state()["error"] == ""
+    session.close()
+
+
+def test_a_name_that_no_file_can_have_is_the_error_of_render(file: Path) -> None:
+    session = Session(file, "tiny", size=SIZE)
+    file.write_text('mesh.path = "a\\u0000.obj"\n')
+    session.look()
+    with pytest.raises(UserError) as error:
+        colonnade.Scene.load(file).render(config="tiny", size=SIZE)
+    assert session.state()["error"] == str(error.value) and "not a file name" in str(error.value)
+    session.close()
