@@ -7,12 +7,12 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import SCENE, configuration_options, echo, encoder_option, size_option
+from colonnade.cli.options import configuration_options, echo, encoder_option, size_option
 from colonnade.maps.encoders import Encoder
 
 
 @click.command(short_help="Show a scene in the browser, while it is edited.")
-@click.argument("scene", type=SCENE)
+@click.argument("scene", type=click.Path())
 @configuration_options
 @size_option("Frame size in pixels.  [default: 320x240]")
 @partial(encoder_option, default="live")
@@ -21,25 +21,29 @@ from colonnade.maps.encoders import Encoder
 )
 @click.option("--open/--no-open", "opens", default=True, show_default=True, help="Open the page in a browser.")
 def view(
-    scene: Path, config: str, overrides: tuple[str, ...], size: str | None, encoder: Encoder, port: int, opens: bool
+    scene: str, config: str, overrides: tuple[str, ...], size: str | None, encoder: Encoder, port: int, opens: bool
 ) -> None:
     """Show SCENE, a TOML file or the name of one, in a page at 127.0.0.1, rendered by the bit-exact model.
 
-    Drag orbits, the wheel zooms, shift and drag pans. The file is loaded again whenever it changes. The key s writes
-    the camera into the file, r goes back to that of the file. Ctrl-C ends the command.
+    Drag orbits, the wheel zooms, shift and drag pans. The scene is loaded again whenever its file or one that it
+    reads changes. The key s writes the camera into the file, r goes back to that of the file. Ctrl-C ends the command.
     """
     import threading
     import webbrowser
 
     from colonnade.common.frame_size import parse_size
     from colonnade.common.progress import for_terminal
+    from colonnade.scene.parser import scene_file
     from colonnade.viewer.server import ViewServer
     from colonnade.viewer.session import Session
 
     pixels = parse_size(size) if size is not None else (320, 240)
-    server = ViewServer(Session(scene, config, overrides, pixels, encoder, for_terminal()), port)
+    file = scene_file(scene)
+    session = Session(file, config, overrides, pixels, encoder, for_terminal(), is_own=file == Path(scene))
+    server = ViewServer(session, port)
     server.start()
-    echo(f"{scene} is in view at {server.address}; Ctrl-C ends")
+    echo(f"{file} is in view; Ctrl-C ends. Its page, for you alone:")
+    echo(server.address)
     if opens:
-        webbrowser.open(server.address)
+        webbrowser.open(server.link)
     threading.Event().wait()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import threading
 import time
 from collections.abc import Sequence
@@ -24,6 +25,7 @@ from colonnade.maps.encoders import Encoder
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.host_frame import HostFrame, require_filter
 from colonnade.scene.model import Camera, Scene
+from colonnade.scene.model.values import WorldVector
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import exposed
 from colonnade.scene.view import place
@@ -46,8 +48,8 @@ class ViewCamera:
         target: World point at the picture's centre.
     """
 
-    position: tuple[float, float, float]
-    target: tuple[float, float, float]
+    position: WorldVector
+    target: WorldVector
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,11 @@ class _Picture:
 class Session:
     """A scene file in view. Its methods may be called by any thread.
 
+    Attributes:
+        file: The scene file.
+        size: Width and height, pixels.
+        has_ended: After `end`.
+
     Args:
         file: The scene file.
         config: The design, as in `ModelDevice`.
@@ -93,6 +100,7 @@ class Session:
         size: Width and height, pixels.
         encoder: Of a room's maps and of textures.
         progress: Shows the run of the generator.
+        is_own: The file is the user's; False: it belongs to the project, and no camera is saved into it.
 
     Raises:
         UserError: The scene cannot be read or packed.
@@ -106,17 +114,20 @@ class Session:
         size: tuple[int, int] = (320, 240),
         encoder: Encoder = "live",
         progress: Progress = QUIET,
+        is_own: bool = True,
     ) -> None:
         self.file, self.size = file, size
+        self._is_own = is_own
         self._encoder = encoder
         self._manifest = manifest_for(config, overrides, progress).manifest
         check_size(size, self._manifest)
         self._device = ModelDevice(config, overrides)
         self._rendering = threading.Lock()
+        self._loading = threading.RLock()
         self._changed = threading.Condition()
         self._state: dict[str, Any] = {"version": 0}
         self._error = ""
-        self._ends = False
+        self.has_ended = False
         self._rest: _Picture | None = None
         self._load()
 
@@ -129,7 +140,7 @@ class Session:
         """
         with self._changed:
             if version is not None:
-                self._changed.wait_for(lambda: self._ends or self._state["version"] != version, timeout)
+                self._changed.wait_for(lambda: self.has_ended or self._state["version"] != version, timeout)
             return self._state | {"error": self._error}
 
     def frame(self, camera: ViewCamera | None = None) -> ViewFrame:
@@ -196,31 +207,44 @@ class Session:
         """Write a camera into the scene file.
 
         Raises:
-            UserError: See `save_camera`.
+            UserError: The file is not the user's, or has an error; no frame can show the scene with this camera; or see
+                `save_camera`.
         """
-        save_camera(self.file, camera.position, camera.target)
+        if not self._is_own:
+            copy = f"cp -r {shlex.quote(str(self.file.parent))} my-scenes && colonnade view my-scenes/{self.file.name}"
+            raise UserError(f"{self.file.stem} is a scene of the project: to save a camera, view a copy of it: {copy}")
+        with self._loading:
+            self.look()
+            if self._error:
+                raise UserError(f"no camera is saved while the scene has an error: {self._error}")
+            save_camera(self.file, camera.position, camera.target, self._require_frame)
+
+    def _require_frame(self, scene: Scene) -> None:
+        """Refuse the camera of a scene if no frame can show it: the scene could not be loaded again."""
+        self._scene.with_camera(scene.camera).registers(self.size, composited=True)
 
     def watch(self) -> None:
         """Load the scene again whenever a file that it reads changes, until `end`."""
-        while not self._ends:
+        while not self.has_ended:
             time.sleep(_INTERVAL)
             self.look()
 
     def look(self) -> None:
         """Load the scene again if a file that it reads has changed, or one that was missing has come."""
-        if all(ledger.stamp_of(path) == stamp for path, stamp in self._lookups.items()):
-            return
-        try:
-            self._load()
-        except UserError as wrong:
-            self._tell(str(wrong))
-        except Exception as bug:  # the view goes on
-            self._tell(f"{type(bug).__name__}: {bug}")
+        with self._loading:
+            if all(ledger.stamp_of(path) == stamp for path, stamp in self._lookups.items()):
+                return
+            try:
+                self._load()
+            except UserError as wrong:
+                self._tell(str(wrong))
+            except Exception as bug:  # the view goes on
+                self._tell(f"{type(bug).__name__}: {bug}")
 
     def end(self) -> None:
         """End `watch` and all waits."""
         with self._changed:
-            self._ends = True
+            self.has_ended = True
             self._changed.notify_all()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A scene in view is loaded again when a file that it reads changes."""
+"""A scene in view is loaded again when a file that it reads changes, and keeps a camera that can be shown."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from PIL import Image
 
 import colonnade
 from colonnade.common.errors import UserError
-from colonnade.viewer.session import Session
+from colonnade.viewer.session import Session, ViewCamera
 
 SIZE = (48, 36)
 OBJ = """mtllib m.mtl
@@ -106,4 +106,62 @@ def test_a_name_that_no_file_can_have_is_the_error_of_render(file: Path) -> None
     with pytest.raises(UserError) as error:
         colonnade.Scene.load(file).render(config="tiny", size=SIZE)
     assert session.state()["error"] == str(error.value) and "not a file name" in str(error.value)
+    session.close()
+
+
+@pytest.mark.parametrize(
+    ("camera", "says"),
+    [
+        (ViewCamera((2.0, 2.0, 4.0), (2.0, 2.0, 4.0)), "position is its target"),
+        (ViewCamera((1e11, 0.0, 0.0), (0.0, 0.0, 0.0)), "edges away"),
+    ],
+)
+def test_a_camera_that_no_frame_shows_is_not_saved(file: Path, camera: ViewCamera, says: str) -> None:
+    session, text = Session(file, "tiny", size=SIZE), file.read_bytes()
+    with pytest.raises(UserError, match=says):
+        session.save(camera)
+    assert file.read_bytes() == text
+    session.close()
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e-3, 1e3])
+def test_a_saved_camera_shows_what_was_shown_at_any_scale(file: Path, scale: float) -> None:
+    file.write_text(f'mesh.name = "octahedron"\ntransform.scale = {scale}\n')
+    session = Session(file, "tiny", size=SIZE)
+    camera = ViewCamera((2 * scale, 2 * scale, 4 * scale), (0.2 * scale, 0.2 * scale, 0.2 * scale))
+    shown = session.frame(camera).pixels
+    session.save(camera)
+    session.look()
+    assert session.state()["error"] == ""
+    np.testing.assert_array_equal(session.frame().pixels, shown)
+    near = ViewCamera((0.20001 * scale, 0.2 * scale, 0.2 * scale), camera.target)
+    session.save(near)
+    session.look()
+    assert session.state()["error"] == "" and session.state()["camera"]["position"] == pytest.approx(near.position)
+    session.close()
+
+
+def test_a_camera_is_saved_in_the_scene_as_its_file_is(file: Path) -> None:
+    """Also where the file has changed since the session has last looked at it."""
+    session = Session(file, "tiny", size=SIZE)
+    camera = ViewCamera((0.0, 0.0, 3e4), (0.0, 0.0, 0.0))
+    with pytest.raises(UserError, match="edges away"):
+        session.save(camera)
+    file.write_text(f"transform.scale = 1e4\n{file.read_text()}")
+    session.save(camera)
+    text = file.read_text()
+    assert "position = [0.0, 0.0, 30000.0]" in text
+    file.write_text(text.replace("35.0", "350.0"))
+    with pytest.raises(UserError, match=r"while the scene has an error: .*fov"):
+        session.save(camera)
+    session.close()
+
+
+def test_a_scene_of_the_project_is_not_edited(file: Path) -> None:
+    session, text = Session(file, "tiny", size=SIZE, is_own=False), file.read_bytes()
+    with pytest.raises(
+        UserError, match=r"scene is a scene of the project.*: cp -r .* my-scenes && colonnade view my-scenes"
+    ):
+        session.save(ViewCamera((2.0, 2.0, 4.0), (0.0, 0.0, 0.0)))
+    assert file.read_bytes() == text
     session.close()
