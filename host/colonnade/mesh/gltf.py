@@ -26,7 +26,16 @@ from colonnade.mesh.gltf_metal import metal_of, of_map
 from colonnade.mesh.gltf_relief import relief_of
 from colonnade.mesh.gltf_textures import GltfTextures
 from colonnade.mesh.losses import Losses, extension_loss
-from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, gltf_losses, metal_factors, unused_extensions
+from colonnade.mesh.materials import (
+    PLAIN,
+    MeshMaterial,
+    Vector,
+    from_gltf,
+    gltf_losses,
+    metal_factors,
+    unused_extensions,
+)
+from colonnade.mesh.palette import MAX_MATERIALS
 from colonnade.mesh.resolver import References
 from colonnade.mesh.roughness import merged_roughness, surface_areas
 from colonnade.mesh.surface import RawSurface, joined
@@ -52,20 +61,11 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     """
     document = GltfDocument(data, path, references)
     _check_extensions(document)
-    materials = (*(from_gltf(material) for material in document.json.get("materials", [])), PLAIN)
     textures = GltfTextures(document, references, losses)
-    compressed = DracoPrimitives(document)
-    used: set[int] = set()
-    parts: list[_Part] = []
-    for node, matrix in _nodes(document, losses):
-        mesh = document.entry("meshes", node["mesh"])
-        for primitive in mesh.get("primitives", []):
-            part = _primitive(document, primitive, matrix, len(materials) - 1, losses, textures, compressed)
-            if part is not None:
-                parts.append(part)
-                used.add(part.material)
+    parts = _parts(document, textures, losses)
+    materials = (*(from_gltf(material) for material in document.json.get("materials", [])), PLAIN)
     found = list(materials)
-    for index in sorted(used - {len(materials) - 1}):
+    for index in sorted({part.material for part in parts} - {len(materials) - 1}):
         material = document.entry("materials", index)
         losses.update(gltf_losses(material))
         losses.update((extension_loss(name), 1) for name in unused_extensions(material))
@@ -107,17 +107,45 @@ class _Part:
     material: int
     metal: tuple[NDArray[np.bool_], Floats] | None = None
 
+    @property
+    def has_one_colour(self) -> bool:
+        """Whether all of its faces, of which there are some, have the colour of the material."""
+        return self.surface.uvs is None and self.surface.colours is None and len(self.surface.faces) > 0
+
+
+def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses) -> list[_Part]:
+    """The primitives of the default scene; refused as soon as they have too many materials."""
+    compressed, default = DracoPrimitives(document), len(document.json.get("materials", []))
+    parts: list[_Part] = []
+    # Of surfaces that no texture or corner colours; metal by a map keeps these, too
+    plain: set[tuple[Vector, float]] = set()
+    for node, matrix in _nodes(document, losses):
+        for primitive in document.entry("meshes", node["mesh"]).get("primitives", []):
+            part = _primitive(document, primitive, matrix, default, losses, textures, compressed)
+            if part is None:
+                continue
+            parts.append(part)
+            if part.material != default and part.has_one_colour:
+                material = from_gltf(document.entry("materials", part.material))
+                if material.alpha is None:
+                    plain.add((material.albedo, material.ior))
+            if len(plain) > MAX_MATERIALS:
+                raise document.error(f"it has more than {MAX_MATERIALS} materials: use at most {MAX_MATERIALS}")
+    return parts
+
 
 def _materials_of(
     materials: tuple[MeshMaterial, ...], parts: list[_Part], textures: GltfTextures
 ) -> tuple[tuple[MeshMaterial, ...], Indices]:
     """The materials, with further ones for parts that show their texture, and for metal; that of each face."""
     found, numbers = list(materials), []
+    first = {material: number for number, material in reversed(list(enumerate(found)))}
 
     def number_of(material: MeshMaterial) -> int:
-        if material not in found:
+        number = first.setdefault(material, len(found))
+        if number == len(found):
             found.append(material)
-        return found.index(material)
+        return number
 
     for part in parts:
         use = None if part.surface.uvs is None else textures.uses[part.material]

@@ -105,8 +105,8 @@ def table_entries(materials: Sequence[MeshMaterial]) -> tuple[tuple[MeshMaterial
         material if material.texture is None else replace(material, albedo=(1.0, 1.0, 1.0), texture=0)
         for material in materials
     ]
-    entries = list(dict.fromkeys(textured))
-    return tuple(entries), np.array([entries.index(material) for material in textured], dtype=np.int64)
+    entries = {material: number for number, material in enumerate(dict.fromkeys(textured))}
+    return tuple(entries), np.array([entries[material] for material in textured], dtype=np.int64)
 
 
 def with_corner_albedo(mesh: Mesh) -> Mesh:

@@ -61,6 +61,17 @@ def of_gltf(**changes: Any) -> dict[str, Content]:
 ACCESSORS = gltf()["accessors"]
 
 
+def of_materials(count: int) -> dict[str, Content]:
+    """A document of so many triangles, each in a colour of its own."""
+    primitive = gltf()["meshes"][0]["primitives"][0]
+    factors = {"metallicFactor": 0}
+    colours = [[number / count, 0, 0, 1] for number in range(count)]
+    return of_gltf(
+        meshes=[{"primitives": [primitive | {"material": number} for number in range(count)]}],
+        materials=[{"pbrMetallicRoughness": factors | {"baseColorFactor": colour}} for colour in colours],
+    )
+
+
 def of_draco(**extension: Any) -> dict[str, Content]:
     """A document whose triangle is said to be compressed."""
     primitive = gltf()["meshes"][0]["primitives"][0] | {"extensions": {"KHR_draco_mesh_compression": extension}}
@@ -188,6 +199,7 @@ CASES = {
     "gltf-draco-no-attributes": Case(GLTF, "Draco use has no attributes", of_draco(bufferView=0)),
     "gltf-draco-no-view": Case(GLTF, "bufferViews[None] is used", of_draco(attributes={})),
     "gltf-draco-view": Case(GLTF, "bufferViews[9] is used", of_draco(bufferView=9, attributes={})),
+    "gltf-many-materials": Case(GLTF, "more than 256 materials: use at most 256", of_materials(20_000)),
     "gltf-extension": Case(
         GLTF, "requires the glTF extension ACME_x, which is not supported", of_gltf(extensionsRequired=["ACME_x"])
     ),

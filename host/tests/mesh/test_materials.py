@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
+from textured_files import gltf
 from trimesh.visual.material import PBRMaterial
 
 from colonnade.common.errors import UserError
@@ -41,6 +42,28 @@ def test_mtl_materials() -> None:
     assert from_mtl({"tr": ["1.0"]}) == PLAIN  # as MeshLab writes opaque ones
     assert from_mtl({"tr": ["0.9"], "d": ["1"]}) == PLAIN
     assert from_mtl({"kd": "noise", "d": ["nan"], "illum": []}) == PLAIN
+
+
+@pytest.mark.parametrize("texture", [{}, {"baseColorTexture": {"index": 0}}], ids=["plain", "textured"])
+def test_comparisons_of_materials_grow_with_their_number(
+    texture: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of each with all would take minutes."""
+    primitive = {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}}
+    numbers = range(250)
+    compared = []
+    equal = MeshMaterial.__eq__
+    monkeypatch.setattr(MeshMaterial, "__eq__", lambda one, other: compared.append(1) or equal(one, other))
+    file = gltf(
+        tmp_path,
+        meshes=[{"primitives": [primitive | {"material": number} for number in numbers]}],
+        materials=[
+            {"pbrMetallicRoughness": {"baseColorFactor": [number / 250, 0, 0, 1], "metallicFactor": 0, **texture}}
+            for number in numbers
+        ],
+    )
+    load_mesh(file, corner_colours=True)
+    assert len(compared) < 20 * len(numbers)
 
 
 def test_a_glb_file_keeps_its_materials_apart(tmp_path: Path) -> None:
