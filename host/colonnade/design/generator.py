@@ -28,7 +28,7 @@ from colonnade.design.config_name import ConfigurationSource, Overrides, find_co
 from colonnade.design.design_folder import check_replaceable, replace_folder
 from colonnade.design.idle_parts import idle_notes
 from colonnade.design.manifest import Manifest
-from colonnade.design.toolchain import cache_directory, find_java, generator_jar, project_root
+from colonnade.design.toolchain import cache_directory, find_java, generator_jar, printed, project_root
 
 #: Source states to keep in the cache; older ones are removed when they were not used for a day.
 KEPT_STATES = 4
@@ -47,6 +47,9 @@ MANIFEST_ONLY = "--manifest-only"
 #: Most of the generator's code runs once. The optimising compiler of Java would take longer than it saves, and so would
 #: the threads of its garbage collector.
 JAVA_OPTIONS = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-XX:ErrorFile=/dev/null")
+
+#: What Java prints of an exception that a program does not handle: it is one of the generator.
+_CRASH = "Exception in thread"
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
@@ -234,8 +237,8 @@ def _compile(root: Path, log: Path, progress: Progress) -> list[str]:
         first = errors[0] if errors else (lines[-1] if lines else f"sbt ended with status {status}")
         raise UserError(f"the generator does not compile: {first} (full log: {log})")
     entries = next((line for line in reversed(lines) if ".jar" in line and os.pathsep in line), "").split(os.pathsep)
-    if not any(Path(entry).is_dir() for entry in entries):
-        raise RuntimeError(f"sbt printed no class path: see {log}")
+    if not any(entry and Path(entry).is_dir() for entry in entries):
+        raise UserError(f"sbt printed no class path: check its Java, by JAVA_HOME or PATH (full log: {log})")
     return entries
 
 
@@ -267,7 +270,9 @@ def _run(
     if done.returncode != 0 or not (design / "manifest.json").is_file():
         log = state / "generate.log"
         log.write_text(done.stdout + done.stderr)
-        raise RuntimeError(f"the generator failed with status {done.returncode}: see {log}")
+        if _CRASH in done.stderr:
+            raise RuntimeError(f"the generator failed with status {done.returncode}: see {log}")
+        raise UserError(f"{java} wrote no design: {printed(done)}: fix JAVA_HOME or PATH (full log: {log})")
 
 
 def _java_options(root: Path) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -72,8 +73,8 @@ def find_java() -> Path:
     found = str(in_home) if in_home and in_home.is_file() else shutil.which("java") or _packaged_java()
     if found is None:
         raise UserError(f"no Java found, which the generator needs: {advice}")
-    version = _java_version(found)
-    if version is not None and version < MINIMUM_JAVA:
+    version = _java_version(found, advice)
+    if version < MINIMUM_JAVA:
         raise UserError(f"{found} is Java {version}, too old for the generator: {advice}")
     return Path(found)
 
@@ -86,14 +87,23 @@ def _packaged_java() -> str | None:
     return str(java) if folders and java.is_file() else None
 
 
-def _java_version(java: str) -> int | None:
+def _java_version(java: str, advice: str) -> int:
     try:
-        command = [java, "-version"]
-        answer = processes.run(command)
+        answer = processes.run([java, "-version"])
     except OSError as error:
         raise UserError(f"{java} cannot be run ({error.strerror}): fix JAVA_HOME or PATH") from error
     match = re.search(r'version "(\d+)', answer.stderr + answer.stdout)
-    return int(match.group(1)) if match else None
+    if match is None or answer.returncode != 0:
+        raise UserError(f"{java} is no Java that works: {printed(answer)}: fix JAVA_HOME or PATH, or {advice}")
+    return int(match.group(1))
+
+
+def printed(done: subprocess.CompletedProcess[str]) -> str:
+    """How a program has ended and the first line that it printed, for an error."""
+    first = next((line for line in (done.stderr + done.stdout).splitlines() if line.strip()), None)
+    return f"it ended with status {done.returncode} and printed " + (
+        "nothing" if first is None else f"{first.strip()!r}"
+    )
 
 
 def require_program(name: str, purpose: str, package: str | None = None) -> Path:

@@ -34,6 +34,8 @@ MANIFEST = {
     "formatHash": "f",
     "configHash": "c",
 }
+#: Of a script that has the version of a Java that works.
+VERSION = 'if [ "$1" = -version ]; then echo \'openjdk version "17.0.1"\' >&2; exit; fi\n'
 
 
 def script(path: Path, text: str) -> None:
@@ -62,8 +64,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (root / "manifest").write_text(json.dumps(MANIFEST))
     script(
         root / "jdk" / "bin" / "java",
-        f'if [ "$1" = -version ]; then echo \'openjdk version "17.0.1"\' >&2; exit; fi\n'
-        f'echo "java $*" >>"{root}/runs"\n'
+        f'{VERSION}echo "java $*" >>"{root}/runs"\n'
         "while [ $# -gt 0 ]; do\n"
         f'case "$1" in --output) output="$2" ;; {generator.WRITE_ARCHIVE}*) echo >"${{1#*=}}" ;; esac\n'
         "shift; done\n"
@@ -251,18 +252,46 @@ def test_compile_error_is_one_line_and_names_the_log(checkout: Path) -> None:
 
 
 def test_an_error_of_the_generator_is_passed_on(checkout: Path) -> None:
-    script(
-        checkout / "jdk" / "bin" / "java",
-        'if [ "$1" = -version ]; then echo \'java version "21"\' >&2; exit; fi\n'
-        "echo 'colonnade.Generate: error: array.rows is 0: at least 1' >&2\nexit 2\n",
-    )
+    error = "echo 'colonnade.Generate: error: array.rows is 0: at least 1' >&2\nexit 2\n"
+    script(checkout / "jdk" / "bin" / "java", VERSION + error)
     with pytest.raises(UserError, match=r"^array.rows is 0: at least 1$"):
         generator.manifest_for("tiny", ["array.rows=0"])
 
 
 def test_crash_of_the_generator_is_a_bug(checkout: Path) -> None:
-    script(checkout / "jdk" / "bin" / "java", "echo 'Exception in thread main' >&2\nexit 1\n")
+    script(checkout / "jdk" / "bin" / "java", f"{VERSION}echo 'Exception in thread main' >&2\nexit 1\n")
     with pytest.raises(RuntimeError, match="status 1"):
+        generator.manifest_for("tiny")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            "exit 1\n",
+            "is no Java that works: it ended with status 1 and printed nothing: fix JAVA_HOME or PATH, or pip",
+        ),
+        ("", "is no Java that works: it ended with status 0 and printed nothing"),
+        ("head -c 64 /dev/zero; echo; echo more\n", r"is no Java that works: it ended with status 0 and printed '"),
+        (
+            f"{VERSION}exit 3\n",
+            "jdk/bin/java wrote no design: it ended with status 3 and printed nothing: fix JAVA_HOME",
+        ),
+        (f"{VERSION}echo 'no heap' >&2; exit 1\n", r"status 1 and printed 'no heap': .* \(full log: .*generate.log\)"),
+        (VERSION, "wrote no design: it ended with status 0 and printed nothing"),
+    ],
+    ids=["fails", "silent", "garbage", "generator fails", "no heap", "no design"],
+)
+def test_a_java_that_does_not_work_is_named(checkout: Path, text: str, says: str) -> None:
+    script(checkout / "jdk" / "bin" / "java", text)
+    with pytest.raises(UserError, match=says) as raised:
+        generator.manifest_for("tiny")
+    assert str(raised.value).isprintable()
+
+
+def test_an_sbt_that_does_not_work_is_named(checkout: Path) -> None:
+    script(checkout / "tools" / "sbt", "echo done\n")
+    with pytest.raises(UserError, match=r"sbt printed no class path: check its Java, .*sbt.log"):
         generator.manifest_for("tiny")
 
 
