@@ -57,8 +57,9 @@ export class Library {
     return new TextDecoder().decode(this.bytes.slice(pointer, end));
   }
 
-  check(pointer) {
-    if (pointer !== 0) throw new Error(this.text(pointer));
+  /** `mesh`: what an error about the mesh is of. */
+  check(pointer, mesh = "the mesh") {
+    if (pointer !== 0) throw new Error(this.text(pointer).replace(/^the mesh/, () => mesh));
   }
 
   /** Calls `use` with the addresses of copies of typed arrays; 0 for null. */
@@ -83,11 +84,11 @@ export class Library {
     this.withArrays([new TextEncoder().encode(designLines(manifest) + "\0")], (lines) => this.check(this.wasm.colonnade_model_open(lines)));
   }
 
-  /** Packs a mesh: vertices and normals are Float64Array, faces Int32Array; the model has it then. */
+  /** Packs a mesh: vertices and normals are Float64Array, faces Int32Array; the model has it then. After an error it has the mesh before. */
   pack(mesh, isGlass = false) {
-    const { vertices, faces, normals = null, colours = null } = mesh;
+    const { name, vertices, faces, normals = null, colours = null } = mesh;
     return this.withArrays([vertices, faces, normals, colours, new Int32Array(PACKED.length)], (v, f, n, c, out) => {
-      this.check(this.wasm.colonnade_model_pack(v, vertices.length / 3, f, faces.length / 3, n, c, Number(isGlass), out));
+      this.check(this.wasm.colonnade_model_pack(v, vertices.length / 3, f, faces.length / 3, n, c, Number(isGlass), out), name && `mesh ${name}`);
       const values = new Int32Array(this.wasm.memory.buffer, out, PACKED.length);
       return Object.fromEntries(PACKED.map((name, index) => [name, values[index]]));
     });

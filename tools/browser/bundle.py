@@ -13,8 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
 #: Modules after those that they import.
 WORKER = (
-    *("design", "library", "lightcube", "meshes", "photo", "sums", "depth", "normals", "encoder", "room", "rtl"),
-    "worker",
+    *("design", "library", "lightcube", "corners", "gltfchecks", "gltfdocument", "gltf", "meshes", "photo", "sums"),
+    *("depth", "normals", "encoder", "room", "rtl", "worker"),
 )
 PAGE = (
     *("camera", "design", "photo", "lightcube", "roomview", "path", "panels", "orbit", "renderer", "state"),

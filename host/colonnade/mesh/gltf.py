@@ -264,13 +264,15 @@ def _primitive(
     losses.add(lost.MORPHS, len(primitive.get("targets", [])))
     arrays = compressed.arrays(primitive)
     positions = arrays.attribute("POSITION").astype(np.float64)
+    if positions.shape[1] != 3:
+        raise document.error("the positions of a primitive are not of type VEC3: export it again")
     count = len(positions)
 
     def attribute(name: str, width: int) -> Floats | None:
         if name not in attributes:
             return None
         values = arrays.attribute(name)
-        if len(values) != count or values.shape[1] < width or positions.shape[1] != 3:
+        if len(values) != count or values.shape[1] < width:
             raise document.error(f"a primitive has {len(values):,} of {name} for {count:,} positions")
         return np.asarray(values[:, :width], dtype=np.float64)
 

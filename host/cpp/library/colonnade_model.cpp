@@ -152,10 +152,10 @@ const char* colonnade_model_pack(const double* vertices, std::uint32_t vertexCou
         raw.normals.resize(faceCount);
         std::memcpy(raw.normals.data(), normals, faceCount * sizeof(mesh::Corners));
     }
-    if (const char* error = mesh::whyUnclean(raw)) return error;
+    if (const std::string error = mesh::whyUnclean(raw); !error.empty()) return refuse(error);
     auto next = std::make_unique<Packed>();
     next->clean = mesh::clean(raw, leastCosine);
-    if (next->clean.faces.empty()) return "the mesh has only triangles without area";
+    if (next->clean.faces.empty()) return refuse("the mesh has only degenerate triangles (" + std::to_string(faceCount) + ", all without area)");
     const mesh::CleanMesh& clean = next->clean;
     next->quantised = packer::quantise(clean.vertices.data(), clean.vertices.size(), clean.faces.data(), clean.faces.size(), library->format.vertexBits);
     if (next->quantised.faces.empty()) return "no triangle keeps an area in this design's vertex units";

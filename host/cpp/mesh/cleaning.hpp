@@ -3,6 +3,8 @@
 /// vertices go, and closed parts are reversed that point inward.
 #pragma once
 
+#include <string>
+
 #include "winding.hpp"
 
 namespace colonnade::mesh {
@@ -22,16 +24,22 @@ struct CleanMesh {
     CornerNormals normals;
 };
 
-/// Null, or why a mesh cannot be cleaned.
-inline const char* whyUnclean(const RawMesh& raw) {
+/// Why a mesh cannot be cleaned, in the words of host/colonnade/mesh/load.py; empty if it can.
+inline std::string whyUnclean(const RawMesh& raw) {
     if (raw.faces.empty()) return "the mesh has no faces";
+    std::vector<bool> isUsed(raw.vertices.size());
     for (const Face& face : raw.faces)
         for (const std::int32_t vertex : face) {
             if (vertex < 0 || static_cast<std::size_t>(vertex) >= raw.vertices.size()) return "a face names a vertex that does not exist";
-            for (const double component : raw.vertices[vertex])
-                if (!std::isfinite(component) || std::fabs(component) > 1e100) return "a vertex is not a number, or beyond 1e100";
+            isUsed[vertex] = true;
         }
-    return nullptr;
+    double largest = 0.0;
+    for (std::size_t i = 0; i < raw.vertices.size(); ++i)
+        for (const double component : raw.vertices[i]) {
+            if (isUsed[i] && !std::isfinite(component)) return "the mesh: vertex " + std::to_string(i) + " is not a finite number: repair the file";
+            if (isUsed[i]) largest = std::max(largest, std::fabs(component));
+        }
+    return largest > 1e100 ? "the mesh has coordinates beyond 1e100: scale it down" : "";
 }
 
 /// No faces are left if none has an area.

@@ -346,7 +346,7 @@ def test_files_are_read_and_what_is_left_out_is_said(context: BrowserContext, tm
     )
     expect(page.locator("#error")).to_have_text("huge.ply is damaged, or no PLY file")
     tab.drop("cycle.gltf", json.dumps(triangle_document() | {"nodes": [{"children": [0]}]}))
-    expect(page.locator("#error")).to_have_text("cycle.gltf is damaged, or no GLTF file")
+    expect(page.locator("#error")).to_have_text("mesh cycle.gltf: node 0 is its own ancestor: export it again")
     before = tab.frames()
     tab.drop("one.gltf", json.dumps(triangle_document()))
     expect(page.locator("#mesh")).to_have_text("one.gltf")

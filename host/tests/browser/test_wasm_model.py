@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import playwright
 import pytest
+from page_module import MODULE, NEEDS_MODULE, ROOT, RTL, run_node
 from PIL import Image
 
 from colonnade.common.accumulation import UNSHADOWED, Accumulation
@@ -31,17 +29,8 @@ from colonnade.scene.parser import load_scene
 from colonnade.scene_image.environment import map_sections
 from colonnade.scene_image.packer import pack
 
-ROOT = Path(__file__).resolve().parents[3]
-MODULE, RTL = (ROOT / ".cache" / "browser-objects" / f"{name}.wasm" for name in ("colonnade", "tiny"))
 EIGHT = ("teapot", "stanford-bunny", "cheburashka", "fandisk", "rocker-arm", "duck", "armadillo", "dragon")
-pytestmark = pytest.mark.skipif(not MODULE.is_file(), reason="the page is not built: run `make browser`")
-
-
-def node() -> str:
-    """The node that Playwright brings, or the system's."""
-    own = Path(playwright.__file__).parent / "driver" / "node"
-    program = str(own) if own.is_file() else shutil.which("node")
-    return program if program is not None else pytest.skip("no node")
+pytestmark = NEEDS_MODULE
 
 
 def check(
@@ -65,12 +54,11 @@ def check(
         "frame": {"writes": writes, "width": size[0], "height": size[1]},
         "rtl": str(RTL) if config == "tiny" else None,
     }
-    (folder / "job.json").write_text(json.dumps(job))
     vertices, faces = (mesh.vertices, mesh.faces) if raw is None else raw
     vertices.astype("<f8").tofile(folder / "vertices.bin")
     faces.astype("<i4").tofile(folder / "faces.bin")
     (mesh.corner_normals if raw is None else np.zeros((len(faces), 3, 3))).astype("<f8").tofile(folder / "normals.bin")
-    subprocess.run([node(), Path(__file__).with_name("frames.mjs"), folder], check=True)
+    run_node("frames.mjs", folder, job)
 
     assert (folder / "records.bin").read_bytes() == image.records.tobytes()
     packed = json.loads((folder / "packed.json").read_text())
@@ -128,11 +116,10 @@ def test_a_room_is_encoded_as_by_the_host(tmp_path: Path) -> None:
         "step": 0.001,
         "lens": lens,
     }
-    (tmp_path / "job.json").write_text(json.dumps(job))
     for name in ("albedo", "normals", "depth"):
         getattr(frame, name).tofile(tmp_path / f"{name}.bin")
     Image.fromarray(steps).save(tmp_path / "depth.png")
-    subprocess.run([node(), Path(__file__).with_name("room.mjs"), tmp_path], check=True)
+    run_node("room.mjs", tmp_path, job)
 
     for section in map_sections(maps.image, manifest):
         assert (tmp_path / section.memory).read_bytes() == section.words.tobytes(), section.memory
@@ -174,8 +161,7 @@ def test_the_light_cube_and_the_sums_of_passes_are_those_of_the_host(tmp_path: P
         for colour, ratio, shows in passes
     ]
     job = {"rotation": rotation.tolist(), "pixels": 20, "white": white, "passes": as_rows}
-    (tmp_path / "job.json").write_text(json.dumps(job))
-    subprocess.run([node(), Path(__file__).with_name("light.mjs"), tmp_path], check=True)
+    run_node("light.mjs", tmp_path, job)
     assert (tmp_path / "words.bin").read_bytes() == cube.turned(rotation).words().tobytes()
 
     sums = [

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// The corners of a mesh that is being read.
+
+/** The tab reads so many triangles; the command line reads more. */
+const MOST_TRIANGLES = 4_000_000;
+
+/** Collects polygons as fans of triangles. */
+export class Corners {
+  constructor() {
+    this.faces = [];
+    this.normals = [];
+    this.colours = [];
+    this.hasNormals = false;
+    this.hasColours = false;
+    this.notes = new Set();
+  }
+
+  add(vertices, normals, colours) {
+    for (let i = 1; i + 1 < vertices.length; ++i)
+      for (const corner of [0, i, i + 1]) {
+        this.faces.push(vertices[corner]);
+        this.normals.push(...(normals?.[corner] ?? [0, 0, 0]));
+        this.colours.push(...(colours?.[corner] ?? [1, 1, 1]));
+      }
+    if (this.faces.length > 3 * MOST_TRIANGLES) throw new Error(`the mesh has more than ${MOST_TRIANGLES.toLocaleString("en")} triangles: the command line reads larger ones`);
+    this.hasNormals ||= Boolean(normals?.some(Boolean));
+    this.hasColours ||= Boolean(colours?.some(Boolean));
+  }
+
+  mesh(vertices) {
+    return {
+      vertices: Float64Array.from(vertices),
+      faces: Int32Array.from(this.faces),
+      normals: this.hasNormals ? Float64Array.from(this.normals) : null,
+      colours: this.hasColours ? Float64Array.from(this.colours) : null,
+      notes: [...this.notes],
+    };
+  }
+}
