@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: controls, orbit, dropped files, the ray of a pixel.
 
-import { ROOM_START, START, cameraOf, isAtMaps, roomCamera } from "./camera.js";
+import { ROOM_START, START, isAtMaps } from "./camera.js";
 import { droppedFiles, roomFiles } from "./files.js";
-import { listen } from "./orbit.js";
-import { element, listDesigns, showCosts, showRays } from "./panels.js";
 import { radianceOf } from "./lightcube.js";
+import { orbitBy, panBy, zoomBy } from "./moves.js";
 import { notesOf } from "./notes.js";
-import { draw, raysOf } from "./path.js";
+import { listen } from "./orbit.js";
+import { element, listDesigns, showCosts } from "./panels.js";
 import { Picture } from "./picture.js";
+import { Queue } from "./queue.js";
+import { RayPanel } from "./raypanel.js";
 import { Renderer, bytesOf, unpack } from "./renderer.js";
 import { RtlPanel } from "./rtlpanel.js";
-import { readState, writeState } from "./state.js";
-import { materialOf, poseIn, viewOf } from "./view.js";
+import { DEFAULTS, RANGES, followOf, followText, readState, writeState } from "./state.js";
+import { materialOf } from "./view.js";
 import { kindFor, placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
 
 const MOST_WORKERS = 8;
@@ -21,12 +23,13 @@ const STAND_WITHIN = 40;
 
 const form = element("controls");
 const stage = element("stage");
-const overlay = element("overlay").getContext("2d");
 
-let data, renderer, picture, manifest, packed, rays, chosen, traced;
-let state = readState(location.hash);
-/** Works that wait or run: the state may be ahead of design, room and mesh. */
-let works = 0;
+let data, renderer, picture, state, manifest, packed;
+/** What the link is of, and the page does not have. */
+let linkNotes = [];
+/** The design and room that the workers have, and those with which they have the mesh, too; the replaced workers that have all of it. */
+let opened = null, shown = null, restored = 0;
+const isWhole = () => shown === opened && restored === (renderer?.replaced ?? 0);
 /** What tests read: the last whole frame, the light of its room, and its last pass. */
 const page = (window.colonnade = { frames: 0, picture: null });
 
@@ -37,6 +40,7 @@ function roomOf() {
 }
 
 const scene = () => ({ state, mesh: page.mesh, manifest, packed });
+const ray = new RayPanel(page, () => ({ renderer, picture, scene: scene(), room: roomOf() }));
 
 function fail(text) {
   element("error").textContent = text;
@@ -44,13 +48,14 @@ function fail(text) {
 }
 
 function showNotes() {
-  element("notes").replaceChildren(...notesOf(scene(), roomOf()).map((note) => Object.assign(document.createElement("li"), { textContent: note })));
+  element("notes").replaceChildren(...[...linkNotes, ...notesOf(scene(), roomOf())].map((note) => Object.assign(document.createElement("li"), { textContent: note })));
 }
 
 // Meshes and designs
 
 async function openDesign() {
-  manifest = data.manifests[state.design] ?? data.manifests[(state.design = "textured")];
+  opened = { design: state.design, room: state.room };
+  manifest = data.manifests[state.design];
   await completeRoom(data.rooms[state.room]);
   const room = roomOf();
   const files = room ? room.views[state.design] : { plain: data.views[state.design] };
@@ -73,51 +78,71 @@ async function photoOf({ photo, picture: own, width, height }) {
 
 async function changeDesign() {
   await openDesign();
-  forget();
+  ray.forget();
   await pack();
 }
 
 async function pack() {
   const answer = await renderer.pack(materialOf(scene(), roomOf()) === "glass");
   packed = answer.packed;
+  shown = opened;
   page.packTime = answer.milliseconds;
   page.packed = packed;
   showNotes();
 }
 
-/** Does one thing after the other, and then renders; after an error, what was. Nothing is rendered meanwhile. */
-let queue = Promise.resolve();
-function then(work) {
-  ++works;
-  queue = queue
-    .then(async () => {
-      await renderer.stop();
-      await work();
-    })
-    .then(
-      () => (--works, show()),
-      (error) => (--works, fail(error.message), picture.update()),
-    );
-  return queue;
+/** Works change design, room or mesh; until they are done the state is ahead, and nothing is rendered. */
+const queue = new Queue(element("busy"), {
+  async before() {
+    await renderer?.stop().catch(() => {}); // of one that is replaced
+    await restore();
+  },
+  async failed(error) {
+    fail(error.message);
+    // Back to the hardware and the room of before, unless others are chosen already
+    if (!isWhole() && shown && queue.waiting.length === 1) Object.assign(state, shown);
+    await restore().catch((again) => fail(again.message));
+  },
+  done(isWell) {
+    if (isWell) fail("");
+    if (picture) show();
+  },
+});
+
+/** Gives the workers design, room and mesh, where some do not have them. */
+async function restore() {
+  if (isWhole()) return;
+  const { replaced } = renderer;
+  await openDesign();
+  if (page.file) {
+    await renderer.read(page.file.name, page.file.bytes, page.file.files);
+    await pack();
+  }
+  restored = replaced;
+}
+
+/** An error of a picture or a ray. */
+function failWhenIdle(error) {
+  if (isWhole()) return fail(error.message);
+  queue.add("Starting a worker", () => {
+    throw error;
+  });
 }
 
 /** Reads and packs a file; if it cannot be, the mesh stays what it was. */
 async function readFile(name, bytes, files) {
-  const [mesh, file] = [page.mesh, page.file];
+  const { mesh } = page;
   try {
     page.mesh = await renderer.read(name, bytes, files);
     await pack();
   } catch (error) {
     page.mesh = mesh;
-    if (file) {
-      await renderer.read(file.name, file.bytes, file.files);
-      await pack();
-    }
     throw error;
   }
   page.file = { name, bytes, files };
   state.mesh = name;
-  forget();
+  linkNotes = [];
+  ray.forget();
 }
 
 // A visitor's room
@@ -126,9 +151,7 @@ async function readFile(name, bytes, files) {
 async function openRoom(found, files) {
   const settings = { degrees: form.elements.degrees.valueAsNumber, millimetres: form.elements.step.valueAsNumber };
   const { template, design } = templateFor(data.rooms, state.design);
-  const hint = element("hint");
-  Object.assign(hint, { hidden: false, textContent: `Making the maps of ${found.photo}…` });
-  const room = await visitorRoom(renderer, data.manifests[design], template, found, files, settings).finally(() => (hint.hidden = true));
+  const room = await visitorRoom(renderer, data.manifests[design], template, found, files, settings);
   if (!data.rooms[found.photo]) form.elements.room.add(new Option(found.photo));
   data.rooms[found.photo] = page.room = room;
   Object.assign(state, { design, room: found.photo, ...ROOM_START, azimuth: START.azimuth });
@@ -150,19 +173,24 @@ stage.addEventListener("dblclick", (event) => {
   if (!room?.files || !isAtMaps(state)) return;
   const box = picture.canvas.getBoundingClientRect();
   const place = placeOf(room, ((event.clientX - box.left) / box.width) * room.width, ((event.clientY - box.top) / box.height) * room.height, STAND_WITHIN);
-  then(async () => {
+  queue.add("Moving the object", async () => {
     const own = data.rooms[state.room];
     Object.assign(own, placedRoom(own, templateFor(data.rooms, state.design).template, place));
     await changeDesign();
   });
 });
 
-async function openFiles(list) {
-  const files = new Map(await Promise.all([...list].map(async (file) => [file.name, new Uint8Array(await file.arrayBuffer())])));
-  const isMesh = [...files.keys()].some((name) => /\.(obj|ply|glb|gltf)$/i.test(name));
-  if (!isMesh && [...files.keys()].some((name) => /\.(jpe?g|png|webp|npy)$/i.test(name))) return void (await then(() => openRoom(roomFiles(files), files)));
-  const name = [...files.keys()].find((each) => /\.(obj|ply|glb|gltf)$/i.test(each)) ?? [...files.keys()][0];
-  if (name !== undefined) await then(() => readFile(name, files.get(name), files));
+/** Opens files: a mesh with what it names, or a photo with its depth; a promise of them shows at once that it is awaited. */
+function openFiles(promise) {
+  promise.catch(() => {}); // the work says it
+  queue.add("Reading the files", async () => {
+    const files = new Map(await Promise.all([...(await promise)].map(async (file) => [file.name, new Uint8Array(await file.arrayBuffer())])));
+    const names = [...files.keys()];
+    const mesh = names.find((name) => /\.(obj|ply|glb|gltf)$/i.test(name));
+    if (!mesh && names.some((name) => /\.(jpe?g|png|webp|npy)$/i.test(name))) return openRoom(roomFiles(files), files);
+    const name = mesh ?? names[0];
+    if (name !== undefined) await readFile(name, files.get(name), files);
+  });
 }
 
 const openTeapot = () => readFile("teapot.ply", page.teapot, new Map());
@@ -188,165 +216,112 @@ function keepLink() {
 }
 
 function show() {
-  fail("");
   fill();
   keepLink();
   picture.update();
 }
 
+/** After a change that needs no work. */
+function moved() {
+  fail("");
+  showNotes();
+  show();
+}
+
 form.addEventListener("input", ({ target }) => {
   if (target.name === "drag") return;
-  if (target.name === "degrees" || target.name === "step") return void then(() => openRoom(roomOf().files.found, roomOf().files.files));
+  if (target.name === "degrees" || target.name === "step") return void queue.add("Making the maps", () => openRoom(roomOf().files.found, roomOf().files.files));
   if (target.name in data.sliders) {
     state.design = data.sliders[target.name][target.value].design;
-    return void then(changeDesign);
+    showCosts(data, state.design);
+    return void queue.add(`Opening ${state.design}`, changeDesign);
   }
   const value = target.type === "checkbox" ? Number(target.checked) : target.type === "color" ? target.value.slice(1) : target.value;
   state[target.name] = ["light", "bounces", "pixel"].includes(target.name) ? Number(value) : value;
-  if (target.name === "design" || target.name === "room") then(changeDesign);
-  else if (["material", "gather"].includes(target.name)) then(pack);
-  else show();
-  if (traced && target.name !== "pixel") follow();
+  if (target.name === "design" || target.name === "room") queue.add(`Opening ${value || "no room"}`, changeDesign);
+  else if (["material", "gather"].includes(target.name)) queue.add("Packing the mesh", pack);
+  else moved();
+  if (ray.rays && target.name !== "pixel") follow();
 });
 form.addEventListener("submit", (event) => event.preventDefault());
 for (const id of ["open", "open-room"]) element(id).onclick = () => element("file").click();
-element("file").onchange = ({ target }) => openFiles(target.files).then(() => (target.value = ""));
-element("home").onclick = () => then(() => Object.assign(state, ROOM_START));
-element("teapot").onclick = () => then(openTeapot);
+element("file").onchange = ({ target }) => {
+  openFiles(Promise.resolve([...target.files]));
+  target.value = "";
+};
+element("home").onclick = () => queue.add("Going back to the photo", () => Object.assign(state, ROOM_START));
+element("teapot").onclick = () => queue.add("Reading the teapot", openTeapot);
 element("link").onclick = async ({ target }) => {
   await navigator.clipboard?.writeText(location.href).catch(() => {});
   target.textContent = "Copied";
   setTimeout(() => (target.textContent = "Copy"), 1500);
 };
 window.addEventListener("hashchange", () => {
-  const { design, material, room } = state;
-  const mesh = state.mesh;
-  state = { ...readState(location.hash), mesh };
-  then(async () => {
-    const isOther = design !== state.design || room !== state.room;
+  if (!state) return;
+  const { material, mesh } = state;
+  state = { ...linkedState(), mesh };
+  queue.add("Opening the link", async () => {
+    const isOther = opened.design !== state.design || opened.room !== state.room;
     if (isOther) await openDesign();
     if (isOther || material !== state.material) await pack();
-    if (state.follow) await followRay();
+    if (state.follow) await ray.follow();
+    else ray.forget();
   });
 });
-stage.addEventListener("dragover", (event) => (event.preventDefault(), stage.classList.add("dropping")));
-stage.addEventListener("dragleave", () => stage.classList.remove("dropping"));
-stage.addEventListener("drop", (event) => {
+window.addEventListener("dragover", (event) => (event.preventDefault(), stage.classList.add("dropping")));
+window.addEventListener("dragleave", () => stage.classList.remove("dropping"));
+window.addEventListener("drop", (event) => {
   event.preventDefault();
   stage.classList.remove("dropping");
-  droppedFiles(event.dataTransfer).then(openFiles).catch((error) => fail(error.message));
+  openFiles(droppedFiles(event.dataTransfer));
 });
+
+/** The state of the link; of hardware and rooms that the page does not have there are notes. */
+function linkedState() {
+  const linked = readState(location.hash);
+  linkNotes = [];
+  if (!(linked.design in data.manifests)) {
+    linkNotes.push(`the link is of ${linked.design}, which the page does not have: this is ${DEFAULTS.design}`);
+    linked.design = DEFAULTS.design;
+  }
+  if (linked.room !== "" && !(linked.room in data.rooms)) {
+    linkNotes.push("the link is of a room that it does not hold: drop photo and depth again");
+    linked.room = "";
+  }
+  return linked;
+}
 
 // Orbit
 
 listen(stage, {
-  orbit(azimuth, elevation, event) {
-    const room = roomOf();
-    if (room && (form.elements.drag.value === "camera" || event?.altKey || event?.ctrlKey)) {
-      state.roomAzimuth = ((((state.roomAzimuth + azimuth + 180) % 360) + 360) % 360) - 180;
-      state.roomElevation = Math.max(-89, Math.min(89, state.roomElevation + elevation));
-      return showNotes();
-    }
-    state.azimuth = (((state.azimuth + azimuth) % 360) + 360) % 360;
-    state.elevation = Math.max(-89, Math.min(89, state.elevation + elevation));
-  },
-  zoom(factor) {
-    if (roomOf()) {
-      state.roomDistance = Math.max(0.2, Math.min(5, state.roomDistance * factor));
-      return showNotes();
-    }
-    state.distance = Math.max(1.8, Math.min(40, state.distance * factor));
-  },
-  pan(x, y) {
-    const room = roomOf();
-    if (room) {
-      const depth = state.roomDistance * Math.hypot(...room.camera.position.map((value, axis) => value - room.object.position[axis]));
-      state.roomX += (x * depth) / room.camera.lens[0];
-      state.roomY += (y * depth) / room.camera.lens[0];
-      return showNotes();
-    }
-    const height = 2 * state.distance * Math.tan((20 * Math.PI) / 180);
-    state.x += x * height;
-    state.y += y * height;
-  },
+  orbit: (azimuth, elevation, event) => orbitBy(state, roomOf(), form.elements.drag.value === "camera" || event?.altKey || event?.ctrlKey, azimuth, elevation),
+  zoom: (factor) => zoomBy(state, roomOf(), factor),
+  pan: (x, y) => panBy(state, roomOf(), x, y),
   click(event) {
     const box = picture.canvas.getBoundingClientRect();
     const [width, height] = picture.size(state.pixel);
     const x = Math.floor(((event.clientX - box.left) / box.width) * width);
     const y = Math.floor(((event.clientY - box.top) / box.height) * height);
     if (x < 0 || y < 0 || x >= width || y >= height) return;
-    const { azimuth, elevation, distance, x: panX, y: panY } = state;
-    const moved = roomOf() && !isAtMaps(state) ? Object.keys(ROOM_START).map((name) => state[name]) : [];
-    state.follow = [x, y, width, height, azimuth, elevation, distance, panX, panY, ...moved].map((value) => Math.round(value * 1000) / 1000).join();
+    state.follow = followText({ x, y, width, height, orbit: state }, roomOf() && !isAtMaps(state));
     keepLink();
     follow();
   },
-  done: show,
+  done: moved,
 });
 stage.addEventListener("pointerdown", () => (element("hint").hidden = true));
 
-// The ray of a pixel
-
-/** The followed pixel, the frame that it is of, and the frame's orbit. */
-function followed() {
-  const [x, y, width, height, azimuth, elevation, distance, panX, panY, ...moved] = state.follow.split(",").map(Number);
-  const inRoom = Object.entries(ROOM_START).map(([name, value], index) => [name, moved[index] ?? value]);
-  return { x, y, width, height, orbit: { azimuth, elevation, distance, x: panX, y: panY, ...Object.fromEntries(inRoom) } };
-}
-
 /** Follows the ray of the state's pixel, after what is being done, unless more is to be done then. */
 function follow() {
-  queue = queue.then(() => works === 0 && followRay()).catch((error) => fail(error.message));
+  queue.addIdle(() => ray.follow(), failWhenIdle);
 }
 
-async function followRay() {
-  if (!packed || !state.follow) return;
-  const { x, y, width, height, orbit } = followed();
-  const view = viewOf(scene(), roomOf(), width, height, orbit);
-  traced = { x, y, width, height };
-  const { steps } = await renderer.trace(view, x, y);
-  rays = raysOf(steps, manifest.memories.columnBvh.line?.records);
-  page.rays = rays;
-  chosen = null;
-  element("path").hidden = false;
-  element("times").hidden = true;
-  element("time").hidden = roomOf() !== null;
-  element("pixel").textContent = `${x}, ${y}`;
-  for (const head of document.querySelectorAll(".lines")) head.hidden = !manifest.memories.columnBvh.line;
-  listRays();
-}
-
-function listRays() {
-  showRays(rays, chosen, (index) => {
-    chosen = chosen === index ? null : index;
-    listRays();
-  });
-  drawPath();
-}
-
-function drawPath() {
-  const canvas = overlay.canvas;
-  const box = picture.box();
-  canvas.width = Math.round(box.width * devicePixelRatio);
-  canvas.height = Math.round(box.height * devicePixelRatio);
-  if (!rays) return;
-  const room = roomOf();
-  const camera = room ? roomCamera(room, box.width, box.height, state) : cameraOf(state, box.width, box.height);
-  draw(overlay, camera, poseIn(scene(), room, state), rays, 2 ** manifest.config.geometry.vertexBits - 1, chosen);
-}
-
-function forget() {
-  rays = traced = undefined;
-  state.follow = "";
-  element("path").hidden = true;
-  drawPath();
-}
-element("forget").onclick = () => (forget(), keepLink());
+element("forget").onclick = () => (ray.forget(), keepLink());
 
 // The RTL
 
 const panel = new RtlPanel(page, fail, () => ({ data, renderer, state, scene: scene() }));
-element("time").onclick = () => panel.timePixel(followed());
+element("time").onclick = () => panel.timePixel(followOf(state.follow));
 element("rtl-start").onclick = () => panel.render();
 
 // Start
@@ -355,30 +330,28 @@ async function start() {
   const texts = JSON.parse(element("data").textContent);
   const [code, json, teapot] = await Promise.all([texts.module, texts.data, texts.teapot].map(unpack));
   data = JSON.parse(new TextDecoder().decode(json));
-  page.module = code;
-  page.teapot = teapot;
+  // Links have names: those of objects are none
+  for (const name of ["manifests", "rooms", "views", "sliders", "cycles"]) Object.setPrototypeOf(data[name], null);
+  Object.assign(page, { module: code, teapot });
   for (const name of Object.keys(data.rooms)) form.elements.room.add(new Option(name));
+  for (const name of ["light", "bounces"]) [form.elements[name].min, form.elements[name].max] = RANGES[name];
   listDesigns(data);
   element("about").textContent = `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
-  renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));
-  page.renderer = renderer;
-  const now = () => ({ scene: scene(), room: roomOf(), discs: data.discs, isReady: Boolean(packed) && works === 0 });
-  picture = new Picture({ renderer, page, now, drawn: drawPath, fail });
-  const wanted = state.mesh;
-  const followed = state.follow;
-  const isLost = state.room !== "" && !(state.room in data.rooms);
-  if (isLost) state.room = "";
+  renderer = page.renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));
+  const now = () => ({ scene: scene(), room: roomOf(), discs: data.discs, isReady: Boolean(packed) && !queue.isBusy && isWhole() });
+  picture = new Picture({ renderer, page, now, drawn: () => ray.draw(), fail: failWhenIdle });
+  state = linkedState();
+  const { mesh, follow: followed } = state;
+  if (mesh !== DEFAULTS.mesh) linkNotes.push(`the link is of ${mesh}, which a link does not hold: drop the file; this is the teapot`);
+  const notes = linkNotes;
   await openDesign();
   await openTeapot();
-  if (isLost) page.mesh.notes.push("the link is of a room that it does not hold: drop photo and depth again");
-  if (wanted !== "teapot.ply") {
-    page.mesh.notes.push(`the link is of ${wanted}, which a link does not hold: drop the file; this is the teapot`);
-  }
+  linkNotes = notes;
   showNotes();
   state.follow = followed;
-  if (followed) await followRay();
-  show();
+  await ray.follow();
+  document.body.inert = false;
   new ResizeObserver(() => picture.update()).observe(stage);
 }
 
-start().catch((error) => fail(error.message));
+queue.add("Loading", start);

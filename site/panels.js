@@ -63,13 +63,29 @@ export function listDesigns({ presets, studies, sliders }) {
   for (const [name, points] of Object.entries(sliders)) form.elements[name].max = points.length - 1;
 }
 
-/** The sliders, and error, energy, area and rate of the hardware, from the first study that has it. */
-export function showCosts({ studies, sliders }, chosen) {
+/** What the sliders change of a configuration, as their points have it. */
+function sliderValues({ precision: { mac, sqrt, div }, geometry, array }) {
+  return { precision: `${mac}b${sqrt}s${div}d`, vertexBits: geometry.vertexBits, contexts: array.contexts };
+}
+
+/** The sliders, with their values of the hardware if it is one of their points, else of `edge`; folded when other hardware is chosen. */
+function showSliders({ sliders, manifests }, chosen) {
+  const isPoint = Object.values(sliders).some((points) => points.some(({ design }) => design === chosen));
+  const values = sliderValues(manifests[isPoint ? chosen : "edge"].config);
   for (const [name, points] of Object.entries(sliders)) {
-    const index = points.findIndex(({ design }) => design === chosen);
-    if (index >= 0) element("controls").elements[name].value = index;
-    element(`${name}-value`).textContent = index >= 0 ? points[index].value : "";
+    element("controls").elements[name].value = points.findIndex(({ value }) => value === values[name]);
+    element(`${name}-value`).textContent = values[name];
   }
+  const { classList, dataset } = element("studied");
+  classList.toggle("isStudied", isPoint);
+  if (dataset.design !== chosen) element("studied").open = isPoint;
+  dataset.design = chosen;
+}
+
+/** The sliders, and error, energy, area and rate of the hardware, from the first study that has it. */
+export function showCosts(data, chosen) {
+  showSliders(data, chosen);
+  const { studies } = data;
   const study = studies.find(({ points }) => points.some(({ design }) => design === chosen));
   element("costs").hidden = !study;
   if (!study) return;

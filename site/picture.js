@@ -8,7 +8,7 @@ const COARSE = 4;
 
 /**
  * `now()` gives what is to be shown: the scene (view.js), its room or null, `discs` of lights, and `isReady`: design, room
- * and mesh are those of the state. `page` has what tests read. `drawn()` is called after each frame, `fail(text)` for errors.
+ * and mesh are those of the state. `page` has what tests read. `drawn()` is called after each frame, `fail(error)` for errors.
  */
 export class Picture {
   constructor({ renderer, page, now, drawn, fail }) {
@@ -38,6 +38,14 @@ export class Picture {
     return [clientWidth, clientHeight].map((length) => Math.max(8, Math.floor(length * scale)));
   }
 
+  /** Whether frames of the design and the room may have a size. */
+  hasSize(width, height) {
+    const { room, scene } = this.now();
+    if (room) return [1, 2, 4].some((pixel) => room.width === pixel * width && room.height === pixel * height);
+    const { maxWidth, maxHeight } = scene.manifest.config.frame;
+    return width >= 8 && height >= 8 && width <= maxWidth && height <= maxHeight;
+  }
+
   /** Renders until the picture is that of the state: coarse at once, then whole, band by band, then the sums of passes. */
   async update() {
     if (!this.now().isReady) return;
@@ -52,7 +60,7 @@ export class Picture {
         if ((await this.render(room ? COARSE : COARSE * pixel, true)) && (await this.render(pixel, false))) await this.rest();
       }
     } catch (error) {
-      this.fail(error.message);
+      this.fail(error);
     } finally {
       this.isRunning = false;
     }

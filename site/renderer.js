@@ -11,31 +11,72 @@ export async function unpack(text) {
 /** Bytes, or those of base64. */
 export const bytesOf = (text) => (typeof text === "string" ? Uint8Array.from(atob(text), (character) => character.charCodeAt(0)) : text);
 
+/** A worker that has something to do and sends nothing for so long is ended, seconds. */
+const MOST_SILENCE = 20;
+/** What a worker does, for messages. */
+const DOING = {
+  open: "opening the hardware", read: "reading the file", pack: "packing the mesh", load: "taking the mesh", room: "making the maps of the room",
+  frame: "rendering", trace: "following the ray", rtl: "running the RTL",
+};
+
 export class Renderer {
+  /** `replaced` counts workers that were ended: those in their place have neither design nor mesh. */
   constructor(source, count) {
     this.url = URL.createObjectURL(new Blob([source], { type: "text/javascript" }));
     this.waiting = new Map();
-    this.next = 0;
-    this.workers = Array.from({ length: count }, () => {
-      const worker = new Worker(this.url);
-      worker.onmessage = ({ data }) => this.receive(data);
-      return worker;
-    });
+    this.next = this.replaced = 0;
+    this.workers = Array.from({ length: count }, () => this.start());
+    setInterval(() => this.watch(), 1000);
   }
 
-  receive({ id, band, answer, error }) {
-    const { resolve, reject, onBand } = this.waiting.get(id);
-    if (band) return onBand(band);
+  start() {
+    const worker = new Worker(this.url);
+    worker.silence = 0;
+    worker.onmessage = ({ data }) => this.receive(worker, data);
+    worker.onerror = ({ message }) => this.replace(worker, `a worker has stopped: ${message}`);
+    return worker;
+  }
+
+  /** Counts the seconds in which a worker does not answer: a page that sleeps counts none. */
+  watch() {
+    for (const worker of new Set([...this.waiting.values()].map((each) => each.worker))) {
+      const { call } = [...this.waiting.values()].find((each) => each.worker === worker);
+      if (++worker.silence > MOST_SILENCE) this.replace(worker, `a worker has not answered for ${MOST_SILENCE} s while ${DOING[call] ?? "answering"}: it is replaced, and the page goes on with what it had`);
+    }
+  }
+
+  /** Ends a worker, and what it was asked with an error. */
+  replace(worker, reason) {
+    worker.terminate();
+    const index = this.workers.indexOf(worker);
+    if (index >= 0) {
+      this.workers[index] = this.start();
+      ++this.replaced;
+    }
+    for (const [id, { worker: asked, reject }] of this.waiting)
+      if (asked === worker) {
+        this.waiting.delete(id);
+        reject(new Error(reason));
+      }
+  }
+
+  receive(worker, { id, band, answer, error, isBroken }) {
+    const asked = this.waiting.get(id);
+    if (!asked) return;
+    worker.silence = 0;
+    if (band) return asked.onBand(band);
+    if (isBroken) return this.replace(worker, `the model has stopped while ${DOING[asked.call]} (${error}): the page goes on with what it had`);
     this.waiting.delete(id);
-    if (error === undefined) resolve(answer);
-    else reject(new Error(error));
+    if (error === undefined) asked.resolve(answer);
+    else asked.reject(new Error(error));
   }
 
   ask(worker, call, parameters, onBand) {
     return new Promise((resolve, reject) => {
       const id = this.next++;
-      this.waiting.set(id, { resolve, reject, onBand });
       worker.postMessage({ id, call, ...parameters });
+      if (![...this.waiting.values()].some((each) => each.worker === worker)) worker.silence = 0;
+      this.waiting.set(id, { worker, call, resolve, reject, onBand });
     });
   }
 
@@ -76,8 +117,7 @@ export class Renderer {
 
   /** Opens a design in a worker of its own, packs a file there, and calls `use` with the worker. */
   async aside(design, file, use) {
-    const worker = new Worker(this.url);
-    worker.onmessage = ({ data }) => this.receive(data);
+    const worker = this.start();
     try {
       await this.ask(worker, "open", design);
       await this.ask(worker, "read", file);

@@ -11,13 +11,15 @@ import { prepareRoom } from "./room.js";
 import { renderRtl } from "./rtl.js";
 import { Sums, codeOf } from "./sums.js";
 
-const BAND = 4;
+/** A band has this many rows, or fewer: a worker listens again after so many pixels. */
+const [BAND, BAND_PIXELS] = [4, 2560];
 
-/** Answers messages {id, call, …} with {id, …}; of a frame, with its bands, until another frame begins. */
+/** Answers messages {id, call, …} with {id, …}; of a frame, with its bands, until another frame begins. After isBroken it is of no use. */
 export function serve(scope) {
   let library;
   let white;
-  let raw;
+  let raw; // the packed mesh
+  let read; // the one that is to be packed
   let files;
   let opened;
   let photos;
@@ -47,13 +49,16 @@ export function serve(scope) {
       return {};
     },
     read({ name, bytes, files }) {
-      raw = readMesh(name, bytes, files);
-      const { vertices, faces, colours, notes } = raw;
+      read = readMesh(name, bytes, files);
+      const { vertices, faces, colours, notes } = read;
       return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, notes };
     },
     pack({ isGlass }) {
       const begin = performance.now();
-      const packed = library.pack(raw, isGlass);
+      const mesh = read ?? raw;
+      read = null;
+      const packed = library.pack(mesh, isGlass);
+      raw = mesh;
       return { packed, records: library.records(packed), milliseconds: performance.now() - begin };
     },
     load({ records }) {
@@ -81,11 +86,12 @@ export function serve(scope) {
       start(view);
       if (!sample?.index) sums = new Sums(camera.width * camera.height, white * view.exposure, view.inPhoto ? photos[view.file] : null);
       ++sums.samples;
-      for (let first = BAND * part; first < camera.height; first += BAND * parts) {
+      const band = Math.max(1, Math.min(BAND, Math.floor(BAND_PIXELS / camera.width)));
+      for (let first = band * part; first < camera.height; first += band * parts) {
         await pause();
         if (own !== frame) return { isStopped: true };
         if (current !== view) start(view);
-        const last = Math.min(first + BAND, camera.height);
+        const last = Math.min(first + band, camera.height);
         const rows = library.rows(first, last, camera.width);
         sums.add(rows, first * camera.width);
         const pixels = sums.shown(first * camera.width, last * camera.width);
@@ -147,7 +153,7 @@ export function serve(scope) {
       const answer = await calls[call](parameters, (band) => scope.postMessage({ id, band }));
       scope.postMessage({ id, answer });
     } catch (error) {
-      scope.postMessage({ id, error: String(error.message ?? error) });
+      scope.postMessage({ id, error: String(error.message ?? error), isBroken: error instanceof WebAssembly.RuntimeError });
     }
   };
 }

@@ -17,8 +17,8 @@ WORKER = (
     *("depth", "normals", "encoder", "room", "rtl", "worker"),
 )
 PAGE = (
-    *("camera", "design", "photo", "lightcube", "roomview", "path", "panels", "orbit", "renderer", "state"),
-    *("recording", "view", "notes", "picture", "files", "visitor", "rtlpanel", "page"),
+    *("camera", "design", "photo", "lightcube", "roomview", "path", "panels", "orbit", "queue", "renderer", "state"),
+    *("moves", "recording", "view", "notes", "picture", "raypanel", "files", "visitor", "rtlpanel", "page"),
 )
 
 _IMPORT = re.compile(r'^import [^;]*? from "\./(\w+)\.js";\n', re.MULTILINE)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from built_page import MODULE, NEEDS_MODULE, ROOT, run_node
 from gltf_documents import READ, REFUSED
-from page_module import MODULE, NEEDS_MODULE, ROOT, run_node
 
 from colonnade.common.errors import UserError
 from colonnade.common.vectors import unit_vectors

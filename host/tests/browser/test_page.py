@@ -7,15 +7,15 @@ import gzip
 import itertools
 import json
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from built_page import FILE, NEEDS_PAGE, OBJ, ROOT, Tab
 from PIL import Image
-from playwright.sync_api import Browser, BrowserContext, Page, expect
+from playwright.sync_api import Browser, BrowserContext, expect
 
 from colonnade.common.image_io import decode_srgb
 from colonnade.common.srgb import srgb_from_linear
@@ -35,75 +35,7 @@ from colonnade.scene.samples import samples_of_frame
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 
-ROOT = Path(__file__).resolve().parents[3]
-FILE = ROOT / "out" / "browser" / "index.html"
-#: A tetrahedron with a colour at each vertex.
-OBJ = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\nl 1 2\n"
-
-pytestmark = pytest.mark.skipif(not FILE.is_file(), reason="the page is not built: run `make browser`")
-
-
-class Tab:
-    """The open page, and what it asked for or complained about."""
-
-    def __init__(self, context: BrowserContext, link: str = "") -> None:
-        self.page: Page = context.new_page()
-        self.page.set_default_timeout(30_000)
-        self.requests: list[str] = []
-        self.complaints: list[str] = []
-        self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.on("console", lambda message: self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.goto(FILE.as_uri() + link)
-        self.wait()
-
-    def wait(self, before: int = 0) -> None:
-        """Wait for a whole frame after so many."""
-        self.page.wait_for_selector("body[data-frames]")
-        end = time.monotonic() + 30
-        while self.frames() <= before:
-            assert time.monotonic() < end, self.page.locator("#error").inner_text() or "no frame came"
-            time.sleep(0.02)
-
-    def frames(self) -> int:
-        return int(self.page.get_attribute("body", "data-frames") or 0)
-
-    def picture(self) -> dict[str, Any]:
-        """The last whole frame, and the writes of its registers."""
-        return dict(
-            self.page.evaluate(
-                """async () => {
-                  const { width, height, view, ...pixels } = colonnade.picture;
-                  const { writes } = await colonnade.renderer.writes(view);
-                  const lists = Object.entries(pixels).map(([name, values]) => [name, [...values]]);
-                  return { width, height, writes, ...Object.fromEntries(lists) };
-                }"""
-            )
-        )
-
-    def drop(self, name: str, text: str) -> None:
-        """Drop a file onto the picture."""
-        self.page.evaluate(
-            """([name, text]) => {
-              const dataTransfer = new DataTransfer();
-              dataTransfer.items.add(new File([text], name));
-              document.getElementById("stage").dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true }));
-            }""",
-            [name, text],
-        )
-
-    def is_quiet(self) -> bool:
-        """Whether the page asked no host, and the console is empty."""
-        assert not [url for url in self.requests if not url.startswith((FILE.as_uri(), "blob:", "data:"))]
-        assert not self.complaints
-        return True
-
-
-@pytest.fixture
-def context(browser: Browser) -> Iterator[BrowserContext]:
-    context = browser.new_context(viewport={"width": 800, "height": 240}, offline=True)
-    yield context
-    context.close()
+pytestmark = NEEDS_PAGE
 
 
 def registers_of(picture: dict[str, Any], manifest: Manifest) -> dict[str, int]:
@@ -437,6 +369,8 @@ def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) ->
         expect(slider).to_have_value(place)
         expect(slider).to_have_attribute("max", "2")
         expect(page.locator(f"#{name}-value")).to_have_text(value)
+    expect(page.locator("input[name=precision]")).to_have_value("3")
+    expect(page.locator("#precision-value")).to_have_text("32b32s64d")
     sharp = tab.picture()["colours"]
     before = tab.frames()
     page.fill("input[name=precision]", "0")
@@ -449,7 +383,7 @@ def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) ->
     before = tab.frames()
     page.fill("input[name=vertexBits]", "0")
     expect(page.locator("#vertexBits-value")).to_have_text("12")
-    expect(page.locator("#precision-value")).to_have_text("")
+    expect(page.locator("#precision-value")).to_have_text("32b32s64d")
     tab.wait(before)
     expect(page.locator("#study")).to_contain_text("vertices-contexts.toml")
     assert tab.picture()["colours"] != sharp
@@ -458,6 +392,17 @@ def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) ->
     expect(page.locator("#contexts-value")).to_have_text("4")
     tab.wait(before)
     assert tab.picture()["colours"] == sharp, "contexts change no pixel"
+    # Other hardware: they are folded, and have the values of edge
+    page.select_option("select[name=design]", "lean")
+    expect(page.locator("input[name=contexts]")).to_be_hidden()
+    page.click("#studied summary")
+    expect(page.locator("#studied")).to_contain_text("a slider changes to a variant of edge")
+    expect(page.locator("#studied span", has_text="The chosen hardware is another one")).to_be_visible()
+    values = [page.locator(f"#{name}-value").inner_text() for name in ("precision", "vertexBits", "contexts")]
+    assert values == ["32b32s64d", "16", "12"]
+    page.fill("input[name=contexts]", "2")
+    expect(page.locator("#contexts-value")).to_have_text("16")
+    expect(page.locator("select[name=design]")).to_have_value("16 contexts")
     assert tab.is_quiet()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page_module import MODULE, NEEDS_MODULE, ROOT, RTL, run_node
+from built_page import MODULE, NEEDS_MODULE, ROOT, RTL, run_node
 from PIL import Image
 
 from colonnade.common.accumulation import UNSHADOWED, Accumulation

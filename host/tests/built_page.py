@@ -1,0 +1,91 @@
+"""What `make browser` has built: the page, open in Chromium, and its WebAssembly in node."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import playwright
+import pytest
+from playwright.sync_api import BrowserContext, Page
+
+ROOT = Path(__file__).resolve().parents[2]
+FILE = ROOT / "out" / "browser" / "index.html"
+MODULE, RTL = (ROOT / ".cache" / "browser-objects" / f"{name}.wasm" for name in ("colonnade", "tiny"))
+#: The marks of tests that need the page, and its WebAssembly.
+NEEDS_PAGE, NEEDS_MODULE = (
+    pytest.mark.skipif(not file.is_file(), reason="the page is not built: run `make browser`")
+    for file in (FILE, MODULE)
+)
+#: A tetrahedron with a colour at each vertex.
+OBJ = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\nl 1 2\n"
+
+
+def run_node(program: str, folder: Path, job: Any) -> None:
+    """Run a program of tests/browser on a folder with the job, by the node that Playwright brings, or the system's."""
+    own = Path(playwright.__file__).parent / "driver" / "node"
+    node = str(own) if own.is_file() else shutil.which("node")
+    if node is None:
+        pytest.skip("no node")
+    (folder / "job.json").write_text(json.dumps(job))
+    subprocess.run([node, Path(__file__).with_name("browser") / program, folder], check=True)
+
+
+class Tab:
+    """The open page, and what it asked for or complained about."""
+
+    def __init__(self, context: BrowserContext, link: str = "") -> None:
+        self.page: Page = context.new_page()
+        self.page.set_default_timeout(30_000)
+        self.requests: list[str] = []
+        self.complaints: list[str] = []
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.goto(FILE.as_uri() + link)
+        self.wait()
+
+    def wait(self, before: int = 0) -> None:
+        """Wait for a whole frame after so many."""
+        self.page.wait_for_selector("body[data-frames]")
+        end = time.monotonic() + 30
+        while self.frames() <= before:
+            assert time.monotonic() < end, self.page.locator("#error").inner_text() or "no frame came"
+            time.sleep(0.02)
+
+    def frames(self) -> int:
+        return int(self.page.get_attribute("body", "data-frames") or 0)
+
+    def picture(self) -> dict[str, Any]:
+        """The last whole frame, and the writes of its registers."""
+        return dict(
+            self.page.evaluate(
+                """async () => {
+                  const { width, height, view, ...pixels } = colonnade.picture;
+                  const { writes } = await colonnade.renderer.writes(view);
+                  const lists = Object.entries(pixels).map(([name, values]) => [name, [...values]]);
+                  return { width, height, writes, ...Object.fromEntries(lists) };
+                }"""
+            )
+        )
+
+    def drop(self, name: str, text: str) -> None:
+        """Drop a file onto the picture."""
+        self.page.evaluate(
+            """([name, text]) => {
+              const dataTransfer = new DataTransfer();
+              dataTransfer.items.add(new File([text], name));
+              document.getElementById("stage").dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true }));
+            }""",
+            [name, text],
+        )
+
+    def is_quiet(self) -> bool:
+        """Whether the page asked no host, and the console is empty."""
+        assert not [url for url in self.requests if not url.startswith((FILE.as_uri(), "blob:", "data:"))]
+        assert not self.complaints
+        return True
