@@ -19,7 +19,7 @@ export function notesOf(scene, room) {
   if (room && !room.light) notes.push("this hardware does not gather the light of the room: choose textured");
   if (room?.light?.share) notes.push(`the photo shows ${Math.round(100 * room.light.share)} % of the directions around the object; its mean light comes from the others`);
   const material = materialOf(scene, room);
-  if (state.material === "metal" && material === "mirror") notes.push("metal is rough where light is gathered, in a room; here it is a mirror");
+  if (state.material === "metal" && material !== "metal") notes.push("rough metal is diffuse: hardware that gathers the light of a room renders its reflections");
   else if (material !== state.material) notes.push("this hardware has neither mirrors nor glass");
   return notes;
 }

@@ -8,7 +8,7 @@ import { roomRegisters } from "./roomview.js";
 
 const LIGHT = [1.2, 1.6, 1.5];
 const GLASS = 1.5;
-const ROUGHNESS = 0.4;
+const ROUGHNESS = 0.45;
 /** Passes of a frame that rests, with gathered light and without. */
 const PASSES = [4, 64];
 
@@ -19,11 +19,11 @@ const gathers = ({ state }, room) => Boolean(room?.light && state.gather);
 
 export const passesOf = (scene, room) => PASSES[Number(gathers(scene, room))];
 
-/** The material that the design has of the one that is chosen; metal is rough where light is gathered. */
+/** The material that the design has of the one that is chosen; metal as rough as this is diffuse where no light is gathered. */
 export function materialOf(scene, room) {
   const { state, manifest } = scene;
   if (manifest.config.frame.maxBounces === 0) return "diffuse";
-  return state.material === "metal" && !gathers(scene, room) ? "mirror" : state.material;
+  return state.material === "metal" && !gathers(scene, room) ? "diffuse" : state.material;
 }
 
 /** The registers of the lobe of rough metal, and the share of light that its microfacets reflect at once (docs/gather.md). */

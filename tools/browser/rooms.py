@@ -79,7 +79,7 @@ def _kind(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
         maps = own
     assert ready.photo is not None
     photo = io.BytesIO()
-    Image.fromarray(ready.photo).save(photo, "JPEG", quality=88)
+    Image.fromarray(ready.photo).save(photo, "JPEG", quality=88, subsampling=0)
     light = _light(ready) if ready.scene.paths.gather else None
     room = {"photo": base64_text(photo.getvalue()), **_poses(ready)}
     return {"views": views, "maps": maps, "headroom": ready.scene.headroom, "light": light, "room": room}
