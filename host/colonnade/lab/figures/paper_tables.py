@@ -21,6 +21,8 @@ def table_1(data: Data) -> str:
     rates = {design.name: ("–", "–") for design in paper.DESIGNS}
     rates[paper.DESIGNS[-1].name] = (f"{paper.MRAYS:g}", f"{paper.MILLIWATTS / paper.MRAYS:.2f}")
     for preset in ARRAYS:
+        if data.get(f"area-{preset}-asap7") is None:
+            continue
         own = facts(data, preset)
         widths = data.file(f"area-{preset}-asap7")["config"]["precision"]
         design = [f"`{preset}`", "28, scaled", text(own, "mm2"), "synthesis", f"{MEGAHERTZ:g}"]
