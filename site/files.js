@@ -34,7 +34,7 @@ export function readMeta(bytes, { width, height }) {
   const isPose = Array.isArray(rows) && [0, 1, 2].every((i) => Array.isArray(rows[i]) && rows[i].length === 4 && rows[i].every(Number.isFinite));
   if (rows !== undefined && !isPose) throw new Error("meta.json: cam_to_world is not 4 rows of 4 numbers");
   const step = meta.depth_step ?? 0.001;
-  if (!(step > 0 && step <= 1000)) throw new Error("meta.json: depth_step is not metres of a step of the depth map");
+  if (!(step >= 1e-6 && step <= 1000)) throw new Error("meta.json: depth_step must be the metres per step of the depth map, 1e-6 to 1000");
   return { lens, step, pose: isPose ? { rotation: unitAxes(rows.slice(0, 3).map((row) => row.slice(0, 3))), position: [0, 1, 2].map((i) => rows[i][3]) } : null };
 }
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import struct
 import subprocess
 import zipfile
 from dataclasses import dataclass, replace
@@ -127,6 +128,15 @@ def record3d_members(recording: Recording) -> dict[str, bytes]:
         members[f"rgbd/{number}.depth"] = lzfse.compress(recording.depth.astype("<f4").tobytes())
         members[f"rgbd/{number}.conf"] = lzfse.compress(recording.confident().tobytes())
     return members
+
+
+def lzfse_bomb(mebibytes: int, claimed: int) -> bytes:
+    """A stream of zeros whose blocks of a mebibyte claim to have at most some bytes."""
+    import lzfse
+
+    block = bytearray(lzfse.compress(bytes(1 << 20))[:-4])
+    struct.pack_into("<I", block, 4, min(claimed, 1 << 20))
+    return bytes(block) * mebibytes + b"bvx$"
 
 
 def write_zip(path: Path, members: dict[str, bytes]) -> Path:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +23,20 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.common.input_files import exists, is_folder
 from colonnade.common.limits import MAX_FRAMES
 from colonnade.common.progress import QUIET, Progress
-from colonnade.common.types import Floats
+from colonnade.common.types import Bytes, Floats
+from colonnade.environment.camera import read_camera
 from colonnade.environment.depth_normals import depth_noise
 from colonnade.environment.load import load_environment
 from colonnade.environment.repair import MAX_HOLES, filled, holes_of
+from colonnade.environment.sequence import load_sequence
 
 #: Size of the maps.
 WIDTH, HEIGHT = 640, 480
 #: Metres of a step of depth pictures, and the depth that they reach; farther depth is a hole.
 DEPTH_STEP = 0.0005
 MAX_DEPTH = 32.0
+#: Digits of a time after the point, and seconds from a frame to the next on average, at most.
+_TIME_DIGITS, _LARGEST_GAP = 6, 1000.0
 #: Frames that tell the floor.
 _LEVELLING = 6
 #: The folder of the first frame, a room.
@@ -110,43 +115,57 @@ def convert(
         raise UserError(f"{len(numbers):,} frames are too many, {MAX_FRAMES:,} are possible: give --every or --frames")
     with progress.step("finding the floor"):
         samples = numbers[:: max(1, len(numbers) // _LEVELLING)][:_LEVELLING]
-        levelling = level(list(source.frames(samples)), up if up is not None else outline.up, str(path))
+        levelling = level(source.frames(samples), up if up is not None else outline.up, str(path))
     tables: list[str] = []
     times: list[float] = []
     left_out = []
     noises: list[float] = []
     turns: int | None = None
+    start: float | None = None
     with progress.step("converting frames") as report:
-        for count, frame in enumerate(source.frames(numbers)):
+        # Not enumerated: one whole frame at a time is in memory
+        for frame in source.frames(numbers):
             frame, turns = _level_and_upright(frame, levelling, turns)
             frame = fitted(frame, WIDTH, HEIGHT)
-            report((count + 1) / len(numbers))
+            report((frame.number - first + 1) / (numbers[-1] - first + 1))
             steps = np.where(frame.depth <= MAX_DEPTH, np.rint(frame.depth / DEPTH_STEP), 0).astype(np.uint16)
             if (steps == 0).mean() > MAX_HOLES:
                 left_out.append(frame.number)
                 continue
-            if times and frame.time <= times[-1]:
-                raise UserError(f"{path}: the time of frame {frame.number} is not after that of the frame before")
+            start = frame.time if start is None else start
+            time = round(frame.time - start, _TIME_DIGITS)
+            if times and time <= times[-1]:
+                raise UserError(
+                    f"{path}: the time of frame {frame.number} is not a microsecond or more after the frame before"
+                )
+            camera = {**asdict(frame.lens), "cam_to_world": frame.to_world.tolist()}
+            read_camera(camera, Path(f"{path}, frame {frame.number}"))
             name = f"{len(times):04d}"
             if not times:
                 (output / ROOM).mkdir()
-                _write_room(output / ROOM, frame, steps)
+                _write_room(output / ROOM, frame.photo, steps, camera)
             Image.fromarray(frame.photo).save(output / f"{name}.png")
             Image.fromarray(steps).save(output / f"{name}.depth.png")
             if len(noises) < _LEVELLING:
                 noises.append(_noise(steps))
-            times.append(frame.time)
-            tables.append(_table(name, frame, frame.time - times[0]))
+            times.append(time)
+            tables.append(_table(name, time, camera))
     if not times:
         raise UserError(
             f"{path}: no frame has certain depth in half of its pixels, as a room needs: come nearer to the surfaces"
         )
-    seconds = times[-1] - times[0]
-    rate = (len(times) - 1) / seconds if seconds > 0 else 30.0
+    seconds, gaps = times[-1], max(len(times) - 1, 1)
+    if seconds / gaps > _LARGEST_GAP:
+        raise UserError(f"{path}: its frames are {seconds / gaps:.3g} s apart, {_LARGEST_GAP:g} s at most")
+    rate = gaps / seconds if seconds > 0 else 30.0
     noise = float(np.median(noises))
     head = f"width = {WIDTH}\nheight = {HEIGHT}\nrate = {rate:.3f}\n"
     head += f"depth_step = {DEPTH_STEP}\ndepth_noise = {noise:.5f}\n"
     (output / "sequence.toml").write_text(head + "".join(tables), encoding="utf-8")
+    try:
+        load_sequence(output / "sequence.toml")
+    except UserError as error:
+        raise UserError(f"{path} gives no sequence that can be read: {error}") from None
     with progress.step("deriving normals and albedo"):
         room = load_environment(output / ROOM)
         Image.fromarray(np.rint((room.normals * 0.5 + 0.5) * 255).astype(np.uint8)).save(output / ROOM / "normal.png")
@@ -173,29 +192,24 @@ def _noise(steps: NDArray[np.uint16]) -> float:
     return depth_noise(filled(steps.astype(np.float64), holes), holes)
 
 
-def _write_room(folder: Path, frame: Frame, steps: NDArray[np.uint16]) -> None:
-    Image.fromarray(frame.photo).save(folder / "photo.png")
+def _write_room(folder: Path, photo: Bytes, steps: NDArray[np.uint16], camera: dict[str, Any]) -> None:
+    Image.fromarray(photo).save(folder / "photo.png")
     Image.fromarray(steps).save(folder / "depth.png")
-    lens = frame.lens
     meta = {
         "width": WIDTH,
         "height": HEIGHT,
-        "fx": lens.fx,
-        "fy": lens.fy,
-        "cx": lens.cx,
-        "cy": lens.cy,
-        "cam_to_world": [*frame.to_world.tolist(), [0.0, 0.0, 0.0, 1.0]],
+        **camera,
+        "cam_to_world": [*camera["cam_to_world"], [0.0, 0.0, 0.0, 1.0]],
         "albedo_encoding": "srgb",
         "depth_step": DEPTH_STEP,
     }
     (folder / "meta.json").write_text(json.dumps(meta, indent=1) + "\n", encoding="utf-8")
 
 
-def _table(name: str, frame: Frame, time: float) -> str:
-    lens = frame.lens
-    rows = (f"[{', '.join(f'{value:.9f}' for value in row)}]" for row in frame.to_world)
+def _table(name: str, time: float, camera: dict[str, Any]) -> str:
+    rows = (f"[{', '.join(f'{value:.9f}' for value in row)}]" for row in camera["cam_to_world"])
     return (
-        f'\n[[frame]]\ntime = {time:.6f}\nphoto = "{name}.png"\ndepth = "{name}.depth.png"\n'
-        f"fx = {lens.fx:.6f}\nfy = {lens.fy:.6f}\ncx = {lens.cx:.6f}\ncy = {lens.cy:.6f}\n"
-        f"cam_to_world = [{', '.join(rows)}]\n"
+        f'\n[[frame]]\ntime = {time:.{_TIME_DIGITS}f}\nphoto = "{name}.png"\ndepth = "{name}.depth.png"\n'
+        + "".join(f"{key} = {camera[key]:.6f}\n" for key in ("fx", "fy", "cx", "cy"))
+        + f"cam_to_world = [{', '.join(rows)}]\n"
     )

@@ -6,7 +6,7 @@ below. Where the vertical is known, only its height is found.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,21 +53,21 @@ class Levelling:
         return turned
 
 
-def level(frames: Sequence[Frame], up: Floats | None, where: str) -> Levelling:
+def level(frames: Iterable[Frame], up: Floats | None, where: str) -> Levelling:
     """Find the floor.
 
     Args:
-        frames: Some frames of the capture.
+        frames: Some frames of the capture; one at a time is in memory.
         up: The vertical of its world; None: unknown.
         where: The capture, for messages.
 
     Raises:
         UserError: The vertical is unknown, and there is no floor.
     """
-    surfaces = [_surface(frame) for frame in frames]
+    surfaces = list(map(_surface, frames))
     points, normals, distances = (np.concatenate([surface[part] for surface in surfaces]) for part in range(3))
     thickness = np.maximum(_THICKNESS * distances, _LEAST_THICKNESS)
-    towards = unit_vectors(up if up is not None else np.mean([-frame.to_world[:, 1] for frame in frames], axis=0))
+    towards = unit_vectors(up if up is not None else np.mean([surface[3] for surface in surfaces], axis=0))
     level_points = np.flatnonzero(normals @ towards > (_UNCERTAIN if up is None else _KNOWN))
     best: tuple[int, Floats, float] | None = None
     for index in level_points[:: max(1, len(level_points) // _HYPOTHESES)]:
@@ -99,14 +99,19 @@ def level(frames: Sequence[Frame], up: Floats | None, where: str) -> Levelling:
     return Levelling(_rotation_to_y(normal), -height, f"{what}; {count / len(points):.0%} of the surface lie on it")
 
 
-def _surface(frame: Frame) -> tuple[Floats, Floats, Floats]:
-    """Points and normals in the capture's world, float64 [n, 3], and distances from the camera, float64 [n]."""
-    holes = holes_of(frame.depth)
+def _surface(frame: Frame) -> tuple[Floats, Floats, Floats, Floats]:
+    """What a frame shows, in the capture's world.
+
+    Returns:
+        Points and normals, float64 [n, 3], their distances from the camera, float64 [n], and up in its picture, [3].
+    """
+    upwards = -frame.to_world[:, 1]
     rows, columns = frame.depth.shape
     step = max(1, round(float(np.sqrt(frame.depth.size / (256 * 192)))))
-    depth, holes = frame.depth[::step, ::step], holes[::step, ::step]
+    depth = frame.depth[::step, ::step]
+    holes = holes_of(depth)
     if holes.all():
-        return np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
+        return np.empty((0, 3)), np.empty((0, 3)), np.empty(0), upwards
     across, down = columns / frame.photo.shape[1] / step, rows / frame.photo.shape[0] / step
     lens = frame.lens
     camera = EnvironmentCamera(lens.fx * across, lens.fy * down, lens.cx * across, lens.cy * down, np.eye(3, 4))
@@ -116,7 +121,8 @@ def _surface(frame: Frame) -> tuple[Floats, Floats, Floats]:
     chosen = np.s_[:: max(1, len(points) // _POINTS)]
     rotation = frame.to_world[:, :3].T
     points = points[chosen]
-    return points @ rotation + frame.to_world[:, 3], normals[chosen] @ rotation, np.linalg.norm(points, axis=1)
+    world = points @ rotation + frame.to_world[:, 3]
+    return world, normals[chosen] @ rotation, np.linalg.norm(points, axis=1), upwards
 
 
 def _rotation_to_y(up: Floats) -> Floats:

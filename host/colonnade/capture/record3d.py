@@ -8,14 +8,14 @@ is that of the first camera, so its y is not up.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from colonnade.capture.archive import Archive, opened
-from colonnade.capture.lzfse_streams import decode_lzfse
+from colonnade.capture.lzfse_streams import decode_lzfse, longest
 from colonnade.capture.source import (
     CERTAIN,
     OPENGL_AXES,
@@ -33,8 +33,8 @@ from colonnade.common.input_files import parse_json
 from colonnade.common.limits import MAX_CAPTURE_FRAMES, MAX_CAPTURE_TEXT_BYTES, MAX_DEPTH_PIXELS, MAX_MEMBER_BYTES
 from colonnade.common.types import Floats
 
-#: Frames whose streams are decoded together.
-_BATCH = 32
+#: Bytes of depth and confidence that are decoded together, if these are of several frames.
+_BATCH = 1 << 23
 
 
 class Record3D:
@@ -59,35 +59,40 @@ class Record3D:
 
     def frames(self, numbers: Sequence[int]) -> Iterator[Frame]:
         """Read frames, by ascending number."""
+        count = max(1, _BATCH // (5 * self._depth_size[0] * self._depth_size[1]))
         with opened(self._path) as archive:
-            for first in range(0, len(numbers), _BATCH):
-                yield from self._batch(archive, numbers[first : first + _BATCH])
+            for first in range(0, len(numbers), count):
+                yield from self._batch(archive, numbers[first : first + count])
 
     def _batch(self, archive: Archive, numbers: Sequence[int]) -> Iterator[Frame]:
-        width, height = self._depth_size
+        pixels = self._depth_size[0] * self._depth_size[1]
         streams = []
         for number in numbers:
             for kind, size in (("depth", 4), ("conf", 1)):
                 name = f"rgbd/{number}.{kind}"
                 if kind == "depth" or archive.has(name):
-                    streams.append((name, archive.read(name, MAX_MEMBER_BYTES), size * width * height))
+                    streams.append((name, archive.read(name, longest(size * pixels)), size * pixels))
         decoded = dict(zip((name for name, *_ in streams), decode_lzfse(streams, str(self._path)), strict=True))
         for number in numbers:
-            depth = np.frombuffer(decoded[f"rgbd/{number}.depth"], "<f4").reshape(height, width).astype(np.float64)
-            confidence = decoded.get(f"rgbd/{number}.conf")
-            if confidence is not None:
-                depth[np.frombuffer(confidence, np.uint8).reshape(height, width) < CERTAIN] = 0.0
-            name = f"rgbd/{number}.jpg"
-            with opened_bytes(archive.read(name, MAX_MEMBER_BYTES), f"{name} in {self._path}") as picture:
-                photo = rgb_pixels(picture)
-            yield Frame(
-                number,
-                self._time(number),
-                photo,
-                clean_depth(depth),
-                self._lens(number, photo.shape[1], photo.shape[0]),
-                self._poses[number],
-            )
+            yield self._frame(archive, number, decoded)
+
+    def _frame(self, archive: Archive, number: int, decoded: Mapping[str, bytes]) -> Frame:
+        width, height = self._depth_size
+        depth = np.frombuffer(decoded[f"rgbd/{number}.depth"], "<f4").reshape(height, width).astype(np.float64)
+        confidence = decoded.get(f"rgbd/{number}.conf")
+        if confidence is not None:
+            depth[np.frombuffer(confidence, np.uint8).reshape(height, width) < CERTAIN] = 0.0
+        name = f"rgbd/{number}.jpg"
+        with opened_bytes(archive.read(name, MAX_MEMBER_BYTES), f"{name} in {self._path}") as picture:
+            photo = rgb_pixels(picture)
+        return Frame(
+            number,
+            self._time(number),
+            photo,
+            clean_depth(depth),
+            self._lens(number, photo.shape[1], photo.shape[0]),
+            self._poses[number],
+        )
 
     def _poses_of(self) -> list[Floats]:
         rows = self._data.get("poses")

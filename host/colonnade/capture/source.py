@@ -14,6 +14,7 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Bytes, Floats
+from colonnade.environment.repair import holes_of
 
 #: Factors of the camera's axes in OpenGL, x right, y up, z backward, to those of view space.
 OPENGL_AXES = np.array([1.0, -1.0, -1.0])
@@ -127,8 +128,9 @@ def lens(values: Sequence[float], where: str) -> Lens:
 
 
 def clean_depth(depth: Floats) -> Floats:
-    """Depth with holes, which are negative, infinite or no number in files, as 0."""
-    return np.where(np.isfinite(depth) & (depth > 0), depth, 0.0)
+    """Set holes, which are negative, infinite or no number in files, to 0; returns the same array."""
+    depth[holes_of(depth)] = 0.0
+    return depth
 
 
 def finite_numbers(text: Sequence[str], where: str) -> list[float]:

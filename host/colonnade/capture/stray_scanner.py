@@ -9,23 +9,24 @@ sensor lies.
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from colonnade.capture.source import CERTAIN, Frame, Lens, Outline, finite_numbers, lens, quaternion_pose
+from colonnade.capture.text_lines import text_lines
 from colonnade.capture.video import frames_of_video
 from colonnade.common.errors import UserError
 from colonnade.common.extras import require_extra
-from colonnade.common.input_files import read_input, require_regular
-from colonnade.common.limits import MAX_CAPTURE_FRAMES, MAX_CAPTURE_TEXT_BYTES
+from colonnade.common.input_files import require_regular
+from colonnade.common.limits import MAX_CAPTURE_FRAMES
 from colonnade.common.types import Floats
 from colonnade.environment import files
 
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
-_LENS = ("fx", "fy", "cx", "cy")
+_COLUMNS, _LENS = ("timestamp", "frame", *_POSE), ("fx", "fy", "cx", "cy")
 _MILLIMETRE = 0.001
 
 
@@ -37,20 +38,19 @@ class StrayScanner:
         self._folder = folder
         require_regular(self._file("rgb.mp4"), "the video", f"{folder} has no photos: it lacks rgb.mp4")
         rows = self._table("odometry.csv")
-        titles = [title.strip() for title in rows[0]] if rows else []
-        missing = [name for name in ("timestamp", "frame", *_POSE) if name not in titles]
-        if missing or len(rows) < 2:
+        titles = [title.strip() for title in next(rows, [])]
+        missing = [name for name in _COLUMNS if name not in titles]
+        self._rows = [
+            {name: value for name, value in zip(titles, row, strict=False) if name in (*_COLUMNS, *_LENS)}
+            for row in rows
+        ]
+        if missing or not self._rows:
             what = f"it lacks the column {missing[0]}" if missing else "it has no lines"
             raise UserError(f"{self._file('odometry.csv')} has no poses: {what}")
-        self._rows = [dict(zip(titles, row, strict=False)) for row in rows[1:]]
-        if len(self._rows) > MAX_CAPTURE_FRAMES:
-            raise UserError(
-                f"{self._file('odometry.csv')} has {len(self._rows):,} frames, {MAX_CAPTURE_FRAMES:,} at most"
-            )
-        matrix = self._table("camera_matrix.csv")
-        if len(matrix) < 3 or any(len(row) < 3 for row in matrix[:3]):
+        matrix = list(islice(self._table("camera_matrix.csv"), 3))
+        if len(matrix) < 3 or any(len(row) < 3 for row in matrix):
             raise UserError(f"{self._file('camera_matrix.csv')} must have three lines of three numbers")
-        k = [finite_numbers(row[:3], str(self._file("camera_matrix.csv"))) for row in matrix[:3]]
+        k = [finite_numbers(row[:3], str(self._file("camera_matrix.csv"))) for row in matrix]
         self._matrix = [k[0][0], k[1][1], k[0][2], k[1][2]]
 
     @property
@@ -77,10 +77,10 @@ class StrayScanner:
             )
 
     def _depth(self, name: str) -> Floats:
-        file, confidence_file = self._file("depth") / name, self._file("confidence") / name
-        depth = files.read_grey(file) * _MILLIMETRE
+        file, confidence_file = self._file(f"depth/{name}"), self._file(f"confidence/{name}")
+        depth = files.read_grey(file, _MILLIMETRE)
         if confidence_file.exists():
-            confidence = np.rint(files.read_channels(confidence_file)[..., 0] * 255.0)
+            confidence = files.read_samples(confidence_file)[..., 0]
             if confidence.shape != depth.shape:
                 raise UserError(f"{confidence_file} has another size than {file}")
             depth[confidence < CERTAIN] = 0.0
@@ -97,13 +97,13 @@ class StrayScanner:
         value = self._rows[number].get(name) or ""
         return finite_numbers([value], f"{self._file('odometry.csv')}, line {number + 2}: {name}")[0]
 
-    def _table(self, name: str) -> list[list[str]]:
+    def _table(self, name: str) -> Iterator[list[str]]:
         file = self._file(name)
-        data = read_input(file, "the table", MAX_CAPTURE_TEXT_BYTES, f"{self._folder} lacks {name}")
-        try:
-            return [row for row in csv.reader(io.StringIO(data.decode("utf-8"))) if row]
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise UserError(f"{file} is not a table: {error}") from None
+        for line in text_lines(file, "the table", MAX_CAPTURE_FRAMES + 1):
+            try:
+                yield from filter(None, csv.reader([line]))
+            except csv.Error as error:
+                raise UserError(f"{file} is not a table: {error}") from None
 
     def _file(self, name: str) -> Path:
-        return self._folder / name
+        return files.inside(self._folder, name, str(self._folder))

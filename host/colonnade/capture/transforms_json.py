@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from colonnade.capture.source import OPENGL_AXES, Frame, Lens, Outline, clean_depth, lens, pose
-from colonnade.capture.tum import inside
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import read_picture
 from colonnade.common.input_files import read_json
@@ -56,32 +55,34 @@ class TransformsJson:
 
     def frames(self, numbers: Sequence[int]) -> Iterator[Frame]:
         """Read frames, by ascending number."""
-        for number in numbers:
-            frame = self._frames[number]
-            where = f"{self._file}, frame {number}"
-            try:
-                matrix = np.array(frame["transform_matrix"], np.float64)
-            except (KeyError, TypeError, ValueError):
-                matrix = np.empty(0)
-            if matrix.shape not in ((3, 4), (4, 4)):
-                raise UserError(f"{where} has no pose: transform_matrix must be 4 rows of 4 numbers")
-            photo = read_picture(self._path(frame, "file_path", where))
-            depth_file = self._path(frame, "depth_file_path", where)
-            steps = files.read_array(depth_file) if depth_file.suffix == ".npy" else files.read_grey(depth_file)
-            yield Frame(
-                number,
-                number * _INTERVAL,
-                photo,
-                clean_depth(steps * _MILLIMETRE),
-                self._lens(frame, photo.shape[1], photo.shape[0], where),
-                pose(matrix[:3, :3], matrix[:3, 3], where, OPENGL_AXES),
-            )
+        return map(self._frame, numbers)
+
+    def _frame(self, number: int) -> Frame:
+        frame = self._frames[number]
+        where = f"{self._file}, frame {number}"
+        try:
+            matrix = np.array(frame["transform_matrix"], np.float64)
+        except (KeyError, TypeError, ValueError):
+            matrix = np.empty(0)
+        if matrix.shape not in ((3, 4), (4, 4)):
+            raise UserError(f"{where} has no pose: transform_matrix must be 4 rows of 4 numbers")
+        photo = read_picture(self._path(frame, "file_path", where))
+        depth_file = self._path(frame, "depth_file_path", where)
+        read = files.read_array if depth_file.suffix == ".npy" else files.read_grey
+        return Frame(
+            number,
+            number * _INTERVAL,
+            photo,
+            clean_depth(read(depth_file, _MILLIMETRE)),
+            self._lens(frame, photo.shape[1], photo.shape[0], where),
+            pose(matrix[:3, :3], matrix[:3, 3], where, OPENGL_AXES),
+        )
 
     def _path(self, frame: dict[str, Any], key: str, where: str) -> Path:
         name = frame.get(key)
         if not isinstance(name, str):
             raise UserError(f"{where} lacks {key}")
-        return inside(self._folder, name, "transforms.json")
+        return files.inside(self._folder, name, where)
 
     def _lens(self, frame: dict[str, Any], width: int, height: int, where: str) -> Lens:
         def value(key: str, default: float | None = None) -> float:

@@ -8,18 +8,24 @@ from __future__ import annotations
 
 from bisect import bisect
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
+from statistics import median
 
 from colonnade.capture.source import Frame, Outline, finite_numbers, lens, quaternion_pose
+from colonnade.capture.text_lines import text_lines
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import read_picture
-from colonnade.common.input_files import read_input
-from colonnade.common.limits import MAX_CAPTURE_FRAMES, MAX_CAPTURE_TEXT_BYTES
+from colonnade.common.limits import MAX_CAPTURE_FRAMES
 from colonnade.environment import files
 
 _STEP = 1.0 / 5000.0
 #: Largest difference of times within a frame, seconds.
 _TOGETHER = 0.02
+#: Lines of a list.
+_MOST_LINES = 1 << 19
+#: Other units of times, and the least that a list's times are apart in them; seconds are less apart.
+_UNITS = {"nanoseconds": 2e6, "microseconds": 2e3, "milliseconds": 2.0}
 #: fx, fy, cx, cy of the cameras, by a part of the folder's name; the centre of their first pixel is at 0.
 _LENSES = {
     "freiburg1": (517.3, 516.5, 318.6, 255.3),
@@ -36,6 +42,11 @@ class TumRgbd:
         self._folder = folder
         photos, depths = (self._list(name, 2) for name in ("rgb.txt", "depth.txt"))
         poses = self._list("groundtruth.txt", 8)
+        self._notes = tuple(
+            note
+            for name, table in (("rgb.txt", photos), ("depth.txt", depths), ("groundtruth.txt", poses))
+            if (note := _unit_note(folder / name, table)) is not None
+        )
         # (time, photo, depth, pose) of each frame
         self._frames = []
         for time, (photo, *_) in photos:
@@ -43,12 +54,14 @@ class TumRgbd:
             if depth is not None and pose is not None:
                 self._frames.append((time, photo, depth[0], pose))
         if not self._frames:
-            raise UserError(f"{folder}: no photo has depth and a pose within {_TOGETHER * 1000:.0f} ms")
+            problem = f"{folder}: no photo has depth and a pose within {_TOGETHER * 1000:.0f} ms"
+            raise UserError("; ".join((problem, *self._notes)))
         if len(self._frames) > MAX_CAPTURE_FRAMES:
             raise UserError(f"{folder} has {len(self._frames):,} frames, {MAX_CAPTURE_FRAMES:,} at most")
         name = folder.resolve().name
         known = next((values for key, values in _LENSES.items() if key in name), None)
-        self._notes = () if known else ("the lens was taken as fx = fy = 525 pixels: a TUM folder does not hold it",)
+        if known is None:
+            self._notes += ("the lens was taken as fx = fy = 525 pixels: a TUM folder does not hold it",)
         fx, fy, cx, cy = known or _OTHER_LENS
         self._lens = lens((fx, fy, cx + 0.5, cy + 0.5), str(folder))
 
@@ -59,24 +72,25 @@ class TumRgbd:
 
     def frames(self, numbers: Sequence[int]) -> Iterator[Frame]:
         """Read frames, by ascending number."""
-        for number in numbers:
-            time, photo, depth, row = self._frames[number]
-            where = f"{self._folder / 'groundtruth.txt'}, time {time:.6f}"
-            values = finite_numbers(row, where)
-            yield Frame(
-                number,
-                time,
-                read_picture(inside(self._folder, photo, "rgb.txt")),
-                files.read_grey(inside(self._folder, depth, "depth.txt")) * _STEP,
-                self._lens,
-                quaternion_pose(values[3:7], values[:3], where, None),
-            )
+        return map(self._frame, numbers)
+
+    def _frame(self, number: int) -> Frame:
+        time, photo, depth, row = self._frames[number]
+        where = f"{self._folder / 'groundtruth.txt'}, time {time:.6f}"
+        values = finite_numbers(row, where)
+        return Frame(
+            number,
+            time,
+            read_picture(files.inside(self._folder, photo, "rgb.txt")),
+            files.read_grey(files.inside(self._folder, depth, "depth.txt"), _STEP),
+            self._lens,
+            quaternion_pose(values[3:7], values[:3], where, None),
+        )
 
     def _list(self, name: str, columns: int) -> list[tuple[float, list[str]]]:
         file = self._folder / name
-        data = read_input(file, "the list", MAX_CAPTURE_TEXT_BYTES, f"{self._folder} lacks {name}")
         found = []
-        for number, line in enumerate(data.decode("utf-8", "replace").splitlines(), 1):
+        for number, line in enumerate(text_lines(file, "the list", _MOST_LINES), 1):
             words = line.replace(",", " ").split()
             if not words or words[0].startswith("#"):
                 continue
@@ -88,12 +102,11 @@ class TumRgbd:
         return sorted(found, key=lambda entry: entry[0])
 
 
-def inside(folder: Path, name: str, where: str) -> Path:
-    """A file that a list names, which must lie in the folder of the capture."""
-    file = folder / name
-    if "\0" in name or not file.resolve().is_relative_to(folder.resolve()):
-        raise UserError(f"{where} in {folder} names {name}: a file must lie in the folder of the capture")
-    return file
+def _unit_note(file: Path, table: list[tuple[float, list[str]]]) -> str | None:
+    """A line on times that are too far apart to be seconds."""
+    interval = median(later[0] - earlier[0] for earlier, later in pairwise(table)) if len(table) > 1 else 0.0
+    unit = next((unit for unit, least in _UNITS.items() if interval >= least), None)
+    return unit and f"the times in {file} are {interval:g} apart, as of {unit}: they must be seconds"
 
 
 def _nearest(table: list[tuple[float, list[str]]], time: float) -> list[str] | None:

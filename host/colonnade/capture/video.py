@@ -13,11 +13,12 @@ import numpy as np
 
 from colonnade.common import ledger, processes
 from colonnade.common.errors import UserError
-from colonnade.common.limits import MAX_PIXELS
 from colonnade.common.types import Bytes
 
 #: Bytes of a line of a picture's title.
 _MAX_LINE = 64
+#: Pixels of a frame: some more than of 4K, as the decoder keeps some dozen frames.
+_MAX_PIXELS = 4096 * 2304
 
 
 def frames_of_video(path: Path, places: Sequence[int]) -> Iterator[Bytes]:
@@ -36,7 +37,7 @@ def frames_of_video(path: Path, places: Sequence[int]) -> Iterator[Bytes]:
     # Only this file is opened, as this format; the numbers of the frames are in no shell
     command = [
         imageio_ffmpeg.get_ffmpeg_exe(), "-nostdin", "-v", "error", "-threads", "1", "-noautorotate",
-        "-max_pixels", MAX_PIXELS, "-protocol_whitelist", "file", "-f", "mov", "-i", f"file:{path.absolute()}",
+        "-max_pixels", _MAX_PIXELS, "-protocol_whitelist", "file", "-f", "mov", "-i", f"file:{path.absolute()}",
         "-map", "0:v:0", "-vf", f"select={_selected(places)}", "-fps_mode", "passthrough", "-frames:v", len(places),
         "-f", "image2pipe", "-c:v", "ppm", "-",
     ]  # fmt: skip

@@ -97,11 +97,9 @@ def pack(
     declare_output(file)
     terminal = progress.for_terminal()
     pixels = parse_size(size) if size is not None else None
-    described = load_scene(scene)
+    described = load_scene(scene, background)
     if mesh is not None:
         described = described.with_mesh(mesh)
-    if background is not None:
-        described = described.with_environment(background)
     if maps_image is not None and described.background.room is None:
         raise UserError(
             f"--maps-image holds the maps of a room, and {scene} has none: give background.room or --background"

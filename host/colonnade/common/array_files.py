@@ -20,7 +20,7 @@ _MAX_BYTES = 16
 
 
 def parse_npy(data: bytes) -> NDArray[Any]:
-    """Parse a ``.npy`` file: a numeric array of any shape.
+    """Parse a ``.npy`` file: a numeric array of any shape, which shares its memory and cannot be written.
 
     Raises:
         ValueError: The data is not a numeric array; the message says why.
@@ -33,7 +33,7 @@ def parse_npy(data: bytes) -> NDArray[Any]:
         if version not in ((1, 0), (2, 0)):
             raise ValueError("the format version is unknown")
         read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read_header(stream, max_header_size=_MAX_HEADER)
+        shape, is_fortran, dtype = read_header(stream, max_header_size=_MAX_HEADER)
     except ValueError:
         raise
     except Exception as error:  # the header parser raises many types on invalid data
@@ -44,9 +44,7 @@ def parse_npy(data: bytes) -> NDArray[Any]:
         raise ValueError(f"the data size does not match the shape {shape}")
     if math.prod(shape) == 0:
         raise ValueError("the array is empty")
-    stream.seek(0)
-    array: NDArray[Any] = np.load(stream, allow_pickle=False)
-    return array
+    return np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape, order="F" if is_fortran else "C")
 
 
 def parse_npz(data: bytes, names: Sequence[str]) -> list[NDArray[Any]]:

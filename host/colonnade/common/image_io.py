@@ -157,6 +157,7 @@ def rgb_pixels(picture: PillowImage) -> NDArray[np.uint8]:
     import numpy as np
 
     if picture.mode.startswith("I"):  # 16-bit grey, which Pillow's convert would clip at 255
-        grey = np.rint(np.clip(np.asarray(picture, dtype=np.float64), 0, 65535) / 257).astype(np.uint8)
+        samples = np.asarray(picture).clip(0, 65535).astype(np.uint32)
+        grey = ((samples + 128) // 257).astype(np.uint8)
         return np.repeat(grey[..., np.newaxis], 3, axis=2)
     return np.asarray(picture.convert("RGB"))

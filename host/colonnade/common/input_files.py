@@ -13,13 +13,15 @@ from typing import Any
 from colonnade.common import ledger
 from colonnade.common.atomic_files import kind_of
 from colonnade.common.errors import UserError, reason_of
-from colonnade.common.limits import MAX_DEPTH, MAX_DIGITS, MAX_TEXT, MAX_TEXT_BYTES
+from colonnade.common.limits import MAX_DEPTH, MAX_DIGITS, MAX_GROUPS, MAX_TEXT, MAX_TEXT_BYTES
 
 #: The first bytes of what Git leaves in place of a large file.
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
 
-def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: str | None = None) -> bytes:
+def read_input(
+    path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: str | None = None, first: int | None = None
+) -> bytes:
     """Read an input file.
 
     Args:
@@ -27,6 +29,7 @@ def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: st
         what: for messages, e.g. ``"the scene"``.
         maximum: largest size, bytes.
         missing: the error message for a missing file.
+        first: only so many bytes are read; None: all.
 
     Raises:
         UserError: The file is missing, not regular, too large, unreadable, a pointer of Git LFS, or a declared output.
@@ -39,7 +42,7 @@ def read_input(path: Path, what: str, maximum: int = MAX_TEXT_BYTES, missing: st
             status = os.fstat(handle)
             if not stat.S_ISREG(status.st_mode):
                 raise refused
-            data = stream.read(maximum + 1) if status.st_size <= maximum else b""
+            data = stream.read(first or maximum + 1) if status.st_size <= maximum else b""
     except OSError as error:
         raise UserError(f"cannot read {what} {path}: {reason_of(error)}") from None
     if status.st_size > maximum or len(data) > maximum:
@@ -117,6 +120,8 @@ def parse_json(data: bytes | str, what: str, max_text: int = MAX_TEXT) -> Any:
     """
     try:
         text = data.decode("utf-8-sig") if isinstance(data, bytes) else data
+        if text.count("[") + text.count("{") > MAX_GROUPS:
+            raise ValueError(f"it holds more than {MAX_GROUPS:,} lists and objects")
         value = json.loads(
             text,
             object_pairs_hook=_object,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 #: Nesting levels of JSON and TOML.
 MAX_DEPTH = 64
+#: Lists and objects of a JSON document.
+MAX_GROUPS = 1 << 20
 #: Digits of an integer.
 MAX_DIGITS = 40
 #: Characters of a string in a scene, of a mesh's name, or of a ``--set``.

@@ -190,7 +190,9 @@ def _fitted(depth: Floats, rays: Floats) -> Floats:
     """The plane with the least squared relative error of depth, float64 [3]."""
     points = rays * depth[:, np.newaxis]
     matrix = np.array([[(points[:, i] * points[:, j]).sum() for j in range(3)] for i in range(3)])
-    return fixed_order.solve(matrix + np.eye(3) * 1e-9 * depth.size, points.sum(axis=0))
+    # The second term is of depth in kilometres, whose rounding would make the matrix singular
+    least = max(1e-9 * depth.size, 1e-12 * float(matrix.trace()))
+    return fixed_order.solve(matrix + np.eye(3) * least, points.sum(axis=0))
 
 
 def _agrees(plane: Floats, depth: Floats, rays: Floats, local: Floats, noise: float) -> NDArray[np.bool_]:

@@ -34,8 +34,8 @@ from colonnade.environment.repair import holes_of, repair_depth, repair_normals
 
 #: Default metres per step of a 16-bit depth picture, as in common depth cameras.
 DEFAULT_DEPTH_STEP = 0.001
-#: Largest metres per step.
-MAX_DEPTH_STEP = 1e3
+#: Least and largest metres per step.
+DEPTH_STEPS = (1e-6, 1e3)
 #: Largest width or height of a map, pixels, limited by the hardware's plane coefficients.
 MAX_EDGE = 4096
 #: Names of the photo.
@@ -87,7 +87,7 @@ def load_environment(path: Path, camera_height: float | None = None) -> Environm
         files.find(folder, ("normal.png",)),
         files.find(folder, ("depth.npy", "depth.png")),
         files.find(folder, PHOTOS),
-        _depth_step(meta, meta_file),
+        depth_step(meta, meta_file),
         encoding,
     )
     for missing, other in (("albedo.png", maps.albedo or maps.photo), ("normal.png", maps.normals or maps.depth)):
@@ -176,13 +176,19 @@ def load_maps(
 _ALBEDO_NOTE = "there is no albedo.png: the albedo is the photo divided by the light that was fitted to it"
 
 
-def _depth_step(meta: dict[str, Any], meta_file: Path) -> float:
-    step = meta.get("depth_step", DEFAULT_DEPTH_STEP)
-    if isinstance(step, bool) or not isinstance(step, int | float) or not 0 < step <= MAX_DEPTH_STEP:
-        raise UserError(f"{meta_file}: depth_step must be the metres per step of depth.png")
+def depth_step(data: dict[str, Any], file: Path) -> float:
+    """The metres per step of depth pictures that a file tells.
+
+    Raises:
+        UserError: It is no number, or out of range.
+    """
+    step = data.get("depth_step", DEFAULT_DEPTH_STEP)
+    low, high = DEPTH_STEPS
+    if isinstance(step, bool) or not isinstance(step, int | float) or not low <= step <= high:
+        raise UserError(f"{file}: depth_step must be the metres per step of depth pictures, {low:g} to {high:g}")
     return float(step)
 
 
 def _depth(file: Path, step: float) -> NDArray[np.float64]:
     """Read the depth map before repair, metres: float64 [height, width]."""
-    return files.read_array(file) if file.suffix == ".npy" else files.read_grey(file) * step
+    return files.read_array(file) if file.suffix == ".npy" else files.read_grey(file, step)

@@ -17,6 +17,8 @@ _MAX_BAD_NORMALS = 0.05
 _MAX_FACING_AWAY = 0.1
 #: Largest fraction of pixels without depth.
 MAX_HOLES = 0.5
+#: Least and largest depth, metres: those of one and of all steps of a depth picture.
+_DEPTHS = (1e-6, 1e8)
 
 
 def repair_normals(
@@ -58,7 +60,7 @@ def repair_normals(
 
 
 def repair_depth(depth: NDArray[np.float64], file: Path) -> tuple[NDArray[np.float64], list[str]]:
-    """Fill holes (NaN, infinite, zero or negative depth) from their nearest neighbours.
+    """Fill holes, see `holes_of`, from their nearest neighbours.
 
     Args:
         depth: float64 [height, width], metres.
@@ -85,8 +87,9 @@ def repair_depth(depth: NDArray[np.float64], file: Path) -> tuple[NDArray[np.flo
 
 
 def holes_of(depth: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Pixels without depth: NaN, infinite, zero or negative, bool [height, width]."""
-    return np.asarray(~(np.isfinite(depth) & (depth > 0)))
+    """Pixels without depth: NaN, zero or negative, or not from 1e-6 to 1e8 metres, bool [height, width]."""
+    low, high = _DEPTHS
+    return np.asarray(~((depth >= low) & (depth <= high)))
 
 
 def filled(values: NDArray[np.float64], holes: NDArray[np.bool_]) -> NDArray[np.float64]:

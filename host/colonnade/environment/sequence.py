@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from annotated_types import Gt, Interval, Len
+from annotated_types import Interval, Len
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, Strict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
@@ -22,8 +22,9 @@ from colonnade.common.input_files import check_values, read_input
 from colonnade.common.limits import MAX_CAPTURE_TEXT_BYTES, MAX_DEPTH, MAX_FRAMES
 from colonnade.environment.camera import check_size, read_camera
 from colonnade.environment.derived_albedo import hue_lights
+from colonnade.environment.files import inside
 from colonnade.environment.lights import RoomLights
-from colonnade.environment.load import DEFAULT_DEPTH_STEP, MAX_DEPTH_STEP, MAX_EDGE, RoomFiles, load_maps
+from colonnade.environment.load import DEFAULT_DEPTH_STEP, MAX_EDGE, RoomFiles, depth_step, load_maps
 from colonnade.environment.model import Environment, EnvironmentCamera
 
 if sys.version_info >= (3, 11):
@@ -90,7 +91,7 @@ class SequenceFile:
     height: _Pixels
     frame: Annotated[tuple[SequenceFrame, ...], Len(1, MAX_FRAMES)]
     rate: Annotated[_Float, Interval(gt=0, le=1e6)] = 30.0
-    depth_step: Annotated[_Float, Gt(0), Interval(le=MAX_DEPTH_STEP)] = DEFAULT_DEPTH_STEP
+    depth_step: _Float = DEFAULT_DEPTH_STEP
     depth_noise: Annotated[_Float, Interval(ge=0.0, le=1.0)] = 0.005
     maps: SequenceMaps = SequenceMaps()
 
@@ -178,6 +179,7 @@ def load_sequence(path: Path) -> Sequence:
     except ValueError as error:  # invalid TOML or UTF-8, or too many digits
         raise UserError(f"sequence {path} is not TOML: {error}") from None
     check_values(data, f"sequence {path}")
+    depth_step(data, path)
     try:
         # Lists become the tuples of the schema
         found = _SCHEMA.validate_python(data)
@@ -193,6 +195,6 @@ def load_sequence(path: Path) -> Sequence:
         raise UserError(f"sequence {path}: the times of its frames must ascend")
     for number, frame in enumerate(found.frame):
         for name in (frame.photo, frame.depth, frame.albedo, frame.normal):
-            if name is not None and (Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name):
-                raise UserError(f"sequence {path}, frame {number}: {name} must lie beside the sequence")
+            if name is not None:
+                inside(path.parent, name, f"sequence {path}, frame {number},")
     return Sequence(path, found)

@@ -1,14 +1,9 @@
-"""Decodes Draco streams in a process of its own.
-
-The decoder is C++, and a stream of a few bytes may ask for any memory and time, or end the process. So this one has
-limits of both in proportion to the streams, and what ends it is one line of an error. The module is also its program.
-"""
+"""Decodes Draco streams in a process of its own, with limits in proportion to the streams; also its program."""
 
 from __future__ import annotations
 
 import io
 import struct
-import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common.decoder_process import DAMAGED, decode
 from colonnade.common.errors import UserError
 from colonnade.common.machine_limits import limit_this_process
 
@@ -25,9 +21,6 @@ from colonnade.common.machine_limits import limit_this_process
 _MEMORY, _MEMORY_OF_A_BYTE, _MOST_MEMORY = 1 << 29, 500, 1 << 33
 #: Its processor time, seconds, and bytes of the streams for one more. It decodes 30 MB in a second.
 _SECONDS, _BYTES_OF_A_SECOND = 5, 1 << 20
-
-#: Exit status of the process if the decoder refuses a stream.
-_DAMAGED = 3
 
 
 @dataclass(frozen=True)
@@ -53,20 +46,13 @@ def decode_draco(streams: Sequence[bytes]) -> list[DracoMesh]:
     size = sum(map(len, streams))
     memory = min(_MEMORY + _MEMORY_OF_A_BYTE * size, _MOST_MEMORY)
     seconds = _SECONDS + size // _BYTES_OF_A_SECOND
-    done = subprocess.run(
-        [sys.executable, "-I", "-m", "colonnade.mesh.draco", str(memory), str(seconds)],
-        input=b"".join(struct.pack("<Q", len(stream)) + stream for stream in streams),
-        capture_output=True,
-        check=False,
-    )
-    if done.returncode == _DAMAGED or done.returncode < 0:
+    data = b"".join(struct.pack("<Q", len(stream)) + stream for stream in streams)
+    done = decode("colonnade.mesh.draco", memory, seconds, data=data)
+    if done.returncode != 0:
         raise UserError(
             f"its Draco data are damaged, or take more than {memory >> 20:,} MiB or {seconds} s to decode:"
             " export it without compression"
         )
-    if done.returncode != 0:
-        reason = (done.stderr.decode("utf-8", "replace").splitlines() or ["no reason given"])[-1]
-        raise UserError(f"the decoder for Draco does not start: {reason}: install Colonnade again")
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
         found: list[dict[str, npt.NDArray[Any]]] = [{} for _ in streams]
         for name in arrays.files:
@@ -95,7 +81,7 @@ def _main() -> None:
             at, number = at + 8 + size, number + 1
         np.savez(sys.stdout.buffer, **arrays)  # type: ignore[arg-type]
     except Exception:  # of many types, and MemoryError
-        sys.exit(_DAMAGED)
+        sys.exit(DAMAGED)
 
 
 if __name__ == "__main__":

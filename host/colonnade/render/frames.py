@@ -45,11 +45,11 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     """
     if request.backend == "reference":
         require_extra("reference", "the reference backend")
-    scene = request.scene if isinstance(request.scene, Scene) else load_scene(request.scene)
-    if request.background is not None:
-        scene = scene.with_environment(request.background)
-    if request.sequence is not None:
-        scene = scene.with_environment(request.sequence.path.parent)
+    room = request.background if request.sequence is None else request.sequence.path.parent
+    if not isinstance(request.scene, Scene):
+        scene = load_scene(request.scene, room)
+    else:
+        scene = request.scene if room is None else request.scene.with_environment(room)
     if isinstance(request.mesh, str):
         scene = scene.with_mesh(request.mesh)
     elif request.mesh is not None:

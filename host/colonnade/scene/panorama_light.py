@@ -12,7 +12,8 @@ from colonnade.common.accumulation import LUMINANCE
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
 from colonnade.environment.lights import RoomLight, RoomLights, light_box
-from colonnade.environment.panorama import Panorama, read_panorama
+from colonnade.environment.panorama import Panorama
+from colonnade.environment.panorama_file import read_panorama
 from colonnade.environment.panorama_lights import DistantLight, split_lights
 from colonnade.environment.photo_colours import MAX_INTENSITY
 from colonnade.environment.seen_light import FINE, SeenLight, texel_weights

@@ -55,14 +55,19 @@ def scene_file(name: str | Path) -> Path:
     return named
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, room: Path | None = None) -> Scene:
     """Read a scene file; its paths are relative to its folder.
+
+    Args:
+        path: The file.
+        room: Folder of a room in place of the scene's background, if it has one.
 
     Raises:
         UserError: The file is missing, is not TOML, or has an invalid key or value.
     """
     file = Path(path)
-    return scene_of(read_tables(file), f"scene {file}", file.parent)
+    scene = scene_of(read_tables(file), f"scene {file}", file.parent, room is not None)
+    return scene if room is None else scene.with_environment(room)
 
 
 def read_tables(file: Path) -> dict[str, Any]:
@@ -82,20 +87,21 @@ def read_tables(file: Path) -> dict[str, Any]:
         raise UserError(f"scene {file} is not TOML: {error}") from None
 
 
-def scene_of(tables: Mapping[str, Any], where: str, folder: Path) -> Scene:
+def scene_of(tables: Mapping[str, Any], where: str, folder: Path, in_room: bool = False) -> Scene:
     """The scene of a file's tables.
 
     Args:
         tables: By name, with the keys of the file.
         where: Names the tables in messages.
         folder: What the paths are relative to.
+        in_room: Whether the scene gets a room, also if its background names none.
 
     Raises:
         UserError: A key or a value is invalid.
     """
     check_values(tables, where)
     try:
-        _check_combinations(tables)
+        _check_combinations(tables, in_room)
         scene = _SCHEMA.validate_python(_as_schema(tables))
     except ValidationError as error:
         raise UserError(f"{where}: {_message(error.errors(include_url=False)[0])}") from None
@@ -138,7 +144,7 @@ def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
     return {"mesh": {}} | tables
 
 
-def _check_combinations(data: Mapping[str, Any]) -> None:
+def _check_combinations(data: Mapping[str, Any], in_room: bool) -> None:
     """Refuse unknown tables and contradictory keys.
 
     Raises:
@@ -149,8 +155,9 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
             raise ValueError(f"unknown key {name}; known here: {', '.join(_TABLES)}")
         if not isinstance(value, dict) and not (name in ("light", "object") and isinstance(value, list) and value):
             raise ValueError(f"{name} must be a table: [{name}]")
+    in_room = in_room or "room" in _table(data, "background")
     if isinstance(data.get("object"), list):
-        _check_objects(data)
+        _check_objects(data, in_room)
         data = {name: value for name, value in data.items() if name != "object"}
     lights = data.get("light", {})
     lights = lights if isinstance(lights, list) else [lights]
@@ -158,24 +165,24 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
     is_placed = "camera" in data and set(camera) != {"grain"}
     if "room" in background and is_placed and "position" not in camera:
         raise ValueError("the camera is the room's: give camera.position, or leave out [camera]")
-    if "photo" in background and "room" not in background:
+    if "photo" in background and not in_room:
         raise ValueError("background.photo is a view of a room: it needs background.room")
     if "photo" in background and not is_placed:
         raise ValueError("background.photo is for a camera that the scene places: give [camera]; a room has its photo")
     if "photo" in background and "camera" in _table(data, "motion"):
         raise ValueError("background.photo is the view of one camera: leave out motion.camera")
-    if "grain" in camera and "room" not in background:
+    if "grain" in camera and not in_room:
         raise ValueError("camera.grain is of the photo of a room: it needs background.room")
     for key in ("panorama_yaw", "panorama_exposure"):
         if key in background and "panorama" not in background:
             raise ValueError(f"background.{key} is of a panorama: it needs background.panorama")
-    if "room" not in background and "second_view" in background:
+    if not in_room and "second_view" in background:
         raise ValueError("background.second_view is another view of a room: it needs background.room")
-    if "room" not in background and "shadows" in background:
+    if not in_room and "shadows" in background:
         raise ValueError("background.shadows is of shadows on a room's photo: it needs background.room")
-    if "room" not in background and "colours" in background:
+    if not in_room and "colours" in background:
         raise ValueError("background.colours chooses the colours of a room: it needs background.room")
-    if "room" not in background and "object" in data:
+    if not in_room and "object" in data:
         raise ValueError("[object] places the object in a room: it needs background.room")
     if "object" in data and ("scale" in transform or "translate" in transform):
         raise ValueError("[object] places the object: leave out transform.scale and transform.translate")
@@ -194,13 +201,13 @@ def _check_combinations(data: Mapping[str, Any]) -> None:
         raise ValueError("motion.light starts at the first light's position: give light.position")
 
 
-def _check_objects(data: Mapping[str, Any]) -> None:
+def _check_objects(data: Mapping[str, Any], in_room: bool) -> None:
     """Refuse contradictory keys of a scene with ``[[object]]`` tables.
 
     Raises:
         ValueError: The message for the user.
     """
-    objects, in_room = data["object"], "room" in data.get("background", {})
+    objects = data["object"]
     if len(objects) > MAX_OBJECTS:
         raise ValueError(f"the scene has {len(objects)} [[object]], at most {MAX_OBJECTS} are possible: join meshes")
     for table in ("mesh", "transform", "material"):

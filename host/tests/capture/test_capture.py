@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import weakref
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +17,10 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from colonnade.capture import convert as conversion
+from colonnade.capture import record3d
 from colonnade.cli.main import cli
+from colonnade.common import image_io
+from colonnade.common.errors import UserError
 from colonnade.environment.depth_normals import DepthNormals
 from colonnade.environment.load import load_environment
 from colonnade.environment.sequence import Sequence, load_sequence
@@ -203,13 +208,16 @@ def test_a_folder_that_is_not_empty_stays(living: Recording, tmp_path: Path) -> 
 
 
 def test_a_sequence_is_checked(tmp_path: Path) -> None:
-    from colonnade.common.errors import UserError
-
     row = "[1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.5], [0.0, 0.0, -1.0, 0.0]"
     frame = '[[frame]]\ntime = 0.0\nphoto = "a.png"\ndepth = "b.png"\nfx = 60.0\nfy = 60.0\ncx = 32.0\ncy = 24.0\n'
     frame += f"cam_to_world = [{row}]\n"
     good = f"width = 64\nheight = 48\n{frame}"
-    file = tmp_path / "sequence.toml"
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (tmp_path / "outside.png").touch()
+    (folder / "link.png").symlink_to("../outside.png")
+    (folder / "circle.png").symlink_to("circle.png")
+    file = folder / "sequence.toml"
     file.write_text(good)
     assert len(load_sequence(file)) == 1
     changes: dict[str, Callable[[str], str]] = {
@@ -217,7 +225,12 @@ def test_a_sequence_is_checked(tmp_path: Path) -> None:
         "unknown key frame.0.speed": lambda text: text + "speed = 1.0\n",
         "width: ": lambda text: text.replace("width = 64", "width = 64000"),
         "times of its frames must ascend": lambda text: text + frame,
-        "must lie beside": lambda text: text.replace("a.png", "../a.png"),
+        r"frame 0, names \.\./a\.png: a file must lie in the folder": lambda text: text.replace("a.png", "../a.png"),
+        "names link.png: a file must lie in the folder": lambda text: text.replace("a.png", "link.png"),
+        "names circle.png: a file must lie in the folder": lambda text: text.replace("b.png", "circle.png"),
+        "depth_step must be the metres per step of depth pictures, 1e-06 to 1000": lambda text: (
+            "depth_step = 1e-300\n" + text
+        ),
         "unit, at right angles": lambda text: text.replace("[1.0, 0.0", "[2.0, 0.0"),
         "is not TOML": lambda text: text + "[[",
         "a focal length": lambda text: text.replace("fx = 60.0", "fx = 0.0"),
@@ -230,6 +243,70 @@ def test_a_sequence_is_checked(tmp_path: Path) -> None:
     file.write_text(good)
     with pytest.raises(UserError, match=r"no picture .*a\.png"):
         load_sequence(file).room(0)
+
+
+def test_what_cannot_be_loaded_replaces_nothing(
+    living: Recording, tmp_path: Path, quick: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(path: Path) -> Sequence:
+        assert path.is_file()
+        raise UserError("sequence sequence.toml is wrong")
+
+    monkeypatch.setattr(conversion, "load_sequence", refused)
+    result = run(write_transforms(tmp_path, phone(living)), tmp_path / "out")
+    assert result.exit_code == 2 and "gives no sequence that can be read: sequence sequence.toml is" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("mark", [b"\xef\xbb\xbf", b"\xff\xfe"], ids=["utf-8", "utf-16"])
+def test_text_may_begin_with_a_mark_of_its_encoding(living: Recording, tmp_path: Path, mark: bytes) -> None:
+    for name in ("stray", "tum"):
+        source = WRITERS[name](tmp_path, phone(living))
+        expected = [frame.time for frame in conversion.source_of(source).frames([0, 1, 2])]
+        for file in (*source.glob("*.txt"), *source.glob("*.csv")):
+            text = file.read_text()
+            file.write_bytes(mark + text.encode("utf-8" if mark[0] == 0xEF else "utf-16-le"))
+        assert [frame.time for frame in conversion.source_of(source).frames([0, 1, 2])] == expected
+
+
+def with_times(source: Path, change: Callable[[float], str]) -> None:
+    """Change the times in the lists of a TUM folder."""
+    for name in ("rgb.txt", "depth.txt", "groundtruth.txt"):
+        lines = [line.split() for line in (source / name).read_text().splitlines() if not line.startswith("#")]
+        (source / name).write_text("\n".join(" ".join([change(float(time)), *rest]) for time, *rest in lines) + "\n")
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
+def test_times_of_a_tum_folder_in_another_unit_are_named(
+    living: Recording, tmp_path: Path, factor: float, unit: str
+) -> None:
+    source = WRITERS["tum"](tmp_path, phone(living))
+    with_times(source, lambda time: f"{time * factor:.0f}")
+    with pytest.raises(UserError, match=rf"rgb\.txt are \S+ apart, as of {unit}: they must be seconds"):
+        conversion.source_of(source)
+    with_times(source, lambda time: f"{time - time % (factor / 30):.0f}")
+    assert f"as of {unit}: they must be seconds" in conversion.source_of(source).outline.notes[0]
+
+
+def test_one_frame_at_a_time_is_in_memory(
+    living: Recording, tmp_path: Path, quick: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    photos: list[weakref.ref[Any]] = []
+    pixels = image_io.rgb_pixels
+
+    def watched(picture: Image.Image) -> Any:
+        assert all(photo() is None for photo in photos)
+        photo = pixels(picture).copy()
+        photos.append(weakref.ref(photo))
+        return photo
+
+    monkeypatch.setattr(image_io, "rgb_pixels", watched)
+    monkeypatch.setattr(record3d, "rgb_pixels", watched)
+    for name in ("record3d", "tum", "transforms"):
+        result = run(WRITERS[name](tmp_path, phone(living)), tmp_path / f"out-{name}")
+        assert result.exit_code == 0, result.output
+    # Three frames for the floor, the same three for the sequence, and the room's photo
+    assert len(photos) == 3 * 7
 
 
 def test_the_report(living: Recording, tmp_path: Path, quick: None) -> None:

@@ -140,11 +140,11 @@ def test_a_photo_that_its_exif_data_rotate_is_noted(environment: Path) -> None:
 
 def test_holes_take_their_neighbours_depth(environment: Path) -> None:
     depth, _ = corner()
-    for k, nothing in enumerate((0.0, -1.0, np.nan, np.inf)):
+    for k, nothing in enumerate((0.0, -1.0, np.nan, np.inf, 1e-300, 1e300)):
         depth[5 + k, 7 : 7 + 3] = nothing
     np.save(environment / "depth.npy", depth)
     loaded = load_environment(environment)
-    assert loaded.notes == ("12 of 3,072 pixels had no depth and were filled from their neighbours",)
+    assert loaded.notes == ("18 of 3,072 pixels had no depth and were filled from their neighbours",)
     assert np.allclose(loaded.depth, corner()[0])
 
 
@@ -243,6 +243,8 @@ def test_float_pictures_are_rejected(environment: Path) -> None:
         (meta(cam_to_world=TILTED.tolist()), "at right angles and right-handed"),
         (meta(width=640), "is 64x48 pixels, but .*meta.json says width 640"),
         (meta(albedo_encoding="gamma"), "albedo_encoding must be linear or srgb"),
+        (meta(depth_step=9e-7), "meta.json: depth_step must be the metres per step of depth pictures, 1e-06 to 1000"),
+        (meta(depth_step=1001), "depth_step must be the metres per step of depth pictures, 1e-06 to 1000"),
         (remove("albedo.png"), "lacks albedo.png"),
         (remove("normal.png", "depth.npy"), "lacks normal.png"),
         (break_file("albedo.png", b"no picture"), "albedo.png is not a readable picture"),
@@ -289,6 +291,28 @@ def test_normals_alone_are_derived(environment: Path) -> None:
     _, truth = corner()
     assert (np.abs(found.normals - truth).max(axis=2) < 0.01).mean() > 0.91
     assert any("normals are those of the depth map" in note for note in found.notes)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("step", [1e-6, 1e-3, 1e3])
+def test_normals_are_finite_whatever_the_step_of_depth(environment: Path, step: float) -> None:
+    remove("normal.png", "depth.npy")(environment)
+    change_meta(environment, depth_step=step)
+    steps = np.random.default_rng(1).choice(np.array([1, 2, 1000, 65535], np.uint16), (SIZE[1], SIZE[0]))
+    for depth in (steps, np.ones_like(steps), np.sort(steps)):
+        Image.fromarray(depth).save(environment / "depth.png")
+        assert np.isfinite(load_environment(environment).normals).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_normals_are_finite_whatever_the_depth(environment: Path) -> None:
+    """Far surfaces beside near ones are lost in rounding."""
+    remove("normal.png")(environment)
+    random = np.random.default_rng(1)
+    for near in (1e-6, 1e-300, 1.0):
+        depth = np.where(random.random((SIZE[1], SIZE[0])) < 0.4, near, 1e8)
+        np.save(environment / "depth.npy", depth)
+        assert np.isfinite(load_environment(environment).normals).all()
 
 
 def test_a_room_without_photo_and_albedo_is_refused(environment: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -15,14 +16,17 @@ from PIL import Image
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats
+from colonnade.environment import panorama_file
 from colonnade.environment.light_cube import FACE, face_directions
-from colonnade.environment.panorama import ROWS, Panorama, read_panorama
+from colonnade.environment.panorama import Panorama
+from colonnade.environment.panorama_file import ROWS, read_panorama
 from colonnade.environment.panorama_lights import split_lights
 
 
-def write(path: Path, pixels: Floats, channels: tuple[str, ...] = ("R", "G", "B")) -> Path:
+def write(path: Path, pixels: Floats, channels: tuple[str, ...] = ("R", "G", "B"), tile: int = 0) -> Path:
     spec = OpenImageIO.ImageSpec(pixels.shape[1], pixels.shape[0], len(channels), "float")
     spec.channelnames = channels
+    spec.tile_width = spec.tile_height = tile
     output = OpenImageIO.ImageOutput.create(str(path))
     assert output is not None and output.open(str(path), spec) and output.write_image(pixels.astype(np.float32))
     output.close()
@@ -60,12 +64,13 @@ def test_formats_show_the_same(name: str, tmp_path: Path) -> None:
 
 @settings(max_examples=8, deadline=None)
 @given(st.integers(2, 400), st.floats(0.01, 50))
-def test_a_constant_panorama_is_a_constant_cube(rows: int, level: float) -> None:
-    from colonnade.environment.panorama import _resized
-
-    panorama = _resized(Panorama(np.full((rows, 2 * rows, 3), level)))
-    np.testing.assert_allclose(panorama.mean(), level, rtol=1e-9)
-    np.testing.assert_allclose(panorama.cube(FACE).texels, level, rtol=1e-9)
+def test_a_constant_panorama_is_a_constant_cube(
+    tmp_path_factory: pytest.TempPathFactory, rows: int, level: float
+) -> None:
+    file = tmp_path_factory.mktemp("constant") / "a.exr"
+    panorama = read_panorama(write(file, np.full((rows, 2 * rows, 3), level)))
+    np.testing.assert_allclose(panorama.mean(), level, rtol=1e-6)
+    np.testing.assert_allclose(panorama.cube(FACE).texels, level, rtol=1e-6)
 
 
 @pytest.mark.parametrize("yaw", [-90.0, 37.0])
@@ -139,6 +144,44 @@ def test_bad_panoramas_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(sys.modules, "OpenImageIO", None)
     with pytest.raises(UserError, match=r"pip install 'colonnade\[panorama\]'"):
         read_panorama(tmp_path / "whole.hdr")
+
+
+def test_a_large_panorama_is_its_means_by_solid_angle(tmp_path: Path) -> None:
+    radiance = np.random.default_rng(1).random((600, 1200, 3)).astype(np.float32).astype(np.float64)
+    found = read_panorama(write(tmp_path / "a.exr", radiance))
+    tiled = read_panorama(write(tmp_path / "tiled.exr", radiance, tile=48))
+    np.testing.assert_array_equal(tiled.radiance, found.radiance)
+    assert found.radiance.shape == (ROWS, 2 * ROWS, 3)
+    np.testing.assert_allclose(found.mean(), Panorama(radiance).mean(), rtol=1e-3)
+    angles = Panorama(radiance).solid_angles()[:2]  # rows 0 and 1 become the first one, as do columns 0 and 1
+    expected = (radiance[:2, :2] * angles[..., None]).sum(axis=(0, 1)) / (2 * angles.sum())
+    np.testing.assert_allclose(found.radiance[0, 0], expected)
+
+
+def test_layers_take_no_memory(tmp_path: Path) -> None:
+    """Of all channels only R, G and B are decoded to numbers, in a process with limits."""
+    layers = tuple(f"layer{number}.Z" for number in range(61))
+    pixels = np.broadcast_to(np.array([[[2.0]]]), (512, 1024, 64))
+    file = write(tmp_path / "layers.exr", pixels, ("R", "G", "B", *layers))
+    program = (
+        "import resource, sys; from pathlib import Path\n"
+        "from colonnade.environment.panorama_file import read_panorama\n"
+        "assert (read_panorama(Path(sys.argv[1])).radiance == 2.0).all()\n"
+        "print(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0])\n"
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+    )
+    done = subprocess.run([sys.executable, "-c", program, file], capture_output=True, text=True, check=True)
+    assert sum(map(int, done.stdout.split())) < 300 << 10  # KiB; all channels take 400 MiB
+
+
+def test_a_panorama_beyond_the_limits_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("R", "G", "B", *(f"layer{number}.Z" for number in range(62)))
+    with pytest.raises(UserError, match=r"many\.exr has 65 channels, 64 at most: leave out layers"):
+        read_panorama(write(tmp_path / "many.exr", np.ones((4, 8, 65)), names))
+    large = write(tmp_path / "large.exr", np.ones((1024, 2048, 3)))
+    monkeypatch.setattr(panorama_file, "_MEMORY", 1 << 23)
+    with pytest.raises(UserError, match=r"large\.exr is damaged, or takes more than 8 MiB or 60 s to decode"):
+        read_panorama(large)
 
 
 def test_grey_is_light_of_all_channels(tmp_path: Path) -> None:

@@ -53,7 +53,6 @@ object.size = 0.5
 material.kind = "mirror"
 paths.bounces = 1
 background.colours = "{colours}"
-background.room = "unused"
 light = {{offset = [1.0, 1.5, 0.5]}}
 """
 

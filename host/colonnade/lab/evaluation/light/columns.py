@@ -21,7 +21,7 @@ from colonnade.device.device import require_no_errors
 from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
-from colonnade.environment.panorama import read_radiance
+from colonnade.environment.panorama_file import read_radiance
 from colonnade.lab.evaluation.light import files
 from colonnade.lab.evaluation.light.mirror_rays import MirrorErrors, mirror_errors
 from colonnade.lab.evaluation.light.probe import ProbeFrame

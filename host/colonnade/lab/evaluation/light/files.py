@@ -21,7 +21,7 @@ from colonnade.common.temporary import temporary_folder
 from colonnade.common.types import Floats
 from colonnade.design.toolchain import project_root
 from colonnade.environment.model import Environment
-from colonnade.environment.panorama import read_radiance
+from colonnade.environment.panorama_file import read_radiance
 from colonnade.lab.evaluation.light.rooms import FRAME, GLASSES, METALS, KnownRoom, PointLight, Thing
 from colonnade.lab.evaluation.light.surfaces import pose_of
 from colonnade.lab.evaluation.studies.synthetic_attic import write_room

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colonnade.environment.panorama import read_radiance
+from colonnade.environment.panorama_file import read_radiance
 from colonnade.lab.evaluation.light import files
 from colonnade.lab.evaluation.light.probe import Probe
 from colonnade.lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS, Lamp, Thing, Window
