@@ -159,7 +159,8 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
   it should "describe each target" in inScratch { scratch =>
     Files.writeString(scratch.resolve("filelist.f"), "Divider.sv\n")
     CoreFile.write("Divider", scratch)
-    val targets = Files.readString(scratch.resolve(CoreFile.name)).split("\ntargets:\n").last.split("(?m)^  (?=\\w)").tail
+    val targets =
+      Files.readString(scratch.resolve(CoreFile.name)).split("\ntargets:\n").last.split("(?m)^  (?=\\w)").tail
     targets.map(_.takeWhile(_ != ':')) shouldBe Seq("default", "lint", "sim", "synth")
     targets.flatMap(_.linesIterator.filter(_.startsWith("    description: "))).distinct should have size 4
   }
