@@ -33,10 +33,13 @@ size_t target_read(const char *name, void *to, size_t most) {
 void target_load(struct target *target, struct colonnade *device, const char *name) {
     target_check("device", colonnade_probe(device, &target->bus, &colonnade_design));
     colonnade_acknowledge(device, COLONNADE_FRAME_DONE | COLONNADE_IMAGE_DONE | COLONNADE_ERROR); /* of an earlier program */
+    /* Also of an event that comes before the wait for it: who counts interrupts sees each */
+    colonnade_enable_interrupts(device, COLONNADE_IMAGE_DONE);
     const uint32_t bytes = target_put(target, name);
     const uint64_t base = target->base;
     const struct colonnade_image image = {target->memory, bytes, base, {base, base + target->size}};
     target_check(name, colonnade_load(device, &image, ATTEMPTS));
+    colonnade_enable_interrupts(device, COLONNADE_FRAME_DONE);
 }
 
 uint32_t target_stride(uint32_t width) {
