@@ -23,7 +23,7 @@ _STEP = 1.0 / 5000.0
 #: Largest difference of times within a frame, seconds.
 _TOGETHER = 0.02
 #: Lines of a list.
-_MOST_LINES = 1 << 19
+_MAX_LINES = 1 << 19
 #: Other units of times, and the least that a list's times are apart in them; seconds are less apart.
 _UNITS = {"nanoseconds": 2e6, "microseconds": 2e3, "milliseconds": 2.0}
 #: fx, fy, cx, cy of the cameras, by a part of the folder's name; the centre of their first pixel is at 0.
@@ -90,7 +90,7 @@ class TumRgbd:
     def _list(self, name: str, columns: int) -> list[tuple[float, list[str]]]:
         file = self._folder / name
         found = []
-        for number, line in enumerate(text_lines(file, "the list", _MOST_LINES), 1):
+        for number, line in enumerate(text_lines(file, "the list", _MAX_LINES), 1):
             words = line.replace(",", " ").split()
             if not words or words[0].startswith("#"):
                 continue

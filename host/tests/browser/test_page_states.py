@@ -102,13 +102,13 @@ def test_an_error_of_a_file_shows_at_once_and_the_mesh_stays(context: BrowserCon
     tab = Tab(context, "#room=living&material=metal")
     page = tab.page
     expect(page.locator("#samples")).to_contain_text("is added")
-    shown = page.evaluate("document.getElementById('error').hidden")
+    is_hidden = page.evaluate("document.getElementById('error').hidden")
     frames = tab.frames()
     content = gltf_documents.REFUSED["doubled.gltf"][1].decode()
     tab.drop("doubled.gltf", content)
     assert page.evaluate("document.getElementById('busy').textContent") == "Reading the files…"
     expect(page.locator("#error")).to_have_text("mesh doubled.gltf: node 1 has two parents: export it again")
-    assert shown and tab.frames() == frames
+    assert is_hidden and tab.frames() == frames
     expect(page.locator("#busy")).to_be_hidden()
     tab.wait(frames)
     assert page.locator("#mesh").inner_text() == "teapot.ply" and page.locator("#error").is_visible()
@@ -123,7 +123,7 @@ def test_an_error_of_a_file_shows_at_once_and_the_mesh_stays(context: BrowserCon
 def test_each_work_shows_what_it_is(context: BrowserContext) -> None:
     tab = Tab(context, "#pixel=4")
     page = tab.page
-    shown = page.evaluate(
+    signs = page.evaluate(
         """([name, text]) => {
           const { elements } = document.getElementById("controls");
           const said = [];
@@ -144,7 +144,7 @@ def test_each_work_shows_what_it_is(context: BrowserContext) -> None:
         }""",
         ["four.obj", OBJ],
     )
-    assert shown == ["Opening edge…", ["Opening edge…", "Opening office…", "Packing the mesh…", "Reading the files…"]]
+    assert signs == ["Opening edge…", ["Opening edge…", "Opening office…", "Packing the mesh…", "Reading the files…"]]
     assert page.locator("#mesh").inner_text() == "four.obj"
     assert tab.is_quiet()
 
@@ -159,16 +159,16 @@ def test_hardware_that_cannot_hold_the_mesh_is_not_taken(context: BrowserContext
     tab.drop("grid.obj", vertices + faces)
     expect(page.locator("#mesh")).to_have_text("grid.obj", timeout=30_000)
     tab.wait(before)
-    before, shown = tab.frames(), tab.picture()["colours"]
+    before, colours = tab.frames(), tab.picture()["colours"]
     page.select_option("select[name=design]", "tiny")
     expect(page.locator("#error")).to_contain_text("mesh grid.obj needs ")
     tab.wait(before)
     expect(page.locator("select[name=design]")).to_have_value("textured")
-    assert tab.picture()["colours"] == shown and page.locator("#error").is_visible()
+    assert tab.picture()["colours"] == colours and page.locator("#error").is_visible()
     before = tab.frames()
     page.select_option("select[name=material]", "mirror")
     tab.wait(before)
-    assert page.locator("#error").is_hidden() and tab.picture()["colours"] != shown
+    assert page.locator("#error").is_hidden() and tab.picture()["colours"] != colours
     assert tab.is_quiet()
 
 

@@ -129,11 +129,11 @@ def test_a_saved_camera_shows_what_was_shown_at_any_scale(file: Path, scale: flo
     file.write_text(f'mesh.name = "octahedron"\ntransform.scale = {scale}\n')
     session = Session(file, "tiny", size=SIZE)
     camera = ViewCamera((2 * scale, 2 * scale, 4 * scale), (0.2 * scale, 0.2 * scale, 0.2 * scale))
-    shown = session.frame(camera).pixels
+    pixels = session.frame(camera).pixels
     session.save(camera)
     session.look()
     assert session.state()["error"] == ""
-    np.testing.assert_array_equal(session.frame().pixels, shown)
+    np.testing.assert_array_equal(session.frame().pixels, pixels)
     near = ViewCamera((0.20001 * scale, 0.2 * scale, 0.2 * scale), camera.target)
     session.save(near)
     session.look()
