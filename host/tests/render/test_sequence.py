@@ -103,7 +103,7 @@ def test_a_frame_is_the_still_of_its_room_with_the_object_in_the_world(
     """The maps are those of an encoder that has seen the frames before."""
     manifest = manifest_for("small", ROOM).manifest
     rooms = [load_environment(folder / str(number)) for number in range(VIEWS)]
-    first = DeviceScene.of(load_scene(folder / "albedo.toml"), manifest, room=rooms[0], encoder="live").scene
+    first = DeviceScene.of(load_scene(folder / "albedo.toml", folder), manifest, room=rooms[0], encoder="live").scene
     mesh = load_mesh("teapot:3")
     pose = object_pose(first, mesh.extent, rooms[0])
     x, y, z = pose.translate
@@ -130,7 +130,10 @@ def test_a_frame_is_the_still_of_its_room_with_the_object_in_the_world(
 def test_the_object_stays_where_it_is_while_the_camera_moves(folder: Path, frames: list[RenderResult]) -> None:
     sequence = load_sequence(folder / "sequence.toml")
     scene = DeviceScene.of(
-        load_scene(folder / "albedo.toml"), manifest_for("small", ROOM).manifest, room=sequence.room(0), encoder="live"
+        load_scene(folder / "albedo.toml", folder),
+        manifest_for("small", ROOM).manifest,
+        room=sequence.room(0),
+        encoder="live",
     ).scene
     extent = load_mesh("teapot:3").extent
     centre = object_pose(scene, extent, sequence.room(0)).to_world(extent.centre)
@@ -154,7 +157,7 @@ def test_colours_of_the_photo_keep_the_light_of_the_first_frame(folder: Path) ->
     def encode(room: object) -> AttributeImage:
         return encoder.encode(LiveFrame.of(room)).image  # type: ignore[arg-type]
 
-    first = DeviceScene.of(load_scene(folder / "photo.toml"), manifest, room=rooms[0], encode=encode)
+    first = DeviceScene.of(load_scene(folder / "photo.toml", folder), manifest, room=rooms[0], encode=encode)
     second = first.seen_in(rooms[1], encode)
     assert first.scene.headroom > 1 and second.scene.headroom == first.scene.headroom
     one, other = (prepared.registers(SIZE) for prepared in (first, second))
@@ -221,7 +224,10 @@ def test_a_camera_of_a_capture_has_any_pose_and_lens(folder: Path) -> None:
     turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
     camera = replace(camera, to_world=np.column_stack([camera.to_world[:, :3] @ turn, camera.to_world[:, 3]]))
     prepared = DeviceScene.of(
-        load_scene(folder / "albedo.toml"), manifest_for("small", ROOM).manifest, room=sequence.room(0), encoder="live"
+        load_scene(folder / "albedo.toml", folder),
+        manifest_for("small", ROOM).manifest,
+        room=sequence.room(0),
+        encoder="live",
     )
     view = prepared.seen_by(camera, None).view(SIZE)
     pose = object_pose(prepared.scene, prepared.image.header.extent, sequence.room(0))
