@@ -136,7 +136,8 @@ def convert(
             time = round(frame.time - start, _TIME_DIGITS)
             if times and time <= times[-1]:
                 raise UserError(
-                    f"{path}: the time of frame {frame.number} is not a microsecond or more after the frame before"
+                    f"{path}: the time of frame {frame.number} is not a microsecond or more after the frame before:"
+                    " give ascending times in seconds"
                 )
             camera = {**asdict(frame.lens), "cam_to_world": frame.to_world.tolist()}
             read_camera(camera, Path(f"{path}, frame {frame.number}"))
@@ -156,7 +157,9 @@ def convert(
         )
     seconds, gaps = times[-1], max(len(times) - 1, 1)
     if seconds / gaps > _LARGEST_GAP:
-        raise UserError(f"{path}: its frames are {seconds / gaps:.3g} s apart, {_LARGEST_GAP:g} s at most")
+        raise UserError(
+            f"{path}: its frames are {seconds / gaps:.3g} s apart, {_LARGEST_GAP:g} s at most: give times in seconds"
+        )
     rate = gaps / seconds if seconds > 0 else 30.0
     noise = float(np.median(noises))
     head = f"width = {WIDTH}\nheight = {HEIGHT}\nrate = {rate:.3f}\n"

@@ -31,7 +31,7 @@ _LINEAR = {"hdr": (b"#?",), "openexr": (b"\x76\x2f\x31\x01",)}
 #: Largest deviation of the proportions from 2:1.
 _MAX_STRETCH = 0.02
 #: Channels of a picture.
-_MOST_CHANNELS = 64
+_MAX_CHANNELS = 64
 #: Rows that are decoded together, about.
 _BAND = 256
 #: Memory of the process beside its libraries, bytes: float32 of the largest picture, and what the library takes; and
@@ -109,8 +109,8 @@ def _linear(path: Path, reader: str) -> NDArray[np.float32]:
         spec = picture.spec()
         if spec.width * spec.height > MAX_PIXELS:
             raise UserError(f"{path} has too many pixels: a picture may have {MAX_PIXELS:,}")
-        if spec.nchannels > _MOST_CHANNELS:
-            raise UserError(f"{path} has {spec.nchannels:,} channels, {_MOST_CHANNELS} at most: leave out layers")
+        if spec.nchannels > _MAX_CHANNELS:
+            raise UserError(f"{path} has {spec.nchannels:,} channels, {_MAX_CHANNELS} at most: leave out layers")
         if spec.depth > 1 or spec.deep:
             raise UserError(f"{path} has volumes or deep pixels: give a flat panorama")
         names = list(spec.channelnames)
