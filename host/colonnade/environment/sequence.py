@@ -5,7 +5,6 @@ The schema is `Sequence` and `SequenceFrame`: keys, ranges and defaults. Unknown
 
 from __future__ import annotations
 
-import sys
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,19 +17,15 @@ from pydantic.dataclasses import dataclass
 
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import read_picture
-from colonnade.common.input_files import check_values, read_input
-from colonnade.common.limits import MAX_CAPTURE_TEXT_BYTES, MAX_DEPTH, MAX_FRAMES
+from colonnade.common.input_files import read_input
+from colonnade.common.limits import MAX_CAPTURE_TEXT_BYTES, MAX_FRAMES
+from colonnade.common.toml_files import parse_toml
 from colonnade.environment.camera import check_size, read_camera
 from colonnade.environment.derived_albedo import hue_lights
 from colonnade.environment.files import inside
 from colonnade.environment.lights import RoomLights
 from colonnade.environment.load import DEFAULT_DEPTH_STEP, MAX_EDGE, RoomFiles, depth_step, load_maps
 from colonnade.environment.model import Environment, EnvironmentCamera
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 _STRICT = ConfigDict(extra="forbid")
 _Float = Annotated[float, Strict()]
@@ -172,13 +167,7 @@ def load_sequence(path: Path) -> Sequence:
         UserError: The file is missing, is not TOML, or has an invalid key or value.
     """
     content = read_input(path, "the sequence", MAX_CAPTURE_TEXT_BYTES, f"sequence {path} does not exist")
-    try:
-        data: dict[str, Any] = tomllib.loads(content.decode("utf-8-sig"))
-    except RecursionError:
-        raise UserError(f"sequence {path} is nested too deeply: {MAX_DEPTH} levels at most") from None
-    except ValueError as error:  # invalid TOML or UTF-8, or too many digits
-        raise UserError(f"sequence {path} is not TOML: {error}") from None
-    check_values(data, f"sequence {path}")
+    data = parse_toml(content, f"sequence {path}")
     depth_step(data, path)
     try:
         # Lists become the tuples of the schema

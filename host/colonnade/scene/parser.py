@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,15 +15,11 @@ from pydantic_core import ErrorDetails
 from colonnade.common.arguments import checked
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import check_values, read_input
-from colonnade.common.limits import MAX_COORDINATE, MAX_DEPTH
+from colonnade.common.limits import MAX_COORDINATE
+from colonnade.common.toml_files import parse_toml
 from colonnade.design.toolchain import project_root
 from colonnade.mesh.formats import SUFFIXES
 from colonnade.scene.model import MAX_EDGE, MAX_OBJECTS, MeshSource, Scene
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 #: Tables of the file in the order of messages. `Scene` names ``object`` placement, and splits several
 #: ``light``; several ``object`` are its objects.
@@ -79,12 +74,7 @@ def read_tables(file: Path) -> dict[str, Any]:
     if file.suffix.lower() in SUFFIXES:
         raise UserError(f"{file} is a mesh, not a scene: give it by mesh.path of a scene, or as --mesh of as-authored")
     content = read_input(file, "the scene", missing=f"scene file {file} does not exist")
-    try:
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except RecursionError:
-        raise UserError(f"scene {file} is nested too deeply: {MAX_DEPTH} levels at most") from None
-    except ValueError as error:  # invalid TOML or UTF-8, or too many digits
-        raise UserError(f"scene {file} is not TOML: {error}") from None
+    return parse_toml(content, f"scene {file}")
 
 
 def scene_of(tables: Mapping[str, Any], where: str, folder: Path, in_room: bool = False) -> Scene:

@@ -164,6 +164,7 @@ CASES |= {
     # Configurations
     "duplicate-section": Case("generate --config x.json --print", "twice", {"x.json": '{"array": 1, "array": 2}'}),
     "duplicate-field": Case("generate --config x.json --print", "twice", {"x.json": '{"array":{"rows":1,"rows":2}}'}),
+    "keys-deep": Case(X, "nested too deeply", {"x.toml": f"{'a.' * 400_000}b = 1\n"}),
     "json-deep": Case("generate --config x.json --print", "nested too deeply", {"x.json": "[" * 100_000}),
     "json-100-deep": Case("generate --config x.json --print", "nested", {"x.json": "[" * 100 + "]" * 100}),
     "rows-of-1000-digits": Case("generate --config x.json --print", "digits", {"x.json": f'{{"a": {"9" * 1000}}}'}),
@@ -187,6 +188,7 @@ CASES |= {
         STUDY, "more than 1,000 points", study("".join(f"a{k} = {TWENTY}\n" for k in range(5)))
     ),
     "study-of-nothing": Case(STUDY, "title", {"x.toml": ""}),
+    "study-keys-deep": Case(STUDY, "nested too deeply", study(f"{'a.' * 400_000}b = 1\n")),
     "study-deep": Case(STUDY, "nested too deeply", study(f"a = {'[' * DEEP}{']' * DEEP}\n")),
     "study-digits": Case(STUDY, "digits", study(f"a = [{NINES}]\n")),
     "study-with-escapes": Case(STUDY, "x1b[2J", study('"\\u001b[2J" = 1\n')),

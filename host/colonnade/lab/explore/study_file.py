@@ -6,7 +6,6 @@ import dataclasses
 import datetime
 import math
 import re
-import sys
 import unicodedata
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,15 +15,10 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from colonnade.common.errors import UserError
-from colonnade.common.input_files import check_values, read_input
-from colonnade.common.limits import MAX_DEPTH
+from colonnade.common.input_files import read_input
 from colonnade.common.terminal_text import one_line
+from colonnade.common.toml_files import parse_toml
 from colonnade.lab.explore.study import Study, quoted
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 _SCHEMA = TypeAdapter(Study)
 
@@ -56,16 +50,8 @@ def load_study(path: Path) -> StudyFile:
         UserError: The file is missing, is not TOML, or has an invalid key or value; with its line.
     """
     content = read_input(path, "the study", missing=f"study file {path} does not exist")
-    try:
-        text = content.decode("utf-8")
-        data = tomllib.loads(text)
-    except RecursionError:
-        raise UserError(f"study {path} is nested too deeply: {MAX_DEPTH} levels at most") from None
-    except UnicodeDecodeError:
-        raise UserError(f"study {path} is not TOML: save it as UTF-8 text") from None
-    except ValueError as error:
-        raise UserError(f"study {path} is not TOML: {error}") from None
-    check_values(data, f"study {path}")
+    data = parse_toml(content, f"study {path}")
+    text = content.decode("utf-8-sig")
     for where, problem in _unusable(data, ()):
         line = line_of(text, where)
         raise UserError(f"{path}{'' if line is None else f':{line}'}: {one_line('.'.join(where))}: {problem}")
