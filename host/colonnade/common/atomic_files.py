@@ -11,8 +11,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
-from colonnade.common import ledger
+from colonnade.common import ledger, processes
 from colonnade.common.errors import UserError, reason_of
+
+#: Temporary files, which go when a signal ends the process while the main thread is in a call of a library.
+_unfinished: set[Path] = set()
 
 
 @contextlib.contextmanager
@@ -34,6 +37,7 @@ def replacing(path: Path, is_edited: bool = False) -> Iterator[IO[bytes]]:
     try:
         handle, name = tempfile.mkstemp(prefix=".colonnade.", dir=path.parent)
         temporary = Path(name)
+        _unfinished.add(temporary)
         with os.fdopen(handle, "wb") as stream:
             yield stream
         temporary.chmod(_mode(path))
@@ -45,6 +49,8 @@ def replacing(path: Path, is_edited: bool = False) -> Iterator[IO[bytes]]:
         if isinstance(error, OSError):
             raise UserError(f"cannot write {path}: {reason_of(error)}") from None
         raise
+    finally:
+        _unfinished.discard(temporary or path)
     ledger.add_written(path)
 
 
@@ -154,3 +160,12 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} is not a JSON type")
+
+
+def _remove_unfinished() -> None:
+    for temporary in list(_unfinished):
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+processes.when_leaving(_remove_unfinished)

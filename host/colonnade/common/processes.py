@@ -1,8 +1,9 @@
 """Starts child programs, and ends all of them on a signal.
 
 Each program runs in its own process group, so that its children end with it. SIGINT, SIGTERM, SIGHUP and SIGXCPU raise
-`Interrupted` in the main thread; `guarded` then ends every program, removes temporary files and exits. On Linux a
-program also ends when this process is killed.
+`Interrupted` in the main thread; `guarded` then ends every program, removes temporary files and exits. While the main
+thread is in a call of a library that does not return, another thread does so, as soon as the library lets it run. On
+Linux a program also ends when this process is killed.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ CLEANUP_SECONDS = 0.7
 
 #: Seconds in which further signals are ignored, because `timeout` and terminals may send several.
 REPEAT_SECONDS = 3.0
+
+#: Seconds after which another thread exits for a main thread that has not received a signal.
+PATIENCE = 0.8
 
 #: Seconds after which a signal interrupts again: a library may have caught the first exception.
 INSIST_SECONDS = 2.0
@@ -255,6 +259,7 @@ def guarded(program: Callable[[], object]) -> NoReturn:
         # nohup ignores SIGHUP: keep it so
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _receive)
+    _watch_signals()
     try:
         try:
             program()
@@ -284,6 +289,29 @@ def tool(program: Callable[[], object]) -> NoReturn:
     guarded(run)
 
 
+def _watch_signals() -> None:
+    """Start the thread that exits where the main thread does not receive a signal.
+
+    Python writes the number of a signal to a pipe when it arrives, and calls `_receive` when the main thread is back.
+    """
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    # A signal to a copy of this process is not one to this process
+    os.register_at_fork(after_in_child=lambda: signal.set_wakeup_fd(-1))
+
+    def watch() -> None:
+        while True:
+            (number,) = os.read(reader, 1)
+            if number not in SIGNALS:
+                continue
+            time.sleep(PATIENCE)
+            if _signal is None:
+                _leave(number)
+
+    threading.Thread(target=watch, name="signals", daemon=True).start()
+
+
 def _receive(number: int, frame: object) -> None:
     global _signal, _signal_time
     now = time.monotonic()
@@ -311,12 +339,14 @@ def _leave(number: int) -> NoReturn:
     """End all programs, give the threads time to clean up, run the exit functions, and exit."""
     global _is_leaving
     with _lock:
-        _is_leaving = True
+        is_second, _is_leaving = _is_leaving, True
         members = list(_running)
+    if is_second:  # the first thread exits
+        threading.Event().wait()
     _end(members)
     deadline = time.monotonic() + CLEANUP_SECONDS
     for thread in threading.enumerate():
-        if thread is not threading.current_thread() and not thread.daemon:
+        if thread not in (threading.current_thread(), threading.main_thread()) and not thread.daemon:
             thread.join(max(0.0, deadline - time.monotonic()))
     for function in _when_leaving:
         with contextlib.suppress(Exception):

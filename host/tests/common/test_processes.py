@@ -234,6 +234,28 @@ processes.guarded(main)
     assert interrupted(program, tmp_path)
 
 
+def test_a_signal_while_a_library_does_not_return_is_obeyed(tmp_path: Path) -> None:
+    """The call computes for minutes, without Python's lock; the files that it writes go."""
+    program = """
+import hashlib, os, signal, threading
+from pathlib import Path
+from colonnade.common import processes
+from colonnade.common.atomic_files import replacing
+from colonnade.common.temporary import temporary_folder
+
+def main():
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with temporary_folder(".job.", Path()), replacing(Path("picture.png")):
+        hashlib.pbkdf2_hmac("sha256", b"", b"", 1 << 30)
+
+processes.guarded(main)
+"""
+    begun = time.monotonic()
+    assert interrupted(program, tmp_path)
+    assert time.monotonic() - begun < 10.0
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_signal_at_the_end_of_python_does_not_wait_for_threads(tmp_path: Path) -> None:
     program = """
 import os, queue, signal, threading
