@@ -20,7 +20,7 @@ from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
 from colonnade.mesh.checks import DRACO, READ_EXTENSIONS
-from colonnade.mesh.gltf_document import GltfDocument
+from colonnade.mesh.gltf_document import COMPRESSION, GltfDocument
 from colonnade.mesh.gltf_draco import DracoPrimitives, PrimitiveArrays
 from colonnade.mesh.gltf_metal import metal_of, of_map
 from colonnade.mesh.gltf_relief import relief_of
@@ -40,9 +40,6 @@ from colonnade.mesh.resolver import References
 from colonnade.mesh.roughness import merged_roughness, surface_areas
 from colonnade.mesh.surface import RawSurface, joined
 from colonnade.mesh.texture import MAX_UV
-
-#: Extensions that compress the mesh, and are not supported.
-_COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 #: Largest magnitude of a transform's element, in the scene.
 _MAX_TRANSFORM = 1e100
@@ -165,10 +162,8 @@ def _materials_of(
 def _check_extensions(document: GltfDocument) -> None:
     required = document.json.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else []:
-        if name in _COMPRESSION:
-            raise document.error(
-                f"its meshes are compressed (it requires the glTF extension {name}): export it without compression"
-            )
+        if name in COMPRESSION:
+            raise document.compressed(name)
         if name not in READ_EXTENSIONS:
             raise document.error(f"it requires the glTF extension {name}, which is not supported: export it without")
 
@@ -256,9 +251,9 @@ def _primitive(
     if mode not in (_TRIANGLES, _STRIP, _FAN):
         raise document.error(f"a primitive has the unknown mode {mode}")
     for name in primitive.get("extensions", {}):
-        if name in _COMPRESSION and "bufferView" not in document.entry("accessors", attributes.get("POSITION")):
-            raise document.error(f"its meshes are compressed ({name}): export it without compression")
-        losses.add(extension_loss(name), name not in (DRACO, *_COMPRESSION))
+        if name in COMPRESSION and "bufferView" not in document.entry("accessors", attributes.get("POSITION")):
+            raise document.compressed(name)
+        losses.add(extension_loss(name), name not in (DRACO, *COMPRESSION))
     if "POSITION" not in attributes:
         raise document.error("a primitive has no positions")
     losses.add(lost.MORPHS, len(primitive.get("targets", [])))

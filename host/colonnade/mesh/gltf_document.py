@@ -20,6 +20,8 @@ from colonnade.mesh.checks import check_gltf
 from colonnade.mesh.resolver import References
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+#: Extensions that compress the mesh, and are not supported.
+COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
@@ -49,6 +51,12 @@ class GltfDocument:
     def error(self, reason: str) -> UserError:
         """An error of this file."""
         return UserError(f"mesh {self._path}: {reason}")
+
+    def compressed(self, name: str) -> UserError:
+        """The error of a file whose meshes an extension compresses."""
+        return self.error(
+            f"its meshes are compressed (it requires the glTF extension {name}): export it without compression"
+        )
 
     def _chunks(self, data: bytes) -> tuple[bytes, bytes | None]:
         """The JSON of a binary file, and the chunk after it."""
@@ -160,8 +168,11 @@ class GltfDocument:
         return {}
 
     def _read_buffer(self, index: int) -> bytes:
-        uri = self.entry("buffers", index).get("uri")
+        buffer = self.entry("buffers", index)
+        uri = buffer.get("uri")
         if uri is None:
+            if name := next(iter(buffer.get("extensions", {}).keys() & set(COMPRESSION)), None):
+                raise self.compressed(name)
             if index != 0 or self._binary is None:
                 raise self.error(f"buffer {index} has no data")
             return self._binary

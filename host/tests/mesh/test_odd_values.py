@@ -97,9 +97,17 @@ def test_what_unread_extensions_hold_is_not_checked(tmp_path: Path) -> None:
     content["extensionsRequired"] = ["KHR_materials_emissive_strength", "KHR_materials_unlit"]
     content["bufferViews"][0]["extensions"] = {"EXT_meshopt_compression": {"mode": "ATTRIBUTES"}}
     assert "1 picture of a texture is not readable" in loaded(tmp_path, content)[0]
-    content["extensionsRequired"] = ["EXT_meshopt_compression"]
-    with pytest.raises(UserError, match=r"its meshes are compressed .*EXT_meshopt_compression"):
-        loaded(tmp_path, content)
+
+
+@pytest.mark.parametrize("name", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
+def test_compressed_meshes_are_refused_with_what_to_do(name: str, tmp_path: Path) -> None:
+    """Also of a file that does not require the extension, and whose buffer in its place has no data."""
+    required = document(tmp_path) | {"extensionsRequired": [name]}
+    optional = document(tmp_path)
+    optional["buffers"] = [{"byteLength": 96, "extensions": {name: {"fallback": True}}}]
+    for content in (required, optional):
+        with pytest.raises(UserError, match=rf"its meshes are compressed \(.* {name}\): export it without compression"):
+            loaded(tmp_path, content)
 
 
 def test_a_negative_emission_is_refused(tmp_path: Path) -> None:
