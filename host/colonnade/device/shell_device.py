@@ -35,6 +35,7 @@ _MEANINGS = {
     "tooLarge": "a transfer left the memory of the device",
     "busy": "the device is busy: wait for its frame, or reset it",
     "busResponse": "the memory has answered the device with an error",
+    "misaligned": "the address of the framebuffer is not aligned: give a multiple of 4096",
     "noFrame": "no frame is set: set its registers before the start",
     "noPhoto": "the device composites no photo, or not the strengths of its shadows: render without them",
 }
@@ -92,6 +93,8 @@ class ShellDevice(Device):
         Raises:
             UserError: There is no such configuration, or no Java or Verilator.
         """
+        if not PAGE_BYTES <= memory <= 1 << 32:
+            raise UserError(f"memory is {memory}: it must be from {PAGE_BYTES:,} to {1 << 32:,} bytes")
         design = shell_design_for(config, overrides, progress=progress)
         return cls(SimulatedTransport(design, memory, progress=progress), design)
 

@@ -183,6 +183,12 @@ def test_threads_that_share_a_device_have_their_own_pictures(
             np.testing.assert_array_equal(one, picture)
 
 
+@pytest.mark.parametrize("memory", [0, -5, 1 << 36])
+def test_a_memory_that_no_bus_has_is_refused(memory: int) -> None:
+    with pytest.raises(UserError, match=rf"memory is {memory}: it must be from 4,096 to 4,294,967,296 bytes"):
+        ShellDevice.simulated(*CONFIG, memory=memory)
+
+
 @NEEDS_SIMULATOR
 def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScene, tmp_path: Path) -> None:
     """Its memory is a file from a bus address on, which has the image when it is loaded."""
@@ -233,6 +239,7 @@ def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScen
                 device.set_frame(registers)
                 for message, arguments in {
                     r"pixel_format is 9: it must be from 0 to 2": (9,),
+                    r"the address of the framebuffer is not aligned: give a multiple": (0, 0x5F00_0004),
                     r"the frame at 0x0 is below the device's memory, which is at 0x5f000000": (0, 0),
                 }.items():
                     with pytest.raises(UserError, match=message):
