@@ -4,9 +4,8 @@
 
 import { Corners } from "./corners.js";
 import { DRACO, READ_EXTENSIONS } from "./gltfchecks.js";
-import { GltfDocument, grouped } from "./gltfdocument.js";
+import { COMPRESSION, GltfDocument, grouped } from "./gltfdocument.js";
 
-const COMPRESSION = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 /** Largest magnitude of a transform's element, in the scene. */
 const MOST_TRANSFORM = 1e100;
 const [POINTS, TRIANGLES, STRIP, FAN] = [0, 4, 5, 6];
@@ -16,7 +15,7 @@ export function readGltf(bytes, name, files) {
   const document = new GltfDocument(bytes, name, files);
   const { json } = document;
   for (const extension of json.extensionsRequired ?? []) {
-    if (COMPRESSION.includes(extension)) throw document.error(`its meshes are compressed (it requires the glTF extension ${extension}): export it without compression`);
+    if (COMPRESSION.includes(extension)) throw document.compressed(extension);
     if (!READ_EXTENSIONS.includes(extension)) throw document.error(`it requires the glTF extension ${extension}, which is not supported: export it without`);
   }
   const corners = new Corners();
@@ -57,7 +56,7 @@ function addPrimitive(document, primitive, matrix, { corners, vertices, left }) 
   if (mode < TRIANGLES) return void ++left[mode === POINTS ? "point primitive" : "line primitive"];
   if (mode > FAN) throw document.error(`a primitive has the unknown mode ${mode}`);
   for (const name of COMPRESSION)
-    if (name in extensions && document.entry("accessors", attributes.POSITION).bufferView === undefined) throw document.error(`its meshes are compressed (${name}): export it without compression`);
+    if (name in extensions && document.entry("accessors", attributes.POSITION).bufferView === undefined) throw document.compressed(name);
   if (attributes.POSITION === undefined) throw document.error("a primitive has no positions");
   if (DRACO in extensions && document.entry("accessors", attributes.POSITION).bufferView === undefined)
     throw document.error(`its meshes are compressed (${DRACO}), which the tab does not read: the command line does`);

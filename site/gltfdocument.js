@@ -14,6 +14,8 @@ const COMPONENTS = new Map([
 ]);
 const WIDTHS = new Map([["SCALAR", 1], ["VEC2", 2], ["VEC3", 3], ["VEC4", 4]]);
 
+/** Extensions that compress the mesh, and are not supported. */
+export const COMPRESSION = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 export const grouped = (number) => number.toLocaleString("en");
 
 /** The document of a file, text or binary, its buffers, and the arrays of its accessors. */
@@ -27,6 +29,11 @@ export class GltfDocument {
 
   error(reason) {
     return new Error(`mesh ${this.name}: ${reason}`);
+  }
+
+  /** The error of a file whose meshes an extension compresses. */
+  compressed(extension) {
+    return this.error(`its meshes are compressed (${extension}): export it without compression`);
   }
 
   /** Four characters. */
@@ -87,7 +94,9 @@ export class GltfDocument {
   }
 
   buffer(index) {
-    const { uri } = this.entry("buffers", index);
+    const { uri, extensions = {} } = this.entry("buffers", index);
+    const compression = COMPRESSION.find((name) => uri === undefined && name in extensions);
+    if (compression) throw this.compressed(compression);
     if (!this.buffers.has(index)) this.buffers.set(index, this.content(index, uri));
     return this.buffers.get(index);
   }

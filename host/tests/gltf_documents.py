@@ -185,13 +185,17 @@ REFUSED: dict[str, tuple[str, bytes]] = {
     "matrix.gltf": ("transform of node 0 is not finite, or too large", _node(matrix=[1e300] * 16)),
     "matrix-short.gltf": ("transform of node 0 is not valid", _node(matrix=[1] * 15)),
     "rotation.gltf": ("transform of node 0 is not valid", _node(rotation=[0, 0, 1])),
-    "meshopt.gltf": (f"compressed (it requires the glTF extension {_MESHOPT})", _text(extensionsRequired=[_MESHOPT])),
+    "meshopt.gltf": (f"its meshes are compressed ({_MESHOPT})", _text(extensionsRequired=[_MESHOPT])),
     "meshopt-optional.gltf": (
         f"its meshes are compressed ({_MESHOPT})",
         _text(
             accessors=[_NO_DATA, gltf()["accessors"][1]],
             meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "extensions": {_MESHOPT: {}}}]}],
         ),
+    ),
+    "meshopt-buffer.gltf": (
+        f"its meshes are compressed ({_MESHOPT})",
+        _text(buffers=[{"byteLength": 96, "extensions": {_MESHOPT: {"fallback": True}}}]),
     ),
     "extension.gltf": (
         "requires the glTF extension ACME_x, which is not supported",

@@ -54,9 +54,7 @@ class GltfDocument:
 
     def compressed(self, name: str) -> UserError:
         """The error of a file whose meshes an extension compresses."""
-        return self.error(
-            f"its meshes are compressed (it requires the glTF extension {name}): export it without compression"
-        )
+        return self.error(f"its meshes are compressed ({name}): export it without compression")
 
     def _chunks(self, data: bytes) -> tuple[bytes, bytes | None]:
         """The JSON of a binary file, and the chunk after it."""

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from colonnade.common.errors import UserError
+from colonnade.common.toml_files import parse_toml
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.model import MeshSource, Paths, Placement, Scene
-from colonnade.scene.parser import _TABLES, load_scene, tomllib
+from colonnade.scene.parser import _TABLES, load_scene
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "scenes"
@@ -48,7 +49,7 @@ def test_the_page_of_the_scene_file_has_all_keys_and_their_defaults() -> None:
     assert [re.findall("`([a-z]+)`", row[0])[0] for row in rows] == _TABLES
     for row in rows:
         (name, *_), spans = re.findall("`([a-z]+)`", row[0]), re.findall("`([^`]+)`", "".join(row[2:]))
-        given = tomllib.loads("\n".join(spans))
+        given = parse_toml("\n".join(spans).encode(), "the table")
         keys = asdict(getattr(scene, {"object": "placement"}.get(name, name)))
         keys = {key: list(value) if isinstance(value, tuple) else value for key, value in keys.items()}
         assert given == {key: value for key, value in keys.items() if value not in (None, [], "cube")}, name
