@@ -41,7 +41,7 @@ void checkFaces(const Rows<std::int32_t>& faces, std::size_t vertices) {
 
 nb::dict quantise(const Rows<double>& vertices, const Rows<std::int32_t>& faces, int vertexBits) {
     checkFaces(faces, vertices.shape(0));
-    const packer::QuantisedMesh mesh = packer::quantise(rowsOf<mesh::Vector>(vertices), vertices.shape(0), rowsOf<mesh::Face>(faces), faces.shape(0), vertexBits);
+    const packer::QuantisedMesh mesh = released([&] { return packer::quantise(rowsOf<mesh::Vector>(vertices), vertices.shape(0), rowsOf<mesh::Face>(faces), faces.shape(0), vertexBits); });
     nb::dict result;
     result["vertices"] = arrayOf<std::int32_t>(mesh.vertices, {mesh.vertices.size(), 3});
     result["faces"] = arrayOf<std::int32_t>(mesh.faces, {mesh.faces.size(), 3});
@@ -99,7 +99,7 @@ public:
         if (std::min({normals.shape(0), materials.shape(0), isClear.shape(0)}) < faces || (colours && colours->shape(0) < faces)) throw std::invalid_argument("a face has no attributes");
         const packer::FaceAttributes attributes{rowsOf<std::array<mesh::Vector, 3>>(normals), materials.data(), reinterpret_cast<const std::uint8_t*>(isClear.data()),
                                                 colours ? rowsOf<std::array<mesh::Row<std::int64_t>, 3>>(*colours) : nullptr};
-        const std::vector<std::uint8_t> records = packer_->records(attributes);
+        const std::vector<std::uint8_t> records = released([&] { return packer_->records(attributes); });
         return arrayOf<std::uint8_t>(records, {packer_->sections().recordCount, format_.recordBytes()});
     }
 
@@ -113,29 +113,29 @@ private:
 };
 
 nb::tuple mergeRows(const Rows<double>& rows) {
-    const mesh::MergedRows<double> merged = mesh::mergeRows(rowsOf<mesh::Vector>(rows), rows.shape(0));
+    const mesh::MergedRows<double> merged = released([&] { return mesh::mergeRows(rowsOf<mesh::Vector>(rows), rows.shape(0)); });
     return nb::make_tuple(arrayOf<double>(merged.rows, {merged.rows.size(), 3}), arrayOf<std::int64_t>(merged.index, {merged.index.size()}));
 }
 
 nb::object dropFaces(const Rows<double>& vertices, const Rows<std::int64_t>& faces) {
-    const std::vector<std::int64_t> keep = mesh::dropFaces(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Row<std::int64_t>>(faces));
+    const std::vector<std::int64_t> keep = released([&] { return mesh::dropFaces(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Row<std::int64_t>>(faces)); });
     return arrayOf<std::int64_t>(keep, {keep.size()});
 }
 
 nb::tuple findWinding(const Rows<double>& vertices, const Rows<std::int32_t>& faces) {
-    const mesh::Winding winding = mesh::findWinding(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces));
+    const mesh::Winding winding = released([&] { return mesh::findWinding(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces)); });
     const std::size_t count = faces.shape(0);
     return nb::make_tuple(arrayOf<bool>(winding.reversed, {count}), winding.mixed, winding.inverted, arrayOf<bool>(winding.isOpen, {count}));
 }
 
 nb::object creaseNormals(const Rows<double>& vertices, const Rows<std::int32_t>& faces, double leastCosine) {
-    const std::vector<mesh::Corners> normals = mesh::creaseNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), leastCosine);
+    const std::vector<mesh::Corners> normals = released([&] { return mesh::creaseNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), leastCosine); });
     return arrayOf<double>(normals, {normals.size(), 3, 3});
 }
 
 nb::tuple cornerNormals(const Rows<double>& vertices, const Rows<std::int32_t>& faces, const CornerRows<double>& authored, double leastCosine) {
     const mesh::CornerNormals result =
-        mesh::cornerNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), vectorOf<mesh::Corners>(authored), leastCosine);
+        released([&] { return mesh::cornerNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), vectorOf<mesh::Corners>(authored), leastCosine); });
     return nb::make_tuple(arrayOf<double>(result.normals, {result.normals.size(), 3, 3}), result.flipped, result.replaced, result.missing);
 }
 

@@ -30,6 +30,12 @@ template <class T> Pixels<T> makeArray(std::initializer_list<std::size_t> shape,
     return Pixels<T>(data, shape, owner);
 }
 
+/// What a function of C++ alone returns, while other threads of Python run.
+template <class Function> auto released(const Function& function) {
+    nb::gil_scoped_release release;
+    return function();
+}
+
 inline std::map<std::string, Layout> layoutsOf(const FieldTuples& tuples) {
     std::map<std::string, Layout> layouts;
     for (const auto& [record, fields] : tuples)

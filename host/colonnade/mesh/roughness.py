@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from heapq import heapify, heappop, heappush
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -34,38 +35,47 @@ def merged_roughness(
     area = np.bincount(index, weights, len(entries)).tolist()
     # Roughnesses of surfaces without a coat count as those that are nearly matt
     values = [GLOSSY if one.kind == "diffuse" and not one.roughness else one.roughness for one in entries]
-    kinds: dict[MeshMaterial, list[list[int]]] = {}
+    kinds: dict[MeshMaterial, list[int]] = {}
     for number, entry in enumerate(entries):
-        kinds.setdefault(replace(entry, roughness=0.0), []).append([number])
+        kinds.setdefault(replace(entry, roughness=0.0), []).append(number)
+    for members in kinds.values():
+        members.sort(key=values.__getitem__)
+    # Groups by their first entries, and the next group of the same kind
+    place = {number: at for at, number in enumerate(chain.from_iterable(kinds.values()))}
+    groups = {number: [number] for number in range(len(entries))}
+    following = dict(chain.from_iterable(pairwise(members) for members in kinds.values()))
+    preceding = {second: first for first, second in following.items()}
 
-    def mean(members: list[int]) -> tuple[float, float]:
+    def mean(group: int) -> tuple[float, float]:
+        members = groups[group]
         total = sum(area[one] for one in members)
-        return total, sum(area[one] * values[one] for one in members) / total if total else values[members[0]]
+        return total, sum(area[one] * values[one] for one in members) / total if total else values[group]
 
-    def cost(a: list[int], b: list[int]) -> float:
-        (first, of_first), (second, of_second) = mean(a), mean(b)
-        return first * second * (of_first - of_second) ** 2 / max(first + second, 1e-300)
+    def offer(group: int) -> tuple[float, int, int, int, int]:
+        (first, of_first), (second, of_second) = mean(group), mean(following[group])
+        cost = first * second * (of_first - of_second) ** 2 / max(first + second, 1e-300)
+        return cost, place[group], group, len(groups[group]), len(groups[following[group]])
 
-    for groups in kinds.values():
-        groups.sort(key=lambda members: values[members[0]])
-    number = len(entries)
-    while number > count:
-        pairs = [
-            (cost(first, second), order, place)
-            for order, groups in enumerate(kinds.values())
-            for place, (first, second) in enumerate(pairwise(groups))
-        ]
-        if not pairs:
-            break
-        _, order, place = min(pairs)
-        groups = list(kinds.values())[order]
-        groups[place : place + 2] = [groups[place] + groups[place + 1]]
-        number -= 1
+    offers = [offer(group) for group in following]
+    heapify(offers)
+    while len(groups) > count and offers:
+        _, _, group, *sizes = heappop(offers)
+        # An offer is void when one of its groups has grown or is gone
+        if group not in following or [len(groups[group]), len(groups[following[group]])] != sizes:
+            continue
+        second = following.pop(group)
+        groups[group] += groups.pop(second)
+        if second in following:
+            following[group] = following.pop(second)
+            preceding[following[group]] = group
+            heappush(offers, offer(group))
+        if group in preceding:
+            heappush(offers, offer(preceding[group]))
     found = list(values)
-    for groups in kinds.values():
-        for members in groups:
+    for group, members in groups.items():
+        if len(members) > 1:
             for one in members:
-                found[one] = mean(members)[1] if len(members) > 1 else values[one]
+                found[one] = mean(group)[1]
     change = float((weights * np.abs(np.array(found) - values)[index]).sum() / max(float(weights.sum()), 1e-300))
     rounded = [
         entry.roughness if after == before else (coat_roughness(after) if entry.kind == "diffuse" else after)

@@ -12,6 +12,7 @@ from tomlkit.exceptions import TOMLKitError
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import read_input
+from colonnade.common.toml_files import parse_toml
 from colonnade.scene.model import Scene
 from colonnade.scene.parser import scene_of
 
@@ -31,9 +32,11 @@ def save_camera(file: Path, position: Sequence[float], target: Sequence[float], 
     Raises:
         UserError: The file cannot be read or replaced, or has another camera that forbids this one.
     """
+    data = read_input(file, "the scene")
+    parse_toml(data, f"scene {file}")
     try:
-        document = tomlkit.parse(read_input(file, "the scene").decode("utf-8-sig"))
-    except (TOMLKitError, ValueError) as error:
+        document = tomlkit.parse(data.decode("utf-8-sig"))
+    except TOMLKitError as error:
         raise UserError(f"scene {file} is not TOML: {error}") from None
     if "camera" not in document:
         document["camera"] = tomlkit.table()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -88,3 +89,27 @@ def test_merged_roughnesses_fit_a_table(parts: list[tuple[str, int]], count: int
         both = zip(materials, found, strict=True)
         pairs = sorted((a.roughness or 1, b.roughness or 1) for a, b in both if a.kind == kind)
         assert kind == "mirror" or [after for _, after in pairs] == sorted(after for _, after in pairs)
+
+
+def test_the_least_change_is_merged_first() -> None:
+    """The same classes as by comparing all pairs at each step; their number is beyond what that could do in a test."""
+    random = np.random.default_rng(5)
+    materials = [MeshMaterial("mirror", roughness=float(value)) for value in random.random(4_000)]
+    weights = random.random(4_000)
+    found, change = merged_roughness(materials, weights, 16)
+    assert len(set(found)) == 16 and 0.005 < change < 0.02
+    few, few_weights = materials[:40], weights[:40]
+    classes = [[index] for index in sorted(range(40), key=lambda index: few[index].roughness)]
+
+    def centre(one: list[int]) -> tuple[float, float]:
+        total = float(few_weights[one].sum())
+        return total, float(sum(few_weights[index] * few[index].roughness for index in one) / total)
+
+    while len(classes) > 7:
+        pairs = [(centre(a), centre(b)) for a, b in pairwise(classes)]
+        costs = [a[0] * b[0] / (a[0] + b[0]) * (a[1] - b[1]) ** 2 for a, b in pairs]
+        least = costs.index(min(costs))
+        classes[least : least + 2] = [classes[least] + classes[least + 1]]
+    merged, _ = merged_roughness(few, few_weights, 7)
+    for one in classes:
+        np.testing.assert_allclose([merged[index].roughness for index in one], centre(one)[1])

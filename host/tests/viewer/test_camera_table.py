@@ -29,10 +29,11 @@ def test_a_camera_in_every_form_of_a_table_is_saved(tmp_path: Path, before: str,
     assert after in file.read_text()
     camera = colonnade.Scene.load(file).description.camera
     assert camera.position == (1, 2, 3) and camera.target == (0, 0, 0.1235)
-    file.write_text("camera = 5")
-    with pytest.raises(UserError):
-        save_camera(file, (1, 2, 3), (0, 0, 0), lambda _: None)
-    assert file.read_text() == "camera = 5"
+    for broken in ("camera = 5", "camera =", ".".join(["a"] * 50_000) + " = 1"):
+        file.write_text(broken)
+        with pytest.raises(UserError):
+            save_camera(file, (1, 2, 3), (0, 0, 0), lambda _: None)
+        assert file.read_text() == broken
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-5, 1.0, 1e4, 1e10])
