@@ -125,6 +125,9 @@ MIXED = Loss.of(
     "closed part with mixed winding", "repaired", "all faces point outward", "closed parts with mixed winding"
 )
 INVERTED = Loss.of("inside-out closed part", "turned outward", "the faces are reversed")
+SURPLUS = Loss.of(
+    "value beyond those of the header", "not read", "a row has those of the header", "values beyond those of the header"
+)
 
 
 def shrunk_textures(factor: int) -> Loss:

@@ -93,7 +93,7 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
     file = _Statements(re.sub(r"\\\r?\n", " ", text_of(data)).replace("\t", " "))
     vertices, vertex_colours = _vertices(file.vertices, losses)
     normals = _rows(file.normals, 3)[:, :3]
-    sizes, corners, corner_normals, corner_uvs = _corners(file, path)
+    sizes, corners, corner_normals, corner_uvs = _corners(file, path, losses)
     losses.add(lost.POINTS, file.losses.get("p", 0))
     losses.add(lost.LINES, file.losses.get("l", 0))
     losses.add(lost.CURVES, sum(file.losses.get(name, 0) for name in _CURVES))
@@ -181,7 +181,7 @@ def _indices(words: Sequence[str]) -> tuple[list[int], list[int | None], list[in
     return [int(part[0]) for part in parts], numbers_of(2), numbers_of(1)
 
 
-def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices, Indices]:
+def _corners(file: _Statements, path: Path, losses: Losses) -> tuple[Indices, Indices, Indices, Indices]:
     """Sizes of the polygons, and vertex, normal and position (-1: none) of each corner."""
     words = [face.split() for face in file.faces]
     sizes = np.array(list(map(len, words)), dtype=np.int64)
@@ -189,6 +189,9 @@ def _corners(file: _Statements, path: Path) -> tuple[Indices, Indices, Indices, 
         vertices, normals, uvs = _indices(list(chain.from_iterable(words)))
     except ValueError:
         raise UserError(f"mesh {path}: a vertex index of a face is not an integer") from None
+    if not file.normals:
+        losses.add(lost.MISSING, sum(index is not None for index in normals))
+        normals = [None] * len(normals)
     for one, several, indices, count in (
         ("vertex", "vertices", vertices, len(file.vertices)),
         ("normal", "normals", normals, len(file.normals)),

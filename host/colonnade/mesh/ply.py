@@ -20,7 +20,7 @@ from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials import PLAIN
-from colonnade.mesh.ply_elements import AsciiReader, BinaryReader, Columns, Element, ListColumn, read_header
+from colonnade.mesh.ply_elements import BinaryReader, Columns, Element, ListColumn, read_ascii, read_header
 from colonnade.mesh.ply_textures import textured_polygons
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface, from_polygons, linear_colours
@@ -47,10 +47,12 @@ def read_ply(data: bytes, path: Path, references: References, losses: Losses) ->
         UserError: The file is invalid or truncated, or a face names a vertex that does not exist.
     """
     header, body, encoding = read_header(data, path)
-    reader = (
-        AsciiReader(body, path) if encoding == "ascii" else BinaryReader(body, path, encoding == "binary_big_endian")
-    )
-    content = {element.name: (element, reader.read(element)) for element in header}
+    if encoding == "ascii":
+        columns = read_ascii(body, path, header, losses)
+    else:
+        reader = BinaryReader(body, path, encoding == "binary_big_endian")
+        columns = [reader.read(element) for element in header]
+    content = {element.name: (element, values) for element, values in zip(header, columns, strict=True)}
     if "vertex" not in content:
         raise UserError(f"mesh {path} has no vertices")
     vertex = content["vertex"][1]

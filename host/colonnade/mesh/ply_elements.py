@@ -13,6 +13,8 @@ import numpy.typing as npt
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
+from colonnade.mesh import losses as lost
+from colonnade.mesh.losses import Losses
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -101,12 +103,62 @@ def _truncated(path: Path, element: Element) -> UserError:
     )
 
 
-class AsciiReader:
+def read_ascii(body: bytes, path: Path, header: Sequence[Element], losses: Losses) -> list[Columns]:
+    """The columns of all elements of an ASCII file.
+
+    Rows may go over several lines. Where the words are not those of the header, each line is a row, of which the
+    values beyond those of the header are left out.
+
+    Raises:
+        UserError: The file is truncated, or a value is missing.
+    """
+    reader, refused = _AsciiReader(body.split(), path), None
+    try:
+        columns = [reader.read(element) for element in header]
+    except UserError as error:
+        refused = error
+    if refused is not None or reader.left:
+        words = _declared([line.split() for line in body.splitlines() if line.strip()], header)
+        if words is not None:
+            reader = _AsciiReader(words, path)
+            columns = [reader.read(element) for element in header]
+            losses.add(lost.SURPLUS, len(body.split()) - len(words))
+        elif refused is not None:
+            raise refused
+        else:
+            losses.add(lost.SURPLUS, reader.left)
+    return columns
+
+
+def _declared(rows: Sequence[Sequence[bytes]], header: Sequence[Element]) -> list[bytes] | None:
+    """The words of the rows that the header declares; None if a line has fewer than a row."""
+    words: list[bytes] = []
+    kinds = [element.properties for element in header for _ in range(min(element.rows, len(rows) + 1))]
+    if len(kinds) > len(rows):
+        return None
+    for row, properties in zip(rows, kinds, strict=False):
+        size = 0
+        for one in properties:
+            if one.count_kind and (size >= len(row) or not row[size].isdigit()):
+                return None
+            size += 1 + int(row[size]) if one.count_kind else 1
+        if size > len(row):
+            return None
+        words += row[:size]
+    return words
+
+
+class _AsciiReader:
     """Reads elements from the words of an ASCII file."""
 
-    def __init__(self, body: bytes, path: Path) -> None:
-        self._words = body.split()
+    def __init__(self, words: list[bytes], path: Path) -> None:
+        self._words = words
         self._at, self._path = 0, path
+
+    @property
+    def left(self) -> int:
+        """The words after the elements that were read."""
+        return len(self._words) - self._at
 
     def read(self, element: Element) -> Columns:
         """The columns of the next element."""

@@ -94,12 +94,12 @@ def test_midpoints_keep_the_surface() -> None:
         ("old.gltf", b'{"nodes": {"a": {}}}', "glTF of version 1: export it as glTF 2.0"),
         ("named.gltf", b'{"asset": {"version": "1.1"}}', "glTF of version 1: export it as glTF 2.0"),
         ("empty.stl", b"solid a\nendsolid a\n", "no faces: its solids hold no facets"),
-        ("cloud.ply", PLY % b"property float w\nelement face 0\nproperty list uchar int vertex_indices", "no polygons"),
         (
-            "extra.ply",
-            PLY % b"property float w\nelement face 2\nproperty list uchar int vertex_indices",
-            "than the header",
+            "cloud.ply",
+            PLY % b"property float w\nelement face 0\nproperty list uchar int vertex_indices",
+            "no faces: 10 values",
         ),
+        ("few.ply", PLY % b"element face 3\nproperty list uchar int vertex_indices", "truncated|than the header"),
     ],
 )
 def test_bad_files_are_refused_in_one_line(tmp_path: Path, file: str, content: bytes, message: str) -> None:

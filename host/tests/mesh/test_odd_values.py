@@ -161,3 +161,34 @@ def test_normals_of_stl_that_are_no_numbers_print_nothing(
     mesh = load_mesh(tmp_path / "a.stl")
     assert len(mesh.faces) == 2 and mesh.notes == ()
     assert caplog.records == [] and capfd.readouterr().err == ""
+
+
+PLY = (
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 2\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\n"
+    "property uchar blue\nend_header\n"
+)
+
+
+def test_rows_of_ply_that_are_longer_than_the_header_states(tmp_path: Path) -> None:
+    """Of a line is read what the header states; a row may also go over several lines."""
+    plain = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 3 255 0 0\n"
+    longer = "".join(f"{line} 6 0.5\n" for line in plain.splitlines())
+    for text, values in ((plain, ""), (plain.replace(" ", "\n"), ""), (longer, "12"), (plain + "0 0 0\n", "3")):
+        (tmp_path / "a.ply").write_text(PLY + text)
+        mesh = load_mesh(tmp_path / "a.ply")
+        assert [material.albedo for material in mesh.materials] == [(1, 0, 0)]
+        assert sorted(map(tuple, mesh.vertices[mesh.faces].reshape(-1, 3)))[::2] == [(0, 0, 0), (0, 1, 0), (1, 1, 0)]
+        note = "values beyond those of the header are not read: a row has those of the header"
+        assert [one for one in mesh.notes if "values" in one] == [f"mesh {tmp_path}/a.ply: {values} {note}"] * bool(
+            values
+        )
+
+
+def test_faces_of_obj_with_normals_that_the_file_lacks(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(f"{TRIANGLE}f 1//7 2//8 3\n")
+    mesh = load_mesh(tmp_path / "a.obj")
+    assert len(mesh.faces) == 1 and mesh.notes[0].endswith("2 corners have no normal: they are computed from the faces")
+    (tmp_path / "a.obj").write_text(f"vn 0 0 1\n{TRIANGLE}f 1//1 2//1 3//2\n")
+    with pytest.raises(UserError, match="a face names normal 2, but the file has 1 normals"):
+        load_mesh(tmp_path / "a.obj")
