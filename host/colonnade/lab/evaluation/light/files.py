@@ -7,7 +7,6 @@ and panoramas, ``panorama.hdr`` and, without the emitters, ``around.hdr``. Maps 
 from __future__ import annotations
 
 import json
-import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -25,10 +24,8 @@ from colonnade.environment.panorama_file import read_radiance
 from colonnade.lab.evaluation.light.rooms import FRAME, GLASSES, METALS, KnownRoom, PointLight, Thing
 from colonnade.lab.evaluation.light.surfaces import pose_of
 from colonnade.lab.evaluation.studies.synthetic_attic import write_room
+from colonnade.mesh.glb import Glb
 from colonnade.mesh.load import load_mesh
-
-#: Constants of glTF.
-_FLOAT, _ARRAY = 5126, 34962
 
 
 def stored(name: str) -> Path:
@@ -115,7 +112,6 @@ def write_glb(path: Path, thing: Thing) -> None:
     """Write the mesh of an object as binary glTF, with its metallic-roughness material."""
     mesh = load_mesh(thing.mesh)
     corners = (mesh.vertices[mesh.faces].reshape(-1, 3), mesh.corner_normals.reshape(-1, 3))
-    arrays = [np.ascontiguousarray(values, dtype="<f4") for values in corners]
     material: dict[str, Any] = {
         "pbrMetallicRoughness": {
             "baseColorFactor": [*thing.colour, 1.0],
@@ -123,44 +119,21 @@ def write_glb(path: Path, thing: Thing) -> None:
             "roughnessFactor": thing.roughness,
         }
     }
-    used = []
-    if thing.kind in GLASSES:
-        used = ["KHR_materials_transmission", "KHR_materials_ior"]
+    used = ["KHR_materials_transmission", "KHR_materials_ior"] if thing.kind in GLASSES else []
+    if used:
         material["extensions"] = {used[0]: {"transmissionFactor": 1.0}, used[1]: {"ior": 1.5}}
-    lengths = [values.nbytes for values in arrays]
+    glb = Glb()
+    attributes = dict(zip(("POSITION", "NORMAL"), map(glb.accessor, corners), strict=True))
     document = {
-        "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "material": 0}]}],
+        "meshes": [{"primitives": [{"attributes": attributes, "material": 0}]}],
         "materials": [material],
         "extensionsUsed": used,
-        "buffers": [{"byteLength": sum(lengths)}],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": start, "byteLength": length, "target": _ARRAY}
-            for start, length in zip((0, lengths[0]), lengths, strict=True)
-        ],
-        "accessors": [
-            {
-                "bufferView": index,
-                "componentType": _FLOAT,
-                "count": len(values),
-                "type": "VEC3",
-                "min": values.min(axis=0).tolist(),
-                "max": values.max(axis=0).tolist(),
-            }
-            for index, values in enumerate(arrays)
-        ],
     }
-    if not used:
-        del document["extensionsUsed"]
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    body = b"".join(values.tobytes() for values in arrays)
     with replacing(path) as stream:
-        stream.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(body)))
-        stream.write(struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(body), b"BIN\0") + body)
+        stream.write(glb.content(document))
 
 
 def store(name: str, result: Path) -> None:
