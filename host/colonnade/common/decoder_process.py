@@ -34,6 +34,10 @@ def decode(
     words = [sys.executable, "-I", "-m", module, memory, seconds, *arguments]
     done = subprocess.run(list(map(str, words)), input=data, capture_output=True, check=False)
     if done.returncode > 0 and done.returncode != DAMAGED:
-        reason = (done.stderr.decode("utf-8", "replace").splitlines() or ["no reason given"])[-1]
-        raise UserError(f"the decoder {module} does not start: {reason}: install Colonnade again")
+        raise UserError(f"the decoder {module} does not start: {last_line(done.stderr)}: install Colonnade again")
     return done
+
+
+def last_line(output: bytes) -> str:
+    """The last line that a decoder printed, the reason for its end."""
+    return (output.decode("utf-8", "replace").splitlines() or ["no reason given"])[-1]

@@ -8,7 +8,7 @@ from colonnade.common.errors import UserError
 
 #: Modules of each extra, by its name in pyproject.toml, and where a package exists if that is not everywhere.
 EXTRAS = {
-    "reference": {"embreex": "Linux on x86_64 and macOS", "trimesh": ""},
+    "reference": {"embreex": "Linux on x86_64 and macOS"},
     "quality": {"flip_evaluator": "Linux on x86_64 and macOS, Python up to 3.13"},
     "panorama": {"OpenImageIO": ""},
     "denoise": {"pyoidn": ""},

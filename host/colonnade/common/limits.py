@@ -38,6 +38,8 @@ MAX_TEXT_BYTES = 1 << 20
 MAX_PICTURE_BYTES = 1 << 30
 #: Bytes of a mesh, with the files that it references.
 MAX_MESH_BYTES = 1 << 31
+#: Triangles of a mesh with its instances: twice those of the largest memory.
+MAX_TRIANGLES = 1 << 24
 #: Bytes of a scene image and of its header.
 MAX_IMAGE_BYTES = 1 << 32
 MAX_HEADER_BYTES = 1 << 24

@@ -12,8 +12,9 @@ from colonnade.mesh.losses import Losses
 from colonnade.mesh.resolver import References
 from colonnade.mesh.surface import RawSurface
 
-#: Suffixes of mesh files.
-SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf")
+#: Suffixes of the formats that trimesh reads for us, and of all mesh files.
+TRIMESH_SUFFIXES = (".3mf", ".dae", ".zae", ".3dxml", ".xaml")
+SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", *TRIMESH_SUFFIXES)
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,10 @@ def read_surface(path: Path) -> MeshFile:
         from colonnade.mesh.off import read_off
 
         surface = read_off(content, path, losses)
+    elif kind in TRIMESH_SUFFIXES:
+        from colonnade.mesh.trimesh_files import read_by_trimesh
+
+        surface = read_by_trimesh(content, path, references, losses)
     else:
         from colonnade.mesh.stl import read_stl
 

@@ -142,7 +142,7 @@ class GltfTextures:
             if found is None:
                 self._losses.add(lost.NO_PICTURES)
                 return None
-            data = found
+            data, name = found, unquote(uri)
         else:
             raise self._document.error(f"{name} has no picture: export it again")
         return self.reader.read(data, name, (wrap_u, wrap_v), is_nearest)

@@ -1,4 +1,4 @@
-"""Loads triangle meshes by name, or from a file (OBJ, PLY, STL, OFF, glTF).
+"""Loads triangle meshes by name, or from a file (OBJ, PLY, STL, OFF, glTF, 3MF, COLLADA …).
 
 Every loaded mesh is clean: vertices are merged by position, degenerate faces, duplicate faces and unused vertices are
 removed, and closed parts point outward. Its corner normals are those of the file, else smooth up to a crease angle.

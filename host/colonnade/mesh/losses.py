@@ -63,6 +63,12 @@ CAMERAS = Loss.of("camera", "not used", "the scene file has the camera")
 ANIMATIONS = Loss.of("animation", "not played", "nodes stand as the file places them")
 SKINS = Loss.of("skin", "not applied", "its mesh has the pose in which it was bound")
 MORPHS = Loss.of("morph target", "not applied", "its mesh has its base shape")
+HOLES = Loss.of("polygon with holes", "not shown", "export triangles", "polygons with holes")
+BEAMS = Loss.of("beam lattice", "not shown", "only faces are rendered")
+MATERIAL_GROUPS = Loss.of(
+    "group of materials or colours", "not read", "faces have the default material", "groups of materials or colours"
+)
+WRAPS = Loss.of("wrap of a texture", "not used", "its picture repeats", "wraps of textures")
 LINES = Loss.of("line primitive", "not shown", "only faces are rendered")
 POINTS = Loss.of("point primitive", "not shown", "only faces are rendered")
 CURVES = Loss.of("free-form curve or surface", "not shown", "only faces are rendered", "free-form curves and surfaces")
@@ -125,6 +131,7 @@ MIXED = Loss.of(
     "closed part with mixed winding", "repaired", "all faces point outward", "closed parts with mixed winding"
 )
 INVERTED = Loss.of("inside-out closed part", "turned outward", "the faces are reversed")
+
 SURPLUS = Loss.of(
     "value beyond those of the header", "not read", "a row has those of the header", "values beyond those of the header"
 )
@@ -145,6 +152,11 @@ def smooth_normals(degrees: float) -> Loss:
 def unread_properties(names: Sequence[str], has_more: bool) -> Loss:
     """The loss of properties of a PLY file, of which some are named."""
     return Loss.of("property", "not read", ", ".join(names) + (" …" if has_more else ""), "properties")
+
+
+def unread_part(reason: str) -> Loss:
+    """The loss of a part that the reader of another library passes over."""
+    return Loss("part is not read as it stands", "parts are not read as they stand", reason)
 
 
 def extension_loss(name: str) -> Loss:

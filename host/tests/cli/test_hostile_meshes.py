@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import struct
+import zipfile
+from pathlib import Path
 from typing import Any
 
 import gltf_documents
@@ -11,12 +13,15 @@ import hostile
 import pytest
 from gltf_documents import gltf
 from hostile import RENDER, TRIANGLE, Case, Content, fifo, link_to
+from interchange_files import MESH, archive, dae, threemf
+from interchange_files import POINTS as CORNERS
 
 from colonnade.common.errors import UserError
 from colonnade.mesh.load import load_mesh
 
 OBJ, PLY, STL, OFF = (f"{RENDER} --mesh x.{suffix}" for suffix in ("obj", "ply", "stl", "off"))
 GLTF = f"{RENDER} --mesh x.gltf"
+THREEMF, DAE, ZAE = (f"{RENDER} --mesh x.{suffix}" for suffix in ("3mf", "dae", "zae"))
 POINTS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 PLY_HEADER = (
     "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
@@ -57,6 +62,33 @@ def of_draco(**extension: Any) -> dict[str, Content]:
 def buffer(name: str) -> list[dict[str, Any]]:
     return [{"byteLength": 42, "uri": name}]
 
+
+def bomb(path: Path) -> None:
+    """A 3MF file that unpacks to a thousand times its size."""
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file,
+        file.open("3D/3dmodel.model", "w") as member,
+    ):
+        for _ in range(700):
+            member.write(bytes(1 << 20))
+
+
+def claiming(content: bytes, size: int) -> bytes:
+    """An archive whose list states another size of its first member."""
+    start = content.index(b"PK\1\2") + 24
+    return content[:start] + struct.pack("<I", size) + content[start + 4 :]
+
+
+#: Entities of ten of the one before, to 10^9, and one of another file.
+LAUGHS = "".join(f"<!ENTITY e{k} '" + f"&e{k - 1};" * 10 + "'>" for k in range(1, 10))
+ENTITIES = f'<!DOCTYPE x [<!ENTITY e0 "0 0 0 ">{LAUGHS}<!ENTITY file SYSTEM "tri.obj">]>'
+#: Objects of two of the one before, to 2^38.
+DOUBLED = "".join(
+    f"<object id='{k}'><components><component objectid='{k - 1}'/><component objectid='{k - 1}'/></components></object>"
+    for k in range(2, 40)
+)
+#: 200,000 triangles.
+MANY = MESH.replace("<triangles>", "<triangles>" + '<triangle v1="0" v2="1" v3="2"/>' * 200_000)
 
 CASES = {
     "obj-index-0": Case(OBJ, "names vertex 0", {"x.obj": f"{POINTS}f 0 1 2\n"}),
@@ -132,6 +164,37 @@ CASES = {
     "gltf-draco-no-view": Case(GLTF, "bufferViews[None] is used", of_draco(attributes={})),
     "gltf-draco-view": Case(GLTF, "bufferViews[9] is used", of_draco(bufferView=9, attributes={})),
     "gltf-many-materials": Case(GLTF, "more than 256 materials: use at most 256", of_materials(20_000)),
+    "3mf-bomb": Case(THREEMF, "it takes more than 1,1", {"x.3mf": bomb}),
+    "3mf-claimed-size": Case(
+        THREEMF, "unpacks to more than 2,147,483,648 bytes", {"x.3mf": claiming(threemf(), 0xFFFFFFF0)}
+    ),
+    "3mf-false-size": Case(THREEMF, "cannot be read as a mesh: BadZipFile", {"x.3mf": claiming(threemf(), 99)}),
+    "3mf-items": Case(
+        THREEMF,
+        "its parts have more than 16,777,216 triangles",
+        {"x.3mf": threemf(f'<object id="1">{MANY}</object>', '<item objectid="1"/>' * 100)},
+    ),
+    "3mf-components": Case(
+        THREEMF,
+        "it takes more than 1,024 MiB or 5 s: export it as glTF, or in parts",
+        {"x.3mf": threemf(f'<object id="1">{MESH}</object>{DOUBLED}', '<item objectid="39"/>')},
+    ),
+    "3mf-loop": Case(
+        THREEMF,
+        "no faces",
+        {"x.3mf": threemf('<object id="1"><components><component objectid="1"/></components></object>')},
+    ),
+    "3mf-text": Case(THREEMF, "XMLSyntaxError", {"x.3mf": archive(**{"3D_3dmodel__model": b"\xff" * 400})}),
+    "dae-entities": Case(DAE, "entity amplification", {"x.dae": dae(head=ENTITIES).replace(CORNERS, "&e9;")}),
+    "dae-file-entity": Case(DAE, "Entity 'file' not defined", {"x.dae": dae(head=ENTITIES).replace(CORNERS, "&file;")}),
+    "dae-deep": Case(DAE, "Excessive depth", {"x.dae": dae(instance="<node>" * 50_000)}),
+    "dae-escapes": Case(DAE, "x.dae", {"x.dae": dae(instance="\x1b[31m")}),
+    "zae-encrypted": Case(
+        ZAE,
+        "is encrypted",
+        {"x.zae": archive(a__dae=dae()).replace(b"PK\1\2\x14\x03\x14\0\0", b"PK\1\2\x14\x03\x14\0\1")},
+    ),
+    "zae-none": Case(ZAE, "File is not a zip file", {"x.zae": dae()}),
     "strict": Case(f"{GLTF} --strict", "2 cameras are not used", of_gltf(cameras=[{}, {}])),
     **{
         name: Case(f"{RENDER} --mesh {name}", says, {name: content})
