@@ -241,7 +241,7 @@ def test_invalid_files_are_one_line(name: str, content: bytes | str, message: st
 
 def test_a_reader_that_does_not_start_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    with pytest.raises(UserError, match="decoder for this format does not start: no reason given: install Colonnade"):
+    with pytest.raises(UserError, match="trimesh_program does not start: no reason given: install Colonnade"):
         loaded(tmp_path, "a.3mf", threemf())
 
 
