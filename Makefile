@@ -62,7 +62,7 @@ release-check: ## make the release twice, compare, and use its files in bare sys
 container: ## the image `colonnade`: Debian 12, a checkout that is set up; by podman, buildah or docker
 	@tools/container
 
-lock: setup ## make host/locks, project/dependencies.sha256 and sbom.json again
+lock: setup ## make host/locks and project/dependencies.sha256 again
 	@tools/lock
 
 format: setup ## let the formatters rewrite the sources

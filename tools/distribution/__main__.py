@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -37,7 +38,8 @@ def main(arguments: list[str]) -> None:
             _say(f"the design of preset {preset}")
             designs.write(preset, jar, work / "designs", files / f"colonnade-{preset}-{version}.tar.gz", time)
         archives.write_tar(site, "colonnade-docs", files / f"colonnade-docs-{version}.tar.gz", time)
-        shutil.copy(ROOT / "sbom.json", files / f"colonnade-{version}.cdx.json")
+        materials = subprocess.check_output([sys.executable, ROOT / "tools" / "supply_chain", "sbom"])
+        (files / f"colonnade-{version}.cdx.json").write_bytes(materials)
         _write_checksums(files)
         shutil.rmtree(output, ignore_errors=True)
         shutil.move(files, output)

@@ -1,17 +1,16 @@
-"""Generates sbom.json (CycloneDX 1.6) from the locks, and checks offline that it matches them.
+"""The bill of materials of setup, CycloneDX 1.6, from the locks.
 
-Versions and hashes come only from the locks. Licences come from the metadata of packages that are installed when the
-file is written; the check ignores them.
+Versions and hashes come only from the locks. Licences come from the metadata of packages that are installed in the
+environments of this checkout, and of POM files in Coursier's cache.
 """
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
-from importlib.metadata import PackageNotFoundError, metadata
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ import jars
 import python_locks
 
 ROOT = Path(__file__).resolve().parents[2]
-FILE = ROOT / "sbom.json"
 
 Component = dict[str, Any]
 
@@ -27,37 +25,16 @@ Component = dict[str, Any]
 _MINIMUM_OF = {"g++": "gxx", "python3": "python", "openjdk-17-jdk-headless": "java"}
 
 
-def write() -> None:
-    """Write sbom.json. Licences come from this environment and Coursier's cache, else from the previous file."""
-    before = {part["bom-ref"]: part.get("licenses") for part in _read().get("components", [])}
-    components = _components()
+def document() -> dict[str, Any]:
+    """The bill of materials, as JSON has it."""
+    components = [*_python(), *_maven(), *_debian()]
     for component in components:
-        licences = _licences(component) or before.get(component["bom-ref"])
-        if licences:
+        if licences := _licences(component):
             component["licenses"] = licences
-    FILE.write_text(json.dumps(_document(components), indent=1) + "\n", encoding="utf-8")
+    return {**_head(), "components": components}
 
 
-def check() -> list[str]:
-    """The errors of sbom.json, one line each."""
-    if not FILE.is_file():
-        return ["sbom.json is missing; run: tools/lock"]
-    existing = _read()
-    for component in existing.get("components", []):
-        component.pop("licenses", None)
-    if existing != _document(_components()):
-        return ["sbom.json does not match the locks; run: tools/lock"]
-    return []
-
-
-def _read() -> dict[str, Any]:
-    if not FILE.is_file():
-        return {}
-    data: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
-    return data
-
-
-def _document(components: list[Component]) -> dict[str, Any]:
+def _head() -> dict[str, Any]:
     project = python_locks.project_tables()["project"]
     product = {
         "type": "application",
@@ -66,12 +43,7 @@ def _document(components: list[Component]) -> dict[str, Any]:
         "version": project["version"],
         "licenses": [{"license": {"id": project["license"]["text"]}}],
     }
-    head = {"bomFormat": "CycloneDX", "specVersion": "1.6", "version": 1, "metadata": {"component": product}}
-    return {**head, "components": components}
-
-
-def _components() -> list[Component]:
-    return [*_python(), *_maven(), *_debian()]
+    return {"bomFormat": "CycloneDX", "specVersion": "1.6", "version": 1, "metadata": {"component": product}}
 
 
 def _python() -> list[Component]:
@@ -130,11 +102,10 @@ def _licences(component: Component) -> list[Component]:
 
 
 def _python_licences(name: str, version: str) -> list[Component]:
-    try:
-        package = metadata(name)
-    except PackageNotFoundError:
-        return []
-    if package["Version"] != version:
+    places = [*sys.path, *map(str, (ROOT / ".cache").glob("*/lib/python*/site-packages"))]
+    found = (one.metadata for one in distributions(name=name, path=places) if one.version == version)
+    package = next(found, None)
+    if package is None:
         return []
     if package["License-Expression"]:
         return [{"expression": package["License-Expression"]}]
@@ -160,8 +131,3 @@ def _pom_licences(folder: Path, depth: int = 0) -> list[str]:
         return [name for name in names if name]
     group, name, version = (parent.findtext(key, "") for key in ("groupId", "artifactId", "version"))
     return _pom_licences(Path(*group.split("."), name, version), depth + 1)
-
-
-if __name__ == "__main__":
-    write()
-    sys.exit(len(check()))
