@@ -1,4 +1,4 @@
-# Debian 12 with all that continuous integration installs; docs/container.md describes its use. The stage `tools` is the
+# Debian 12 with all that continuous integration installs; docs/release.md describes its use. The stage `tools` is the
 # development container, for a mounted checkout; the last one holds this checkout, set up and compiled.
 ARG BASE=docker.io/library/debian:bookworm-20260918@sha256:f37a335e82bca302e955fa39f9dfe28f1be618f016f8a2b56318e5a5111afc26
 FROM ${BASE} AS tools

@@ -1,4 +1,4 @@
-"""Files of a release stay readable, and files of a newer one are refused in one line (docs/compatibility.md).
+"""Files of a release stay readable, and files of a newer one are refused in one line (docs/release.md).
 
 The folder `data/formats` holds what this command wrote, and the manifest of its configuration:
 

@@ -126,7 +126,7 @@ def problem_of(entry: Entry, content: Mapping[str, Any]) -> str | None:
 
 
 def _completed(config: Any, defaults: Any) -> Any:
-    """A configuration with the values of the keys that are younger than it (docs/compatibility.md)."""
+    """A configuration with the values of the keys that are younger than it (docs/release.md)."""
     if not isinstance(config, Mapping) or not isinstance(defaults, Mapping):
         return config
     return {**defaults, **{key: _completed(value, defaults.get(key)) for key, value in config.items()}}
