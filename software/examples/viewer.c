@@ -1,4 +1,4 @@
-/* A viewer under Linux, without DRM: renders into the device's memory, which is the display's (docs/other-socs.md), while
+/* A viewer under Linux, without DRM: renders into the device's memory, which is the display's (docs/soc.md), while
  * keys orbit the object.
  *
  * usage: viewer /dev/uio0 IMAGE VIEW             keys of the terminal: a d w s or arrows orbit, + - come nearer, r goes back,

@@ -1,4 +1,4 @@
-"""Linux' console on a display that shows the device's memory: kept from drawing there (docs/other-socs.md, "Linux")."""
+"""Linux' console on a display that shows the device's memory: kept from drawing there (docs/soc.md, "Linux")."""
 
 from __future__ import annotations
 
