@@ -12,6 +12,8 @@ from colonnade.lab.figures.facts import MEGAHERTZ, facts
 Frame = Mapping[str, Any]
 #: Frames whose cost is given: samples, gathered rays of a path, and passes, a quarter more with coats.
 _COSTS = ((1, 1, 1), (4, 1, 5), (16, 1, 20), (16, 2, 20))
+#: Columns that are compared by material and at mirrors.
+_MATERIALS = ("probe, rasteriser", "ambient light", "1 pass, filtered", "16 passes, filtered", "photo alone")
 
 
 def _of(data: Data, suffix: str) -> dict[str, Frame]:
@@ -20,34 +22,35 @@ def _of(data: Data, suffix: str) -> dict[str, Frame]:
     return {name.removesuffix(suffix): own for name, own in frames.items() if name.endswith(suffix)}
 
 
-def _columns(frames: Mapping[str, Frame], with_oidn: bool = False) -> list[str]:
-    """The columns of frames; Open Image Denoise filters the objects alone."""
-    return [name for name in next(iter(frames.values()))["qualities"] if with_oidn or "OIDN" not in name]
+def _columns(frames: Mapping[str, Frame]) -> list[str]:
+    return list(next(iter(frames.values()))["qualities"])
 
 
-def _cells(frames: Mapping[str, Frame], column: str, part: str) -> list[str]:
-    """Decibels, FLIP, and of frame and objects DISTS, if it was measured."""
-    keys = ("flip",) if part == "room" else ("flip", "dists")
-    found = []
-    for own in (frame["qualities"][column] for frame in frames.values()):
-        values = [own.get(f"{part}_{key}") for key in keys]
-        found.append(", ".join([f"{own[part]:.1f}", *("–" if value is None else f"{value:.3f}" for value in values)]))
-    return found
+def _means(frames: Mapping[str, Frame], column: str, part: str, *keys: str) -> str:
+    """Mean over the rooms of values of a part of the frame: dash without them."""
+    own = [frame["qualities"][column] for frame in frames.values()]
+    names = [part, *(f"{part}_{key}" for key in keys)]
+    if any(one.get(name) is None for one in own for name in names):
+        return "–"
+    values = [_mean([one[name] for one in own]) for name in names]
+    return ", ".join(f"{value:.3f}" if index else f"{value:.1f}" for index, value in enumerate(values))
 
 
-def objects(data: Data) -> str:
-    """PSNR, FLIP and DISTS of the rough objects' pixels."""
+def quality(data: Data) -> str:
+    """PSNR of the rough objects by room, and means of PSNR, FLIP and DISTS of objects, changed room and frame."""
     frames = _of(data, "-rough")
-    rows = [[column, *_cells(frames, column, "object")] for column in _columns(frames, with_oidn=True)[1:]]
-    return markdown(["objects: dB, FLIP, DISTS", *frames], rows)
-
-
-def rooms(data: Data) -> str:
-    """PSNR and FLIP of the room that changes, and with DISTS of the whole frame, with the rough objects."""
-    frames = _of(data, "-rough")
-    rows = [[column, *_cells(frames, column, "room"), *_cells(frames, column, "frame")] for column in _columns(frames)]
-    titles = [f"{room}, {part}" for part in ("room", "frame") for room in frames]
-    return markdown(["dB, FLIP, of frames DISTS", *titles], rows)
+    rows = []
+    for column in _columns(frames):
+        objects = ["–"] * (len(frames) + 1)
+        if column != "no object":
+            each = [f"{frame['qualities'][column]['object']:.1f}" for frame in frames.values()]
+            objects = [*each, _means(frames, column, "object", "flip", "dists")]
+        # Open Image Denoise filters the objects alone.
+        others = ["–", "–"]
+        if "OIDN" not in column:
+            others = [_means(frames, column, "room", "flip"), _means(frames, column, "frame", "flip", "dists")]
+        rows.append([column, *objects, *others])
+    return markdown(["dB, FLIP, DISTS", *frames, "objects", "room", "frame"], rows)
 
 
 def materials(data: Data) -> str:
@@ -55,7 +58,7 @@ def materials(data: Data) -> str:
     every = [found for frame in ("rough", "clear", "blurred") if (found := _of(data, f"-{frame}"))]
     kinds = [list(next(iter(frames.values()))["qualities"]["ambient light"]["things"]) for frames in every]
     rows = []
-    for column in _columns(every[0], with_oidn=True)[1:]:
+    for column in filter(_MATERIALS.__contains__, _columns(every[0])):
         cells = [
             f"{_mean([own['qualities'][column]['things'][kind] for own in frames.values()]):.1f}"
             for frames, own_kinds in zip(every, kinds, strict=True)
@@ -69,9 +72,9 @@ def mirrors(data: Data) -> str:
     """Light of the mirrors against the truth, and where their rays look."""
     frames = _of(data, "-clear")
     rows = []
-    for column in _columns(frames)[1:]:
+    for column in filter(_MATERIALS.__contains__, _columns(frames)):
         own = [frame["qualities"][column] for frame in frames.values()]
-        rows.append([column, *(f"{one['things']['mirror']:.1f} dB, {one['brightness']:.2f}" for one in own)])
+        rows.append([f"light: {column}", *(f"{one['brightness']:.2f}" for one in own)])
     for kind, title in (("probe", "rays of the probe"), ("colonnade", "rays of Colonnade")):
         errors = [frame["mirrors"][kind] for frame in frames.values()]
         rows.append([title, *(f"{one['median']:.1f}°, {one['high']:.1f}°" for one in errors)])
@@ -119,8 +122,7 @@ def _mean(values: list[float]) -> float:
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {
-    "light-objects": objects,
-    "light-rooms": rooms,
+    "light-quality": quality,
     "light-materials": materials,
     "light-mirrors": mirrors,
     "light-cost": cost,

@@ -267,7 +267,7 @@ def compared(*kinds: str) -> dict[str, Any]:
         "no object",
         "probe, rasteriser",
         "ambient light",
-        "1 pass",
+        "1 pass, filtered",
         "1 pass, OIDN",
         "photo alone, no gathered light",
     )
@@ -326,11 +326,15 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert path in table(docs, "live-paths")
     assert "60 kGE; + 3.0, 5.0 %" in table(docs, "gather")
     assert "50,000 cycles, 900 gathered rays" in table(docs, "gather")
-    assert "| 1 pass | 30.0, 0.125, 0.125 |" in table(docs, "light-objects")
+    quality = table(docs, "light-quality")
+    means = "| 1 pass, filtered | 30.0 | 30.0, 0.125, 0.125 | 30.0, 0.125 | 30.0, 0.125, 0.125 |"
+    assert means in quality
+    assert "| no object | – | – | 30.0, 0.125 |" in quality
+    assert "| 1 pass, OIDN | 30.0 | 30.0, 0.125, 0.125 | – | – |" in quality
     assert "| matt | metal | mirror | rough mirror |" in table(docs, "light-materials")
-    assert "| 1 pass, OIDN | 24.0 | 24.0 | 24.0 | 24.0 |" in table(docs, "light-materials")
-    assert "OIDN" not in table(docs, "light-mirrors") + table(docs, "light-rooms")
-    assert "| 1 pass | 23.0 dB, 0.75 |" in table(docs, "light-mirrors")
+    assert "| 1 pass, filtered | 23.0 | 23.0 | 23.0 | 23.0 |" in table(docs, "light-materials")
+    assert "OIDN" not in table(docs, "light-mirrors") + table(docs, "light-materials")
+    assert "| light: 1 pass, filtered | 0.75 |" in table(docs, "light-mirrors")
     assert "| rays of Colonnade | 1.2°, 3.0° |" in table(docs, "light-mirrors")
     # A million rays of 2 nJ a pass
     assert "| 1, 1 | 50,000 | 1,000,000 | 4,000 | 2.00 |" in table(docs, "light-cost")
