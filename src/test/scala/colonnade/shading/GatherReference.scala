@@ -1,6 +1,6 @@
 package colonnade.shading
 
-/** Gathered rays in the integers of docs/gather.md. */
+/** Gathered rays in the integers of docs/numbers.md, section 8. */
 object GatherReference {
 
   /** The point of the unit sphere of a sample point, with 8 fraction bits. */
