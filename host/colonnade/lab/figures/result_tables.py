@@ -10,6 +10,8 @@ from colonnade.lab.figures.catalog import SAMPLES, catalog
 from colonnade.lab.figures.data import Data, commands_of
 from colonnade.lab.figures.facts import MEGAHERTZ, PRESETS, facts, text
 
+#: Parts of `tools/figures` whose minutes are listed.
+_LONGEST = 5
 #: A verified frame of `colonnade verify`.
 Frame = Mapping[str, Any]
 
@@ -109,9 +111,9 @@ def rates_of_presets(data: Data) -> str:
         own = facts(data, preset)
         meshes = f"{len(bench['meshes'])}"
         figures = [text(own, key) for key in ("raysPerCycle", "timesChip", "fewest", "most", "mirrorRaysPerCycle")]
-        rows.append([f"`{preset}`", meshes, f"**{figures[0]}**", *figures[1:], _command(f"bench-{preset}")])
+        rows.append([f"`{preset}`", meshes, f"**{figures[0]}**", *figures[1:]])
     titles = ["preset", "meshes", "in-box rays per cycle", "against the chip", "lowest mesh", "highest", "as mirrors"]
-    return markdown([*titles, "command"], rows)
+    return markdown(titles, rows)
 
 
 def board(data: Data) -> str:
@@ -119,17 +121,17 @@ def board(data: Data) -> str:
     placed, bench = data.result("fpga"), data.result("bench-fpga")
     available = placed["available"]
     rows = [
-        ["clock after routing", f"{placed['fmax_mhz']:.1f} MHz", _command("fpga")],
-        ["LUTs", f"{placed['luts']:,} of {available['luts']:,}", "the same"],
-        ["flip-flops", f"{placed['flip_flops']:,}", "the same"],
-        ["multipliers, block RAMs", f"{placed['dsps']:,}, {placed['block_rams']:,}", "the same"],
+        ["clock after routing", f"{placed['fmax_mhz']:.1f} MHz"],
+        ["LUTs", f"{placed['luts']:,} of {available['luts']:,}"],
+        ["flip-flops", f"{placed['flip_flops']:,}"],
+        ["multipliers, block RAMs", f"{placed['dsps']:,}, {placed['block_rams']:,}"],
     ]
     for name, mesh in bench["meshes"].items():
         rate = mesh["rays_per_cycle_in_box"]
         millions = rate * placed["clock_mhz"]
         figures = f"{rate:.4f} in-box rays per cycle, {millions:.2f} million a second at {placed['clock_mhz']:g} MHz"
-        rows.append([name, figures, _command("bench-fpga")])
-    return markdown(["`fpga`", "", "command"], rows)
+        rows.append([name, figures])
+    return markdown(["`fpga`", ""], rows)
 
 
 def rooms(data: Data) -> str:
@@ -209,20 +211,11 @@ def samples(data: Data) -> str:
 
 
 def measuring(data: Data) -> str:
-    """The time that each part of `tools/figures` takes, and its commit."""
-    rows, total = [], 0.0
-    for name in catalog():
-        content = data.get(name)
-        if content is not None:
-            total += content["seconds"]
-            commit = f"{content['commit'][:8]}{', modified' if content['is_modified'] else ''}"
-            rows.append([f"`{name}`", _minutes(content["seconds"]), commit])
-    rows.append(["all", _minutes(total), ""])
-    return markdown(["part", "minutes", "commit"], rows)
-
-
-def _minutes(seconds: float) -> str:
-    return f"{seconds / 60:.1f}"
+    """The minutes of `tools/figures`: its longest parts, and all."""
+    minutes = {name: content["seconds"] / 60 for name in catalog() if (content := data.get(name)) is not None}
+    longest = sorted(minutes, key=lambda name: -minutes[name])[:_LONGEST]
+    rows = [[f"`{name}`", f"{minutes[name]:.1f}"] for name in longest]
+    return markdown(["part", "minutes"], [*rows, [f"all {len(minutes)}", f"{sum(minutes.values()):.1f}"]])
 
 
 def _command(name: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -318,7 +319,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| 500 | 498 | 10 | 30 | 90 | 9.0 | 3.0 |" in table(docs, "bvh-cycles")
     assert "| **all records**, with nodes | 105 | 105 | 100 | +5.0 % | +5.0 % | +5.6 % |" in table(docs, "bvh-costs")
     assert "| **array**, MGE | 4.00 | 3.00 | 2.00 | +100.0 % | +50.0 % | +5.7 % |" in table(docs, "bvh-costs")
-    assert "| all | 46.5 |" in table(docs, "measuring")
+    assert re.search(r"\| all \d+ \| 46.5 \|", table(docs, "measuring"))
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 (×1.20) | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
     assert "| seed 1 | –, – |" in live and "15.0" not in live
