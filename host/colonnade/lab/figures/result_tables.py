@@ -200,6 +200,18 @@ def environments(data: Data) -> str:
     return markdown(["", *names, "command"], rows)
 
 
+def rebuilds(data: Data) -> str:
+    """Rays of spheres whose march is right, by what the march has of the room."""
+    accuracy = data.result("environments")["accuracy"]
+    kinds = list(dict.fromkeys(name.partition(", ")[2] for name in accuracy))
+    rows = []
+    for room in dict.fromkeys(name.partition(",")[0] for name in accuracy):
+        marches = [accuracy[f"{room}, {kind}"] for kind in kinds]
+        shares = [[f"{100 * one[ray]['ok']:.1f}" for ray in ("mirror", "cosine", "glass")] for one in marches]
+        rows.append([room, *(", ".join(own) for own in shares)])
+    return markdown(["mirror, cosine, glass: ok, %", *kinds], rows)
+
+
 def samples(data: Data) -> str:
     """The error of several samples a pixel."""
     found = data.result("samples")
@@ -233,6 +245,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     "moved-rooms": moved_rooms,
     "gather": gather,
     "environments": environments,
+    "rebuilds": rebuilds,
     "samples": samples,
     "measuring": measuring,
 }

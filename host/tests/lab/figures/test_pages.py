@@ -178,7 +178,9 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "files": {"Duck": {"pixels": 9, "psnr": 30.0, "flip": 0.125}},
         },
         "environments": {
-            "accuracy": {"Room, device": {"mirror": {"ok": 0.97}, "mean_steps": 18.0}},
+            "accuracy": {
+                "Room, device": {**dict.fromkeys(("mirror", "cosine", "glass"), {"ok": 0.97}), "mean_steps": 18.0}
+            },
             "living": room("Room"),
         },
         "live-rooms": {
@@ -320,6 +322,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| **all records**, with nodes | 105 | 105 | 100 | +5.0 % | +5.0 % | +5.6 % |" in table(docs, "bvh-costs")
     assert "| **array**, MGE | 4.00 | 3.00 | 2.00 | +100.0 % | +50.0 % | +5.7 % |" in table(docs, "bvh-costs")
     assert re.search(r"\| all \d+ \| 46.5 \|", table(docs, "measuring"))
+    assert "| Room | 97.0, 97.0, 97.0 |" in table(docs, "rebuilds")
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 (×1.20) | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
     assert "| seed 1 | –, – |" in live and "15.0" not in live
