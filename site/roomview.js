@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// View files of a visitor's room (docs/view.md, "The view file"): those of a room of the page, with other words.
+// View files of a visitor's room (docs/driver.md, "The view file"): those of a room of the page, with other words.
 
 const [LIGHTS, GRID, OBJECT, CAMERA, FIRST_LIGHT] = [28, 30, 45, 60, 85];
 const LIGHT_WORDS = 11;

@@ -1,4 +1,4 @@
-/* Registers of a frame from poses: docs/view.md.
+/* Registers of a frame from poses: docs/driver.md.
  *
  * Integers only: no allocation, no floating point, no library. The same poses give the same words on every processor. */
 #ifndef COLONNADE_VIEW_H

@@ -27,7 +27,7 @@ from machine import PIXELS, REGISTER_BYTES, REGISTERS, Display, Run, boot, fail
 from numpy.typing import NDArray
 from PIL import Image
 
-#: Words of a view file: positions and rotations of object and camera (docs/view.md).
+#: Words of a view file: positions and rotations of object and camera (docs/driver.md).
 OBJECT, CAMERA = 45, 60
 METRE, ONE = 1 << 32, 1 << 30
 #: How `init` moves the torus, millimetres.

@@ -1,4 +1,4 @@
-"""Where a view file (docs/view.md) holds its poses, in words of 32 bits."""
+"""Where a view file (docs/driver.md) holds its poses, in words of 32 bits."""
 
 OBJECT = 45
 CAMERA = 60

@@ -1,4 +1,4 @@
-/* Camera, lights and outline: docs/view.md. */
+/* Camera, lights and outline: docs/driver.md. */
 #include "colonnade_view_parts.h"
 #include "colonnade_words.h"
 

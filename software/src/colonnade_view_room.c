@@ -1,4 +1,4 @@
-/* Projection to the maps of a room, window and occlusion: docs/view.md. */
+/* Projection to the maps of a room, window and occlusion: docs/driver.md. */
 #include "colonnade_view_parts.h"
 #include "colonnade_words.h"
 

@@ -1,4 +1,4 @@
-/* The samples of a frame's passes: docs/view.md. Their definition is host/colonnade/scene/samples.py. */
+/* The samples of a frame's passes: docs/driver.md. Their definition is host/colonnade/scene/samples.py. */
 #include "colonnade_view_parts.h"
 
 enum { MAX_SAMPLES = 64, MAX_DIMENSIONS = COLONNADE_VIEW_LIGHTS + COLONNADE_VIEW_RAYS };

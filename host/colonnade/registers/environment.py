@@ -1,4 +1,4 @@
-"""Registers of a room that ``colonnade_view.c`` does not compute in stills (docs/view.md, docs/background.md)."""
+"""Registers of a room that ``colonnade_view.c`` does not compute in stills (docs/driver.md, docs/background.md)."""
 
 from __future__ import annotations
 

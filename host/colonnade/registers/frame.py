@@ -1,7 +1,7 @@
 """Computes all frame registers of a scene, as defined in docs/numbers.md.
 
 Camera, lights, outline and the projection to a room's maps are those of ``software/src/colonnade_view.c``
-(docs/view.md): on the object's grid, so that the object itself never moves.
+(docs/driver.md): on the object's grid, so that the object itself never moves.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The view file: what a target needs to compute a scene's registers from poses (docs/view.md), words of 32 bits."""
+"""The view file: what a target needs to compute a scene's registers from poses (docs/driver.md), words of 32 bits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The registers that a target computes from poses (docs/view.md), by name."""
+"""The registers that a target computes from poses (docs/driver.md), by name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A room in a view file: the pose of its maps, and what window and occlusion need (docs/view.md)."""
+"""A room in a view file: the pose of its maps, and what window and occlusion need (docs/driver.md)."""
 
 from __future__ import annotations
 

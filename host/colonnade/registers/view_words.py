@@ -1,4 +1,4 @@
-"""Poses, cameras and lights as words of 32 bits of a view file (docs/view.md)."""
+"""Poses, cameras and lights as words of 32 bits of a view file (docs/driver.md)."""
 
 from __future__ import annotations
 

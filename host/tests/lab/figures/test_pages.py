@@ -179,7 +179,7 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         },
         "environments": {
             "accuracy": {
-                "Room, device": {**dict.fromkeys(("mirror", "cosine", "glass"), {"ok": 0.97}), "mean_steps": 18.0}
+                "Room, device": {**{key: {"ok": 0.97} for key in ("mirror", "cosine", "glass")}, "mean_steps": 18.0}
             },
             "living": room("Room"),
         },
