@@ -10,19 +10,39 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 #: The DISTS loss that doubles the index, %.
 SCALE = 1.0
 
 #: Scales, %, for the dependence of the ranking on this choice; the definition is the first.
-SCALES = (SCALE, 0.1, 0.3, 3.0, 10.0)
+SCALES = (SCALE, 0.03, 10.0)
 
 #: What is added to all three shares of the ranges by the norm over ranges.
 OFFSET = 0.1
 
-#: DISTS loss in %; energy per ray, area and plain power relative to the baseline.
-Terms = tuple[float, float, float, float]
+
+@dataclass(frozen=True)
+class Terms:
+    """What the index of a point is made of; all but the loss are relative to the baseline.
+
+    Attributes:
+        loss: DISTS distance from the baseline's frames, %.
+        dists: DISTS distance from Embree's frames.
+        energy: Energy per ray.
+        energy_28nm: The same, with the gates' energy scaled to 28 nm, at which the memories' is given.
+        power: Mean power, whatever the rate of rays.
+        area: Area of the array.
+    """
+
+    loss: float
+    dists: float
+    energy: float
+    energy_28nm: float
+    power: float
+    area: float
+
 
 DEFINITION = (
     f"RenderIndex = (1 + DISTS loss / {SCALE:g} %) × energy per ray / the baseline's × area / the baseline's; lower is "
@@ -42,43 +62,49 @@ def index_rows(points: Sequence[Mapping[str, Any]], baseline: str, libraries: Se
     rows = []
     for library in libraries:
         terms = _terms(points, baseline, library)
-        for name, (loss, power, area, _) in terms.items():
-            norms = {"norm_loss": 1 + loss / SCALE, "norm_power": power, "norm_area": area}
-            row = {"name": name, "library": library, "loss": loss, **norms}
+        for name, own in terms.items():
+            norms = {"norm_loss": 1 + own.loss / SCALE, "norm_power": own.energy, "norm_area": own.area}
+            row = {"name": name, "library": library, "loss": own.loss, **norms}
             rows.append(row | {"index": math.prod(norms.values())})
     return rows
 
 
 def sensitivity(points: Sequence[Mapping[str, Any]], baseline: str, libraries: Sequence[str]) -> list[dict[str, Any]]:
     """The ranking by other choices of Norm, for each library."""
-    found = []
-    for library in libraries:
-        terms = _terms(points, baseline, library)
-        if not terms:
-            continue
-        choices: dict[str, Callable[[Terms], float]] = {f"1 + loss / {scale:g} %": _by_scale(scale) for scale in SCALES}
-        choices["energy × area alone"] = _by_scale(math.inf)
-        choices["power in place of energy"] = lambda terms: (1 + terms[0] / SCALE) * terms[3] * terms[2]
-        ranges = [(min(column), max(column)) for column in zip(*terms.values(), strict=True)]
-        choices["shares of the ranges (a 0 wins)"] = _by_ranges(ranges, 0.0)
-        choices[f"shares of the ranges + {OFFSET:g}"] = _by_ranges(ranges, OFFSET)
-        for choice, value in choices.items():
-            ranking = [name for _, name in sorted((value(term), name) for name, term in terms.items())]
-            found.append({"choice": choice, "library": library, "ranking": ranking})
-    return found
+    return [
+        {"choice": choice, "library": library, "ranking": sorted(found, key=lambda name: (found[name], name))}
+        for library in libraries
+        for choice, found in indices(points, baseline, library).items()
+    ]
+
+
+def indices(points: Sequence[Mapping[str, Any]], baseline: str, library: str) -> dict[str, dict[str, float]]:
+    """The index of each point that has all terms, by choice of Norm; empty without the baseline's terms."""
+    terms = _terms(points, baseline, library)
+    if not terms:
+        return {}
+    choices: dict[str, Callable[[Terms], float]] = {f"1 + loss / {scale:g} %": _by_scale(scale) for scale in SCALES}
+    choices["energy × area alone"] = _by_scale(math.inf)
+    choices["DISTS to Embree in place of the loss"] = lambda own: own.dists * own.energy * own.area
+    choices["power in place of energy"] = lambda own: (1 + own.loss / SCALE) * own.power * own.area
+    choices["energy at 28 nm"] = lambda own: (1 + own.loss / SCALE) * own.energy_28nm * own.area
+    shared = [[getattr(own, key) for own in terms.values()] for key in ("loss", "energy", "area")]
+    ranges = [(min(column), max(column)) for column in shared]
+    choices["shares of the ranges (a 0 wins)"] = _by_ranges(ranges, 0.0)
+    choices[f"shares of the ranges + {OFFSET:g}"] = _by_ranges(ranges, OFFSET)
+    return {choice: {name: value(own) for name, own in terms.items()} for choice, value in choices.items()}
 
 
 def _by_scale(scale: float) -> Callable[[Terms], float]:
-    return lambda terms: (1 + terms[0] / scale) * terms[1] * terms[2]
+    return lambda own: (1 + own.loss / scale) * own.energy * own.area
 
 
 def _by_ranges(ranges: Sequence[tuple[float, float]], offset: float) -> Callable[[Terms], float]:
     """The product of each term's share of its range, plus an offset."""
 
-    def value(terms: Terms) -> float:
-        shares = (
-            (t - low) / (high - low) if high > low else 0.0 for t, (low, high) in zip(terms[:3], ranges, strict=False)
-        )
+    def value(own: Terms) -> float:
+        terms = zip((own.loss, own.energy, own.area), ranges, strict=True)
+        shares = ((term - low) / (high - low) if high > low else 0.0 for term, (low, high) in terms)
         return math.prod(offset + share for share in shares)
 
     return value
@@ -88,12 +114,11 @@ def _terms(points: Sequence[Mapping[str, Any]], baseline: str, library: str) -> 
     """The terms of each point that has all of them."""
     figures = {point["name"]: point["figures"] for point in points}
     base = figures.get(baseline, {})
-    loss, *ratios = "dists_loss", f"nj.{library}", f"array_kge.{library}", f"mw.{library}"
-    if any(base.get(key) is None for key in (loss, *ratios)):
+    ratios = ("dists", *(f"{key}.{library}" for key in ("nj", "nj_28nm", "mw", "array_kge")))
+    if any(base.get(key) is None for key in ("dists_loss", *ratios)):
         return {}
-    found: dict[str, Terms] = {}
-    for name, own in figures.items():
-        if all(own.get(key) is not None for key in (loss, *ratios)):
-            energy, area, power = (own[key] / base[key] for key in ratios)
-            found[name] = (own[loss], energy, area, power)
-    return found
+    return {
+        name: Terms(own["dists_loss"], *(own[key] / base[key] if base[key] else math.inf for key in ratios))
+        for name, own in figures.items()
+        if all(own.get(key) is not None for key in ("dists_loss", *ratios))
+    }

@@ -19,6 +19,7 @@ from colonnade.lab.figures import (
     map_tables,
     paper_tables,
     performance_tables,
+    precision_tables,
     result_tables,
     study_tables,
     tree_tables,
@@ -36,6 +37,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     **light_tables.TABLES,
     **paper_tables.TABLES,
     **tree_tables.TABLES,
+    **precision_tables.TABLES,
 }
 
 _TABLE = re.compile(r"^<!-- ([\w-]+) -->\n.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
 from colonnade.lab.explore.figures import Column, area_figures, columns, front, point_figures
-from colonnade.lab.explore.render_index import index_rows, sensitivity
+from colonnade.lab.explore.render_index import index_rows, indices, sensitivity
 from colonnade.lab.explore.search import check_search, parse_condition, search_front
 from colonnade.lab.explore.study import FieldValue
 from colonnade.lab.explore.study_file import StudyFile, load_study
@@ -41,10 +41,14 @@ def test_a_point_without_a_figure_is_not_on_the_front() -> None:
 
 
 def measured(**figures: tuple[float, float, float]) -> list[dict[str, Any]]:
-    """Points with a loss, an energy and an area; the power of a point is 1 mW."""
-    keys = ("dists_loss", "nj.a", "array_kge.a")
+    """Points with a loss, an energy and an area; the power of a point is 1 mW, its DISTS to Embree the loss + 1 %."""
     return [
-        {"name": name, "figures": dict(zip(keys, own, strict=True)) | {"mw.a": 1.0}} for name, own in figures.items()
+        {
+            "name": name,
+            "figures": {"dists_loss": loss, "nj.a": energy, "array_kge.a": area}
+            | {"dists": 0.01 * (1 + loss), "nj_28nm.a": energy, "mw.a": 1.0},
+        }
+        for name, (loss, energy, area) in figures.items()
     ]
 
 
@@ -57,8 +61,11 @@ def test_render_index_of_the_baseline_is_one_and_a_loss_of_zero_does_not_win_by_
     rankings = {each["choice"]: each["ranking"] for each in sensitivity(found, "wide", ["a"])}
     assert rankings["energy × area alone"][0] == "coarse"
     assert rankings["shares of the ranges (a 0 wins)"][0] in ("wide", "exact", "coarse")
-    assert rankings["1 + loss / 0.1 %"][-1] == "coarse"
+    assert rankings["1 + loss / 0.03 %"][-1] == "coarse"
     assert rankings["power in place of energy"][0] == "lean"
+    # Where the baseline's pictures have an error of their own, a ratio to it is a norm: 1.5 × 0.5 × 0.6
+    by_ratio = indices(found, "wide", "a")["DISTS to Embree in place of the loss"]
+    assert by_ratio == pytest.approx({"wide": 1.0, "exact": 0.9405, "lean": 0.45, "coarse": 2.0})
     assert all(sorted(ranking) == sorted(rows) for ranking in rankings.values())
 
 
