@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from colonnade.common import processes
-from colonnade.common.atomic_files import write_json
+from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import manifest_for
@@ -20,9 +20,7 @@ from colonnade.design.toolchain import project_root
 from colonnade.lab.common.parallel import processors
 from colonnade.lab.figures.catalog import LIBRARIES, REPORT, Entry
 from colonnade.lab.figures.data import Data, commands_of, commit, declare_measured, is_current, problem_of, text_of
-
-#: Keys of reports that no page shows, or that the data file has itself.
-_LEFT_OUT = frozenset({"cells", "flop_tables", "picture", "config", "config_hash", "command", "commit", "is_modified"})
+from colonnade.lab.figures.kept import kept, record_lines
 
 
 def require_libraries(entries: Sequence[Entry]) -> None:
@@ -61,7 +59,7 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
         "seconds": round(max(seconds, _seconds_before(known, entry, head)), 1),
         "processors": processors(),
         "config": config,
-        "result": _kept(reports.get("", {part: each for part, each in reports.items() if part[:1] != "-"})),
+        "result": kept(reports.get("", {part: each for part, each in reports.items() if part[:1] != "-"})),
     }
     reported = reports.get("", {}).get("config")
     # Some reports have the name of the configuration alone
@@ -69,7 +67,8 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
     if problem is not None:
         raise UserError(f"{entry.name}: the report of {text_of(next(iter(entry.commands.values())))}: {problem}")
     (docs / "data").mkdir(parents=True, exist_ok=True)
-    write_json(docs / "data" / f"{entry.name}.json", content)
+    with replacing(docs / "data" / f"{entry.name}.json") as stream:
+        stream.write(f"{record_lines(content)}\n".encode())
     declare_measured(docs, entry.name)
     print(f"figures: {entry.name} took {seconds:,.0f} s", flush=True)
 
@@ -115,10 +114,3 @@ def _expanded(command: tuple[str, ...], report: Path) -> list[str]:
         else:
             found.append(part.replace(REPORT, str(report)))
     return found
-
-
-def _kept(report: Any) -> Any:
-    """A report without what is left out."""
-    if isinstance(report, Mapping):
-        return {key: _kept(value) for key, value in report.items() if key not in _LEFT_OUT}
-    return [_kept(value) for value in report] if isinstance(report, list) else report

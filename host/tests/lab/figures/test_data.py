@@ -11,7 +11,7 @@ import pytest
 
 from colonnade.common.errors import UserError
 from colonnade.design.toolchain import project_root
-from colonnade.lab.figures import catalog, data, measure
+from colonnade.lab.figures import catalog, data, kept, measure
 from colonnade.lab.figures.catalog import Entry
 from colonnade.lab.figures.facts import PRESETS
 
@@ -54,6 +54,26 @@ def test_a_data_file_says_what_it_is_of(docs: Path) -> None:
     }
     assert data.unmeasured(docs) == []
     assert list(data.problems(docs)) == []
+
+
+def test_a_data_file_keeps_what_is_read_a_record_on_a_line(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    unread = {"stalls": {"box unit": list(range(900))}, "psnr": 50.0, "cycles": None}
+    frame = {"rays_per_cycle_in_box": 2.5, "counters": {"raysInBox": 7, "boxTests": 8, "frames": 1}, **unread}
+    area = {"array_kge": 17_040.0, "units": {"BoxUnit": {"kge": 37.0}}}
+    point = {"values": {}, "workloads": {"bunny": frame}, "area": {"asap7": area}, "failures": [], "power": {}}
+    points = [
+        {"name": f"point {index}", "figures": dict.fromkeys(map(str, range(99)), 0.5), **point} for index in (1, 2)
+    ]
+    study = {"title": "Study", "workloads": [{"name": "bunny"}], "points": points, "jobs": {"run": 9}}
+    monkeypatch.setattr(measure, "_report", lambda *_: study)
+    measure.measure(ENTRY, docs)
+    own = {"rays_per_cycle_in_box": 2.5, "counters": {"raysInBox": 7, "boxTests": 8}}
+    found = content(docs)["result"]
+    assert found.keys() == {"title", "workloads", "points"}
+    assert [each["workloads"] for each in found["points"]] == [{"bunny": own}, {"bunny": own}]
+    assert found["points"][0]["area"] == {"asap7": {"array_kge": 17_040.0}}
+    lines = (docs / "data" / "bench-tiny.json").read_text().splitlines()
+    assert len([line for line in lines if "point " in line]) == 2 and max(map(len, lines)) <= kept.WIDTH + 1
 
 
 def test_figures_of_the_same_sources_are_not_measured_again(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
