@@ -23,5 +23,8 @@ final class ResultBus(config: ColonnadeConfig) extends Module {
   arbiter.isTaken  := isChosen
   io.units.zip(arbiter.grant.asBools).foreach { case (unit, isGranted) => unit.ready := isGranted }
   io.results.valid := RegNext(isChosen, false.B)
-  io.results.bits  := RegEnable(Mux1H(arbiter.grant, io.units.map(_.bits)), isChosen)
+
+  // Of legal outcomes one is chosen: a legal one
+  private val result = suppressEnumCastWarning(Mux1H(arbiter.grant, io.units.map(_.bits)))
+  io.results.bits := RegEnable(result, isChosen)
 }
