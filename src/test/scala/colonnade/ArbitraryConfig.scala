@@ -7,15 +7,15 @@ import org.scalacheck.Gen
 object ArbitraryConfig {
   private val flag = Gen.oneOf(true, false)
 
-  private val precision =
+  val precision: Gen[PrecisionConfig] =
     Gen.zip(width, width, width).map { case (mac, sqrt, div) => PrecisionConfig(mac, sqrt, div) }
 
   private def width: Gen[Int] = Gen.chooseNum(16, 64, 17, 32, 63)
 
   private val array = for {
-    rows     <- Gen.chooseNum(1, 100)
-    columns  <- Gen.chooseNum(1, 100.min(ArrayConfig.maxUnits / rows))
-    contexts <- Gen.chooseNum(1, 16)
+    rows     <- Gen.chooseNum(1, ArrayConfig.maxRows)
+    columns  <- Gen.chooseNum(1, ArrayConfig.maxColumns)
+    contexts <- Gen.chooseNum(1, ArrayConfig.maxContexts)
   } yield ArrayConfig(rows, columns, contexts)
 
   private val geometry = for {

@@ -9,7 +9,6 @@ package colonnade.config
 final case class ArrayConfig(rows: Int = 1, columns: Int = 1, contexts: Int = 8) {
   Require.within("array.rows", rows, 1, ArrayConfig.maxRows)
   Require.within("array.columns", columns, 1, ArrayConfig.maxColumns)
-  Require.product("array.rows", rows, "array.columns", columns, ArrayConfig.maxUnits)
   Require.within("array.contexts", contexts, 1, ArrayConfig.maxContexts)
 }
 
@@ -19,8 +18,6 @@ object ArrayConfig {
   val maxContexts: Int = 16
   val maxRows:     Int = 256
   val maxColumns:  Int = 256
-
-  val maxUnits: Int = 1024 // maximum number of traversal units: twelve times `edge`
 }
 
 /** Operand widths, the paper's mixed precision: `32b32s64d` is mac 32, sqrt 32, div 64.

@@ -11,10 +11,6 @@ private[config] object Require {
     if (value < low || value > high)
       throw new ConfigError(s"$field is $value; it must be ${orElse}from $low to $high")
 
-  def product(first: String, one: Int, second: String, other: Int, max: Int): Unit =
-    if (one.toLong * other > max)
-      throw new ConfigError(s"$first times $second is ${one.toLong * other}; it must be at most $max")
-
   def oneOf(field: String, value: Int, allowed: Seq[Int]): Unit =
     if (!allowed.contains(value))
       throw new ConfigError(s"$field is $value; it must be one of ${allowed.mkString(", ")}")

@@ -3,7 +3,7 @@ package colonnade.formats
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.axi.Axi
-import colonnade.config.{ColonnadeConfig, NumberFormats, SceneCacheConfig}
+import colonnade.config.{ArrayConfig, ColonnadeConfig, NumberFormats, SceneCacheConfig, UnitsConfig}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
 import scala.collection.immutable.SeqMap
@@ -178,7 +178,7 @@ final class Errors(config: ColonnadeConfig) extends Bundle {
   * keep their addresses.
   */
 final class Counters(config: ColonnadeConfig) extends Bundle {
-  private def counter            = UInt(Counters.bits.W)
+  private def counter            = UInt(Counters.bits(config).W)
   private def environmentCounter = config.physicalAttributeMemory.map(_ => counter)
   private def cacheCounter       = config.columnBvhMemory.cache.map(_ => counter)
 
@@ -246,7 +246,12 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
 }
 
 object Counters {
-  val bits: Int = 48
+
+  /** Width of a counter: none overflows within 2^32^ cycles, whatever all parts of the array do in each of them. */
+  def bits(config: ColonnadeConfig): Int = {
+    val perColumn = config.array.rows * ArrayConfig.maxContexts + UnitsConfig.maxPathContexts
+    48.max(32 + log2Ceil(config.array.columns * perColumn))
+  }
 }
 
 /** The registers that the host reads. */

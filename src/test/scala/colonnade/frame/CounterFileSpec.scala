@@ -2,12 +2,15 @@ package colonnade.frame
 
 import chisel3._
 import chiseltest._
-import colonnade.TestConfigs
+import colonnade.config.{ArrayConfig, ColonnadeConfig, UnitsConfig}
+import colonnade.formats.Counters
+import colonnade.{ArbitraryConfig, Properties, TestConfigs}
+import org.scalacheck.Prop
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-class CounterFileSpec extends AnyFlatSpec with ChiselScalatestTester {
+class CounterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Properties {
   behavior of "CounterFile"
 
   private val columns = 3
@@ -46,6 +49,17 @@ class CounterFileSpec extends AnyFlatSpec with ChiselScalatestTester {
         }
       }
     }
+  }
+
+  it should "overflow in no array within 2^32 cycles" in {
+    def sums(config:  ColonnadeConfig) = new EventSums(config, config.array.columns).elements -- levels
+    def lasts(config: ColonnadeConfig) = sums(config).values.map(_.getWidth).max + 32 <= Counters.bits(config)
+    val most                           = config.copy(
+      array = ArrayConfig(ArrayConfig.maxRows, ArrayConfig.maxColumns, ArrayConfig.maxContexts),
+      units = config.units.copy(pathContexts = UnitsConfig.maxPathContexts)
+    )
+    assert(lasts(most))
+    holds(cases = 100)(Prop.forAll(ArbitraryConfig.legal)(lasts))
   }
 
   it should "keep the deepest stack and the errors of a frame, and clear those of the previous one" in {
