@@ -74,11 +74,11 @@ STILL_ROOMS = (
     ("kind", "options"),
     [
         ("diffuse", ()),
-        pytest.param("mirror", (), marks=pytest.mark.matrix),
+        pytest.param("mirror", ("array.rows=3", "array.columns=5"), marks=pytest.mark.matrix),
         ("glass", SHARED),
         pytest.param("mirror", SLIC, marks=pytest.mark.matrix),
     ],
-    ids=["diffuse", "mirror", "glass, maps shared by two columns", "mirror, SLIC maps"],
+    ids=["diffuse", "mirror, 3×5", "glass, maps shared by two columns", "mirror, SLIC maps"],
 )
 def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, ...]) -> None:
     """The relit room and the shadow window; two lights, one light, no bounces; a sample; a stalled sink."""

@@ -1,30 +1,17 @@
 package colonnade
 
-import chisel3._
+import colonnade.Scratch.names
 import colonnade.config.{ConfigError, ConfigIO}
 import colonnade.formats.Manifest
-import colonnade.numbers.Divider
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
 import java.io.ByteArrayOutputStream
-import java.nio.file.{Files, Path}
-import java.util.Comparator
-import scala.jdk.CollectionConverters._
-import scala.sys.process.{Process, ProcessLogger}
-import scala.util.{Try, Using}
+import java.nio.file.Files
+import scala.sys.process.Process
 
 class GenerateSpec extends AnyFlatSpec with Matchers {
   behavior of "Generate"
-
-  private def inScratch(body: Path => Unit): Unit = {
-    val scratch = Files.createTempDirectory("colonnade")
-    try body(scratch)
-    finally Using.resource(Files.walk(scratch))(_.sorted(Comparator.reverseOrder[Path]()).forEach(Files.delete(_)))
-  }
-
-  private def names(directory: Path): Seq[String] =
-    Using.resource(Files.list(directory))(_.iterator.asScala.map(_.getFileName.toString).toSeq.sorted)
 
   private def run(arguments: String*): (Int, String) = {
     val errors = new ByteArrayOutputStream
@@ -41,7 +28,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     ()
   }
 
-  it should "write the manifest alone, and nothing beside it" in inScratch { scratch =>
+  it should "write the manifest alone, and nothing beside it" in Scratch { scratch =>
     val output = scratch.resolve("a/b")
     run("--config", "tiny", "--set", "array.rows=3", s"--output=$output", "--manifest-only") shouldBe ((0, ""))
     ujson.read(Files.readString(output.resolve("manifest.json"))) shouldBe
@@ -50,7 +37,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     names(output.getParent) shouldBe Seq("b")
   }
 
-  it should "write the registers of the AXI4 shell beside the same manifest" in inScratch { scratch =>
+  it should "write the registers of the AXI4 shell beside the same manifest" in Scratch { scratch =>
     val output = scratch.resolve("shell")
     run("--config", "tiny", "--axi", "32", s"--output=$output", "--manifest-only") shouldBe ((0, ""))
     names(output) shouldBe Seq(DesignMarker.name, "manifest.json", "shell.json")
@@ -63,13 +50,13 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
       Seq("isRunning" -> 0, "isQueued" -> 1, "isLoading" -> 2, "isResetting" -> 3)
   }
 
-  it should "refuse a pixel stream without the shell" in inScratch { scratch =>
+  it should "refuse a pixel stream without the shell" in Scratch { scratch =>
     val output = scratch.resolve("out").toString
     refused("--config", "tiny", "--output", output, "--manifest-only", "--pixel-stream")("it needs --axi")
     run("--config", "tiny", "--output", output, "--manifest-only", "--axi", "16", "--pixel-stream")._1 shouldBe 0
   }
 
-  it should "replace an earlier output, but no other directory" in inScratch { scratch =>
+  it should "replace an earlier output, but no other directory" in Scratch { scratch =>
     val output = scratch.resolve("out")
     for (_ <- 0 until 2) run("--config", "tiny", "--output", output.toString, "--manifest-only")._1 shouldBe 0
     Files.writeString(output.resolve("thesis.txt"), "irreplaceable")
@@ -87,7 +74,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     )("thesis.txt: there is a file")
   }
 
-  it should "recognise its own directories by their file list" in inScratch { scratch =>
+  it should "recognise its own directories by their file list" in Scratch { scratch =>
     val output        = scratch.resolve("out")
     def write(): Unit = OutputFiles.replaceDirectory(output) { fresh =>
       OutputFiles.writeFile(fresh.resolve("a"), "a\n")
@@ -121,7 +108,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     refused("--config", "tiny", "--output", ".", "--manifest-only")("working directory")
   }
 
-  it should "leave an earlier output as it was when the new one fails" in inScratch { scratch =>
+  it should "leave an earlier output as it was when the new one fails" in Scratch { scratch =>
     val output = scratch.resolve("out")
     run("--config", "tiny", "--output", output.toString, "--manifest-only")
     an[ArithmeticException] should be thrownBy OutputFiles.replaceDirectory(output) { fresh =>
@@ -132,7 +119,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     names(scratch) shouldBe Seq("out")
   }
 
-  it should "refuse wrong input in one line" in inScratch { scratch =>
+  it should "refuse wrong input in one line" in Scratch { scratch =>
     val output = scratch.resolve("out").toString
     refused("--config", "tiny", "--output", output, "--manifest-onyl")("unknown option --manifest-onyl")
     refused("--config", "tiny")("--output is missing")
@@ -156,7 +143,7 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
 
   behavior of "CoreFile"
 
-  it should "describe each target" in inScratch { scratch =>
+  it should "describe each target" in Scratch { scratch =>
     Files.writeString(scratch.resolve("filelist.f"), "Divider.sv\n")
     CoreFile.write("Divider", scratch)
     val targets =
@@ -164,44 +151,4 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     targets.map(_.takeWhile(_ != ':')) shouldBe Seq("default", "lint", "sim", "synth")
     targets.flatMap(_.linesIterator.filter(_.startsWith("    description: "))).distinct should have size 4
   }
-
-  behavior of "Emit"
-
-  it should "write a file for each module and their list" in inScratch { scratch =>
-    Emit(new Divider(32, 18), scratch, blackBoxMemories = false)
-    names(scratch) shouldBe Seq("Divider.sv", "filelist.f")
-    Files.readString(scratch.resolve("filelist.f")).trim shouldBe "Divider.sv"
-    Files.readString(scratch.resolve("Divider.sv")) should not include "RANDOM"
-  }
-
-  it should "write Verilog that passes Verilator's linter, except for unused bits" in inScratch { scratch =>
-    assume(Try(Process("verilator --version").!!).isSuccess, "verilator is not installed")
-    Emit(new Divider(32, 18), scratch, blackBoxMemories = false)
-    val lint =
-      Seq("verilator", "--lint-only", "-Wall", "-Wno-UNUSEDSIGNAL", "--top-module", "Divider", "-f", "filelist.f")
-    val said = new StringBuilder
-    withClue(said) {
-      Process(lint, scratch.toFile).!(ProcessLogger(line => said ++= line + "\n")) shouldBe 0
-    }
-  }
-
-  it should "leave memories out and describe their shapes on demand" in inScratch { scratch =>
-    Emit(new EmitSpecMemory, scratch, blackBoxMemories = true)
-    names(scratch) should not contain "mems.conf"
-    val memories = ujson.read(Files.readString(scratch.resolve("memories.json"))).arr
-    memories.map(m => (m("depth").num, m("width").num)) shouldBe Seq((64, 20))
-    memories.head("ports").arr.map(_.str).sorted shouldBe Seq("read", "write")
-  }
-}
-
-private class EmitSpecMemory extends Module {
-  val writeAddress = IO(Input(UInt(6.W)))
-  val readAddress  = IO(Input(UInt(6.W)))
-  val write        = IO(Input(Bool()))
-  val data         = IO(Input(UInt(20.W)))
-  val read         = IO(Output(UInt(20.W)))
-
-  private val memory = SyncReadMem(64, UInt(20.W))
-  when(write)(memory.write(writeAddress, data))
-  read := memory.read(readAddress)
 }

@@ -1,0 +1,81 @@
+package colonnade
+
+import chisel3._
+import colonnade.Scratch.names
+import colonnade.config.{ColonnadeConfig, ConfigIO, PrecisionConfig}
+import colonnade.numbers.Divider
+import org.scalacheck.Prop.propBoolean
+import org.scalacheck.{Gen, Prop}
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import java.nio.file.{Files, Path, Paths}
+import scala.sys.process.{Process, ProcessLogger}
+import scala.util.Try
+
+class EmitSpec extends AnyFlatSpec with Matchers with Properties {
+  behavior of "Emit"
+
+  it should "write a file for each module and their list" in Scratch { scratch =>
+    Emit(new Divider(32, 18), scratch, blackBoxMemories = false)
+    names(scratch) shouldBe Seq("Divider.sv", "filelist.f")
+    Files.readString(scratch.resolve("filelist.f")).trim shouldBe "Divider.sv"
+    Files.readString(scratch.resolve("Divider.sv")) should not include "RANDOM"
+  }
+
+  it should "leave memories out and describe their shapes on demand" in Scratch { scratch =>
+    Emit(new EmitSpecMemory, scratch, blackBoxMemories = true)
+    names(scratch) should not contain "mems.conf"
+    val memories = ujson.read(Files.readString(scratch.resolve("memories.json"))).arr
+    memories.map(m => (m("depth").num, m("width").num)) shouldBe Seq((64, 20))
+    memories.head("ports").arr.map(_.str).sorted shouldBe Seq("read", "write")
+  }
+
+  behavior of "The Verilog of an array"
+
+  private val small    = ConfigIO.load("small")
+  private val treeless = small.copy(geometry = small.geometry.copy(bvh = false))
+
+  for ((rows, columns, config) <- Seq((3, 5, small), (7, 1, TestConfigs.withPipelines(small)), (1, 9, treeless)))
+    it should s"pass Verilator's linter: $rows×$columns, at any precision" in
+      passes(rows, columns, config, ArbitraryConfig.precision)
+
+  it should "pass Verilator's linter: 40×40" taggedAs Matrix in passes(40, 40, small, small.precision)
+
+  private def passes(rows: Int, columns: Int, config: ColonnadeConfig, precisions: Gen[PrecisionConfig]): Unit = {
+    assume(Try(Process("verilator --version").!!).isSuccess, "verilator is not installed")
+    val array = config.array.copy(rows = rows, columns = columns)
+    holds(cases = 1)(Prop.forAll(precisions) { precision =>
+      val report = lint(config.copy(array = array, precision = precision))
+      report.isEmpty :| report
+    })
+  }
+
+  /** Verilator's warnings for the modules of a device. It reads and checks each module once; with `--lint-only` it would
+    * flatten the array, and take a time by its size. Older versions write XML.
+    */
+  private def lint(config: ColonnadeConfig): String = Scratch { scratch =>
+    Emit(new Colonnade(config), scratch, blackBoxMemories = false)
+    Iterator("--json-only", "--xml-only").map(verilate(scratch, _)).find(!_.contains("Invalid option")).get
+  }
+
+  private def verilate(folder: Path, form: String): String = {
+    val waivers = Paths.get("tools", "lint.vlt").toAbsolutePath.toString
+    val command = Seq("verilator", form, "-Wall", waivers, "--top-module", "Colonnade", "-f", "filelist.f")
+    val said    = new StringBuilder
+    val status  = Process(command, folder.toFile).!(ProcessLogger(line => said ++= line + "\n"))
+    if (status == 0) "" else said.toString
+  }
+}
+
+private class EmitSpecMemory extends Module {
+  val writeAddress = IO(Input(UInt(6.W)))
+  val readAddress  = IO(Input(UInt(6.W)))
+  val write        = IO(Input(Bool()))
+  val data         = IO(Input(UInt(20.W)))
+  val read         = IO(Output(UInt(20.W)))
+
+  private val memory = SyncReadMem(64, UInt(20.W))
+  when(write)(memory.write(writeAddress, data))
+  read := memory.read(readAddress)
+}
