@@ -65,6 +65,7 @@ class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
     var ended   = 0
     var cycles  = 0
     var idle    = 0
+    var held    = Option.empty[BigInt] // the context of an offer that was not taken
     unit.io.offset.poke(offset)
     while (ended < hits.size) {
       val offers = sent < hits.size && free.nonEmpty && (poked == sent || random.nextDouble() >= stalls)
@@ -77,8 +78,10 @@ class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       val result = unit.io.result.bits
       unit.io.result.ready.poke(takes)
       idle += 1
-      if (takes && unit.io.result.valid.peekBoolean()) {
-        val context = result.context.peekInt().toInt
+      val offered = Option.when(unit.io.result.valid.peekBoolean())(result.context.peekInt())
+      assert(held.forall(offered.contains(_)), "an offer has changed")
+      held = offered.filterNot(_ => takes)
+      for (context <- offered.map(_.toInt) if takes) {
         val index   = flying.remove(context).getOrElse(fail(s"no bounce of context $context"))
         // A reflection starts at the origin of its request
         val (found, full) = (peek(result), answers(index))

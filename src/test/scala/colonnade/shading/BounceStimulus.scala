@@ -127,7 +127,13 @@ final class BounceStimulus(config: ColonnadeConfig, random: Random) {
 
   private def reflectance: BigInt = if (chance(8)) BigInt(4096) else BigInt(random.nextInt(4097))
 
-  def offset(): BigInt = natural(numbers.gridBits - 2)
+  /** Of any size; half of them such that their products with odd components are halfway between two steps. */
+  def offset(): BigInt =
+    if (random.nextBoolean()) natural(numbers.gridBits - 2)
+    else {
+      val below = NumberFormats.normalFraction
+      ((BigInt(numbers.gridBits - 2 - below, random) << 1) + 1) << (below - 1)
+    }
 
   /** Components of any size, independent of each other. */
   def any(): BounceCase = BounceCase(
@@ -195,6 +201,38 @@ final class BounceStimulus(config: ColonnadeConfig, random: Random) {
       backSide = false,
       etas = Seq(BigInt(one + random.nextInt(3) - 1), BigInt(one))
     )
+  }
+
+  /** Along the normal. The product of normal and ray is a power of two, or a little more. The product of their lengths is
+    * less, without the bits that are dropped. So the mantissa of the quotient is a half, and the cosine is one.
+    */
+  def perpendicular(): BounceCase = {
+    def product(a: Seq[BigInt], b: Seq[BigInt]) = a.zip(b).map { case (x, y) => x * y }.sum.abs
+    def squared(vector: Seq[BigInt])            = {
+      val square = product(vector, vector)
+      val low    = square.bitLength - numbers.shadeBits
+      square >> low << low
+    }
+    Iterator.continually {
+      val normal = anyUnit
+      val axis   = normal.indices.maxBy(normal(_).abs)
+      val hit    = any().copy(
+        axis = axis,
+        negative = normal(axis) > 0,
+        shear = Seq(1, 2).map(i => -normal((axis + i) % 3) * steepest / normal(axis).abs),
+        backSide = false,
+        normals = xyz(normal),
+        geometricNormal = normal,
+        isFlat = false,
+        isGlass = true
+      )
+      val along  = product(normal, hit.dir(numbers))
+      val weight = ((BigInt(1) << (along.bitLength + numbers.barycentricBits)) + along - 1) / along
+      hit.copy(weights = Seq(weight / 3, weight / 3, weight - weight / 3 * 2))
+    }.find { hit =>
+      val (normal, dir) = (hit.normal(numbers), hit.dir(numbers))
+      squared(normal) * squared(dir) < (BigInt(1) << (2 * (product(normal, dir).bitLength - 1)))
+    }.get
   }
 
   /** The vertices' normals cancel, or all normals are zero. */

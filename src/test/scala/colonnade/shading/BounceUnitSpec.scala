@@ -69,7 +69,12 @@ class BounceUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
         val all =
           Seq.fill(6)(stimulus.surface()) ++ Seq.fill(4)(stimulus.any()) ++ Seq.fill(4)(stimulus.grazing()) ++
             Seq.fill(4)(stimulus.critical()) ++ Seq.fill(2)(stimulus.extreme()) ++
-            Seq(stimulus.straight(), stimulus.withoutNormal(), stimulus.surface(spread = 1500))
+            Seq(
+              stimulus.straight(),
+              stimulus.perpendicular(),
+              stimulus.withoutNormal(),
+              stimulus.surface(spread = 1500)
+            )
         stimulus.offset() -> random.shuffle(all)
       }
       check(config, rounds, random, _ % 2 * 0.7)(unit)

@@ -85,7 +85,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   /** [[ShadingPipelineSpec]] covers other formats of the pipeline. */
   private def tag(config: ColonnadeConfig): Tag = {
-    val common = Seq(TestConfigs.withPipelines(TestConfigs.tiny), TestConfigs.withColours.head)
+    val common = Seq(TestConfigs.withPipelines(TestConfigs.tiny), TestConfigs.withTextures)
     if (common.contains(config.copy(physicalAttributeMemory = None))) Always
     else if (isPipeline(config) || config.geometry.cornerColours) Matrix
     else Always.ifExtreme(config)
@@ -279,7 +279,7 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for (
     config <- (TestConfigs.formats ++ Seq(
-      TestConfigs.withColours.head,
+      TestConfigs.withTextures,
       TestConfigs.withPipelines(TestConfigs.tiny),
       TestConfigs.withPipelines(TestConfigs.withTextures)
     )).map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment)))

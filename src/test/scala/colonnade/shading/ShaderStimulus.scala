@@ -195,12 +195,18 @@ final class ShaderStimulus(config: ColonnadeConfig, random: Random) {
     }
   }
 
-  /** Products halfway between two grid steps, or next to that; the offset's product too if it is odd. */
+  /** Products halfway between two grid steps, or next to that: by little, or by half of what the lowest digit holds. The
+    * offset's product too if it is odd.
+    */
   def halfway(): HitCase = {
-    val half = BigInt(1) << (numbers.shearFraction - 1)
+    val fraction       = numbers.shearFraction - numbers.shadeBits
+    val isDigit        = fraction > 0 && random.nextBoolean()
+    def near(): BigInt =
+      if (isDigit) (((BigInt(numbers.shadeBits - 1, random) << 1) + 1) << fraction) + 1
+      else (BigInt(1) << (numbers.shearFraction - 1)) + random.nextInt(3) - 1
     anyHit().copy(
-      shear = Seq.fill(2)((half + random.nextInt(3) - 1) * (if (random.nextBoolean()) 1 else -1)),
-      t = random.nextInt(64),
+      shear = Seq.fill(2)(near() * (if (random.nextBoolean()) 1 else -1)),
+      t = if (isDigit) BigInt(1) << (numbers.shadeBits - 1) else random.nextInt(64),
       geometricNormal = Seq(1024, -1024, 1025)
     )
   }

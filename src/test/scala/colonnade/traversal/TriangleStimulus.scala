@@ -64,12 +64,21 @@ final class TriangleStimulus(config: ColonnadeConfig, seed: Int) {
 
   def vertex: Seq[BigInt] = Seq.fill(3)(coordinate)
 
-  /** Any triangle, or one around a point: small, large, or with an edge or vertex there. */
+  /** Any triangle, or one around a point: small, large, with an edge or vertex there, or with a right angle and legs that
+    * are powers of two, so that its weights add up to a little less than one as a ray along an axis sees it.
+    */
   def triangle(point: Seq[BigInt]): TestTriangle = random.nextInt(10) match {
     case 0 => TestTriangle(Seq.fill(3)(vertex))
     case 1 => TestTriangle(Seq.fill(3)(Seq.fill(3)(if (random.nextBoolean()) BigInt(0) else cube - 1)))
     case 2 => val other = vertex; TestTriangle(Seq(other, other, vertex))
     case 3 => TestTriangle(random.shuffle(Seq(point, vertex, vertex)))
+    case 4 =>
+      val axis   = random.nextInt(3)
+      val legs   = Seq(1, 2).map(offset => (axis + offset) % 3 -> (cube >> (1 + random.nextInt(3))))
+      val corner = legs.foldLeft(point) { case (at, (side, leg)) =>
+        at.updated(side, (at(side) - below(leg / 2)).max(0).min(cube - 1 - leg))
+      }
+      TestTriangle(random.shuffle(corner +: legs.map { case (side, leg) => corner.updated(side, corner(side) + leg) }))
     case _ =>
       val size     = BigInt(1) << (2 + random.nextInt(numbers.vertexBits - 1))
       val near     = Seq.fill(2)(point.map(c => inCube(c + between(-size, size))))
@@ -78,28 +87,30 @@ final class TriangleStimulus(config: ColonnadeConfig, seed: Int) {
   }
 
   /** Two triangles, most of them around a point. Half of them share an edge as neighbours of one winding do, the others
-    * almost: with opposite windings, at other vertices, as a point, or all three edges.
+    * almost: with opposite windings, at other vertices, as a point, all three edges, or one vertex of the edge.
     */
   def pair(point: Seq[BigInt]): Seq[TestTriangle] = {
     val Seq(a, b, c) = triangle(point).vertices
     val d            = if (chance(2)) vertex else triangle(point).vertices.head
-    val (one, two)   = random.nextInt(12) match {
+    val (one, two)   = random.nextInt(14) match {
       case 0 => (Seq(a, b, c), Seq(a, b, d))
       case 1 => (Seq(a, b, c), Seq(a, d, b))
       case 2 => (Seq(a, b, c), Seq(a, b, c))
       case 3 => (Seq(a, b, c), Seq(b, a, c))
       case 4 => (Seq(a, a, c), Seq(a, a, d))
       case 5 => (Seq(a, b, c), triangle(point).vertices)
+      case 6 => (Seq(a, b, c), if (random.nextBoolean()) Seq(d, a, c) else Seq(b, d, c))
       case _ => if (random.nextBoolean()) (Seq(a, b, c), Seq(b, a, d)) else (Seq(b, a, d), Seq(a, b, c))
     }
     Seq(TestTriangle(one), TestTriangle(two))
   }
 
-  /** A ray, three in four times aimed at a point, with triangles, most of them around that point. */
+  /** A ray, three in four times aimed at a point or next to it, with triangles, most of them around that point. */
   def meeting(triangles: Int): (TestRay, Seq[TestTriangle]) = {
     val point = vertex
     val met   = if (triangles == 2) pair(point) else Seq.fill(triangles)(triangle(point))
-    (if (chance(4)) ray else rayTo(point.map(steps)), met)
+    val next  = if (chance(2)) steps(1) else BigInt(0)
+    (if (chance(4)) ray else rayTo(point.map(steps(_) + between(0, next))), met)
   }
 
   /** Triangles that surround a vertex as a ray sees it, and the ray, aimed at it or at an edge that meets it. */
