@@ -80,9 +80,10 @@ class BouncePipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       idle += 1
       val offered = Option.when(unit.io.result.valid.peekBoolean())(result.context.peekInt())
       assert(held.forall(offered.contains(_)), "an offer has changed")
-      held = offered.filterNot(_ => takes)
-      for (context <- offered.map(_.toInt) if takes) {
-        val index   = flying.remove(context).getOrElse(fail(s"no bounce of context $context"))
+      val taken = offered.filter(_ => takes)
+      held = if (taken.isEmpty) offered else None
+      for (context <- taken.map(_.toInt)) {
+        val index = flying.remove(context).getOrElse(fail(s"no bounce of context $context"))
         // A reflection starts at the origin of its request
         val (found, full) = (peek(result), answers(index))
         val expected      = if (full.head == 0) full.patch(1, found.slice(1, 4), 3) else full

@@ -2,6 +2,7 @@ package colonnade.shading
 
 import chisel3._
 import chiseltest._
+import colonnade.RandomPorts.peek
 import colonnade.TestParts._
 import colonnade.common.ModuloSchedule
 import colonnade.config.ColonnadeConfig
@@ -27,7 +28,7 @@ private class ShadersHarness(config: ColonnadeConfig) extends Module {
 }
 
 class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
-  import ShaderDriver._
+  import ShaderDriver.{peek => _, _}
 
   behavior of "ShadingPipeline"
 
@@ -118,8 +119,8 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
       if (hit.nonEmpty) io.request.ready.expect(true, "a promised hit is taken")
       if (hit.nonEmpty || (point.nonEmpty && io.environment.get.ready.peekBoolean())) left = left.tail
       val offered = Seq(
-        Option.when(io.lit.valid.peekBoolean())(leaves(io.lit.bits)),
-        io.bounced.filter(_.valid.peekBoolean()).map(port => leaves(port.bits))
+        Option.when(io.lit.valid.peekBoolean())(peek(io.lit.bits)),
+        io.bounced.filter(_.valid.peekBoolean()).map(port => peek(port.bits))
       )
       for ((before, now) <- held.zip(offered); value <- before) assert(now.contains(value), "an offer has changed")
       held = offered.zip(accepts).map { case (offer, isTaken) => offer.filterNot(_ => isTaken) }
@@ -150,15 +151,6 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
     dut.clock.step()
     dut.reset.asBool.poke(false)
     dut.shaders.foreach(_.request.valid.poke(false))
-  }
-
-  /** The numbers of a port. */
-  private def leaves(data: Data): Seq[BigInt] = data match {
-    case vec: Vec[_]    => vec.flatMap(element => leaves(element.asInstanceOf[Data]))
-    case record: Record => record.elements.values.flatMap(leaves).toSeq
-    case number: SInt   => Seq(number.peekInt())
-    case number: UInt   => Seq(number.peekInt())
-    case other          => throw new IllegalArgumentException(s"a port of $other")
   }
 
   for (shining <- Seq(1, 2))
