@@ -15,6 +15,14 @@ final class FlatChannel(reqBits: Int, respBits: Int, tagBits: Int) extends Bundl
 
 object FlatChannel {
 
+  /** The channels of a port, in the order of its fields. */
+  def channels(port: AttributePort): Seq[AttributeChannel[_ <: Data, _ <: Data]] =
+    Seq(port.albedo, port.normals, port.cells, port.planes)
+
+  /** Ports for all channels of a port of the unit under test. */
+  def all(port: AttributePort): Seq[FlatChannel] =
+    Seq(FlatChannel(port.albedo), FlatChannel(port.normals), FlatChannel(port.cells), FlatChannel(port.planes))
+
   /** Ports for a channel of the unit under test. */
   def apply[Q <: Data, R <: Data](channel: AttributeChannel[Q, R]): FlatChannel = {
     val (req, resp) = (channel.req.bits, channel.resp.bits)

@@ -26,9 +26,7 @@ private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
   }
 
   /** All channels of each unit. */
-  val channels = columns.flatMap(_.ports).map { port =>
-    Seq(FlatChannel(port.albedo), FlatChannel(port.normals), FlatChannel(port.cells), FlatChannel(port.planes))
-  }
+  val channels = columns.flatMap(_.ports).map(FlatChannel.all)
 }
 
 class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
