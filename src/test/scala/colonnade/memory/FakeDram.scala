@@ -1,0 +1,91 @@
+package colonnade.memory
+
+import chiseltest._
+import colonnade.axi.AxiReadPort
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{RecordFormats, SceneInDram, SceneLines}
+import org.scalatest.matchers.should.Matchers._
+
+import scala.collection.mutable
+import scala.util.Random
+
+/** A scene of random records in DRAM: reads of random latency, in order for each id only.
+  *
+  * @param isShared a line is not read twice at a time
+  */
+class FakeDram(axi: AxiReadPort, config: ColonnadeConfig, random: Random, isShared: Boolean) {
+  private val banks = config.columnBvhMemory.banks
+  private val bus   = config.columnBvhMemory.cache.get.busBytes
+  private val bits  = new RecordFormats(config).recordBits
+  private val beats = (SceneLines.bytes(config) + bus - 1) / bus
+
+  /** A line of a bank that is read: the cycle from which on it is sent, and the beat that fails, if one does. */
+  private case class Read(line: Int, due: Int, failingBeat: Int)
+  private val inFlight = Seq.fill(banks)(mutable.Queue.empty[Read])
+  private val sent     = Array.fill(banks)(0) // beats of the first one
+  private val contents = mutable.Map.empty[(Int, Int), BigInt]
+  private var now      = 0
+
+  val page: BigInt = 0x1234567
+
+  /** Lines, by their number in a bank, whose reads fail. */
+  var failing = Set.empty[Int]
+
+  /** Lines whose read has been accepted; beats that have been taken. */
+  var reads, taken = 0
+
+  private def contentOf(bank: Int, line: Int): BigInt =
+    contents.getOrElseUpdate((bank, line), BigInt(Lines.records * bits, random))
+
+  /** Without its parity. */
+  def record(bank: Int, line: Int, word: Int): BigInt =
+    (contentOf(bank, line) >> (word * bits)) & ((BigInt(1) << bits) - 1)
+
+  def cycle(): Unit = {
+    read()
+    answer()
+    now += 1
+  }
+
+  private def read(): Unit = {
+    val ar    = axi.ar
+    val accepts = random.nextInt(3) > 0
+    ar.ready.poke(accepts)
+    if (accepts && ar.valid.peekBoolean()) {
+      val address = ar.bits.addr.peekInt() - (page << SceneInDram.pageLog)
+      val bank    = ar.bits.id.peekInt().toInt
+      address % SceneLines.pitch(config) shouldBe 0
+      val line = (address / SceneLines.pitch(config)).toInt
+      line % banks shouldBe bank
+      ar.bits.len.expect(beats - 1)
+      (1 << ar.bits.size.peekInt().toInt) shouldBe bus
+      ar.bits.burst.expect(1)
+      if (isShared) inFlight(bank).map(_.line) should not contain (line / banks)
+      val failingBeat = if (failing(line / banks)) random.nextInt(beats) else -1
+      inFlight(bank).enqueue(Read(line / banks, now + 1 + random.nextInt(60), failingBeat))
+      reads += 1
+    }
+  }
+
+  private def answer(): Unit = {
+    val r    = axi.r
+    val due  = (0 until banks).filter(bank => inFlight(bank).headOption.exists(_.due <= now))
+    val bank = if (due.nonEmpty && random.nextInt(4) > 0) Some(due(random.nextInt(due.size))) else None
+    r.valid.poke(bank.nonEmpty)
+    for (id <- bank) {
+      val read = inFlight(id).head
+      r.bits.id.poke(id)
+      r.bits.data.poke((contentOf(id, read.line) >> (sent(id) * bus * 8)) & ((BigInt(1) << (bus * 8)) - 1))
+      r.bits.resp.poke(if (sent(id) == read.failingBeat) 2 else 0)
+      r.bits.last.poke(sent(id) == beats - 1)
+      if (r.ready.peekBoolean()) {
+        taken += 1
+        sent(id) += 1
+        if (sent(id) == beats) {
+          sent(id) = 0
+          inFlight(id).dequeue()
+        }
+      }
+    }
+  }
+}
