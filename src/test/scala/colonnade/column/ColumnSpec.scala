@@ -2,12 +2,12 @@ package colonnade.column
 
 import chisel3._
 import chiseltest._
-import colonnade.config.{ColonnadeConfig, UnitsConfig}
+import colonnade.config.ColonnadeConfig
 import colonnade.environment.EnvironmentImage
 import colonnade.formats.{FrameRegisters, LoadTarget, Pixel}
 import colonnade.frame.TileDivider
-import colonnade.unit.{SmallEnvironment, SmallScene}
-import colonnade.{Always, Matrix, Model, Packed, Simulation, TestConfigs}
+import colonnade.unit.{SmallEnvironment, SmallFrame, SmallScene}
+import colonnade.{Always, Matrix, Packed, Simulation, TestConfigs}
 import org.scalatest.Tag
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -18,8 +18,6 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "Column"
 
   private val (wide, high) = (12, 8)
-  private val names        = Seq("colour.r", "colour.g", "colour.b", "isObject", "hit.triangle", "hit.distance") ++
-    Seq("r", "g", "b").map(channel => s"ratio.$channel")
 
   /** Probability that a port is ready or valid, seed, shadow rays, environment, and whether it may hide the object. */
   private val rounds =
@@ -61,34 +59,22 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
           val width     = wide + 3
           val registers = environment.fold(scene.registers)(_.registers) ++
             Map[String, BigInt]("frame.width" -> width, "frame.objectRect.x0" -> (if (hasEnvironment) 4 else 0))
-          val positions                                = for (x <- 0 until width; y <- 0 until high) yield (x, y)
-          def modelled(registers: Map[String, BigInt]) =
-            Model.pixels(config, registers, scene.records, positions, environment.map(_.words)).map(names.zip(_).toMap)
-          val expected = modelled(registers)
-          val frame    = new ColumnFrame(dut, config, registers, scene.records, environment.map(_.words), seed)
-          val pixels   = frame.run(positions.size, willing)
-
-          assert(pixels.map(_._1).sorted == positions.sorted, "every position comes out once")
-          val found = pixels.toMap
-          for ((position, pixel) <- positions.zip(expected))
-            assert(found(position) == pixel.filter(value => found(position).contains(value._1)), s"at $position")
-
-          val hits = expected.count(_("isObject") == 1)
-          assert(frame.counts("hits") == hits && frame.counts("raysPrimary") == positions.size)
+          val expected  = new SmallFrame(config, registers, scene.records, (width, high), environment.map(_.words))
+          val positions = expected.positions
+          val frame     = new ColumnFrame(dut, config, registers, scene.records, environment.map(_.words), seed)
+          val pixels    = frame.run(positions.size, willing)
+          expected.check(pixels, frame.counts)
+          assert(frame.counts("raysPrimary") == positions.size)
           if (occlusion) {
-            val bare   = modelled(registers + ("environment.occlusion" -> BigInt(0)))
-            val hidden = bare.zip(expected).count { case (bare, pixel) => bare("isObject") != pixel("isObject") }
-            assert(hits > 0 && (hidden > 1) == hasEnvironment, "a part of the object is hidden")
-          } else {
-            assert(hits > wide * high / 8, "there is something to see")
-            assert(if (shadows) frame.counts("raysShadow") > hits / 8 else frame.counts("raysShadow") == 0)
-            assert((frame.counts("raysReflection") + frame.counts("raysRefraction") > 0) == config.frame.hasBounces)
-          }
+            val bare   = expected.modelled(registers + ("environment.occlusion" -> BigInt(0)))
+            val hidden = bare.zip(expected.expected).count { case (a, b) => a("isObject") != b("isObject") }
+            assert(expected.hits > 0 && (hidden > 1) == hasEnvironment, "a part of the object is hidden")
+          } else expected.checkRays(frame.counts, shadows)
           if (config.hasEnvironment) {
-            val isDarker = expected.exists(pixel => Seq("r", "g", "b").exists(c => pixel(s"ratio.$c") < 4096))
+            val isDarker = expected.expected.exists(pixel => Seq("r", "g", "b").exists(c => pixel(s"ratio.$c") < 4096))
             assert(occlusion || isDarker == (hasEnvironment && shadows), "the object takes light from the room")
             assert(
-              if (hasEnvironment) frame.counts("raysEnvironment") >= wide * high - hits
+              if (hasEnvironment) frame.counts("raysEnvironment") >= wide * high - expected.hits
               else frame.counts("raysEnvironment") == 0
             )
           }
@@ -101,31 +87,13 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def withPaths(config: ColonnadeConfig, contexts: Int): ColonnadeConfig =
     config.copy(units = config.units.copy(pathContexts = contexts))
 
-  private def withIntervals(
-      config: ColonnadeConfig,
-      ray:    Int = UnitsConfig.sequentialRayInterval,
-      shade:  Int = UnitsConfig.sequentialShadeInterval
-  ): ColonnadeConfig = config.copy(units = config.units.copy(rayInterval = ray, shadeInterval = shade))
-
-  private val narrow = TestConfigs.withPrecision(16, 16, 32)
-
-  render("a tree, snooping, eight paths", withPaths(tiny, 8))
-  render("timing slices", TestConfigs.withExtraSlices(withPaths(tiny, 8)))
+  render("no environment, eight paths", withPaths(tiny, 8), Matrix)
   render(
-    "no tree, one context, one path, no snooping",
-    withPaths(narrow, 1).copy(
-      array = tiny.array.copy(contexts = 1),
-      geometry = tiny.geometry.copy(bvh = false, trianglesPerRecord = 1),
-      columnBvhMemory = tiny.columnBvhMemory.copy(snooping = false, banks = 1),
-      frame = tiny.frame.copy(hits = false)
-    ),
-    Matrix
+    "an environment, five paths, a ray set-up pipeline", {
+      val config = withPaths(TestConfigs.withEnvironment(TestConfigs.environment), 5)
+      config.copy(units = config.units.copy(rayInterval = 1))
+    }
   )
-  render(
-    "an environment, five paths, a ray set-up pipeline",
-    withIntervals(withPaths(TestConfigs.withEnvironment(TestConfigs.environment), 5), ray = 1)
-  )
-  render("a shading pipeline, eight paths", withIntervals(withPaths(tiny, 8), shade = 3))
   render(
     "two rows that share triangle units, pipelines, many paths, corner colours and emission, an environment", {
       val coloured = TestConfigs.withColours.head
@@ -145,31 +113,14 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   )
   render(
-    "wide units",
-    withPaths(tiny, 8).copy(
-      units = tiny.units.copy(boxLanes = 4, triangleLanes = 2, pathContexts = 8),
-      columnBvhMemory = tiny.columnBvhMemory.copy(recordBuffers = 3)
-    ),
-    Matrix
-  )
-  render(
-    "one light, no bounces",
-    withPaths(tiny, 8).copy(frame = tiny.frame.copy(lights = 1, maxBounces = 0)),
-    Matrix
-  )
-  render(
     "an environment, one context, one path, no bounces",
-    withPaths(narrow, 1).copy(
+    withPaths(TestConfigs.withPrecision(16, 16, 32), 1).copy(
       array = tiny.array.copy(contexts = 1),
       frame = tiny.frame.copy(lights = 1, maxBounces = 0, hits = false),
       physicalAttributeMemory = Some(TestConfigs.environment)
     ),
     Matrix
   )
-  for (config <- TestConfigs.withColours.tail) {
-    val withoutTextures = config.copy(geometry = config.geometry.copy(textureBytes = 0))
-    render(s"corner colours at ${config.precision}", withPaths(withoutTextures, 8), Matrix)
-  }
 }
 
 /** Packs registers and pixel into one port each. */

@@ -9,7 +9,7 @@ import colonnade.formats.{RecordBroadcast, RecordFormats, SceneMap}
 import colonnade.ray.{PreparedRay, SetupCase, SetupRequest}
 import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleLanes
-import colonnade.{Model, Packed, Simulation, TestConfigs}
+import colonnade.{Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.collection.mutable
@@ -87,7 +87,7 @@ private class TraversalUnitHarness(config: ColonnadeConfig) extends Module {
   *   a node, a leaf and the address of another leaf are illegal: their triangles are not found
   */
 private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, seed: Int, isIllegal: Boolean) {
-  private type Fields = Map[String, BigInt]
+  import TriangleSearch.Fields
 
   private val random   = new Random(seed)
   private val numbers  = config.numbers
@@ -118,17 +118,11 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
     case (record, _)                                       => record
   }
 
-  private case class Triangle(id: BigInt, isTransmissive: Boolean, vertices: Seq[Seq[BigInt]])
-  private val triangles = for {
-    address <- base until beyond
-    fields = leaf.unpack(made.records(address))
-    k <- 0 until fields("count").toInt
-  } yield {
-    val vertices = (3 * k until 3 * k + 3).map(i => Seq("x", "y", "z").map(axis => fields(s"vertices[$i].$axis")))
-    val isLost   = address >= end || brokenLeaf.contains(address) || lostLeaves.contains(address)
-    isLost -> Triangle(fields("firstTriangle") + k, fields(s"isClear[$k]") == 1, vertices)
-  }
-  private val found = triangles.collect { case (false, triangle) => triangle }
+  private val search              = new TriangleSearch(config, made)
+  private val (triangles, isLost) = search.triangles.map { case (address, triangle) =>
+    triangle -> (address >= end || brokenLeaf.contains(address) || lostLeaves.contains(address))
+  }.unzip
+  private val found = triangles.zip(isLost).collect { case (triangle, false) => triangle }
 
   // Rays, as the model prepares them, and their hits
   private def steps(units: BigInt): BigInt =
@@ -136,7 +130,7 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
   private val cube = BigInt(1) << numbers.vertexBits
 
   private def request(): SetupRequest = {
-    val Seq(a, b, c) = triangles(random.nextInt(triangles.size))._2.vertices
+    val Seq(a, b, c) = triangles(random.nextInt(triangles.size)).vertices
     val (u, v)       = (random.nextInt(60), random.nextInt(60))
     val target       = Seq(0, 1, 2).map(axis => steps((a(axis) * (120 - u - v) + b(axis) * u + c(axis) * v) / 120))
     val origin       = Seq.fill(3)(steps(cube) * (random.nextInt(300) - 100) / 100)
@@ -154,26 +148,7 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
   }
 
   /** By ray: occlusion of a shadow ray, or the fields of its closest hit. */
-  private val expected: Vector[(Occlusion.Type, Option[Fields])] = {
-    val pairs =
-      for ((_, ray) <- rays; triangle <- found) yield RayTracing.forTriangles(ray) ++ triangle.vertices.flatten
-    val answers = Model.answers(config, pairs, "triangle").grouped(found.size).toVector
-    rays.zip(answers).map { case ((request, ray), answers) =>
-      val hits = found.zip(answers).filter { case (_, hit) => hit.head == 1 && hit(1) < ray("tMax") }
-      if (request.isShadow) {
-        val isOpaque = hits.exists { case (triangle, _) => !triangle.isTransmissive || !config.frame.hasBounces }
-        val met      = if (isOpaque) Occlusion.opaque else if (hits.nonEmpty) Occlusion.transmissive else Occlusion.none
-        (met, None)
-      } else
-        (
-          Occlusion.none,
-          hits.minByOption { case (triangle, hit) => (hit(1), triangle.id) }.map { case (triangle, hit) =>
-            Map("t" -> hit(1), "id" -> triangle.id, "backSide" -> hit(5)) ++
-              (0 until 3).map(i => s"weights[$i]" -> hit(2 + i))
-          }
-        )
-    }
-  }
+  private val expected: Vector[(Occlusion.Type, Option[Fields])] = search.hits(rays.map(_._2), found)
 
   private val packedRay = new Packed(new PreparedRay(PathConfig(config)))
   private val result    = new Packed(new TraceResult(PathConfig(config)))
@@ -303,11 +278,4 @@ private object RayTracing {
       several("ray.exponent", 2) ++ Seq(next("tEntry"), next("tMax"))
     fields.filterNot(_._1.startsWith("units")).toMap
   }
-
-  /** The ray's numbers in the order of the model's question `triangle`. */
-  def forTriangles(ray: Map[String, BigInt]): Seq[BigInt] =
-    Seq("orientation.axis") ++ (0 until 3).map(i => s"orientation.negative[$i]") ++ (0 until 3).map(i =>
-      s"origin[$i]"
-    ) ++
-      (0 until 2).map(i => s"shear[$i]") map (name => ray(s"ray.$name"))
 }
