@@ -79,6 +79,7 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
             dut.requests(row).valid.poke(wants(row).nonEmpty)
             wants(row).foreach(dut.requests(row).bits.address.poke(_))
           }
+          dut.isIdle.expect(!due.exists { case (at, reads) => at >= cycle && reads.nonEmpty })
           // An accepted request is broadcast after the latency.
           val takes = (0 until rows).filter(row => wants(row).nonEmpty && dut.requests(row).ready.peekBoolean())
           assert(takes.map(row => wants(row).get % banks).distinct.size == takes.size, "one a bank")
