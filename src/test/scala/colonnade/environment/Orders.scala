@@ -91,7 +91,7 @@ final class Orders(
         sent += 1
       }
       val accepts = random.nextDouble() < willing
-      val now   = Option.when(dut.answer.valid.peekBoolean())(dut.answer.bits.peekInt())
+      val now     = Option.when(dut.answer.valid.peekBoolean())(dut.answer.bits.peekInt())
       assert(offered.isEmpty || now.map(meant) == offered.map(meant), "an answer is offered until it is taken")
       offered = now.filterNot(_ => accepts)
       dut.answer.ready.poke(accepts)

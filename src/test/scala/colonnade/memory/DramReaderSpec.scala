@@ -28,7 +28,7 @@ class DramReaderSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   for (bus <- Seq(32, 4)) {
     val configuration = config(banks = 1, bus)
-    val held        = if (DramReader.beats(configuration) > DramReader.maxBeats) 1 else 2
+    val held          = if (DramReader.beats(configuration) > DramReader.maxBeats) 1 else 2
     it should s"hold lines of a bank that wait, over $bus bytes: $held" in
       test(new DramReader(configuration)).withAnnotations(Simulation.verilator) { dut =>
         val reads = new Reads(dut, configuration, new Random(5))

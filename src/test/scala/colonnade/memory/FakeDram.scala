@@ -48,7 +48,7 @@ class FakeDram(axi: AxiReadPort, config: ColonnadeConfig, random: Random, isShar
   }
 
   private def read(): Unit = {
-    val ar    = axi.ar
+    val ar      = axi.ar
     val accepts = random.nextInt(3) > 0
     ar.ready.poke(accepts)
     if (accepts && ar.valid.peekBoolean()) {

@@ -47,7 +47,7 @@ class SharedCacheSpec extends AnyFlatSpec with ChiselScalatestTester {
     private val bits     = new RecordFormats(config).recordBits
     private val lines    = 1 << Lines.lineBits(config)
     private val contents = Seq.fill(lines, Lines.records)(BigInt(bits, random))
-    private val inFlight  = mutable.Queue.empty[(Int, Int, Boolean)] // line, due, whether it fails
+    private val inFlight = mutable.Queue.empty[(Int, Int, Boolean)] // line, due, whether it fails
     private val zeros    = mutable.Set.empty[Int]                   // lines whose last read has failed
     private val maxReads = config.columnBvhMemory.cache.get.sharedMisses / config.columnBvhMemory.banks
     private var now      = 0

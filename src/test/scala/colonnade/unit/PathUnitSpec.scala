@@ -118,7 +118,7 @@ private class FakeTraversal(
   var overtaken = 0
 
   def cycle(willing: Double): Unit = {
-    val due    = waiting.indices.filter(waiting(_)._2 <= now)
+    val due  = waiting.indices.filter(waiting(_)._2 <= now)
     val next = Option.when(due.nonEmpty && random.nextDouble() < willing)(due(random.nextInt(due.size)))
     results.valid.poke(next.nonEmpty)
     for (index <- next) {
