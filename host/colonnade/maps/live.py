@@ -1,4 +1,4 @@
-"""The live encoder: maps of a camera's frames in milliseconds, by ``host/cpp/live`` (docs/live-encoder.md).
+"""The live encoder: maps of a camera's frames in milliseconds, by ``host/cpp/live`` (docs/captures.md, "Live encoder").
 
 It writes the words of the offline encoder's memories. Each frame starts with palettes, price of a word and planes of
 the frame before.

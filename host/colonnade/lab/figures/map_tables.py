@@ -1,4 +1,4 @@
-"""The tables of maps: ``docs/background.md``, ``docs/live-encoder.md``, and of rooms of a phone, ``docs/captures.md``.
+"""The tables of maps: ``docs/background.md``, and of captures and the live encoder, ``docs/captures.md``.
 
 Reports also have times, which are those of one machine; no table shows them.
 """
