@@ -14,6 +14,12 @@ from colonnade.lab.figures.facts import MEGAHERTZ, facts, text
 #: Presets of 10×8 arrays, which table 1 has.
 ARRAYS = ("edge", "lean", "diffuse")
 
+#: The entries that the page's commands measure.
+PARTS = (
+    *("bvh-tests", "bvh-costs", "bvh-cycles", "mixed-precision", "paper-maps", "paper-unit", "ablation"),
+    *("environments", "bench-edge", "area-edge-asap7"),
+)
+
 
 def table_1(data: Data) -> str:
     """The paper's table of designs with ours."""
@@ -49,6 +55,12 @@ def unit(data: Data) -> str:
     return markdown([*titles, "rays per cycle and MGE"], rows)
 
 
+def minutes(data: Data) -> str:
+    """The minutes of each command of `tools/figures` that the page names."""
+    found = {name: content["seconds"] / 60 for name in PARTS if (content := data.get(name)) is not None}
+    return markdown(["`tools/figures …`", "minutes"], [[f"`{name}`", f"{found[name]:.1f}"] for name in found])
+
+
 def paper_facts(data: Data) -> dict[str, str]:
     """Single figures of the page, as text.
 
@@ -71,4 +83,4 @@ def paper_facts(data: Data) -> dict[str, str]:
     return found
 
 
-TABLES: Mapping[str, Callable[[Data], str]] = {"table-1": table_1, "paper-unit": unit}
+TABLES: Mapping[str, Callable[[Data], str]] = {"table-1": table_1, "paper-unit": unit, "paper-minutes": minutes}
