@@ -398,7 +398,7 @@ def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) ->
         expect(slider).to_have_value(place)
         expect(slider).to_have_attribute("max", "2")
         expect(page.locator(f"#{name}-value")).to_have_text(value)
-    expect(page.locator("input[name=precision]")).to_have_value("3")
+    expect(page.locator("input[name=precision]")).to_have_value("5")
     expect(page.locator("#precision-value")).to_have_text("32b32s64d")
     sharp = tab.picture()["colours"]
     before = tab.frames()
