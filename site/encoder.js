@@ -9,7 +9,9 @@ const TILE = 16;
 
 /** Sizes of the maps of a design, as live.h has them. */
 export function sizesOf(manifest) {
-  const { width, height, paletteSize, planes, boundingPlanes, tileSize } = manifest.config.physicalAttributeMemory;
+  const { width, height, encoding, paletteSize, planes, boundingPlanes, tileSize } = manifest.config.physicalAttributeMemory;
+  if (encoding === "slic")
+    throw new Error("the live encoder writes two-level maps, this hardware has SLIC maps: set physicalAttributeMemory.encoding=twoLevel");
   if (tileSize !== TILE) throw new Error(`the live encoder has tiles of ${TILE} pixels, this hardware of ${tileSize}`);
   const depthOf = (name) => manifest.memories[name].depth;
   return [width, height, paletteSize, depthOf("albedo.heap"), planes, depthOf("planes.heap"), boundingPlanes];

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
-from colonnade.maps.encoded import EncodedEnvironment
+from colonnade.maps.encoded import EncodedEnvironment, layout_of
+from colonnade.maps.image import AttributeImage
+from colonnade.maps.live import encode_still
+from colonnade.maps.slic import encode_slic
 
 
 def live_maps(room: Path, manifest: Manifest) -> EncodedEnvironment:
-    """The maps of the room in a folder, for a design."""
-    return EncodedEnvironment.of(load_environment(room), manifest, "live")
+    """The maps of the room in a folder, for a design; in a design with SLIC maps only the planes are the encoder's."""
+    environment, layout = load_environment(room), layout_of(manifest)
+    if layout.encoding == "twoLevel":
+        return EncodedEnvironment.of(environment, manifest, "live")
+    live = encode_still(environment, replace(layout, encoding="twoLevel"))
+    superpixels = {
+        "albedo": encode_slic(environment.albedo, live.albedo_space, layout).memories(),
+        "normals": encode_slic(environment.normals, live.normal_space, layout).memories(),
+    }
+    image = AttributeImage.from_memories(layout, {**live.memories(), **superpixels}, live.depth_unit)
+    return EncodedEnvironment(environment, image)

@@ -207,7 +207,9 @@ class Manifest:
         if data["version"] > VERSION:
             raise UserError(f"the manifest has version {data['version']}, this host reads {VERSION} at most: update it")
         if ((data.get("attributes") or {}).get("sizes") or {}).get("sliding"):
-            raise UserError("the manifest is of a design with slic maps, which no host packs: generate it again")
+            raise UserError(
+                "the manifest has the slic maps of version 1, this host packs those of version 2: generate it again"
+            )
         bits = int(data["records"]["bits"])
         return Manifest(
             config=data["config"],

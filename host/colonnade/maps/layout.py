@@ -2,11 +2,11 @@
 
 | memory | word, bits | words |
 |---|---|---|
-| descriptors | 32 | tiles |
-| palette | three fields | `palette_size` |
-| heap | 16 | rest of `map_bytes` |
-| seeds (`slic`, host only) | three fields | tiles |
-| labels (`slic`, host only) | 16: four labels | blocks / 4 |
+| descriptors (`twoLevel`) | 32 | tiles |
+| palette (`twoLevel`) | three fields | `palette_size` |
+| heap (`twoLevel`) | 16 | rest of `map_bytes` |
+| seeds (`slic`) | three fields | tiles |
+| labels (`slic`) | 16: four labels | blocks / 4 |
 | plane descriptors | 16 | tiles |
 | planes | 64 | `planes` |
 | plane heap | 16 | rest of `plane_bytes` |
@@ -35,8 +35,8 @@ LABEL_BITS = 4
 BLOCKS_PER_TILE_EDGE = 4
 
 
-#: Fields that no configuration has: the hardware decodes two-level maps with components of 12 bits.
-HOST_ONLY = ("field_bits", "encoding")
+#: Fields that no configuration has: the hardware decodes components of 12 bits.
+HOST_ONLY = ("field_bits",)
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,11 @@ class AttributeLayout:
 
     Attributes:
         width, height: Pixels of the maps.
-        encoding: Of albedo and normals: ``twoLevel``, or ``slic``, the baseline that no hardware decodes.
+        encoding: Of albedo and normals: ``twoLevel``, or ``slic``, the superpixels of the source paper.
         tile_size: Edge of a tile, pixels: 8, 16 or 32.
-        palette_size: Entries of a map's palette, 4 to 256.
+        palette_size: Entries of a two-level map's palette, 4 to 256.
         field_bits: Bits of a vector's component, 6 to 13.
-        map_bytes: Bytes of the albedo map, and of the normal map.
+        map_bytes: Bytes of the albedo map, and of the normal map; SLIC maps take what they need of them.
         planes: Entries of the plane table, 2 to 128; the last plane is infinitely far away.
         plane_bytes: Bytes of the plane table, the plane map and the bounding planes.
         bounding_planes: Number of bounding planes, for rays that leave the view.

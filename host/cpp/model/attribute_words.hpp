@@ -17,9 +17,13 @@ struct PlaneWord {
 
 /// The manifest's `attributes.sizes`.
 struct AttributeSizes {
-    int width, height, tileLog, tileColumns, tileRows, paletteSize, planes, boundingPlanes;
+    int width, height, tileLog, tileColumns, tileRows, planes, boundingPlanes;
+    /// Of two-level maps; 0 for SLIC maps.
+    int paletteSize = 0;
+    /// Of SLIC maps: log2 of a block's edge, blocks in a row, words with labels; 0 for two-level maps.
+    int blockLog = 0, blockColumns = 0, labelWords = 0;
     /// Depth of the heaps, words.
-    int mapHeapWords, planeHeapWords;
+    int mapHeapWords = 0, planeHeapWords;
 
     explicit AttributeSizes(const std::map<std::string, std::int64_t>& values) {
         const auto take = [&](const char* key) { return static_cast<int>(lookUp(values, key)); };
@@ -28,11 +32,17 @@ struct AttributeSizes {
         tileLog = take("tileLog");
         tileColumns = take("tileColumns");
         tileRows = take("tileRows");
-        paletteSize = take("paletteSize");
         planes = take("planes");
         boundingPlanes = take("boundingPlanes");
-        mapHeapWords = take("mapHeapWords");
         planeHeapWords = take("planeHeapWords");
+        if (values.count("paletteSize")) {
+            paletteSize = take("paletteSize");
+            mapHeapWords = take("mapHeapWords");
+        } else {
+            blockLog = take("blockLog");
+            blockColumns = take("blockColumns");
+            labelWords = take("labelWords");
+        }
     }
 
     /// Sizes of the texture memory, by the manifest's `texture.sizes`: an atlas without planes.
@@ -41,6 +51,7 @@ struct AttributeSizes {
         return AttributeSizes(values);
     }
 
+    bool hasSlicMaps() const { return labelWords > 0; }
     int tiles() const { return tileColumns * tileRows; }
     bool covers(int x, int y) const { return x >= 0 && y >= 0 && x < width && y < height; }
     int tileOf(int x, int y) const { return (y >> tileLog) * tileColumns + (x >> tileLog); }
@@ -69,7 +80,7 @@ public:
     int low(int address) const { return word(address) & 255; }
     int high(int address) const { return word(address) >> 8; }
 
-    /// Element `index` of a mask at `address` with elements of `bits` (1 or 2) bits.
+    /// Element `index` of a mask at `address` with elements of `bits` (1, 2 or 4) bits.
     int select(int address, int index, int bits) const {
         return (word(wordOf(address, index, bits)) >> (index * bits % 16)) & ((1 << bits) - 1);
     }

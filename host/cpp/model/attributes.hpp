@@ -1,4 +1,4 @@
-// Decoders of the physical-attribute memory, as in the RTL's TwoLevelMap and PlaneMap (docs/attributes.md).
+// Decoders of the physical-attribute memory, as in the RTL's TwoLevelMap, SlicMap and PlaneMap (docs/attributes.md).
 #pragma once
 #include "attribute_words.hpp"
 
@@ -34,7 +34,7 @@ struct CellPlane {
     bool isIllegal;
 };
 
-/// Index of a pixel's palette entry.
+/// Index of a pixel's palette entry or seed.
 struct MapEntry {
     int index;
     bool isIllegal;
@@ -47,13 +47,14 @@ struct BoundingPlaneEntry {
     Normal12 normal;
 };
 
-/// A map of three 12-bit components per pixel (albedo or normals).
+/// A map of three 12-bit components per pixel (albedo or normals), two-level or SLIC.
 class ComponentMap {
 public:
     using Components = std::array<int, 3>;
 
     explicit ComponentMap(const AttributeSizes& sizes)
-        : sizes_(sizes), descriptors_(sizes.tiles()), entries_(sizes.paletteSize), heap_(sizes.mapHeapWords) {}
+        : sizes_(sizes), descriptors_(sizes.hasSlicMaps() ? 0 : sizes.tiles()), entries_(sizes.hasSlicMaps() ? sizes.tiles() : sizes.paletteSize),
+          heap_(sizes.hasSlicMaps() ? sizes.labelWords : sizes.mapHeapWords) {}
 
     void loadDescriptors(const AttributeWords& words) {
         for (std::size_t i = 0; i < std::min(words.count(), descriptors_.size()); ++i)
@@ -68,8 +69,17 @@ public:
 
     const Components& components(const MapEntry& entry) const { return entries_[entry.index]; }
 
-    /// The palette entry of a pixel. The mask's word has the highest address that a pixel reads: if it is legal, all are.
-    MapEntry entryAt(int x, int y) const {
+    /// The palette entry or the seed of a pixel.
+    MapEntry entryAt(int x, int y) const { return sizes_.hasSlicMaps() ? MapEntry{seedAt(x, y), false} : paletteEntryAt(x, y); }
+
+private:
+    struct Descriptor {
+        int mode, pointer;
+        std::array<int, 2> entries;
+    };
+
+    /// The mask's word has the highest address that a pixel reads: if it is legal, all are.
+    MapEntry paletteEntryAt(int x, int y) const {
         const Descriptor& tile = descriptors_.at(sizes_.tileOf(x, y));
         const int cell = sizes_.cellOf(x, y, sizes_.tileLog - 1 - (tile.mode & 3));
         const int known = sizes_.paletteSize - 1;
@@ -81,16 +91,19 @@ public:
         return {entry & known, !heap_.covers(AttributeHeap::wordOf(mask, cell, bits))};
     }
 
-private:
-    struct Descriptor {
-        int mode, pointer;
-        std::array<int, 2> entries;
-    };
+    /// A label above 8 selects the tile's own seed; neighbours are clamped to the map.
+    int seedAt(int x, int y) const {
+        const int block = (y >> sizes_.blockLog) * sizes_.blockColumns + (x >> sizes_.blockLog);
+        const int label = heap_.select(0, block, 4), neighbour = label > 8 ? 4 : label;
+        const int column = std::clamp((x >> sizes_.tileLog) + neighbour % 3 - 1, 0, sizes_.tileColumns - 1);
+        const int row = std::clamp((y >> sizes_.tileLog) + neighbour / 3 - 1, 0, sizes_.tileRows - 1);
+        return row * sizes_.tileColumns + column;
+    }
 
     AttributeSizes sizes_;
-    std::vector<Descriptor> descriptors_;
-    std::vector<Components> entries_;
-    AttributeHeap heap_;
+    std::vector<Descriptor> descriptors_; // of a two-level map
+    std::vector<Components> entries_;     // of the palette, or the seeds
+    AttributeHeap heap_;                  // of masks and entries, or of labels
 };
 
 /// The texture memory: one atlas as a two-level map (docs/textures.md).
@@ -176,12 +189,13 @@ public:
     /// Loads a memory, by its name in the manifest, from address 0 with words of `stride` bytes, low byte first. Words beyond its depth are dropped.
     void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
         const auto by = [&](const char* layout) { return AttributeWords(layouts_.at(layout), words, count, stride); };
-        if (memory == "albedo.descriptors") albedo_.loadDescriptors(by("mapDescriptor"));
-        else if (memory == "normals.descriptors") normals_.loadDescriptors(by("mapDescriptor"));
-        else if (memory == "albedo.palette") albedo_.loadEntries(by("albedo"), "rgb");
-        else if (memory == "normals.palette") normals_.loadEntries(by("normal"), "xyz");
-        else if (memory == "albedo.heap") albedo_.heap().load(words, count, stride);
-        else if (memory == "normals.heap") normals_.heap().load(words, count, stride);
+        const std::string entries = sizes_.hasSlicMaps() ? ".seeds" : ".palette", heap = sizes_.hasSlicMaps() ? ".labels" : ".heap";
+        if (memory == "albedo.descriptors" && !sizes_.hasSlicMaps()) albedo_.loadDescriptors(by("mapDescriptor"));
+        else if (memory == "normals.descriptors" && !sizes_.hasSlicMaps()) normals_.loadDescriptors(by("mapDescriptor"));
+        else if (memory == "albedo" + entries) albedo_.loadEntries(by("albedo"), "rgb");
+        else if (memory == "normals" + entries) normals_.loadEntries(by("normal"), "xyz");
+        else if (memory == "albedo" + heap) albedo_.heap().load(words, count, stride);
+        else if (memory == "normals" + heap) normals_.heap().load(words, count, stride);
         else if (memory == "planes.descriptors") ids_.loadDescriptors(by("planeDescriptor"));
         else if (memory == "planes.heap") ids_.heap().load(words, count, stride);
         else if (memory == "planes.planes") loadPlanes(by("plane"));

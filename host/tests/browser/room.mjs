@@ -4,7 +4,7 @@
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { fillHoles, readDepth } from "../../../site/depth.js";
-import { encodeStill } from "../../../site/encoder.js";
+import { encodeStill, sizesOf } from "../../../site/encoder.js";
 import { instantiate } from "../../../site/library.js";
 import { normalsOf } from "../../../site/normals.js";
 
@@ -16,8 +16,18 @@ const { maps, tiles, ...rest } = encodeStill(await instantiate(readFileSync(job.
 for (const { memory, words } of maps) writeFileSync(`${folder}/${memory}`, words);
 for (const [name, values] of Object.entries(tiles)) writeFileSync(`${folder}/tiles.${name}`, new Uint8Array(values.buffer));
 
+const slic = structuredClone(job.manifest);
+slic.config.physicalAttributeMemory.encoding = "slic";
+const refusal = (() => {
+  try {
+    return sizesOf(slic);
+  } catch (error) {
+    return error.message;
+  }
+})();
+
 const { width, height, values } = await readDepth("depth.png", bytes("depth.png"), job.step);
 const { holes, count } = fillHoles(values, width);
 const { normals, noise } = normalsOf(values, holes, job.lens, width, height);
 writeFileSync(`${folder}/derived.bin`, new Uint8Array(normals.buffer));
-writeFileSync(`${folder}/result.json`, JSON.stringify({ ...rest, count, noise }));
+writeFileSync(`${folder}/result.json`, JSON.stringify({ ...rest, count, noise, refusal }));

@@ -126,6 +126,7 @@ def test_a_room_is_encoded_as_by_the_host(tmp_path: Path) -> None:
     for name in ("error", "nearest", "furthest"):
         assert (tmp_path / f"tiles.{name}").read_bytes() == getattr(maps, f"tile_{name}").tobytes()
     result = json.loads((tmp_path / "result.json").read_text())
+    assert "this hardware has SLIC maps: set physicalAttributeMemory.encoding=twoLevel" in result["refusal"]
     assert result["depthUnit"] == maps.image.depth_unit and result["count"] == np.count_nonzero(steps == 0)
     camera = replace(room.camera, **lens)
     holes = steps == 0

@@ -58,6 +58,7 @@ SECOND = Light((-1.0, 1.5, 1.0), colour=(0.2, 0.5, 0.3))
 
 #: Beside `small`: maps that two columns share, and two marches.
 SHARED = ("physicalAttributeMemory.columnsPerCopy=2", "units.marches=2")
+SLIC = ("physicalAttributeMemory.encoding=slic",)
 
 #: Rooms with the encoder of their maps; the offline one needs 20 seconds for each.
 STILL_ROOMS = (
@@ -75,8 +76,9 @@ STILL_ROOMS = (
         ("diffuse", ()),
         pytest.param("mirror", (), marks=pytest.mark.matrix),
         ("glass", SHARED),
+        pytest.param("mirror", SLIC, marks=pytest.mark.matrix),
     ],
-    ids=["diffuse", "mirror", "glass, maps shared by two columns"],
+    ids=["diffuse", "mirror", "glass, maps shared by two columns", "mirror, SLIC maps"],
 )
 def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, ...]) -> None:
     """The relit room and the shadow window; two lights, one light, no bounces; a sample; a stalled sink."""
@@ -121,6 +123,20 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, 
     assert hidden.counters["raysEnvironment"] >= whole.is_object.sum(), "each hit is tested"
     differs = (exact.colour != whole.colour).any(axis=2) & exact.is_object
     assert differs.any() == (kind != "diffuse"), "the room hides hits of later rays"
+
+
+@pytest.mark.parametrize("options", [(), SLIC], ids=["two-level maps", "SLIC maps"])
+def test_ambient_light_shows_the_decoded_albedo(options: tuple[str, ...]) -> None:
+    """In every pixel beside the object the model reads the entry that the host has written."""
+    manifest = manifest_for("small", options).manifest
+    held = live_maps(ROOMS / "living", manifest)
+    image = with_environment(pack(load_mesh("cube"), manifest), held, manifest)
+    scene = replace(TABLE, light=replace(TABLE.light, colour=(0.0, 0.0, 0.0)), ambient=Colour((1.0, 1.0, 1.0)))
+    model = render_model(manifest, image, frame_registers(scene, image.header, manifest, 640, 480, held, relit=True))
+    assert model.errors == []
+    colours = model.colour / ((1 << manifest.numbers["colourBits"]) - 1)
+    assert model.is_object.mean() < 0.2
+    assert np.abs(colours - held.image.decoded_albedo())[~model.is_object].max() < 1e-3
 
 
 def moved(scene: Scene, held: EncodedEnvironment, by: tuple[float, float, float], degrees: float = 0.0) -> Scene:

@@ -272,10 +272,16 @@ def test_the_commands_take_the_encoder() -> None:
     living = ["inspect", "--background", str(ROOMS / "living"), "--no-dists", "--encoder", "live"]
     result = CliRunner().invoke(cli, living)
     assert result.exit_code == 0 and "a 56.2x reduction" in result.output, result.output
+    slic = ["render", str(ROOMS.parent / "room.toml"), "--config", "small"]
+    slic += ["--set", "physicalAttributeMemory.encoding=slic"]
     for words, message in (
         ([*living, "--encoding", "slic"], "--encoder live needs --background"),
         (["inspect", "folder", "--encoder", "live"], "--encoder live needs --background"),
         (["study", "--live", "--path", "room"], "--path needs --live and --rooms"),
+        (
+            [*slic, "--backend", "model", "--encoder", "live"],
+            "colonnade: the live encoder writes twoLevel maps with tiles of 16 pixels, not slic maps",
+        ),
     ):
         result = CliRunner().invoke(cli, words)
         assert result.exit_code == 2 and message in result.output

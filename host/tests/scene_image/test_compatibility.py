@@ -50,7 +50,7 @@ def test_a_manifest_of_version_1(manifest: Manifest, tmp_path: Path) -> None:
     assert Manifest.load(file).registers == manifest.registers
     data["attributes"]["sizes"]["sliding"] = 1
     file.write_text(json.dumps(data))
-    with pytest.raises(UserError, match=r"^the manifest is of a design with slic maps, .*: generate it again$"):
+    with pytest.raises(UserError, match=r"^the manifest has the slic maps of version 1, .*: generate it again$"):
         Manifest.load(file)
 
 

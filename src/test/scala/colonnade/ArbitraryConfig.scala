@@ -97,6 +97,7 @@ object ArbitraryConfig {
   private val physicalAttributeMemory = for {
     width          <- Gen.chooseNum(64, 1000, 640)
     height         <- Gen.chooseNum(64, 1000, 480)
+    encoding       <- Gen.oneOf(MapEncoding.all)
     tileSize       <- Gen.oneOf(16, 32)
     paletteSize    <- Gen.oneOf(16, 64, 256)
     planes         <- Gen.oneOf(16, 128, 256)
@@ -107,11 +108,16 @@ object ArbitraryConfig {
   } yield {
     def parts(size: Int, edge: Int) = (size + edge - 1) / edge
     val tiles                       = parts(width, tileSize) * parts(height, tileSize)
-    val mapBytes                    = tiles * 4 + paletteSize * 9 / 2 + mapHeap
-    val planeBytes                  = tiles * 2 + planes * 8 + boundingPlanes * 18 + planeHeap
+    val mapBytes                    = encoding match {
+      case MapEncoding.TwoLevel => tiles * 4 + paletteSize * 9 / 2 + mapHeap
+      case MapEncoding.Slic     =>
+        (tiles * 9 + 1) / 2 + (parts(width, tileSize / 4) * parts(height, tileSize / 4) + 3) / 4 * 2 + mapHeap
+    }
+    val planeBytes = tiles * 2 + planes * 8 + boundingPlanes * 18 + planeHeap
     PhysicalAttributeMemoryConfig(
       width,
       height,
+      encoding,
       tileSize,
       paletteSize,
       mapBytes,

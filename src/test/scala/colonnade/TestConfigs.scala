@@ -90,6 +90,10 @@ object TestConfigs {
     Seq(environment, large, odd).map(withEnvironment)
   }
 
+  /** The same with SLIC maps. */
+  val slicEnvironments: Seq[ColonnadeConfig] =
+    environments.flatMap(_.physicalAttributeMemory).map(maps => withEnvironment(maps.copy(encoding = MapEncoding.Slic)))
+
   /** A cache of a few lines in front of a scene of `depth` records. */
   def withCache(
       rows:    Int = 1,

@@ -160,5 +160,5 @@ def _layout(manifest: Manifest, memory: str) -> Mapping[str, Field]:
     part, _, name = memory.partition(".")
     entries = {"albedo": "albedo", "normals": "normal", "texture": "albedo"}.get(part, "plane")
     kinds = {"descriptors": "planeDescriptor" if part == "planes" else "mapDescriptor", "planes": "plane"}
-    kinds |= {"bounding": "boundingPlaneEntry", "palette": entries}
+    kinds |= {"bounding": "boundingPlaneEntry", "palette": entries, "seeds": entries}
     return formats.layouts[kinds[name]].fields if name in kinds else {}

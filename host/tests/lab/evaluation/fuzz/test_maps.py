@@ -19,6 +19,7 @@ from colonnade.scene_image.file import LoadSection
 
 NEEDS_SIMULATOR = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 FRAMES = 16
+SLIC = ("physicalAttributeMemory.encoding=slic",)
 
 
 @pytest.fixture(scope="module")
@@ -27,11 +28,12 @@ def manifest() -> Manifest:
 
 
 @NEEDS_SIMULATOR
-def test_hardware_and_model_agree_on_corrupt_maps() -> None:
+@pytest.mark.parametrize("options", [(), pytest.param(SLIC, marks=pytest.mark.matrix)], ids=["two-level", "SLIC"])
+def test_hardware_and_model_agree_on_corrupt_maps(options: tuple[str, ...]) -> None:
     """Pixels, ratios, counters and error bits, and the legal frame after each. Long version:
     ``colonnade fuzz --config small --kind maps --frames 700``.
     """
-    report = fuzz(design_for("small", ()), FRAMES, seed=1, kinds=("maps",))
+    report = fuzz(design_for("small", options), FRAMES, seed=1, kinds=("maps",))
     assert report["disagreements"] == []
     assert report["legal_failures"] == 0
     outcomes = report["kinds"]["maps"]
@@ -68,8 +70,10 @@ def test_pointers_beyond_the_heap_set_the_error_and_read_zeros(manifest: Manifes
     np.testing.assert_array_equal(frames[depth - 1].colour, frames[depth].colour)
 
 
-def test_the_model_of_a_room_is_defined_on_all_words_and_registers(manifest: Manifest) -> None:
+@pytest.mark.parametrize("options", [(), SLIC], ids=["two-level", "SLIC"])
+def test_the_model_of_a_room_is_defined_on_all_words_and_registers(options: tuple[str, ...]) -> None:
     """Loads beyond a memory are ignored, short words are rejected, and the march terminates."""
+    manifest = manifest_for("small", options).manifest
     assert manifest.attributes is not None
     random = np.random.default_rng(7)
     numbers = dict(manifest.numbers) | dict.fromkeys(("arity", "trianglesPerRecord", "stackDepth", "bvh"), 0)

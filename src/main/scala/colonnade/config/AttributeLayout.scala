@@ -2,7 +2,8 @@ package colonnade.config
 
 /** Sizes of the parts of the physical-attribute memory. `formats.AttributeRecords` defines the words.
   *
-  * A map has a descriptor per tile. The bytes that the fixed parts leave are its heap, to which descriptors point.
+  * A two-level map and the plane map have a descriptor per tile. The bytes that the fixed parts leave are their heap, to
+  * which descriptors point. A SLIC map has a seed per tile and a label per block; it takes what these need.
   */
 final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends TileGrid {
   import AttributeLayout._
@@ -17,6 +18,16 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends 
   val tileRows:    Int = (height + tileSize - 1) / tileSize
   val tiles:       Int = tileColumns * tileRows
 
+  /** Log2 of the edge of a block, whose pixels share a SLIC label. */
+  val blockLog:     Int = tileLog - log2(blocksPerTileEdge)
+  val blockColumns: Int = (width + (1 << blockLog) - 1) >> blockLog
+
+  /** Heap words that hold the labels of all blocks, row by row. */
+  val labelWords: Int = {
+    val blockRows = (height + (1 << blockLog) - 1) >> blockLog
+    (blockColumns * blockRows * labelBits + heapWordBits - 1) / heapWordBits
+  }
+
   val xBits:                  Int = bitsOf(width)
   val yBits:                  Int = bitsOf(height)
   val tileBits:               Int = bitsOf(tiles)
@@ -25,16 +36,21 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends 
   val boundingPlaneIndexBits: Int = bitsOf(boundingPlanes)
   val tableIndexBits:         Int = planeIdBits.max(boundingPlaneIndexBits)
 
-  /** Heap words of albedo, and of normals. */
-  val mapHeapWords: Int = {
-    val (descriptors, palette) = (tiles * mapDescriptorBits / 8, bytes(paletteSize * entryBits))
-    heapWords(
-      "mapBytes",
-      mapBytes,
-      descriptors + palette,
-      s"$tiles tile descriptors take $descriptors bytes and $paletteSize palette entries $palette",
-      largestTile = 1 + 2 * (1 << 8) / heapWordBits
-    )
+  /** Heap words of a two-level map of albedo, and of normals; 0 for SLIC maps. */
+  val mapHeapWords: Int = encoding match {
+    case MapEncoding.TwoLevel =>
+      val (descriptors, palette) = (tiles * mapDescriptorBits / 8, bytes(paletteSize * entryBits))
+      heapWords(
+        "mapBytes",
+        mapBytes,
+        descriptors + palette,
+        s"$tiles tile descriptors take $descriptors bytes and $paletteSize palette entries $palette",
+        largestTile = 1 + 2 * (1 << 8) / heapWordBits
+      )
+    case MapEncoding.Slic =>
+      val (seeds, labels) = (bytes(tiles * entryBits), labelWords * heapWordBits / 8)
+      atLeast("mapBytes", mapBytes, seeds + labels, s"$tiles seeds take $seeds bytes and the labels of blocks $labels")
+      0
   }
 
   val planeHeapWords: Int = {
@@ -49,21 +65,26 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends 
     )
   }
 
-  /** All values by their manifest key. */
-  def entries: Seq[(String, Int)] = Seq(
-    "width"          -> width,
-    "height"         -> height,
-    "tileLog"        -> tileLog,
-    "tileColumns"    -> tileColumns,
-    "tileRows"       -> tileRows,
-    "paletteSize"    -> paletteSize,
-    "mapHeapWords"   -> mapHeapWords,
-    "mapBytes"       -> mapBytes,
-    "planes"         -> planes,
-    "planeHeapWords" -> planeHeapWords,
-    "planeBytes"     -> planeBytes,
-    "boundingPlanes" -> boundingPlanes
-  )
+  /** All values by their manifest key. A SLIC map has labels in place of palette and heap. */
+  def entries: Seq[(String, Int)] = {
+    val ofMaps = encoding match {
+      case MapEncoding.TwoLevel => Seq("paletteSize" -> paletteSize, "mapHeapWords" -> mapHeapWords)
+      case MapEncoding.Slic => Seq("blockLog" -> blockLog, "blockColumns" -> blockColumns, "labelWords" -> labelWords)
+    }
+    Seq(
+      "width"       -> width,
+      "height"      -> height,
+      "tileLog"     -> tileLog,
+      "tileColumns" -> tileColumns,
+      "tileRows"    -> tileRows
+    ) ++ ofMaps ++ Seq(
+      "mapBytes"       -> mapBytes,
+      "planes"         -> planes,
+      "planeHeapWords" -> planeHeapWords,
+      "planeBytes"     -> planeBytes,
+      "boundingPlanes" -> boundingPlanes
+    )
+  }
 
   /** Heap words in the remaining bytes.
     *
@@ -71,14 +92,18 @@ final case class AttributeLayout(config: PhysicalAttributeMemoryConfig) extends 
     */
   private def heapWords(field: String, all: Int, fixed: Int, because: String, largestTile: Int): Int = {
     def bytesOf(words: Int): Int = words * heapWordBits / 8
-    val (min, max)               = (fixed + bytesOf(largestTile), fixed + bytesOf(1 << pointerBits))
-    val is                       = s"${PhysicalAttributeMemoryConfig.section}.$field is $all; it must be"
-    if (all < min)
-      throw new ConfigError(s"$is at least $min: $because, the finest tile ${bytesOf(largestTile)}")
+    val max                      = fixed + bytesOf(1 << pointerBits)
+    atLeast(field, all, fixed + bytesOf(largestTile), s"$because, the finest tile ${bytesOf(largestTile)}")
     if (all > max)
-      throw new ConfigError(s"$is at most $max: $because, and tiles reach ${bytesOf(1 << pointerBits)} more")
+      refuse(field, all, s"at most $max: $because, and tiles reach ${bytesOf(1 << pointerBits)} more")
     (all - fixed) / bytesOf(1)
   }
+
+  private def atLeast(field: String, all: Int, min: Int, because: String): Unit =
+    if (all < min) refuse(field, all, s"at least $min: $because")
+
+  private def refuse(field: String, all: Int, rule: String): Nothing =
+    throw new ConfigError(s"${PhysicalAttributeMemoryConfig.section}.$field is $all; it must be $rule")
 }
 
 object AttributeLayout {
@@ -96,8 +121,10 @@ object AttributeLayout {
   val modeBits:    Int = 3
 
   val indexBits:     Int = 8  // width of a stored index into a palette or into the plane table
-  val componentBits: Int = 12 // width of a component of a palette entry
+  val componentBits: Int = 12 // width of a component of a palette entry or of a seed
   val entryBits:     Int = 3 * componentBits
+
+  val labelBits: Int = 4 // width of a SLIC label: one of nine seeds
 
   val mapDescriptorBits:   Int = modeBits + pointerBits + 2 * indexBits
   val planeDescriptorBits: Int = modeBits + pointerBits
@@ -108,6 +135,8 @@ object AttributeLayout {
 
   /** Size of a bounding plane, rounded up to heap words. */
   val boundingPlaneEntryBytes: Int = (planeBits + 2 * entryBits + heapWordBits - 1) / heapWordBits * (heapWordBits / 8)
+
+  private val blocksPerTileEdge = 4
 
   private def bytes(bits: Int): Int = (bits + 7) / 8
 

@@ -13,13 +13,6 @@ private[config] object ConfigMigration {
       replaced("physicalAttributeMemory", "shared") { shared =>
         Seq("columnsPerCopy" -> ujson.Num(if (shared == ujson.True) ArrayConfig.maxColumns else 1))
       },
-      replaced("physicalAttributeMemory", "encoding") {
-        case ujson.Str("twoLevel") => Nil
-        case other                 =>
-          throw new ConfigError(
-            s"physicalAttributeMemory.encoding is ${other.render()}, which no hardware has; remove it: maps are twoLevel"
-          )
-      },
       replaced("units", "directView")(_ => Nil),
       replaced("units", "pipelined") { pipelined =>
         val (ray, shade) = if (pipelined == ujson.True) (1, 3) else (32, 128)

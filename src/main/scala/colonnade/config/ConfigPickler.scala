@@ -13,6 +13,7 @@ private[config] object ConfigPickler extends upickle.AttributeTagged {
   implicit private val units:     Reader[UnitsConfig]                   = macroR
   implicit private val cache:     Reader[SceneCacheConfig]              = macroR
   implicit private val memory:    Reader[ColumnBvhMemoryConfig]         = macroR
+  implicit private val encoding:  Reader[MapEncoding]                   = StringReader.map(MapEncoding.named(_).get)
   implicit private val maps:      Reader[PhysicalAttributeMemoryConfig] = macroR
   implicit private val frame:     Reader[FrameConfig]                   = macroR
   implicit val config:            Reader[ColonnadeConfig]               = macroR

@@ -11,9 +11,10 @@ private[config] object ConfigSchema {
     */
   def completed(json: ujson.Value, example: Any, defaults: Any, path: String = ""): ujson.Value =
     (example, json) match {
-      case (_: Boolean, _: ujson.Bool)                      => json
-      case (_: Int, ujson.Num(number)) if number.isValidInt => json
-      case (Some(_), ujson.Null)                            => json
+      case (_: Boolean, _: ujson.Bool)                                           => json
+      case (_: Int, ujson.Num(number)) if number.isValidInt                      => json
+      case (Some(_), ujson.Null)                                                 => json
+      case (_: MapEncoding, ujson.Str(name)) if MapEncoding.named(name).nonEmpty => json
       case (Some(part), _) => completed(json, part, defaults match { case Some(part) => part; case _ => part }, path)
       case (_: PrecisionConfig, ujson.Str(PrecisionConfig(bits))) => written(bits)
       case (section: Product, ujson.Obj(fields))                  =>
@@ -30,12 +31,13 @@ private[config] object ConfigSchema {
 
   /** The JSON of a configuration or of a part of it. */
   def written(part: Any): ujson.Value = part match {
-    case flag: Boolean    => ujson.Bool(flag)
-    case number: Int      => ujson.Num(number)
-    case None             => ujson.Null
-    case Some(part)       => written(part)
-    case section: Product => ujson.Obj.from(namesOf(section).zip(section.productIterator.map(written)))
-    case other            => throw new IllegalArgumentException(s"$other is no part of a configuration")
+    case flag: Boolean         => ujson.Bool(flag)
+    case number: Int           => ujson.Num(number)
+    case None                  => ujson.Null
+    case encoding: MapEncoding => ujson.Str(encoding.name)
+    case Some(part)            => written(part)
+    case section: Product      => ujson.Obj.from(namesOf(section).zip(section.productIterator.map(written)))
+    case other                 => throw new IllegalArgumentException(s"$other is no part of a configuration")
   }
 
   private def wrong(path: String, found: ujson.Value, rule: String): ConfigError = {
@@ -47,6 +49,7 @@ private[config] object ConfigSchema {
   private def ruleOf(example: Any): String = example match {
     case _: Boolean               => "true or false"
     case _: Int                   => "a whole number"
+    case _: MapEncoding           => s"one of ${MapEncoding.all.map(_.name).mkString(", ")}"
     case Some(example)            => ruleOf(example)
     case section: PrecisionConfig => s"like $section, or an object with the keys ${namesOf(section).mkString(", ")}"
     case section: Product         => s"an object with the keys ${namesOf(section).mkString(", ")}"

@@ -1,11 +1,28 @@
 package colonnade.config
 
+/** How the maps of albedo and normals are stored. */
+sealed abstract class MapEncoding(val name: String)
+
+object MapEncoding {
+
+  /** Each tile has a mode: two or four palette entries, and the size of the cells that select one of them. */
+  object TwoLevel extends MapEncoding("twoLevel")
+
+  /** SLIC superpixels: a tile has one seed, and the label of a block of pixels selects one of the nine nearest seeds. */
+  object Slic extends MapEncoding("slic")
+
+  val all: Seq[MapEncoding] = Seq(TwoLevel, Slic)
+
+  def named(name: String): Option[MapEncoding] = all.find(_.name == name)
+}
+
 /** The on-chip maps of the environment: albedo, normals and planes.
   *
   * @param width       of the maps, pixels
   * @param height      of the maps, pixels
+  * @param encoding    of albedo and normals
   * @param tileSize    edge of a tile, pixels
-  * @param paletteSize entries of a map's palette
+  * @param paletteSize entries of a two-level map's palette
   * @param mapBytes    of albedo, and of normals
   * @param planes      entries of the plane table
   * @param planeBytes  of the plane map, its table and the bounding planes
@@ -15,6 +32,7 @@ package colonnade.config
 final case class PhysicalAttributeMemoryConfig(
     width:          Int = 640,
     height:         Int = 480,
+    encoding:       MapEncoding = MapEncoding.TwoLevel,
     tileSize:       Int = 16,
     paletteSize:    Int = 256,
     mapBytes:       Int = 16384,

@@ -25,11 +25,10 @@ final class PhysicalAttributeMemory(
 ) extends Module {
   val io = IO(new PhysicalAttributeMemoryIO(config, requesters, tagBits))
 
-  private val layout     = AttributeLayout.of(config)
   private val joinedBits = AttributeArbiter.tagBits(requesters, tagBits)
   private val joined     = Module(new AttributeConcentrator(config, requesters, tagBits, ofColumn))
-  private val albedo     = Module(new TwoLevelMap(config, layout, "albedo", new AlbedoEntry, joinedBits))
-  private val normals    = Module(new TwoLevelMap(config, layout, "normals", new NormalEntry, joinedBits))
+  private val albedo     = Module(AttributeMap(config, "albedo", new AlbedoEntry, joinedBits))
+  private val normals    = Module(AttributeMap(config, "normals", new NormalEntry, joinedBits))
   private val planes     = Module(new PlaneMap(config, joinedBits))
 
   joined.io.ports <> io.ports

@@ -1,17 +1,11 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{Cat, MuxLookup, Pipe, RegEnable, Valid}
+import chisel3.util.{Cat, MuxLookup, Pipe, RegEnable}
 import colonnade.config.{ColonnadeConfig, TileGrid}
-import colonnade.formats.{Load, MapDescriptor}
+import colonnade.formats.MapDescriptor
 
-final class TwoLevelMapIO[T <: Data](config: ColonnadeConfig, layout: TileGrid, entry: T, tagBits: Int)
-    extends Bundle {
-  val load   = Flipped(Valid(new Load(config)))
-  val pixels = Flipped(new AttributeChannel(new MapPixel(layout), entry, tagBits))
-}
-
-/** A map with an entry (a colour or a normal) for each pixel: tiles with two or four palette entries each. A mask selects the entry of each cell; a cell's size depends on
+/** A map of tiles with two or four palette entries each. A mask selects the entry of each cell; a cell's size depends on
   * the tile. See `MapDescriptor`.
   *
   * Three reads in sequence: descriptor, mask, palette. Latency six cycles, one pixel a cycle. A tile of four entries has a
@@ -21,9 +15,7 @@ final class TwoLevelMapIO[T <: Data](config: ColonnadeConfig, layout: TileGrid, 
   * @param name of the map in [[colonnade.formats.AttributeMemories]]
   */
 final class TwoLevelMap[T <: Data](config: ColonnadeConfig, layout: TileGrid, name: String, entry: T, tagBits: Int)
-    extends Module {
-  val io = IO(new TwoLevelMapIO(config, layout, entry, tagBits))
-
+    extends AttributeMap(config, layout, entry, tagBits) {
   private val tiles   = Module(new TileLookup(config, layout, s"$name.descriptors", new MapDescriptor, UInt(tagBits.W)))
   private val heap    = new AttributeHeap(config, s"$name.heap", io.load)
   private val palette = AttributeStore(config, s"$name.palette", io.load)

@@ -1,7 +1,7 @@
 package colonnade.formats
 
 import chisel3._
-import colonnade.config.{AttributeLayout, ColonnadeConfig, NumberFormats}
+import colonnade.config.{AttributeLayout, ColonnadeConfig, MapEncoding, NumberFormats}
 
 /** One memory of the environment's maps.
   *
@@ -34,9 +34,12 @@ object AttributeMemories {
 
   private def environment(config: ColonnadeConfig): Seq[(String, Int, Int)] =
     config.physicalAttributeMemory.toSeq.flatMap { memory =>
-      val layout = memory.layout
-      val maps   = Seq("albedo", "normals")
-      maps.flatMap(twoLevel(_, layout.tiles, memory.paletteSize, layout.mapHeapWords)) ++ Seq(
+      val layout            = memory.layout
+      def map(name: String) = memory.encoding match {
+        case MapEncoding.TwoLevel => twoLevel(name, layout.tiles, memory.paletteSize, layout.mapHeapWords)
+        case MapEncoding.Slic     => slic(name, layout.tiles, layout.labelWords)
+      }
+      Seq("albedo", "normals").flatMap(map) ++ Seq(
         ("planes.descriptors", layout.tiles, (new PlaneDescriptor).getWidth),
         ("planes.heap", layout.planeHeapWords, AttributeLayout.heapWordBits),
         ("planes.planes", memory.planes, (new Plane).getWidth),
@@ -76,5 +79,10 @@ object AttributeMemories {
     (s"$name.descriptors", tiles, (new MapDescriptor).getWidth),
     (s"$name.palette", paletteSize, AttributeLayout.entryBits),
     (s"$name.heap", heapWords, AttributeLayout.heapWordBits)
+  )
+
+  private def slic(name: String, tiles: Int, labelWords: Int): Seq[(String, Int, Int)] = Seq(
+    (s"$name.seeds", tiles, AttributeLayout.entryBits),
+    (s"$name.labels", labelWords, AttributeLayout.heapWordBits)
   )
 }

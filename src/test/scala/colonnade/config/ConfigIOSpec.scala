@@ -154,8 +154,8 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
       UnitsConfig()
     migrated("units" -> ujson.Obj("marches" -> 3, "pathContexts" -> 9)).units shouldBe
       UnitsConfig(marches = 3, pathContexts = 9)
-    the[ConfigError] thrownBy migrated("physicalAttributeMemory" -> ujson.Obj("encoding" -> "slic")) should have message
-      "physicalAttributeMemory.encoding is \"slic\", which no hardware has; remove it: maps are twoLevel"
+    migrated("physicalAttributeMemory" -> ujson.Obj("encoding" -> "slic")).physicalAttributeMemory shouldBe
+      Some(maps.copy(encoding = MapEncoding.Slic))
   }
 
   it should "refuse newer versions, and keys of older versions in newer ones" in {
@@ -196,6 +196,8 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     ConfigIO.load("tiny").physicalAttributeMemory shouldBe None
     ConfigIO.load("tiny", environment()).physicalAttributeMemory shouldBe Some(TestConfigs.environment)
     ConfigIO.load("tiny", environment() :+ "physicalAttributeMemory=null").physicalAttributeMemory shouldBe None
+    ConfigIO.load("tiny", environment("encoding=slic")).physicalAttributeMemory shouldBe
+      Some(TestConfigs.environment.copy(encoding = MapEncoding.Slic))
   }
 
   it should "refuse maps that do not fit, with the size that they need" in {
@@ -207,6 +209,10 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
       "and 256 palette entries 1152, the finest tile 66"
     refused("mapBytes=17737") should startWith(".mapBytes is 17737; it must be at most 17736: 50 tile descriptors")
     refused("planeBytes=1335") should startWith(".planeBytes is 1335; it must be at least 1336: 50 tile descriptors")
+    refused("encoding=slic", "mapBytes=566") shouldBe ".mapBytes is 566; it must be at least 567: " +
+      "50 seeds take 225 bytes and the labels of blocks 342"
+    for (name <- Seq("\"jpeg\"", "2"))
+      refused(s"encoding=$name") shouldBe s".encoding is $name; it must be one of twoLevel, slic"
     refused("tileSize=24") shouldBe ".tileSize is 24; it must be one of 16, 32"
     refusal("tiny", "physicalAttributeMemory.width=320") shouldBe
       "the setting 'physicalAttributeMemory.width=320' changes a part of what is null; set the whole section first"

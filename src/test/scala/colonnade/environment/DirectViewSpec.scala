@@ -39,14 +39,14 @@ class DirectViewSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "DirectView"
 
   private val configs =
-    Seq(0, 4, 1).map(TestConfigs.formats).map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment)))
+    Seq(0, 4, 1).map(TestConfigs.formats).map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment))) :+
+      TestConfigs.slicEnvironments.head
 
   for ((config, seed) <- configs.zipWithIndex) {
     val size = config.physicalAttributeMemory.get
 
-    it should s"see what the march sees: ${config.precision}, maps of ${size.width}x${size.height}" taggedAs Always.unless(
-      seed == 1
-    ) in
+    val name = s"${config.precision}, ${size.encoding.name} maps of ${size.width}x${size.height}"
+    it should s"see what the march sees: $name" taggedAs Always.unless(seed % 2 == 1) in
       test(new DirectViewHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         val random   = new Random(seed)
         val stimulus = new MarchStimulus(config, random)

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.Valid
 import chiseltest._
 import colonnade.TestParts._
-import colonnade.config.{AttributeLayout, ColonnadeConfig}
+import colonnade.config.{AttributeLayout, ColonnadeConfig, MapEncoding}
 import colonnade.formats.{EnvironmentView, Load}
 import colonnade.numbers.StreamTester
 import colonnade.{Always, Matrix, Model, Packed, PackedUnit, Simulation, TestConfigs}
@@ -67,14 +67,14 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private def environments: Seq[ColonnadeConfig] =
     TestConfigs.formats.map(_.copy(physicalAttributeMemory = Some(TestConfigs.environment))) ++
-      TestConfigs.environments.tail
+      TestConfigs.environments.tail :+ TestConfigs.slicEnvironments.head
 
   for ((config, seed) <- environments.zipWithIndex) {
     val size = config.physicalAttributeMemory.get
     val name =
-      s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a map of ${size.width}x${size.height}"
+      s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a ${size.encoding.name} map of ${size.width}x${size.height}"
 
-    val isCommon = size.width == 640
+    val isCommon = size.width == 640 || size.encoding == MapEncoding.Slic
     it should s"hit what the model hits, with $name" taggedAs (if (isCommon) Matrix else Always.ifExtreme(config)) in {
       val random   = new Random(seed)
       val stimulus = new MarchStimulus(config, random)

@@ -3,7 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.config.ColonnadeConfig
+import colonnade.config.{ColonnadeConfig, MapEncoding}
 import colonnade.formats.{AttributeEvents, Load}
 import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -34,19 +34,21 @@ private class EnvironmentHarness(config: ColonnadeConfig) extends Module {
 class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "PhysicalAttributeMemory"
 
-  private def config(marches: Int, columns: Int): ColonnadeConfig = {
-    val environment = TestConfigs.withEnvironment(TestConfigs.environment.copy(columnsPerCopy = 2))
+  private def config(encoding: MapEncoding, marches: Int, columns: Int): ColonnadeConfig = {
+    val maps        = TestConfigs.environment.copy(encoding = encoding, columnsPerCopy = 2)
+    val environment = TestConfigs.withEnvironment(maps)
     environment.copy(
       array = environment.array.copy(columns = columns),
       units = environment.units.copy(marches = marches)
     )
   }
 
-  for ((marches, columns) <- Seq((1, 1), (10, 1), (4, 3)))
-    it should s"give each march its own responses: $marches marches, $columns columns" in {
+  import MapEncoding.{Slic, TwoLevel}
+  for ((encoding, marches, columns) <- Seq((TwoLevel, 1, 1), (TwoLevel, 10, 1), (Slic, 3, 1), (TwoLevel, 4, 3)))
+    it should s"give each march its own responses: $marches marches, $columns columns, ${encoding.name}" in {
       val count       = 60
       val random      = new Random(marches)
-      val shape       = config(marches, columns)
+      val shape       = config(encoding, marches, columns)
       val environment = new EnvironmentStimulus(shape, random)
       test(new EnvironmentHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
         environment.load(dut.load, dut.clock)

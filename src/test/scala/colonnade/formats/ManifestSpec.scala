@@ -1,7 +1,7 @@
 package colonnade.formats
 
 import colonnade.{ArbitraryConfig, Properties, TestConfigs}
-import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO, PhysicalAttributeMemoryConfig}
+import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO, MapEncoding, PhysicalAttributeMemoryConfig}
 import org.scalacheck.Prop
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
@@ -85,6 +85,20 @@ class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
     manifest()("registers")("fields").arr.map(_("name").str) should not contain "counters.cellReads"
   }
 
+  it should "describe SLIC maps by their seeds and labels" in {
+    val whole          = Manifest(TestConfigs.withEnvironment(environment.copy(encoding = MapEncoding.Slic)))
+    val (maps, planes) = whole("memories").obj.keys.toSeq.filter(_ != "columnBvh").splitAt(4)
+    maps shouldBe Seq("albedo.seeds", "albedo.labels", "normals.seeds", "normals.labels")
+    planes.forall(_.startsWith("planes.")) shouldBe true
+    whole("memories")("albedo.seeds") shouldBe ujson.Obj("depth" -> 1200, "bits" -> 36, "target" -> 1)
+    whole("memories")("normals.labels") shouldBe ujson.Obj("depth" -> 4800, "bits" -> 16, "target" -> 4)
+    val sizes = whole("attributes")("sizes").obj
+    (sizes("blockLog").num, sizes("blockColumns").num, sizes("labelWords").num) shouldBe ((2, 160, 4800))
+    sizes.keys should contain noElementsOf Seq("paletteSize", "mapHeapWords")
+    Manifest(TestConfigs.withEnvironment(environment))("attributes")("sizes").obj.keys should contain noElementsOf
+      Seq("blockLog", "blockColumns", "labelWords")
+  }
+
   it should "hash the settings of an environment's image, and not the number of its copies" in {
     def hash(environment: PhysicalAttributeMemoryConfig): String =
       Manifest(TestConfigs.withEnvironment(environment))("formatHash").str
@@ -92,9 +106,10 @@ class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
     val others = Seq(
       environment.copy(paletteSize = 128),
       environment.copy(height = 464),
-      environment.copy(planeBytes = 8190)
+      environment.copy(planeBytes = 8190),
+      environment.copy(encoding = MapEncoding.Slic)
     )
-    (others.map(hash) :+ hash(environment) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 5
+    (others.map(hash) :+ hash(environment) :+ Manifest(TestConfigs.tiny)("formatHash").str).distinct.size shouldBe 6
   }
 
   it should "have textures only where the configuration does" in {
