@@ -108,6 +108,36 @@ def _paper_unit() -> Entry:
     return Entry("paper-unit", "edge", commands, overrides, libraries=("ASAP7",))
 
 
+#: The frames in which encodings of maps are compared, with the options of `colonnade render`.
+MAP_FRAMES = {"photo": (), "relit": ("--relit",)}
+#: What the encodings of maps are called in configurations.
+ENCODINGS = ("slic", "twoLevel")
+
+
+def _paper_maps() -> Entry:
+    """SLIC maps: their loss, gates, and frames of the model with either encoding against the float reference."""
+
+    def hardware(encoding: str) -> tuple[str, ...]:
+        return ("--config", "small", "--set", f"physicalAttributeMemory.encoding={encoding}")
+
+    def picture(name: str, frame: str, *options: str) -> tuple[str, ...]:
+        output = ("--output", f"out/maps-{name}-{frame}.png", "--json", REPORT)
+        return ("colonnade", "render", "scenes/room.toml", *options, *MAP_FRAMES[frame], *output)
+
+    commands: dict[str, tuple[str, ...]] = {
+        Path(room).name: ("colonnade", "inspect", "--background", room, "--encoding", "slic", "--json", REPORT)
+        for room in (*_ROOMS, _ATTIC)
+    }
+    commands["area"] = ("colonnade", "ppa", *hardware("slic"), "--no-power", "--liberty", "ASAP7", "--json", REPORT)
+    for frame in MAP_FRAMES:
+        commands[f"-reference, {frame}"] = picture("reference", frame, "--backend", "reference")
+        for encoding in ENCODINGS:
+            commands[f"-{encoding}, {frame}"] = picture(encoding, frame, *hardware(encoding), "--backend", "model")
+            pair = (f"out/maps-{name}-{frame}.png" for name in ("reference", encoding))
+            commands[f"{encoding}, {frame}"] = ("colonnade", "compare", *pair, "--json", REPORT)
+    return Entry("paper-maps", "small", commands, (hardware("slic")[-1],), libraries=("ASAP7",))
+
+
 def _gather() -> Entry:
     """Gathered light on `edge`: its area, a pass of the RTL, and pictures of the model against the reference."""
     override, scene = "frame.gather=true", "scenes/gathered.toml"
@@ -200,6 +230,7 @@ def catalog() -> dict[str, Entry]:
         Entry("simulators", "small", {"": ("tools/simulators", f"--json={REPORT}")}),
         Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}),
         _paper_unit(),
+        _paper_maps(),
         _study("ablation"),
         _study("scaling"),
         _study("bvh-tests"),

@@ -6,8 +6,11 @@ Reports also have times, which are those of one machine; no table shows them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
+from colonnade.lab.common import paper
 from colonnade.lab.common.markdown import markdown
+from colonnade.lab.figures.catalog import ENCODINGS, MAP_FRAMES
 from colonnade.lab.figures.data import Data
 
 
@@ -103,10 +106,45 @@ def captures(data: Data) -> str:
     return markdown(["room", "noise found", "normals off by", "mirror rays right, %: depth map, planes, device"], rows)
 
 
+def encodings(data: Data) -> str:
+    """Raw, SLIC and two-level maps: bytes, loss of maps and of frames, gates and memories; the paper's bytes."""
+    slic = data.result("paper-maps")
+    rooms = [name for name in data.result("environments") if name != "accuracy"]
+    own = {
+        "slic": ("SLIC", slic, slic["area"]),
+        "twoLevel": ("two-level", data.result("environments"), data.result("area-small-asap7")),
+    }
+    source = round(slic[rooms[0]]["bytes"]["albedo"] * slic[rooms[0]]["ratio"]["albedo"])
+    rows = [["raw", f"{source:,}", "1", *["–"] * (len(rooms) + len(MAP_FRAMES) + 2)]]
+    for encoding in ENCODINGS:
+        title, maps, area = own[encoding]
+        losses = (f"{maps[r]['albedo']['psnr']:.1f} dB, {maps[r]['normals']['mean_degrees']:.1f}°" for r in rooms)
+        frames = (_frame(slic[f"{encoding}, {frame}"]) for frame in MAP_FRAMES)
+        memories = (each for each in area["memories"].values() if each["unit"] == _MAPS_UNIT)
+        bits = sum(each["bits"] for each in memories)
+        size, ratio = maps[rooms[0]]["bytes"]["albedo"], maps[rooms[0]]["ratio"]["albedo"]
+        logic = area["units"][_MAPS_UNIT]["kge"]
+        rows.append([title, f"{size:,}", f"{ratio:.1f}", *losses, *frames, f"{logic:.2f}", f"{bits / 8192:.1f}"])
+    rows.append(["source paper", paper.MAP_BYTES, f"{paper.MAP_RATIO}", *["–"] * (len(rooms) + len(MAP_FRAMES) + 2)])
+    titles = ["maps", "bytes of albedo", "times smaller", *(f"{name}: albedo, normals" for name in rooms)]
+    frames_of = (f"frame, {frame}: dB, DISTS" for frame in MAP_FRAMES)
+    return markdown([*titles, *frames_of, "logic of the memory, kGE", "its memories, KiB"], rows)
+
+
+#: The unit of `colonnade ppa` that has the physical-attribute memory, in designs whose columns do not share it.
+_MAPS_UNIT = "ColumnEnvironment"
+
+
+def _frame(difference: Mapping[str, Any]) -> str:
+    dists = difference["dists"]
+    return f"{difference['psnr']:.2f}, {'–' if dists is None else f'{dists:.4f}'}"
+
+
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "map-loss": loss,
     "live-rooms": live_rooms,
     "live-paths": live_paths,
     "moving-frames": moving_frames,
     "captures": captures,
+    "paper-maps": encodings,
 }

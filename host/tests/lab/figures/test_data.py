@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -98,6 +99,22 @@ def test_figures_of_other_hardware_are_refused(docs: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr(data, "manifest_for", refuse)
     assert "the generator refuses its configuration: unknown key array.row" in next(data.problems(docs))
+
+
+def test_a_key_that_is_younger_than_the_file_has_its_default_in_every_section(monkeypatch: pytest.MonkeyPatch) -> None:
+    configs = {
+        ("edge", ()): {"maps": {"width": 64, "encoding": "twoLevel"}, "cache": None},
+        ("tiny", ()): {"maps": None, "cache": None},
+    }
+    complete = {"maps": {"width": 640, "encoding": "twoLevel"}, "cache": {"lines": 8}}
+
+    def generated(config: str, overrides: tuple[str, ...] = ()) -> SimpleNamespace:
+        return SimpleNamespace(manifest=SimpleNamespace(config=configs.get((config, overrides), complete)))
+
+    monkeypatch.setattr(data, "manifest_for", generated)
+    entry = replace(ENTRY, config="edge")
+    assert data.problem_of(entry, {"config": {"maps": {"width": 64}}}) is None
+    assert "(maps.width)" in str(data.problem_of(entry, {"config": {"maps": {"width": 65}}}))
 
 
 def test_files_and_the_list_of_what_is_not_measured_agree(docs: Path) -> None:
