@@ -48,6 +48,11 @@ LOSS = (
     Column("dists_loss_max", "DISTS loss, largest", "%", "lower", ".3f", "largest DISTS loss of a frame"),
     Column("psnr_baseline_min", "PSNR to baseline", "dB", "higher", ".1f", "lowest PSNR against the baseline's frames"),
 )
+TESTS = (
+    Column("box_tests", "box tests", "per ray", "lower", ".2f", "box tests per in-box ray, geometric mean"),
+    Column("triangle_tests", "triangle tests", "per ray", "lower", ",.2f", "the same of triangle tests"),
+    Column("records", "records", "", "lower", ",.0f", "records of the scene, geometric mean"),
+)
 CYCLES = (
     Column(
         "rays_per_cycle", "rays per cycle", "", "higher", ".3f", "in-box rays per cycle of the array, geometric mean"
@@ -104,11 +109,12 @@ def columns(has: Mapping[str, bool], libraries: Sequence[str]) -> list[Column]:
     """The figures of a study.
 
     Args:
-        has: Which of ``quality``, ``baseline``, ``cycles``, ``area`` and ``power`` it measures.
+        has: Which of ``quality``, ``tests``, ``baseline``, ``cycles``, ``area`` and ``power`` it measures.
         libraries: Names of its libraries.
     """
     found = list(QUALITY) if has["quality"] else []
     found += LOSS if has["quality"] and has["baseline"] else ()
+    found += TESTS if has["tests"] else ()
     found += CYCLES if has["cycles"] else ()
     for library in libraries:
         of_library = list(AREA) if has["area"] else []
@@ -183,6 +189,10 @@ def point_figures(point: Mapping[str, Any], has: Mapping[str, bool], libraries: 
         found["dists_loss"] = _of(lambda values: 100 * _mean(values), (frame["dists_baseline"] for frame in frames))
         found["dists_loss_max"] = _of(lambda values: 100 * max(values), (frame["dists_baseline"] for frame in frames))
         found["psnr_baseline_min"] = _of(min, (frame["psnr_baseline"] for frame in frames))
+    if has["tests"]:
+        for key, counter in (("box_tests", "boxTests"), ("triangle_tests", "triangleTests")):
+            found[key] = _of(geometric_mean, (per_ray(frame, counter) for frame in frames))
+        found["records"] = _of(geometric_mean, (frame["records"] and frame["records"]["records"] for frame in frames))
     if has["cycles"]:
         rates = [frame["rays_per_cycle_in_box"] for frame in frames if frame["is_timed"]]
         found["rays_per_cycle"] = _of(geometric_mean, rates)
@@ -204,6 +214,12 @@ def point_figures(point: Mapping[str, Any], has: Mapping[str, bool], libraries: 
             pair = (found[f"area_per_rate.{library}"], found[f"nj.{library}"])
             found[f"energy_area.{library}"] = _of(math.prod, pair)
     return found
+
+
+def per_ray(frame: Mapping[str, Any], counter: str) -> float | None:
+    """A counter of a frame per in-box ray; None if it is not measured."""
+    counters = frame["counters"]
+    return None if counters is None else float(counters[counter] / max(counters["raysInBox"], 1))
 
 
 def _of(function: Any, values: Iterable[float | None]) -> float | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
+import inspect
 import json
 import pickle
 import shutil
@@ -38,7 +39,7 @@ class Kind:
 
     Attributes:
         name: Its name, which is that of its function in `colonnade.lab.explore.work`.
-        packages: The host's packages whose sources determine the result.
+        packages: Folders of the host's packages whose sources, beside that of the function, determine the result.
         needs: Resources of a worker: programs by their names, and ``memory`` in MB.
         uses_generator: The hardware's sources determine the result.
         uses_model: The compiled sources do: those of the tree builder and of the model.
@@ -62,15 +63,15 @@ KINDS = {
         Kind("comparison", ("quality",), {"memory": 1000}),
         Kind(
             "cycles",
-            (*_SCENE, "device", "render", "evaluation"),
+            (*_SCENE, "device", "render", "lab/evaluation"),
             {"memory": 3000, "java": 1, "verilator": 1},
             uses_generator=True,
             uses_model=True,
         ),
-        Kind("area", ("ppa",), {"memory": 2000, "java": 1, "yosys": 1}, uses_generator=True),
+        Kind("area", ("lab/ppa",), {"memory": 2000, "java": 1, "yosys": 1}, uses_generator=True),
         Kind(
             "power",
-            (*_SCENE, "device", "ppa"),
+            (*_SCENE, "device", "lab/ppa"),
             {"memory": 3000, "java": 1, "yosys": 1, "verilator": 1},
             uses_generator=True,
             uses_model=True,
@@ -102,9 +103,12 @@ class Job:
     @functools.cached_property
     def key(self) -> str:
         """The name of its cache entry."""
+        from colonnade.lab.explore import work
+
         parts: dict[str, Any] = {
             "identity": self.identity,
             "inputs": list(self.inputs),
+            "function": inspect.getsource(getattr(work, self.kind.name)),
             "packages": {package: package_digest(package) for package in self.kind.packages},
         }
         if self.kind.uses_generator:

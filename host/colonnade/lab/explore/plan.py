@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +16,15 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 from colonnade.lab.explore import figures
-from colonnade.lab.explore.frames import Frame, cycles_job, frame_of
+from colonnade.lab.explore.frames import Frame, cycles_job
 from colonnade.lab.explore.jobs import KINDS, Job, JobFailed, figures_of
 from colonnade.lab.explore.points import Point, config_of
 from colonnade.lab.explore.schedule import Outcome
 from colonnade.lab.explore.study import quoted
 from colonnade.lab.explore.study_file import StudyFile
+from colonnade.lab.explore.work import PICTURE
+from colonnade.lab.explore.workload import frames_of
 from colonnade.lab.ppa.library.one_library import library_files
-from colonnade.mesh.mesh import Mesh
-from colonnade.scene.lit_room import scene_room
-from colonnade.scene.object_mesh import object_mesh
-from colonnade.scene.parser import load_scene
-from colonnade.scene.passes import exposed
 
 #: The library of Yosys's generic gates.
 GENERIC = "yosys"
@@ -54,7 +50,7 @@ class Plan:
         self.file = file
         self.study = file.study
         with progress.step("loading scenes and meshes"):
-            self.frames = _frames(file)
+            self.frames = frames_of(file)
         measures_gates = bool(self.study.area or self.study.power)
         self.libraries = self.study.libraries or ((GENERIC,) if measures_gates else ())
         self._contents = {name: _library(file, name, libraries) for name in self.study.libraries}
@@ -73,6 +69,7 @@ class Plan:
         study = self.study
         return {
             "quality": study.quality is not None,
+            "tests": study.tests is not None,
             "baseline": study.baseline is not None,
             "cycles": study.cycles is not None,
             "area": study.area is not None,
@@ -123,6 +120,11 @@ class Plan:
                         {"with_dists": study.quality.dists},
                         inputs=(other.key, own.key),
                     )
+        if study.tests is not None:
+            found.pictures |= {frame.name: self._picture(point, manifest, frame) for frame in self.frames}
+            if study.tests.same_pictures and baseline is not None:
+                found.models = {frame.name: self._picture(*baseline, frame) for frame in self.frames}
+                found.support += found.models.values()
         identity = {"config": manifest.config}
         if study.cycles is not None:
             for frame in self._frames_of(study.cycles.meshes):
@@ -171,6 +173,7 @@ class PointJobs:
         self.point = point
         self.manifest = manifest
         self.pictures: dict[str, Job] = {}
+        self.models: dict[str, Job] = {}
         self.comparisons: dict[tuple[str, str], Job] = {}
         self.cycles: dict[str, Job] = {}
         self.areas: dict[str, Job] = {}
@@ -203,6 +206,11 @@ class PointJobs:
             values: dict[str, Any] = {}
             picture = of(self.pictures.get(frame.name), frame.name)
             values["error_bits"] = picture and picture["error_bits"]
+            if plan.study.tests is not None:
+                values |= {key: picture and picture[key] for key in ("counters", "records")}
+                if self._differs(frame.name, outcomes):
+                    reason = f"its picture differs from that of {plan.study.baseline}"
+                    failures.append({"measure": "tests", "workload": frame.name, "library": None, "reason": reason})
             for to, suffix in (("reference", ""), ("baseline", "_baseline")):
                 found = of(self.comparisons.get((frame.name, to)), frame.name) or {}
                 values |= {f"{key}{suffix}": found.get(key) for key in ("psnr", "ssim", "flip", "dists")}
@@ -231,42 +239,15 @@ class PointJobs:
             "failures": failures,
         }
 
+    def _differs(self, frame: str, outcomes: Mapping[str, Outcome]) -> bool:
+        """Whether the picture of a frame and the one that it must equal are there and differ."""
+        pair = (jobs[frame].key for jobs in (self.pictures, self.models) if frame in jobs)
+        found = [outcome for key in pair if isinstance(outcome := outcomes.get(key), Path)]
+        return len({(folder / PICTURE).read_bytes() for folder in found}) > 1
+
 
 def _job(kind: str, title: str, identity: Mapping[str, Any], arguments: Mapping[str, Any], **links: Any) -> Job:
     return Job(KINDS[kind], title, identity, arguments, **links)
-
-
-def _frames(file: StudyFile) -> list[Frame]:
-    workload = file.study.workload
-    meshes: dict[str, Mesh] = {}
-    found: list[Frame] = []
-    for name in workload.scenes:
-        try:
-            scene = exposed(load_scene(file.path.parent / name))
-            samples = scene.frame.samples or 1
-            if scene.blurs or samples > 1:
-                key = "frame.samples" if samples > 1 else scene.blurs[0]
-                raise UserError(f"scene {name}: a study renders one sample a pixel: leave out {key}")
-        except UserError as error:
-            raise file.error(("workload", "scenes", name), str(error)) from None
-        for source in workload.meshes or (None,):
-            try:
-                own = scene if source is None else scene.with_mesh(source)
-                key = name if own.objects else f"{own.mesh_source} {own.mesh.crease}"
-                if key not in meshes:
-                    meshes[key] = object_mesh(own, scene_room(own) if own.objects else None, corner_colours=True)
-            except UserError as error:
-                where = ("workload", "scenes", name) if source is None else ("workload", "meshes", source)
-                raise file.error(where, str(error)) from None
-            both = len(workload.scenes) > 1 and source is not None
-            stem = Path(name).stem
-            title = f"{stem}, {source}" if both else stem if source is None else source
-            mesh = replace(meshes[key], name=source or meshes[key].name)
-            if any(title == frame.name for frame in found):
-                where = ("workload", "scenes", name) if source is None else ("workload", "meshes", source)
-                raise file.error(where, f"two frames are named {title}: rename a scene's file, or name a mesh once")
-            found.append(frame_of(title, own, mesh, source))
-    return found
 
 
 def _library(file: StudyFile, name: str, given: Mapping[str, Sequence[str]]) -> dict[str, bytes]:

@@ -92,10 +92,12 @@ class Workload:
         scenes: Scene files, relative to the study.
         meshes: Names or files; empty: the mesh of each scene.
         size: Width and height in pixels, ``[640, 480]`` or ``"640x480"``.
+        reduce: Frames of meshes with at most so many triangles, each in place of the mesh itself.
     """
 
     scenes: Annotated[_Names, MinLen(1)]
     meshes: _Names = ()
+    reduce: tuple[_Count, ...] = ()
     size: _Size = (640, 480)
 
 
@@ -108,6 +110,17 @@ class Quality:
     """
 
     dists: StrictBool = True
+
+
+@dataclass(frozen=True, config=_STRICT)
+class Tests:
+    """Box tests, triangle tests and node reads of the bit-exact model, and the records of the scene.
+
+    Attributes:
+        same_pictures: The pictures of each point must equal those of the baseline.
+    """
+
+    same_pictures: StrictBool = False
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -174,7 +187,7 @@ class Study:
         baseline: Name of the point that the others are compared with.
         libraries: Names of standard-cell libraries, whose files the command line gives; empty: Yosys's generic gates.
         objectives: Figures whose Pareto front is reported.
-        quality, cycles, area, power: The measures; one without a table is not taken.
+        quality, tests, cycles, area, power: The measures; one without a table is not taken.
         design: The configuration that every point starts from.
         axes: Values of configuration fields.
         point: Points beside those of the axes.
@@ -193,6 +206,7 @@ class Study:
     axes: Mapping[str, Annotated[tuple[FieldValue, ...], MinLen(1)]] = field(default_factory=dict)
     point: tuple[NamedPoint, ...] = ()
     quality: Quality | None = None
+    tests: Tests | None = None
     cycles: Cycles | None = None
     area: Area | None = None
     power: Power | None = None
@@ -211,8 +225,12 @@ class Study:
             return "combine: a list has [[point]] tables and no [axes]"
         if self.combine != "list" and not self.axes:
             return 'combine: no [axes]; use combine = "list" for [[point]] tables alone'
-        if not any((self.quality, self.cycles, self.area, self.power)):
-            return "nothing is measured: give [quality], [cycles], [area] or [power]"
+        if not any((self.quality, self.tests, self.cycles, self.area, self.power)):
+            return "nothing is measured: give [quality], [tests], [cycles], [area] or [power]"
+        if self.workload.reduce and not self.workload.meshes:
+            return "workload.reduce: the meshes of scenes stay as they are: name workload.meshes"
+        if self.tests is not None and self.tests.same_pictures and self.baseline is None:
+            return 'tests.same_pictures: the same as which point: give baseline = "NAME"'
         for key, names in (("libraries", self.libraries), ("objectives", self.objectives)):
             twice = [name for name, count in Counter(names).items() if count > 1]
             if twice:

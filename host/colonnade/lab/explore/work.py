@@ -35,14 +35,18 @@ def reference(folder: Path, *, scene: Scene, mesh: Mesh, size: Size) -> None:
 
 
 def picture(folder: Path, *, config: str, overrides: Sequence[str], scene: Scene, mesh: Mesh, size: Size) -> None:
-    """Render a frame with the bit-exact model. Error bits are part of the result."""
+    """Render a frame with the bit-exact model. Error bits, counters and the records of the scene are in the result."""
+    from colonnade.device.scene import DeviceScene
     from colonnade.render.device_frames import render_model
+    from colonnade.scene_image.packer import memory_use
 
     with _configuration(config) as path:
         manifest: Manifest = manifest_for(str(path), overrides).manifest
     rendered = render_model(scene, mesh, manifest, size)
     write_png(folder / PICTURE, rendered.image)
-    write_result(folder, {"error_bits": list(rendered.report.errors), "rays": dict(rendered.report.rays)})
+    header = DeviceScene.of(scene.with_samples(1), manifest, mesh).image.header
+    report = {"error_bits": list(rendered.report.errors), "counters": dict(rendered.report.counters)}
+    write_result(folder, {**report, "records": memory_use(header, manifest)["columnBvhMemory"]})
 
 
 def comparison(folder: Path, first: Content, second: Content, *, with_dists: bool) -> None:

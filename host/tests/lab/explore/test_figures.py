@@ -70,10 +70,12 @@ def test_render_index_needs_the_baseline_and_leaves_out_points_without_figures()
 
 
 def test_figures_of_a_point_are_missing_only_where_a_measurement_is() -> None:
-    has = dict.fromkeys(("quality", "baseline", "cycles", "area", "power"), True)
+    has = dict.fromkeys(("quality", "tests", "baseline", "cycles", "area", "power"), True)
     frame = {"psnr": 50.0, "dists": 0.01, "flip": 0.02, "dists_baseline": 0.004, "psnr_baseline": 60.0}
     frame |= {"rays_per_cycle_in_box": 2.0, "is_timed": True}
-    other = frame | {"psnr": 40.0, "dists_baseline": 0.006, "rays_per_cycle_in_box": 8.0}
+    frame |= {"counters": {"raysInBox": 10, "boxTests": 40, "triangleTests": 20}, "records": {"records": 300}}
+    fewer = {"raysInBox": 10, "boxTests": 10, "triangleTests": 5}
+    other = frame | {"counters": fewer, "psnr": 40.0, "dists_baseline": 0.006, "rays_per_cycle_in_box": 8.0}
     unit = {"traversal_unit_kge": 300.0, "array_kge": 24000.0, "mm2_28nm": 11.8, "slowest_path_fo4": 60.0}
     runs = {name: {"mw": mw, "nj_per_ray": mw / 4, "nj_per_ray_28nm": mw} for name, mw in (("a", 4.0), ("b", 8.0))}
     point = {"workloads": {"a": frame, "b": other}, "area": {"lib": unit}, "power": {"lib": runs}}
@@ -81,6 +83,8 @@ def test_figures_of_a_point_are_missing_only_where_a_measurement_is() -> None:
     assert (found["psnr_min"], found["psnr_mean"]) == (40.0, 45.0)
     assert (found["dists_loss"], found["dists_loss_max"]) == (pytest.approx(0.5), pytest.approx(0.6))
     assert found["rays_per_cycle"] == pytest.approx(4.0)
+    assert (found["box_tests"], found["triangle_tests"]) == (pytest.approx(2.0), pytest.approx(1.0))
+    assert found["records"] == pytest.approx(300.0)
     assert (found["mw.lib"], found["nj.lib"], found["nj_28nm.lib"]) == (6.0, 1.5, 6.0)
     assert found["area_per_rate.lib"] == pytest.approx(6000.0)
     assert found["energy_area.lib"] == pytest.approx(9000.0)
@@ -130,7 +134,7 @@ def test_areas_are_without_scratchpads_and_with_caches() -> None:
     assert array_kge({"lines": 256}) == 1000.0
 
 
-HAS = {"quality": True, "baseline": False, "cycles": True, "area": False, "power": False}
+HAS = {"quality": True, "tests": False, "baseline": False, "cycles": True, "area": False, "power": False}
 
 
 @pytest.fixture

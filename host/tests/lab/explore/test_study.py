@@ -199,7 +199,7 @@ def test_what_a_search_cannot_take_is_one_line(tmp_path: Path, line: str, messag
     search = f'[search]\n{line}\nobjectives = ["psnr_min", "flip"]\n{head}'
     text = STUDY.replace('baseline = "32b32s64d"\n', '#\ncombine = "search"\n')
     text = text.replace("[quality]\n", f"{search}[quality]\n")
-    kinds = ("quality", "baseline", "cycles", "area", "power")
+    kinds = ("quality", "tests", "baseline", "cycles", "area", "power")
     with pytest.raises(UserError) as error:
         check_search(study(tmp_path, text), columns(dict.fromkeys(kinds, True), ()))
     assert message in str(error.value) and "\n" not in str(error.value)
