@@ -17,7 +17,8 @@ from colonnade.design.config_name import find_configuration
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
-from colonnade.lab.explore.jobs import KINDS, Job, JobFailed, cached, figures_of, forget
+from colonnade.lab.explore.jobs import KINDS, Job, JobFailed, cached, forget
+from colonnade.lab.explore.result import figures_of
 from colonnade.lab.explore.runners import LocalRunner
 from colonnade.lab.explore.schedule import Outcome, Schedule
 from colonnade.mesh.mesh import Mesh

@@ -1,6 +1,6 @@
 """Jobs: measurements with a key made of their inputs, and the cache of their results.
 
-A result is a folder of files, of which ``result.json`` holds the figures. The cache entry is ``explore/KIND-KEY``.
+The cache entry of a result is ``explore/KIND-KEY``.
 """
 
 from __future__ import annotations
@@ -20,17 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from colonnade.common import cache, processes
-from colonnade.common.atomic_files import write_json
 from colonnade.common.errors import UserError
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import source_hash
 from colonnade.design.toolchain import cache_directory, project_root
-
-#: The figures of a result.
-RESULT = "result.json"
-
-#: The content of a result: each file by its name.
-Content = Mapping[str, bytes]
+from colonnade.lab.explore import work
+from colonnade.lab.explore.result import Content
 
 
 @dataclass(frozen=True)
@@ -103,8 +98,6 @@ class Job:
     @functools.cached_property
     def key(self) -> str:
         """The name of its cache entry."""
-        from colonnade.lab.explore import work
-
         parts: dict[str, Any] = {
             "identity": self.identity,
             "inputs": list(self.inputs),
@@ -161,12 +154,6 @@ def forget(job: Job) -> None:
         shutil.rmtree(entry_of(job))
 
 
-def figures_of(folder: Path) -> dict[str, Any]:
-    """The figures of a result."""
-    figures: dict[str, Any] = json.loads((folder / RESULT).read_text())
-    return figures
-
-
 def content_of(folder: Path) -> dict[str, bytes]:
     """The files of a result, for another machine."""
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir()) if path.name != cache.CONTENTS}
@@ -206,8 +193,3 @@ def run(job: Job, inputs: tuple[Content, ...]) -> dict[str, bytes]:
         return content_of(cache.entry(entry_of(job), make, f"result of {job.title}"))
     except UserError as error:
         raise JobFailed(str(error)) from None
-
-
-def write_result(folder: Path, figures: Mapping[str, Any]) -> None:
-    """Write the figures of a result."""
-    write_json(folder / RESULT, figures)

@@ -17,8 +17,9 @@ from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 from colonnade.lab.explore import figures
 from colonnade.lab.explore.frames import Frame, cycles_job
-from colonnade.lab.explore.jobs import KINDS, Job, JobFailed, figures_of
+from colonnade.lab.explore.jobs import KINDS, Job, JobFailed
 from colonnade.lab.explore.points import Point, config_of
+from colonnade.lab.explore.result import figures_of
 from colonnade.lab.explore.schedule import Outcome
 from colonnade.lab.explore.study import quoted
 from colonnade.lab.explore.study_file import StudyFile

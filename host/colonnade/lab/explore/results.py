@@ -97,7 +97,8 @@ class Results:
 
     def _scenes(self) -> list[str]:
         workload = self._plan.study.workload
-        return [scene for scene in workload.scenes for _ in workload.meshes or (None,)]
+        frames = (len(workload.meshes) or 1) * (len(workload.reduce) or 1)
+        return [scene for scene in workload.scenes for _ in range(frames)]
 
     def _render_index(self, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
         has, baseline = self._plan.has, self._plan.study.baseline

@@ -15,7 +15,8 @@ from typing import Any, Protocol
 from colonnade.common.errors import UserError
 from colonnade.common.processes import Group
 from colonnade.lab.explore import jobs
-from colonnade.lab.explore.jobs import Content, Job, JobFailed
+from colonnade.lab.explore.jobs import Job, JobFailed
+from colonnade.lab.explore.result import Content
 
 #: Seconds to wait for the scheduler's answer.
 CONNECT_SECONDS = 5

@@ -15,7 +15,7 @@ from colonnade.common.image_io import read_picture, write_png
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
-from colonnade.lab.explore.jobs import Content, write_result
+from colonnade.lab.explore.result import Content, write_result
 from colonnade.mesh.mesh import Mesh
 from colonnade.scene.model import Scene
 

@@ -21,6 +21,7 @@ from colonnade.lab.figures import (
     performance_tables,
     result_tables,
     study_tables,
+    tree_tables,
 )
 from colonnade.lab.figures.data import Data, Missing
 from colonnade.lab.figures.facts import FORMATS, PRESETS, facts, text
@@ -34,6 +35,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     **map_tables.TABLES,
     **light_tables.TABLES,
     **paper_tables.TABLES,
+    **tree_tables.TABLES,
 }
 
 _TABLE = re.compile(r"^<!-- ([\w-]+) -->\n.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)

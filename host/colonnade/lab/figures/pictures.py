@@ -15,6 +15,7 @@ from colonnade.common.atomic_files import replacing
 from colonnade.common.temporary import temporary_folder
 from colonnade.lab.figures.data import Data
 from colonnade.lab.report.fields import plot_fields
+from colonnade.lab.report.speed_up import plot_speed_up
 from colonnade.lab.report.stages import plot_stages
 
 #: The data file of each picture in ``docs/pictures``, and the function that draws its report.
@@ -22,6 +23,7 @@ PICTURES: Mapping[str, tuple[str, Callable[[Mapping[str, Any], Path], None]]] = 
     "bench.png": ("bench-edge", plot_stages),
     "scaling.png": ("scaling", plot_fields),
     "ablation.png": ("ablation", plot_fields),
+    "speed-up.png": ("bvh-cycles", plot_speed_up),
 }
 
 #: The key of the digest among the texts of a PNG file.

@@ -15,7 +15,8 @@ from colonnade.lab.evaluation.bench import mesh_result
 from colonnade.lab.explore import frames, jobs
 from colonnade.lab.explore.bench import bench
 from colonnade.lab.explore.explore import Exploration
-from colonnade.lab.explore.jobs import RESULT, Content, Job, JobFailed
+from colonnade.lab.explore.jobs import Job, JobFailed
+from colonnade.lab.explore.result import RESULT, Content
 from colonnade.lab.explore.study_file import load_study
 
 STUDY = """title = "Two meshes"

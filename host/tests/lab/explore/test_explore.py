@@ -156,6 +156,27 @@ def test_a_study_killed_in_the_middle_continues_gives_the_same_numbers_and_is_ex
     assert extended["points"][2]["figures"]["psnr_baseline_min"] == 100.0
 
 
+def test_tests_are_counted_and_a_picture_that_differs_fails_its_point(study: Path) -> None:
+    text = STUDY.replace('objectives = ["psnr_min", "psnr_baseline_min"]', "")
+    text = text.replace("[quality]\ndists = false", "[tests]\nsame_pictures = true")
+    text = text.replace("size =", "reduce = [20, 12]\nsize =")
+    point = '[[point]]\nname = "none"\nset = { "geometry.bvh" = false }\n'
+    study.write_text(text.replace("[axes]", f"{point}[axes]"))
+    content, _ = explored(study)
+    frames = {point["name"]: point["workloads"]["cube, 20"] for point in content["points"]}
+    tree, none = frames["32b32s64d"], frames["none"]
+    assert none["counters"]["boxTests"] == none["records"]["nodes"] == 0
+    assert none["counters"]["triangleTests"] > tree["counters"]["triangleTests"] > 0
+    assert tree["records"]["nodes"] > 0 and tree["counters"]["boxTests"] >= tree["counters"]["nodeReads"] > 0
+    failures = {point["name"]: point["failures"] for point in content["points"]}
+    assert failures["none"] == failures["32b32s64d"] == []
+    reason = "its picture differs from that of 32b32s64d"
+    found = [(failure["workload"], failure["reason"]) for failure in failures["16b16s32d"]]
+    assert found == [("cube, 20", reason), ("cube, 12", reason)]
+    assert (study.parent / "out" / "report.html").is_file()
+    forget(Exploration(load_study(study), {}))
+
+
 def test_an_interrupt_ends_all_jobs_within_two_seconds(study: Path) -> None:
     running = subprocess.Popen(command(study), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + SECONDS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 from collections.abc import Iterable
 from concurrent.futures import Future
@@ -12,8 +13,9 @@ from typing import Any
 import pytest
 
 from colonnade.common import cache
-from colonnade.lab.explore import jobs
-from colonnade.lab.explore.jobs import KINDS, RESULT, Content, Job, JobFailed, figures_of
+from colonnade.lab.explore import jobs, work
+from colonnade.lab.explore.jobs import KINDS, Job, JobFailed
+from colonnade.lab.explore.result import RESULT, Content, figures_of
 from colonnade.lab.explore.runners import _run_remotely
 from colonnade.lab.explore.schedule import Schedule
 
@@ -135,3 +137,12 @@ def test_the_key_is_made_of_everything_that_matters() -> None:
 def test_a_worker_with_other_sources_refuses(runner: FakeRunner) -> None:
     with pytest.raises(JobFailed, match="the worker has other sources"):
         _run_remotely(job("picture", 1), "picture-0", ())
+
+
+def test_the_key_of_a_result_follows_the_sources_that_make_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing = hashlib.sha256().hexdigest()
+    for kind in KINDS.values():
+        assert all(jobs.package_digest(package) != nothing for package in kind.packages), kind.name
+    before = Job(KINDS["comparison"], "a", {}, {}).key
+    monkeypatch.setattr(work, "comparison", work.picture)
+    assert Job(KINDS["comparison"], "a", {}, {}).key != before

@@ -82,7 +82,14 @@ def refused(folder: Path, text: str) -> str:
         ("[32, 24]", "[32]", "17: workload.size: "),
         ('scenes = ["object.toml"]', "scenes = []", "15: workload.scenes: "),
         ("dists = false", "dists = 1", "20: quality.dists: "),
-        ("[quality]\ndists = false", "", "nothing is measured: give [quality], [cycles], [area] or [power]"),
+        ("[quality]\ndists = false", "", "nothing is measured: give [quality], [tests], [cycles],"),
+        ("size = [32, 24]", "reduce = [0]", "17: workload.reduce: "),
+        (
+            'meshes = ["cube"]',
+            "reduce = [9]",
+            "16: workload.reduce: the meshes of scenes stay as they are: name workload",
+        ),
+        ("[quality]", "[tests]\nsame_pictures = true\n[quality]", "20: tests.same_pictures: the same as which point"),
         ("[quality]", '[power]\nmeshes = ["teapot"]\n[quality]', "power: the gates need a library"),
         ("[quality]", '[cycles]\nmeshes = ["teapot"]\n[quality]', "20: cycles.meshes: teapot is not in"),
         ('"Try"\n', '"Try"\ncombine = "list"\n', "2: combine: a list has [[point]] tables and no [axes]"),
@@ -137,6 +144,20 @@ def test_scenes_of_several_objects_are_frames_of_their_own(tmp_path: Path) -> No
     assert frame.mesh.vertices[:, 0].max() > 2.5
     with pytest.raises(UserError, match=r"a mesh replaces that of a single object, but the scene has 2 \[\[object\]\]"):
         Plan(study(tmp_path, alone.replace("[workload]", '[workload]\nmeshes = ["cube"]')), {})
+
+
+def test_each_mesh_is_reduced_to_each_number_of_triangles(tmp_path: Path) -> None:
+    (tmp_path / "object.toml").write_text('mesh.name = "cube"\n')
+    both = STUDY.replace('["cube"]', '["cube", "torus"]')
+    frames = Plan(study(tmp_path, both.replace("size =", "reduce = [20, 90]\nsize =")), {}).frames
+    assert [frame.name for frame in frames] == ["cube, 20", "cube, 90", "torus, 20", "torus, 90"]
+    assert [frame.source for frame in frames] == ["cube", "cube", "torus", "torus"]
+    for frame, maximum in zip(frames, (20, 90, 20, 90), strict=True):
+        assert 5 < len(frame.mesh.faces) <= maximum
+    with pytest.raises(UserError, match=r":17: mesh cube cannot be reduced to 1 triangles: allow more"):
+        Plan(study(tmp_path, both.replace("size =", "reduce = [1]\nsize =")), {})
+    with pytest.raises(UserError, match=r":16: two frames are named cube, 20"):
+        Plan(study(tmp_path, both.replace("torus", "cube").replace("size =", "reduce = [20]\nsize =")), {})
 
 
 @pytest.mark.parametrize("text", ["frame.samples = 4", "light.radius = 0.5"])

@@ -204,6 +204,9 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             **{"luts": 43_000, "flip_flops": 22_000, "dsps": 81, "block_rams": 68},
             "available": {"luts": 83_640},
         },
+        "bvh-tests": trees("BVH4", "BVH2"),
+        "bvh-costs": trees("BVH4", "BVH2", "none"),
+        "bvh-cycles": trees("BVH4", "BVH2", "none"),
         "scaling": study([{"array.rows": 4}], [2.0]),
         "ablation": study([dict(zip(keys, (*kind, 1), strict=True)) for kind in kinds], [0.5, 0.75, 1.0, 1.25]),
         "mixed-precision": study([{"precision": "32b32s64d"}], [0.75], render_index=index),
@@ -229,6 +232,29 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         }
         (tmp_path / "docs" / "data" / f"{name}.json").write_text(json.dumps(content))
     return tmp_path / "docs"
+
+
+def trees(*names: str) -> dict[str, Any]:
+    """A study of points with and without a tree, over two frames of a mesh."""
+
+    def point(number: int, name: str) -> dict[str, Any]:
+        counters = {"raysInBox": 1_000_000, "boxTests": 0, "triangleTests": 90_000_000}
+        if name != "none":
+            counters |= {"boxTests": 4_000_000, "triangleTests": 2_000_000}
+        records = {
+            "records": 100 + 5 * (name != "none"),
+            "bytes": 2_000_000,
+            "nodes": 5,
+            "triangles": 50,
+            "attributes": 50,
+        }
+        frame = {"counters": counters, "records": records, "cycles": 10.0 * 3**number}
+        area = {"traversal_unit_kge": 100.0 + number, "array_kge": 1e3 * (4 - number)}
+        return {"name": name, "workloads": {f"bunny, {n}": frame for n in (50, 500)}, "area": {"asap7": area}}
+
+    workloads = [{"name": f"bunny, {n}", "triangles": n - 2} for n in (50, 500)]
+    points = [point(*each) for each in enumerate(names)]
+    return {"points": points, "workloads": workloads, "baseline": "BVH4", "libraries": ["asap7"]}
 
 
 def compared(*kinds: str) -> dict[str, Any]:
@@ -286,7 +312,11 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| **8** | 1.1 | 1.10 |" in table(docs, "energy-area")
     assert "| **14** | 1.2 | 1.20 |" in table(docs, "vertices-contexts")
     assert "**32b32s64d**" in table(docs, "precision")
-    assert "| all | 40.5 |" in table(docs, "measuring")
+    assert "| bunny, 500 | 498 | 2.00 | 4.0 + 2.0 | 4.0 + 2.0 | 90 | 15 | 15 | 0.1 |" in table(docs, "bvh-tests")
+    assert "| 500 | 498 | 10 | 30 | 90 | 9.0 | 3.0 |" in table(docs, "bvh-cycles")
+    assert "| **all records**, with nodes | 105 | 105 | 100 | +5.0 % | +5.0 % | +5.6 % |" in table(docs, "bvh-costs")
+    assert "| **array**, MGE | 4.00 | 3.00 | 2.00 | +100.0 % | +50.0 % | +5.7 % |" in table(docs, "bvh-costs")
+    assert "| all | 45.0 |" in table(docs, "measuring")
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 (×1.20) | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
     assert "| seed 1 | –, – |" in live and "15.0" not in live
