@@ -38,19 +38,19 @@ _STALLS = {
     "completion": 0.03,
 }
 _UNITS = {
-    "BoxUnit": ("render_unit", 45.2),
-    "TriangleUnit": ("render_unit", 92.0),
-    "Shader": ("render_unit", 61.0),
-    "RaySetup": ("render_unit", 38.5),
-    "RayGenerator": ("render_unit", 12.1),
-    "HitTable": ("render_unit", 14.9),
-    "RecordFetch": ("render_unit", 20.6),
-    "TraversalStack": ("render_unit", 9.3),
-    "BounceUnit": ("render_unit", 17.7),
-    "ColourUnit": ("render_unit", 8.8),
-    "RtController": ("render_unit", 6.1),
-    "TMaxUnits": ("render_unit", 4.0),
-    "CosineUnit": ("render_unit", 3.1),
+    "BoxUnit": ("traversal_unit", 45.2),
+    "TriangleUnit": ("traversal_unit", 92.0),
+    "Shader": ("traversal_unit", 61.0),
+    "RaySetup": ("traversal_unit", 38.5),
+    "RayGenerator": ("traversal_unit", 12.1),
+    "HitTable": ("traversal_unit", 14.9),
+    "RecordFetch": ("traversal_unit", 20.6),
+    "TraversalStack": ("traversal_unit", 9.3),
+    "BounceUnit": ("traversal_unit", 17.7),
+    "ColourUnit": ("traversal_unit", 8.8),
+    "RtController": ("traversal_unit", 6.1),
+    "TMaxUnits": ("traversal_unit", 4.0),
+    "CosineUnit": ("traversal_unit", 3.1),
     "ColumnBvhController": ("column", 31.0),
     "TileWalker": ("column", 5.5),
     "PixelCollector": ("column", 3.5),
@@ -278,13 +278,13 @@ def _area(scale: float) -> dict[str, Any]:
         name: {"level": level, "kge": size * scale, "power_mw": 0.02 * size * scale}
         for name, (level, size) in _UNITS.items()
     }
-    render_unit = sum(unit["kge"] for unit in units.values() if unit["level"] == "render_unit")
+    traversal_unit = sum(unit["kge"] for unit in units.values() if unit["level"] == "traversal_unit")
     return {
         "units": units,
-        "render_unit_kge": render_unit,
-        "logic_kge": 80 * render_unit,
-        "array_kge": 80 * render_unit + 2000,
-        "mm2_28nm": 0.08 * render_unit,
+        "traversal_unit_kge": traversal_unit,
+        "logic_kge": 80 * traversal_unit,
+        "array_kge": 80 * traversal_unit + 2000,
+        "mm2_28nm": 0.08 * traversal_unit,
         "slowest_path_ns": 1.9 + scale,
         "slowest_path_fo4": 55 + 20 * scale,
         "slowest_path_unit": "BoxUnit",

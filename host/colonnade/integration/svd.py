@@ -14,7 +14,7 @@ def svd(table: RegisterTable, base: int) -> str:
     """The peripheral at the byte address ``base``."""
     device = ET.Element("device", {"schemaVersion": "1.3"})
     _add(device, name="Colonnade", version=f"{table.version >> 16}.{table.version & 0xFFFF}")
-    _add(device, description="Array of ray-tracing render units", addressUnitBits=8, width=32, size=32)
+    _add(device, description="Array of ray tracers", addressUnitBits=8, width=32, size=32)
     peripheral = ET.SubElement(ET.SubElement(device, "peripherals"), "peripheral")
     _add(peripheral, name="COLONNADE", baseAddress=hex(base))
     block = ET.SubElement(peripheral, "addressBlock")

@@ -49,6 +49,17 @@ def test_a_new_use_is_refused(
     assert "1 uses of" in (error := capsys.readouterr().err) and f"{next(iter(texts))}:1" in error
 
 
+@pytest.mark.parametrize(
+    "text", ["a render unit", "mW of a render\n    unit", "/** A render\n  * unit. */", "render_unit"]
+)
+def test_a_phrase_is_of_its_pages(
+    vocabulary: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], text: str
+) -> None:
+    assert run(vocabulary, monkeypatch, {"docs/glossary.md": text}) == 0
+    assert run(vocabulary, monkeypatch, {"docs/unit.md": text}) == 1
+    assert "docs/unit.md says 'render" in capsys.readouterr().err
+
+
 def test_sentences_may_use_english_words(vocabulary: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     texts = {"docs/unit.md": "It is asked.", "src/Unit.scala": '// It is asked.\nval text = "asked"\n'}
     assert run(vocabulary, monkeypatch, texts) == 0

@@ -131,7 +131,7 @@ public:
     /// Loads the words of a file to consecutive addresses of a target, from 0. Words of targets other than the column
     /// memories (target 0) may be narrower than the port.
     ///
-    /// The render units are idle during a load. So records take no cycles, and other words only cycles of device and
+    /// The path tracers are idle during a load. So records take no cycles, and other words only cycles of device and
     /// columns. Extra cycles then bring free-running counters to the same state as a load through the port.
     void load(const std::string& file, std::size_t bytes, std::uint64_t target, bool throughPort) {
         const std::size_t port = sizeof top_.io_load_bits_record;

@@ -88,8 +88,9 @@ def bench(
 
     from colonnade.common import progress
     from colonnade.design.generator import manifest_for
+    from colonnade.lab.common import paper
     from colonnade.lab.common.parallel import processors
-    from colonnade.lab.evaluation.bench import MESHES, PAPER_RAYS_PER_CYCLE
+    from colonnade.lab.evaluation.bench import MESHES
     from colonnade.lab.explore.bench import bench as run_benchmark
 
     terminal = progress.for_terminal()
@@ -115,7 +116,7 @@ def bench(
         table.print("geometric mean", None, None, *means, None, None, None, "")
         echo(
             f"{in_box:.3f} in-box rays per cycle: "
-            f"{report['ratio_to_paper']:.1f} times the paper's {PAPER_RAYS_PER_CYCLE}"
+            f"{report['ratio_to_paper']:.1f} times the paper's {paper.RAYS_PER_CYCLE}"
         )
         return report
 

@@ -6,13 +6,11 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from colonnade.lab.common import paper
 from colonnade.lab.evaluation.throughput import figures
 
 #: Meshes of the benchmark.
 MESHES = ("teapot", "fandisk", "cheburashka", "rocker-arm", "bunny", "armadillo", "dragon", "duck")
-
-#: Rate of the paper's 10x8 chip: 41.6 MRay/s at 200 MHz.
-PAPER_RAYS_PER_CYCLE = 0.208
 
 
 def design_result(
@@ -38,7 +36,7 @@ def design_result(
             bound: geometric_mean(mesh["bounds"][bound] or 0.0 for mesh in meshes.values())
             for bound in ("perfect_memory", "perfect_units")
         },
-        "ratio_to_paper": in_box / PAPER_RAYS_PER_CYCLE,
+        "ratio_to_paper": in_box / paper.RAYS_PER_CYCLE,
     }
 
 

@@ -60,8 +60,8 @@ AREA = (
     Column("fo4", "slowest path", "FO4", "lower", ".0f", "slowest path between registers, without wires"),
 )
 POWER = (
-    Column("mw", "power", "mW", "lower", ".2f", "a render unit with glitches and memories, mean over the meshes"),
-    Column("nj", "energy", "nJ/ray", "lower", ".3f", "energy of a render unit per in-box ray, mean over the meshes"),
+    Column("mw", "power", "mW", "lower", ".2f", "a row with glitches and memories, mean over the meshes"),
+    Column("nj", "energy", "nJ/ray", "lower", ".3f", "energy of a row per in-box ray, mean over the meshes"),
     Column("nj_28nm", "energy at 28 nm", "nJ/ray", "lower", ".3f", "dynamic energy per in-box ray, scaled to 28 nm"),
 )
 PER_RATE = (
@@ -128,7 +128,7 @@ def area_figures(report: Mapping[str, Any]) -> dict[str, Any]:
     slowest = report["slowest_path"]
     return {
         "units": {name: {"level": unit["level"], "kge": unit["kge"]} for name, unit in report["units"].items()},
-        "render_unit_kge": report["levels"]["render_unit"]["kge"],
+        "traversal_unit_kge": report["levels"]["traversal_unit"]["kge"],
         "logic_kge": level["logic_kge"],
         "array_kge": kge,
         "mm2_28nm": kge * report["chip"]["um2_per_gate"] / 1e3,
@@ -178,7 +178,7 @@ def point_figures(point: Mapping[str, Any], has: Mapping[str, bool], libraries: 
     for library in libraries:
         area = point["area"].get(library)
         if has["area"]:
-            found[f"unit_kge.{library}"] = area and area["render_unit_kge"]
+            found[f"unit_kge.{library}"] = area and area["traversal_unit_kge"]
             found[f"array_kge.{library}"] = area and area["array_kge"]
             found[f"array_mm2.{library}"] = area and area["mm2_28nm"]
             found[f"fo4.{library}"] = area and area["slowest_path_fo4"]

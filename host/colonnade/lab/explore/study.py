@@ -124,7 +124,7 @@ class Area:
 
 @dataclass(frozen=True, config=_STRICT)
 class Power:
-    """Gate-level power of one render unit, with each library.
+    """Gate-level power of one row, with each library.
 
     Attributes:
         meshes: Meshes of the workload; empty: all.

@@ -112,7 +112,7 @@ def power(
     window: int,
     clock: float,
 ) -> None:
-    """Estimate the power of a render unit that renders a frame."""
+    """Estimate the power of a row that renders a frame."""
     from colonnade.lab.ppa.measure import measure
     from colonnade.lab.ppa.power.recording import Stimulus
     from colonnade.lab.ppa.power.report import Operation

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from colonnade.lab.common import paper
 from colonnade.lab.common.markdown import markdown
 from colonnade.lab.figures.data import Data
-from colonnade.lab.figures.facts import AREA, MEGAHERTZ, PAPER_MILLIWATTS, PAPER_MRAYS, PRESETS, facts, text
+from colonnade.lab.figures.facts import AREA, MEGAHERTZ, PRESETS, facts, text
 from colonnade.lab.ppa.netlist.hierarchy import LEVEL_NAMES
-from colonnade.lab.ppa.netlist.memories import CHIP_MM2, CHIP_UNITS
 from colonnade.lab.ppa.power.text import KINDS
 from colonnade.lab.ppa.summary import LIBRARIES, MAX_FO4, TITLES
 
@@ -60,8 +60,8 @@ def totals(data: Data) -> str:
             row = [TITLES[level], LIBRARIES[library], f"{total['logic_kge']:,.1f}", f"{total['logic_um2'] / 1e6:.4f}"]
             row += [f"{total['memory_bits'] / 1000:,.0f}", f"{total['logic_mm2_28nm']:.3f}", f"{total['mm2_28nm']:.3f}"]
             rows.append(row)
-    rows.append(["chip ÷ 80", *["–"] * 5, f"{CHIP_MM2 / CHIP_UNITS:.3f}"])
-    rows.append(["chip", *["–"] * 5, f"{CHIP_MM2:.2f}"])
+    rows.append(["chip ÷ 80", *["–"] * 5, f"{paper.MM2 / paper.UNITS:.3f}"])
+    rows.append(["chip", *["–"] * 5, f"{paper.MM2:.2f}"])
     titles = ["level", "library", "logic, kGE", "logic, mm²", "memory, kbit", "logic at 28 nm, mm²"]
     return markdown([*titles, "with memories, mm²"], rows)
 
@@ -71,7 +71,7 @@ def memories(data: Data) -> str:
     report = data.result(AREA.format("edge"))
     levels = report["levels"]
     columns = levels["array"]["of_the_level_below"]
-    copies = {"array": 1, "column": columns, "render_unit": columns * levels["column"]["of_the_level_below"]}
+    copies = {"array": 1, "column": columns, "traversal_unit": columns * levels["column"]["of_the_level_below"]}
     kbits = {name: memory["bits"] * copies[memory["level"]] / 1e3 for name, memory in report["memories"].items()}
     rows = [
         [
@@ -92,7 +92,7 @@ def paths(data: Data) -> str:
     """The slowest paths of `edge`."""
     rows = []
     for library, report in _edge(data).items():
-        slowest, whole = report["slowest_path"], (report["render_unit_paths"] or {}).get("register_to_register")
+        slowest, whole = report["slowest_path"], (report["traversal_unit_paths"] or {}).get("register_to_register")
         found = [(f"within one unit: {slowest['unit']}", slowest), ("across units of a traversal unit", whole)]
         for title, path in found:
             if path:
@@ -102,7 +102,7 @@ def paths(data: Data) -> str:
 
 
 def power(data: Data) -> str:
-    """Power of a render unit of `edge` with its share of the column, and energy of a ray."""
+    """Power of a row of `edge`, and energy of a ray."""
     rows: list[list[str]] = []
     heads = []
     for library, report in _edge(data).items():
@@ -121,7 +121,7 @@ def power(data: Data) -> str:
             f"{window['rays_traced']:,} of them in row 0; scaling to 28 nm: × {found['scale_to_28nm']:.3f}."
         )
     rows.append(
-        ["chip ÷ 80", *[""] * 5, f"{PAPER_MILLIWATTS / CHIP_UNITS:.2f}", "", f"{PAPER_MILLIWATTS / PAPER_MRAYS:.2f}"]
+        ["chip ÷ 80", *[""] * 5, f"{paper.MILLIWATTS / paper.UNITS:.2f}", "", f"{paper.MILLIWATTS / paper.MRAYS:.2f}"]
     )
     titles = ["library", "glitches", "dynamic, mW", "clock pins, mW", "leakage, mW", "memories, mW", "total, mW"]
     table = markdown([*titles, "nJ per in-box ray", "at 28 nm"], rows)
@@ -139,7 +139,7 @@ def presets_cost(data: Data) -> str:
 
 def designs(data: Data) -> str:
     """Rays per second and area of the 10×8 arrays, beside published designs."""
-    rows = [["the paper's chip, 200 MHz", f"{PAPER_MRAYS:g}", f"{CHIP_MM2:g}", f"{PAPER_MRAYS / CHIP_MM2:.1f}"]]
+    rows = [["the paper's chip, 200 MHz", f"{paper.MRAYS:g}", f"{paper.MM2:g}", f"{paper.MRAYS / paper.MM2:.1f}"]]
     for preset in ("edge", "diffuse"):
         own = facts(data, preset)
         at_200 = (text(own, key) for key in ("mrays", "mm2", "mraysPerMm2"))

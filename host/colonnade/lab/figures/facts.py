@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from colonnade.lab.evaluation.bench import PAPER_RAYS_PER_CYCLE, geometric_mean
+from colonnade.lab.common import paper
+from colonnade.lab.evaluation.bench import geometric_mean
 from colonnade.lab.figures.data import Data
 from colonnade.lab.ppa.equal_area import fastest_clock
 
@@ -20,11 +21,8 @@ PRESETS = {
     "fpga": ("an ECP5 board", "`make verify`"),
 }
 
-#: The clock at which rates are given, MHz: that of the paper's chip.
-MEGAHERTZ = 200.0
-
-#: The paper's chip: ray rate at `MEGAHERTZ`, and power.
-PAPER_MRAYS, PAPER_MILLIWATTS = 41.6, 69.5
+#: The clock at which rates are given, MHz.
+MEGAHERTZ = paper.MEGAHERTZ
 
 #: The area of the array without wires and gaps, its rate and its energy come from these two files.
 BENCH, AREA = "bench-{}", "area-{}-asap7"
@@ -39,14 +37,15 @@ def facts(data: Data, preset: str) -> dict[str, float]:
         memories. ``kge``: logic. ``fo4``, ``mhz``: the slowest path, and the clock that it allows. ``nj``,
         ``njGlitches``: energy of an in-box ray at 28 nm. ``equalArea``: rays per cycle relative to the chip at equal
         area. ``mrays``, ``mraysPerMm2``: at `MEGAHERTZ`. ``mraysAtClock``, ``mraysPerMm2AtClock``: at ``mhz``.
-        ``framesPerSecond``: of the benchmark at `MEGAHERTZ`. ``framesPerJoule``: of the benchmark, by ``njGlitches``.
+        ``framesPerSecond``: of the benchmark at `MEGAHERTZ`. ``framesPerJoule``: of as many in-box rays as a frame of
+        the paper has rays, by ``njGlitches``. ``watts``: of the array at ``mrays``, by ``njGlitches``.
     """
     found: dict[str, float] = {}
     bench, area = data.optional(BENCH.format(preset)), data.optional(AREA.format(preset))
     if bench is not None:
         rates = [mesh["rays_per_cycle_in_box"] for mesh in bench["meshes"].values()]
         found |= {"raysPerCycle": bench["geomean_rays_per_cycle_in_box"], "fewest": min(rates), "most": max(rates)}
-        found["timesChip"] = found["raysPerCycle"] / PAPER_RAYS_PER_CYCLE
+        found["timesChip"] = found["raysPerCycle"] / paper.RAYS_PER_CYCLE
         found["mrays"] = found["raysPerCycle"] * MEGAHERTZ
         found["framesPerSecond"] = MEGAHERTZ * 1e6 / geometric_mean(mesh["cycles"] for mesh in bench["meshes"].values())
         if bench.get("mirror"):
@@ -56,6 +55,8 @@ def facts(data: Data, preset: str) -> dict[str, float]:
         found |= {"mm2": array["mm2_28nm"], "kge": array["logic_kge"]}
         found |= {"fo4": clock.fo4, "mhz": clock.megahertz} if clock else {}
         found |= _energies(area)
+    if "njGlitches" in found:
+        found["framesPerJoule"] = 1e9 / (paper.RAYS_A_FRAME * found["njGlitches"])
     if bench is not None and area is not None:
         found["equalArea"] = found["timesChip"] * area["chip"]["mm2"] / found["mm2"]
         found["mraysPerMm2"] = found["mrays"] / found["mm2"]
@@ -63,8 +64,7 @@ def facts(data: Data, preset: str) -> dict[str, float]:
             found["mraysAtClock"] = found["raysPerCycle"] * found["mhz"]
             found["mraysPerMm2AtClock"] = found["mraysAtClock"] / found["mm2"]
         if "njGlitches" in found:
-            rays = geometric_mean(mesh["rays"]["in_box"] for mesh in bench["meshes"].values())
-            found["framesPerJoule"] = 1e9 / (rays * found["njGlitches"])
+            found["watts"] = found["mrays"] * found["njGlitches"] / 1e3
     return found
 
 
@@ -78,7 +78,8 @@ def _energies(area: Mapping[str, Any]) -> dict[str, float]:
 
 #: How a figure of `facts` is written in a text.
 FORMATS = {
-    **dict.fromkeys(("raysPerCycle", "fewest", "most", "mirrorRaysPerCycle", "mm2", "nj", "njGlitches"), ".2f"),
+    **dict.fromkeys(("raysPerCycle", "fewest", "most", "mirrorRaysPerCycle"), ".2f"),
+    **dict.fromkeys(("mm2", "nj", "njGlitches", "watts"), ".2f"),
     "timesChip": ".1f",
     "equalArea": ".2f",
     **dict.fromkeys(("kge", "mhz", "mrays", "mraysAtClock", "framesPerSecond", "framesPerJoule"), ",.0f"),

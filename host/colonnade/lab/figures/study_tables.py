@@ -6,13 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from colonnade.lab.common import paper
 from colonnade.lab.common.markdown import markdown
 from colonnade.lab.figures.data import Data
 
 Study = Mapping[str, Any]
 
-#: The paper's savings of 32b32s64d against its baseline, and its DISTS loss.
-PAPER = ("source paper, 28 nm", "32b32s64d", "–", "33.4 %", "16.7 %", "0.6 to 1.65 %")
+#: The paper's savings, and its DISTS loss.
+_SAVED = (f"{100 * saved:.1f} %" for saved in (paper.POWER_SAVED, paper.AREA_SAVED))
+_LOSS = " to ".join(f"{100 * loss:g}" for loss in paper.LOSS)
+PAPER = ("source paper, 28 nm", paper.PRECISION, "–", *_SAVED, f"{_LOSS} %")
 
 
 def precision(data: Data) -> str:
@@ -38,7 +41,7 @@ def precision(data: Data) -> str:
         for point in study["points"]
     ]
     titles = ["design", "DISTS loss, mean, %", "largest, %", "PSNR to Embree, lowest, dB", "array, MGE", "FO4"]
-    return markdown([*titles, "mW of a render unit", "nJ per in-box ray", "RenderIndex"], rows)
+    return markdown([*titles, "mW of a row", "nJ per in-box ray", "RenderIndex"], rows)
 
 
 def savings(data: Data) -> str:
@@ -48,7 +51,7 @@ def savings(data: Data) -> str:
     points = {point["name"]: point for point in study["points"]}
     base = points[study["baseline"]]["figures"]
     rows: list[Sequence[str]] = [PAPER]
-    for name in {_best(study) or PAPER[1]: None, PAPER[1]: None}:
+    for name in {_best(study) or paper.PRECISION: None, paper.PRECISION: None}:
         own = points[name]["figures"]
         losses = [100 * frame["dists_baseline"] for frame in points[name]["workloads"].values()]
         saved = [1 - own[f"{key}.{library}"] / base[f"{key}.{library}"] for key in ("nj", "mw", "array_kge")]

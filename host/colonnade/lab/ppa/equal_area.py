@@ -9,7 +9,7 @@ from typing import Any
 
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import read_json
-from colonnade.lab.evaluation.bench import PAPER_RAYS_PER_CYCLE
+from colonnade.lab.common import paper
 from colonnade.lab.ppa.netlist.memories import CHIP_NODE
 
 #: FO4 at the chip's node, ps: 500 ps per µm of drawn gate length, at low voltage and high temperature
@@ -76,7 +76,7 @@ def fastest_clock(report: Mapping[str, Any]) -> Clock | None:
     Args:
         report: Of `colonnade.lab.ppa.measure.measure`.
     """
-    path, across = report["slowest_path"], report["render_unit_paths"]
+    path, across = report["slowest_path"], report["traversal_unit_paths"]
     paths = [path["fo4"]] if path["unit"] else []
     if across and across["register_to_register"]:
         paths.append(across["register_to_register"]["fo4"])
@@ -96,5 +96,5 @@ def at_clock(report: Mapping[str, Any], faster: float) -> str:
     return (
         f"clock at {CHIP_NODE}: the slowest path, {clock.fo4:.1f} FO4 of {CHIP_FO4_PS:g} ps, takes "
         f"{clock.nanoseconds:.2f} ns, so at most {clock.megahertz:,.0f} MHz without wires, skew and margin; "
-        f"{faster * PAPER_RAYS_PER_CYCLE * clock.megahertz:,.0f} in-box MRay/s at it"
+        f"{faster * paper.RAYS_PER_CYCLE * clock.megahertz:,.0f} in-box MRay/s at it"
     )

@@ -9,6 +9,7 @@ from typing import Any
 
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import black_boxed_design_for
+from colonnade.lab.common import paper
 from colonnade.lab.ppa.netlist import memories
 from colonnade.lab.ppa.netlist.hierarchy import LEVEL_NAMES, LEVELS, Hierarchy, Level, Memory
 from colonnade.lab.ppa.netlist.mapped import Netlist
@@ -87,13 +88,13 @@ def measure(
         "memories": {memory.name: memories.describe(memory) for memory in boxes},
         "flop_tables": [{**asdict(table), "bits": table.bits} for table in hierarchy.tables()],
         "levels": levels,
-        "render_unit_kge": levels["render_unit"]["kge"],
+        "traversal_unit_kge": levels["traversal_unit"]["kge"],
         "slowest_path": slowest,
-        "render_unit_paths": whole,
+        "traversal_unit_paths": whole,
         "opensta": _opensta_comparison(units),
         "chip": {
-            "mm2": memories.CHIP_MM2,
-            "units": memories.CHIP_UNITS,
+            "mm2": paper.MM2,
+            "units": paper.UNITS,
             "kge_per_unit": memories.chip_unit_kge(),
             "um2_per_gate": memories.CHIP_GATE_UM2,
         },

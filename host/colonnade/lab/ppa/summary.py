@@ -16,7 +16,7 @@ MAX_FO4 = 100
 #: Column titles of the libraries, by the name in the data files.
 LIBRARIES = {"yosys": "Yosys's gates", "asap7": "ASAP7", "sky130": "sky130"}
 
-TITLES = {"render_unit": "traversal unit", "column": "column", "array": "array"}
+TITLES = {"traversal_unit": "traversal unit", "column": "column", "array": "array"}
 
 
 class UnitTable:
@@ -79,21 +79,22 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
             f"{total['mm2_28nm']:,.3f} mm² with memories"
         )
     yield (
-        f"traversal unit with memories: {report['render_unit_kge']:,.1f} kGE; the chip: {chip['kge_per_unit']:.0f} kGE "
-        f"({chip['mm2']} mm² / {chip['units']} with everything, at {chip['um2_per_gate']} µm² per GE)"
+        f"traversal unit with memories: {report['traversal_unit_kge']:,.1f} kGE; "
+        f"the chip: {chip['kge_per_unit']:.0f} kGE ({chip['mm2']} mm² / {chip['units']} with everything, "
+        f"at {chip['um2_per_gate']} µm² per GE)"
     )
     for name, memory in report["memories"].items():
         yield (
             f"memory {name}, in {memory['unit']}: {memory['count']} × {memory['depth']:,} × {memory['width']} bits, "
             f"{_per_node(memory, 'um2', ',.0f')} µm², {_per_node(memory, 'read_pj', '.1f')} pJ per read"
         )
-    tables = [table for table in report["flop_tables"] if table["level"] == "render_unit"]
+    tables = [table for table in report["flop_tables"] if table["level"] == "traversal_unit"]
     largest = (f"{table['name']} in {table['unit']}" for table in tables[:3])
     yield (
         f"flip-flop tables of a traversal unit: {sum(table['bits'] for table in tables):,} bits; "
         f"the largest are {', '.join(largest)}"
     )
-    slowest, whole = report["slowest_path"], report["render_unit_paths"]
+    slowest, whole = report["slowest_path"], report["traversal_unit_paths"]
     if slowest["unit"]:
         yield f"slowest path within one unit: {_path(slowest)}, in {slowest['unit']}"
     if whole and whole["register_to_register"]:

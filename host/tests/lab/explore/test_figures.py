@@ -74,7 +74,7 @@ def test_figures_of_a_point_are_missing_only_where_a_measurement_is() -> None:
     frame = {"psnr": 50.0, "dists": 0.01, "flip": 0.02, "dists_baseline": 0.004, "psnr_baseline": 60.0}
     frame |= {"rays_per_cycle_in_box": 2.0, "is_timed": True}
     other = frame | {"psnr": 40.0, "dists_baseline": 0.006, "rays_per_cycle_in_box": 8.0}
-    unit = {"render_unit_kge": 300.0, "array_kge": 24000.0, "mm2_28nm": 11.8, "slowest_path_fo4": 60.0}
+    unit = {"traversal_unit_kge": 300.0, "array_kge": 24000.0, "mm2_28nm": 11.8, "slowest_path_fo4": 60.0}
     runs = {name: {"mw": mw, "nj_per_ray": mw / 4, "nj_per_ray_28nm": mw} for name, mw in (("a", 4.0), ("b", 8.0))}
     point = {"workloads": {"a": frame, "b": other}, "area": {"lib": unit}, "power": {"lib": runs}}
     found = point_figures(point, has, ["lib"])
@@ -118,7 +118,7 @@ def test_areas_are_without_scratchpads_and_with_caches() -> None:
     def array_kge(cache: dict[str, int] | None) -> float:
         report = {
             "config": {"array": {"columns": 8}, "columnBvhMemory": {"cache": cache}},
-            "levels": {"array": {"kge": 1000.0, "logic_kge": 500.0}, "render_unit": {"kge": 10.0}},
+            "levels": {"array": {"kge": 1000.0, "logic_kge": 500.0}, "traversal_unit": {"kge": 10.0}},
             "memories": {"records": {"kge": 50.0}, "stack": {"kge": 5.0}},
             "units": {},
             "chip": {"um2_per_gate": 0.5},

@@ -45,17 +45,17 @@ def area() -> dict[str, Any]:
         "chip": {"mm2": 5.53},
         "units": {
             "BoxUnit": unit
-            | {"level": "render_unit", "energy_per_ray_nj_at_28nm": {"zero_delay": 1, "glitch_aware": 2}},
+            | {"level": "traversal_unit", "energy_per_ray_nj_at_28nm": {"zero_delay": 1, "glitch_aware": 2}},
             "PathUnit": unit | {"level": "column"},
         },
-        "memories": {"words": memory | {"level": "render_unit"}, "few": memory | {"level": "array", "bits": 10}},
+        "memories": {"words": memory | {"level": "traversal_unit"}, "few": memory | {"level": "array", "bits": 10}},
         "levels": {
-            "render_unit": level | {"of_the_level_below": 0},
+            "traversal_unit": level | {"of_the_level_below": 0},
             "column": level | {"of_the_level_below": 3},
             "array": level | {"of_the_level_below": 2},
         },
         "slowest_path": PATH | {"unit": "BoxUnit"},
-        "render_unit_paths": {"register_to_register": PATH},
+        "traversal_unit_paths": {"register_to_register": PATH},
         "power": {
             "volts": 0.7,
             "clock_mhz": 200,

@@ -34,9 +34,9 @@ def test_the_rate_at_the_area_of_everything_is_of_the_same_configuration(tmp_pat
 
 def test_the_clock_is_that_of_the_slowest_path_within_or_across_units() -> None:
     within, across = {"unit": "Small", "fo4": 50.0}, {"register_to_register": {"fo4": 40.0}}
-    line = at_clock(report() | {"slowest_path": within, "render_unit_paths": across}, 10.0)
+    line = at_clock(report() | {"slowest_path": within, "traversal_unit_paths": across}, 10.0)
     assert "50.0 FO4 of 14 ps, takes 0.70 ns, so at most 1,429 MHz" in line
     assert "2,971 in-box MRay/s" in line
     slower = {"register_to_register": {"fo4": 60.0}}
-    assert "60.0 FO4" in at_clock(report() | {"slowest_path": within, "render_unit_paths": slower}, 10.0)
-    assert "--liberty" in at_clock(report() | {"slowest_path": {"unit": None}, "render_unit_paths": None}, 10.0)
+    assert "60.0 FO4" in at_clock(report() | {"slowest_path": within, "traversal_unit_paths": slower}, 10.0)
+    assert "--liberty" in at_clock(report() | {"slowest_path": {"unit": None}, "traversal_unit_paths": None}, 10.0)

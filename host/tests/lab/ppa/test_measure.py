@@ -185,7 +185,7 @@ def test_synthesis_stops_at_units(tmp_path: Path) -> None:
     assert hierarchy.header("Queue") == "module Queue(\n  input clock\n);\nendmodule\n"
     assert [hierarchy.instances(unit, LEVELS[0]) for unit in ("TraversalUnit", "BoxUnit", "RecordFetch")] == [1, 1, 2]
     rays, records = hierarchy.memories()
-    assert (rays.level, rays.unit, rays.count) == ("render_unit", "RecordFetch", 2)
+    assert (rays.level, rays.unit, rays.count) == ("traversal_unit", "RecordFetch", 2)
     assert (records.level, records.unit, records.count, records.bits) == ("column", "rest of Column", 1, 32)
 
 
@@ -210,7 +210,7 @@ def test_enables_of_clock_gates_have_set_up_times(small: Library) -> None:
 
 
 def test_a_register_file_costs_more_per_bit_than_a_macro() -> None:
-    small, large = (Memory("m", "render_unit", "contexts", 2, depth, 10, "write,read") for depth in (12, 576))
+    small, large = (Memory("m", "traversal_unit", "contexts", 2, depth, 10, "write,read") for depth in (12, 576))
     assert memories.area_um2(small) == pytest.approx(2 * 120 * 1.0)
     assert memories.area_um2(large) == pytest.approx(2 * 5760 * 0.19)
     assert memories.describe(small)["kge"] == pytest.approx(240 / 0.49 / 1e3)

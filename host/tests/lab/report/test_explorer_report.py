@@ -268,7 +268,7 @@ def test_plots_are_written_for_each_choice(tmp_path: Path) -> None:
     names = {path.name for path in paths}
     assert {"pareto--dists_loss--nj.asap7.png", "pareto--nj.asap7--kge.asap7.svg", "index.svg"} <= names
     for library in LIBRARIES:
-        assert {f"area--{library}--{level}.png" for level in ("render_unit", "column", "array")} <= names
+        assert {f"area--{library}--{level}.png" for level in ("traversal_unit", "column", "array")} <= names
     for path in paths:
         assert path.parent == tmp_path / "plots"
         if path.suffix == ".png":

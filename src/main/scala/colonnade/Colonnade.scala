@@ -29,7 +29,7 @@ final class ColonnadeIO(config: ColonnadeConfig) extends Bundle {
   val done = Output(Bool()) // the frame is complete; cleared by the next start
 }
 
-/** The device: columns of render units, run frame by frame.
+/** The device: columns of path tracers, run frame by frame.
   *
   * The host loads the records, writes the frame registers and starts the frame. It accepts pixels until `done`, then reads
   * errors and counters. A frame with an error bit is invalid. An aborted frame withdraws pixels that the sink has not

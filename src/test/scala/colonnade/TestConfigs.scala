@@ -5,7 +5,7 @@ import colonnade.config._
 /** Configurations for specs. */
 object TestConfigs {
 
-  /** One render unit with the formats of the presets and a small memory. */
+  /** One traversal unit with the formats of the presets and a small memory. */
   val tiny: ColonnadeConfig = ColonnadeConfig(
     ArrayConfig(rows = 1, columns = 1, contexts = 4),
     PrecisionConfig(mac = 32, sqrt = 32, div = 64),

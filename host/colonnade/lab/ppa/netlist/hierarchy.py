@@ -69,9 +69,9 @@ class Level:
 
 ARRAY = Level("array", "Colonnade", DEVICE, "rest of Colonnade")
 
-#: The levels, the lowest first. Reports name the first one `render_unit`.
+#: The levels, the lowest first.
 LEVELS = (
-    Level("render_unit", "TraversalUnit", TRACE, "contexts"),
+    Level("traversal_unit", "TraversalUnit", TRACE, "contexts"),
     Level("column", "Column", (*PATHS, *COLUMN), "rest of Column"),
     ARRAY,
 )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from colonnade.lab.common import paper
 from colonnade.lab.ppa.netlist.hierarchy import Memory
 
 
@@ -33,14 +34,13 @@ REGISTER_FILE = {"28 nm": Rate(1.0, 0.05), "45 nm": Rate(2.4, 0.09)}
 #: A memory with fewer words is a register file.
 MIN_SRAM_WORDS = 64
 
-#: The paper's chip: 5.53 mm² for 80 render units, which makes 141 kGE each.
-CHIP_MM2, CHIP_UNITS = 5.53, 80
+#: The paper's chip: the gates of its area at this size make 141 kGE for each unit of its array.
 CHIP_NODE, CHIP_GATE_UM2 = "28 nm", 0.49
 
 
 def chip_unit_kge() -> float:
-    """Gate equivalents of the chip per render unit, kGE, including memories and all other logic."""
-    return CHIP_MM2 * 1e6 / CHIP_UNITS / CHIP_GATE_UM2 / 1e3
+    """Gate equivalents of the chip per unit of its array, kGE, including memories and all other logic."""
+    return paper.MM2 * 1e6 / paper.UNITS / CHIP_GATE_UM2 / 1e3
 
 
 def rates(memory: Memory) -> Mapping[str, Rate]:

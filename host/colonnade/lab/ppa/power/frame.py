@@ -26,8 +26,8 @@ class Frame:
         end: The cycle after the last one.
         counts: Numbers of pixels, rays (primary and shadow), in-box rays and hits of the column.
         traced: In-box rays of the traversal unit.
-        shares: The render unit's part of the power of each replayed module.
-        records_share: The render unit's part of the reads of records.
+        shares: The row's part of the power of each replayed module.
+        records_share: The row's part of the reads of records.
     """
 
     begin: int
@@ -44,7 +44,7 @@ class Frame:
 
     @property
     def rays(self) -> float:
-        """The render unit's part of the rays."""
+        """The row's part of the rays."""
         return self.counts["rays"] * self.traced / (self.counts["rays_in_box"] or 1)
 
 

@@ -1,4 +1,4 @@
-"""The power report of a render unit that renders a frame: gates, activity and memories.
+"""The power report of a row that renders a frame: gates, activity and memories.
 
 With a path unit it is the power of a traversal unit and its share of the modules that follow its paths: its in-box rays
 over those of the column.
@@ -133,7 +133,7 @@ def memory_power(
 
 
 def _record_power(recording: Recording, frame: Frame, record_bits: int, megahertz: float) -> float:
-    """Power of the records that the column reads for a render unit, mW."""
+    """Power of the records that the column reads for a row, mW."""
     valid = [port.name for port in recording.inputs if re.fullmatch(r"io_broadcasts(_\d+)?_valid", port.name)]
     reads = sum(sum(recording.of(name)[frame.begin : frame.end]) for name in valid)
     return _memory_milliwatts(reads * record_bits * frame.records_share, frame.cycles, megahertz)

@@ -1,4 +1,4 @@
-"""The power of a render unit as a sum over the modules that were replayed, and its energy per ray."""
+"""The power of a row as a sum over the modules that were replayed, and its energy per ray."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _UNITS = frozenset({*PATHS, *TRACE, "TriangleUnit"})
 
 
 class Sum:
-    """The power of a render unit, summed up over the modules that were replayed.
+    """The power of a row, summed up over the modules that were replayed.
 
     Attributes:
-        records: Power of the reads of records for the render unit, mW.
+        records: Power of the reads of records for the row, mW.
     """
 
     def __init__(self, frame: Frame, megahertz: float, scale: float) -> None:
@@ -47,7 +47,7 @@ class Sum:
             self._memories[_unit(owner, module), memory] += milliwatts * part
 
     def kinds(self) -> dict[str, float]:
-        """Power of memories of the render unit, and of its records, mW."""
+        """Power of memories of the row, and of its records, mW."""
         return {"own": sum(self._memories.values()), "records": self.records}
 
     def totals(self) -> dict[str, dict[str, Any]]:

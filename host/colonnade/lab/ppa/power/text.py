@@ -18,13 +18,13 @@ OUTSIDE = (
 
 
 def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
-    """Power of a render unit and of its units, energy per ray, and the method."""
+    """Power of a row and of its units, energy per ray, and the method."""
     power = report["power"]
     window, scene = power["window"], power["scene"]
     yield ""
     width, height = scene["size"]
     yield (
-        f"power of a render unit at {power['clock_mhz']:g} MHz and {power['volts']:g} V: {scene['mesh']}, "
+        f"power of a row at {power['clock_mhz']:g} MHz and {power['volts']:g} V: {scene['mesh']}, "
         f"{width}×{height}, {window['cycles']:,} cycles, {window['pixels']:,} pixels, {window['rays']:,} rays, "
         f"{window['rays_in_box']:,} in-box rays, {window['hits']:,} hits in the column, "
         f"whose row 0 traces {window['rays_traced']:,} of them"
@@ -44,7 +44,7 @@ def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
         )
     memories = power["memories_mw"]
     yield (
-        f"  memories, at {power['memory_pj_per_bit']} pJ per bit: {memories['own']:.4f} mW in the render unit, "
+        f"  memories, at {power['memory_pj_per_bit']} pJ per bit: {memories['own']:.4f} mW in the row, "
         f"{memories['records']:.4f} mW for its share of the column memory"
     )
     yield f"  by unit, with glitches, and energy per in-box ray at {CHIP_NODE} without and with glitches:"

@@ -19,7 +19,7 @@ from colonnade.lab.report.explorer.study import (
 Row = dict[str, Any]
 
 #: Levels of units with their titles: a stack of bars is of one level.
-LEVELS = {"render_unit": "one traversal unit", "column": "one column", "array": "the array"}
+LEVELS = {"traversal_unit": "one traversal unit", "column": "one column", "array": "the array"}
 
 #: Units of a stack that have a colour of their own; the smaller ones are added up.
 MAX_UNITS = 12

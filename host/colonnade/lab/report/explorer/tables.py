@@ -35,7 +35,7 @@ class Ranks:
 
 
 _AREA = {
-    "render_unit_kge": ("traversal unit, kGE", ".1f"),
+    "traversal_unit_kge": ("traversal unit, kGE", ".1f"),
     "logic_kge": ("all logic, kGE", ",.0f"),
     "array_kge": ("array, kGE", ",.0f"),
     "mm2_28nm": ("area at 28 nm, mm²", ".3f"),

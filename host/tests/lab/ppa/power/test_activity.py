@@ -87,7 +87,7 @@ def test_power_belongs_to_the_innermost_unit() -> None:
         assert {unit: power.clock for unit, power in found.items()} == {rest: 2, shader: 2, "BounceUnit": 2}
 
 
-def test_a_path_unit_counts_with_the_rays_of_the_render_unit() -> None:
+def test_a_path_unit_counts_with_the_rays_of_its_row() -> None:
     """The energies of all units add up to that of a ray, with each part of a column counted once."""
     counts = {"pixels": 40, "rays": 60, "rays_in_box": 50, "hits": 20}
     shares = {"TraversalUnit": 1.0, "PathUnit": 0.2, "PathHits": 0.2}

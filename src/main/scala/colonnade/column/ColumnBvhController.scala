@@ -19,7 +19,8 @@ final class ColumnBvhControllerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle     = Output(Bool())                                         // no read is in flight
 }
 
-/** Reads records for the render units of a column and broadcasts each one to all of them.
+/** Reads records for the requesters of a column, which are its traversal units and its attribute fetch, and broadcasts
+  * each record to all of them.
   *
   * A bank accepts one request per cycle, in round-robin order of rows. It broadcasts the record one cycle after the
   * memory's response, which is two cycles after the request for a memory of latency 1. Every accepted request gives one

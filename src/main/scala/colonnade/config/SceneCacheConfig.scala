@@ -1,6 +1,6 @@
 package colonnade.config
 
-/** Caches between render units and a scene in DRAM: one in every column, and one that all columns share. A line is four
+/** Caches between traversal units and a scene in DRAM: one in every column, and one that all columns share. A line is four
   * records. Lines are interleaved over `columnBvhMemory.banks` banks in both.
   *
   * @param lines        lines of a column's cache

@@ -11,8 +11,9 @@ final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, 
   val events = Output(new AttributeEvents)
 }
 
-/** The environment's maps, with a port for each requester: render units, or columns that share one memory. Each of the
-  * four channels accepts one request a cycle, see [[AttributeConcentrator]]. A reset drops requests in flight, but keeps the maps.
+/** The environment's maps, with a port for each requester: the marches and the direct view of a column, or the columns
+  * that share one memory. Each of the four channels accepts one request a cycle, see [[AttributeConcentrator]]. A reset
+  * drops requests in flight, but keeps the maps.
   *
   * Latency: that of the map and two cycles.
   */

@@ -9,7 +9,7 @@ class PixelPosition(config: ColonnadeConfig) extends Bundle {
   val y = UInt(config.numbers.coordinateBits.W)
 }
 
-/** A pixel to render in a render unit. */
+/** A pixel to render in a path tracer. */
 final class UnitPosition(config: ColonnadeConfig) extends PixelPosition(config) {
 
   /** With an environment: its primary ray may hit the object; it is of a tile that may show the object. */

@@ -4,12 +4,12 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
 
-/** A render unit's read request to its column. It may be withdrawn until it is accepted. */
+/** A read request of a traversal unit or of the attribute fetch to its column. It may be withdrawn until it is accepted. */
 final class RecordRequest(config: ColonnadeConfig) extends Bundle {
   val address = UInt(RecordFormats.addressBits(config).W)
 }
 
-/** A record that a bank has read, broadcast to all render units of the column for one cycle. */
+/** A record that a bank has read, broadcast to all requesters of the column for one cycle. */
 final class RecordBroadcast(config: ColonnadeConfig) extends Bundle {
   val address = UInt(RecordFormats.addressBits(config).W)
   val record  = new RecordFormats(config).record

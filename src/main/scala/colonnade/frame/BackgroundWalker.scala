@@ -18,7 +18,7 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool()) // no pixel of a tile is left
 }
 
-/** Colours the pixels that show the background, in parallel with the render units: all pixels of its own tiles, and those
+/** Colours the pixels that show the background, in parallel with the path tracer: all pixels of its own tiles, and those
   * that the column's [[TileWalker]] and [[EnvironmentWalker]] reject. Throughput: one pixel per cycle.
   */
 final class BackgroundWalker(config: ColonnadeConfig) extends Module {

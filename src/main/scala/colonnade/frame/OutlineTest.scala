@@ -57,7 +57,7 @@ final class OutlineTestIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** Tests tiles against the object's rectangle and outline. A tile meets the object unless it is outside the rectangle or
-  * wholly outside the half-plane of one edge. Render units get the tiles that meet the object or the environment's window.
+  * wholly outside the half-plane of one edge. Path tracers get the tiles that meet the object or the environment's window.
   *
   * Throughput: one tile per cycle, in order. Latency: two cycles, for products and their sums.
   */

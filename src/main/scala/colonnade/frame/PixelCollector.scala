@@ -11,7 +11,7 @@ final class PixelCollectorIO(config: ColonnadeConfig, count: Int) extends Bundle
   val pixels  = Decoupled(new Pixel(config))
 }
 
-/** Merges the pixels of `count` sources, a column's render units and its background, into one stream, round-robin.
+/** Merges the pixels of `count` sources, a column's path tracer and its background, into one stream, round-robin.
   *
   * Throughput: one pixel per cycle. Latency: one cycle. Pixels of one source stay in order.
   */

@@ -14,7 +14,7 @@ object Lines {
   def lineBits(config: ColonnadeConfig): Int =
     RecordFormats.addressBits(config) - wordBits - log2Ceil(config.columnBvhMemory.banks)
 
-  /** Whether records have a parity bit from the DRAM port to the render units. */
+  /** Whether records have a parity bit from the DRAM port to their requesters. */
   def hasParity(config: ColonnadeConfig): Boolean = config.columnBvhMemory.cache.exists(_.parity)
 
   /** A record in a cache or on a bus: its parity is the most significant bit, if it has one. Zeros have the right parity. */

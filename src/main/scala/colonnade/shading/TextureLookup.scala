@@ -17,7 +17,7 @@ final class Texel extends Bundle {
   val colour    = new AlbedoEntry
 }
 
-/** A render unit's port to the textures. Responses come in the order of the requests and cannot be stalled. */
+/** A path unit's port to the textures. Responses come in the order of the requests and cannot be stalled. */
 final class TexturePort(config: PathConfig) extends Bundle {
   val req  = Decoupled(new TexelPosition(TextureLayout.of(config)))
   val resp = Flipped(Valid(new Texel))

@@ -98,7 +98,7 @@ private final case class Found(context: Int, children: Seq[Child]) extends Stack
 
 private final case class Resumed(context: Int) extends StackOperation
 
-/** Drives the stack like the render unit: each context has at most one operation in flight. */
+/** Drives the stack like the traversal unit: each context has at most one operation in flight. */
 private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: Int) {
   private val contexts  = config.array.contexts
   private val arity     = config.geometry.arity

@@ -15,7 +15,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.collection.mutable
 import scala.util.Random
 
-/** Traverses whole trees like the render unit: records come after a random latency, leaves may reduce tMax. */
+/** Traverses whole trees like the traversal unit: records come after a random latency, leaves may reduce tMax. */
 class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "Traversal"
 
