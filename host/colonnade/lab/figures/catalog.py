@@ -96,6 +96,18 @@ def _samples() -> Entry:
     return Entry("samples", "small", commands)
 
 
+def _paper_unit() -> Entry:
+    """The paper's unit, which traces and shades by itself, with the formats and functions of `edge`."""
+    alone = ("triangleRows=1", "triangleLanes=1", "marches=1", "pathContexts=16", "rayInterval=32", "shadeInterval=128")
+    overrides = ("array.rows=1", "array.columns=1", *(f"units.{each}" for each in alone))
+    hardware = ("--config", "edge", *(part for override in overrides for part in ("--set", override)))
+    commands = {
+        "bench": ("colonnade", "bench", *hardware, "--reuse", *_TWO, "--no-mirror", "--json", REPORT),
+        "area": ("colonnade", "ppa", *hardware, "--no-power", "--liberty", "ASAP7", "--json", REPORT),
+    }
+    return Entry("paper-unit", "edge", commands, overrides, libraries=("ASAP7",))
+
+
 def _gather() -> Entry:
     """Gathered light on `edge`: its area, a pass of the RTL, and pictures of the model against the reference."""
     override, scene = "frame.gather=true", "scenes/gathered.toml"
@@ -187,6 +199,7 @@ def catalog() -> dict[str, Entry]:
         Entry("fpga", "fpga", {"": ("tools/soc-fpga",)}, report="out/fpga/report.json"),
         Entry("simulators", "small", {"": ("tools/simulators", f"--json={REPORT}")}),
         Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}),
+        _paper_unit(),
         _study("ablation"),
         _study("scaling"),
         _study("mixed-precision", "ASAP7"),

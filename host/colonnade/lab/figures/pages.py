@@ -1,7 +1,8 @@
 """Writes tables and single figures of the pages from the data.
 
 A table replaces the text between ``<!-- NAME -->`` on a line of its own and ``<!-- end -->``. A figure replaces that
-between ``<!-- figure:PRESET.NAME -->`` and ``<!-- end -->`` within a line, see `facts`.
+between ``<!-- figure:PRESET.NAME -->`` and ``<!-- end -->`` within a line, see `facts`; for PRESET ``paper`` see
+`paper_facts`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,15 @@ from pathlib import Path
 
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
-from colonnade.lab.figures import cost_tables, light_tables, map_tables, performance_tables, result_tables, study_tables
+from colonnade.lab.figures import (
+    cost_tables,
+    light_tables,
+    map_tables,
+    paper_tables,
+    performance_tables,
+    result_tables,
+    study_tables,
+)
 from colonnade.lab.figures.data import Data, Missing
 from colonnade.lab.figures.facts import FORMATS, PRESETS, facts, text
 
@@ -24,6 +33,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     **study_tables.TABLES,
     **map_tables.TABLES,
     **light_tables.TABLES,
+    **paper_tables.TABLES,
 }
 
 _TABLE = re.compile(r"^<!-- ([\w-]+) -->\n.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)
@@ -57,9 +67,11 @@ def page(content: str, data: Data) -> str:
     def figure(match: re.Match[str]) -> str:
         preset, name = match.groups()
         used.append(f"figure:{preset}.{name}")
-        if preset not in PRESETS or name not in FORMATS:
+        of_paper = paper_tables.paper_facts(data) if preset == "paper" else {}
+        if name not in of_paper and (preset not in PRESETS or name not in FORMATS):
             raise UserError(f"there is no figure {preset}.{name}: choose from {', '.join(FORMATS)} of a preset")
-        return f"<!-- figure:{preset}.{name} -->{text(facts(data, preset), name)}<!-- end -->"
+        shown = of_paper[name] if of_paper else text(facts(data, preset), name)
+        return f"<!-- figure:{preset}.{name} -->{shown}<!-- end -->"
 
     new = _FIGURE.sub(figure, _TABLE.sub(table, content))
     without_end = sorted(set(_MARKER.findall(content)) - set(used))

@@ -1,0 +1,70 @@
+"""The tables and single figures of ``docs/paper.md`` that stand in no other page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from colonnade.lab.common import paper
+from colonnade.lab.common.markdown import markdown
+from colonnade.lab.evaluation.bench import geometric_mean
+from colonnade.lab.figures.data import Data
+from colonnade.lab.figures.facts import MEGAHERTZ, facts, text
+
+#: Presets of 10×8 arrays, which table 1 has.
+ARRAYS = ("edge", "lean", "diffuse")
+
+
+def table_1(data: Data) -> str:
+    """The paper's table of designs with ours."""
+    rows = [[each if each != "-" else "–" for each in design] for design in paper.DESIGNS]
+    rates = {design.name: ("–", "–") for design in paper.DESIGNS}
+    rates[paper.DESIGNS[-1].name] = (f"{paper.MRAYS:g}", f"{paper.MILLIWATTS / paper.MRAYS:.2f}")
+    for preset in ARRAYS:
+        own = facts(data, preset)
+        widths = data.file(f"area-{preset}-asap7")["config"]["precision"]
+        design = [f"`{preset}`", "28, scaled", text(own, "mm2"), "synthesis", f"{MEGAHERTZ:g}"]
+        rows.append([*design, "{mac}b{sqrt}s{div}d".format(**widths), text(own, "watts"), text(own, "framesPerJoule")])
+        rates[design[0]] = (text(own, "mrays"), text(own, "njGlitches"))
+    titles = ["design", "process, nm", "mm²", "architecture", "clock, MHz", "precision", "power, W", "frames/s/W"]
+    return markdown([*titles, "MRay/s", "nJ a ray"], [[*row, *rates[row[0]]] for row in rows])
+
+
+def unit(data: Data) -> str:
+    """A unit that does all by itself, beside a row of `edge`."""
+    alone = data.result("paper-unit")
+    meshes = alone["bench"]["meshes"]
+    edge = {"bench": data.result("bench-edge"), "area": data.result("area-edge-asap7")}
+    rows = []
+    for name, found, units in (("an array of 1×1", alone, 1), ("a row of `edge`: 1/80 of it", edge, paper.UNITS)):
+        kge = found["area"]["levels"]["array"]["kge"] / units
+        rates = (found["bench"]["meshes"][mesh]["rays_per_cycle_in_box"] for mesh in meshes)
+        rate = geometric_mean(rates) / units
+        rows.append([name, f"{kge:,.0f}", f"{rate:.4f}", f"{1e6 * rate / kge:,.1f}"])
+    titles = ["", "kGE, with memories", f"in-box rays per cycle, {', '.join(meshes)}"]
+    return markdown([*titles, "rays per 1,000 cycles and MGE"], rows)
+
+
+def paper_facts(data: Data) -> dict[str, str]:
+    """Single figures of the page, as text.
+
+    Returns:
+        ``mapBytes``, ``mapRatio``: of an environment's albedo, and how much smaller than its source it is. ``nj``:
+        energy of a ray of the chip. ``raysAFrame``: rays of a frame of the paper. ``againstRivals``: its efficiency
+        relative to the other designs of table 1, without the graphics card.
+    """
+    maps = data.optional("environments")
+    own = [float(design.frames_per_joule) for design in paper.DESIGNS]
+    ratios = sorted(paper.FRAMES_PER_JOULE / each for each in own[:-1] if each > 1)
+    found = {
+        "nj": f"{paper.MILLIWATTS / paper.MRAYS:.2f}",
+        "raysAFrame": f"{round(paper.RAYS_A_FRAME, -3):,.0f}",
+        "againstRivals": f"{ratios[0]:.0f} to {ratios[-1]:.0f}",
+    }
+    if maps is not None:
+        living: Mapping[str, Any] = maps["living"]
+        found |= {"mapBytes": f"{living['bytes']['albedo']:,}", "mapRatio": f"{living['ratio']['albedo']:.1f}"}
+    return found
+
+
+TABLES: Mapping[str, Callable[[Data], str]] = {"table-1": table_1, "paper-unit": unit}
