@@ -70,8 +70,8 @@ def page(content: str, data: Data) -> str:
         of_paper = paper_tables.paper_facts(data) if preset == "paper" else {}
         if name not in of_paper and (preset not in PRESETS or name not in FORMATS):
             raise UserError(f"there is no figure {preset}.{name}: choose from {', '.join(FORMATS)} of a preset")
-        shown = of_paper[name] if of_paper else text(facts(data, preset), name)
-        return f"<!-- figure:{preset}.{name} -->{shown}<!-- end -->"
+        value = of_paper[name] if of_paper else text(facts(data, preset), name)
+        return f"<!-- figure:{preset}.{name} -->{value}<!-- end -->"
 
     new = _FIGURE.sub(figure, _TABLE.sub(table, content))
     without_end = sorted(set(_MARKER.findall(content)) - set(used))
