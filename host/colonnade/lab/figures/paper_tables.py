@@ -36,13 +36,15 @@ def unit(data: Data) -> str:
     meshes = alone["bench"]["meshes"]
     edge = {"bench": data.result("bench-edge"), "area": data.result("area-edge-asap7")}
     rows = []
-    for name, found, units in (("an array of 1×1", alone, 1), ("a row of `edge`: 1/80 of it", edge, paper.UNITS)):
-        kge = found["area"]["levels"]["array"]["kge"] / units
+    for name, found in (("1×1: one unit", alone), ("a row of `edge`", edge)):
+        column, array = (found["area"]["levels"][level] for level in ("column", "array"))
+        count = column["of_the_level_below"]
+        logic, area = (column[key] / count for key in ("logic_kge", "kge"))
         rates = (found["bench"]["meshes"][mesh]["rays_per_cycle_in_box"] for mesh in meshes)
-        rate = geometric_mean(rates) / units
-        rows.append([name, f"{kge:,.0f}", f"{rate:.4f}", f"{1e6 * rate / kge:,.1f}"])
-    titles = ["", "kGE, with memories", f"in-box rays per cycle, {', '.join(meshes)}"]
-    return markdown([*titles, "rays per 1,000 cycles and MGE"], rows)
+        rate = geometric_mean(rates) / count / array["of_the_level_below"]
+        rows.append([name, f"{logic:,.0f}", f"{area:,.0f}", f"{rate:.4f}", f"{1e3 * rate / area:.3f}"])
+    titles = ["its part of a column", "logic, kGE", "with memories, kGE", f"in-box rays per cycle, {', '.join(meshes)}"]
+    return markdown([*titles, "rays per cycle and MGE"], rows)
 
 
 def paper_facts(data: Data) -> dict[str, str]:
