@@ -14,6 +14,7 @@ from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.design.toolchain import project_root
+from colonnade.lab.explore.figures import area_figures
 from colonnade.lab.figures.catalog import REPORT, Entry, catalog
 
 #: Lists the entries that nobody has measured on today's hardware yet. It is absent if there are none.
@@ -91,7 +92,7 @@ def declare_measured(docs: Path, name: str) -> None:
 
 
 def problems(docs: Path) -> Iterator[str]:
-    """One line for each data file that is missing, is of no entry, or is of a configuration that is not today's."""
+    """One line for each data file that is missing, of no entry, or of other hardware than today's or another file's."""
     entries, declared = catalog(), unmeasured(docs)
     files = {file.stem for file in (docs / "data").glob("*.json")}
     for name in sorted(files - entries.keys()):
@@ -110,6 +111,36 @@ def problems(docs: Path) -> Iterator[str]:
             problem = problem_of(entry, json.loads((docs / "data" / f"{name}.json").read_text(encoding="utf-8")))
             if problem:
                 yield f"data/{name}.json: {problem}: run tools/figures {name}"
+    yield from _size_problems(Data(docs), entries)
+
+
+def _size_problems(data: Data, entries: Mapping[str, Entry]) -> Iterator[str]:
+    """One line for each array whose size is not that of the same configuration in an earlier entry."""
+    known: dict[str, tuple[str, str]] = {}
+    defaults = manifest_for(_DEFAULTS).manifest.config
+    for name, entry in entries.items():
+        for design, library, config, kge in _sizes(entry, data.get(name) or {}):
+            key = json.dumps([library, _completed(config, defaults)], sort_keys=True)
+            size = f"{kge / 1e3:.2f} MGE"
+            first, expected = known.setdefault(key, (name, size))
+            if size != expected:
+                yield (
+                    f"data/{name}.json: the array of {design} has {size}, in data/{first}.json {expected}: "
+                    f"run tools/figures {name}"
+                )
+
+
+def _sizes(entry: Entry, content: Mapping[str, Any]) -> Iterator[tuple[str, str, Any, float]]:
+    """Design, library, configuration and size, kGE, of each array of a data file."""
+    result = content.get("result")
+    if not isinstance(result, Mapping):
+        return
+    if "levels" in result:
+        report = {**result, "config": content["config"]}
+        yield entry.config, entry.libraries[0].lower(), content["config"], area_figures(report)["array_kge"]
+    for point in result.get("points", ()):
+        for library, area in point.get("area", {}).items():
+            yield point["name"], library, point["config_values"], area["array_kge"]
 
 
 def problem_of(entry: Entry, content: Mapping[str, Any]) -> str | None:

@@ -151,6 +151,34 @@ def test_files_and_the_list_of_what_is_not_measured_agree(docs: Path) -> None:
     assert list(data.problems(docs)) == ["data/bench-tiny.json is missing: run tools/figures bench-tiny"]
 
 
+def test_an_array_has_one_size_in_all_files(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cached = {"array": {"columns": 1}, "columnBvhMemory": {"cache": {}}}
+    area = Entry("area-tiny-asap7", "tiny", {"": ("colonnade",)}, libraries=("ASAP7",))
+    entries = {each.name: each for each in (area, Entry("study", "tiny", {"": ("colonnade",)}))}
+    report: dict[str, Any] = {
+        "units": {},
+        "chip": {"um2_per_gate": 0.5},
+        "slowest_path": dict.fromkeys(("ns", "fo4", "unit")),
+    }
+    report["levels"] = {"array": {"kge": 17_040.0, "logic_kge": 1.0}, "traversal_unit": {"kge": 1.0}}
+
+    def problems(size: float, config: dict[str, Any]) -> list[str]:
+        point = {"name": "base", "config_values": config, "area": {"asap7": {"array_kge": size}}}
+        for name, result in (("area-tiny-asap7", report), ("study", {"points": [point]})):
+            (docs / "data" / f"{name}.json").write_text(json.dumps({"config": cached, "result": result}))
+        return list(data._size_problems(data.Data(docs), entries))
+
+    sizes = "the array of base has 17.28 MGE, in data/area-tiny-asap7.json 17.04 MGE"
+    differs = f"data/study.json: {sizes}: run tools/figures study"
+    assert problems(17_040.0, cached) == []
+    assert problems(17_280.0, cached) == [differs]
+    assert problems(17_280.0, cached | {"array": {"columns": 2}}) == []
+    monkeypatch.setattr(data, "catalog", lambda: entries)
+    monkeypatch.setattr(data, "problem_of", lambda *_: None)
+    (docs / "data" / data.UNMEASURED).unlink()
+    assert problems(17_280.0, cached) == list(data.problems(docs))
+
+
 def test_the_catalog_measures_every_preset() -> None:
     presets = {file.stem for file in (project_root() / "configs").glob("*.json")}
     assert set(PRESETS) == presets
