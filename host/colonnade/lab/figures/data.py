@@ -117,10 +117,9 @@ def problems(docs: Path) -> Iterator[str]:
 def _size_problems(data: Data, entries: Mapping[str, Entry]) -> Iterator[str]:
     """One line for each array whose size is not that of the same configuration in an earlier entry."""
     known: dict[str, tuple[str, str]] = {}
-    defaults = manifest_for(_DEFAULTS).manifest.config
     for name, entry in entries.items():
         for design, library, config, kge in _sizes(entry, data.get(name) or {}):
-            key = json.dumps([library, _completed(config, defaults)], sort_keys=True)
+            key = json.dumps([library, _today(config)], sort_keys=True)
             size = f"{kge / 1e3:.2f} MGE"
             first, expected = known.setdefault(key, (name, size))
             if size != expected:
@@ -149,13 +148,18 @@ def problem_of(entry: Entry, content: Mapping[str, Any]) -> str | None:
         config = manifest_for(entry.config, entry.overrides).manifest.config
     except UserError as error:
         return f"the generator refuses its configuration: {error}"
-    measured = content.get("config")
-    for sections in _DEFAULTS:
-        measured = _completed(measured, manifest_for("tiny", sections).manifest.config)
+    measured = _today(content.get("config"))
     if measured != config:
         keys = sorted(dict(_leaves(config)).items() ^ dict(_leaves(measured or {})).items())
         return f"it is of another configuration than {entry.config} ({', '.join(dict.fromkeys(k for k, _ in keys))})"
     return None
+
+
+def _today(config: Any) -> Any:
+    """A configuration with all keys of today's."""
+    for sections in _DEFAULTS:
+        config = _completed(config, manifest_for("tiny", sections).manifest.config)
+    return config
 
 
 def _completed(config: Any, defaults: Any) -> Any:
