@@ -67,8 +67,8 @@ lock: setup ## make host/locks and project/dependencies.sha256 again
 
 format: setup ## let the formatters rewrite the sources
 	@tools/sbt scalafmtAll
-	@$(venv)/ruff check --fix --select I host
-	@$(venv)/ruff format host
+	@$(venv)/ruff check --fix --select I host lab
+	@$(venv)/ruff format host lab
 	@$(venv)/ruff format --config host/pyproject.toml tools/usage.py tools/host_python.py tools/supply_chain tools/site tools/browser tools/diagrams tools/layers-* tools/vocabulary tools/frame-digests tools/mutations tools/distribution tools/starting-pages tools/doors
 
 clean: ## remove everything that was built, fetched or cached

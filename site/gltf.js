@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads glTF as host/colonnade/mesh/gltf.py does, with its errors: the triangles of the default scene with normals and
+// Reads glTF as host/colonnade/mesh/files/gltf.py does, with its errors: the triangles of the default scene with normals and
 // colours. Draco is not read.
 
 import { Corners } from "./corners.js";

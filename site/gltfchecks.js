@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the JSON of glTF files, as host/colonnade/mesh/checks.py and common/input_files.py do, with their words. Of
+// Checks the JSON of glTF files, as host/colonnade/mesh/files/gltf_checks.py and common/input_files.py do, with their words. Of
 // materials only the factors are checked.
 
 export const DRACO = "KHR_draco_mesh_compression";

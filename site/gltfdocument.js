@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The document of a glTF file: its JSON, its buffers, and the arrays of its accessors; it refuses what
-// host/colonnade/mesh/gltf_document.py refuses, in its words.
+// host/colonnade/mesh/files/gltf_document.py refuses, in its words.
 
 import { checkDocument, parseDocument } from "./gltfchecks.js";
 

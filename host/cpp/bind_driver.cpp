@@ -1,4 +1,4 @@
-// colonnade._core.Driver: software/src/colonnade.c, the driver in C, whose accesses to the registers Python makes.
+// colonnade._core.Driver: driver/src/colonnade.c, the driver in C, whose accesses to the registers Python makes.
 // Without the model's headers: its namespace has the name of the driver's structure.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>

@@ -1,4 +1,4 @@
-// colonnade._core.TargetView: software/src/colonnade_view.c, which computes registers on a target, for Python.
+// colonnade._core.TargetView: driver/src/colonnade_view.c, which computes registers on a target, for Python.
 // Without the model's headers: its namespace has the name of the driver's structure.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>

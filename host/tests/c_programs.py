@@ -13,8 +13,8 @@ import pytest
 
 from colonnade.design import toolchain
 
-SOFTWARE = toolchain.project_root() / "software"
-DRIVER = sorted((SOFTWARE / "src").glob("*.c"))
+DRIVER_FOLDER = toolchain.project_root() / "driver"
+DRIVER = sorted((DRIVER_FOLDER / "src").glob("*.c"))
 WARNINGS = "-std=c11 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Werror -pedantic".split()
 SANITIZERS = "-g -fsanitize=address,undefined -fno-sanitize-recover=all".split()
 RISCV = "riscv64-unknown-elf-gcc"
@@ -31,7 +31,7 @@ def scratch() -> Path:
 
 
 def compile_c(sources: list[Path], program: Path, *options: str) -> Path:
-    includes = [f"-I{SOFTWARE / 'include'}", f"-I{program.parent}"]
+    includes = [f"-I{DRIVER_FOLDER / 'include'}", f"-I{program.parent}"]
     command = ["gcc", "-O1", *WARNINGS, *SANITIZERS, *includes, *map(str, sources), *options, "-o", str(program)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -46,6 +46,6 @@ def driver_objects() -> list[Path]:
 
 
 def compile_test(*names: str, options: tuple[str, ...] = ()) -> Path:
-    """Files of software/tests, with the driver."""
-    sources = [SOFTWARE / "tests" / f"{name}.c" for name in names]
+    """Files of driver/tests, with the driver."""
+    sources = [DRIVER_FOLDER / "tests" / f"{name}.c" for name in names]
     return compile_c([*sources, *driver_objects()], scratch() / names[0], *options)

@@ -1,4 +1,4 @@
-"""Registers of a view in floats: the oracle of those that ``software/src/colonnade_view.c`` computes in integers."""
+"""Registers of a view in floats: the oracle of those that ``driver/src/colonnade_view.c`` computes in integers."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import math
 from typing import Any
 
 import numpy as np
+from colonnade_lab.evaluation.environment_march import projection_of, view_registers
 
 from colonnade.design.manifest import Manifest
 from colonnade.environment.model import Environment
-from colonnade.lab.evaluation.environment_march import projection_of, view_registers
 from colonnade.maps.image import AttributeImage
 from colonnade.scene.view import View
 from colonnade.scene_image.header import ImageHeader

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from colonnade.lab.ppa.library import liberty, liberty_files
-from colonnade.lab.ppa.library.cells import Library
-from colonnade.lab.ppa.netlist.hierarchy import Hierarchy
-from colonnade.lab.ppa.netlist.mapped import Netlist
-from colonnade.lab.ppa.power.recording import Port, Recording
+from colonnade_lab.ppa.library import liberty, liberty_files
+from colonnade_lab.ppa.library.cells import Library
+from colonnade_lab.ppa.netlist.hierarchy import Hierarchy
+from colonnade_lab.ppa.netlist.mapped import Netlist
+from colonnade_lab.ppa.power.recording import Port, Recording
 
 #: At 2 V: 3 fJ per output transition (rise 4, fall 2, supply rail only), 1 fJ per clock transition, 5 pW of leakage.
 LIBERTY = """library (small) {

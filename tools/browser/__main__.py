@@ -20,7 +20,7 @@ import studies
 from colonnade.common.atomic_files import replacing
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT = ROOT / "out" / "browser"

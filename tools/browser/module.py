@@ -13,7 +13,7 @@ ENVIRONMENT = ROOT / ".cache" / "zig-environment"
 OBJECTS = ROOT / ".cache" / "browser-objects"
 LIBRARY = ROOT / "host" / "cpp" / "library"
 LIVE = ROOT / "host" / "cpp" / "live"
-VIEW = ROOT / "software"
+DRIVER = ROOT / "driver"
 
 TARGET = ("-target", "wasm32-wasi", "-O2", "-DNDEBUG", "-ffp-contract=off")
 #: A throw ends the module: it has no exceptions.
@@ -26,15 +26,15 @@ CPP = (
     "-Wno-unused-value",
 )
 SOURCES = (
-    ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{VIEW / 'include'}")),
+    ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{DRIVER / 'include'}")),
     *(("c++", LIVE / f"{name}.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")) for name in ("live", "kernels")),
     *(
-        ("cc", VIEW / "src" / f"{name}.c", ("-std=c11", f"-I{VIEW / 'include'}"))
+        ("cc", DRIVER / "src" / f"{name}.c", ("-std=c11", f"-I{DRIVER / 'include'}"))
         for name in ("colonnade_files", "colonnade_view", "colonnade_view_room", "colonnade_view_sample")
     ),
-    ("cc", LIBRARY / "colonnade_view_size.c", ("-std=c11", f"-I{VIEW / 'include'}")),
+    ("cc", LIBRARY / "colonnade_view_size.c", ("-std=c11", f"-I{DRIVER / 'include'}")),
 )
-HEADERS = (LIBRARY / "colonnade_model.h", LIVE / "live.h", VIEW / "include" / "colonnade_view.h")
+HEADERS = (LIBRARY / "colonnade_model.h", LIVE / "live.h", DRIVER / "include" / "colonnade_view.h")
 
 
 def compile_module(output: Path) -> None:

@@ -23,7 +23,7 @@ def write(preset: str, jar: Path, work: Path, archive: Path, time: int) -> None:
     colonnade = ROOT / ".venv" / "bin" / "colonnade"
     _run([str(colonnade), "registers", "--config", preset, "--output", str(folder / "registers")])
     for part in ("include", "src"):
-        shutil.copytree(ROOT / "software" / part, folder / "driver" / part)
+        shutil.copytree(ROOT / "driver" / part, folder / "driver" / part)
     shutil.copy(ROOT / "LICENSE", folder)
     archives.write_tar(folder, f"colonnade-{preset}", archive, time)
 

@@ -1,4 +1,4 @@
-"""Path-traces glTF files, as `colonnade.lab.evaluation.light.assets` describes them, with the principled material.
+"""Path-traces glTF files, as `colonnade_lab.evaluation.light.assets` describes them, with the principled material.
 
 Usage: asset.py FOLDER SAMPLES    run by tools/light in .cache/light-environment. Each folder in it with a job.npz gets
 truth.npz: `picture`, linear radiance, float32 [height, width, 3].

@@ -1,4 +1,4 @@
-"""Path-traces a room that `colonnade.lab.evaluation.light` describes, with Mitsuba and Open Image Denoise.
+"""Path-traces a room that `colonnade_lab.evaluation.light` describes, with Mitsuba and Open Image Denoise.
 
 Usage: room.py JOB.npz RESULT.npz SAMPLES    run by tools/light in .cache/light-environment. The result has linear
 radiance, float32 [height, width, 3]: one picture for each frame; and of the room without objects, unless the job is of

@@ -23,7 +23,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PACKAGE = ROOT / "host" / "colonnade"
+PACKAGES = (ROOT / "host" / "colonnade", ROOT / "lab" / "colonnade_lab")
 
 # Files of the root and the pages that they become.
 _ROOT_PAGES = {
@@ -153,10 +153,11 @@ class Stage:
 
 
 def packages() -> list[str]:
-    """The Python packages directly under ``colonnade``, and those of its laboratory."""
-    host = sorted(path.parent.name for path in PACKAGE.glob("*/__init__.py") if path.parent.name not in ("api", "lab"))
-    laboratory = sorted(f"lab.{path.parent.name}" for path in PACKAGE.glob("lab/*/__init__.py"))
-    return [f"colonnade.{name}" for name in (*host, *laboratory)]
+    """The Python packages directly under ``colonnade`` and ``colonnade_lab``."""
+    found = [
+        f"{package.name}.{path.parent.name}" for package in PACKAGES for path in sorted(package.glob("*/__init__.py"))
+    ]
+    return [name for name in found if name != "colonnade.api"]
 
 
 def _front_matter(page: str) -> str:

@@ -23,7 +23,7 @@ else:
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = ROOT / "host" / "pyproject.toml"
-LABORATORY = ROOT / "host" / "lab" / "pyproject.toml"
+LABORATORY = ROOT / "lab" / "pyproject.toml"
 LOCKS = ROOT / "host" / "locks"
 REMADE_BY = "run: tools/lock"
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.mesh.load import clean_mesh
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 
 
 class TriangleMesh(Protocol):

@@ -21,7 +21,7 @@ from colonnade.design.config_name import Overrides
 from colonnade.design.generator import manifest_for
 from colonnade.device.scene import DeviceScene
 from colonnade.maps.encoders import Encoder
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.frames import render_frames
 from colonnade.render.request import Backend, RenderRequest
 from colonnade.render.result import RenderResult

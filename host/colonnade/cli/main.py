@@ -35,7 +35,7 @@ DEBUG = "COLONNADE_DEBUG"
 #: Former commands, and what replaces them.
 REPLACED = {"sweep": "colonnade explore STUDY.toml"}
 #: The commands of the laboratory, which is a distribution of its own, and their summaries. Each one is defined in the
-#: module of its name in `colonnade.lab.cli`.
+#: module of its name in `colonnade_lab.cli`.
 LABORATORY = {
     "study": "Measure reconstructed rooms, or AR frames in them.",
     "verify": "Compare the RTL with its model, and the model with Embree.",
@@ -102,9 +102,9 @@ class OneLineErrors(click.Group):
 
 def _of_laboratory(name: str) -> click.Command:
     """The command of the laboratory; a `UserError` if it is not installed."""
-    if find_spec("colonnade.lab") is None:
+    if find_spec("colonnade_lab") is None:
         raise UserError(f"no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab")
-    command = getattr(import_module(f"colonnade.lab.cli.{name}"), name)
+    command = getattr(import_module(f"colonnade_lab.cli.{name}"), name)
     assert isinstance(command, click.Command)
     return command
 

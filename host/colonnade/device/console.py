@@ -30,7 +30,7 @@ class ConsoleGuard:
     """Keeps the console from drawing into memory while a display shows a part of it.
 
     It draws again after `close`, after the end of the program, or after SIGTERM or SIGHUP unless the program handles
-    them. ``software/examples/target_uio.c`` has the same rule in C.
+    them. ``driver/examples/target_uio.c`` has the same rule in C.
 
     Args:
         base: Bus address of the memory.

@@ -24,7 +24,7 @@ from colonnade.scene_image.header import LoadedMemory
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.maps.image import AttributeImage
-    from colonnade.mesh.mesh import Extent
+    from colonnade.mesh.materials.mesh import Extent
     from colonnade.scene.model import Scene
 
 

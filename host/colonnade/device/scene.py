@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from colonnade.environment.model import Environment, EnvironmentCamera
     from colonnade.environment.panorama import Panorama
     from colonnade.environment.surround import Surround
-    from colonnade.mesh.mesh import Mesh
+    from colonnade.mesh.materials.mesh import Mesh
     from colonnade.scene_image.file import SceneImage
 
 

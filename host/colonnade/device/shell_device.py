@@ -1,4 +1,4 @@
-"""A device in its AXI4 shell: the driver in C (software/src/colonnade.c) over a transport."""
+"""A device in its AXI4 shell: the driver in C (driver/src/colonnade.c) over a transport."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the driver has to know of one design: ``struct colonnade_design`` of software/include/colonnade.h."""
+"""What the driver has to know of one design: ``struct colonnade_design`` of driver/include/colonnade.h."""
 
 from __future__ import annotations
 

@@ -19,21 +19,22 @@ from colonnade.common.errors import UserError
 from colonnade.common.input_files import is_file, require_regular
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
-from colonnade.mesh import catalog, primitives, teapot
 from colonnade.mesh import losses as lost
-from colonnade.mesh.coverage import without_alpha
-from colonnade.mesh.formats import SUFFIXES, read_surface
+from colonnade.mesh.files import catalog
+from colonnade.mesh.files.formats import SUFFIXES, read_surface
+from colonnade.mesh.geometry import primitives, teapot
+from colonnade.mesh.geometry.normals import corner_normals
+from colonnade.mesh.geometry.topology import Faces, drop_faces, merge_rows, subdivide, subdivide_corners
+from colonnade.mesh.geometry.winding import find_winding
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.materials import PLAIN, MeshMaterial
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.normal_baking import baked
-from colonnade.mesh.normals import corner_normals
-from colonnade.mesh.palette import MAX_MATERIALS, coloured_materials, corner_coloured_materials
-from colonnade.mesh.relief import Relief
-from colonnade.mesh.swatches import with_swatches
-from colonnade.mesh.texture import Texture
-from colonnade.mesh.topology import Faces, drop_faces, merge_rows, subdivide, subdivide_corners
-from colonnade.mesh.winding import find_winding
+from colonnade.mesh.materials.coverage import without_alpha
+from colonnade.mesh.materials.materials import PLAIN, MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.mesh.materials.normal_baking import baked
+from colonnade.mesh.materials.palette import MAX_MATERIALS, coloured_materials, corner_coloured_materials
+from colonnade.mesh.materials.relief import Relief
+from colonnade.mesh.materials.swatches import with_swatches
+from colonnade.mesh.materials.texture import Texture
 
 TEAPOT_LEVEL = 10
 TEAPOT_LIMIT = 200
@@ -180,7 +181,7 @@ def clean_mesh(
         where: Its source, in messages.
         materials: The materials.
         face_materials: uint8 [m]; None: all faces have the first material.
-        normals: Normals of the file, float64 [m, 3, 3]; see `colonnade.mesh.normals.corner_normals`.
+        normals: Normals of the file, float64 [m, 3, 3]; see `colonnade.mesh.geometry.normals.corner_normals`.
         crease: Crease angle, degrees, in place of ``normals``.
         losses: What the file lost so far; what is repaired here is added.
         colours: Corner colours, float64 [m, 3, 3]; see `Mesh.corner_colours`.

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
-from colonnade.mesh.materials import ROUGH_METAL
+from colonnade.mesh.materials.materials import ROUGH_METAL
 from colonnade.reference.embree import RayTracer, Triangles
 
 if TYPE_CHECKING:
-    from colonnade.mesh.mesh import Mesh
+    from colonnade.mesh.materials.mesh import Mesh
     from colonnade.scene.view import View
 
 

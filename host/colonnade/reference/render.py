@@ -15,7 +15,7 @@ from colonnade.reference.path_tracer import PathTracer, TracedPaths
 from colonnade.reference.scatter import Bytes, pixel_words
 
 if TYPE_CHECKING:
-    from colonnade.mesh.mesh import Mesh
+    from colonnade.mesh.materials.mesh import Mesh
     from colonnade.reference.environment.surface import Backdrop
     from colonnade.scene.view import View
 

@@ -1,6 +1,6 @@
 """Computes all frame registers of a scene, as defined in docs/numbers.md.
 
-Camera, lights, outline and the projection to a room's maps are those of ``software/src/colonnade_view.c``
+Camera, lights, outline and the projection to a room's maps are those of ``driver/src/colonnade_view.c``
 (docs/driver.md): on the object's grid, so that the object itself never moves.
 """
 

@@ -15,7 +15,7 @@ from colonnade.registers.shadow_window import MARGIN, surface_points
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
     from colonnade.maps.encoded import EncodedEnvironment
-    from colonnade.mesh.mesh import Extent
+    from colonnade.mesh.materials.mesh import Extent
     from colonnade.scene.view import View
     from colonnade.scene_image.header import ImageHeader
 

@@ -7,7 +7,7 @@ import numpy as np
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.mesh.materials import ROUGH_METAL, MeshMaterial
+from colonnade.mesh.materials.materials import ROUGH_METAL, MeshMaterial
 from colonnade.registers.surface_offset import surface_offset
 from colonnade.scene.view import View
 from colonnade.scene_image.header import ImageHeader

@@ -11,7 +11,7 @@ from colonnade.common.types import Floats
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.mesh.mesh import Extent
+    from colonnade.mesh.materials.mesh import Extent
     from colonnade.scene.view import View
 
 #: x0, y0, x1, y1; x1 and y1 are exclusive.

@@ -1,4 +1,4 @@
-"""Registers as a target computes them: ``software/src/colonnade_view.c`` (docs/driver.md)."""
+"""Registers as a target computes them: ``driver/src/colonnade_view.c`` (docs/driver.md)."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from colonnade.design.generator import design_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.device import require_no_errors
 from colonnade.device.scene import DeviceScene
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.host_frame import HostFrame
 from colonnade.render.passes import Registers, model_passes, rtl_passes

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.types import Floats, Indices
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.denoise import Guide
 
 

@@ -37,7 +37,7 @@ from colonnade.scene.view import make_view, with_overrides
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.mesh.mesh import Mesh
+    from colonnade.mesh.materials.mesh import Mesh
     from colonnade.reference.environment.surface import Backdrop
 
 

@@ -13,7 +13,7 @@ from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
 from colonnade.design.config_name import Overrides
 from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene.model import Denoiser, Scene
 
 Backend = Literal["rtl", "model", "reference"]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from colonnade.common.accumulation import Accumulation
 from colonnade.common.hits import Hits
 from colonnade.common.image_io import encode_srgb
-from colonnade.mesh.mesh import MeshPart
+from colonnade.mesh.materials.mesh import MeshPart
 from colonnade.render.report import FrameReport
 
 

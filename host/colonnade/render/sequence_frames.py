@@ -20,7 +20,7 @@ from colonnade.maps.encoders import Encoder
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.device_frames import host_frames, rendered
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult

@@ -18,7 +18,7 @@ from colonnade.scene.samples import Point
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment, EnvironmentCamera
-    from colonnade.mesh.mesh import Extent
+    from colonnade.mesh.materials.mesh import Extent
 
 
 #: Largest fraction of the picture's width that a framed object covers.

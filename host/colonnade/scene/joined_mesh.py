@@ -12,10 +12,10 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import PLAIN
-from colonnade.mesh.mesh import Mesh, MeshPart
-from colonnade.mesh.palette import MAX_MATERIALS
-from colonnade.mesh.texture import Texture
+from colonnade.mesh.materials.materials import PLAIN
+from colonnade.mesh.materials.mesh import Mesh, MeshPart
+from colonnade.mesh.materials.palette import MAX_MATERIALS
+from colonnade.mesh.materials.texture import Texture
 from colonnade.scene.model import Material, Scene, SceneObject
 from colonnade.scene.object_pose import Pose, footprint_of, free_placement, rotation_matrix, standing_pose
 from colonnade.scene.standing import surface_point

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.environment.panorama import Panorama
     from colonnade.environment.surround import Surround
-    from colonnade.mesh.mesh import Extent
+    from colonnade.mesh.materials.mesh import Extent
     from colonnade.scene.model import Scene
 
 #: Share of the pixels darker than the photo from which a note reports it.

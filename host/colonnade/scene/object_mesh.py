@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from colonnade.common import notes
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.palette import (
+from colonnade.mesh.materials.palette import (
     reduced,
     table_entries,
     with_corner_albedo,
@@ -16,7 +16,7 @@ from colonnade.mesh.palette import (
     without_emission,
     without_textures,
 )
-from colonnade.mesh.roughness import with_fewer_roughnesses
+from colonnade.mesh.materials.roughness import with_fewer_roughnesses
 from colonnade.scene.joined_mesh import joined_mesh, report_replaced
 from colonnade.scene.model import Scene
 from colonnade.scene.passes import may_have_layers
@@ -25,7 +25,7 @@ from colonnade.scene.view import with_overrides
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
     from colonnade.environment.model import Environment
-    from colonnade.mesh.mesh import Mesh
+    from colonnade.mesh.materials.mesh import Mesh
 
 
 @dataclass(frozen=True)

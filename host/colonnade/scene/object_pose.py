@@ -17,7 +17,7 @@ from colonnade.scene.standing import Footprint, free_place, surface_point
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.mesh.mesh import Extent
+    from colonnade.mesh.materials.mesh import Extent
 
 
 @dataclass(frozen=True)

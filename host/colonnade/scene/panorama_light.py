@@ -22,7 +22,7 @@ from colonnade.scene.room_lights import with_lights
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.mesh.mesh import Extent
+    from colonnade.mesh.materials.mesh import Extent
     from colonnade.scene.model import Scene
 
 #: Distance of a light without a room, in edges of the object's cube.

@@ -18,7 +18,7 @@ from colonnade.common.input_files import check_values, read_input
 from colonnade.common.limits import MAX_COORDINATE
 from colonnade.common.toml_files import parse_toml
 from colonnade.design.toolchain import project_root
-from colonnade.mesh.formats import SUFFIXES
+from colonnade.mesh.files.formats import SUFFIXES
 from colonnade.scene.model import MAX_EDGE, MAX_OBJECTS, MeshSource, Scene
 
 #: Tables of the file in the order of messages. `Scene` names ``object`` placement, and splits several

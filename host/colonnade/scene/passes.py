@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from colonnade.common import notes
-from colonnade.mesh.materials import BLACK, LAYERS, Layer, MeshMaterial, as_rendered, in_layer
+from colonnade.mesh.materials.materials import BLACK, LAYERS, Layer, MeshMaterial, as_rendered, in_layer
 from colonnade.scene.model import Scene
 from colonnade.scene.samples import samples_of_frame
 

@@ -14,7 +14,7 @@ from colonnade.scene.view import world_positions
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.mesh.mesh import Extent
+    from colonnade.mesh.materials.mesh import Extent
 
 
 def lights_of(scene: Scene, extent: Extent, environment: Environment | None) -> RoomLights:

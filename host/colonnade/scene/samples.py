@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from colonnade.common.types import Floats
-from colonnade.mesh.materials import Layer
+from colonnade.mesh.materials.materials import Layer
 
 #: A point of a disc of radius 1, or a shift in pixels: right and down.
 Point = tuple[float, float]

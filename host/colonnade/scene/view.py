@@ -13,8 +13,8 @@ import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
-from colonnade.mesh.materials import MARKS, PLAIN, MeshMaterial, as_rendered, in_layer
-from colonnade.mesh.mesh import Extent
+from colonnade.mesh.materials.materials import MARKS, PLAIN, MeshMaterial, as_rendered, in_layer
+from colonnade.mesh.materials.mesh import Extent
 from colonnade.scene.cameras import (
     WorldCamera,
     camera_axes,

@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.texture import Texture
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.mesh.materials.texture import Texture
 
 #: Edge of a tile, texels.
 TILE = 16

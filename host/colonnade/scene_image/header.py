@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Extent, MeshPart
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Extent, MeshPart
 
 
 @dataclass(frozen=True)

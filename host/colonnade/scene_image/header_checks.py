@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from colonnade.mesh.materials import KINDS
+from colonnade.mesh.materials.materials import KINDS
 
 #: Integer keys of the header, and the limits of their values.
 _COUNTS = (

@@ -18,9 +18,9 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest, field_places
 from colonnade.maps.encoders import Encoder
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.palette import TEXTURE_HARDWARE, table_entries
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.mesh.materials.palette import TEXTURE_HARDWARE, table_entries
 from colonnade.scene_image.atlas import Atlas, make_atlas, uv_codes
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.header import ImageHeader, ObjectFrame, TreeStatistics

@@ -14,7 +14,7 @@ namespace {
 
 using namespace colonnade;
 
-/// Up to this angle, 60 degrees, edges are smooth (host/colonnade/mesh/normals.py).
+/// Up to this angle, 60 degrees, edges are smooth (host/colonnade/mesh/geometry/normals.py).
 constexpr double leastCosine = 0.5000000000000001 - 1e-9;
 
 struct Register {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Winding of closed parts: counter-clockwise seen from outside (host/colonnade/mesh/winding.py).
+/// Winding of closed parts: counter-clockwise seen from outside (host/colonnade/mesh/geometry/winding.py).
 #pragma once
 
 #include "normals.hpp"

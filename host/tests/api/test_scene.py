@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
 
 import colonnade
 from colonnade.design.toolchain import project_root
-from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
 
 SIZE = (48, 36)

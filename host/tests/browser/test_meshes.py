@@ -13,7 +13,7 @@ from gltf_documents import READ, REFUSED
 
 from colonnade.common.errors import UserError
 from colonnade.common.vectors import unit_vectors
-from colonnade.mesh.formats import read_surface
+from colonnade.mesh.files.formats import read_surface
 from colonnade.mesh.load import load_mesh
 
 pytestmark = NEEDS_MODULE

@@ -26,7 +26,7 @@ from colonnade.device.scene import DeviceScene
 from colonnade.environment.light_cube import LightCube
 from colonnade.environment.seen_light import FINE
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.cameras import camera_axes
 from colonnade.scene.parser import load_scene

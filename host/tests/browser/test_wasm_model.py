@@ -21,9 +21,9 @@ from colonnade.environment.load import load_environment
 from colonnade.environment.seen_light import FINE
 from colonnade.maps.encoded import layout_of
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
+from colonnade.mesh.geometry.primitives import Geometry, cube, sphere
 from colonnade.mesh.load import clean_mesh, load_mesh
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.primitives import Geometry, cube, sphere
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.environment import map_sections

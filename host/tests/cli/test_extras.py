@@ -16,7 +16,7 @@ from colonnade.common.extras import EXTRAS
 from colonnade.design.toolchain import project_root
 
 #: Packages of the laboratory.
-LIBRARIES = ["colonnade.lab", "matplotlib", "distributed", "dask", "optuna", "altair", "vl_convert", "jinja2"]
+LIBRARIES = ["colonnade_lab", "matplotlib", "distributed", "dask", "optuna", "altair", "vl_convert", "jinja2"]
 
 #: Renders in a process that can import no module of an extra and none of the laboratory.
 FRAME = """
@@ -85,9 +85,9 @@ def test_a_frame_needs_neither_extras_nor_laboratory(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", LABORATORY)
 def test_without_the_laboratory_its_commands_name_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in [module for module in sys.modules if module.startswith("colonnade.lab")]:
+    for module in [module for module in sys.modules if module.startswith("colonnade_lab")]:
         monkeypatch.delitem(sys.modules, module)
-    monkeypatch.setitem(sys.modules, "colonnade.lab", None)
+    monkeypatch.setitem(sys.modules, "colonnade_lab", None)
     result = CliRunner().invoke(cli, [name, "--help"])
     line = f"colonnade: error: no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab\n"
     assert (result.exit_code, result.stderr) == (2, line)
@@ -102,9 +102,9 @@ def test_both_distributions_have_one_version() -> None:
 
 def test_no_file_belongs_to_two_distributions() -> None:
     host, laboratory = (
-        {str(file) for file in files(name) or () if str(file).startswith("colonnade/")}
+        {str(file) for file in files(name) or () if str(file).startswith(("colonnade/", "colonnade_lab/"))}
         for name in ("colonnade", "colonnade-lab")
     )
-    assert all(file.startswith("colonnade/lab/") for file in laboratory)
-    assert not any(file.startswith("colonnade/lab/") for file in host)
-    assert "colonnade/lab/report/explorer/page.html.jinja" in laboratory and "colonnade/cli/main.py" in host
+    assert all(file.startswith("colonnade_lab/") for file in laboratory)
+    assert not any(file.startswith("colonnade_lab/") for file in host)
+    assert "colonnade_lab/report/explorer/page.html.jinja" in laboratory and "colonnade/cli/main.py" in host

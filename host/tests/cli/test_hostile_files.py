@@ -244,7 +244,7 @@ CASES |= {
 @hostile.parametrised(CASES)
 def test_file_is_refused(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Yosys need not be installed to refuse a liberty
-    monkeypatch.setattr("colonnade.lab.ppa.measure.require_yosys", lambda: None)
+    monkeypatch.setattr("colonnade_lab.ppa.measure.require_yosys", lambda: None)
     hostile.run(case, folder, monkeypatch)
 
 

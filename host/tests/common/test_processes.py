@@ -12,16 +12,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from colonnade_lab.common.parallel import in_order
 
 from colonnade.common import processes
-from colonnade.lab.common.parallel import in_order
 
 #: Imitates a study: two threads, each with a temporary folder and a stand-in for the simulator with a child process.
 STUDY = """
 import sys, time
 from pathlib import Path
 from colonnade.common import processes
-from colonnade.lab.common.parallel import in_order
+from colonnade_lab.common.parallel import in_order
 from colonnade.common.temporary import temporary_folder
 
 def one(number):

@@ -18,10 +18,10 @@ from colonnade.device import console
 from colonnade.device.console import ConsoleGuard
 from colonnade.device.shell_device import ShellDevice
 
-SOFTWARE = toolchain.project_root() / "software"
+DRIVER = toolchain.project_root() / "driver"
 BASE, SIZE = 0xBF00_0000, 0x10000
 #: Displays of a machine, what becomes of the console, and the line of a display that begins where the memory does.
-#: START:BYTES:LINE; "no-console" and "deaf" are of the machine (software/tests/console.c).
+#: START:BYTES:LINE; "no-console" and "deaf" are of the machine (driver/tests/console.c).
 CASES = {
     "bf000000:8000:512": ("graphics text", 512),
     "absent bf000000:20000:512": ("graphics text", 512),
@@ -90,9 +90,9 @@ def program(tmp_path_factory: pytest.TempPathFactory, design: GeneratedDesign) -
 
     folder = tmp_path_factory.mktemp("console")
     (folder / "colonnade_design.h").write_text(design_header(register_table(design), design.manifest))
-    sources = [SOFTWARE / "tests/console.c", SOFTWARE / "examples/target.c", *(SOFTWARE / "src").glob("colonnade*.c")]
+    sources = [DRIVER / "tests/console.c", DRIVER / "examples/target.c", *(DRIVER / "src").glob("colonnade*.c")]
     command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
-    includes = [f"-I{SOFTWARE / 'include'}", f"-I{SOFTWARE / 'examples'}", f"-I{folder}"]
+    includes = [f"-I{DRIVER / 'include'}", f"-I{DRIVER / 'examples'}", f"-I{folder}"]
     subprocess.run([*command, *includes, *sources, "-o", folder / "console"], check=True)
     return folder / "console"
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.environment_march import DeviceMarch
+from colonnade_lab.evaluation.studies.ar_losses import PLACEMENTS
 from live_maps import live_maps
 
 from colonnade.common.types import Floats
@@ -16,13 +18,11 @@ from colonnade.design.generator import design_for, manifest_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.environment.load import load_environment
-from colonnade.lab.evaluation.environment_march import DeviceMarch
-from colonnade.lab.evaluation.studies.ar_losses import PLACEMENTS
 from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.maps.encoders import Encoder
 from colonnade.maps.planes import PlaneProjection
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.mesh import Extent
+from colonnade.mesh.materials.mesh import Extent
 from colonnade.reference.environment.ray_march import HIT
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.occlusion import tolerance_registers

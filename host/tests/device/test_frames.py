@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from colonnade_lab.evaluation.fuzz.cases import coloured, textured
+from colonnade_lab.evaluation.throughput import figures, records_taken
 from equal_frames import assert_equal
 
 from colonnade.common.errors import UserError
@@ -16,10 +18,8 @@ from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
-from colonnade.lab.evaluation.fuzz.cases import coloured, textured
-from colonnade.lab.evaluation.throughput import figures, records_taken
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.registers.frame import frame_registers
 from colonnade.render.report import frame_report
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Paths, Scene

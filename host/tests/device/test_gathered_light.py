@@ -20,7 +20,7 @@ from colonnade.environment.load import load_environment
 from colonnade.maps.cache import encoded_environment
 from colonnade.maps.layout import AttributeLayout
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import COAT_REFLECTANCE, Kind
+from colonnade.mesh.materials.materials import COAT_REFLECTANCE, Kind
 from colonnade.render.frames import render_frames
 from colonnade.render.reference_frames import traced_frames
 from colonnade.render.request import RenderRequest

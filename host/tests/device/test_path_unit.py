@@ -6,12 +6,12 @@ import shutil
 from dataclasses import replace
 
 import pytest
+from colonnade_lab.evaluation.throughput import figures, records_taken
 from equal_frames import assert_equal
 
 from colonnade.design.generator import design_for
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
-from colonnade.lab.evaluation.throughput import figures, records_taken
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.report import frame_report

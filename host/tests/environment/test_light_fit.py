@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.synthetic_attic import AMBIENT, LAMP, LAMP_COLOUR, attic
 
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
@@ -15,7 +16,6 @@ from colonnade.environment.light_fit import fit_lights, relit, relit_psnr
 from colonnade.environment.lights import MAX_FALLOFF, RoomLight, RoomLights, exposure, irradiance, world_surface
 from colonnade.environment.model import Environment
 from colonnade.environment.photo_colours import MAX_CLAMPED, photo_colours
-from colonnade.lab.evaluation.studies.synthetic_attic import AMBIENT, LAMP, LAMP_COLOUR, attic
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from colonnade_lab.evaluation.studies.synthetic_attic import EYE, TARGET, attic, attic_parts, camera_at, synthetic_room
 
 from colonnade.environment.light_cube import LightCube
 from colonnade.environment.seen_light import FINE, SeenLight
-from colonnade.lab.evaluation.studies.synthetic_attic import EYE, TARGET, attic, attic_parts, camera_at, synthetic_room
 
 
 def test_a_second_view_shows_further_directions() -> None:

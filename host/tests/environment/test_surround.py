@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.synthetic_attic import attic
 from scipy.optimize import nnls
 
 from colonnade.common.image_io import encode_srgb
@@ -16,7 +17,6 @@ from colonnade.environment.light_fit import fit_lights
 from colonnade.environment.lights import MIN_HEIGHT, irradiance, light_box, world_surface
 from colonnade.environment.model import Environment
 from colonnade.environment.surround import PATCHES, Surround, non_negative_least_squares, wall_exposures
-from colonnade.lab.evaluation.studies.synthetic_attic import attic
 
 LOW, HIGH = np.array([-2.0, 0.0, -3.0]), np.array([2.0, 2.5, 3.0])
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-PROGRAM = Path(__file__).resolve().parents[3] / "software" / "litex" / "bitstream.py"
+PROGRAM = Path(__file__).resolve().parents[3] / "soc" / "litex" / "bitstream.py"
 
 
 def test_the_clock_with_the_least_margin_counts() -> None:

@@ -12,7 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from c_programs import DRIVER, RISCV, SOFTWARE, WARNINGS, compile_c, compile_test, driver_objects, scratch
+from c_programs import DRIVER, DRIVER_FOLDER, RISCV, WARNINGS, compile_c, compile_test, driver_objects, scratch
+from colonnade_lab.evaluation.demonstration.walk import walk_scene, write_walk
+from colonnade_lab.evaluation.studies.generated_rooms import generated_room
+from colonnade_lab.evaluation.studies.synthetic_attic import write_room
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -27,9 +30,6 @@ from colonnade.device.shell_build import build_shell_simulator
 from colonnade.environment.sequence import load_sequence
 from colonnade.integration.design_header import design_header
 from colonnade.integration.register_table import register_table
-from colonnade.lab.evaluation.demonstration.walk import walk_scene, write_walk
-from colonnade.lab.evaluation.studies.generated_rooms import generated_room
-from colonnade.lab.evaluation.studies.synthetic_attic import write_room
 from colonnade.maps.encoded import layout_of
 from colonnade.maps.live import LiveEncoder, LiveFrame
 from colonnade.mesh.load import load_mesh
@@ -105,15 +105,25 @@ def test_the_driver_compiles_without_a_warning(compiler: str, tmp_path: Path) ->
     if shutil.which(compiler.split()[0]) is None:
         pytest.skip(f"no {compiler.split()[0]}")
     for source in DRIVER:
-        command = [*compiler.split(), *WARNINGS, "-O2", "-ffreestanding", f"-I{SOFTWARE / 'include'}", "-c", source]
+        command = [
+            *compiler.split(),
+            *WARNINGS,
+            "-O2",
+            "-ffreestanding",
+            f"-I{DRIVER_FOLDER / 'include'}",
+            "-c",
+            source,
+        ]
         run_silently(*command, "-o", tmp_path / f"{source.stem}.o")
 
 
 def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> None:
     (tmp_path / "colonnade_design.h").write_text(design_header(register_table(design), design.manifest))
-    linux = [SOFTWARE / "examples" / name for name in ("target.c", "target_uio.c")]
+    linux = [DRIVER_FOLDER / "examples" / name for name in ("target.c", "target_uio.c")]
     for name, options in (("uio", ()), ("viewer", ("-lm",))):
-        program = compile_c([SOFTWARE / "examples" / f"{name}.c", *linux, *driver_objects()], tmp_path / name, *options)
+        program = compile_c(
+            [DRIVER_FOLDER / "examples" / f"{name}.c", *linux, *driver_objects()], tmp_path / name, *options
+        )
         done = subprocess.run([program, "uio9", "none", "none"], capture_output=True, text=True)
         assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
 
@@ -123,7 +133,7 @@ def compiled_driver(program: str, header: str) -> Path:
     """A program of the tests, or the viewer of the examples, with the driver, for the design of a header."""
     folder = scratch()
     (folder / "colonnade_design.h").write_text(header)
-    tests, examples = SOFTWARE / "tests", SOFTWARE / "examples"
+    tests, examples = DRIVER_FOLDER / "tests", DRIVER_FOLDER / "examples"
     if program == "viewer":
         sources = [examples / "viewer.c", examples / "target.c", tests / "target_simulated.c"]
         return compile_c([*sources, *driver_objects()], folder / "driver", f"-I{examples}", "-lm")

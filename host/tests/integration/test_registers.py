@@ -107,7 +107,7 @@ def test_all_headers_compile_without_a_library(folder: Path, tmp_path: Path, com
     use = "unsigned word(void);\nunsigned word(void) { return colonnade_design.maps[0].words; }"
     source.write_text("".join(f'#include "{name}"\n' for name in names) + use)
     command = [*compiler.split(), "-ffreestanding", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only"]
-    includes = [f"-I{toolchain.project_root() / 'software' / 'include'}", f"-I{folder}"]
+    includes = [f"-I{toolchain.project_root() / 'driver' / 'include'}", f"-I{folder}"]
     done = subprocess.run([*command, *includes, source], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
@@ -154,7 +154,7 @@ def test_a_framebuffer_that_is_none_is_refused(framebuffer: str, tmp_path: Path)
 
 def test_the_shell_is_the_same_in_every_design(design: GeneratedDesign) -> None:
     """Also in the repository's header."""
-    header = (toolchain.project_root() / "software" / "include" / "colonnade_shell.h").read_text()
+    header = (toolchain.project_root() / "driver" / "include" / "colonnade_shell.h").read_text()
     assert shell_header(design) == header
     assert shell_header(shell_manifest_for("small", bus_bytes=64)) == header
     assert re.search(r"STATUS__ISLOADING_bm 0x4$", header, re.MULTILINE)

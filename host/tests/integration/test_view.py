@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from c_programs import DRIVER, NEEDS_RISCV, RISCV, SANITIZERS, SOFTWARE, WARNINGS
+from c_programs import DRIVER, DRIVER_FOLDER, NEEDS_RISCV, RISCV, SANITIZERS, WARNINGS
 
 from colonnade.design import toolchain
 from colonnade.design.manifest import Manifest
@@ -20,8 +20,8 @@ from colonnade.scene.view import place
 from colonnade.scene_image.packer import pack
 
 ROOT = toolchain.project_root()
-SOURCES = [SOFTWARE / "tests" / "view.c", *DRIVER]
-VIEW = sorted((SOFTWARE / "src").glob("colonnade_view*.c"))
+SOURCES = [DRIVER_FOLDER / "tests" / "view.c", *DRIVER]
+VIEW = sorted((DRIVER_FOLDER / "src").glob("colonnade_view*.c"))
 MACHINE = ["-march=rv32im", "-mabi=ilp32", "-ffreestanding", "-nostdlib"]
 QEMU = "qemu-riscv32"
 NEEDS_QEMU = pytest.mark.skipif(shutil.which(QEMU) is None, reason=f"no {QEMU}: apt-get install qemu-user")
@@ -59,7 +59,15 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def build(compiler: str, table: Path, name: str, *options: str) -> Path:
     program = table / name
     libraries = ["-lgcc"] if compiler == RISCV else []
-    command = [compiler, *WARNINGS, f"-I{SOFTWARE / 'include'}", f"-I{table}", *options, *map(str, SOURCES), *libraries]
+    command = [
+        compiler,
+        *WARNINGS,
+        f"-I{DRIVER_FOLDER / 'include'}",
+        f"-I{table}",
+        *options,
+        *map(str, SOURCES),
+        *libraries,
+    ]
     done = subprocess.run([*command, "-o", str(program)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return program
@@ -114,10 +122,11 @@ def test_nothing_is_allocated_and_no_float_is_used(tmp_path: Path, compiler: str
     for source in VIEW:
         target = tmp_path / f"{source.stem}.o"
         subprocess.run(
-            [compiler, *WARNINGS, "-O2", *machine, f"-I{SOFTWARE / 'include'}", "-c", source, "-o", target], check=True
+            [compiler, *WARNINGS, "-O2", *machine, f"-I{DRIVER_FOLDER / 'include'}", "-c", source, "-o", target],
+            check=True,
         )
         nm = compiler.replace("gcc", "nm")
         symbols = subprocess.run([nm, "-u", target], capture_output=True, text=True, check=True).stdout.split()
         assert [name for name in symbols if name != "U" and ALLOWED.fullmatch(name) is None] == []
-        text = source.read_text() + (SOFTWARE / "src" / "colonnade_integers.h").read_text()
+        text = source.read_text() + (DRIVER_FOLDER / "src" / "colonnade_integers.h").read_text()
         assert re.search(r"\b(float|double|malloc|__int128)\b", text) is None

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from colonnade_lab.evaluation.studies.generated_rooms import generated_room
+from colonnade_lab.evaluation.studies.synthetic_attic import write_room
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,8 +20,6 @@ from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment, EnvironmentCamera
-from colonnade.lab.evaluation.studies.generated_rooms import generated_room
-from colonnade.lab.evaluation.studies.synthetic_attic import write_room
 from colonnade.maps.image import AttributeImage, memory_words
 from colonnade.maps.layout import POINTER_BITS, AttributeLayout
 from colonnade.maps.live import (

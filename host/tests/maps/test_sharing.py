@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.generated_rooms import generated_room
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from colonnade.lab.evaluation.studies.generated_rooms import generated_room
 from colonnade.maps import cell_errors, plane_encoder, sharing, two_level_encoder
 from colonnade.maps.heap import pack_words
 from colonnade.maps.layout import AttributeLayout

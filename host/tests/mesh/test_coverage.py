@@ -12,9 +12,9 @@ import pytest
 from textured_files import gltf, png
 
 from colonnade.common.errors import UserError
-from colonnade.mesh import coverage
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials import coverage
+from colonnade.mesh.materials.mesh import Mesh
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"
 

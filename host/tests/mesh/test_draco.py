@@ -17,10 +17,10 @@ import pytest
 from textured_files import FOUR, gltf, png
 
 from colonnade.common.errors import UserError
-from colonnade.mesh import draco
-from colonnade.mesh.formats import read_surface
+from colonnade.mesh.files import draco
+from colonnade.mesh.files.formats import read_surface
+from colonnade.mesh.geometry.primitives import sphere
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.primitives import sphere
 
 DRACO = "KHR_draco_mesh_compression"
 #: Component types of glTF, and widths of its types.
@@ -230,7 +230,7 @@ def test_all_primitives_are_decoded_at_once(tmp_path: Path, monkeypatch: pytest.
     arrays, faces, stream = ball()
     calls = []
     monkeypatch.setattr(
-        "colonnade.mesh.gltf_draco.decode_draco",
+        "colonnade.mesh.files.gltf_draco.decode_draco",
         lambda streams: calls.append(len(streams)) or draco.decode_draco(streams),
     )
     path = written(tmp_path, {"POSITION": arrays["POSITION"]}, [(stream, ids_of(stream))] * 3)

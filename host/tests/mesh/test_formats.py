@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
+from colonnade.mesh.geometry.normals import face_normals
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.normals import face_normals
+from colonnade.mesh.materials.mesh import Mesh
 
 POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
 #: Normals that lean away from the middle of `POINTS`.

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from colonnade.common.errors import UserError
+from colonnade.mesh.geometry.topology import subdivide
 from colonnade.mesh.load import clean_mesh, load_mesh
-from colonnade.mesh.topology import subdivide
 
 #: An ASCII file whose rows of faces have a value that its header does not state.
 PLY = (

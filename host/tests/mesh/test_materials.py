@@ -14,7 +14,7 @@ from trimesh.visual.material import PBRMaterial
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import PLAIN, MeshMaterial, from_gltf, from_mtl
+from colonnade.mesh.materials.materials import PLAIN, MeshMaterial, from_gltf, from_mtl
 
 
 def test_gltf_materials() -> None:

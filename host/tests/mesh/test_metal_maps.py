@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from textured_files import gltf
 
 from colonnade.common.srgb import linear_from_srgb
-from colonnade.mesh.gltf_metal import metal_of
+from colonnade.mesh.files.gltf_metal import metal_of
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial, coat_roughness
-from colonnade.mesh.roughness import merged_roughness
-from colonnade.mesh.texture import Texture
+from colonnade.mesh.materials.materials import MeshMaterial, coat_roughness
+from colonnade.mesh.materials.roughness import merged_roughness
+from colonnade.mesh.materials.texture import Texture
 
 
 def packed(roughness: int, metallic: int) -> np.ndarray:

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from textured_files import gltf
 
 from colonnade.common.vectors import unit_vectors
-from colonnade.mesh import normal_baking
+from colonnade.mesh.geometry.normals import face_normals
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.normal_baking import BakedSurface, baked
-from colonnade.mesh.normals import face_normals
-from colonnade.mesh.relief import NormalMap, Relief
-from colonnade.mesh.texture import Texture
+from colonnade.mesh.materials import normal_baking
+from colonnade.mesh.materials.normal_baking import BakedSurface, baked
+from colonnade.mesh.materials.relief import NormalMap, Relief
+from colonnade.mesh.materials.texture import Texture
 
 MATERIAL = {"pbrMetallicRoughness": {"metallicFactor": 0}, "doubleSided": True}
 

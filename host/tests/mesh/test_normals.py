@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from colonnade.mesh.geometry.normals import crease_normals, face_normals
 from colonnade.mesh.load import clean_mesh, load_mesh
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.normals import crease_normals, face_normals
+from colonnade.mesh.materials.mesh import Mesh
 
 
 def heights(mesh: Mesh) -> np.ndarray:

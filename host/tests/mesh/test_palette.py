@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.palette import MAX_MATERIALS, clustered, coloured_materials, reduced, table_entries
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.mesh.materials.palette import MAX_MATERIALS, clustered, coloured_materials, reduced, table_entries
 from colonnade.scene.model import MeshSource, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 

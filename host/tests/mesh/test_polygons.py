@@ -11,9 +11,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
-from colonnade.mesh import polygons
+from colonnade.mesh.geometry import polygons
+from colonnade.mesh.geometry.polygons import MAX_CORNERS, triangulate
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.polygons import MAX_CORNERS, triangulate
 
 #: An L of area 2.5, whose fan from the first corner has the area 2.79.
 L_SHAPE = [(0, 0), (2, 0), (2, 0.5), (1.0, 0.5), (1.0, 2), (0, 2)]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import (
+from colonnade.mesh.materials.materials import (
     BLACK,
     COAT_REFLECTANCE,
     LAYERS,
@@ -19,7 +19,7 @@ from colonnade.mesh.materials import (
     from_mtl,
     in_layer,
 )
-from colonnade.mesh.palette import with_rendered_metal
+from colonnade.mesh.materials.palette import with_rendered_metal
 
 ROUGHNESS = np.arange(0.1, 0.75, 0.05)
 

@@ -13,7 +13,7 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
 from colonnade.render.device_frames import render_model

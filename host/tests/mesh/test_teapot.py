@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from colonnade.mesh.geometry.teapot import patches, tessellate
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.teapot import patches, tessellate
 
 
 def test_it_has_32_patches() -> None:

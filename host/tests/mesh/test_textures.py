@@ -18,8 +18,8 @@ from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.texture import Texture, Wrap, sampled
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.texture import Texture, Wrap, sampled
 from colonnade.scene.model import Material, MeshSource, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
 from colonnade.scene.view import with_overrides
@@ -142,7 +142,7 @@ def painted(folder: Path, *pictures: bytes, suffix: str = "png") -> Path:
 def test_the_textures_of_a_mesh_are_kept_within_a_bound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond it all are halved, to linear means; far beyond it the mesh is refused."""
     file = painted(tmp_path, png(np.tile(FOUR, (2, 2, 1))), png(np.tile(FOUR, (2, 2, 1))[:3, :3]))
-    monkeypatch.setattr("colonnade.mesh.texture_reader.KEPT_TEXTURE_PIXELS", 24)
+    monkeypatch.setattr("colonnade.mesh.materials.texture_reader.KEPT_TEXTURE_PIXELS", 24)
     mesh = load_mesh(file)
     assert [texture.size for texture in mesh.textures] == [(2, 2), (2, 2)]
     np.testing.assert_array_equal(mesh.textures[0].pixels, np.full((2, 2, 3), 188))
@@ -150,7 +150,7 @@ def test_the_textures_of_a_mesh_are_kept_within_a_bound(tmp_path: Path, monkeypa
     assert [note.partition(": ")[2] for note in mesh.notes[:1]] == [
         "2 textures are kept at 1/2 of the width and height: a mesh holds 33,554,432 pixels"
     ]
-    monkeypatch.setattr("colonnade.mesh.texture_reader.MAX_TEXTURE_PIXELS", 24)
+    monkeypatch.setattr("colonnade.mesh.materials.texture_reader.MAX_TEXTURE_PIXELS", 24)
     with pytest.raises(UserError, match="its textures have more than 24 pixels, the most of a mesh"):
         load_mesh(file)
 

@@ -16,9 +16,9 @@ from textured_files import FOUR, png
 
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
-from colonnade.mesh import trimesh_files
+from colonnade.mesh.files import trimesh_files
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 
 
 def loaded(folder: Path, name: str, content: bytes | str) -> Mesh:

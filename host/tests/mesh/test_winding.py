@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from colonnade.mesh.geometry.primitives import Geometry, cube, sphere, square
 from colonnade.mesh.load import clean_mesh
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.primitives import Geometry, cube, sphere, square
+from colonnade.mesh.materials.mesh import Mesh
 
 
 def volume(mesh: Mesh) -> float:

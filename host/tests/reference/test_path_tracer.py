@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.synthetic_attic import attic
 
 from colonnade.environment.light_cube import LightCube
 from colonnade.environment.model import Environment, EnvironmentCamera
-from colonnade.lab.evaluation.studies.synthetic_attic import attic
 from colonnade.mesh.load import clean_mesh, load_mesh
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.reference.bounce import bounce
 from colonnade.reference.environment.depth_mesh import DepthMesh, full_backdrop
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints

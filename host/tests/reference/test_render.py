@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from colonnade.mesh.load import clean_mesh, load_mesh
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.reference.render import primary_directions, render_reference
 from colonnade.scene.view import PlacedLight, View
 

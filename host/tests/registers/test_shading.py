@@ -10,7 +10,7 @@ import pytest
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.registers.frame import frame_registers, registers_of
 from colonnade.scene.model import Light, Material, MeshSource, Paths, Scene
 from colonnade.scene.view import make_view

@@ -15,7 +15,7 @@ from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import load_scene, new_model
 from colonnade.mesh.load import clean_mesh
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.surface_offset import surface_offset
 from colonnade.scene.model import MeshSource, Scene

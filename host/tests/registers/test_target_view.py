@@ -31,7 +31,7 @@ def test_the_scene_of_the_file_is_that_of_the_host(design: Design) -> None:
 
 def test_the_soc_finds_the_poses_of_the_file(design: Design) -> None:
     """Camera and light as its scripts read them are those of the file: setting them changes nothing."""
-    places = runpy.run_path(str(ROOT / "software" / "litex" / "view_places.py"))
+    places = runpy.run_path(str(ROOT / "soc" / "litex" / "view_places.py"))
     camera = struct.unpack_from("<3q9i4q2I", design.file, 4 * places["CAMERA"])
     light = struct.unpack_from("<3q3IQ", design.file, 4 * places["LIGHT"])
     target = design.target()

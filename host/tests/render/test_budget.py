@@ -16,7 +16,7 @@ from colonnade.common.progress import QUIET
 from colonnade.design.generator import manifest_for
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
+from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.render.budget import CLOCK, Budget, estimated_cycles, rounded
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest

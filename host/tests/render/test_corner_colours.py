@@ -19,9 +19,9 @@ from colonnade.common.srgb import linear_from_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.palette import with_face_colours
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.mesh.materials.palette import with_face_colours
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.object import PlacedObject
 from colonnade.reference.render import render_reference

@@ -11,8 +11,8 @@ from colonnade.common import notes
 from colonnade.common.image_io import encode_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial, from_gltf, from_mtl
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.materials import MeshMaterial, from_gltf, from_mtl
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
 from colonnade.render.device_frames import render_model

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.synthetic_attic import attic, write_attic
 
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET
 from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
-from colonnade.lab.evaluation.studies.synthetic_attic import attic, write_attic
 from colonnade.render.reference_frames import reference_frames
 from colonnade.scene.parser import load_scene
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -17,7 +18,6 @@ from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.device import scene as device_scene
 from colonnade.environment.load import load_environment
-from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest

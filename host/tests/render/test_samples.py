@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
+from colonnade_lab.evaluation.verify import equality, verify
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
-from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
-from colonnade.lab.evaluation.verify import equality, verify
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import Backend, RenderRequest

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from colonnade_lab.evaluation.studies.generated_rooms import generated_room
+from colonnade_lab.evaluation.studies.synthetic_attic import DEPTH_STEP, write_room
 from PIL import Image
 
 from colonnade.capture.video import frames_of_video
@@ -27,8 +29,6 @@ from colonnade.device.scene import DeviceScene
 from colonnade.environment.derived_albedo import derived_albedo, hue_lights
 from colonnade.environment.load import load_environment
 from colonnade.environment.sequence import load_sequence
-from colonnade.lab.evaluation.studies.generated_rooms import generated_room
-from colonnade.lab.evaluation.studies.synthetic_attic import DEPTH_STEP, write_room
 from colonnade.maps.encoded import layout_of
 from colonnade.maps.image import AttributeImage
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame

@@ -12,11 +12,11 @@ from PIL import Image
 
 from colonnade.common.image_io import encode_srgb
 from colonnade.design.generator import manifest_for
-from colonnade.mesh import catalog
+from colonnade.mesh.files import catalog
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.texture import Texture
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.mesh.materials.texture import Texture
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
 from colonnade.render.device_frames import render_model

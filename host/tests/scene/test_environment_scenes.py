@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
 
 from colonnade.cli.main import cli
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.load import load_environment
-from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render

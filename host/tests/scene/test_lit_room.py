@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from click.testing import CliRunner
+from colonnade_lab.evaluation.studies.synthetic_attic import attic, write_attic
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
@@ -18,7 +19,6 @@ from colonnade.device import scene as device_scene
 from colonnade.device.gathered_light import scene_cube
 from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
-from colonnade.lab.evaluation.studies.synthetic_attic import attic, write_attic
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.composite import composited

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
 
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.environment.load import load_environment
-from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.cameras import WorldCamera, environment_camera
 from colonnade.scene.model import Camera, CameraKey, MeshSource, Motion, Scene, Vector

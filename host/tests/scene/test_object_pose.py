@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.synthetic_attic import attic
 
 from colonnade.common.errors import UserError
 from colonnade.environment.model import Environment
-from colonnade.lab.evaluation.studies.synthetic_attic import attic
 from colonnade.mesh.load import load_mesh
 from colonnade.reference.render import primary_directions
 from colonnade.scene.model import Light, Material, MeshSource, Placement, Scene, Transform
@@ -73,7 +73,7 @@ def test_by_default_the_object_stands_near_the_middle(environment: Environment) 
 
 
 def test_the_scenes_material_replaces_the_meshs() -> None:
-    from colonnade.mesh.materials import MeshMaterial
+    from colonnade.mesh.materials.materials import MeshMaterial
 
     extent, own = load_mesh("cube").extent, (MeshMaterial("mirror", (1.0, 0.5, 0.5)), MeshMaterial())
     view = make_view(Scene(MeshSource("cube")), extent, 8, 8, own)

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.synthetic_attic import attic
+from colonnade_lab.evaluation.verify import verify
 
 from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.hits import read_hits, write_hits
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.model import Environment
-from colonnade.lab.evaluation.studies.synthetic_attic import attic
-from colonnade.lab.evaluation.verify import verify
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render, render_frames

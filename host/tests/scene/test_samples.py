@@ -14,7 +14,7 @@ from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MARKS, MeshMaterial
+from colonnade.mesh.materials.materials import MARKS, MeshMaterial
 from colonnade.scene.model import Camera, Light, MeshSource, Motion, Paths, Scene
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene

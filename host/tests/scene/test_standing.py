@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from colonnade_lab.evaluation.studies.generated_rooms import generated_room
+from colonnade_lab.evaluation.studies.thin_furniture import behind_thin_things
 
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
-from colonnade.lab.evaluation.studies.generated_rooms import generated_room
-from colonnade.lab.evaluation.studies.thin_furniture import behind_thin_things
 from colonnade.mesh.load import load_mesh
 from colonnade.reference.embree import RayTracer
 from colonnade.reference.render import primary_directions

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import MeshMaterial
-from colonnade.mesh.mesh import Mesh
-from colonnade.mesh.texture import Texture, Wrap
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.mesh.materials.texture import Texture, Wrap
 from colonnade.scene_image.atlas import TILE, make_atlas, uv_codes
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
 
 from colonnade.cli.main import cli
 from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
-from colonnade.lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import encode_still

@@ -16,7 +16,7 @@ from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import clean_mesh, load_mesh
-from colonnade.mesh.mesh import Mesh
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.inspect import describe, report_lines
 from colonnade.scene_image.packer import QuantisedMesh, memory_use, pack, quantise

@@ -16,13 +16,13 @@ from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials import PLAIN
+from colonnade.mesh.materials.materials import PLAIN
 from colonnade.reference.embree import RayTracer, Triangles
 from colonnade.reference.environment.surface import Backdrop, BackdropPoints, BoundingSurface, SurfaceHits
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.mesh.mesh import Mesh
+    from colonnade.mesh.materials.mesh import Mesh
 
 #: A point is what its pixel shows if nothing lies in front of it by more than this, metres.
 VISIBLE = 0.02

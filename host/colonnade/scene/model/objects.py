@@ -11,7 +11,7 @@ from pydantic import StrictBool, model_validator
 from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
-from colonnade.mesh.materials import Kind
+from colonnade.mesh.materials.materials import Kind
 from colonnade.scene.model.values import STRICT, File, Float, LinearColour, RoomPixel, Text, WorldVector
 
 

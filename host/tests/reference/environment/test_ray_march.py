@@ -9,20 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-
-from colonnade.cli.main import cli
-from colonnade.design.generator import manifest_for
-from colonnade.environment.model import Environment, EnvironmentCamera
-from colonnade.lab.evaluation.environment_march import DeviceMarch
-from colonnade.lab.evaluation.studies.environment_accuracy import study, table
-from colonnade.lab.evaluation.studies.probe_spheres import (
+from colonnade_lab.evaluation.environment_march import DeviceMarch
+from colonnade_lab.evaluation.studies.environment_accuracy import study, table
+from colonnade_lab.evaluation.studies.probe_spheres import (
     RADIUS,
     cosine_rays,
     glass_rays,
     mirror_rays,
     standing_spheres,
 )
-from colonnade.lab.evaluation.studies.synthetic_attic import SyntheticRoom, attic, write_attic
+from colonnade_lab.evaluation.studies.synthetic_attic import SyntheticRoom, attic, write_attic
+
+from colonnade.cli.main import cli
+from colonnade.design.generator import manifest_for
+from colonnade.environment.model import Environment, EnvironmentCamera
 from colonnade.maps.image import encode_environment
 from colonnade.maps.layout import AttributeLayout
 from colonnade.reference.embree import RayTracer

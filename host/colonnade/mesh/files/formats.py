@@ -1,0 +1,62 @@
+"""Reads mesh files: their triangles, and for each a material or colour and three normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from colonnade.common.errors import UserError
+from colonnade.common.input_files import read_input
+from colonnade.common.limits import MAX_MESH_BYTES
+from colonnade.mesh.files.resolver import References
+from colonnade.mesh.losses import Losses
+from colonnade.mesh.materials.surface import RawSurface
+
+#: Suffixes of the formats that trimesh reads for us, and of all mesh files.
+TRIMESH_SUFFIXES = (".3mf", ".dae", ".zae", ".3dxml", ".xaml")
+SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", *TRIMESH_SUFFIXES)
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """What a mesh file holds, and what of it is lost."""
+
+    surface: RawSurface
+    losses: Losses
+
+
+def read_surface(path: Path) -> MeshFile:
+    """Read a mesh file and join its parts.
+
+    Raises:
+        UserError: The file is invalid.
+    """
+    content = read_input(path, "the mesh", MAX_MESH_BYTES)
+    kind, losses, references = path.suffix.lower(), Losses(), References(path)
+    if kind in (".glb", ".gltf"):
+        from colonnade.mesh.files.gltf import read_gltf
+
+        surface = read_gltf(content, path, references, losses)
+    elif kind == ".obj":
+        from colonnade.mesh.files.obj import read_obj
+
+        surface = read_obj(content, path, references, losses)
+    elif kind == ".ply":
+        from colonnade.mesh.files.ply import read_ply
+
+        surface = read_ply(content, path, references, losses)
+    elif kind == ".off":
+        from colonnade.mesh.files.off import read_off
+
+        surface = read_off(content, path, losses)
+    elif kind in TRIMESH_SUFFIXES:
+        from colonnade.mesh.files.trimesh_files import read_by_trimesh
+
+        surface = read_by_trimesh(content, path, references, losses)
+    else:
+        from colonnade.mesh.files.stl import read_stl
+
+        surface = read_stl(content, path, losses)
+    if len(surface.faces) == 0:
+        raise UserError(f"mesh {path} has no faces: {'; '.join(losses.lines()) or 'it holds no polygons'}")
+    return MeshFile(surface, losses)

@@ -1,0 +1,356 @@
+"""Reads glTF files: the triangles of the default scene with normals, materials, base-colour textures, vertex colours.
+
+This is our own code because trimesh drops transmission, mixes up normals under scaling, and does not say what it
+leaves out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colonnade.common import fixed_order
+from colonnade.common.types import Floats, Indices
+from colonnade.common.vectors import unit_vectors
+from colonnade.mesh import losses as lost
+from colonnade.mesh.files.gltf_checks import DRACO, READ_EXTENSIONS
+from colonnade.mesh.files.gltf_document import COMPRESSION, GltfDocument
+from colonnade.mesh.files.gltf_draco import DracoPrimitives, PrimitiveArrays
+from colonnade.mesh.files.gltf_metal import metal_of, of_map
+from colonnade.mesh.files.gltf_relief import relief_of
+from colonnade.mesh.files.gltf_textures import GltfTextures
+from colonnade.mesh.files.resolver import References
+from colonnade.mesh.losses import Losses, extension_loss
+from colonnade.mesh.materials.materials import (
+    PLAIN,
+    MeshMaterial,
+    Vector,
+    from_gltf,
+    gltf_losses,
+    metal_factors,
+    unused_extensions,
+)
+from colonnade.mesh.materials.palette import MAX_MATERIALS
+from colonnade.mesh.materials.roughness import merged_roughness, surface_areas
+from colonnade.mesh.materials.surface import RawSurface, joined
+from colonnade.mesh.materials.texture import MAX_UV
+
+#: Largest magnitude of a transform's element, in the scene.
+_MAX_TRANSFORM = 1e100
+
+#: Materials of a file up to which those with a map have all of its roughnesses.
+_MAPPED_MATERIALS = 64
+
+_POINTS, _LINE_MODES, _TRIANGLES, _STRIP, _FAN = 0, (1, 2, 3), 4, 5, 6
+
+
+def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -> RawSurface:
+    """Read a glTF file, text or binary, with the transforms of its nodes.
+
+    Raises:
+        UserError: The file is invalid, or requires an extension that is not supported.
+    """
+    document = GltfDocument(data, path, references)
+    _check_extensions(document)
+    textures = GltfTextures(document, references, losses)
+    parts = _parts(document, textures, losses)
+    materials = (*(from_gltf(material) for material in document.json.get("materials", [])), PLAIN)
+    found = list(materials)
+    for index in sorted({part.material for part in parts} - {len(materials) - 1}):
+        material = document.entry("materials", index)
+        losses.update(gltf_losses(material))
+        losses.update((extension_loss(name), 1) for name in unused_extensions(material))
+        found[index] = replace(found[index], emission=textures.emission(index, found[index].emission))
+    _count_other(document, losses)
+    textures.reader.count_losses()
+    if not parts:
+        return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    surface = joined([part.surface for part in parts])
+    materials, face_materials = _materials_of(tuple(found), parts, textures)
+    areas = surface_areas(surface.vertices, surface.faces, face_materials, len(materials))
+    materials, _ = merged_roughness(materials, areas, max(_MAPPED_MATERIALS, len(found)))
+    two_sided = [bool(material.get("doubleSided", False)) for material in document.json.get("materials", [])] + [True]
+    single_sided = np.concatenate([np.full(len(part.surface.faces), not two_sided[part.material]) for part in parts])
+    colours = surface.colours
+    if colours is not None:
+        colours = colours * np.array([material.albedo for material in materials])[face_materials][:, None]
+    return replace(
+        surface,
+        materials=materials,
+        face_materials=face_materials,
+        colours=colours,
+        textures=tuple(textures.reader.textures),
+        single_sided=single_sided,
+    )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A primitive.
+
+    Attributes:
+        surface: Its triangles, in the scene's space.
+        material: Its number in the file.
+        metal: Faces that are metal by a map, bool [m], and their roughness, float64 [m]; None without a map.
+    """
+
+    surface: RawSurface
+    material: int
+    metal: tuple[NDArray[np.bool_], Floats] | None = None
+
+    @property
+    def has_one_colour(self) -> bool:
+        """Whether all of its faces, of which there are some, have the colour of the material."""
+        return self.surface.uvs is None and self.surface.colours is None and len(self.surface.faces) > 0
+
+
+def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses) -> list[_Part]:
+    """The primitives of the default scene; refused as soon as they have too many materials."""
+    compressed, default = DracoPrimitives(document), len(document.json.get("materials", []))
+    parts: list[_Part] = []
+    # Of surfaces that no texture or corner colours; metal by a map keeps these, too
+    plain: set[tuple[Vector, float]] = set()
+    for node, matrix in _nodes(document, losses):
+        for primitive in document.entry("meshes", node["mesh"]).get("primitives", []):
+            part = _primitive(document, primitive, matrix, default, losses, textures, compressed)
+            if part is None:
+                continue
+            parts.append(part)
+            if part.material != default and part.has_one_colour:
+                material = from_gltf(document.entry("materials", part.material))
+                if material.alpha is None:
+                    plain.add((material.albedo, material.ior))
+            if len(plain) > MAX_MATERIALS:
+                raise document.error(f"it has more than {MAX_MATERIALS} materials: use at most {MAX_MATERIALS}")
+    return parts
+
+
+def _materials_of(
+    materials: tuple[MeshMaterial, ...], parts: list[_Part], textures: GltfTextures
+) -> tuple[tuple[MeshMaterial, ...], Indices]:
+    """The materials, with further ones for parts that show their texture, and for metal; that of each face."""
+    found, numbers = list(materials), []
+    first = {material: number for number, material in reversed(list(enumerate(found)))}
+
+    def number_of(material: MeshMaterial) -> int:
+        number = first.setdefault(material, len(found))
+        if number == len(found):
+            found.append(material)
+        return number
+
+    for part in parts:
+        use = None if part.surface.uvs is None else textures.uses[part.material]
+        material, number = materials[part.material], part.material
+        if use is not None:
+            material = replace(material, texture=use.texture)
+            number = number_of(material)
+        own = np.full(len(part.surface.faces), number)
+        if part.metal is not None and material.kind == "diffuse":
+            kinds, places = np.unique(np.column_stack(part.metal), axis=0, return_inverse=True)
+            numbered = [number_of(of_map(material, bool(is_metal), float(roughness))) for is_metal, roughness in kinds]
+            own = np.array(numbered)[places.reshape(-1)]
+        numbers.append(own)
+    return tuple(found), np.concatenate(numbers)
+
+
+def _check_extensions(document: GltfDocument) -> None:
+    required = document.json.get("extensionsRequired", [])
+    for name in required if isinstance(required, list) else []:
+        if name in COMPRESSION:
+            raise document.compressed(name)
+        if name not in READ_EXTENSIONS:
+            raise document.error(f"it requires the glTF extension {name}, which is not supported: export it without")
+
+
+def _count_other(document: GltfDocument, losses: Losses) -> None:
+    """Count what the file holds beside meshes and materials."""
+    json = document.json
+    for key, loss in (("cameras", lost.CAMERAS), ("animations", lost.ANIMATIONS)):
+        losses.add(loss, len(json.get(key, [])))
+    extensions = json.get("extensions", {})
+    extensions = extensions if isinstance(extensions, Mapping) else {}
+    for name, content in extensions.items():
+        lights = content.get("lights", []) if isinstance(content, Mapping) else []
+        if name == "KHR_lights_punctual":
+            losses.add(lost.LIGHTS, len(lights))
+        else:
+            losses.add(extension_loss(name))
+    for node in json.get("nodes", []):
+        names = node.get("extensions", {})
+        losses.update((extension_loss(name), 1) for name in names if name != "KHR_lights_punctual")
+
+
+def _nodes(document: GltfDocument, losses: Losses) -> Iterator[tuple[Mapping[str, Any], Floats]]:
+    """The nodes with a mesh of the default scene, and their transforms to the scene, float64 [4, 4]."""
+    json = document.json
+    scenes, nodes = json.get("scenes", []), json.get("nodes", [])
+    if scenes:
+        default = json.get("scene", 0)
+        losses.add(lost.SCENES, len(scenes) - 1)
+        roots = document.entry("scenes", default).get("nodes", [])
+    else:
+        children = {child for node in nodes for child in node.get("children", [])}
+        roots = [index for index in range(len(nodes)) if index not in children]
+    pending = [(root, np.eye(4)) for root in reversed(roots)]
+    while pending:
+        index, parent = pending.pop()
+        node = document.entry("nodes", index)
+        matrix = fixed_order.product(parent, _local(document, index, node))
+        if not (np.abs(matrix) < _MAX_TRANSFORM).all():
+            raise document.error(f"the transform of node {index} is not finite, or too large: export it again")
+        pending += [(child, matrix) for child in reversed(node.get("children", []))]
+        if "mesh" in node:
+            losses.add(lost.SKINS, "skin" in node)
+            yield node, matrix
+
+
+def _local(document: GltfDocument, index: int, node: Mapping[str, Any]) -> Floats:
+    """A node's transform to its parent, float64 [4, 4]."""
+    try:
+        if "matrix" in node:
+            matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        else:
+            x, y, z, w = np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64)
+            length = math.hypot(x, y, z, w) or 1.0
+            x, y, z, w = x / length, y / length, z / length, w / length
+            rotation = np.array(
+                [
+                    [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+                ]
+            )
+            matrix = np.eye(4)
+            matrix[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64).reshape(3)
+            matrix[:3, 3] = np.array(node.get("translation", (0.0, 0.0, 0.0)), dtype=np.float64).reshape(3)
+    except (ValueError, TypeError):
+        raise document.error(f"the transform of node {index} is not valid: export it again") from None
+    return matrix
+
+
+def _primitive(
+    document: GltfDocument,
+    primitive: Mapping[str, Any],
+    matrix: Floats,
+    default: int,
+    losses: Losses,
+    textures: GltfTextures,
+    compressed: DracoPrimitives,
+) -> _Part | None:
+    """A primitive; None for points and lines."""
+    mode, attributes = primitive.get("mode", _TRIANGLES), primitive.get("attributes", {})
+    if mode == _POINTS or mode in _LINE_MODES:
+        losses.add(lost.POINTS if mode == _POINTS else lost.LINES)
+        return None
+    if mode not in (_TRIANGLES, _STRIP, _FAN):
+        raise document.error(f"a primitive has the unknown mode {mode}")
+    for name in primitive.get("extensions", {}):
+        if name in COMPRESSION and "bufferView" not in document.entry("accessors", attributes.get("POSITION")):
+            raise document.compressed(name)
+        losses.add(extension_loss(name), name not in (DRACO, *COMPRESSION))
+    if "POSITION" not in attributes:
+        raise document.error("a primitive has no positions")
+    losses.add(lost.MORPHS, len(primitive.get("targets", [])))
+    arrays = compressed.arrays(primitive)
+    positions = arrays.attribute("POSITION").astype(np.float64)
+    if positions.shape[1] != 3:
+        raise document.error("the positions of a primitive are not of type VEC3: export it again")
+    count = len(positions)
+
+    def attribute(name: str, width: int) -> Floats | None:
+        if name not in attributes:
+            return None
+        values = arrays.attribute(name)
+        if len(values) != count or values.shape[1] < width:
+            raise document.error(f"a primitive has {len(values):,} of {name} for {count:,} positions")
+        return np.asarray(values[:, :width], dtype=np.float64)
+
+    corners = _corners(document, arrays, count)
+    faces = _faces(corners, mode if arrays.mesh is None else _TRIANGLES)
+    width = arrays.attribute("COLOR_0").shape[1] if "COLOR_0" in attributes else 0
+    colours, alphas = attribute("COLOR_0", max(width, 3)), None
+    if colours is not None:
+        if not np.isfinite(colours).all():
+            raise document.error("a primitive has a COLOR_0 that is not a finite number: export it again")
+        losses.add(lost.CLIPPED_COLOURS, int(((colours < 0) | (colours > 1)).any(axis=1).sum()))
+        colours, alphas = colours[:, :3], np.clip(colours[:, 3], 0.0, 1.0) if width == 4 else None
+    normals = attribute("NORMAL", 3)
+    linear = matrix[:3, :3]
+    # The cofactors are the inverse transpose but for a factor, and exist for flat transforms too
+    x, y, z = linear.T
+    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
+    is_mirrored = float(fixed_order.dot(x, cofactors[0])) < 0
+    if normals is not None:
+        normals = unit_vectors(fixed_order.product(unit_vectors(normals), cofactors) * (-1.0 if is_mirrored else 1.0))
+    if is_mirrored:
+        faces = faces[:, ::-1]
+    material = primitive.get("material", default)
+    has_alpha = False
+    if material != default or "material" in primitive:
+        has_alpha = from_gltf(document.entry("materials", material)).alpha is not None
+    if alphas is not None and not has_alpha:
+        losses.add(lost.ALPHA, int((alphas < 1.0).sum()))
+    use = textures.use_of(int(material)) if material != default else None
+    uvs = None if use is None else attribute(use.coordinates, 2)
+    if uvs is not None and use is not None:
+        uvs = use.uvs(uvs)
+    if uvs is not None and not (np.abs(uvs) <= MAX_UV).all():
+        raise document.error(
+            f"a primitive has texture coordinates beyond {MAX_UV:,.0f}, or not finite: export it again"
+        )
+    if use is not None:
+        losses.add(lost.NO_UVS, len(faces) if uvs is None else 0)
+    relief = textures.normals_of(int(material)) if material != default else None
+    shows_colours = colours is not None and not (colours == 1.0).all()
+    if uvs is not None:
+        losses.add(lost.TEXTURED_COLOURS, len(faces) if shows_colours else 0)
+        shows_colours = False
+    surface = RawSurface(
+        vertices=fixed_order.product(positions, linear.T) + matrix[:3, 3],
+        faces=faces,
+        normals=None if normals is None else normals[faces],
+        colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
+        uvs=None if uvs is None else uvs[faces],
+        alphas=None if alphas is None else alphas[faces],
+        relief=relief_of(relief, attribute, faces, linear, losses),
+    )
+    metal = textures.metal_of(int(material)) if material != default else None
+    places = None if metal is None else attribute(metal.coordinates, 2)
+    if metal is None or places is None or not (np.abs(places) <= MAX_UV).all():
+        return _Part(surface, int(material))
+    factors = metal_factors(document.entry("materials", material))
+    texture = textures.reader.textures[metal.texture]
+    return _Part(surface, int(material), metal_of(texture, metal.uvs(places)[faces], factors))
+
+
+def _corners(document: GltfDocument, arrays: PrimitiveArrays, count: int) -> Indices:
+    """The vertices of a primitive in order, int64 [k]."""
+    values = arrays.indices()
+    if values is None:
+        return np.arange(count, dtype=np.int64)
+    if values.shape[1] != 1 or values.dtype.kind not in "iu":
+        raise document.error("the indices of a primitive are not whole numbers")
+    corners = values[:, 0].astype(np.int64)
+    if len(corners) and int(corners.max()) >= count:
+        raise document.error(
+            f"a face names vertex {corners.max()}, which does not exist: its primitive has {count:,} vertices,"
+            " numbered from 0"
+        )
+    return corners
+
+
+def _faces(corners: Indices, mode: int) -> Indices:
+    """The triangles of a primitive, int64 [m, 3]."""
+    if mode == _TRIANGLES:
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    start = np.arange(max(0, len(corners) - 2))
+    if mode == _FAN:
+        return np.stack([corners[start + 1], corners[start + 2], corners[np.zeros_like(start)]], axis=1)
+    odd = start % 2
+    return np.stack([corners[start], corners[start + 1 + odd], corners[start + 2 - odd]], axis=1)

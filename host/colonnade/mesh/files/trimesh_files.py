@@ -1,0 +1,47 @@
+"""Reads mesh files of the formats that trimesh reads and that have no reader here: 3MF, COLLADA, 3DXML, XAML.
+
+`colonnade.mesh.files.trimesh_program` runs in a process of its own and writes a file as binary glTF, which `read_gltf`
+reads with its materials and its limits. Pictures beside a COLLADA file are read here, by the rules of all references.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from colonnade.common.decoder_process import decode, last_line
+from colonnade.common.errors import UserError
+from colonnade.mesh.files.gltf import read_gltf
+from colonnade.mesh.files.resolver import References
+from colonnade.mesh.losses import Loss, Losses
+from colonnade.mesh.materials.surface import RawSurface
+
+#: Memory of the process beside its libraries, bytes, more for each byte of the file, and the most. Archives hold text
+#: at a tenth of its size, of which the tree of XML has ten times.
+_MEMORY, _MEMORY_OF_A_BYTE, _MOST_MEMORY = 1 << 30, 200, 1 << 33
+#: Its processor time, seconds, and bytes of the file for one more.
+_SECONDS, _BYTES_OF_A_SECOND = 5, 1 << 16
+
+
+def read_by_trimesh(data: bytes, path: Path, references: References, losses: Losses) -> RawSurface:
+    """Read a file as trimesh does, in metres if it states a unit, and with y up if it states an axis.
+
+    Raises:
+        UserError: The file is invalid, or asks for more memory or time than the limits.
+    """
+    memory = min(_MEMORY + _MEMORY_OF_A_BYTE * len(data), _MOST_MEMORY)
+    seconds = _SECONDS + len(data) // _BYTES_OF_A_SECOND
+    program = "colonnade.mesh.files.trimesh_program"
+    done = decode(program, memory, seconds, path.suffix.lower(), data=data)
+    reason = last_line(done.stderr)
+    if done.returncode < 0 or (done.returncode and re.search("MemoryError|allocat", reason)):
+        raise UserError(
+            f"{path} cannot be read as a mesh: it takes more than {memory >> 20:,} MiB or {seconds} s:"
+            " export it as glTF, or in parts"
+        )
+    if done.returncode != 0:
+        raise UserError(f"{path} cannot be read as a mesh: {reason}")
+    found, _, content = done.stdout.partition(b"\n")
+    losses.update((Loss(one, several, instead), count) for one, several, instead, count in json.loads(found))
+    return read_gltf(content, path, references, losses)

@@ -1,0 +1,1 @@
+"""Geometry of meshes: polygons, neighbours, winding, normals, primitives."""

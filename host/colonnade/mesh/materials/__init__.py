@@ -1,0 +1,1 @@
+"""The clean mesh and what its surfaces look like: materials, textures, relief, coverage."""

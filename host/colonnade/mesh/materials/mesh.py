@@ -1,0 +1,104 @@
+"""The clean triangle mesh, made by `colonnade.mesh.load`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common import fixed_order
+from colonnade.common.types import Floats
+from colonnade.mesh.geometry import primitives
+from colonnade.mesh.geometry.topology import Faces
+from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.texture import Texture
+
+
+@dataclass(frozen=True)
+class Extent:
+    """The bounds of a mesh, for framing the camera.
+
+    Attributes:
+        low, high: The bounding box, float64 [3], mesh space.
+        outline: The extreme vertices along many directions, float64 [k, 3], mesh space.
+    """
+
+    low: Floats
+    high: Floats
+    outline: Floats
+
+    @property
+    def edge(self) -> float:
+        """Edge length of the bounding cube, mesh units."""
+        return float((self.high - self.low).max())
+
+    @property
+    def centre(self) -> Floats:
+        """Centre of the bounding box, float64 [3]."""
+        return (self.low + self.high) / 2
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """One of the objects of a joined mesh.
+
+    Attributes:
+        name: Name of its mesh.
+        first_face: Number of its face 0 in the source faces of the joined mesh.
+        edge: Longest edge of its mesh's box, units of the joined mesh.
+    """
+
+    name: str
+    first_face: int
+    edge: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A clean triangle mesh: no duplicate vertices, no degenerate or duplicate triangles.
+
+    Attributes:
+        vertices: float64 [n, 3], mesh space.
+        faces: int32 [m, 3], counter-clockwise seen from outside.
+        corner_normals: Shading normals at the corners of the faces, unit length, or 0 where those of the adjacent
+            faces cancel, float64 [m, 3, 3].
+        materials: Materials of the mesh file; at least one.
+        face_materials: uint8 [m], index into `materials`.
+        source_faces: int32 [m], the face's index in the source, which includes dropped faces.
+        source_count: Number of faces in the source.
+        name: Name for reports.
+        notes: Lines on what the file holds and a picture does not show, and on what was repaired.
+        parts: The objects of a joined mesh, in the order of their source faces; none of a single mesh.
+        corner_colours: Linear colours at the corners of the faces, 0 to 1, 0 on faces whose material has none, float64
+            [m, 3, 3]; None: no material has any.
+        textures: Base-colour textures of the materials.
+        corner_uvs: Texture coordinates (u, v) of the corners of the faces, 0 on faces
+            without one, float64 [m, 3, 2]; None: no material has a texture.
+    """
+
+    vertices: Floats
+    faces: Faces
+    corner_normals: Floats
+    materials: tuple[MeshMaterial, ...]
+    face_materials: npt.NDArray[np.uint8]
+    source_faces: npt.NDArray[np.int32]
+    source_count: int
+    name: str
+    notes: tuple[str, ...] = ()
+    parts: tuple[MeshPart, ...] = ()
+    corner_colours: Floats | None = None
+    textures: tuple[Texture, ...] = ()
+    corner_uvs: Floats | None = None
+
+    @cached_property
+    def extent(self) -> Extent:
+        """The bounding box and the outline."""
+        points, _ = primitives.sphere(720)
+        directions = np.unique(points, axis=0)
+        outermost: set[int] = set()
+        for direction in directions[directions[:, 0] >= 0]:
+            height = fixed_order.product(self.vertices, direction)
+            outermost |= {int(height.argmax()), int(height.argmin())}
+        return Extent(self.vertices.min(axis=0), self.vertices.max(axis=0), self.vertices[sorted(outermost)])

@@ -1,0 +1,105 @@
+"""Normal maps of mesh files, and what of them each face of a surface has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common import fixed_order
+from colonnade.common.types import Floats, Indices
+from colonnade.mesh.materials.texture import Texture, sampled
+
+
+@dataclass(frozen=True, eq=False)
+class NormalMap:
+    """A map of normals in the tangent space of a surface: along u, against v, along its own normal.
+
+    Attributes:
+        texture: Its picture; codes 0 to 255 stand for -1 to 1.
+        scale: Factor of both tangential components.
+    """
+
+    texture: Texture
+    scale: float = 1.0
+
+    @cached_property
+    def levels(self) -> tuple[npt.NDArray[np.float32], ...]:
+        """Unit normals of the pixels, and their means over squares of 2, 4, … pixels, float32 [height, width, 3]."""
+        codes = self.texture.pixels
+        table = np.float32(2 / 255) * np.arange(256, dtype=np.float32) - np.float32(1)
+        level = table[codes]
+        level[..., :2] *= np.float32(self.scale)
+        level[..., 2] = np.maximum(level[..., 2], 0)
+        length = np.sqrt(level[..., 0] ** 2 + level[..., 1] ** 2 + level[..., 2] ** 2)[..., None]
+        level = np.where(
+            length > 0, level / np.maximum(length, np.float32(1e-6)), np.array([0, 0, 1], dtype=np.float32)
+        )
+        found = [level]
+        while max(level.shape[:2]) > 1:
+            level = np.pad(level, ((0, level.shape[0] % 2), (0, level.shape[1] % 2), (0, 0)), mode="edge")
+            rows = level[::2] + level[1::2]
+            level = (rows[:, ::2] + rows[:, 1::2]) / np.float32(4)
+            found.append(level)
+        return tuple(found)
+
+    def normals(self, uvs: Floats, level: int) -> Floats:
+        """Means of the map near texture coordinates, float64 [n, 2]: bilinear in a level, float64 [n, 3].
+
+        The mean of unit normals that differ is shorter than 1.
+        """
+        pixels = self.levels[min(level, len(self.levels) - 1)]
+        return sampled(pixels, uvs, self.texture.wrap, self.texture.is_nearest and level == 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """The normal maps of a surface's faces.
+
+    Attributes:
+        maps: The normal maps.
+        index: The map of each face, -1 for none, int64 [m].
+        uvs: Positions of the corners in their map, float64 [m, 3, 2].
+        tangents: Tangents of the file at the corners, along u, and 1 or -1 where the bitangent is that of a mirrored
+            map; 0 where it has none, float64 [m, 3, 4].
+    """
+
+    maps: tuple[NormalMap, ...]
+    index: Indices
+    uvs: Floats
+    tangents: Floats
+
+    def pieces(self, owners: Indices, weights: Floats) -> Relief:
+        """That of parts of the faces, by the weights of their corners, float64 [k, 3, 3]."""
+        uvs, tangents = (fixed_order.product(weights, values[owners]) for values in (self.uvs, self.tangents))
+        return Relief(self.maps, self.index[owners], uvs, tangents)
+
+    def kept(self, faces: Indices) -> Relief:
+        """That of some of the faces."""
+        return Relief(self.maps, self.index[faces], self.uvs[faces], self.tangents[faces])
+
+    def reversed(self, faces: npt.NDArray[np.bool_]) -> Relief:
+        """That of a surface some of whose faces have the other winding."""
+        uvs, tangents = (
+            np.where(faces[:, None, None], values[:, ::-1], values) for values in (self.uvs, self.tangents)
+        )
+        return Relief(self.maps, self.index, uvs, tangents)
+
+    @staticmethod
+    def joined(parts: Sequence[Relief | None], counts: Sequence[int]) -> Relief | None:
+        """That of surfaces of so many faces, one after the other; None if none has any."""
+        if all(part is None for part in parts):
+            return None
+        maps: list[NormalMap] = []
+        index, uvs, tangents = [], [], []
+        for part, count in zip(parts, counts, strict=True):
+            if part is None:
+                part = Relief((), np.full(count, -1), np.zeros((count, 3, 2)), np.zeros((count, 3, 4)))
+            index.append(np.where(part.index >= 0, part.index + len(maps), -1))
+            maps += part.maps
+            uvs.append(part.uvs)
+            tangents.append(part.tangents)
+        return Relief(tuple(maps), np.concatenate(index), np.concatenate(uvs), np.concatenate(tangents))

@@ -1,0 +1,152 @@
+"""The content of a mesh file before cleaning, and its assembly from polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from colonnade.common.srgb import linear_from_srgb
+from colonnade.common.types import Floats, Indices
+from colonnade.mesh.geometry.polygons import triangulate
+from colonnade.mesh.losses import CLIPPED_COLOURS, CROSSED, DARK_COLOURS, SHORT_FACES, TEXTURED_COLOURS, Losses
+from colonnade.mesh.materials.materials import PLAIN, MeshMaterial
+from colonnade.mesh.materials.relief import Relief
+from colonnade.mesh.materials.texture import Texture
+
+
+@dataclass(frozen=True)
+class RawSurface:
+    """The triangles of a mesh file.
+
+    Attributes:
+        vertices: float64 [n, 3].
+        faces: int64 [m, 3].
+        normals: The file's normals at the corners, of any length, 0 where it has none, float64 [m, 3, 3]; None: none.
+        materials: At least one.
+        face_materials: int64 [m], index into `materials`.
+        colours: Colours at the corners, which replace the albedo of their materials, linear, 0 to 1, NaN on faces
+            without, float64 [m, 3, 3]; None: none.
+        textures: Textures of the materials.
+        uvs: Texture coordinates (u, v) of the corners, 0 on faces without, float64 [m, 3, 2]; None: none.
+        source_faces: The face of the file that each is a part of, int64 [m]; None: themselves.
+        source_count: Faces of the file, if `source_faces` is given.
+        single_sided: Faces whose back viewers do not show, bool [m]; None: none.
+        alphas: Alpha of the corners, which counts for materials with one, 0 to 1, float64 [m, 3]; None: all are opaque.
+        relief: Normal maps of the faces; None: none.
+    """
+
+    vertices: Floats
+    faces: Indices
+    normals: Floats | None = None
+    materials: tuple[MeshMaterial, ...] = (PLAIN,)
+    face_materials: Indices | None = None
+    colours: Floats | None = None
+    textures: tuple[Texture, ...] = ()
+    uvs: Floats | None = None
+    source_faces: Indices | None = None
+    source_count: int = 0
+    single_sided: npt.NDArray[np.bool_] | None = None
+    alphas: Floats | None = None
+    relief: Relief | None = None
+
+    @property
+    def material_index(self) -> Indices:
+        """`face_materials`, or zeros, int64 [m]."""
+        return np.zeros(len(self.faces), dtype=np.int64) if self.face_materials is None else self.face_materials
+
+
+def from_polygons(
+    vertices: Floats,
+    corners: Indices,
+    sizes: Indices,
+    losses: Losses,
+    *,
+    corner_normals: Floats | None = None,
+    materials: tuple[MeshMaterial, ...] = (PLAIN,),
+    polygon_materials: Indices | None = None,
+    vertex_colours: Floats | None = None,
+    polygon_colours: Floats | None = None,
+    textures: tuple[Texture, ...] = (),
+    corner_uvs: Floats | None = None,
+) -> RawSurface:
+    """Split polygons into triangles, with what they carry.
+
+    Args:
+        vertices: float64 [n, 3].
+        corners: Vertices of all polygons' corners, one polygon after the other, int64 [k], each below n.
+        sizes: Corners of each polygon, int64 [p].
+        losses: Counts polygons without area.
+        corner_normals: float64 [k, 3], 0 for none.
+        materials: The materials.
+        polygon_materials: int64 [p].
+        vertex_colours: float64 [n, 3], linear; not for polygons with a texture.
+        polygon_colours: float64 [p, 3], linear, NaN for none; before `vertex_colours`.
+        textures: Textures of the materials.
+        corner_uvs: Texture coordinates, float64 [k, 2].
+    """
+    split = triangulate(vertices[corners], sizes)
+    losses.add(SHORT_FACES, split.short)
+    losses.add(CROSSED, split.crossed)
+    faces = corners[split.corners]
+    colours = None if vertex_colours is None else vertex_colours[faces]
+    if polygon_colours is not None:
+        colours = np.repeat(polygon_colours[split.polygons][:, None], 3, axis=1)
+    if colours is not None and textures and polygon_materials is not None:
+        is_textured = np.array([material.texture is not None for material in materials])[polygon_materials]
+        hidden = is_textured[split.polygons]
+        losses.add(TEXTURED_COLOURS, int((hidden & (colours != 1.0).any(axis=(1, 2))).sum()))
+        colours = None if hidden.all() else np.where(hidden[:, None, None], np.nan, colours)
+    return RawSurface(
+        vertices=vertices,
+        faces=faces,
+        normals=None if corner_normals is None else corner_normals[split.corners],
+        materials=materials,
+        face_materials=None if polygon_materials is None else polygon_materials[split.polygons],
+        colours=colours,
+        textures=textures,
+        uvs=None if corner_uvs is None else corner_uvs[split.corners],
+    )
+
+
+def linear_colours(colours: Floats, white: float | None, losses: Losses) -> Floats:
+    """Linear colours of sRGB ones, float64 [n, 3]; what is clipped, or no number, is counted.
+
+    Args:
+        colours: float64 [n, 3].
+        white: Their largest value; None: 255 if one of them is above 2, else 1.
+        losses: Counts the colours that change.
+    """
+    finite = np.isfinite(colours)
+    if white is None:
+        white = 255.0 if bool((colours[finite] > 2.0).any()) else 1.0
+    losses.add(DARK_COLOURS, int((~finite).any(axis=1).sum()))
+    losses.add(CLIPPED_COLOURS, int((finite & ((colours < 0.0) | (colours > white))).any(axis=1).sum()))
+    return linear_from_srgb(np.clip(np.where(finite, colours, 0.0) / white, 0.0, 1.0))
+
+
+def joined(parts: Sequence[RawSurface]) -> RawSurface:
+    """The parts of a file as one surface; at least one part. All have the same materials."""
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+
+    def filled(name: str, shape: tuple[int, ...], value: float) -> Floats | None:
+        values = [getattr(part, name) for part in parts]
+        if all(one is None for one in values):
+            return None
+        blanks = [np.full((len(part.faces), *shape), value) for part in parts]
+        return np.concatenate([blank if one is None else one for one, blank in zip(values, blanks, strict=True)])
+
+    return RawSurface(
+        vertices=np.concatenate([part.vertices for part in parts]),
+        faces=np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
+        normals=filled("normals", (3, 3), 0.0),
+        materials=parts[0].materials,
+        face_materials=np.concatenate([part.material_index for part in parts]),
+        colours=filled("colours", (3, 3), np.nan),
+        textures=parts[0].textures,
+        uvs=filled("uvs", (3, 2), 0.0),
+        alphas=filled("alphas", (3,), 1.0),
+        relief=Relief.joined([part.relief for part in parts], [len(part.faces) for part in parts]),
+    )

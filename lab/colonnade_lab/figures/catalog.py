@@ -1,0 +1,260 @@
+"""What is measured: one data file of ``docs/data`` for each entry, and the commands that print its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from colonnade.design.toolchain import project_root
+
+from colonnade_lab.explore.study_file import load_study
+
+#: Stands for the file that a command writes its report to.
+REPORT = "REPORT"
+
+#: Stand for the liberty files of a library in a command, and name the variables that hold their paths.
+LIBRARIES = ("ASAP7", "SKY130")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A data file.
+
+    Attributes:
+        name: Its name without ``.json``.
+        config: The preset, before `overrides`, that it is of.
+        commands: The command of each part of the result; the part "" is the whole result, and one that begins with a
+            hyphen only prepares the next ones.
+        overrides: Changes to the configuration, ``key.path=value``.
+        report: The file that the commands write, below the root, where they take no name of one.
+        libraries: Those of `LIBRARIES` that the commands need.
+    """
+
+    name: str
+    config: str
+    commands: Mapping[str, tuple[str, ...]]
+    overrides: tuple[str, ...] = ()
+    report: str | None = None
+    libraries: tuple[str, ...] = ()
+
+
+def _colonnade(*arguments: str) -> dict[str, tuple[str, ...]]:
+    return {"": ("colonnade", *arguments, "--json", REPORT)}
+
+
+def _bench(config: str, *options: str) -> Entry:
+    return Entry(f"bench-{config}", config, _colonnade("bench", "--config", config, "--reuse", *options))
+
+
+def _area(config: str, library: str, *options: str) -> Entry:
+    command = _colonnade("ppa", "--config", config, *options, "--liberty", library)
+    return Entry(f"area-{config}-{library.lower()}", config, command, libraries=(library,))
+
+
+def _verify(name: str, config: str, *options: str) -> Entry:
+    return Entry(f"{name}-{config}", config, _colonnade("verify", "--config", config, *options))
+
+
+def _study(name: str, *libraries: str) -> Entry:
+    path = Path("scenes") / "studies" / f"{name}.toml"
+    design = load_study(project_root() / path).study.design
+    options = (option for library in libraries for option in ("--library", f"{library.lower()}={library}"))
+    command = ("colonnade", "explore", str(path), *options, "--output", f"out/{name}")
+    return Entry(name, design.config, {"": command}, design.set, f"out/{name}/study.json", libraries)
+
+
+#: Meshes for small arrays, whose frames take millions of cycles.
+_TWO = ("--mesh", "bunny", "--mesh", "armadillo")
+
+_ROOMS = ("scenes/rooms/living", "scenes/rooms/office")
+_ATTIC = "scenes/rooms/attic"
+
+#: A generated room on which no encoder is tuned.
+_SEEDS = "100"
+#: Generated rooms in which a camera moves: one of each kind.
+_MOVED = "100-103"
+
+
+#: Samples a pixel of the table of samples.
+SAMPLES = (1, 4, 16, 64)
+
+
+def _samples() -> Entry:
+    """Pictures of the model at several samples a pixel, against the reference at the most."""
+
+    def picture(backend: str, number: int) -> tuple[str, ...]:
+        options = ("--backend", backend, "--size", "320x240", "--samples", str(number))
+        output = ("--output", f"out/{backend}-{number}.png")
+        return ("colonnade", "render", "scenes/soft-shadow.toml", *options, *output, "--json", REPORT)
+
+    reference = f"out/reference-{SAMPLES[-1]}.png"
+    commands = {"-reference": picture("reference", SAMPLES[-1])}
+    for number in SAMPLES:
+        commands[f"-{number}"] = picture("model", number)
+        commands[str(number)] = ("colonnade", "compare", "--no-dists", reference, f"out/model-{number}.png")
+        commands[str(number)] += ("--json", REPORT)
+    return Entry("samples", "small", commands)
+
+
+def _paper_unit() -> Entry:
+    """The paper's unit, which traces and shades by itself, with the formats and functions of `edge`."""
+    alone = ("triangleRows=1", "triangleLanes=1", "marches=1", "pathContexts=16", "rayInterval=32", "shadeInterval=128")
+    overrides = ("array.rows=1", "array.columns=1", *(f"units.{each}" for each in alone))
+    hardware = ("--config", "edge", *(part for override in overrides for part in ("--set", override)))
+    commands = {
+        "bench": ("colonnade", "bench", *hardware, "--reuse", *_TWO, "--no-mirror", "--json", REPORT),
+        "area": ("colonnade", "ppa", *hardware, "--no-power", "--liberty", "ASAP7", "--json", REPORT),
+    }
+    return Entry("paper-unit", "edge", commands, overrides, libraries=("ASAP7",))
+
+
+#: The frames in which encodings of maps are compared, with the options of `colonnade render`.
+MAP_FRAMES = {"photo": (), "relit": ("--relit",)}
+#: What the encodings of maps are called in configurations.
+ENCODINGS = ("slic", "twoLevel")
+
+
+def _paper_maps() -> Entry:
+    """SLIC maps: their loss, gates, and frames of the model with either encoding against the float reference."""
+
+    def hardware(encoding: str) -> tuple[str, ...]:
+        return ("--config", "small", "--set", f"physicalAttributeMemory.encoding={encoding}")
+
+    def picture(name: str, frame: str, *options: str) -> tuple[str, ...]:
+        output = ("--output", f"out/maps-{name}-{frame}.png", "--json", REPORT)
+        return ("colonnade", "render", "scenes/room.toml", *options, *MAP_FRAMES[frame], *output)
+
+    commands: dict[str, tuple[str, ...]] = {
+        Path(room).name: ("colonnade", "inspect", "--background", room, "--encoding", "slic", "--json", REPORT)
+        for room in (*_ROOMS, _ATTIC)
+    }
+    commands["area"] = ("colonnade", "ppa", *hardware("slic"), "--no-power", "--liberty", "ASAP7", "--json", REPORT)
+    for frame in MAP_FRAMES:
+        commands[f"-reference, {frame}"] = picture("reference", frame, "--backend", "reference")
+        for encoding in ENCODINGS:
+            commands[f"-{encoding}, {frame}"] = picture(encoding, frame, *hardware(encoding), "--backend", "model")
+            pair = (f"out/maps-{name}-{frame}.png" for name in ("reference", encoding))
+            commands[f"{encoding}, {frame}"] = ("colonnade", "compare", *pair, "--json", REPORT)
+    return Entry("paper-maps", "small", commands, (hardware("slic")[-1],), libraries=("ASAP7",))
+
+
+def _gather() -> Entry:
+    """Gathered light on `edge`: its area, a pass of the RTL, and pictures of the model against the reference."""
+    override, scene = "frame.gather=true", "scenes/gathered.toml"
+
+    def render(backend: str, *options: str) -> tuple[str, ...]:
+        hardware = ("--config", "edge", "--set", override, "--backend", backend)
+        return ("colonnade", "render", scene, *hardware, *options, "--json", REPORT)
+
+    pictures = {backend: f"out/gathered-{backend}.png" for backend in ("reference", "model")}
+    small = ("--size", "320x240", "--samples", "16", "--output")
+    commands = {
+        "area": ("colonnade", "ppa", "--config", "edge", "--set", override, "--liberty", "ASAP7", "--json", REPORT),
+        "pass": render("rtl", "--samples", "1"),
+        "whole": render("rtl", "--samples", "1", "--relit"),
+        **{f"-{backend}": render(backend, *small, picture) for backend, picture in pictures.items()},
+        "compare": ("colonnade", "compare", "--no-dists", *pictures.values(), "--json", REPORT),
+    }
+    return Entry("gather", "edge", commands, (override,), libraries=("ASAP7",))
+
+
+def _light() -> Entry:
+    """Frames in known rooms against a path tracer, and a pass of the RTL over one of them, with gathered light."""
+    scenes = [f"out/light/panorama-{rays}/attic-rough.toml" for rays in (1, 2)]
+    # Its meshes need more records than those of the benchmark
+    larger = ("--set", "columnBvhMemory.depth=262144")
+    hardware = ("--config", "edge", "--set", "frame.gather=true", *larger, "--backend", "rtl")
+    options = ("--samples", "1", "--size", "640x480", "--json", REPORT)
+    commands = {
+        "frames": ("tools/light", "frames", "--json", REPORT),
+        "pass": ("colonnade", "render", scenes[0], *hardware, *options),
+        "two": ("colonnade", "render", scenes[1], *hardware, *options),
+    }
+    return Entry("light", "textured", commands)
+
+
+def catalog() -> dict[str, Entry]:
+    """All entries by name. Those that the pages need most come first."""
+    entries = (
+        _bench("edge"),
+        _area("edge", "ASAP7"),
+        _bench("diffuse"),
+        _area("diffuse", "ASAP7"),
+        Entry("rooms", "edge", {"": ("tools/room-frames", "edge", "640x480", "--compare", f"--json={REPORT}")}),
+        _bench("lean", "--no-mirror"),
+        _area("lean", "ASAP7"),
+        _verify("quality", "edge", "--no-rtl"),
+        _verify("quality", "lean", "--no-rtl"),
+        Entry(
+            "environments",
+            "edge",
+            {
+                "accuracy": ("colonnade", "study", *_ROOMS, "--json", REPORT),
+                **{
+                    Path(room).name: ("colonnade", "inspect", "--background", room, "--json", REPORT)
+                    for room in (*_ROOMS, _ATTIC)
+                },
+            },
+        ),
+        Entry("room-lights", "small", _colonnade("study", "--light", *_ROOMS, _ATTIC)),
+        Entry(
+            "live-rooms",
+            "small",
+            {
+                "rooms": ("colonnade", "study", "--live", *_ROOMS, _ATTIC, "--json", REPORT),
+                "generated": ("colonnade", "study", "--live", "--rooms", _SEEDS, "--json", REPORT),
+            },
+        ),
+        Entry("live-paths", "small", _colonnade("study", "--live", "--path", "--rooms", _MOVED)),
+        Entry(
+            "moved-rooms",
+            "edge",
+            {"": ("tools/room-frames", "edge", "160x120", "--moved", "--compare", f"--json={REPORT}")},
+        ),
+        Entry("moving-frames", "small", _colonnade("study", "--views", "--frames", "--rooms", _MOVED)),
+        Entry("captures", "small", _colonnade("study", "--capture", *_ROOMS, _ATTIC)),
+        _samples(),
+        _gather(),
+        _light(),
+        Entry("assets", "textured", {"": ("tools/light", "samples", "--json", REPORT)}),
+        _bench("small", *_TWO, "--no-mirror"),
+        _area("small", "ASAP7"),
+        _bench("tiny", *_TWO),
+        _area("tiny", "ASAP7"),
+        _area("textured", "ASAP7", "--no-power"),
+        _area("edge", "SKY130"),
+        _bench("fpga", *_TWO, "--dram-latency", "15", "--dram-interval", "2"),
+        _area("fpga", "ASAP7"),
+        _verify("equality", "small", "--no-reference", "--size", "320x240"),
+        Entry("fpga", "fpga", {"": ("tools/soc-fpga",)}, report="out/fpga/report.json"),
+        Entry("simulators", "small", {"": ("tools/simulators", f"--json={REPORT}")}),
+        Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}),
+        _paper_unit(),
+        _paper_maps(),
+        _study("ablation"),
+        _study("scaling"),
+        _study("bvh-tests"),
+        _study("bvh-costs", "ASAP7"),
+        _study("bvh-cycles"),
+        _study("mixed-precision", "ASAP7"),
+        _study("energy-area", "ASAP7"),
+        _study("vertices-contexts", "ASAP7"),
+    )
+    return {entry.name: entry for entry in entries}
+
+
+def selected(parts: tuple[str, ...]) -> list[Entry]:
+    """The entries of parts: a part is the name of an entry or what it begins with before a hyphen; none: all entries.
+
+    Raises:
+        KeyError: A part that names no entry.
+    """
+    entries = catalog()
+    found: dict[str, Entry] = {}
+    for part in parts or tuple(entries):
+        of_part = {name: entry for name, entry in entries.items() if name == part or name.startswith(f"{part}-")}
+        if not of_part:
+            raise KeyError(part)
+        found |= of_part
+    return list(found.values())

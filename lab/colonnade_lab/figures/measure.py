@@ -1,0 +1,117 @@
+"""Measures an entry of the catalog: runs its commands and writes its data file."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from colonnade.common import processes
+from colonnade.common.atomic_files import replacing
+from colonnade.common.errors import UserError
+from colonnade.common.temporary import temporary_folder
+from colonnade.design.generator import manifest_for
+from colonnade.design.toolchain import project_root
+
+from colonnade_lab.common.parallel import processors
+from colonnade_lab.figures.catalog import LIBRARIES, REPORT, Entry
+from colonnade_lab.figures.data import Data, commands_of, commit, declare_measured, is_current, problem_of, text_of
+from colonnade_lab.figures.kept import kept, record_lines
+
+
+def require_libraries(entries: Sequence[Entry]) -> None:
+    """Check that the variables name the liberty files.
+
+    Raises:
+        UserError: A variable is not set.
+    """
+    for library in dict.fromkeys(library for entry in entries for library in entry.libraries):
+        if not os.environ.get(library):
+            names = ", ".join(entry.name for entry in entries if library in entry.libraries)
+            raise UserError(f"set {library} to the liberty files of this library, separated by spaces: for {names}")
+
+
+def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
+    """Run the commands of an entry and write its data file; not if the file is of today's sources.
+
+    Raises:
+        UserError: A command failed.
+    """
+    known = Data(docs).get(entry.name)
+    if known is not None and not again and is_current(entry, known):
+        print(f"figures: {entry.name} is of these sources", flush=True)
+        return
+    print(f"figures: {entry.name}", flush=True)
+    head, is_modified = commit()
+    config = manifest_for(entry.config, entry.overrides).manifest.config
+    begin = time.monotonic()
+    reports = {part: _report(entry, command) for part, command in entry.commands.items()}
+    seconds = time.monotonic() - begin
+    content = {
+        "command": commands_of(entry),
+        "commit": head,
+        "is_modified": is_modified,
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        "seconds": round(max(seconds, _seconds_before(known, entry, head)), 1),
+        "processors": processors(),
+        "config": config,
+        "result": kept(reports.get("", {part: each for part, each in reports.items() if part[:1] != "-"})),
+    }
+    reported = reports.get("", {}).get("config")
+    # Some reports have the name of the configuration alone
+    problem = problem_of(entry, {"config": reported}) if isinstance(reported, Mapping) else None
+    if problem is not None:
+        raise UserError(f"{entry.name}: the report of {text_of(next(iter(entry.commands.values())))}: {problem}")
+    (docs / "data").mkdir(parents=True, exist_ok=True)
+    with replacing(docs / "data" / f"{entry.name}.json") as stream:
+        stream.write(f"{record_lines(content)}\n".encode())
+    declare_measured(docs, entry.name)
+    print(f"figures: {entry.name} took {seconds:,.0f} s", flush=True)
+
+
+def _seconds_before(known: Mapping[str, Any] | None, entry: Entry, head: str | None) -> float:
+    """The time of an earlier run of the same commands on the same commit, whose results are cached now."""
+    if known is None or (known.get("commit"), known.get("command")) != (head, commands_of(entry)):
+        return 0.0
+    return float(known["seconds"])
+
+
+def _report(entry: Entry, command: tuple[str, ...]) -> Any:
+    """Run a command and read its report."""
+    root = project_root()
+    (root / "out").mkdir(exist_ok=True)
+    with temporary_folder() as folder:
+        report = root / entry.report if entry.report else folder / "report.json"
+        program, *arguments = _expanded(command, report)
+        programs: dict[str, list[object]] = {
+            "colonnade": [Path(sys.executable).parent / "colonnade"],
+            **{tool: [sys.executable, tool] for tool in ("tools/room-frames", "tools/simulators", "tools/view-frames")},
+        }
+        started = programs.get(program, [root / program])
+        done = processes.run([*started, *arguments], cwd=root, stdout=None, stderr=None)
+        if done.returncode != 0:
+            raise UserError(f"{entry.name}: {text_of(command)} failed with status {done.returncode}")
+        content = json.loads(report.read_text(encoding="utf-8"))
+    failed = [failure["reason"] for point in content.get("points", ()) for failure in point["failures"]]
+    if failed:
+        raise UserError(f"{entry.name}: {len(failed)} measurements failed, the first one: {failed[0]}")
+    return content
+
+
+def _expanded(command: tuple[str, ...], report: Path) -> list[str]:
+    """The command with the paths of its report and of the libraries."""
+    found: list[str] = []
+    for part in command:
+        prefix, _, library = part.rpartition("=")
+        if library in LIBRARIES:
+            option = found.pop()
+            for file in os.environ[library].split():
+                found += [option, f"{prefix}={file}" if prefix else file]
+        else:
+            found.append(part.replace(REPORT, str(report)))
+    return found

@@ -1,0 +1,95 @@
+"""The tables of the eight precisions in ``docs/paper.md``: loss and cost, RenderIndex by each norm, savings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from colonnade_lab.common import paper
+from colonnade_lab.common.markdown import markdown
+from colonnade_lab.explore.render_index import indices
+from colonnade_lab.figures.data import Data
+from colonnade_lab.figures.study_tables import number
+
+Study = Mapping[str, Any]
+
+#: The paper's savings, and its DISTS loss.
+_SAVED = (f"{100 * saved:.1f} %" for saved in (paper.POWER_SAVED, paper.AREA_SAVED))
+_LOSS = " to ".join(f"{100 * loss:g}" for loss in paper.LOSS)
+PAPER = ("source paper, 28 nm", paper.PRECISION, "–", *_SAVED, f"{_LOSS} %")
+
+
+def precision(data: Data) -> str:
+    """Loss, area, energy and RenderIndex of each precision."""
+    study = data.result("mixed-precision")
+    (library,) = study["libraries"]
+    columns = (
+        ("dists_loss", ".3f", 1),
+        ("dists_loss_max", ".3f", 1),
+        ("psnr_min", ".1f", 1),
+        (f"array_kge.{library}", ".1f", 1e-3),
+        (f"fo4.{library}", ".0f", 1),
+        (f"mw.{library}", ".2f", 1),
+        (f"nj.{library}", ".3f", 1),
+        (f"render_index.{library}", ".3f", 1),
+    )
+    rows = [
+        [
+            _marked(point["name"], study),
+            *(number(point["figures"][key], form, scale) for key, form, scale in columns),
+        ]
+        for point in study["points"]
+    ]
+    titles = ["design", "DISTS loss, mean, %", "largest, %", "PSNR to Embree, lowest, dB", "array, MGE", "FO4"]
+    return markdown([*titles, "mW of a row", "nJ per in-box ray", "RenderIndex"], rows)
+
+
+def savings(data: Data) -> str:
+    """What the best precision and the paper's choice save against the baseline, beside the paper."""
+    study = data.result("mixed-precision")
+    (library,) = study["libraries"]
+    points = {point["name"]: point for point in study["points"]}
+    base = points[study["baseline"]]["figures"]
+    rows: list[Sequence[str]] = [PAPER]
+    for name in {_best(study) or paper.PRECISION: None, paper.PRECISION: None}:
+        own = points[name]["figures"]
+        losses = [100 * frame["dists_baseline"] for frame in points[name]["workloads"].values()]
+        saved = [1 - own[f"{key}.{library}"] / base[f"{key}.{library}"] for key in ("nj", "mw", "array_kge")]
+        shares = (f"{100 * share:.1f} %" for share in saved)
+        rows.append(["Colonnade, ASAP7", name, *shares, f"{min(losses):.4f} to {max(losses):.4f} %"])
+    return markdown(["", "design", "energy per ray saved", "power saved", "area saved", "DISTS loss of a frame"], rows)
+
+
+def render_index(data: Data) -> str:
+    """The RenderIndex of each precision by each choice of Norm; bold: the lowest of a choice."""
+    study = data.result("mixed-precision")
+    (library,) = study["libraries"]
+    choices = indices(study["points"], study["baseline"], library)
+    rows = []
+    for point in study["points"]:
+        cells = []
+        for found in choices.values():
+            value = found.get(point["name"])
+            text = number(value, "#.3g")
+            cells.append(f"**{text}**" if value is not None and value == min(found.values()) else text)
+        rows.append([_marked(point["name"], study), *cells])
+    return markdown(["design", *choices], rows)
+
+
+def _marked(name: str, study: Study) -> str:
+    """The name of a design; the best one is bold, the paper's choice is called so."""
+    text = f"**{name}**" if name == _best(study) else name
+    return f"{text} (the paper's choice)" if name == paper.PRECISION else text
+
+
+def _best(study: Study) -> str | None:
+    """The design of the lowest RenderIndex."""
+    rows = study["render_index"]["rows"]
+    return min(rows, key=lambda row: float(row["index"]))["name"] if rows else None
+
+
+TABLES: Mapping[str, Callable[[Data], str]] = {
+    "precision": precision,
+    "render-index": render_index,
+    "savings": savings,
+}

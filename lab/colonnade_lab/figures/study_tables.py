@@ -1,0 +1,43 @@
+"""The tables of ``docs/studies.md``: energy and area, vertex bits and contexts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from colonnade_lab.common.markdown import markdown
+from colonnade_lab.figures.data import Data
+
+
+def trade(name: str, data: Data) -> str:
+    """Error, rate, area and energy of each design of a study; bold: on the front."""
+    study = data.result(name)
+    (library,) = study["libraries"]
+    key = f"energy_area.{library}"
+    base = next(point for point in study["points"] if point["name"] == study["baseline"])["figures"][key]
+    rows = []
+    for point in study["points"]:
+        own = point["figures"]
+        rows.append(
+            [
+                f"**{point['name']}**" if point["on_front"] else point["name"],
+                number(own["psnr_min"], ".1f"),
+                number(own["rays_per_cycle"], ".2f"),
+                number(own[f"array_kge.{library}"], ".2f", 1e-3),
+                number(own[f"nj.{library}"], ".3f"),
+                number(own[f"area_per_rate.{library}"], ",.0f"),
+                "–" if own[key] is None or base is None else f"{100 * (own[key] / base - 1):+.1f} %",
+            ]
+        )
+    titles = ["design", "PSNR to Embree, lowest, dB", "rays per cycle, bunny", "array, MGE", "nJ per ray"]
+    return markdown([*titles, "kGE·cycle/ray", f"energy × area ÷ rate, to `{study['baseline']}`"], rows)
+
+
+def number(value: float | None, form: str, scale: float = 1.0) -> str:
+    """The scaled value as text; a dash without one."""
+    return "–" if value is None else format(value * scale, form)
+
+
+TABLES: Mapping[str, Callable[[Data], str]] = {
+    name: partial(trade, name) for name in ("energy-area", "vertices-contexts")
+}

@@ -1,0 +1,96 @@
+"""The tables of what a tree saves and costs: tests, cycles, records and area."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from colonnade_lab.common import paper
+from colonnade_lab.common.markdown import markdown
+from colonnade_lab.evaluation.bench import geometric_mean
+from colonnade_lab.explore.figures import per_ray
+from colonnade_lab.figures.data import Data
+from colonnade_lab.report.speed_up import NONE, reductions
+
+Point = Mapping[str, Any]
+
+
+def _points(study: Mapping[str, Any]) -> dict[str, Point]:
+    return {point["name"]: point for point in study["points"]}
+
+
+def tests(data: Data) -> str:
+    """Tests of an in-box ray with and without a tree, by mesh, and those of a frame without one by arithmetic."""
+    study, costs = data.result("bvh-tests"), data.result("bvh-costs")
+    points, alone = _points(study), _points(costs)[NONE]
+    rows: list[list[str]] = []
+    savings: dict[str, list[float]] = {name: [] for name in points}
+    for workload in study["workloads"]:
+        frame = workload["name"]
+        every = per_ray(alone["workloads"][frame], "triangleTests") or 0.0
+        base = points[study["baseline"]]["workloads"][frame]
+        row = [frame, f"{workload['triangles']:,}", f"{base['records']['bytes'] / 1e6:.2f}"]
+        for name, point in points.items():
+            boxes, triangles = (
+                per_ray(point["workloads"][frame], f"{kind}Tests") or 0.0 for kind in ("box", "triangle")
+            )
+            savings[name].append(every / (boxes + triangles))
+            row.append(f"{boxes:.1f} + {triangles:.1f}")
+        factors = (f"{each[-1]:,.0f}" for each in savings.values())
+        rows.append([*row, f"{every:,.0f}", *factors, f"{base['counters']['raysInBox'] * every / 1e9:.1f}"])
+    means = (f"{geometric_mean(each):,.0f}" for each in savings.values())
+    rows.append(["geometric mean", *[""] * (3 + len(points)), *means, ""])
+    titles = [f"{name}: box + triangle tests of a ray" for name in points]
+    ratios = [f"none ÷ {name}" for name in points]
+    head = ["mesh", "triangles", "scene, MB", *titles, "none: triangle tests of a ray", *ratios]
+    return markdown([*head, "none: tests of a frame, billions"], rows)
+
+
+def cycles(data: Data) -> str:
+    """Cycles of reduced meshes with and without a tree, and the speed-up, beside the paper's."""
+    study = data.result("bvh-cycles")
+    names = [point["name"] for point in study["points"]]
+    rows = [
+        [
+            f"{each.maximum:,}",
+            f"{each.triangles:,.0f}",
+            *(f"{each.cycles[name]:,.0f}" for name in names),
+            *(f"{each.speed_up(name):.1f}" for name in names if name != NONE),
+        ]
+        for each in reductions(study)
+    ]
+    rows.append(["source paper", *["–"] * (1 + len(names)), f"{paper.TREE_SPEED_UP:g}", "–"])
+    head = ["triangles, at most", "triangles, mean", *(f"cycles, {name}" for name in names)]
+    return markdown([*head, *(f"speed-up by {name}" for name in names if name != NONE)], rows)
+
+
+def costs(data: Data) -> str:
+    """Records and area with and without a tree, beside the paper's."""
+    study = data.result("bvh-costs")
+    (library,) = study["libraries"]
+    points = _points(study)
+
+    def row(title: str, value: Callable[[Point], float], form: str, published: float | None = None) -> list[str]:
+        values = {name: value(point) for name, point in points.items()}
+        shares = [f"{100 * (own / values[NONE] - 1):+.1f} %" for name, own in values.items() if name != NONE]
+        claim = "–" if published is None else f"+{100 * published:.1f} %"
+        return [title, *(format(own, form) for own in values.values()), *shares, claim]
+
+    def records(kinds: Sequence[str]) -> Callable[[Point], float]:
+        return lambda point: geometric_mean(
+            sum(frame["records"][kind] for kind in kinds) for frame in point["workloads"].values()
+        )
+
+    rows = [
+        row("triangle records", records(["triangles"]), ",.0f"),
+        row("attribute records", records(["attributes"]), ",.0f"),
+        row("**all records**, with nodes", records(["records"]), ",.0f", paper.TREE_MEMORY),
+        row("traversal unit, kGE", lambda point: point["area"][library]["traversal_unit_kge"], ".1f"),
+        row("**array**, MGE", lambda point: point["area"][library]["array_kge"] / 1e3, ".2f", paper.TREE_AREA),
+    ]
+    names = list(points)
+    overheads = [f"overhead of {name}" for name in names if name != NONE]
+    return markdown(["", *names, *overheads, "source paper"], rows)
+
+
+TABLES: Mapping[str, Callable[[Data], str]] = {"bvh-tests": tests, "bvh-cycles": cycles, "bvh-costs": costs}

@@ -1,0 +1,73 @@
+"""The demonstration: its camera, photos, and what it measures of a frame."""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from colonnade.design.generator import design_for
+from colonnade.environment.sequence import load_sequence
+from colonnade.scene.parser import load_scene
+
+from colonnade_lab.evaluation.demonstration import measure, walk
+from colonnade_lab.evaluation.demonstration.measure import FrameCost
+from colonnade_lab.evaluation.studies.synthetic_attic import RoomModel, attic_parts
+from colonnade_lab.report.live_page import MEGAHERTZ, Energy, Way, figures, page
+
+SIZE = (96, 72)
+ROOM = tuple(f"physicalAttributeMemory.{key}" for key in ("width=96", "height=72", "mapBytes=4096", "planeBytes=4096"))
+SINGLE = ("array.rows=1", "array.columns=1", *ROOM)
+
+
+def test_the_camera_loops_by_30_centimetres_and_10_degrees() -> None:
+    poses = [walk.camera_of(number / walk.FRAMES, *SIZE).to_world for number in range(walk.FRAMES)]
+    first = poses[0]
+    np.testing.assert_allclose(first, walk.camera_of(1.0, *SIZE).to_world, atol=1e-12)
+    aside = np.array([(pose[:, 3] - first[:, 3]) @ first[:, 0] for pose in poses])
+    turns = np.degrees([np.arctan2(pose[:, 2] @ first[:, 0], pose[:, 2] @ first[:, 2]) for pose in poses])
+    for values, maximum in ((aside, 0.3), (turns, 10.0)):
+        assert values.max() == pytest.approx(maximum, rel=0.15) and values.min() == pytest.approx(-maximum, rel=0.15)
+    assert max(np.linalg.norm(b[:, 3] - a[:, 3]) for a, b in itertools.pairwise(poses)) < 0.03
+
+
+def test_photos_have_soft_edges_and_exact_maps() -> None:
+    model, camera = RoomModel("attic", attic_parts()), walk.camera_of(0.3, *SIZE)
+    view, hard = walk.attic_view(model, camera, *SIZE), model.seen_by(camera, *SIZE)
+    np.testing.assert_array_equal(view.depth, hard.depth)
+    assert view.photo is not None and hard.photo is not None
+    assert len(np.unique(view.photo.reshape(-1, 3), axis=0)) > 1.2 * len(np.unique(hard.photo.reshape(-1, 3), axis=0))
+    assert np.abs(view.photo.astype(int) - hard.photo).mean() < 25
+
+
+@pytest.mark.parametrize(
+    "rtl", [[], pytest.param([1], marks=pytest.mark.skipif(shutil.which("verilator") is None, reason="no Verilator"))]
+)
+def test_costs_of_frames(tmp_path: Path, rtl: list[int]) -> None:
+    sequence = load_sequence(walk.write_walk(tmp_path, SIZE, 3))
+    (tmp_path / "scene.toml").write_text(walk.walk_scene(*SIZE))
+    scene = load_scene(tmp_path / "scene.toml")
+    frames: list[np.ndarray] = []
+    demonstration = measure.Demonstration(sequence, scene, design_for("small", SINGLE), 2, rtl)
+    costs = measure.run(demonstration, 2, frames.append)
+    assert [frame.shape for frame in frames] == [(72, 96, 3)] * 3
+    assert [cost.encode_ms > 0 for cost in costs] == [cost.load_cycles > 0 for cost in costs] == [True, False, True]
+    assert [cost.registers_ms is None for cost in costs] == [False, True, False]
+    assert [cost.cycles is not None for cost in costs] == [number in rtl for number in range(3)]
+    assert all(cost.differing == 0 and cost.rays_in_box > 0 for cost in costs)
+    assert costs[1].march_steps > costs[0].march_steps, "primary rays march between keyframes"
+
+
+def test_the_page_adds_up(tmp_path: Path) -> None:
+    costs = [FrameCost(30.0, 0.1, 40_000, 1000, 5), FrameCost(0.0, None, 0, 3000, 5, 200_000)]
+    found = figures(costs, Energy(1.5, "docs/data/x.json"))
+    assert found["load"] == pytest.approx(20_000 / (1e3 * MEGAHERTZ)) and found["frame"] == pytest.approx(1.0)
+    assert found["device"] == pytest.approx(0.1 + 0.1 + 1.0) and found["live"] == pytest.approx(15.0 + 1.2)
+    assert found["microjoules"] == pytest.approx(3.0)
+    assert figures(costs[:1], Energy(1.5, ""))["device"] is None, "no frame of the RTL, no sum"
+    (tmp_path / "a.mp4").write_bytes(b"film")
+    text = page([Way(2, costs, tmp_path / "a.mp4")], (640, 480), 30.0, ["A <note>."], Energy(1.5, ""))
+    assert "data:video/mp4;base64,ZmlsbQ==" in text and "A &lt;note&gt;." in text and "200,000" in text
+    assert "http" not in text.replace("http-equiv", ""), "it loads nothing"

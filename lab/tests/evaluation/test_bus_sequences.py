@@ -1,0 +1,31 @@
+"""No abuse of the AXI4 shell at its pins breaks a rule of the bus, hangs it, or harms the frame that follows."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from colonnade.design.generator import shell_design_for
+
+from colonnade_lab.evaluation.bus_sequences import run_sequences
+
+CACHE = {"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2, "sharedMisses": 8}
+CACHE |= {"busBytes": 32, "parity": True}
+PLAIN, CACHED = ("array.columns=2",), ("array.columns=2", f"columnBvhMemory.cache={json.dumps(CACHE)}")
+
+
+@pytest.mark.parametrize(
+    ("overrides", "sequences"),
+    [
+        pytest.param(PLAIN, 140, id="scene in memories"),
+        pytest.param(CACHED, 70, id="scene in DRAM"),
+        pytest.param(PLAIN, 10_000, id="scene in memories, many", marks=pytest.mark.matrix),
+        pytest.param(CACHED, 3_000, id="scene in DRAM, many", marks=pytest.mark.matrix),
+    ],
+)
+def test_no_abuse_at_the_bus_breaks_a_rule_or_the_next_frame(overrides: tuple[str, ...], sequences: int) -> None:
+    """140 sequences are each kind of abuse with each order of slaves."""
+    result = run_sequences(shell_design_for("tiny", overrides, bus_bytes=16), sequences)
+    assert result.broken_rules == ()
+    assert result.sequences == result.ended == result.exact == sequences
+    assert result.is_right and result.bursts > 10 * sequences

@@ -1,0 +1,206 @@
+"""A data file holds what its commands print, and is refused when its hardware is not today's."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from colonnade.common.errors import UserError
+from colonnade.design.toolchain import project_root
+
+from colonnade_lab.figures import catalog, data, kept, measure
+from colonnade_lab.figures.catalog import Entry
+from colonnade_lab.figures.facts import PRESETS
+
+CONFIG = {"array": {"rows": 1}, "frame": None}
+ENTRY = Entry("bench-tiny", "tiny", {"": ("colonnade", "bench", "--config", "tiny", "--json", "REPORT")})
+
+
+@pytest.fixture
+def docs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for data, a catalog of one entry that is not measured, and a generator without Java."""
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / data.UNMEASURED).write_text("bench-tiny\n")
+    for module in (data, measure):
+        monkeypatch.setattr(module, "manifest_for", lambda *_: SimpleNamespace(manifest=SimpleNamespace(config=CONFIG)))
+    monkeypatch.setattr(data, "catalog", lambda: {ENTRY.name: ENTRY})
+    monkeypatch.setattr(measure, "commit", lambda: ("c0ffee", False))
+    monkeypatch.setattr(measure, "_report", lambda *_: {"config": CONFIG, "rate": 1.5, "path": {"cells": [1], "ns": 2}})
+    monkeypatch.setattr(data, "_git", lambda *_: "")
+    return tmp_path
+
+
+def content(docs: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((docs / "data" / "bench-tiny.json").read_text())
+    return found
+
+
+def test_a_data_file_says_what_it_is_of(docs: Path) -> None:
+    assert list(data.problems(docs)) == []
+    measure.measure(ENTRY, docs)
+    found = content(docs)
+    assert found.pop("seconds") >= 0
+    assert found.pop("processors") >= 1
+    assert len(found.pop("date")) == 10
+    assert found == {
+        "command": ["colonnade bench --config tiny"],
+        "commit": "c0ffee",
+        "is_modified": False,
+        "config": CONFIG,
+        "result": {"rate": 1.5, "path": {"ns": 2}},
+    }
+    assert data.unmeasured(docs) == []
+    assert list(data.problems(docs)) == []
+
+
+def test_a_data_file_keeps_what_is_read_a_record_on_a_line(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    unread = {"stalls": {"box unit": list(range(900))}, "psnr": 50.0, "cycles": None}
+    frame = {"rays_per_cycle_in_box": 2.5, "counters": {"raysInBox": 7, "boxTests": 8, "frames": 1}, **unread}
+    area = {"array_kge": 17_040.0, "units": {"BoxUnit": {"kge": 37.0}}}
+    point = {"values": {}, "workloads": {"bunny": frame}, "area": {"asap7": area}, "failures": [], "power": {}}
+    points = [
+        {"name": f"point {index}", "figures": dict.fromkeys(map(str, range(99)), 0.5), **point} for index in (1, 2)
+    ]
+    study = {"title": "Study", "workloads": [{"name": "bunny"}], "points": points, "jobs": {"run": 9}}
+    monkeypatch.setattr(measure, "_report", lambda *_: study)
+    measure.measure(ENTRY, docs)
+    own = {"rays_per_cycle_in_box": 2.5, "counters": {"raysInBox": 7, "boxTests": 8}}
+    found = content(docs)["result"]
+    assert found.keys() == {"title", "workloads", "points"}
+    assert [each["workloads"] for each in found["points"]] == [{"bunny": own}, {"bunny": own}]
+    assert found["points"][0]["area"] == {"asap7": {"array_kge": 17_040.0}}
+    lines = (docs / "data" / "bench-tiny.json").read_text().splitlines()
+    assert len([line for line in lines if "point " in line]) == 2 and max(map(len, lines)) <= kept.WIDTH + 1
+
+
+def test_figures_of_the_same_sources_are_not_measured_again(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    measure.measure(ENTRY, docs)
+    file = docs / "data" / "bench-tiny.json"
+    file.write_text(json.dumps(content(docs) | {"seconds": 1000.0}))
+    monkeypatch.setattr(measure, "_report", lambda *_: {"config": CONFIG, "rate": 2.5})
+    measure.measure(ENTRY, docs)
+    assert content(docs)["result"]["rate"] == 1.5
+    measure.measure(ENTRY, docs, again=True)
+    # What is in the caches takes no time: the longer one counts
+    assert (content(docs)["result"]["rate"], content(docs)["seconds"]) == (2.5, 1000.0)
+    monkeypatch.setattr(data, "_git", lambda *_: None)
+    monkeypatch.setattr(measure, "commit", lambda: ("another", False))
+    measure.measure(ENTRY, docs)
+    assert (content(docs)["commit"], content(docs)["seconds"] < 1000) == ("another", True)
+
+
+def test_a_report_of_other_hardware_is_refused(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measure, "_report", lambda *_: {"config": {"array": {"rows": 9}}})
+    with pytest.raises(UserError, match="another configuration than tiny"):
+        measure.measure(ENTRY, docs)
+    monkeypatch.setattr(measure, "_report", lambda *_: {"config": "tiny", "equal": True})
+    measure.measure(ENTRY, docs)
+    assert content(docs)["result"] == {"equal": True}
+
+
+def test_figures_of_other_hardware_are_refused(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    measure.measure(ENTRY, docs)
+    file = docs / "data" / "bench-tiny.json"
+    file.write_text(json.dumps(content(docs) | {"config": {"array": {"rows": 2}, "frame": None}}))
+    (problem,) = data.problems(docs)
+    assert "another configuration than tiny (array.rows)" in problem
+    assert "run tools/figures bench-tiny" in problem
+
+    # A key that is younger than the file has the value of tiny
+    file.write_text(json.dumps(content(docs) | {"config": {"array": {"rows": 1}}}))
+    assert not list(data.problems(docs))
+
+    def refuse(*_: object) -> None:
+        raise UserError("unknown key array.row")
+
+    monkeypatch.setattr(data, "manifest_for", refuse)
+    assert "the generator refuses its configuration: unknown key array.row" in next(data.problems(docs))
+
+
+def test_a_key_that_is_younger_than_the_file_has_its_default_in_every_section(monkeypatch: pytest.MonkeyPatch) -> None:
+    configs = {
+        ("edge", ()): {"maps": {"width": 64, "encoding": "twoLevel"}, "cache": None},
+        ("tiny", ()): {"maps": None, "cache": None},
+    }
+    complete = {"maps": {"width": 640, "encoding": "twoLevel"}, "cache": {"lines": 8}}
+
+    def generated(config: str, overrides: tuple[str, ...] = ()) -> SimpleNamespace:
+        return SimpleNamespace(manifest=SimpleNamespace(config=configs.get((config, overrides), complete)))
+
+    monkeypatch.setattr(data, "manifest_for", generated)
+    entry = replace(ENTRY, config="edge")
+    assert data.problem_of(entry, {"config": {"maps": {"width": 64}}}) is None
+    assert "(maps.width)" in str(data.problem_of(entry, {"config": {"maps": {"width": 65}}}))
+
+
+def test_files_and_the_list_of_what_is_not_measured_agree(docs: Path) -> None:
+    (docs / "data" / data.UNMEASURED).write_text("bench-tiny\nbench-huge\n")
+    (docs / "data" / "old.json").write_text("{}")
+    (docs / "data" / "bench-tiny.json").write_text(json.dumps({"config": CONFIG}))
+    lines = list(data.problems(docs))
+    assert len(lines) == 3
+    assert all(name in line for name, line in zip(("old.json", "bench-huge", "bench-tiny"), lines, strict=True))
+    (docs / "data" / data.UNMEASURED).unlink()
+    (docs / "data" / "old.json").unlink()
+    assert list(data.problems(docs)) == []
+    (docs / "data" / "bench-tiny.json").unlink()
+    assert list(data.problems(docs)) == ["data/bench-tiny.json is missing: run tools/figures bench-tiny"]
+
+
+def test_an_array_has_one_size_in_all_files(docs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cached = {"array": {"columns": 1}, "columnBvhMemory": {"cache": {}}}
+    area = Entry("area-tiny-asap7", "tiny", {"": ("colonnade",)}, libraries=("ASAP7",))
+    entries = {each.name: each for each in (area, Entry("study", "tiny", {"": ("colonnade",)}))}
+    report: dict[str, Any] = {
+        "units": {},
+        "chip": {"um2_per_gate": 0.5},
+        "slowest_path": dict.fromkeys(("ns", "fo4", "unit")),
+    }
+    report["levels"] = {"array": {"kge": 17_040.0, "logic_kge": 1.0}, "traversal_unit": {"kge": 1.0}}
+
+    def problems(size: float, config: dict[str, Any]) -> list[str]:
+        point = {"name": "base", "config_values": config, "area": {"asap7": {"array_kge": size}}}
+        for name, result in (("area-tiny-asap7", report), ("study", {"points": [point]})):
+            (docs / "data" / f"{name}.json").write_text(json.dumps({"config": cached, "result": result}))
+        return list(data._size_problems(data.Data(docs), entries))
+
+    sizes = "the array of base has 17.28 MGE, in data/area-tiny-asap7.json 17.04 MGE"
+    differs = f"data/study.json: {sizes}: run tools/figures study"
+    assert problems(17_040.0, cached) == []
+    assert problems(17_280.0, cached) == [differs]
+    assert problems(17_280.0, cached | {"array": {"columns": 2}}) == []
+    monkeypatch.setattr(data, "catalog", lambda: entries)
+    monkeypatch.setattr(data, "problem_of", lambda *_: None)
+    (docs / "data" / data.UNMEASURED).unlink()
+    assert problems(17_280.0, cached) == list(data.problems(docs))
+
+
+def test_the_catalog_measures_every_preset() -> None:
+    presets = {file.stem for file in (project_root() / "configs").glob("*.json")}
+    assert set(PRESETS) == presets
+    entries = catalog.catalog()
+    assert all(f"area-{preset}-asap7" in entries for preset in presets)
+    assert {entry.name for entry in catalog.selected(("fpga", "area-edge"))} == {
+        "fpga",
+        "area-edge-asap7",
+        "area-edge-sky130",
+    }
+    with pytest.raises(KeyError):
+        catalog.selected(("beauty",))
+
+
+def test_libraries_are_named_by_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    entries = catalog.selected(("area-tiny", "energy-area"))
+    monkeypatch.delenv("ASAP7", raising=False)
+    with pytest.raises(UserError, match="set ASAP7"):
+        measure.require_libraries(entries)
+    monkeypatch.setenv("ASAP7", "a.lib b.lib")
+    measure.require_libraries(entries)
+    ppa, explore = (measure._expanded(entry.commands[""], tmp_path / "r.json") for entry in entries)
+    assert ppa[3:] == ["tiny", "--liberty", "a.lib", "--liberty", "b.lib", "--json", str(tmp_path / "r.json")]
+    assert explore[3:7] == ["--library", "asap7=a.lib", "--library", "asap7=b.lib"]
+    assert data.commands_of(entries[0]) == ["colonnade ppa --config tiny --liberty ASAP7"]

@@ -1,0 +1,73 @@
+"""Recordings of a traversal unit among several, and of the modules that follow its paths."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pytest
+
+from colonnade_lab.ppa.netlist.hierarchy import PATH_MODULES, REPLAYED, TRIANGLES
+from colonnade_lab.ppa.power.frame import frame_of
+from colonnade_lab.ppa.power.recording import Recording, Stimulus, record
+
+UNIT = "TraversalUnit"
+
+
+def ports(inputs: Sequence[str], outputs: Sequence[str]) -> Mapping[str, Any]:
+    """One-bit ports in Yosys's JSON, with the clock."""
+    directions = {"input": ("clock", "reset", *inputs), "output": outputs}
+    return {name: {"direction": each, "bits": [0]} for each, names in directions.items() for name in names}
+
+
+PORTS = {
+    UNIT: ports(
+        ("io_start", "io_rays_valid", "io_broadcasts_0_valid"), ("io_isFree", "io_events_intersector_raysInBox")
+    ),
+    "PathUnit": ports(
+        ("io_positions_valid", "io_pixels_ready"),
+        ("io_positions_ready", "io_pixels_valid", "io_events_raysShadow", "io_events_hits"),
+    ),
+    "PathHits": ports(("io_start", "io_rays_ready"), ("io_rays_valid",)),
+    "RayBus": ports(("io_rays_valid",), ("io_rays_ready", "io_units_0_valid", "io_units_1_valid")),
+    "ResultBus": ports((), ("io_results_valid",)),
+    TRIANGLES: ports(("io_rows_0_candidate_valid", "io_rows_1_candidate_valid"), ("io_rows_0_result_valid",)),
+}
+
+
+def recorded(cycles: int) -> dict[str, Recording]:
+    overrides = (
+        "array.rows=3",
+        "units.pathContexts=24",
+        "units.rayInterval=1",
+        "units.shadeInterval=3",
+        "units.triangleRows=2",
+    )
+    return record("tiny", overrides, PORTS, Stimulus.of_benchmark("cube", (24, 18), cycles))
+
+
+@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+def test_recordings_are_of_one_unit_and_its_paths_from_the_first_to_the_last_cycle() -> None:
+    whole = recorded(900)
+    assert set(whole) == set(REPLAYED)
+    assert all(len(recording.cycles) == 900 for recording in whole.values())
+    unit = whole[UNIT]
+    assert [cycle for cycle, start in enumerate(unit.of("io_start")) if start] == [0]
+    for cycles in (434, 899):
+        for module, part in recorded(cycles).items():
+            assert part.cycles == whole[module].cycles[:cycles]
+            assert part.idle_cycles == whole[module].idle_cycles
+    # The unit of row 0, in the same cycles as the column
+    assert unit.of("io_rays_valid") == whole["RayBus"].of("io_units_0_valid")
+    assert whole["PathHits"].fires("io_rays") == whole["RayBus"].fires("io_rays")
+    frame = frame_of(whole)
+    assert 0 < frame.counts["hits"] < frame.counts["pixels"] <= 24 * 18
+    share = frame.traced / frame.counts["rays_in_box"]
+    assert 0.2 < share < 0.5
+    assert frame.records_share == share
+    # Two of the rows share a triangle unit
+    of_group = sum(sum(whole["RayBus"].of(f"io_units_{row}_valid")[frame.begin : frame.end]) for row in range(2))
+    shared = dict.fromkeys(PATH_MODULES, share) | {TRIANGLES: frame.traced / of_group}
+    assert frame.shares == {UNIT: 1.0} | shared
+    assert share < shared[TRIANGLES] < 1
