@@ -40,7 +40,7 @@ OUTPUTS = {
     "bench-plot": "bench --plot out",
     "bench-json": "bench --json out",
     "verify-json": "verify --json out",
-    "study-json": "study room --json out",
+    "study-json": "study rays room --json out",
     "ppa-json": "ppa --json out",
 }
 CASES = {
@@ -94,7 +94,7 @@ CASES |= {
     "camera": Case("inspect --background room --no-dists --json room/meta.json", "would replace room/meta.json"),
     "albedo": Case("inspect --background room --no-dists --json room/albedo.png", "would replace room/albedo.png"),
     "depth": Case("inspect --background room --no-dists --json room/depth.npy", "would replace room/depth.npy"),
-    "room-of-a-study": Case("study room --json room/normal.png", "would replace room/normal.png"),
+    "room-of-a-study": Case("study rays room --json room/normal.png", "would replace room/normal.png"),
     "scene-of-verify": Case(
         "verify --config tiny --mesh cube --no-rtl --no-reference --scene s.toml --json s.toml", "would replace s.toml"
     ),
@@ -133,8 +133,8 @@ CASES |= {
     "pack-over-a-foreign-image": Case(f"{PACK} --output q", "not a scene image", {"q/scene.image": "mine"}),
     "pack-long-name": Case(f"{PACK} --output {LONG}", "File name too long"),
     "maps-into-a-file": Case("inspect --background room --no-dists --output a.png", "a file"),
-    "study-into-a-file": Case("study room --frames --no-dists --output a.png", "a file"),
-    "study-into-a-link": Case("study room --frames --output l", "a symbolic link", {"l": link_to("room")}),
+    "study-into-a-file": Case("study frames room --no-dists --output a.png", "a file"),
+    "study-into-a-link": Case("study frames room --output l", "a symbolic link", {"l": link_to("room")}),
     "explore-into-a-file": Case("explore x.toml --output a.png", "a file"),
     "explore-into-a-pipe": Case("explore x.toml --output d", "a pipe", {"d": fifo}),
     "explore-over-a-room": Case("explore x.toml --output room", "room holds files, but no"),

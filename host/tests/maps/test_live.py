@@ -277,7 +277,7 @@ def test_the_commands_take_the_encoder() -> None:
     for words, message in (
         ([*living, "--encoding", "slic"], "--encoder live needs --background"),
         (["inspect", "folder", "--encoder", "live"], "--encoder live needs --background"),
-        (["study", "--live", "--path", "room"], "--path needs --live and --rooms"),
+        (["study", "live", "room", "--rooms", "0"], "give either ROOMS or --rooms SEEDS"),
         (
             [*slic, "--backend", "model", "--encoder", "live"],
             "error: the live encoder writes twoLevel maps with tiles of 16 pixels, not slic maps",

@@ -190,30 +190,30 @@ def catalog() -> dict[str, Entry]:
             "environments",
             "edge",
             {
-                "accuracy": ("colonnade", "study", *_ROOMS, "--json", REPORT),
+                "accuracy": ("colonnade", "study", "rays", *_ROOMS, "--json", REPORT),
                 **{
                     Path(room).name: ("colonnade", "inspect", "--background", room, "--json", REPORT)
                     for room in (*_ROOMS, _ATTIC)
                 },
             },
         ),
-        Entry("room-lights", "small", _colonnade("study", "--light", *_ROOMS, _ATTIC)),
+        Entry("room-lights", "small", _colonnade("study", "light", *_ROOMS, _ATTIC)),
         Entry(
             "live-rooms",
             "small",
             {
-                "rooms": ("colonnade", "study", "--live", *_ROOMS, _ATTIC, "--json", REPORT),
-                "generated": ("colonnade", "study", "--live", "--rooms", _SEEDS, "--json", REPORT),
+                "rooms": ("colonnade", "study", "live", *_ROOMS, _ATTIC, "--json", REPORT),
+                "generated": ("colonnade", "study", "live", "--rooms", _SEEDS, "--json", REPORT),
             },
         ),
-        Entry("live-paths", "small", _colonnade("study", "--live", "--path", "--rooms", _MOVED)),
+        Entry("live-paths", "small", _colonnade("study", "live-paths", _MOVED)),
         Entry(
             "moved-rooms",
             "edge",
             {"": ("tools/room-frames", "edge", "160x120", "--moved", "--compare", f"--json={REPORT}")},
         ),
-        Entry("moving-frames", "small", _colonnade("study", "--views", "--frames", "--rooms", _MOVED)),
-        Entry("captures", "small", _colonnade("study", "--capture", *_ROOMS, _ATTIC)),
+        Entry("moving-frames", "small", _colonnade("study", "moved-frames", _MOVED)),
+        Entry("captures", "small", _colonnade("study", "captures", *_ROOMS, _ATTIC)),
         _samples(),
         _gather(),
         _light(),

@@ -155,7 +155,7 @@ def test_the_device_passes_closely_behind_a_thin_board(gap: float, passes: bool)
 def test_the_command_prints_a_table_and_writes_json(tmp_path: Path) -> None:
     write_attic(tmp_path / "attic", 160, 120)
     output = tmp_path / "r.json"
-    result = CliRunner().invoke(cli, ["study", str(tmp_path / "attic"), "--json", str(output)])
+    result = CliRunner().invoke(cli, ["study", "rays", str(tmp_path / "attic"), "--json", str(output)])
     assert result.exit_code == 0, result.output
     report = json.loads(output.read_text())
     assert list(report) == ["attic, full maps", "attic, planes", "attic, device"]

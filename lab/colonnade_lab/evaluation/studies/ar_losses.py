@@ -3,7 +3,7 @@
 The ground truth is the float reference with full maps and depth mesh
 (`colonnade.reference.environment.decoded.backdrops`). The bit-exact model renders the device's frames.
 
-`colonnade study --frames ROOM …` prints the losses of three objects in rooms.
+`colonnade study frames ROOM …` prints the losses of three objects in rooms.
 """
 
 from __future__ import annotations

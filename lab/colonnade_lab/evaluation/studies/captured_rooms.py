@@ -3,7 +3,7 @@
 Rays are compared with the mesh of the room's own depth map, which the capture does not see. The albedo does not decide
 them, so all of it is grey.
 
-`colonnade study --capture ROOM …` prints the figures.
+`colonnade study captures ROOM …` prints the figures.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A ray is *known* if it hits the mesh from the front. A known ray is *ok* if the 
 same map position or within `NEAR_METRES` of the same point. It is *missed* if the march has no hit. Pictures show the
 albedo in sRGB over known rays; missed rays are black.
 
-`colonnade study ROOM …` prints the figures of rooms for three marches: float through the planes of the full maps, float
+`colonnade study rays ROOM …` prints the figures of three marches: float through the planes of the full maps, float
 through the planes of the attribute memory, and the device's march.
 """
 

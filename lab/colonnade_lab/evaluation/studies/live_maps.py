@@ -3,8 +3,8 @@
 Rays are reflections at mirror spheres, marched on the device, as in `environment_accuracy`. The live encoder gets each
 room as a still. Times are CPU milliseconds of one core, the least of several frames.
 
-`colonnade study --live ROOMS` and `colonnade study --live --rooms SEEDS` print the table; `--path` walks through the
-rooms of the seeds instead.
+`colonnade study live ROOMS` and `colonnade study live --rooms SEEDS` print the table; `colonnade study live-paths`
+walks through the rooms of the seeds instead.
 """
 
 from __future__ import annotations

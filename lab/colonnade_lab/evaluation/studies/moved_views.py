@@ -4,7 +4,7 @@ The cameras stand up to `METRES` beside the maps' camera along each axis, and tu
 rays of a frame's pixels march. A pixel is right as a ray of `environment_accuracy` is: within 5 pixels or 5 cm of the
 real surface. Only pixels count whose surface the maps show.
 
-`colonnade study --views --rooms SEEDS` prints the table.
+`colonnade study views SEEDS` prints the table.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 keyframe as if they were those of the frame, with its photo. The truth is the float reference with the full maps of the
 frame. Maps are those of the live encoder.
 
-`colonnade study --views --frames --rooms SEEDS` prints the table.
+`colonnade study moved-frames SEEDS` prints the table.
 """
 
 from __future__ import annotations

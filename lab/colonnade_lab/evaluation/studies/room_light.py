@@ -3,16 +3,16 @@
 A *single-bounce* pixel shows a mirror whose reflected ray misses the object and hits the depth map from the front, so
 that the photo has the colour of the reflected point. Lights cast no shadows here, since the photo lacks the object's.
 
-`colonnade study --light ROOM …` prints the figures.
+`colonnade study light ROOM …` prints the figures.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from colonnade.common.image_io import decode_srgb, encode_srgb, write_png
@@ -147,6 +147,16 @@ def study_light(
             if output is not None:
                 write_png(output / f"{room.environment.name}-{choice.replace(', ', '-').replace(' ', '-')}.png", frame)
     return reports
+
+
+def study_both(folders: Sequence[Path], progress: Progress, output: Path | None) -> dict[str, Any]:
+    """The quality of fits and of rooms, for `tables`."""
+    return {"fits": study_fits(folders), "choices": study_light(folders, progress, output)}
+
+
+def tables(reports: dict[str, Any]) -> str:
+    """The reports of `study_both` as Markdown tables."""
+    return f"{fits_table(reports['fits'])}\n\n{table(reports['choices'])}"
 
 
 def fits_table(reports: dict[str, FitQuality]) -> str:

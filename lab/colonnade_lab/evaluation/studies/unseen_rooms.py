@@ -4,7 +4,7 @@ Rays are those of `environment_accuracy`: reflections at mirror spheres, right w
 the depth map. Their hits on the real surface are a second truth. Each ray that is wrong on the device has one cause,
 the first that holds of `CAUSES`.
 
-`colonnade study --rooms SEEDS` prints the table.
+`colonnade study generated SEEDS` prints the table.
 """
 
 from __future__ import annotations
@@ -80,12 +80,12 @@ def parse_seeds(text: str) -> list[int]:
         first, dash, last = (piece.strip() for piece in part.partition("-"))
         last = last if dash else first
         if not all(piece.isascii() and piece.isdigit() and len(piece) <= 6 for piece in (first, last)):
-            raise UserError(f"--rooms {text!r}: {part!r} is no seed: give seeds from 0 to {MAX_SEED}, such as 0-9,100")
+            raise UserError(f"seeds {text!r}: {part!r} is no seed: give seeds from 0 to {MAX_SEED}, such as 0-9,100")
         if int(last) < int(first):
-            raise UserError(f"--rooms {text!r}: the range {part!r} is empty: give the lower seed first")
+            raise UserError(f"seeds {text!r}: the range {part!r} is empty: give the lower seed first")
         seeds += range(int(first), min(int(last), int(first) + MAX_ROOMS) + 1)
         if len(seeds) > MAX_ROOMS:
-            raise UserError(f"--rooms {text!r} has more than {MAX_ROOMS:,} seeds: give fewer")
+            raise UserError(f"seeds {text!r} has more than {MAX_ROOMS:,} seeds: give fewer")
     return list(dict.fromkeys(seeds))
 
 

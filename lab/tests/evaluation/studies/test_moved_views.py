@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from click.testing import CliRunner
-from colonnade.cli.main import cli
 
 from colonnade_lab.evaluation.studies.generated_rooms import generated_room
 from colonnade_lab.evaluation.studies.moved_views import METRES, measure_seed, moved_rays, table
@@ -26,8 +24,3 @@ def test_cameras_stand_beside_that_of_the_maps() -> None:
     environment, random = generated_room(3, 64, 48).environment, np.random.default_rng(1)
     origins = np.array([moved_rays(environment, random)[0][0] for _ in range(20)])
     assert len(np.unique(origins, axis=0)) == 20 and 0.2 < np.abs(origins).max() <= METRES
-
-
-def test_views_are_of_generated_rooms() -> None:
-    result = CliRunner().invoke(cli, ["study", "--views", "room"])
-    assert result.exit_code == 2 and "--views needs --rooms" in result.output
