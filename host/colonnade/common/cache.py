@@ -53,18 +53,20 @@ def digests(folder: Path) -> dict[str, str] | None:
     return _verified.get(folder)
 
 
+@contextlib.contextmanager
 def entry(
     folder: Path,
-    make: Callable[[Path], None],
     what: str,
     progress: Progress = QUIET,
     is_usable: Callable[[Path], bool] = lambda folder: True,
-) -> Path:
-    """Return the intact entry `folder`; the first process that needs it makes it.
+) -> Iterator[Path | None]:
+    """Make sure that the entry `folder` is intact after the block, which the first process that needs it fills.
+
+    The block gets an empty folder to fill, which then becomes the entry; or None if there is nothing to do. Other
+    processes wait for the end of the block.
 
     Args:
         folder: path of the entry; its name is the key, which identifies all inputs of the content.
-        make: fills an empty folder, which then becomes the entry.
         what: for messages, e.g. ``"simulator"``.
         progress: shows waiting for another process.
         is_usable: further check of a cached entry, e.g. that files outside it still exist.
@@ -73,22 +75,26 @@ def entry(
         UserError: the cache is not writable.
     """
     if _is_known(folder) and is_usable(folder):
-        return folder
+        yield None
+        return
     try:
         with locked(folder.parent / f"{folder.name}.lock", what, progress):
-            if not (_is_known(folder) and is_usable(folder)):
+            if _is_known(folder) and is_usable(folder):
+                yield None
+            else:
                 if os.path.lexists(folder):
                     progress.note(f"the cached {what} was damaged and is built again")
                 temporary.remove_abandoned(".", folder.parent)
                 with temporary.temporary_folder(f".{folder.name}.", folder.parent) as content:
-                    _fill(content, make, folder)
+                    with _disk_watched(content, folder.parent):
+                        yield content
+                        seal(content, folder.name)
                     temporary.replace(content, folder)
                 _verified[folder] = _known(folder)
     except OSError as error:
         if (refusal := _unwritable(folder.parent, error)) is None:
             raise
         raise refusal from None
-    return folder
 
 
 def discard(folder: Path) -> None:
@@ -133,14 +139,14 @@ def stored(file: Path, key: Mapping[str, Any], progress: Progress = QUIET) -> di
     return None
 
 
-def _fill(content: Path, make: Callable[[Path], None], folder: Path) -> None:
+@contextlib.contextmanager
+def _disk_watched(content: Path, cache: Path) -> Iterator[None]:
     try:
-        make(content)
-        seal(content, folder.name)
+        yield
     except (OSError, RuntimeError):
         # Programs and `shutil` report a full disk differently: measure it before the partial entry is removed
         if shutil.disk_usage(content).free < MIN_FREE_BYTES:
-            raise _full(folder.parent) from None
+            raise _full(cache) from None
         raise
 
 

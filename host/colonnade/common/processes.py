@@ -17,6 +17,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, NoReturn
 
@@ -92,13 +93,27 @@ _lock = threading.RLock()
 _running: dict[subprocess.Popen[str], Group | None] = {}
 _when_leaving: list[Callable[[], None]] = []
 
-#: The received signal and its time; signals are deferred while the main thread starts and registers a program.
-_signal: int | None = None
-_signal_time = 0.0
-_is_deferred = False
-_is_leaving = False
-#: The program has ended, and Python ends: nothing would catch an exception.
-_is_over = False
+
+@dataclass
+class _Process:
+    """What this process knows of its own end.
+
+    Attributes:
+        signal: The received signal.
+        signal_time: When it came, `time.monotonic` seconds.
+        is_deferred: Signals are deferred while the main thread starts and registers a program.
+        is_leaving: All programs end, and no more can start.
+        is_over: The program has ended, and Python ends: nothing would catch an exception.
+    """
+
+    signal: int | None = None
+    signal_time: float = 0.0
+    is_deferred: bool = False
+    is_leaving: bool = False
+    is_over: bool = False
+
+
+_this = _Process()
 
 
 @contextlib.contextmanager
@@ -205,7 +220,7 @@ def _start(
 
 
 def _refuse_ended(group: Group | None) -> None:
-    if _is_leaving or (group is not None and group.is_ended):
+    if _this.is_leaving or (group is not None and group.is_ended):
         raise Ended("the group of this program has ended")
 
 
@@ -234,17 +249,16 @@ def _send(process: subprocess.Popen[str], number: int) -> bool:
 @contextlib.contextmanager
 def signals_deferred() -> Iterator[None]:
     """Defer signals to the end of the block, so that what it makes is always registered: a program, a folder."""
-    global _is_deferred
-    if threading.current_thread() is not threading.main_thread() or _is_deferred:
+    if threading.current_thread() is not threading.main_thread() or _this.is_deferred:
         yield
         return
-    _is_deferred = True
+    _this.is_deferred = True
     try:
         yield
     finally:
-        _is_deferred = False
-    if _signal is not None:
-        raise Interrupted(_signal)
+        _this.is_deferred = False
+    if _this.signal is not None:
+        raise Interrupted(_this.signal)
 
 
 def when_leaving(function: Callable[[], None]) -> None:
@@ -254,7 +268,6 @@ def when_leaving(function: Callable[[], None]) -> None:
 
 def guarded(program: Callable[[], object]) -> NoReturn:
     """Run a command line's main program and exit; a signal gives one error line and status 128 plus its number."""
-    global _is_over
     for number in SIGNALS:
         # nohup ignores SIGHUP: keep it so
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
@@ -264,15 +277,15 @@ def guarded(program: Callable[[], object]) -> NoReturn:
         try:
             program()
         finally:
-            _is_over = True
+            _this.is_over = True
     except Interrupted as interrupted:
         _leave(interrupted.number)
     except BaseException:
         # A failure after a signal is a consequence of the signal
-        if _signal is None:
+        if _this.signal is None:
             raise
-    if _signal is not None:
-        _leave(_signal)
+    if _this.signal is not None:
+        _leave(_this.signal)
     sys.exit(0)
 
 
@@ -306,40 +319,38 @@ def _watch_signals() -> None:
             if number not in SIGNALS:
                 continue
             time.sleep(PATIENCE)
-            if _signal is None:
+            if _this.signal is None:
                 _leave(number)
 
     threading.Thread(target=watch, name="signals", daemon=True).start()
 
 
 def _receive(number: int, frame: object) -> None:
-    global _signal, _signal_time
     now = time.monotonic()
-    if _signal is not None:
-        if now - _signal_time > REPEAT_SECONDS:
+    if _this.signal is not None:
+        if now - _this.signal_time > REPEAT_SECONDS:
             for process in list(_running):
                 _send(process, signal.SIGKILL)
             os._exit(128 + number)
         return
-    _signal, _signal_time = number, now
+    _this.signal, _this.signal_time = number, now
     signal.signal(signal.SIGALRM, _insist)
     signal.setitimer(signal.ITIMER_REAL, INSIST_SECONDS, INSIST_SECONDS)
     _insist(number, frame)
 
 
 def _insist(number: int, frame: object) -> None:
-    if _signal is None or _is_deferred or _is_leaving:
+    if _this.signal is None or _this.is_deferred or _this.is_leaving:
         return
-    if _is_over:
-        _leave(_signal)
-    raise Interrupted(_signal)
+    if _this.is_over:
+        _leave(_this.signal)
+    raise Interrupted(_this.signal)
 
 
 def _leave(number: int) -> NoReturn:
     """End all programs, give the threads time to clean up, run the exit functions, and exit."""
-    global _is_leaving
     with _lock:
-        is_second, _is_leaving = _is_leaving, True
+        is_second, _this.is_leaving = _this.is_leaving, True
         members = list(_running)
     if is_second:  # the first thread exits
         threading.Event().wait()

@@ -169,14 +169,13 @@ def _cached(config: str, overrides: Overrides, options: tuple[str, ...], progres
     if options == (MANIFEST_ONLY,) and (released := _released(root, source)) is not None:
         return released
     state = cache_directory(root) / "generator" / source_hash(root)
-
-    def make(folder: Path) -> None:
-        java = find_java()
-        jar = generator_jar(root)
-        classpath = str(jar) if jar is not None else _compiled(root, state, progress)
-        _run(root, java, classpath, source, options, folder / DESIGN, state, progress)
-
-    entry = cache.entry(state / _key(source, options), make, "design", progress)
+    entry = state / _key(source, options)
+    with cache.entry(entry, "design", progress) as empty:
+        if empty is not None:
+            java = find_java()
+            jar = generator_jar(root)
+            classpath = str(jar) if jar is not None else _compiled(root, state, progress)
+            _run(root, java, classpath, source, options, empty / DESIGN, state, progress)
     cache.touch(state)
     manifest = Manifest.load(entry / DESIGN / "manifest.json")
     notes.report(idle_notes(manifest.config))
@@ -204,22 +203,22 @@ def _key(source: ConfigurationSource, options: Sequence[str]) -> str:
 def _compiled(root: Path, state: Path, progress: Progress) -> str:
     """Return the class path of the compiled generator; compile it if this state is not cached."""
 
-    def make(folder: Path) -> None:
-        entries = _compile(root, state.parent / "sbt.log", progress)
-        # A later compile overwrites sbt's class folders: copy them
-        for index, entry in enumerate(entries):
-            if Path(entry).is_dir():
-                # Java archives no classes of a folder
-                entries[index] = Path(shutil.make_archive(str(folder / f"classes{index}"), "zip", entry)).name
-        (folder / CLASSPATH).write_text(json.dumps(entries))
-
     def path(folder: Path) -> list[Path]:
         return [folder / entry for entry in json.loads((folder / CLASSPATH).read_text())]
 
     def has_libraries(folder: Path) -> bool:
         return all(entry.exists() for entry in path(folder))
 
-    folder = cache.entry(state / "jars", make, "generator", progress, has_libraries)
+    folder = state / "jars"
+    with cache.entry(folder, "generator", progress, has_libraries) as empty:
+        if empty is not None:
+            entries = _compile(root, state.parent / "sbt.log", progress)
+            # A later compile overwrites sbt's class folders: copy them
+            for index, entry in enumerate(entries):
+                if Path(entry).is_dir():
+                    # Java archives no classes of a folder
+                    entries[index] = Path(shutil.make_archive(str(empty / f"classes{index}"), "zip", entry)).name
+            (empty / CLASSPATH).write_text(json.dumps(entries))
     _forget_old_states(state.parent)
     return os.pathsep.join(map(str, path(folder)))
 

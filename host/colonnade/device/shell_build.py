@@ -15,6 +15,7 @@ from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.device.compiler import SAFE, require_right_compiler
 from colonnade.device.simulator_build import (
     PROGRAM,
+    Tools,
     build_environment,
     optimisation,
     ports_header,
@@ -42,24 +43,25 @@ def build_shell_simulator(design: GeneratedDesign, progress: Progress = QUIET) -
     ]
     key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
     folder = cache_directory(project_root()) / "simulator" / key
+    with cache.entry(folder, "simulator", progress) as empty:
+        if empty is not None:
+            with progress.step("building the simulator of the shell"), temporary_folder() as work:
+                _build(tools, design, harness, ports, work, folder.with_suffix(".log"))
+                shutil.move(work / "obj" / PROGRAM, empty / PROGRAM)
+    return folder / PROGRAM
 
-    def make(output: Path) -> None:
-        log = folder.with_suffix(".log")
-        with progress.step("building the simulator of the shell"), temporary_folder() as work:
-            require_right_compiler(tools.compiler, (optimisation().flag, *SAFE))
-            for source in [*design.sources, *harness]:
-                shutil.copy(source, work / source.name)
-            (work / "ports.hpp").write_text(ports)
-            # Registers begin with random values, as at power-up
-            command = [*verilator_command(tools), "--x-initial", "unique", "--top-module", _TOP, "--Mdir", "obj"]
-            command += ["--exe", "-o", PROGRAM, harness[0].name, *(source.name for source in design.sources)]
-            with log.open("w") as stream:
-                done = processes.run(
-                    command, cwd=work, env=build_environment(), stdout=stream, stderr=subprocess.STDOUT
-                )
-            if done.returncode != 0:
-                raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
-            shutil.move(work / "obj" / PROGRAM, output / PROGRAM)
-        log.unlink()
 
-    return cache.entry(folder, make, "simulator", progress) / PROGRAM
+def _build(tools: Tools, design: GeneratedDesign, harness: list[Path], ports: str, work: Path, log: Path) -> None:
+    """Build `PROGRAM` in ``work/obj``."""
+    require_right_compiler(tools.compiler, (optimisation().flag, *SAFE))
+    for source in [*design.sources, *harness]:
+        shutil.copy(source, work / source.name)
+    (work / "ports.hpp").write_text(ports)
+    # Registers begin with random values, as at power-up
+    command = [*verilator_command(tools), "--x-initial", "unique", "--top-module", _TOP, "--Mdir", "obj"]
+    command += ["--exe", "-o", PROGRAM, harness[0].name, *(source.name for source in design.sources)]
+    with log.open("w") as stream:
+        done = processes.run(command, cwd=work, env=build_environment(), stdout=stream, stderr=subprocess.STDOUT)
+    if done.returncode != 0:
+        raise RuntimeError(f"the simulator does not build (status {done.returncode}): see {log}")
+    log.unlink()

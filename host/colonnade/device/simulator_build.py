@@ -108,13 +108,12 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, wavefor
     parts += ["waveform"] if waveform else []
     key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
     folder = cache_directory(project_root()) / "simulator" / key
-
-    def make(output: Path) -> None:
-        with progress.step("building the simulator"):
-            require_right_compiler(tools.compiler, (optimisation().flag, *SAFE))
-            _build(tools, design, harness, output, folder.with_suffix(".log"), waveform)
-
-    return cache.entry(folder, make, "simulator", progress) / PROGRAM
+    with cache.entry(folder, "simulator", progress) as empty:
+        if empty is not None:
+            with progress.step("building the simulator"):
+                require_right_compiler(tools.compiler, (optimisation().flag, *SAFE))
+                _build(tools, design, harness, empty, folder.with_suffix(".log"), waveform)
+    return folder / PROGRAM
 
 
 def _build(

@@ -47,11 +47,12 @@ def encoded_environment(
     rooms = folder or cache_directory(project_root()) / "rooms"
 
     def keep(part: str, make: Callable[[], Words]) -> Words:
-        def write(entry: Path) -> None:
-            words: dict[str, Any] = make()
-            np.savez(entry / FILE, **words)
-
-        with np.load(cache.entry(rooms / _key(part, environment, layout), write, "room") / FILE) as stored:
+        entry = rooms / _key(part, environment, layout)
+        with cache.entry(entry, "room") as empty:
+            if empty is not None:
+                words: dict[str, Any] = make()
+                np.savez(empty / FILE, **words)
+        with np.load(entry / FILE) as stored:
             return {name: stored[name] for name in stored.files}
 
     return encode_environment(environment, layout, keep)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -83,11 +82,10 @@ def _encoded(colours: Floats, layout: AttributeLayout) -> TwoLevelMap:
     digest = hashlib.sha256(encoder_sources())
     digest.update(repr((layout, _ROUNDS, _SHARED_ROUNDS)).encode() + np.ascontiguousarray(colours).tobytes())
     folder = cache_directory(project_root()) / "textures" / digest.hexdigest()[:32]
-
-    def make(entry: Path) -> None:
-        found = encode_two_level(colours, AlbedoSpace(layout.field_bits), layout, _ROUNDS, _SHARED_ROUNDS)
-        with (entry / _FILE).open("wb") as stream:
-            np.savez(stream, descriptors=found.descriptors, palette=found.palette, heap=found.heap)
-
-    with np.load(cache.entry(folder, make, "texture") / _FILE) as stored:
+    with cache.entry(folder, "texture") as empty:
+        if empty is not None:
+            found = encode_two_level(colours, AlbedoSpace(layout.field_bits), layout, _ROUNDS, _SHARED_ROUNDS)
+            with (empty / _FILE).open("wb") as stream:
+                np.savez(stream, descriptors=found.descriptors, palette=found.palette, heap=found.heap)
+    with np.load(folder / _FILE) as stored:
         return TwoLevelMap(stored["descriptors"], stored["palette"], stored["heap"])

@@ -33,14 +33,21 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 def get(folder: Path, made: list[Path]) -> Path:
     """The entry, as in a new process."""
     cache._verified.clear()
+    with cache.entry(folder, "simulator") as empty:
+        if empty is not None:
+            made.append(empty)
+            (empty / "deep").mkdir()
+            (empty / "program").write_bytes(b"\x7fELF" * 100)
+            (empty / "deep" / "a.sv").write_text("module a; endmodule\n")
+    return folder
 
-    def make(place: Path) -> None:
-        made.append(place)
-        (place / "deep").mkdir()
-        (place / "program").write_bytes(b"\x7fELF" * 100)
-        (place / "deep" / "a.sv").write_text("module a; endmodule\n")
 
-    return cache.entry(folder, make, "simulator")
+def fail(folder: Path, error: Exception) -> None:
+    """Fail after half of an entry."""
+    with cache.entry(folder, "simulator") as empty:
+        assert empty is not None
+        (empty / "half").write_text("")
+        raise error
 
 
 def names(folder: Path) -> set[str]:
@@ -104,21 +111,14 @@ def test_an_entry_of_another_key_is_not_used(tmp_path: Path, made: list[Path]) -
 
 
 def test_a_failed_build_leaves_nothing(tmp_path: Path, made: list[Path]) -> None:
-    def fail(place: Path) -> None:
-        (place / "half").write_text("")
-        raise RuntimeError("no")
-
     with pytest.raises(RuntimeError, match="no"):
-        cache.entry(tmp_path / "k0", fail, "simulator")
+        fail(tmp_path / "k0", RuntimeError("no"))
     assert names(tmp_path) == {"k0.lock"}
 
 
 def test_a_full_or_unwritable_cache_is_reported(tmp_path: Path, made: list[Path]) -> None:
-    def fill(place: Path) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
     with pytest.raises(UserError, match="no space left on the disk of"):
-        cache.entry(tmp_path / "k0", fill, "simulator")
+        fail(tmp_path / "k0", OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="cannot be written: "):
         get(tmp_path / "file" / "k0", made)
@@ -127,23 +127,21 @@ def test_a_full_or_unwritable_cache_is_reported(tmp_path: Path, made: list[Path]
 
 
 def test_a_lack_of_space_is_reported(tmp_path: Path, made: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(place: Path) -> None:
-        raise errors.pop()
-
     monkeypatch.setattr(cache, "MIN_FREE_BYTES", 1 << 80)
-    errors = [RuntimeError("g++ failed"), shutil.Error([("from", "to", "No space left")])]
-    while errors:
+    for error in (RuntimeError("g++ failed"), shutil.Error([("from", "to", "No space left")])):
         with pytest.raises(UserError, match="no space left on the disk of the cache"):
-            cache.entry(tmp_path / "k0", fail, "simulator")
+            fail(tmp_path / "k0", error)
     assert names(tmp_path) == {"k0.lock"}
 
 
 def test_threads_share_one_build(tmp_path: Path, made: list[Path]) -> None:
-    def make(place: Path) -> None:
-        made.append(place)
-        time.sleep(0.05)
+    def make() -> None:
+        with cache.entry(tmp_path / "k0", "simulator") as empty:
+            if empty is not None:
+                made.append(empty)
+                time.sleep(0.05)
 
-    threads = [threading.Thread(target=cache.entry, args=(tmp_path / "k0", make, "simulator")) for _ in range(4)]
+    threads = [threading.Thread(target=make) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -164,12 +164,12 @@ def content_of(folder: Path) -> dict[str, bytes]:
 
 def keep(job: Job, content: Content) -> Path:
     """Store a result that another machine made; returns its cache entry."""
-
-    def write(folder: Path) -> None:
-        for name, data in content.items():
-            (folder / Path(name).name).write_bytes(data)
-
-    return cache.entry(entry_of(job), write, f"result of {job.title}")
+    entry = entry_of(job)
+    with cache.entry(entry, f"result of {job.title}") as empty:
+        if empty is not None:
+            for name, data in content.items():
+                (empty / Path(name).name).write_bytes(data)
+    return entry
 
 
 def run(job: Job, inputs: tuple[Content, ...]) -> dict[str, bytes]:
@@ -182,17 +182,21 @@ def run(job: Job, inputs: tuple[Content, ...]) -> dict[str, bytes]:
     Raises:
         JobFailed: The job failed.
     """
-
-    def make(folder: Path) -> None:
-        with temporary_folder() as work:
-            (work / "job").write_bytes(pickle.dumps((job.kind.name, dict(job.arguments), inputs)))
-            command = [sys.executable, "-m", "colonnade_lab.explore.worker", work / "job", folder]
-            done = processes.run(command, cwd=work)
-        if done.returncode != 0:
-            lines = [line for line in done.stderr.splitlines() if line.strip()] or [f"status {done.returncode}"]
-            raise JobFailed(lines[-1].removeprefix("colonnade: error: ").strip())
-
+    entry = entry_of(job)
     try:
-        return content_of(cache.entry(entry_of(job), make, f"result of {job.title}"))
+        with cache.entry(entry, f"result of {job.title}") as empty:
+            if empty is not None:
+                _measure(job, inputs, empty)
+        return content_of(entry)
     except UserError as error:
         raise JobFailed(str(error)) from None
+
+
+def _measure(job: Job, inputs: tuple[Content, ...], folder: Path) -> None:
+    with temporary_folder() as work:
+        (work / "job").write_bytes(pickle.dumps((job.kind.name, dict(job.arguments), inputs)))
+        command = [sys.executable, "-m", "colonnade_lab.explore.worker", work / "job", folder]
+        done = processes.run(command, cwd=work)
+    if done.returncode != 0:
+        lines = [line for line in done.stderr.splitlines() if line.strip()] or [f"status {done.returncode}"]
+        raise JobFailed(lines[-1].removeprefix("colonnade: error: ").strip())

@@ -163,19 +163,17 @@ def synthesise(hierarchy: Hierarchy, top: str, tech: Technology, progress: Progr
     boxes = "".join(hierarchy.header(module) for module in black_boxes)
     digest.update(f"{tech.digest} {_constraints(tech)} {boxes} {importlib.metadata.version('pyosys')}".encode())
     folder = cache_directory(project_root()) / "ppa" / f"{top}-{digest.hexdigest()[:20]}"
-
-    def make(output: Path) -> None:
-        with temporary_folder() as work:
-            links = {hierarchy.files[module].name: hierarchy.files[module] for module in own}
-            links |= {file.name: file for file in (tech.library.files if tech.library else ())}
-            (work / "constraints").write_text(_constraints(tech))
-            (work / "boxes.sv").write_text(boxes)
-            run_yosys([*script, "write_json netlist.json"], work, links, folder.with_suffix(".log"))
-            written = json.loads((work / "netlist.json").read_text())["modules"][top]
-        (output / NETLIST).write_bytes(gzip.compress(json.dumps(_trimmed(written)).encode(), 3))
-
-    file = cache.entry(folder, make, f"netlist of {top}", progress) / NETLIST
-    netlist: dict[str, Any] = json.loads(gzip.decompress(file.read_bytes()))
+    with cache.entry(folder, f"netlist of {top}", progress) as empty:
+        if empty is not None:
+            with temporary_folder() as work:
+                links = {hierarchy.files[module].name: hierarchy.files[module] for module in own}
+                links |= {file.name: file for file in (tech.library.files if tech.library else ())}
+                (work / "constraints").write_text(_constraints(tech))
+                (work / "boxes.sv").write_text(boxes)
+                run_yosys([*script, "write_json netlist.json"], work, links, folder.with_suffix(".log"))
+                written = json.loads((work / "netlist.json").read_text())["modules"][top]
+            (empty / NETLIST).write_bytes(gzip.compress(json.dumps(_trimmed(written)).encode(), 3))
+    netlist: dict[str, Any] = json.loads(gzip.decompress((folder / NETLIST).read_bytes()))
     return netlist
 
 

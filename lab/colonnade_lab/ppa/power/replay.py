@@ -85,17 +85,15 @@ def build(progress: Progress = QUIET) -> Path:
     compiler, version = require_compiler("power")
     parts = (source.read_text(), version, " ".join(OPTIONS))
     digest = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
-
-    def make(output: Path) -> None:
-        with progress.step("building the gate simulator"):
-            require_right_compiler(compiler, OPTIONS[1:])
-            command = [compiler, *OPTIONS, "-o", output / "gates", source]
-            done = processes.run(command, env=clean_environment())
-        if done.returncode != 0:
-            raise RuntimeError(f"the gate simulator does not build: {done.stderr[:300]}")
-
     entry = cache_directory(project_root()) / "gates" / digest
-    return cache.entry(entry, make, "gate simulator", progress) / "gates"
+    with cache.entry(entry, "gate simulator", progress) as empty:
+        if empty is not None:
+            with progress.step("building the gate simulator"):
+                require_right_compiler(compiler, OPTIONS[1:])
+                done = processes.run([compiler, *OPTIONS, "-o", empty / "gates", source], env=clean_environment())
+            if done.returncode != 0:
+                raise RuntimeError(f"the gate simulator does not build: {done.stderr[:300]}")
+    return entry / "gates"
 
 
 def require_same(recording: Recording, found: Sequence[int]) -> None:
