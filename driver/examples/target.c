@@ -1,34 +1,7 @@
-/* What the examples do on every machine: files, errors, a load and a frame. */
+/* What the examples do on every machine: a load and a frame. */
 #include "target.h"
 
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum { ATTEMPTS = 6000 }; /* of a tenth of a second at most */
-
-void target_fail(const char *what, const char *why) {
-    fprintf(stderr, "%s: %s\n", what, why);
-    exit(2);
-}
-
-void target_check(const char *what, enum colonnade_error error) {
-    if (error != COLONNADE_OK) target_fail(what, colonnade_error_name(error));
-}
-
-size_t target_read(const char *name, void *to, size_t most) {
-    FILE *file = fopen(name, "rb");
-    if (file == NULL) target_fail(name, strerror(errno));
-    size_t bytes = fread(to, 1, most, file);
-    if (fgetc(file) != EOF) {
-        char why[64];
-        snprintf(why, sizeof why, "larger than the %zu bytes that it may have", most);
-        target_fail(name, why);
-    }
-    fclose(file);
-    return bytes;
-}
 
 void target_load(struct target *target, struct colonnade *device, const char *name) {
     target_check("device", colonnade_probe(device, &target->bus, &colonnade_design));

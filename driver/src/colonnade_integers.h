@@ -133,4 +133,6 @@ static inline bool colonnade_include(struct colonnade_extent *extent, const int6
     return true;
 }
 
+static inline bool colonnade_is_within(int64_t value, int64_t low, int64_t high) { return low <= value && value <= high; }
+
 #endif

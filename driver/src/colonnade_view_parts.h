@@ -6,6 +6,8 @@
 
 #define COLONNADE_PIXEL ((int64_t)1 << 32) /* of a lens */
 
+enum { COLONNADE_ROTATION_BITS = 30, COLONNADE_MAX_BLOCKS = 6 };
+
 /* Contents of `environment.window`. */
 enum { WINDOW_NONE, WINDOW_SHADOW, WINDOW_WHOLE, WINDOW_CONSTANT, WINDOW_NEAR }; /* shadow and near may both be */
 
@@ -62,8 +64,41 @@ static inline int32_t colonnade_exponent_limit(const struct colonnade_view_scene
     return ((int32_t)1 << colonnade_bit_length(2 * bits)) - 1;
 }
 
+/* The words that a device of a scene has, block by block. */
+struct colonnade_block {
+    uint32_t address, place, count;
+};
+
+/* Finds the blocks; answers their number. */
+int colonnade_find_blocks(const struct colonnade_view_scene *scene, struct colonnade_block blocks[COLONNADE_MAX_BLOCKS]);
+
+/* Whether rows are unit and at right angles, to 2^-20, and right-handed, and the position is in the world. */
+bool colonnade_is_pose(const struct colonnade_pose *pose);
+
+/* Whether a position is in the world. */
+bool colonnade_is_place(const int64_t position[3]);
+
+/* Whether focal lengths and principal point, 2^-32 pixels, are those of a lens. */
+bool colonnade_is_lens(int64_t fx, int64_t fy, int64_t cx, int64_t cy);
+
+/* Whether a scene's device renders the picture of a camera. */
+enum colonnade_error colonnade_check_camera(const struct colonnade_view_scene *scene, const struct colonnade_camera *camera);
+
+/* A point of the world on the object's grid, 2^-16 steps. Answers whether it is in the hardware's range. */
+bool colonnade_find_on_grid(const struct colonnade_view *view, const int64_t point[3], int64_t steps[3]);
+
 /* Axes and eye of a pose. Answers whether the eye is in the hardware's range. */
 bool colonnade_find_sight(const struct colonnade_view *view, const struct colonnade_pose *pose, struct colonnade_work *work);
+
+/* The scaled rays of a picture, as whole numbers: those of the registers. */
+struct colonnade_view_rays {
+    int32_t first[3], step_x[3], step_y[3];
+    int shift; /* of `first` */
+};
+
+/* The registers of the object's outline and rectangle. */
+void colonnade_view_outline(struct colonnade_view *view, const struct colonnade_work *work,
+                            const struct colonnade_view_rays *rays);
 
 /* The registers of the environment. */
 enum colonnade_error colonnade_view_room(struct colonnade_view *view, const struct colonnade_work *work);

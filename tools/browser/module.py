@@ -28,10 +28,7 @@ CPP = (
 SOURCES = (
     ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{DRIVER / 'include'}")),
     *(("c++", LIVE / f"{name}.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")) for name in ("live", "kernels")),
-    *(
-        ("cc", DRIVER / "src" / f"{name}.c", ("-std=c11", f"-I{DRIVER / 'include'}"))
-        for name in ("colonnade_files", "colonnade_view", "colonnade_view_room", "colonnade_view_sample")
-    ),
+    *(("cc", file, ("-std=c11", f"-I{DRIVER / 'include'}")) for file in sorted((DRIVER / "src").glob("colonnade_*.c"))),
     ("cc", LIBRARY / "colonnade_view_size.c", ("-std=c11", f"-I{DRIVER / 'include'}")),
 )
 HEADERS = (LIBRARY / "colonnade_model.h", LIVE / "live.h", DRIVER / "include" / "colonnade_view.h")

@@ -90,7 +90,7 @@ def program(tmp_path_factory: pytest.TempPathFactory, design: GeneratedDesign) -
 
     folder = tmp_path_factory.mktemp("console")
     (folder / "colonnade_design.h").write_text(design_header(register_table(design), design.manifest))
-    sources = [DRIVER / "tests/console.c", DRIVER / "examples/target.c", *(DRIVER / "src").glob("colonnade*.c")]
+    sources = [DRIVER / "tests/console.c", DRIVER / "examples/target_files.c", *(DRIVER / "src").glob("colonnade*.c")]
     command = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
     includes = [f"-I{DRIVER / 'include'}", f"-I{DRIVER / 'examples'}", f"-I{folder}"]
     subprocess.run([*command, *includes, *sources, "-o", folder / "console"], check=True)

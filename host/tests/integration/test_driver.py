@@ -119,7 +119,7 @@ def test_the_driver_compiles_without_a_warning(compiler: str, tmp_path: Path) ->
 
 def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> None:
     (tmp_path / "colonnade_design.h").write_text(design_header(register_table(design), design.manifest))
-    linux = [DRIVER_FOLDER / "examples" / name for name in ("target.c", "target_uio.c")]
+    linux = [DRIVER_FOLDER / "examples" / name for name in ("target.c", "target_files.c", "target_uio.c")]
     for name, options in (("uio", ()), ("viewer", ("-lm",))):
         program = compile_c(
             [DRIVER_FOLDER / "examples" / f"{name}.c", *linux, *driver_objects()], tmp_path / name, *options
@@ -135,7 +135,12 @@ def compiled_driver(program: str, header: str) -> Path:
     (folder / "colonnade_design.h").write_text(header)
     tests, examples = DRIVER_FOLDER / "tests", DRIVER_FOLDER / "examples"
     if program == "viewer":
-        sources = [examples / "viewer.c", examples / "target.c", tests / "target_simulated.c"]
+        sources = [
+            examples / "viewer.c",
+            examples / "target.c",
+            examples / "target_files.c",
+            tests / "target_simulated.c",
+        ]
         return compile_c([*sources, *driver_objects()], folder / "driver", f"-I{examples}", "-lm")
     return compile_c([tests / f"{program}.c", *driver_objects()], folder / "driver")
 
