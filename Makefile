@@ -66,6 +66,8 @@ lock: setup ## make host/locks and project/dependencies.sha256 again
 	@tools/lock
 
 format: setup ## let the formatters rewrite the sources
+	@tools/lint-environment
+	@git ls-files '*.c' '*.h' '*.cpp' '*.hpp' | xargs .cache/lint-environment/bin/clang-format -i
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host lab
 	@$(venv)/ruff format host lab
