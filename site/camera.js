@@ -17,7 +17,7 @@ export function cameraOf({ azimuth, elevation, distance, x, y }, width, height) 
 }
 
 /** A light's position: right, up and towards the camera from the cube's centre, in edges of the cube. */
-export function lightOf({ right, down, forward }, [x, y, z]) {
+export function lightOf({ right, down, forward }, /** @type {number[]} */ [x, y, z]) {
   return [0, 1, 2].map((axis) => 2 * (x * right[axis] - y * down[axis] - z * forward[axis]));
 }
 

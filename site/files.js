@@ -54,7 +54,7 @@ export async function droppedFiles({ items, files }) {
   const found = [...files].filter(({ name }) => !entries.some((entry) => entry.name === name));
   for (const entry of entries) {
     const reader = entry.createReader();
-    for (let part = [1]; part.length > 0; ) {
+    for (let part = /** @type {any[]} */ ([1]); part.length > 0; ) {
       part = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
       for (const each of part) if (each.isFile) found.push(await new Promise((resolve, reject) => each.file(resolve, reject)));
     }

@@ -8,7 +8,7 @@ import { COMPRESSION, GltfDocument, grouped } from "./gltfdocument.js";
 
 /** Largest magnitude of a transform's element, in the scene. */
 const MOST_TRANSFORM = 1e100;
-const [POINTS, TRIANGLES, STRIP, FAN] = [0, 4, 5, 6];
+const [POINTS, TRIANGLES, FAN] = [0, 4, 6];
 
 /** A mesh, as of readMesh; `files` has the other dropped files by name. */
 export function readGltf(bytes, name, files) {

@@ -20,6 +20,8 @@ export const grouped = (number) => number.toLocaleString("en");
 
 /** The document of a file, text or binary, its buffers, and the arrays of its accessors. */
 export class GltfDocument {
+  name; files; binary; buffers;
+
   constructor(bytes, name, files) {
     Object.assign(this, { name, files, binary: null, buffers: new Map() });
     const isBinary = this.text(bytes, 0) === "glTF";

@@ -27,14 +27,15 @@ export function wasi() {
   });
 }
 
-/** Instantiates a module: a WebAssembly.Module, or its bytes. */
+/** Instantiates a module: a WebAssembly.Module, or its bytes. @returns {Promise<any>} its exports */
 export async function instantiate(code) {
   const module = code instanceof WebAssembly.Module ? code : await WebAssembly.compile(code);
-  const imports = {};
+  const imports = /** @type {any} */ ({});
   for (const { module: from, name } of WebAssembly.Module.imports(module)) (imports[from] ??= {})[name] = wasi()[name];
   const instance = await WebAssembly.instantiate(module, imports);
-  instance.exports._initialize?.();
-  return instance.exports;
+  const exports = /** @type {any} */ (instance.exports);
+  exports._initialize?.();
+  return exports;
 }
 
 /** A design, a mesh packed for it, and frames of it. Errors are thrown, with a text for the visitor. */

@@ -3,6 +3,7 @@
 
 import { listen } from "./orbit.js";
 
+/** @returns {any} */
 const element = (id) => document.getElementById(id);
 const stage = element("stage");
 const canvas = element("picture");
@@ -19,8 +20,8 @@ let rest = 0;
 /** Fewer samples are not shown: their mean is beside the pixels' middle. */
 const SHOWN_SAMPLES = 4;
 const times = [];
-/** What tests read: frames so far, and the version of the last. */
-const page = (window.colonnade = { frames: 0, version: 0 });
+/** What tests read: frames so far, and the version of the last. @type {any} */
+const page = (globalThis.colonnade = { frames: 0, version: 0 });
 
 // Vectors
 
@@ -89,7 +90,7 @@ async function draw() {
   } finally {
     isBusy = false;
   }
-  rest = setTimeout(accumulate, REST);
+  rest = window.setTimeout(accumulate, REST);
 }
 
 /** Further passes of a camera that rests, one after the other; another page's camera ends them. */
@@ -101,7 +102,7 @@ async function accumulate(before = 0) {
 
 /** Shows a picture, of the first sample or of those so far; returns its figures, or nothing if it came too late. */
 async function frame(isStill = false) {
-  const address = new URLSearchParams({ ...(camera && { camera: [...camera.position, ...camera.target].join() }), ...(isStill && { still: 1 }) });
+  const address = new URLSearchParams({ ...(camera && { camera: [...camera.position, ...camera.target].join() }), ...(isStill && { still: "1" }) });
   const response = await fetch(`frame?${address}`);
   if (!response.ok) return fail(await response.text());
   const figures = JSON.parse(response.headers.get("X-Frame"));

@@ -30,8 +30,8 @@ let linkNotes = [];
 /** The design and room that the workers have, and those with which they have the mesh, too; the replaced workers that have all of it. */
 let opened = null, shown = null, restored = 0;
 const isWhole = () => shown === opened && restored === (renderer?.replaced ?? 0);
-/** What tests read: the last whole frame, the light of its room, and its last pass. */
-const page = (window.colonnade = { frames: 0, picture: null });
+/** What tests read: the last whole frame, the light of its room, and its last pass. @type {any} */
+const page = (globalThis.colonnade = { frames: 0, picture: null });
 
 /** The room of the state, as the hardware has it; null if it has no maps. */
 function roomOf() {
@@ -184,7 +184,7 @@ stage.addEventListener("dblclick", (event) => {
 function openFiles(promise) {
   promise.catch(() => {}); // the work says it
   queue.add("Reading the files", async () => {
-    const files = new Map(await Promise.all([...(await promise)].map(async (file) => [file.name, new Uint8Array(await file.arrayBuffer())])));
+    const files = new Map(await Promise.all([...(await promise)].map(async (file) => /** @type {const} */ ([file.name, new Uint8Array(await file.arrayBuffer())]))));
     const names = [...files.keys()];
     const mesh = names.find((name) => /\.(obj|ply|glb|gltf)$/i.test(name));
     if (!mesh && names.some((name) => /\.(jpe?g|png|webp|npy)$/i.test(name))) return openRoom(roomFiles(files), files);
@@ -205,7 +205,7 @@ function fill() {
   form.elements.drag.disabled = roomOf() === null;
   form.elements.gather.disabled = !roomOf()?.light;
   element("home").hidden = roomOf() === null || isAtMaps(state);
-  for (const label of document.querySelectorAll(".lens")) label.hidden = !roomOf()?.files;
+  for (const label of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".lens"))) label.hidden = !roomOf()?.files;
   showCosts(data, state.design);
   for (const name of ["background", "light"]) form.elements[name].disabled = roomOf() !== null;
   element("mesh").textContent = state.mesh;

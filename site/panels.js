@@ -3,6 +3,7 @@
 
 import { lineOf } from "./path.js";
 
+/** An element of the page, of whatever kind it has there. @returns {any} */
 export const element = (id) => document.getElementById(id);
 
 /** Counters of the register map, in words. */

@@ -11,6 +11,8 @@ const COARSE = 4;
  * and mesh are those of the state. `page` has what tests read. `drawn()` is called after each frame, `fail(error)` for errors.
  */
 export class Picture {
+  renderer; page; now; drawn; fail;
+
   constructor({ renderer, page, now, drawn, fail }) {
     Object.assign(this, { renderer, page, now, drawn, fail });
     this.stage = element("stage");

@@ -2,6 +2,8 @@
 // Works one after the other, with a sign of what is being done.
 
 export class Queue {
+  sign; before; done; failed; waiting; last;
+
   /** `sign`: an element. `before()` comes before each work, `failed(error)` after one that did not go well, and then `done(isWell)`; none of them throws. */
   constructor(sign, { before, done, failed }) {
     Object.assign(this, { sign, before, done, failed, waiting: [], last: Promise.resolve() });

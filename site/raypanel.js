@@ -8,6 +8,8 @@ import { followOf } from "./state.js";
 import { poseIn, viewOf } from "./view.js";
 
 export class RayPanel {
+  page; context; rays; chosen;
+
   /** `page` takes what tests read, `context` gives renderer, picture, scene and room of now. */
   constructor(page, context) {
     Object.assign(this, { page, context, rays: null, chosen: null });
@@ -29,7 +31,7 @@ export class RayPanel {
     element("times").hidden = true;
     element("time").hidden = room !== null;
     element("pixel").textContent = `${x}, ${y}`;
-    for (const head of document.querySelectorAll(".lines")) head.hidden = !line;
+    for (const head of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".lines"))) head.hidden = !line;
     this.list();
   }
 

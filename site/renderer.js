@@ -30,8 +30,7 @@ export class Renderer {
   }
 
   start() {
-    const worker = new Worker(this.url);
-    worker.silence = 0;
+    const worker = Object.assign(new Worker(this.url), { silence: 0 });
     worker.onmessage = ({ data }) => this.receive(worker, data);
     worker.onerror = ({ message }) => this.replace(worker, `a worker has stopped: ${message}`);
     return worker;

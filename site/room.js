@@ -33,7 +33,7 @@ function quantile(values, share) {
  * `lens` is that of the photo; `pose` from view space to the world, or null: it is that of the floor. `gathers`: the light
  * of the photo is gathered, so the room's lights have its scale.
  */
-export function prepareRoom({ photo, whole, depth, lens, pose, gathers }) {
+export function prepareRoom(/** @type {any} */ { photo, whole, depth, lens, pose, gathers }) {
   const { width, height } = photo;
   if (Math.abs(depth.width * whole.height - depth.height * whole.width) > 0.03 * depth.width * whole.height)
     throw new Error(`the depth map is ${depth.width} × ${depth.height}, the photo ${whole.width} × ${whole.height}: both have to show the same part of the room`);
@@ -144,7 +144,7 @@ function fitLight(world, colours, eye, notes) {
   const low = range(3).map((axis) => Math.min(quantile(world.map(({ point }) => point[axis]), 0.02), eye[axis]) - MARGIN[axis]);
   const high = range(3).map((axis) => Math.max(quantile(world.map(({ point }) => point[axis]), 0.98), eye[axis]) + MARGIN[axis]);
   low[1] += MARGIN[1] + LEAST_HEIGHT;
-  let best = { error: Infinity };
+  let best = /** @type {any} */ ({ error: Infinity });
   for (const place of range(GRID[0] * GRID[1] * GRID[2])) {
     const index = [place % GRID[0], Math.floor(place / GRID[0]) % GRID[1], Math.floor(place / GRID[0] / GRID[1])];
     const position = index.map((value, axis) => low[axis] + (value / (GRID[axis] - 1)) * (high[axis] - low[axis]));

@@ -10,6 +10,8 @@ import { viewOf } from "./view.js";
 const RTL = { design: "tiny", width: 64, height: 48 };
 
 export class RtlPanel {
+  page; fail; context;
+
   /** `page` takes what tests read, `fail` shows an error, `context` gives data, renderer, state and scene of now. */
   constructor(page, fail, context) {
     Object.assign(this, { page, fail, context });

@@ -77,7 +77,7 @@ function lightAt({ seen, pose }, { position, scale }, lamp, exposure) {
 /** The largest part around the middle of a picture with the proportions of the maps, in their size. */
 function pixelsOf(bitmap, width, height) {
   const scale = Math.min(bitmap.width / width, bitmap.height / height);
-  const part = [(bitmap.width - scale * width) / 2, (bitmap.height - scale * height) / 2, scale * width, scale * height];
+  const part = /** @type {const} */ ([(bitmap.width - scale * width) / 2, (bitmap.height - scale * height) / 2, scale * width, scale * height]);
   const context = new OffscreenCanvas(width, height).getContext("2d");
   context.imageSmoothingQuality = "high";
   context.drawImage(bitmap, ...part, 0, 0, width, height);
@@ -92,12 +92,12 @@ export function placeOf(room, x, y, within = Infinity) {
   const { surface, pose, width, height } = room;
   const isFree = x === undefined;
   const middle = isFree ? [width / 2, 0.62 * height] : [x, y];
-  const pixelsTo = ({ pixel }, [u, v]) => Math.hypot((pixel % width) - u, Math.floor(pixel / width) - v);
+  const pixelsTo = ({ pixel }, /** @type {number[]} */ [u, v]) => Math.hypot((pixel % width) - u, Math.floor(pixel / width) - v);
   const nearest = (points, to) => points.reduce((best, each) => (pixelsTo(each, to) < pixelsTo(best, to) ? each : best));
   const edgeAt = (point) => OBJECT_SHARE * Math.hypot(...point.map((value, axis) => value - pose.position[axis]));
   const isHidden = ({ point, distance }) => {
     const edge = edgeAt(point);
-    const shown = ([across, up]) => point.map((value, axis) => value + edge * (across * pose.rotation[axis][0] + (axis === 1 ? up : 0)));
+    const shown = (/** @type {number[]} */ [across, up]) => point.map((value, axis) => value + edge * (across * pose.rotation[axis][0] + (axis === 1 ? up : 0)));
     return OUTLINE.some((place) => nearest(surface, pixelOf(room, shown(place))).distance < distance - 0.6 * edge);
   };
   const level = surface.filter((each) => each.normal[1] > 0.9 && pixelsTo(each, middle) <= within);

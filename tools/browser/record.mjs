@@ -19,7 +19,7 @@ library.openView(new Uint8Array(readFileSync(job.view)));
 const frames = job.pixels.map(([x, y]) => {
   const { camera, lights, registers } = ofPixel(viewOf(scene, null, width, height, START), { x, y, width, height });
   library.setCamera(camera);
-  lights.forEach(({ position, colour }, index) => library.setLight(index, position, colour));
+  lights.forEach((light, index) => library.setLight(index, light));
   return library.frame(registers);
 });
 process.stdout.write(JSON.stringify(frames));
