@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The camera on its orbit. The world is the object's cube, from -1 to 1; y is up.
 
 const FOCAL = 1 / (2 * Math.tan((20 * Math.PI) / 180)); // 40 degrees, of the picture's height

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The corners of a mesh that is being read.
 
 /** The tab reads so many triangles; the command line reads more. */

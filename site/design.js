@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // A design as its manifest describes it: the lines that colonnade_model_open reads, and writes of registers.
 
 /** The lines of host/cpp/library/colonnade_model.h for a manifest. */

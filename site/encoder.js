@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The live encoder of a room's maps (host/cpp/live), as the host encodes a still.
 
 const ROUNDS = 3;

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The files of a visitor's room: photo, depth map and, in a room of `colonnade capture`, meta.json with camera and pose.
 
 const PICTURE = /\.(jpe?g|png|webp)$/i;

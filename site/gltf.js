@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Reads glTF as host/colonnade/mesh/files/gltf.py does, with its errors: the triangles of the default scene with normals and
 // colours. Draco is not read.
 

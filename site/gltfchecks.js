@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Checks the JSON of glTF files, as host/colonnade/mesh/files/gltf_checks.py and common/input_files.py do, with their words. Of
 // materials only the factors are checked.
 

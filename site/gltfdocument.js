@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The document of a glTF file: its JSON, its buffers, and the arrays of its accessors; it refuses what
 // host/colonnade/mesh/files/gltf_document.py refuses, in its words.
 

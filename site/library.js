@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The packer, the model and colonnade_view in WebAssembly (host/cpp/library, driver/src).
 
 import { designLines, registerWrites } from "./design.js";

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The page of `colonnade view`: asks the server for frames of its camera, and shows what it says about the scene.
 
 import { listen } from "./orbit.js";

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Readers of OBJ, PLY and glTF (gltf.js): positions, triangles, corner normals and corner colours. What a file holds and
 // they leave out is a note.
 

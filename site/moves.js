@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Moves of a state's camera, or of its object in a room; `room` is null without one.
 
 import { within } from "./state.js";

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Notes below the controls: what mesh, room and hardware hold and the picture does not show.
 
 import { isAtMaps } from "./camera.js";

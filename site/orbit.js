@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Mouse, touch and keys on the picture: orbit, zoom, pan, and a click that is none of them.
 
 /** `actions`: orbit(degrees, degrees, event), zoom(factor), pan(x, y) in heights of the stage, click(event), done(). */

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The page: controls, orbit, dropped files, the ray of a pixel.
 
 import { ROOM_START, START, isAtMaps } from "./camera.js";

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Tables and lists of the page.
 
 import { lineOf } from "./path.js";

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The rays of a pixel, step by step: as a table, and drawn over the picture.
 
 import { project, toWorld } from "./camera.js";

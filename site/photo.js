@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // sRGB, and a room's photo in the size of a frame.
 
 export const decode = (code) => (code <= 0.04045 * 255 ? code / 255 / 12.92 : ((code / 255 + 0.055) / 1.055) ** 2.4);

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The picture: frames of the state, coarse, whole, and the sums of their passes.
 
 import { element, showFigures } from "./panels.js";

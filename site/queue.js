@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Works one after the other, with a sign of what is being done.
 
 export class Queue {

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The rays of a followed pixel: their table, their steps, and their lines over the picture.
 
 import { cameraOf, roomCamera } from "./camera.js";

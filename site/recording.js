@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Cycles of single pixels of the page's first view, recorded from the RTL of presets (tools/browser/record.py).
 
 import { START } from "./camera.js";

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Workers that share frames: each renders every n-th band of rows.
 
 /** The bytes of a compressed text of the page. */

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // A room of a visitor's photo and depth: pose, light and maps, as the host finds them
 // (docs/background.md), but one white lamp and no shadows of the photo.
 

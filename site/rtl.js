@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // A frame of the RTL, in WebAssembly (tools/browser/rtl.cpp).
 
 import { instantiate } from "./library.js";

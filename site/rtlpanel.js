@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // The RTL of a small design in the page: frames of it beside the model's, and the cycles of a pixel.
 
 import { element, fillTable, showTimes } from "./panels.js";

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // What a link holds: mesh, design, room, material, light, camera, size of a pixel, and the pixel that is followed.
 
 import { ROOM_START, START } from "./camera.js";

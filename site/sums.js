@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Sums over the passes of a frame, and what they show (docs/sampling.md, "Sums").
 
 import { decode, encode } from "./photo.js";

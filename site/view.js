@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Views: what a frame of the state is, from the open mesh and its packed form for a design. `scene` has state, mesh,
 // manifest and packed.
 

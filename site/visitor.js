@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // A room of a visitor's files, in the page: the worker makes its maps, this module its view files.
 
 import { readMeta } from "./files.js";

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // A worker with a model of its own. The first one packs meshes, and gives their records to the others.
 
 import { readDepth } from "./depth.js";

@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: Apache-2.0
 """Imported first by the programs of this folder that use the host: runs them with the Python of .venv."""
 
 from __future__ import annotations

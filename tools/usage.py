@@ -1,4 +1,3 @@
-# SPDX-License-Identifier: Apache-2.0
 """Imported first by the Python programs of this folder: `-h` and `--help` print the program's docstring."""
 
 from __future__ import annotations

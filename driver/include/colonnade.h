@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Driver of the Colonnade device in its AXI4 shell: docs/driver.md.
  *
  * It allocates nothing, uses no floating point, and keeps no state but what it is given. Pointers are those of the caller,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Registers of a frame from poses: docs/driver.md.
  *
  * Integers only: no allocation, no floating point, no library. The same poses give the same words on every processor. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "colonnade.h"
 
 #include "colonnade_shell.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Device images and frame files: what they have to be. */
 #include "colonnade.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Arithmetic of colonnade_view. */
 #ifndef COLONNADE_INTEGERS_H
 #define COLONNADE_INTEGERS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Registers of a frame: camera and lights; room and outline are in files of their own: docs/driver.md. */
 #include "colonnade_view_parts.h"
 #include "colonnade_words.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Reads view files: docs/formats.md. */
 #include "colonnade_view_parts.h"
 #include "colonnade_words.h"

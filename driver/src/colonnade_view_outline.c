@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The part of a picture in which the object may be. */
 #include "colonnade_view_parts.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What the files of colonnade_view share. */
 #ifndef COLONNADE_VIEW_PARTS_H
 #define COLONNADE_VIEW_PARTS_H

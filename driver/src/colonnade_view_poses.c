@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Poses, cameras and lights of a view: docs/driver.md. */
 #include "colonnade_view_parts.h"
 

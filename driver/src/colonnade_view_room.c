@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Projection to the maps of a room, window and occlusion: docs/driver.md. */
 #include "colonnade_view_parts.h"
 #include "colonnade_words.h"

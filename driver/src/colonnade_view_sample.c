@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The samples of a frame's passes: docs/driver.md. Their definition is host/colonnade/scene/samples.py. */
 #include "colonnade_view_parts.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Points and poses on the grid of the object. */
 #include "colonnade_view_parts.h"
 

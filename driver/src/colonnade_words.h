@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Words of files, and the header that all files begin with. Words are read byte by byte, so that files may lie anywhere. */
 #ifndef COLONNADE_WORDS_H
 #define COLONNADE_WORDS_H

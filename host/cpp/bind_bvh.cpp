@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// `colonnade._core.build_bvh`: the tree builder on numpy arrays, for tests of its structure.
 
 #include <nanobind/nanobind.h>

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The functions of colonnade.common.fixed_order on numpy arrays.
 #include "binding.hpp"
 #include "fixed_order.hpp"

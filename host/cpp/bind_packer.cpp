@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The packer (cpp/packer) and the operations on meshes (cpp/mesh) for Python.
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>

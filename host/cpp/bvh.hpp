@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The binary tree over quantised triangles, from which every tree layout is derived.
 ///
 /// Splits are binned by a surface-area heuristic, and exact sweeps near the leaves. All costs are exact integers, so a mesh

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Arithmetic with equal bits on every processor: IEEE additions, multiplications, divisions and square roots alone, in
 /// a fixed order, never contracted into fused operations (CMakeLists.txt). Libraries of linear algebra and of
 /// elementary functions choose their order, and so their rounding, by the processor.

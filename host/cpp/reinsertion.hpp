@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Reinsertion: moves subtrees of the binary tree to where they add the least area (Bittner, Hapala and Havran 2013, "Fast
 /// Insertion-Based Optimization of Bounding Volume Hierarchies"; search of Meister and Bittner 2018, "Parallel Reinsertion for
 /// Bounding Volume Hierarchy Optimization").

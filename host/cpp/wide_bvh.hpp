@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The tree in the hardware's layout: nodes of two or four children with boxes quantised relative to their node.
 ///
 /// Collapsing the binary tree keeps the order of the leaves, so the packed ids do not depend on the arity.

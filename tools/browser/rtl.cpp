@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // A bench of a design with one column: a frame of its RTL, in slices of cycles. Pixels are taken when they come.
 #include <cstdint>
 #include <cstring>

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Verilator's runtime names threads, which WebAssembly's library lacks; a model with one thread starts none.
 #pragma once
 #include <condition_variable>

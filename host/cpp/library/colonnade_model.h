@@ -1,6 +1,4 @@
-/* SPDX-License-Identifier: Apache-2.0
- *
- * The packer and the bit-exact model without Python, behind C: docs/browser.md. With driver/include/colonnade_view.h, which
+/* The packer and the bit-exact model without Python, behind C: docs/browser.md. With driver/include/colonnade_view.h, which
  * computes registers from poses, it renders meshes as a design does. One design at a time; calls are those of one thread. */
 #ifndef COLONNADE_MODEL_H
 #define COLONNADE_MODEL_H

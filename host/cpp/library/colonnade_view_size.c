@@ -1,6 +1,4 @@
-/* SPDX-License-Identifier: Apache-2.0
- *
- * The size of a view, for callers that cannot read colonnade_view.h. */
+/* The size of a view, for callers that cannot read colonnade_view.h. */
 #include "colonnade_view.h"
 
 uint32_t colonnade_view_size(void);

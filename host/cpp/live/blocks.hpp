@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Blocks of 4×4 pixels: each with the plane that fits it, and how flat it is.
 #pragma once
 

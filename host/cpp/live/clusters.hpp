@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Two or four clusters of a tile's cells, without iterations to convergence: the cells are split by the sign of their
 /// projection on a column of the covariance matrix, each half once more, and the means move once or twice.
 #pragma once

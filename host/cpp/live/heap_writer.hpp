@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Writes words of tiles into a heap. Equal words are stored once.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Inner loops of the live encoder, for the compiler to vectorise. All arithmetic is that of integers, without overflow, so
 /// a loop gives the same values in any order and with any vectors. kernels.cpp compiles each loop for several processors.
 #pragma once

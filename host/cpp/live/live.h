@@ -1,4 +1,3 @@
-/* SPDX-License-Identifier: Apache-2.0 */
 /* The live encoder of a room's maps: words of the physical-attribute memory for each frame of a camera
  * (docs/captures.md, "Live encoder"). Equal frames in equal order give equal words on every processor. */
 #ifndef COLONNADE_LIVE_H

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// What each mode of a tile costs, and the price of a word at which the selected modes fill the heap.
 #pragma once
 

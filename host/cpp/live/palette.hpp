@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The palette of a map: its entries as points and as words, its first fit, and its step from frame to frame.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Encodes the plane map and the bounding planes from frame to frame.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The planes of each tile, and the words of the plane map.
 #pragma once
 

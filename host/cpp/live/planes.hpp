@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Planes of the picture's inverse depth, in whole numbers.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The table of planes: those of the frame before, moved with the camera, and those of regions that none of them fits.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// What the encoder keeps of a tile: the means of its cells on four levels, and the errors that stay within them.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Encodes a two-level map, of colours or normals, from frame to frame.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Cleaning, as host/colonnade/mesh/load.py does it: vertices are merged by position; degenerate faces, equal faces and unused
 /// vertices go, and closed parts are reversed that point inward.
 #pragma once

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Samples of pictures at texture coordinates (host/colonnade/mesh/materials/texture.py), summed in a fixed order.
 #pragma once
 

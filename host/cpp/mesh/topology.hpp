@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Vectors of meshes, and operations on indexed triangles: merging vertices and dropping faces.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Quantisation: a mesh with vertices rounded to vertex units (docs/numbers.md).
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The records of the column memory: nodes, triangles and attributes, in this order, by the manifest's layouts.
 /// Addresses in nodes are absolute.
 #pragma once

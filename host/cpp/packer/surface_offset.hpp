@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The distance from a surface at which shadow rays and bounces start (docs/numbers.md, "Off the surface").
 #pragma once
 

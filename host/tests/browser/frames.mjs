@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Packs a mesh and renders frames in WebAssembly: node frames.mjs FOLDER, which has job.json and the mesh's arrays.
 // It writes records.bin, and colours, triangles and counters of the frame, by the RTL too if the job names its module.
 

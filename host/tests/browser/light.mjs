@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Sums of passes and the light cube, as the page makes them: node light.mjs FOLDER, which has job.json. It writes the words
 // of the cube, and what sums show with a photo and without one.
 

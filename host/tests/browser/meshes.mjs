@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Reads and packs mesh files, as the page does: node meshes.mjs FOLDER, which has job.json and the files. It writes result.json:
 // of each file the error, or the corners of its triangles, one after the other, with normals and colours.
 

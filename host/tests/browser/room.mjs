@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Encodes a room in WebAssembly, and derives normals, as the page does: node room.mjs FOLDER, which has job.json, the
 // codes of the maps and a depth map. It writes the memories, what the encoder returns beside them, and the normals.
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Reads links as the page does: node state.mjs FOLDER, which has job.json, a list of them. It writes the states that differ
 // from the defaults, in result.json.
 
