@@ -197,6 +197,7 @@ const char *colonnade_error_name(enum colonnade_error error);
 
 /* Accesses of a processor that sees the registers at `context`, for `struct colonnade_bus`. */
 uint32_t colonnade_mmio_read(void *context, uint32_t address);
+/* Likewise, a write of 32 bits at a byte address. */
 void colonnade_mmio_write(void *context, uint32_t address, uint32_t value);
 
 #ifdef __cplusplus

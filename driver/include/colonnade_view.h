@@ -106,7 +106,9 @@ enum colonnade_error colonnade_rotation(int32_t rotation[3][3], const int32_t qu
 
 /* In a room the device marches from this camera; until the first call the camera is the file's. */
 enum colonnade_error colonnade_view_set_camera(struct colonnade_view *view, const struct colonnade_camera *camera);
+/* Where the object is, 2^-32 m; until the first call it is where the file has it. */
 enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, const struct colonnade_pose *object);
+/* Light `index` of the scene, 0 to its count - 1; until the first call it is that of the file. */
 enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index,
                                               const struct colonnade_light *light);
 
@@ -118,6 +120,7 @@ enum colonnade_error colonnade_view_set_sample(struct colonnade_view *view, uint
  * pairs of words; colonnade_view_most_writes says how many are enough. */
 enum colonnade_error colonnade_view_frame(struct colonnade_view *view, uint8_t *writes, uint32_t capacity,
                                           struct colonnade_frame *frame);
+/* The pairs of words that a frame has at most. */
 uint32_t colonnade_view_most_writes(const struct colonnade_view *view);
 
 /* The device has the last frame: call it when colonnade_set_frame has returned COLONNADE_OK. */

@@ -52,6 +52,7 @@ typedef struct colonnade_live colonnade_live;
 
 /* An encoder, or a null pointer if a size is out of range. */
 colonnade_live* colonnade_live_create(const colonnade_live_sizes* sizes);
+/* Frees an encoder, or does nothing with a null pointer. */
 void colonnade_live_destroy(colonnade_live* live);
 /* Encodes the next frame. The frame before is the start of the search. */
 void colonnade_live_encode(colonnade_live* live, const colonnade_live_frame* frame, colonnade_live_maps* maps);
