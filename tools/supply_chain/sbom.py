@@ -1,11 +1,13 @@
 """The bill of materials of setup, CycloneDX 1.6, from the locks.
 
-Versions and hashes come only from the locks. Licences come from the metadata of packages that are installed in the
-environments of this checkout, and of POM files in Coursier's cache.
+Versions and hashes come only from the locks. Licences come from the lock of npm, from the
+metadata of packages that are installed in the environments of this checkout, and from POM files in Coursier's cache.
 """
 
 from __future__ import annotations
 
+import base64
+import json
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -27,7 +29,7 @@ _MINIMUM_OF = {"g++": "gxx", "python3": "python", "openjdk-17-jdk-headless": "ja
 
 def document() -> dict[str, Any]:
     """The bill of materials, as JSON has it."""
-    components = [*_python(), *_maven(), *_debian()]
+    components = [*_python(), *_maven(), *_npm(), *_debian()]
     for component in components:
         if licences := _licences(component):
             component["licenses"] = licences
@@ -67,6 +69,20 @@ def _maven() -> list[Component]:
         {**_component(f"pkg:maven/{group}/{name}@{version}", name, version, sorted(found)), "group": group}
         for (group, name, version), found in sorted(hashes.items())
     ]
+
+
+def _npm() -> list[Component]:
+    lock = json.loads((ROOT / "tools" / "lint" / "package-lock.json").read_text(encoding="utf-8"))
+    components = []
+    for place, package in sorted(lock["packages"].items()):
+        if not place:  # the folder of the lock
+            continue
+        name, version = place.removeprefix("node_modules/"), package["version"]
+        component = _component(f"pkg:npm/{name.replace('@', '%40')}@{version}", name, version, [], lock="npm")
+        digest = base64.b64decode(package["integrity"].removeprefix("sha512-")).hex()
+        licence = {"expression": package["license"]}
+        components.append({**component, "hashes": [{"alg": "SHA-512", "content": digest}], "licenses": [licence]})
+    return components
 
 
 def _debian() -> list[Component]:
