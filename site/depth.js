@@ -114,31 +114,11 @@ export function fitDepth(depth, photo, crop, width, height) {
   return result;
 }
 
-/** Fills holes, in place, from the nearest pixel by steps; returns which they were. */
-export function fillHoles(depth, width) {
+/** Fills holes, in place, from the nearest pixel; returns which they were. */
+export function fillHoles(library, depth, width) {
   const holes = Uint8Array.from(depth, (value) => Number(!(value > 0)));
   const count = holes.reduce((sum, hole) => sum + hole, 0);
   if (count > MOST_HOLES * depth.length) throw new Error(`${Math.round((100 * count) / depth.length)} % of the depth map have no depth: it needs half of the pixels`);
-  spread(holes, width, (to, from) => (depth[to] = depth[from]));
+  library.nearest(holes, width).forEach((from, to) => (depth[to] = depth[from]));
   return { holes, count };
-}
-
-/** Calls `copy` for each missing pixel with one of its neighbours that is nearer to a known pixel. */
-export function spread(missing, width, copy) {
-  const known = Uint8Array.from(missing, (value) => 1 - value);
-  let edge = [];
-  for (let i = 0; i < known.length; ++i) if (known[i]) edge.push(i);
-  while (edge.length > 0) {
-    const next = [];
-    for (const from of edge) {
-      const x = from % width;
-      for (const to of [x > 0 ? from - 1 : -1, x < width - 1 ? from + 1 : -1, from - width, from + width]) {
-        if (to < 0 || to >= known.length || known[to]) continue;
-        known[to] = 1;
-        copy(to, from);
-        next.push(to);
-      }
-    }
-    edge = next;
-  }
 }

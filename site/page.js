@@ -2,7 +2,6 @@
 
 import { ROOM_START, START, isAtMaps } from "./camera.js";
 import { droppedFiles, roomFiles } from "./files.js";
-import { radianceOf } from "./lightcube.js";
 import { orbitBy, panBy, zoomBy } from "./moves.js";
 import { notesOf } from "./notes.js";
 import { listen } from "./orbit.js";
@@ -60,7 +59,7 @@ async function openDesign() {
   const files = room ? room.views[state.design] : { plain: data.views[state.design] };
   const views = Object.fromEntries(Object.entries(files).map(([name, text]) => [name, bytesOf(text)]));
   const maps = (room?.maps ?? []).map(({ words, ...map }) => ({ ...map, words: bytesOf(words) }));
-  const light = room?.light ? (room.light.radiance ??= radianceOf(bytesOf(room.light.cube))) : null;
+  const light = room?.light ? (room.light.radiance ?? bytesOf(room.light.cube)) : null;
   Object.assign(page, { light: room?.light, middle: room?.object.position });
   await renderer.open({ module: page.module, manifest, views, maps, light, photo: room && (await photoOf(room)) });
 }
@@ -174,7 +173,7 @@ stage.addEventListener("dblclick", (event) => {
   const place = placeOf(room, ((event.clientX - box.left) / box.width) * room.width, ((event.clientY - box.top) / box.height) * room.height, STAND_WITHIN);
   queue.add("Moving the object", async () => {
     const own = data.rooms[state.room];
-    Object.assign(own, placedRoom(own, templateFor(data.rooms, state.design).template, place));
+    Object.assign(own, await placedRoom(renderer, own, templateFor(data.rooms, state.design).template, place));
     await changeDesign();
   });
 });

@@ -14,7 +14,7 @@ export const bytesOf = (text) => (typeof text === "string" ? Uint8Array.from(ato
 const MOST_SILENCE = 20;
 /** What a worker does, for messages. */
 const DOING = {
-  open: "opening the hardware", read: "reading the file", pack: "packing the mesh", load: "taking the mesh", room: "making the maps of the room",
+  open: "opening the hardware", read: "reading the file", pack: "packing the mesh", load: "taking the mesh", room: "making the maps of the room", light: "finding the light of the room",
   frame: "rendering", trace: "following the ray", rtl: "running the RTL",
 };
 
@@ -128,6 +128,11 @@ export class Renderer {
   /** Encodes a room of a photo and its depth (worker.js). */
   room(request) {
     return this.ask(this.workers[0], "room", request);
+  }
+
+  /** The light of a visitor's photo around a point (worker.js). */
+  light(request) {
+    return this.ask(this.workers[0], "light", request);
   }
 
   trace(view, x, y) {

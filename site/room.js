@@ -2,7 +2,6 @@
 // (docs/background.md), but one white lamp and no shadows of the photo.
 
 import { cropOf, fillHoles, fitDepth } from "./depth.js";
-import { fitted, normalsOf, raysOfLens } from "./normals.js";
 import { decode, encode } from "./photo.js";
 
 /** Points that tell floor and light, of a map's pixels every so many across and down. */
@@ -32,19 +31,19 @@ function quantile(values, share) {
  * `lens` is that of the photo; `pose` from view space to the world, or null: it is that of the floor. `gathers`: the light
  * of the photo is gathered, so the room's lights have its scale.
  */
-export function prepareRoom(/** @type {any} */ { photo, whole, depth, lens, pose, gathers }) {
+export function prepareRoom(/** @type {any} */ library, /** @type {any} */ { photo, whole, depth, lens, pose, gathers }) {
   const { width, height } = photo;
   if (Math.abs(depth.width * whole.height - depth.height * whole.width) > 0.03 * depth.width * whole.height)
     throw new Error(`the depth map is ${depth.width} × ${depth.height}, the photo ${whole.width} × ${whole.height}: both have to show the same part of the room`);
   const crop = cropOf(whole, width, height);
   const own = { fx: lens.fx / crop.scale, fy: lens.fy / crop.scale, cx: (lens.cx - crop.left) / crop.scale, cy: (lens.cy - crop.top) / crop.scale };
   const filled = fitDepth(depth, whole, crop, width, height);
-  const { holes, count } = fillHoles(filled, width);
-  const { normals, noise } = normalsOf(filled, holes, own, width, height);
+  const { holes, count } = fillHoles(library, filled, width);
+  const { normals, noise } = library.normals(filled, holes, own, width, height);
   const notes = [`normals are those of the depth map, whose noise is ${(100 * noise).toFixed(2)} %`];
   if (count > 0) notes.push(`${count.toLocaleString("en")} pixels had no depth and are filled from their neighbours`);
   const surface = surfaceOf(filled, normals, raysOfLens(own, width, height), width, height);
-  const found = pose ?? levelled(surface, notes);
+  const found = pose ?? levelled(library, surface, notes);
   const world = surface.map(({ pixel, point, normal, distance }) => {
     const at = turned(found.rotation, point).map((value, axis) => value + found.position[axis]);
     return { pixel, point: at, normal: turned(found.rotation, normal), distance };
@@ -56,9 +55,19 @@ export function prepareRoom(/** @type {any} */ { photo, whole, depth, lens, pose
   return { width, height, lens: own, pose: found, depth: filled, normals, albedo, light, headroom, noise, surface: world, seen, notes };
 }
 
-/** Points, normals and colours of every second pixel across and down, in the world, for lightcube.js. */
+/** View rays of the pixels, with z = 1: three of each. */
+function raysOfLens({ fx, fy, cx, cy }, width, height) {
+  const rays = new Float64Array(3 * width * height).fill(1);
+  for (let i = 0; i < width * height; ++i) {
+    rays[3 * i] = ((i % width) + 0.5 - cx) / fx;
+    rays[3 * i + 1] = (Math.floor(i / width) + 0.5 - cy) / fy;
+  }
+  return rays;
+}
+
+/** Points, normals and colours of every second pixel across and down, in the world, for the light of an object (library.js). */
 function seenOf(depth, normals, colours, rays, pose, width, height) {
-  const [points, turnedNormals, seenColours] = range(3).map(() => new Float32Array(3 * (width >> 1) * (height >> 1)));
+  const [points, turnedNormals, seenColours] = range(3).map(() => new Float64Array(3 * (width >> 1) * (height >> 1)));
   let at = 0;
   for (let y = 0; y + 1 < height; y += 2)
     for (let x = 0; x + 1 < width; x += 2, at += 3) {
@@ -83,7 +92,7 @@ function surfaceOf(depth, normals, rays, width, height) {
 }
 
 /** The pose of a level world with the floor at 0: the floor is the largest low plane that points up in the picture. */
-function levelled(surface, notes) {
+function levelled(library, surface, notes) {
   const towards = [0, -1, 0];
   const level = surface.filter(({ normal }) => dot(normal, towards) > UNCERTAIN);
   let best = { count: 0 };
@@ -102,7 +111,7 @@ function levelled(surface, notes) {
   for (let round = 0; best.normal && round < 3; ++round) {
     const on = surface.filter((each) => Math.abs(dot(up, each.point) - height) < Math.max(THICKNESS * each.distance, LEAST_THICKNESS) && dot(up, each.normal) > PARALLEL);
     if (on.length < 3) break;
-    const plane = fitted(on.map((_, i) => i), on.map(() => 1), on.flatMap(({ point }) => point)); // m · p = 1, below the eye: height < 0
+    const plane = library.plane(Float64Array.from(on.flatMap(({ point }) => point))); // m · p = 1, below the eye: height < 0
     const length = Math.hypot(...plane);
     [up, height] = [Array.from(plane, (value) => -value / length), -1 / length];
   }
@@ -129,6 +138,14 @@ function exposure(point, normal, position, reach) {
   return reach === 0 ? cosine : cosine * Math.min(MOST_FALLOFF, reach ** 2 / squared);
 }
 
+/** The corners of the box around a room: what its camera sees, and around; its lowest level is that of the floor. `points`: three numbers each. */
+export function roomBox(points, eye) {
+  const along = range(3).map((axis) => points.filter((_, index) => index % 3 === axis));
+  const floor = quantile(along[1], 0.02);
+  const low = along.map((values, axis) => (axis === 1 ? floor : Math.min(quantile(values, 0.02), eye[axis]) - MARGIN[axis]));
+  return [low, along.map((values, axis) => Math.max(quantile(values, 0.98), eye[axis]) + MARGIN[axis])];
+}
+
 /** Ambient light and one lamp that explain the brightness of the photo best, if its mean albedo is 0.5. */
 function fitLight(world, colours, eye, notes) {
   const samples = world
@@ -140,9 +157,8 @@ function fitLight(world, colours, eye, notes) {
   const sum = (f) => target.reduce((total, _, i) => total + weights[i] ** 2 * f(i), 0);
   const [ones, targets] = [sum(() => 1), sum((i) => target[i])];
   const least = targets / ones / 2;
-  const low = range(3).map((axis) => Math.min(quantile(world.map(({ point }) => point[axis]), 0.02), eye[axis]) - MARGIN[axis]);
-  const high = range(3).map((axis) => Math.max(quantile(world.map(({ point }) => point[axis]), 0.98), eye[axis]) + MARGIN[axis]);
-  low[1] += MARGIN[1] + LEAST_HEIGHT;
+  const [low, high] = roomBox(world.flatMap(({ point }) => point), eye);
+  low[1] += LEAST_HEIGHT;
   let best = /** @type {any} */ ({ error: Infinity });
   for (const place of range(GRID[0] * GRID[1] * GRID[2])) {
     const index = [place % GRID[0], Math.floor(place / GRID[0]) % GRID[1], Math.floor(place / GRID[0] / GRID[1])];

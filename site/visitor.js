@@ -1,7 +1,6 @@
 // A room of a visitor's files, in the page: the worker makes its maps, this module its view files.
 
 import { readMeta } from "./files.js";
-import { parallaxOf, seenLight } from "./lightcube.js";
 import { bytesOf } from "./renderer.js";
 import { lensOf, roomView } from "./roomview.js";
 
@@ -40,11 +39,11 @@ export async function visitorRoom(renderer, manifest, template, found, files, { 
   const { ignored } = found;
   if (!meta) room.notes.push(`the photo's width is taken as ${degrees}°, a step of a PNG of depth as ${millimetres} mm`);
   if (ignored.length > 0) room.notes.push(`${ignored.join(" and ")} ${ignored.length > 1 ? "are" : "is"} not read`);
-  return { ...room, ...placedRoom(room, template, place ?? placeOf(room)), picture: photo, files: { found, files, settings: { degrees, millimetres } } };
+  return { ...room, ...(await placedRoom(renderer, room, template, place ?? placeOf(room))), picture: photo, files: { found, files, settings: { degrees, millimetres } } };
 }
 
 /** What the page needs of a room whose object stands at its place: camera, object, light and view files. */
-export function placedRoom(room, template, place) {
+export async function placedRoom(renderer, room, template, place) {
   const { pose, lens, width, height, headroom, encoded } = room;
   const axis = (column) => pose.rotation.map((row) => row[column]);
   const scale = place.edge / 2;
@@ -55,7 +54,7 @@ export function placedRoom(room, template, place) {
   const viewsOf = (views) => Object.fromEntries(Object.entries(views).map(([factor, text]) => [factor, roomView(bytesOf(text), template.object.scale, { ...room, lamp }, object, Number(factor))]));
   const views = Object.fromEntries(Object.entries(template.views).map(([design, views]) => [design, viewsOf(views)]));
   const ambient = room.light.ambient * headroom * exposure;
-  const light = template.light && { exposure, ...lightAt(room, object, lamp, exposure) };
+  const light = template.light && { exposure, ...(await lightAt(renderer, room, object, lamp, exposure)) };
   return {
     place,
     object,
@@ -67,10 +66,10 @@ export function placedRoom(room, template, place) {
 }
 
 /** The light that an object meets, in the device's numbers: that of the photo, and the lamp with an area. */
-function lightAt({ seen, pose }, { position, scale }, lamp, exposure) {
-  const { radiance, share } = seenLight(seen, position);
+async function lightAt(renderer, { seen, pose }, { position, scale }, lamp, exposure) {
+  const { radiance, ...found } = await renderer.light({ seen, eye: pose.position, point: position, edge: 2 * scale });
   const radius = LAMP_SHARE * Math.hypot(...lamp.position.map((value, axis) => value - position[axis]));
-  return { radiance: radiance.map((value) => value * exposure), share, parallax: parallaxOf(seen, pose.position, position, 2 * scale), lamps: [{ ...lamp, radius }] };
+  return { ...found, radiance: radiance.map((value) => value * exposure), lamps: [{ ...lamp, radius }] };
 }
 
 /** The largest part around the middle of a picture with the proportions of the maps, in their size. */

@@ -3,10 +3,9 @@
 import { readDepth } from "./depth.js";
 import { codesOf, encodeStill } from "./encoder.js";
 import { Library } from "./library.js";
-import { cubeWords } from "./lightcube.js";
 import { readMesh } from "./meshes.js";
 import { resizedPhoto } from "./photo.js";
-import { prepareRoom } from "./room.js";
+import { prepareRoom, roomBox } from "./room.js";
 import { renderRtl } from "./rtl.js";
 import { Sums, codeOf } from "./sums.js";
 
@@ -34,7 +33,7 @@ export function serve(scope) {
   const pause = () => new Promise((resolve) => (waiting.push(resolve), channel.port2.postMessage(null)));
 
   const calls = {
-    /** `views`: view files by name; `maps`, `photo` and `light`: those of a room, the photo as RGBA, the light as in lightcube.js. */
+    /** `views`: view files by name; `maps`, `photo` and `light`: those of a room, the photo as RGBA, the light as radiance or words. */
     async open({ module, manifest, views, maps, photo, light }) {
       library ??= await Library.from(module);
       library.open(manifest);
@@ -43,7 +42,7 @@ export function serve(scope) {
       opened = null;
       photos = photo ? Object.fromEntries(Object.keys(views).map((factor) => [factor, resizedPhoto(photo, Number(factor))])) : {};
       white = 2 ** manifest.numbers.colourBits - 1;
-      radiance = light;
+      radiance = light instanceof Uint8Array ? library.radianceOf(light) : light;
       lit = null;
       return {};
     },
@@ -67,11 +66,15 @@ export function serve(scope) {
     /** Encodes the room of a photo and its depth, for the maps of a design (room.js). */
     async room({ manifest, depth, step, ...photo }) {
       const begin = performance.now();
-      const { depth: filled, normals, albedo, ...room } = prepareRoom({ ...photo, depth: await readDepth(depth.name, depth.bytes, step) });
+      const { depth: filled, normals, albedo, ...room } = prepareRoom(library, { ...photo, depth: await readDepth(depth.name, depth.bytes, step) });
       const prepared = performance.now();
       const encoded = encodeStill(library.wasm, manifest, codesOf({ ...room, albedo, normals, depth: filled }));
       const milliseconds = [prepared - begin, performance.now() - prepared];
       return { ...room, encoded, milliseconds };
+    },
+    /** The light of a visitor's photo that a point meets, and what the object's cube of this edge sees by it. */
+    light({ seen, eye, point, edge }) {
+      return { ...library.lightAt(seen, point), parallax: library.parallax(roomBox(seen.points, eye), point, edge) };
     },
     writes({ view }) {
       start(view);
@@ -138,7 +141,7 @@ export function serve(scope) {
     if (!camera.isOfMaps) library.setCamera(camera);
     if (object) library.setObject(object);
     if (radiance && lit !== String(object.rotation)) {
-      library.loadMemories([{ memory: "light.cube", words: cubeWords(radiance, object.rotation), bytes: 4 }]);
+      library.loadMemories([{ memory: "light.cube", words: library.cubeWords(radiance, object.rotation), bytes: 4 }]);
       lit = String(object.rotation);
     }
     lights.forEach((light, index) => library.setLight(index, light));

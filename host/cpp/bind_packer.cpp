@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "binding.hpp"
+#include "mesh/cleaning.hpp"
 #include "mesh/texture.hpp"
-#include "mesh/winding.hpp"
 #include "packer/records.hpp"
 #include "packer/surface_offset.hpp"
 
@@ -116,26 +116,16 @@ nb::tuple mergeRows(const Rows<double>& rows) {
     return nb::make_tuple(arrayOf<double>(merged.rows, {merged.rows.size(), 3}), arrayOf<std::int64_t>(merged.index, {merged.index.size()}));
 }
 
-nb::object dropFaces(const Rows<double>& vertices, const Rows<std::int64_t>& faces) {
-    const std::vector<std::int64_t> keep = released([&] { return mesh::dropFaces(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Row<std::int64_t>>(faces)); });
-    return arrayOf<std::int64_t>(keep, {keep.size()});
-}
-
-nb::tuple findWinding(const Rows<double>& vertices, const Rows<std::int32_t>& faces) {
-    const mesh::Winding winding = released([&] { return mesh::findWinding(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces)); });
-    const std::size_t count = faces.shape(0);
-    return nb::make_tuple(arrayOf<bool>(winding.reversed, {count}), winding.mixed, winding.inverted, arrayOf<bool>(winding.isOpen, {count}));
-}
-
-nb::object creaseNormals(const Rows<double>& vertices, const Rows<std::int32_t>& faces, double leastCosine) {
-    const std::vector<mesh::Corners> normals = released([&] { return mesh::creaseNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), leastCosine); });
-    return arrayOf<double>(normals, {normals.size(), 3, 3});
-}
-
-nb::tuple cornerNormals(const Rows<double>& vertices, const Rows<std::int32_t>& faces, const CornerRows<double>& authored, double leastCosine) {
-    const mesh::CornerNormals result =
-        released([&] { return mesh::cornerNormals(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), vectorOf<mesh::Corners>(authored), leastCosine); });
-    return nb::make_tuple(arrayOf<double>(result.normals, {result.normals.size(), 3, 3}), result.flipped, result.replaced, result.missing);
+nb::object clean(const Rows<double>& vertices, const Rows<std::int32_t>& faces, const std::optional<CornerRows<double>>& normals, double leastCosine, std::size_t sourceFaces) {
+    if (normals && normals->shape(0) != faces.shape(0)) throw std::invalid_argument("a face has no normals");
+    const mesh::CleanMesh mesh = released([&] {
+        return mesh::clean({vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), normals ? vectorOf<mesh::Corners>(*normals) : std::vector<mesh::Corners>()}, leastCosine, sourceFaces);
+    });
+    if (!mesh.error.empty()) return nb::cast(mesh.error);
+    const std::size_t count = mesh.faces.size();
+    return nb::make_tuple(arrayOf<double>(mesh.vertices, {mesh.vertices.size(), 3}), arrayOf<std::int32_t>(mesh.faces, {count, 3}), arrayOf<std::int64_t>(mesh.sources, {count}),
+                          arrayOf<double>(mesh.normals.normals, {count, 3, 3}), arrayOf<bool>(mesh.winding.reversed, {count}), arrayOf<bool>(mesh.winding.isOpen, {count}),
+                          nb::make_tuple(mesh.winding.mixed, mesh.winding.inverted, mesh.normals.flipped, mesh.normals.replaced, mesh.normals.missing));
 }
 
 template <class Pixel>
@@ -173,10 +163,7 @@ void bind_packer(nb::module_& module) {
         },
         "grid_fraction"_a, "weight_bits"_a, "mantissa_bits"_a, "distance_digits"_a, "largest_triangle"_a);
     module.def("merge_rows", &mergeRows, "rows"_a);
-    module.def("drop_faces", &dropFaces, "vertices"_a, "faces"_a);
-    module.def("find_winding", &findWinding, "vertices"_a, "faces"_a);
-    module.def("crease_normals", &creaseNormals, "vertices"_a, "faces"_a, "least_cosine"_a);
+    module.def("clean", &clean, "vertices"_a, "faces"_a, "normals"_a.none(), "least_cosine"_a, "source_faces"_a);
     module.def("sampled", &sampled<std::uint8_t>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
     module.def("sampled", &sampled<float>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
-    module.def("corner_normals", &cornerNormals, "vertices"_a, "faces"_a, "authored"_a, "least_cosine"_a);
 }

@@ -9,9 +9,13 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import playwright
 import pytest
 from playwright.sync_api import BrowserContext, Page
+
+from colonnade.environment.light_cube import LightCube
+from colonnade.environment.seen_light import FINE
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "out" / "browser" / "index.html"
@@ -33,6 +37,13 @@ def run_node(program: str, folder: Path, job: Any) -> None:
         pytest.skip("no node")
     (folder / "job.json").write_text(json.dumps(job))
     subprocess.run([node, Path(__file__).with_name("browser") / program, folder], check=True)
+
+
+def cube_of(words: bytes) -> LightCube:
+    """The light cube of `FINE` texels along an edge that words of the device hold."""
+    numbers = np.frombuffer(words, "<u4")
+    mantissas = np.stack([numbers >> shift & 127 for shift in (14, 7, 0)], axis=1)
+    return LightCube((mantissas << (numbers[:, None] >> 21 & 15)).reshape(6, FINE, FINE, 3) / 4096)
 
 
 class Tab:

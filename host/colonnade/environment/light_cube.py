@@ -103,24 +103,22 @@ class LightCube:
 
         It has no lights.
         """
-        turn = rotation.T
-        return LightCube.of(lambda directions: self.radiance(fixed_order.product(directions, turn)))
+        from colonnade import _core
+
+        texels = np.asarray(self.texels, np.float64)
+        return LightCube(_core.turned_cube(texels.reshape(-1, 3), texels.shape[1], rotation))
 
     def words(self) -> NDArray[np.uint8]:
         """The words of the device's memory, uint8 [texels, 4], low byte first.
 
         The fields are, from the highest, a light, the exponent, and the mantissas of red, green and blue.
         """
-        fixed = self.texels.reshape(-1, 3) * _ONE
-        largest = (1 << _MANTISSA) - 1
-        exponents = np.zeros(len(fixed), dtype=np.int64)
-        for _ in range(_LAST_EXPONENT):
-            exponents += np.rint(np.ldexp(fixed.max(axis=1), -exponents)) > largest
-        mantissas = np.rint(np.ldexp(fixed, -exponents[:, None])).clip(0, largest).astype("<u4")
-        words = exponents.astype("<u4") if self.lights is None else exponents.astype("<u4") | self.lights.ravel() << 4
-        for channel in range(3):
-            words = words << _MANTISSA | mantissas[:, channel]
-        return np.ascontiguousarray(words, dtype="<u4").view(np.uint8).reshape(-1, 4)
+        from colonnade import _core
+
+        texels = np.asarray(self.texels, np.float64).reshape(-1, 3)
+        lights = np.zeros(len(texels), bool) if self.lights is None else self.lights.ravel()
+        words: NDArray[np.uint32] = _core.cube_words(texels, lights)
+        return words.astype("<u4").view(np.uint8).reshape(-1, 4)
 
 
 def face_directions(size: int) -> tuple[Floats, Floats]:

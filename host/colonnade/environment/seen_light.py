@@ -7,18 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common import fixed_order
 from colonnade.common.accumulation import LUMINANCE
 from colonnade.common.image_io import decode_srgb
 from colonnade.common.types import Floats
-from colonnade.environment.light_cube import LightCube, face_directions
+from colonnade.environment.light_cube import face_directions
 from colonnade.environment.lights import RoomLights, irradiance, world_surface
 from colonnade.environment.model import Environment
 
 #: Texels along the edge of a face while the light is collected.
 FINE = 32
-#: Pixels of a texel that are farther than its nearest one by this factor are behind it.
-_BEHIND = 1.1
 
 
 def texel_weights() -> Floats:
@@ -79,17 +76,8 @@ class SeenLight:
             colours = decode_srgb(environment.photo)
         else:
             colours = (environment.albedo * irradiance(surface, normals, lights)).clip(max=1.0)
-        towards = (surface - point).reshape(-1, 3)
-        facing = fixed_order.dot(normals.reshape(-1, 3), towards) < 0
-        towards, colours = towards[facing], colours.reshape(-1, 3)[facing]
-        count = 6 * FINE * FINE
-        texel = LightCube(np.zeros((6, FINE, FINE, 3))).texel_of(towards)
-        distance = np.sqrt(fixed_order.dot(towards, towards))
-        nearest = np.full(count, np.inf)
-        np.minimum.at(nearest, texel, distance)
-        is_near = distance <= _BEHIND * nearest[texel]
-        texel, colours = texel[is_near], colours[is_near]
-        pixels = np.bincount(texel, minlength=count)
-        sums = np.stack([np.bincount(texel, colours[:, channel], count) for channel in range(3)], axis=1)
-        bright = np.bincount(texel, colours.max(axis=1) >= 1.0, count) > 0
-        return SeenLight(sums / np.maximum(pixels, 1)[:, None], pixels > 0, bright, nearest)
+        from colonnade import _core
+
+        pixels = (values.reshape(-1, 3) for values in (surface, normals, colours))
+        radiance, count, is_bright, distance = _core.seen_light(*pixels, point.tolist())
+        return SeenLight(radiance, count > 0, is_bright, distance)

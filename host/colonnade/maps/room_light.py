@@ -73,15 +73,11 @@ def room_light(
 
 def _distance(environment: Environment, point: Floats) -> float:
     """The median of the distances from a point to the box around a room, along the largest component, metres."""
-    directions, weights = face_directions(FINE)
+    from colonnade import _core
+
     low, high = room_box(environment)
     inside = np.clip(point, low + _INSIDE, high - _INSIDE)
-    with np.errstate(divide="ignore"):
-        steps = (np.where(directions > 0, high - inside, inside - low) / np.abs(directions)).min(axis=-1)
-    distances = (steps * np.abs(directions).max(axis=-1)).ravel()
-    order = np.argsort(distances, kind="stable")
-    shares = np.cumsum(np.broadcast_to(weights, directions.shape[:3]).ravel()[order])
-    return float(distances[order][np.searchsorted(shares, shares[-1] / 2)])
+    return float(_core.box_distance(low.tolist(), high.tolist(), inside.tolist()))
 
 
 def _bounding_light(

@@ -23,9 +23,8 @@ from colonnade.mesh import losses as lost
 from colonnade.mesh.files import catalog
 from colonnade.mesh.files.formats import SUFFIXES, read_surface
 from colonnade.mesh.geometry import primitives, teapot
-from colonnade.mesh.geometry.normals import corner_normals
-from colonnade.mesh.geometry.topology import Faces, drop_faces, merge_rows, subdivide, subdivide_corners
-from colonnade.mesh.geometry.winding import find_winding
+from colonnade.mesh.geometry.cleaning import clean
+from colonnade.mesh.geometry.topology import Faces, merge_rows, subdivide, subdivide_corners
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials.coverage import without_alpha
 from colonnade.mesh.materials.materials import PLAIN, MeshMaterial
@@ -181,7 +180,7 @@ def clean_mesh(
         where: Its source, in messages.
         materials: The materials.
         face_materials: uint8 [m]; None: all faces have the first material.
-        normals: Normals of the file, float64 [m, 3, 3]; see `colonnade.mesh.geometry.normals.corner_normals`.
+        normals: Normals of the file, float64 [m, 3, 3]; see `colonnade.mesh.geometry.cleaning.clean`.
         crease: Crease angle, degrees, in place of ``normals``.
         losses: What the file lost so far; what is repaired here is added.
         colours: Corner colours, float64 [m, 3, 3]; see `Mesh.corner_colours`.
@@ -196,48 +195,25 @@ def clean_mesh(
     """
     label = f"mesh {where or name}"
     losses = Losses() if losses is None else losses
-    if len(faces) == 0:
-        raise UserError(f"{label} has no faces")
-    used, numbered = np.unique(faces, return_inverse=True)
-    if not np.isfinite(vertices[used]).all():
-        bad = int(used[np.flatnonzero(~np.isfinite(vertices[used]).all(axis=1))[0]])
-        raise UserError(f"{label}: vertex {bad} is not a finite number: repair the file")
     source_faces, source_count = (np.arange(len(faces)), len(faces)) if sources is None else sources
-    vertices = vertices[used]
-    if np.abs(vertices).max() > 1e100:
-        raise UserError(f"{label} has coordinates beyond 1e100: scale it down")
-    merged, index = merge_rows(vertices + 0.0)
-    corners = index[numbered.reshape(-1, 3)]
-    edge = float((merged.max(axis=0) - merged.min(axis=0)).max())
-    if edge > 0:
-        keep = drop_faces((merged - merged.min(axis=0)) / edge, corners)
-    if edge == 0 or len(keep) == 0:
-        raise UserError(f"{label} has only degenerate triangles ({source_count:,}, all without area)")
-    if edge < 1e-100:
-        raise UserError(f"{label} is smaller than 1e-100: scale it up")
-    used, renumbered = np.unique(corners[keep], return_inverse=True)
-    vertices, faces = merged[used], renumbered.reshape(-1, 3).astype(np.int32)
-    normals, colours, uvs = (None if values is None else values[keep] for values in (normals, colours, uvs))
-    relief = None if relief is None else relief.kept(keep)
-    winding = find_winding(vertices, faces)
-    has_backs = single_sided is not None and bool((single_sided[keep] & winding.is_open).any())
-    if winding.reversed.any():
-        losses.add(lost.MIXED, winding.mixed)
-        losses.add(lost.INVERTED, winding.inverted)
-        faces[winding.reversed] = faces[winding.reversed][:, ::-1]
-        for values in (normals, colours, uvs):
-            if values is not None:
-                values[winding.reversed] = values[winding.reversed][:, ::-1]
-        relief = None if relief is None else relief.reversed(winding.reversed)
-    shading = corner_normals(vertices, faces, normals, crease)
-    losses.add(lost.FLIPPED, shading.flipped)
-    losses.add(lost.REPLACED, shading.replaced)
-    losses.add(lost.MISSING, shading.missing)
+    cleaned = clean(vertices, faces, normals, crease, source_count)
+    if isinstance(cleaned, str):
+        raise UserError(label + cleaned.removeprefix("the mesh"))
+    vertices, faces, keep = cleaned.vertices, cleaned.faces, cleaned.sources
+    colours, uvs = (None if values is None else values[keep] for values in (colours, uvs))
+    has_backs = single_sided is not None and bool((single_sided[keep] & cleaned.is_open).any())
+    for values in (colours, uvs):
+        if values is not None:
+            values[cleaned.reversed] = values[cleaned.reversed][:, ::-1]
+    relief = None if relief is None else relief.kept(keep).reversed(cleaned.reversed)
+    repairs = (lost.MIXED, lost.INVERTED, lost.FLIPPED, lost.REPLACED, lost.MISSING)
+    for loss, number in zip(repairs, cleaned.repairs, strict=True):
+        losses.add(loss, number)
     sources_kept = source_faces[keep].astype(np.int32)
     materials_kept = np.zeros(len(faces), dtype=np.uint8) if face_materials is None else face_materials[keep]
-    corners_normals = shading.normals
+    corners_normals = cleaned.normals
     if relief is not None and (relief.index >= 0).any():
-        parts = baked(vertices, faces, shading.normals, relief, losses)
+        parts = baked(vertices, faces, cleaned.normals, relief, losses)
         colours, uvs = (None if values is None else parts.corners(values) for values in (colours, uvs))
         sources_kept, materials_kept = sources_kept[parts.owners], materials_kept[parts.owners]
         vertices, index = merge_rows(parts.vertices)

@@ -13,7 +13,7 @@ namespace {
 
 using namespace colonnade;
 
-/// Up to this angle, 60 degrees, edges are smooth (host/colonnade/mesh/geometry/normals.py).
+/// Up to this angle, 60 degrees, edges are smooth (host/colonnade/mesh/geometry/cleaning.py).
 constexpr double leastCosine = 0.5000000000000001 - 1e-9;
 
 struct Register {
@@ -151,10 +151,9 @@ const char* colonnade_model_pack(const double* vertices, std::uint32_t vertexCou
         raw.normals.resize(faceCount);
         std::memcpy(raw.normals.data(), normals, faceCount * sizeof(mesh::Corners));
     }
-    if (const std::string error = mesh::whyUnclean(raw); !error.empty()) return refuse(error);
     auto next = std::make_unique<Packed>();
-    next->clean = mesh::clean(raw, leastCosine);
-    if (next->clean.faces.empty()) return refuse("the mesh has only degenerate triangles (" + std::to_string(faceCount) + ", all without area)");
+    next->clean = mesh::clean(raw, leastCosine, faceCount);
+    if (!next->clean.error.empty()) return refuse(next->clean.error);
     const mesh::CleanMesh& clean = next->clean;
     next->quantised = packer::quantise(clean.vertices.data(), clean.vertices.size(), clean.faces.data(), clean.faces.size(), library->format.vertexBits);
     if (next->quantised.faces.empty()) return "no triangle keeps an area in this design's vertex units";

@@ -1,4 +1,5 @@
-/// Cleaning, as host/colonnade/mesh/load.py does it: vertices are merged by position; degenerate faces, equal faces and unused
+// SPDX-License-Identifier: Apache-2.0
+/// Cleaning: vertices are merged by position; degenerate faces, equal faces and unused
 /// vertices go, and closed parts are reversed that point inward.
 #pragma once
 
@@ -16,6 +17,7 @@ struct RawMesh {
 };
 
 struct CleanMesh {
+    std::string error;                  ///< why the mesh cannot be cleaned, beginning with "the mesh"; empty if it can
     std::vector<Vector> vertices;
     std::vector<Face> faces;
     std::vector<std::int64_t> sources;  ///< of each face, its index in the raw mesh
@@ -23,13 +25,13 @@ struct CleanMesh {
     CornerNormals normals;
 };
 
-/// Why a mesh cannot be cleaned, in the words of host/colonnade/mesh/load.py; empty if it can.
+/// Why a mesh cannot be cleaned, before its faces are looked at.
 inline std::string whyUnclean(const RawMesh& raw) {
     if (raw.faces.empty()) return "the mesh has no faces";
     std::vector<bool> isUsed(raw.vertices.size());
     for (const Face& face : raw.faces)
         for (const std::int32_t vertex : face) {
-            if (vertex < 0 || static_cast<std::size_t>(vertex) >= raw.vertices.size()) return "a face names a vertex that does not exist";
+            if (vertex < 0 || static_cast<std::size_t>(vertex) >= raw.vertices.size()) return "the mesh has a face that names a vertex that does not exist";
             isUsed[vertex] = true;
         }
     double largest = 0.0;
@@ -41,8 +43,17 @@ inline std::string whyUnclean(const RawMesh& raw) {
     return largest > 1e100 ? "the mesh has coordinates beyond 1e100: scale it down" : "";
 }
 
-/// No faces are left if none has an area.
-inline CleanMesh clean(const RawMesh& raw, double leastCosine) {
+/// A number with a comma after each third digit from the end.
+inline std::string grouped(std::size_t number) {
+    std::string text = std::to_string(number);
+    for (std::size_t end = text.size(); end > 3; end -= 3) text.insert(end - 3, ",");
+    return text;
+}
+
+/// `sourceFaces`: the number of faces of the file, for messages.
+inline CleanMesh clean(const RawMesh& raw, double leastCosine, std::size_t sourceFaces) {
+    CleanMesh result{whyUnclean(raw), {}, {}, {}, {}, {}};
+    if (!result.error.empty()) return result;
     std::vector<bool> isUsed(raw.vertices.size());
     for (const Face& face : raw.faces)
         for (const std::int32_t vertex : face) isUsed[vertex] = true;
@@ -61,15 +72,16 @@ inline CleanMesh clean(const RawMesh& raw, double leastCosine) {
             high[axis] = std::max(high[axis], vertex[axis]);
         }
     const double edge = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
-    CleanMesh result;
-    if (!(edge >= 1e-100)) return result;
     std::vector<Vector> scaled = merged.rows;
     for (Vector& vertex : scaled)
         for (int axis = 0; axis < 3; ++axis) vertex[axis] = (vertex[axis] - low[axis]) / edge;
     std::vector<Row<std::int64_t>> corners(raw.faces.size());
     for (std::size_t i = 0; i < corners.size(); ++i)
         for (int corner = 0; corner < 3; ++corner) corners[i][corner] = merged.index[number[raw.faces[i][corner]]];
-    result.sources = dropFaces(scaled, corners);
+    if (edge > 0) result.sources = dropFaces(scaled, corners);
+    if (result.sources.empty()) result.error = "the mesh has only degenerate triangles (" + grouped(sourceFaces) + ", all without area)";
+    else if (edge < 1e-100) result.error = "the mesh is smaller than 1e-100: scale it up";
+    if (!result.error.empty()) return result;
 
     std::vector<std::int32_t> renumbered(merged.rows.size(), -1);
     for (const std::int64_t source : result.sources)
@@ -86,7 +98,6 @@ inline CleanMesh clean(const RawMesh& raw, double leastCosine) {
         if (!raw.normals.empty()) authored.push_back(raw.normals[source]);
         hasNormals = hasNormals || (!raw.normals.empty() && raw.normals[source] != Corners{});
     }
-    if (result.faces.empty()) return result;
     result.winding = findWinding(result.vertices, result.faces);
     for (std::size_t i = 0; i < result.faces.size(); ++i)
         if (result.winding.reversed[i]) {

@@ -1,5 +1,5 @@
-/// Corner normals: the normals of a face at its three corners, from the file or smoothed up to a crease angle
-/// (host/colonnade/mesh/geometry/normals.py).
+// SPDX-License-Identifier: Apache-2.0
+/// Corner normals: the normals of a face at its three corners, from the file or smoothed up to a crease angle.
 #pragma once
 
 #include "fixed_order.hpp"

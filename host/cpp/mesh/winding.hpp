@@ -1,4 +1,5 @@
-/// Winding of closed parts: counter-clockwise seen from outside (host/colonnade/mesh/geometry/winding.py).
+// SPDX-License-Identifier: Apache-2.0
+/// Winding of closed parts: counter-clockwise seen from outside.
 #pragma once
 
 #include "normals.hpp"

@@ -4,14 +4,14 @@
 import { readFileSync, writeFileSync } from "node:fs";
 import { fillHoles, readDepth } from "../../../site/depth.js";
 import { encodeStill, sizesOf } from "../../../site/encoder.js";
-import { instantiate } from "../../../site/library.js";
-import { normalsOf } from "../../../site/normals.js";
+import { Library } from "../../../site/library.js";
 
 const folder = process.argv[2];
 const bytes = (name) => Uint8Array.from(readFileSync(`${folder}/${name}`));
 const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
+const library = await Library.from(readFileSync(job.module));
 const codes = { ...job.codes, albedo: bytes("albedo.bin"), normals: bytes("normals.bin"), depth: new Uint32Array(bytes("depth.bin").buffer) };
-const { maps, tiles, ...rest } = encodeStill(await instantiate(readFileSync(job.module)), job.manifest, codes);
+const { maps, tiles, ...rest } = encodeStill(library.wasm, job.manifest, codes);
 for (const { memory, words } of maps) writeFileSync(`${folder}/${memory}`, words);
 for (const [name, values] of Object.entries(tiles)) writeFileSync(`${folder}/tiles.${name}`, new Uint8Array(values.buffer));
 
@@ -26,7 +26,7 @@ const refusal = (() => {
 })();
 
 const { width, height, values } = await readDepth("depth.png", bytes("depth.png"), job.step);
-const { holes, count } = fillHoles(values, width);
-const { normals, noise } = normalsOf(values, holes, job.lens, width, height);
+const { holes, count } = fillHoles(library, values, width);
+const { normals, noise } = library.normals(values, holes, job.lens, width, height);
 writeFileSync(`${folder}/derived.bin`, new Uint8Array(normals.buffer));
 writeFileSync(`${folder}/result.json`, JSON.stringify({ ...rest, count, noise, refusal }));

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from built_page import FILE, NEEDS_PAGE, OBJ, ROOT, Tab
+from built_page import FILE, NEEDS_PAGE, OBJ, ROOT, Tab, cube_of
 from PIL import Image
 from playwright.sync_api import Browser, BrowserContext, expect
 
@@ -24,7 +24,6 @@ from colonnade.device.bit_exact import render_model
 from colonnade.device.gathered_light import with_cube
 from colonnade.device.scene import DeviceScene
 from colonnade.environment.light_cube import LightCube
-from colonnade.environment.seen_light import FINE
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.registers.frame import frame_registers
@@ -160,8 +159,8 @@ def test_a_room_lights_the_object_and_passes_are_added(context: BrowserContext) 
     """The light cube turns with the object; passes have the host's samples, and the points of its lights' discs."""
     tab = Tab(context, "#pixel=4&room=living&material=metal&azimuth=64")
     page = tab.page
-    light = page.evaluate("({ lamps: colonnade.light.lamps, radiance: [...colonnade.light.radiance] })")
-    cube = LightCube(np.reshape(light["radiance"], (6, FINE, FINE, 3)))
+    light = page.evaluate("colonnade.light")
+    cube = cube_of(base64.b64decode(light["cube"]))
     for _ in range(2):
         picture = tab.picture()
         angle = np.radians(float(page.evaluate("/azimuth=([\\d.]+)/.exec(location.hash)[1]")) - 24)

@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from capture_files import ROOMS, phone, recording_of
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.ndimage import distance_transform_edt
 
 from colonnade.capture.picture import fitted
 from colonnade.capture.source import Frame, Lens
-from colonnade.environment import depth_normals
 from colonnade.environment.depth_normals import normals_of_depth
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment, EnvironmentCamera
+from colonnade.environment.repair import filled
 
 
 def degrees(first: np.ndarray, second: np.ndarray) -> float:
@@ -40,7 +43,7 @@ def test_a_plane_has_its_normal_everywhere() -> None:
     assert (found.planes, found.on_planes) == (1, 1.0)
 
 
-def test_noise_is_measured_and_planes_average_it(living: Environment, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_noise_is_measured_and_planes_average_it(living: Environment) -> None:
     holes = np.zeros((living.height, living.width), bool)
     limits = {0.0: 4.5, 0.005: 7.0, 0.01: 9.5}
     for noise, limit in limits.items():
@@ -49,9 +52,20 @@ def test_noise_is_measured_and_planes_average_it(living: Environment, monkeypatc
         assert degrees(found.normals, living.normals) < limit
         if noise:
             assert 0.6 * noise < found.noise < 1.1 * noise
-    monkeypatch.setattr(depth_normals, "_large_planes", lambda *arguments: [])
-    windows = normals_of_depth(depth, holes, living.camera)
+    windows = normals_of_depth(depth, holes, living.camera, max_planes=0)
     assert degrees(windows.normals, living.normals) > 1.5 * degrees(found.normals, living.normals)
+
+
+@given(st.integers(1, 30), st.integers(1, 30), st.floats(0.0, 0.99), st.integers(0, 2**32 - 1))
+def test_a_missing_pixel_takes_a_nearest_one(width: int, height: int, share: float, seed: int) -> None:
+    missing = np.random.default_rng(seed).random((height, width)) < share
+    missing[height // 2, width // 3] = False
+    pixels = np.arange(missing.size, dtype=np.float64).reshape(missing.shape)
+    found = filled(pixels, missing).astype(int)
+    assert not missing.ravel()[found].any()
+    rows, columns = np.indices(missing.shape)
+    squared = (found // width - rows) ** 2 + (found % width - columns) ** 2
+    assert (squared == np.rint(distance_transform_edt(missing) ** 2)).all()
 
 
 def test_holes_take_the_normals_of_what_is_beside_them(living: Environment) -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colonnade.mesh.geometry.normals import crease_normals, face_normals
+from colonnade.mesh.geometry.normals import face_normals
 from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 
@@ -62,7 +62,7 @@ def test_an_edge_is_smooth_up_to_the_crease_angle(angle: float, crease: float) -
     turn = np.radians(angle)
     vertices = np.array([[0.0, 0, 0], [0, 1, 0], [-1, 0, 0], [np.cos(turn), 0, -np.sin(turn)]])
     faces = np.array([[0, 1, 2], [1, 0, 3]], dtype=np.int32)
-    normals = crease_normals(vertices, faces, crease)
+    normals = clean_mesh(vertices, faces, "a", crease=crease).corner_normals
     edge = np.abs(normals[0, 0] - normals[1, 1]).max()
     assert (edge < 1e-9) == (angle < crease)
 

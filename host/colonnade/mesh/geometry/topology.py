@@ -1,4 +1,4 @@
-"""Operations on indexed triangle meshes: subdivision, merging, cleaning and edges."""
+"""Operations on indexed triangle meshes: subdivision and merging."""
 
 from __future__ import annotations
 
@@ -56,11 +56,3 @@ def merge_rows(rows: Floats) -> tuple[Floats, npt.NDArray[np.int64]]:
 
     merged: tuple[Floats, npt.NDArray[np.int64]] = _core.merge_rows(rows)
     return merged
-
-
-def drop_faces(vertices: Floats, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Indices of the faces to keep, ascending: with an area, and the first of each vertex set."""
-    from colonnade import _core
-
-    keep: npt.NDArray[np.int64] = _core.drop_faces(vertices, faces)
-    return keep
