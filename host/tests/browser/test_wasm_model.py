@@ -32,6 +32,7 @@ from colonnade.scene_image.environment import map_sections
 from colonnade.scene_image.packer import pack
 
 EIGHT = ("teapot", "stanford-bunny", "cheburashka", "fandisk", "rocker-arm", "duck", "armadillo", "dragon")
+ROOMS = ("living", "office", "attic")
 pytestmark = NEEDS_MODULE
 
 
@@ -98,10 +99,11 @@ def test_a_file_is_cleaned_as_by_the_host(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "packed.json").read_text())["reversed"] == 1
 
 
-def test_a_room_is_encoded_as_by_the_host(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ROOMS)
+def test_a_room_is_encoded_as_by_the_host(tmp_path: Path, name: str) -> None:
     """Bytes of all memories, depths and errors of tiles; normals of a depth map with noise and holes."""
     manifest = Manifest.load(ROOT / "configs" / "golden" / "edge.json")
-    room = load_environment(ROOT / "scenes" / "rooms" / "living")
+    room = load_environment(ROOT / "scenes" / "rooms" / name)
     frame, encoder = LiveFrame.of(room), LiveEncoder(layout_of(manifest))
     for _ in range(STILL_ROUNDS):
         maps = encoder.encode(frame)
@@ -109,7 +111,7 @@ def test_a_room_is_encoded_as_by_the_host(tmp_path: Path) -> None:
     random = np.random.default_rng(7)
     depth = room.depth[small] * (1 + 0.003 * random.normal(size=room.depth[small].shape))
     steps = np.where(random.random(depth.shape) < 0.02, 0, np.rint(depth / 0.001)).astype(np.uint16)
-    lens = {name: getattr(room, name) / 4 for name in ("fx", "fy", "cx", "cy")}
+    lens = {each: getattr(room, each) / 4 for each in ("fx", "fy", "cx", "cy")}
     codes = {"lens": [room.fx, room.fy, room.cx, room.cy], "tolerance": 0.006}
     job = {
         "module": str(MODULE),
@@ -118,15 +120,15 @@ def test_a_room_is_encoded_as_by_the_host(tmp_path: Path) -> None:
         "step": 0.001,
         "lens": lens,
     }
-    for name in ("albedo", "normals", "depth"):
-        getattr(frame, name).tofile(tmp_path / f"{name}.bin")
+    for part in ("albedo", "normals", "depth"):
+        getattr(frame, part).tofile(tmp_path / f"{part}.bin")
     Image.fromarray(steps).save(tmp_path / "depth.png")
     run_node("room.mjs", tmp_path, job)
 
     for section in map_sections(maps.image, manifest):
         assert (tmp_path / section.memory).read_bytes() == section.words.tobytes(), section.memory
-    for name in ("error", "nearest", "furthest"):
-        assert (tmp_path / f"tiles.{name}").read_bytes() == getattr(maps, f"tile_{name}").tobytes()
+    for part in ("error", "nearest", "furthest"):
+        assert (tmp_path / f"tiles.{part}").read_bytes() == getattr(maps, f"tile_{part}").tobytes()
     result = json.loads((tmp_path / "result.json").read_text())
     assert "this hardware has SLIC maps: set physicalAttributeMemory.encoding=twoLevel" in result["refusal"]
     assert result["depthUnit"] == maps.image.depth_unit and result["count"] == np.count_nonzero(steps == 0)
@@ -135,7 +137,8 @@ def test_a_room_is_encoded_as_by_the_host(tmp_path: Path) -> None:
     assert (tmp_path / "derived.bin").read_bytes() == own.normals.tobytes() and result["noise"] == own.noise
 
 
-def test_the_light_cube_and_the_sums_of_passes_are_those_of_the_host(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ROOMS)
+def test_the_light_cube_and_the_sums_of_passes_are_those_of_the_host(tmp_path: Path, name: str) -> None:
     random = np.random.default_rng(3)
     fine = LightCube(random.gamma(0.5, 1.0, (6, FINE, FINE, 3))).words()
     (tmp_path / "fine.bin").write_bytes(fine.tobytes())
@@ -157,11 +160,11 @@ def test_the_light_cube_and_the_sums_of_passes_are_those_of_the_host(tmp_path: P
         }
         for colour, ratio, shows in passes
     ]
-    room = load_environment(ROOT / "scenes" / "rooms" / "living")
+    room = load_environment(ROOT / "scenes" / "rooms" / name)
     assert room.photo is not None
     surface, point = world_surface(room), room.camera_to_world @ [0.1, 0.2, 1.5, 1.0]
-    for name, values in zip(("points", "normals", "colours"), (*surface, decode_srgb(room.photo)), strict=True):
-        np.asarray(values, "<f8").tofile(tmp_path / f"{name}.bin")
+    for part, values in zip(("points", "normals", "colours"), (*surface, decode_srgb(room.photo)), strict=True):
+        np.asarray(values, "<f8").tofile(tmp_path / f"{part}.bin")
     job = {"module": str(MODULE), "point": point.tolist(), "rotation": rotation.tolist()}
     job |= {"pixels": 20, "white": white, "passes": as_rows}
     run_node("light.mjs", tmp_path, job)
