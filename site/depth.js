@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // Depth of a visitor: PNG of 16 bits and NumPy files, which a browser does not read by itself; crop, size and holes as
 // `colonnade capture` has them (docs/captures.md).
 

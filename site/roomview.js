@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 // View files of a visitor's room (docs/driver.md, "The view file"): those of a room of the page, with other words.
 
 const [LIGHTS, GRID, OBJECT, CAMERA, FIRST_LIGHT] = [28, 30, 45, 60, 85];

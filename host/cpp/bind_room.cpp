@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Normals of depth maps and light cubes (cpp/room) for Python.
 #include <nanobind/stl/array.h>
 

@@ -1,4 +1,3 @@
-/* SPDX-License-Identifier: Apache-2.0
  *
  * Normals of a depth map and the light cube of an object (cpp/room) behind C. Maps are row by row; vectors have three doubles. */
 #ifndef COLONNADE_ROOM_H

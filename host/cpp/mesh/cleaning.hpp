@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Cleaning: vertices are merged by position; degenerate faces, equal faces and unused
 /// vertices go, and closed parts are reversed that point inward.
 #pragma once

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Corner normals: the normals of a face at its three corners, from the file or smoothed up to a crease angle.
 #pragma once
 

@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Winding of closed parts: counter-clockwise seen from outside.
 #pragma once
 

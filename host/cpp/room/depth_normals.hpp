@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// Normals of a depth map.
 ///
 /// A plane is linear in inverse depth: w = m · (x, y, 1) at the view ray (x, y, 1), and its normal is -m / |m|. Planes are

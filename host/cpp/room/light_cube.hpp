@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The light cube of an object (docs/gather.md): radiance by direction, 6 faces of n × n texels. Face 2 a + s is that of
 /// directions whose largest component is a, with sign s, 1 for a negative one. Rows part the slope of the next axis, columns
 /// that of the one after it, from -1 to 1.

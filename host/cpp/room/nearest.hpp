@@ -1,4 +1,3 @@
-// SPDX-License-Identifier: Apache-2.0
 /// The nearest known pixel of each pixel: the feature transform of Maurer, Qi and Raghavan, PAMI 2003.
 #pragma once
 
