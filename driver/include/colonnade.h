@@ -23,8 +23,9 @@ enum colonnade_error {
     COLONNADE_NOT_AN_IMAGE,    /* no device image, or one of another version */
     COLONNADE_NOT_A_FRAME,     /* no frame file, or one of another version */
     COLONNADE_TRUNCATED,       /* a file is shorter or longer than it says */
-    COLONNADE_TOO_LARGE,       /* an image or a framebuffer leaves its window, or a frame is larger than the device's */
-    COLONNADE_MISALIGNED,      /* an address, a size or a stride is no multiple of what it has to be */
+    COLONNADE_TOO_LARGE,       /* an image or a framebuffer leaves its window, lines overlap, a frame is larger than the
+                                  * device's, or a view's capacity is too small */
+    COLONNADE_MISALIGNED,      /* an image's address or size is no multiple of 128, or a base or stride of no tile row */
     COLONNADE_BAD_REGISTER,    /* a frame sets a word that is no frame register, or more words than there are */
     COLONNADE_BAD_FORMAT,      /* a framebuffer's format is none of enum colonnade_format */
     COLONNADE_NO_FRAME,        /* a start without colonnade_set_frame before it */
@@ -34,7 +35,7 @@ enum colonnade_error {
     COLONNADE_BUS_RESPONSE,    /* the memory answered with an error */
     COLONNADE_BAD_SECTION,     /* an image has a section for a memory that the device lacks, or one that is too long */
     COLONNADE_BAD_LENGTH,      /* an image's sections do not fill it */
-    COLONNADE_NO_PHOTO,        /* the device cannot composite a photo, or a photo with strengths */
+    COLONNADE_NO_PHOTO,        /* no photo: shell 1.0, or no environment; no strengths: a shell before 1.3 */
     COLONNADE_FRAME_INVALID,   /* the device has an error bit: colonnade_device_errors */
     COLONNADE_NO_SCENE,        /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not */
     /* Of colonnade_view.h */
