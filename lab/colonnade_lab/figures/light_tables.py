@@ -109,12 +109,17 @@ def fits(data: Data) -> str:
 
 
 def choices(data: Data) -> str:
-    """A mirror in rooms under default and fitted lights."""
+    """A mirror in rooms under default and fitted lights: by choice, values of all rooms."""
+    found: dict[str, dict[str, Mapping[str, float]]] = {}
+    for name, own in data.result("room-lights")["choices"].items():
+        room, _, choice = name.partition(": ")
+        found.setdefault(choice, {})[room] = own
+    keys = ("relit", "mirror_device", "mirror_right")
     rows = [
-        [name, *(f"{own[key]:.1f}" for key in ("relit", "mirror_device", "mirror_right"))]
-        for name, own in data.result("room-lights")["choices"].items()
+        [one, *(", ".join(f"{own[key]:.1f}" for own in rooms.values()) for key in keys)] for one, rooms in found.items()
     ]
-    return markdown(["against the photo, dB", "relit room", "mirror", "its rays that are right"], rows)
+    title = f"{', '.join(next(iter(found.values())))} against the photo, dB"
+    return markdown([title, "relit", "mirror", "rays that are right"], rows)
 
 
 def _mean(values: list[float]) -> float:
