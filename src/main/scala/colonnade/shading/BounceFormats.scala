@@ -6,7 +6,7 @@ import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{FrameRegisters, Vec3}
 import colonnade.numbers.{Fixed, FixedPointFormat}
 
-/** Widths of reflection and refraction, from the bounds in docs/bounce.md. */
+/** Widths of reflection and refraction, from the bounds in docs/shading.md. */
 final class BounceFormats(numbers: NumberFormats) {
   val shadeBits:     Int = numbers.shadeBits
   val componentBits: Int = shadeBits + 1 // a component of a scaled normal or of the ray's direction, signed

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Mux1H, PriorityEncoderOH}
 import colonnade.config.PathConfig
 
-/** [[BounceUnit]] with several hits at a time: docs/bounce.md. Mirrors take a [[MirrorPipeline]], a hit every three cycles;
+/** [[BounceUnit]] with several hits at a time: docs/shading.md. Mirrors take a [[MirrorPipeline]], a hit every three cycles;
   * glass takes one of several units. Results come in any order; the hits in it are of different contexts.
   */
 final class BouncePipeline(config: PathConfig) extends Module {

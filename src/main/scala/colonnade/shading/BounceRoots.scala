@@ -30,7 +30,7 @@ final class BounceRootsIO(numbers: NumberFormats) extends Bundle {
   val shiftRight = Output(UInt(2.W))
 }
 
-/** The root of Snell's discriminant and the cosine's root and quotient, from one `RootDivider`: docs/bounce.md.
+/** The root of Snell's discriminant and the cosine's root and quotient, from one `RootDivider`: docs/shading.md.
   *
   * A discriminant that is too long for the square root is divided by four until it fits, and its root is doubled as often.
   */

@@ -15,7 +15,7 @@ final class BounceUnitIO(config: PathConfig) extends Bundle {
   val busy = Output(Bool()) // holds a bounce
 }
 
-/** Reflection at mirrors; refraction and Schlick's Fresnel term at glass: docs/numbers.md, section 6, and docs/bounce.md.
+/** Reflection at mirrors; refraction and Schlick's Fresnel term at glass: docs/numbers.md, section 6, and docs/shading.md.
   *
   * One bounce at a time, in a program whose products take two cycles or more. The shading normal is the smooth one, unless
   * that turns away from the ray or would send it to the wrong side of the surface: then the program starts over with the
