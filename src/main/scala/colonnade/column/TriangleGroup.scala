@@ -13,7 +13,7 @@ final class TriangleGroupIO(config: ColonnadeConfig, count: Int) extends Bundle 
   val waits = Input(Vec(count, Bool())) // by row: a record waits for a triangle unit
 }
 
-/** Triangle units of a group of rows: docs/triangle.md, triangle groups. A row is chosen one cycle before it may grant a
+/** Triangle units of a group of rows: docs/traversal.md, triangle groups. A row is chosen one cycle before it may grant a
   * record to a context, so a record takes three cycles more than in a group of one row, and its results one. Throughput: a
   * record and a result per cycle. A row that keeps waiting is one of the next `count` chosen.
   *

@@ -38,7 +38,7 @@ final class RayGeneratorIO(config: PathConfig) extends Bundle {
   * Throughput: a ray per cycle while each pixel follows the one before it in the Morton order of its tile; pixels of two
   * tiles may be mixed, `inObjectTile` tells them apart. Another pixel takes `coordinateBits` + 1 cycles. Any order gives the
   * same rays. Latency: 2 cycles, later by the cycles of a sum bit by bit, and if another ray waits before it. The registers
-  * may change when the unit has been empty for [[RayGenerator.emptyCycles]] cycles. Source: docs/ray-setup.md.
+  * may change when the unit has been empty for [[RayGenerator.emptyCycles]] cycles. Source: docs/traversal.md.
   */
 final class RayGenerator(config: PathConfig) extends Module {
   val io = IO(new RayGeneratorIO(config))
@@ -75,7 +75,7 @@ final class RayGenerator(config: PathConfig) extends Module {
   when(sums && !follows) { bit := Mux(bit === 0.U, topBit.U, bit - 1.U) }
   when(inFront || inBack) { empty := 0.U }.elsewhen(!isNew) { empty := empty + 1.U }
 
-  // What is added, by the table in docs/ray-setup.md: a pixel that follows sets the lowest clear bit of the Morton code
+  // What is added, by the table in docs/traversal.md: a pixel that follows sets the lowest clear bit of the Morton code
   // before. For another pixel, the sum goes through the bits of x and y from the top, and takes in the camera's direction
   // at bit stepShift, so that needs no shifter.
   private val code     = tileCode(position).asBools

@@ -5,7 +5,7 @@ import chisel3.util.Cat
 import colonnade.config.PathConfig
 import colonnade.numbers.Divider
 
-/** Prepares rays for traversal, one after the other and in order, with up to three rays in flight: docs/ray-setup.md.
+/** Prepares rays for traversal, one after the other and in order, with up to three rays in flight: docs/traversal.md.
   *
   * With quotients of 31 and 19 bits, the latency is about 30 cycles and the throughput at least one ray every 16 cycles; it
   * is one every 27 cycles at the widest formats with extra slices. The quotients of a component that is 0 are computed,

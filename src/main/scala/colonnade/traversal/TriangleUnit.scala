@@ -21,7 +21,7 @@ final private class PendingTriangle(config: PartConfig) extends Bundle {
 }
 
 /** Watertight test of a ray against the triangles of a record (after Woop, Benthin and Wald 2013, in integers);
-  * docs/triangle.md. The hit table compares the result with the closest hit so far.
+  * docs/traversal.md. The hit table compares the result with the closest hit so far.
   *
   * Throughput: a record whose two triangles share an edge every 5 cycles, any other triangle every 4 cycles; one result
   * for each triangle, in order. Latency of a miss: 10 cycles. A triangle that the ray's line crosses takes about 30 cycles
