@@ -6,7 +6,7 @@ import colonnade.common.DelayLine
 import colonnade.config.PathConfig
 import colonnade.numbers.PipelinedDivider
 
-/** Prepares a ray a cycle for traversal, in order and bit for bit as [[SequentialRaySetup]]: docs/traversal.md, pipeline.
+/** Prepares a ray a cycle for traversal, in order and bit for bit as [[SequentialRaySetup]]: docs/traversal.md, ray set-up.
   *
   * Latency: [[SetupStages.count]] cycles, 18 with 24-bit triangle tests. All stages stall together while the offered ray is
   * not taken; a stage without a ray keeps its values. `busy`: a ray enters. Source: docs/numbers.md, section 2.

@@ -21,7 +21,7 @@ final class TriangleSequencerIO(config: PartConfig) extends Bundle {
 }
 
 /** Sequences the triangles of a record in rounds: 4 slots for a triangle, 5 for a pair that shares an edge;
-  * docs/traversal.md, slots and pairs.
+  * docs/traversal.md, triangle test.
   *
   * The gap frees the first register of the pipeline, so the last vertex never waits, and a record's end is known one cycle
   * before. The next candidate is accepted with the last vertex, so no slot is lost between records. Without a record, a
