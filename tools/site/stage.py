@@ -1,6 +1,7 @@
 """Writes the sources of the site into a folder, from which Zensical builds it: pages, pictures and the configuration.
 
 - README, CHANGELOG, CONTRIBUTING and SECURITY become pages, so that each text exists once.
+- tools/mutations makes the page of modules and faults; links to src/test/mutations.toml lead there.
 - Each Python package of host/colonnade gets a page of its docstrings; those of the Python API follow docs/api.md.
 - Scaladoc, PeakRDL's register pages and the page of tools/browser are copied into the site, from the folders that the
   environment variables COLONNADE_SCALADOC, COLONNADE_REGISTERS and COLONNADE_BROWSER name.
@@ -18,6 +19,7 @@ import os
 import posixpath
 import re
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -25,12 +27,15 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PACKAGES = (ROOT / "host" / "colonnade", ROOT / "lab" / "colonnade_lab")
 
-# Files of the root and the pages that they become.
-_ROOT_PAGES = {
+#: The table of mutations, whose page tools/mutations makes.
+_MUTATIONS = "src/test/mutations.toml"
+# Files outside docs and the pages that they become.
+_OTHER_PAGES = {
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
     "CONTRIBUTING.md": "contributing.md",
     "SECURITY.md": "security.md",
+    _MUTATIONS: "modules.md",
 }
 #: Folders of finished pages: environment variable, place, section, title.
 _COPIED = (
@@ -67,7 +72,7 @@ class Stage:
     def __init__(self) -> None:
         self.errors: list[str] = []
         #: Page of the site, and its file in the repository
-        self.sources = {page: source for source, page in _ROOT_PAGES.items()}
+        self.sources = {page: source for source, page in _OTHER_PAGES.items()}
         for path in sorted(DOCS.rglob("*.md")):
             page = path.relative_to(DOCS).as_posix()
             self.sources[page] = f"docs/{page}"
@@ -95,13 +100,22 @@ class Stage:
         """A page's text with the site's links, and blank lines between paragraphs and what follows them."""
         lines: list[str] = []
         is_code = False
-        for line in self._links((ROOT / source).read_text(encoding="utf-8"), page, source, docs).split("\n"):
+        for line in self._links(self._source(source), page, source, docs).split("\n"):
             if _FENCE.match(line):
                 is_code = not is_code
             elif not is_code and lines and lines[-1].strip() and _begins_block(line, lines[-1]):
                 lines.append("")
             lines.append(line)
         return "\n".join([*lines, *(f"\n::: {module}\n" for module in _REFERENCES.get(page, ()))])
+
+    def _source(self, source: str) -> str:
+        """The Markdown of the repository's file ``source``."""
+        if source != _MUTATIONS:
+            return (ROOT / source).read_text(encoding="utf-8")
+        made = subprocess.run([sys.executable, ROOT / "tools/mutations", "--page"], capture_output=True, text=True)
+        if made.returncode:
+            self.errors.append(made.stderr.strip())
+        return made.stdout
 
     def _links(self, text: str, page: str, source: str, docs: Path) -> str:
         """The ``text`` of the repository's file ``source`` with the links of the site's ``page``."""
@@ -125,7 +139,7 @@ class Stage:
             if not (ROOT / target).exists():
                 self.errors.append(f"{source} links to {address}, which does not exist")
             return text
-        place = _ROOT_PAGES.get(target) or target.removeprefix("docs/")
+        place = _OTHER_PAGES.get(target) or target.removeprefix("docs/")
         if place not in self.sources and target.endswith(".png") and not target.startswith("docs/"):
             # A picture from outside docs
             (docs / place).parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The table of mutations stays applicable, and has one of each module of the hardware; docs/modules.md is its page."""
+"""The table of mutations stays applicable, and has one of each module of the hardware."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ def tool(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def test_the_page_lists_the_mutations_of_all_modules(tool: dict[str, Any]) -> None:
-    assert tool["page"](TABLE) == (ROOT / "docs/modules.md").read_text(encoding="utf-8")
+    page = tool["page"](TABLE)
+    assert page.count("\n| ") == len(TABLE) + 1
+    assert "| `bus` | `RowBuffer` | `RowBufferSpec` | `Mux(isTaken, tagOf(pixel), tag)` → `tag` |\n" in page
 
 
 def test_a_module_without_a_mutation_is_named(tool: dict[str, Any]) -> None:

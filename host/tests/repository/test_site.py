@@ -35,26 +35,29 @@ def stage(folder: Path, ending: str) -> tuple[int, str, str]:
     return done.returncode, done.stderr.strip(), staged.rpartition("The ending.\n")[2].rstrip("\n")
 
 
-@pytest.mark.parametrize(
-    ("written", "staged"),
-    [
-        ("a ([sec\nurity](../SECURITY.md#scope)).", "a ([sec\nurity](security.md#scope))."),
-        ("[shading](\n  shading.md)", "[shading](shading.md)"),
-        ('[log](../CHANGELOG.md "what\nis new")', '[log](changelog.md "what\nis new")'),
-        ("[log](<../CHANGELOG.md>)", "[log](changelog.md)"),
-        ("[`a[0]` of [b]](../README.md)", "[`a[0]` of [b]](index.md)"),
-        ("[![room](pictures/room.png)](../README.md)", "[![room](pictures/room.png)](index.md)"),
-        ("[Config\nfields](../build.sbt)", "Config\nfields"),
-        (
-            "`[x](../SECURITY.md)`, [0, 1) and [log](../CHANGELOG.md)",
-            "`[x](../SECURITY.md)`, [0, 1) and [log](changelog.md)",
-        ),
-        ("```\n[x](nowhere.md)\n```", "```\n[x](nowhere.md)\n```"),
-        ("[a\n\nb](nowhere.md)", "[a\n\nb](nowhere.md)"),
-    ],
+#: Links as they are written and as they are staged
+LINKS = (
+    ("a ([sec\nurity](../SECURITY.md#scope)).", "a ([sec\nurity](security.md#scope))."),
+    ("[shading](\n  shading.md)", "[shading](shading.md)"),
+    ('[log](../CHANGELOG.md "what\nis new")', '[log](changelog.md "what\nis new")'),
+    ("[log](<../CHANGELOG.md>)", "[log](changelog.md)"),
+    ("[`a[0]` of [b]](../README.md)", "[`a[0]` of [b]](index.md)"),
+    ("[![room](pictures/room.png)](../README.md)", "[![room](pictures/room.png)](index.md)"),
+    ("[Config\nfields](../build.sbt)", "Config\nfields"),
+    (
+        "`[x](../SECURITY.md)`, [0, 1) and [log](../CHANGELOG.md)",
+        "`[x](../SECURITY.md)`, [0, 1) and [log](changelog.md)",
+    ),
+    ("```\n[x](nowhere.md)\n```", "```\n[x](nowhere.md)\n```"),
+    ("[a\n\nb](nowhere.md)", "[a\n\nb](nowhere.md)"),
+    ("[faults](../src/test/mutations.toml)", "[faults](modules.md)"),
 )
-def test_a_link_leads_to_the_page_of_the_site(written: str, staged: str, tmp_path: Path) -> None:
+
+
+def test_links_lead_to_the_pages_of_the_site(tmp_path: Path) -> None:
+    written, staged = ("\n\n".join(each) for each in zip(*LINKS, strict=True))
     assert stage(tmp_path, written) == (0, "", staged)
+    assert "`RowBufferSpec`" in (tmp_path / "site" / "docs" / "modules.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
