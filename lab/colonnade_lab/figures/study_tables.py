@@ -1,4 +1,4 @@
-"""The tables of ``docs/studies.md``: energy and area, vertex bits and contexts."""
+"""The tables of ``docs/explore.md``: energy and area, vertex bits and contexts."""
 
 from __future__ import annotations
 
