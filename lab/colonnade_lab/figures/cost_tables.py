@@ -26,14 +26,14 @@ def units(data: Data) -> str:
     """Area, slowest path and energy of each unit of `edge`."""
     reports = _edge(data)
     first, *others = reports.values()
-    titles = ["unit", "instances", "kGE", "flip-flops"]
+    titles = ["unit", "instances", "kGE"]
     titles += [f"FO4, {', '.join(LIBRARIES[library] for library in reports)}", "pJ a ray, without glitches", "with"]
     rows: list[list[str]] = []
     for level in LEVEL_NAMES:
         rows.append([f"**{TITLES[level]}**", *[""] * (len(titles) - 1)])
         for name, unit in first["units"].items():
             if unit["level"] == level and unit["kge"] >= MIN_KGE:
-                row = [name, str(unit["count"]), f"{unit['kge']:.1f}", f"{unit['flops']:,}"]
+                row = [name, str(unit["count"]), f"{unit['kge']:.1f}"]
                 row.append(", ".join(_fo4(report["units"].get(name)) for report in (first, *others)))
                 rows.append([*row, *_energies(unit)])
     return markdown(titles, rows)
@@ -60,8 +60,8 @@ def totals(data: Data) -> str:
             row = [TITLES[level], LIBRARIES[library], f"{total['logic_kge']:,.1f}", f"{total['logic_um2'] / 1e6:.4f}"]
             row += [f"{total['memory_bits'] / 1000:,.0f}", f"{total['logic_mm2_28nm']:.3f}", f"{total['mm2_28nm']:.3f}"]
             rows.append(row)
-    rows.append(["chip ÷ 80", *["–"] * 5, f"{paper.MM2 / paper.UNITS:.3f}"])
-    rows.append(["chip", *["–"] * 5, f"{paper.MM2:.2f}"])
+    rows.append(["chip ÷ 80", *[""] * 5, f"{paper.MM2 / paper.UNITS:.3f}"])
+    rows.append(["chip", *[""] * 5, f"{paper.MM2:.2f}"])
     titles = ["level", "library", "logic, kGE", "logic, mm²", "memory, kbit", "logic at 28 nm, mm²"]
     return markdown([*titles, "with memories, mm²"], rows)
 
@@ -104,7 +104,8 @@ def paths(data: Data) -> str:
 def power(data: Data) -> str:
     """Power of a row of `edge`, and energy of a ray."""
     rows: list[list[str]] = []
-    heads = []
+    heads: list[str] = []
+    scales: list[str] = []
     for library, report in _edge(data).items():
         found = report["power"]
         for kind, title in KINDS.items():
@@ -116,25 +117,25 @@ def power(data: Data) -> str:
         window, scene = found["window"], found["scene"]
         size = "×".join(map(str, scene["size"]))
         heads.append(
-            f"{LIBRARIES[library]}: {found['clock_mhz']:g} MHz; {scene['mesh']} at {size}, "
-            f"{window['cycles']:,} cycles with {window['rays_in_box']:,} in-box rays of the column, "
-            f"{window['rays_traced']:,} of them in row 0; scaling to 28 nm: × {found['scale_to_28nm']:.3f}."
+            f"{scene['mesh'].capitalize()} at {size}, {found['clock_mhz']:g} MHz: {window['cycles']:,} cycles, "
+            f"{window['rays_in_box']:,} in-box rays of the column, {window['rays_traced']:,} of row 0."
         )
+        scales.append(f"{found['scale_to_28nm']:.3f} for {LIBRARIES[library]}")
     rows.append(
         ["chip ÷ 80", *[""] * 5, f"{paper.MILLIWATTS / paper.UNITS:.2f}", "", f"{paper.MILLIWATTS / paper.MRAYS:.2f}"]
     )
-    titles = ["library", "glitches", "dynamic, mW", "clock pins, mW", "leakage, mW", "memories, mW", "total, mW"]
+    titles = ["library", "glitches", "dynamic, mW", "clock pins", "leakage", "memories", "total"]
     table = markdown([*titles, "nJ per in-box ray", "at 28 nm"], rows)
-    return "\n".join(heads) + f"\n\n{table}"
+    return "\n".join(dict.fromkeys(heads)) + f" To 28 nm: × {', × '.join(scales)}.\n\n{table}"
 
 
 def presets_cost(data: Data) -> str:
     """Area, clock and energy of every preset, with ASAP7."""
     keys = ("kge", "mm2", "fo4", "mhz", "nj", "njGlitches", "equalArea")
     rows = [[f"`{preset}`", *(text(facts(data, preset), key) for key in keys)] for preset in PRESETS]
-    titles = ["preset", "logic, kGE", "mm² at 28 nm, with memories", "slowest path, FO4", "MHz at 28 nm, at most"]
-    titles += ["nJ per in-box ray at 28 nm, without glitches", "with glitches"]
-    return markdown([*titles, "rays per cycle against the chip, at equal area"], rows)
+    titles = ["preset", "logic, kGE", "mm²", "FO4", "MHz"]
+    titles += ["nJ a ray, without glitches", "with glitches"]
+    return markdown([*titles, "rate against the chip, at equal area"], rows)
 
 
 def designs(data: Data) -> str:
@@ -145,7 +146,7 @@ def designs(data: Data) -> str:
         at_200 = (text(own, key) for key in ("mrays", "mm2", "mraysPerMm2"))
         rows.append([f"`{preset}`, {MEGAHERTZ:g} MHz", *at_200])
         at_clock = (text(own, key) for key in ("mraysAtClock", "mm2", "mraysPerMm2AtClock"))
-        rows.append([f"`{preset}`, {text(own, 'mhz')} MHz, which its paths allow", *at_clock])
+        rows.append([f"`{preset}`, {text(own, 'mhz')} MHz, by its paths", *at_clock])
     rows.append(["MMsRT ([2023](https://doi.org/10.1142/s021812662350192x)), by simulator", "82.9", "0.856", "97"])
     return markdown(["design", "in-box MRay/s", "mm² at 28 nm", "MRay/s/mm²"], rows)
 
@@ -156,8 +157,10 @@ def libraries(data: Data) -> str:
     for library, report in _edge(data).items():
         used = report["technology"]
         row = [LIBRARIES[library], ", ".join(used["liberty"]), f"{used['um2_per_gate']:g}"]
-        rows.append([*row, f"{used['fo4_ns'] * 1e3:.1f}", used["fo4"], f"{used['delay_target_ns']:.3f}"])
-    titles = ["library", "files", "µm² per GE", "FO4, ps", "definition of FO4", "target delay of abc, ns"]
+        rows.append(
+            [*row, f"{used['fo4_ns'] * 1e3:.1f}", used["fo4"].split(" driving ")[0], f"{used['delay_target_ns']:.3f}"]
+        )
+    titles = ["library", "files", "µm² per GE", "FO4, ps", "of", "target delay, ns"]
     return markdown(titles, rows)
 
 

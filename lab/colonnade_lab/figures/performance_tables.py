@@ -8,7 +8,7 @@ from typing import Any
 from colonnade_lab.common.markdown import markdown
 from colonnade_lab.evaluation.throughput import PATH_UNIT
 from colonnade_lab.figures.data import Data
-from colonnade_lab.report.fields import LABELS, base_of, rate_of, varied_points
+from colonnade_lab.report.fields import base_of, rate_of, varied_points
 
 
 def rates(data: Data) -> str:
@@ -30,8 +30,8 @@ def rates(data: Data) -> str:
     ]
     means = (f"**{each['geomean_rays_per_cycle_in_box']:.2f}**" for each in (bench, bench["mirror"]))
     rows.append(["geometric mean", "", "", "", next(means), "", "", next(means)])
-    titles = ["mesh", "triangles", "cycles", "in-box rays", "in-box rays per cycle", "bottleneck, utilisation"]
-    return markdown([*titles, "cycles as a mirror", "rays per cycle as a mirror"], rows)
+    titles = ["mesh", "triangles", "cycles", "in-box rays", "rays per cycle", "bottleneck, %"]
+    return markdown([*titles, "cycles as a mirror", "rays per cycle"], rows)
 
 
 def utilisation(data: Data) -> str:
@@ -41,7 +41,7 @@ def utilisation(data: Data) -> str:
     rows = [[name, *(_percent(share) for share in mesh["utilisation"].values())] for name, mesh in meshes.items()]
     limits = {name: [mesh["limits"].get(name) for mesh in meshes.values()] for name in shares if name != PATH_UNIT}
     means = ["" if name == PATH_UNIT else _least(limits[name]) for name in shares]
-    return markdown(["mesh", *shares], [*rows, ["lowest limit, rays per cycle", *means]])
+    return markdown(["%", *shares], [*rows, ["lowest limit", *means]])
 
 
 def _least(limits: list[float | None]) -> str:
@@ -53,7 +53,7 @@ def scaling(data: Data) -> str:
     """Rays per cycle over each field, relative to the base."""
     study = data.result("scaling")
     base = base_of(study)
-    titles = ["field", "value", *(f"{name}, in-box rays per cycle" for name in base["workloads"]), "to the base"]
+    titles = ["field", "value", *base["workloads"], "to the base"]
 
     def row(name: str, value: str, point: Mapping[str, Any]) -> list[str]:
         each = (f"{rate_of(point, workload):.2f}" for workload in point["workloads"])
@@ -62,7 +62,7 @@ def scaling(data: Data) -> str:
     rows = [row("base", "", base)]
     for point in varied_points(study):
         ((key, value),) = point["values"].items()
-        rows.append(row(LABELS.get(key, key), str(value), point))
+        rows.append(row(f"`{key}`", str(value), point))
     return markdown(titles, rows)
 
 
@@ -84,7 +84,7 @@ def ablation(data: Data) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
+    return f"{100 * share:.0f}"
 
 
 def simulators(data: Data) -> str:

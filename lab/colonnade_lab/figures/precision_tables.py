@@ -14,9 +14,9 @@ from colonnade_lab.figures.study_tables import number
 Study = Mapping[str, Any]
 
 #: The paper's savings, and its DISTS loss.
-_SAVED = (f"{100 * saved:.1f} %" for saved in (paper.POWER_SAVED, paper.AREA_SAVED))
+_SAVED = (f"{100 * saved:.1f}" for saved in (paper.POWER_SAVED, paper.AREA_SAVED))
 _LOSS = " to ".join(f"{100 * loss:g}" for loss in paper.LOSS)
-PAPER = ("source paper, 28 nm", paper.PRECISION, "–", *_SAVED, f"{_LOSS} %")
+PAPER = ("source paper, 28 nm", paper.PRECISION, "–", *_SAVED, _LOSS)
 
 
 def precision(data: Data) -> str:
@@ -40,8 +40,8 @@ def precision(data: Data) -> str:
         ]
         for point in study["points"]
     ]
-    titles = ["design", "DISTS loss, mean, %", "largest, %", "PSNR to Embree, lowest, dB", "array, MGE", "FO4"]
-    return markdown([*titles, "mW of a row", "nJ per in-box ray", "RenderIndex"], rows)
+    titles = ["design", "mean loss, %", "largest, %", "lowest PSNR, dB", "array, MGE", "FO4"]
+    return markdown([*titles, "mW", "nJ", "RenderIndex"], rows)
 
 
 def savings(data: Data) -> str:
@@ -55,9 +55,9 @@ def savings(data: Data) -> str:
         own = points[name]["figures"]
         losses = [100 * frame["dists_baseline"] for frame in points[name]["workloads"].values()]
         saved = [1 - own[f"{key}.{library}"] / base[f"{key}.{library}"] for key in ("nj", "mw", "array_kge")]
-        shares = (f"{100 * share:.1f} %" for share in saved)
-        rows.append(["Colonnade, ASAP7", name, *shares, f"{min(losses):.4f} to {max(losses):.4f} %"])
-    return markdown(["", "design", "energy per ray saved", "power saved", "area saved", "DISTS loss of a frame"], rows)
+        shares = (f"{100 * share:.1f}" for share in saved)
+        rows.append(["Colonnade, ASAP7", name, *shares, f"{min(losses):.4f} to {max(losses):.4f}"])
+    return markdown(["saved, %", "design", "energy per ray", "power", "area", "DISTS loss, %"], rows)
 
 
 def render_index(data: Data) -> str:
@@ -79,7 +79,7 @@ def render_index(data: Data) -> str:
 def _marked(name: str, study: Study) -> str:
     """The name of a design; the best one is bold, the paper's choice is called so."""
     text = f"**{name}**" if name == _best(study) else name
-    return f"{text} (the paper's choice)" if name == paper.PRECISION else text
+    return f"{text} (paper)" if name == paper.PRECISION else text
 
 
 def _best(study: Study) -> str | None:

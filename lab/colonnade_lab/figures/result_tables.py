@@ -94,10 +94,10 @@ def fidelity(data: Data) -> str:
     rows = []
     for name, mesh in edge.items():
         each: list[Frame] = [mesh["reference"], lean[name]["reference"]]
-        shares = [f"{100 * own['hit_disagreement']:.4f} %" for own in each]
-        others = [f"{100 * own['triangle_disagreement']:.2f} %" for own in each]
+        shares = [f"{100 * own['hit_disagreement']:.4f}" for own in each]
+        others = [f"{100 * own['triangle_disagreement']:.2f}" for own in each]
         rows.append([name, f"{mesh['triangles']:,}", shares[0], others[0], *(f"{own['psnr']:.1f}" for own in each)])
-    titles = ["mesh", "triangles", "`edge`: hit or miss differs", "other triangle", "PSNR, dB", "`lean`: PSNR, dB"]
+    titles = ["mesh", "triangles", "`edge`: hit or miss differs, %", "other triangle, %", "dB", "`lean`: dB"]
     return markdown(titles, rows)
 
 

@@ -35,15 +35,15 @@ def tests(data: Data) -> str:
                 per_ray(point["workloads"][frame], f"{kind}Tests") or 0.0 for kind in ("box", "triangle")
             )
             savings[name].append(every / (boxes + triangles))
-            row.append(f"{boxes:.1f} + {triangles:.1f}")
+            row.append(f"{boxes:.1f}, {triangles:.1f}")
         factors = (f"{each[-1]:,.0f}" for each in savings.values())
         rows.append([*row, f"{every:,.0f}", *factors, f"{base['counters']['raysInBox'] * every / 1e9:.1f}"])
     means = (f"{geometric_mean(each):,.0f}" for each in savings.values())
     rows.append(["geometric mean", *[""] * (3 + len(points)), *means, ""])
-    titles = [f"{name}: box + triangle tests of a ray" for name in points]
+    titles = [f"{name}: box, triangle tests" for name in points]
     ratios = [f"none ÷ {name}" for name in points]
-    head = ["mesh", "triangles", "scene, MB", *titles, "none: triangle tests of a ray", *ratios]
-    return markdown([*head, "none: tests of a frame, billions"], rows)
+    head = ["mesh", "triangles", "scene, MB", *titles, "none: triangle tests", *ratios]
+    return markdown([*head, "none: a frame's, billions"], rows)
 
 
 def cycles(data: Data) -> str:
@@ -61,7 +61,7 @@ def cycles(data: Data) -> str:
     ]
     rows.append(["source paper", *["–"] * (1 + len(names)), f"{paper.TREE_SPEED_UP:g}", "–"])
     head = ["triangles, at most", "triangles, mean", *(f"cycles, {name}" for name in names)]
-    return markdown([*head, *(f"speed-up by {name}" for name in names if name != NONE)], rows)
+    return markdown([*head, *(f"speed-up, {name}" for name in names if name != NONE)], rows)
 
 
 def costs(data: Data) -> str:
@@ -72,8 +72,8 @@ def costs(data: Data) -> str:
 
     def row(title: str, value: Callable[[Point], float], form: str, published: float | None = None) -> list[str]:
         values = {name: value(point) for name, point in points.items()}
-        shares = [f"{100 * (own / values[NONE] - 1):+.1f} %" for name, own in values.items() if name != NONE]
-        claim = "–" if published is None else f"+{100 * published:.1f} %"
+        shares = [f"{100 * (own / values[NONE] - 1):+.1f}" for name, own in values.items() if name != NONE]
+        claim = "–" if published is None else f"+{100 * published:.1f}"
         return [title, *(format(own, form) for own in values.values()), *shares, claim]
 
     def records(kinds: Sequence[str]) -> Callable[[Point], float]:
@@ -89,8 +89,8 @@ def costs(data: Data) -> str:
         row("**array**, MGE", lambda point: point["area"][library]["array_kge"] / 1e3, ".2f", paper.TREE_AREA),
     ]
     names = list(points)
-    overheads = [f"overhead of {name}" for name in names if name != NONE]
-    return markdown(["", *names, *overheads, "source paper"], rows)
+    overheads = [f"{name}, %" for name in names if name != NONE]
+    return markdown(["", *names, *overheads, "the paper, %"], rows)
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {"bvh-tests": tests, "bvh-cycles": cycles, "bvh-costs": costs}
