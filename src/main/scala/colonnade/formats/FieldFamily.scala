@@ -27,7 +27,7 @@ private[formats] final case class FieldFamily(
     val limits = indexes.zip(counts).map { case (index, count) => s"[$index<$count]" }
     val parts  = name.split("\\[\\]", -1)
     val filled = parts.zipAll(limits, "", "").map { case (part, limit) => part + limit }.mkString
-    if (letters.isEmpty) filled else s"$filled.$letters"
+    Seq(filled, letters).filter(_.nonEmpty).mkString(".")
   }
 
   def positions: String = {
@@ -42,7 +42,7 @@ private[formats] final case class FieldFamily(
 private[formats] object FieldFamily {
   private val Indexes = Seq("i", "j", "k")
   private val Index   = """\[(\d+)\]""".r
-  private val Letter  = """(.*)\.([a-z])""".r
+  private val Letter  = """(?:(.*)\.)?([a-z])""".r
 
   /** The families of numbers, each a name, a position and a kind. */
   def of(numbers: Seq[(String, Int, String)]): Seq[FieldFamily] = {
@@ -67,8 +67,9 @@ private[formats] object FieldFamily {
     }
     require(isWhole, s"$name is no regular family")
     name match {
-      case Letter(prefix, letter) => FieldFamily(prefix, letter, Seq(at(zero)), counts, strides, kind)
-      case _                      => FieldFamily(name, "", Seq(at(zero)), counts, strides, kind)
+      case Letter(prefix, letter) =>
+        FieldFamily(Option(prefix).getOrElse(""), letter, Seq(at(zero)), counts, strides, kind)
+      case _ => FieldFamily(name, "", Seq(at(zero)), counts, strides, kind)
     }
   }
 

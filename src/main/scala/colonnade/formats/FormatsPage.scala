@@ -9,25 +9,22 @@ object FormatsPage {
     val formats = new RecordFormats(config)
     val page    = Seq(
       "# Memory formats",
-      s"""*Written by the generator (`colonnade.Generate --config small --formats-page docs/formats.md`) from the Chisel
-         |bundles in `src/main/scala/colonnade/formats`; a spec compares them. Widths follow the configuration: these are of
-         |precision ${config.precision}.*""".stripMargin,
-      """**Reading the tables.** `u16` is an unsigned number of 16 bits; `s12.11` is signed, 12 bits, 11 of them fraction bits. A field
-        |begins at its low bit; bit 0 is the least significant. One row holds fields of one kind: `normals[i<3].xyz` at `68+36i`,
-        |`56+36i`, `44+36i` are `normals[0].x` at bit 68, `normals[0].y` at 56, and so on, to `normals[2].z` at 44 + 36 · 2.""".stripMargin,
+      s"""*Written by the generator (`tools/regenerate`) from the Chisel bundles of `colonnade.formats`, for preset `small`, precision
+         |${config.precision}. Widths follow the configuration.*""".stripMargin,
+      """`u16` is an unsigned number of 16 bits; `s12.11` is signed, 12 bits, 11 of them fraction bits. Bit 0 is the least significant.
+        |One row holds fields of one kind: of `normals[i<3].xyz` at `68+36i`, `56+36i`, `44+36i`, `normals[2].z` is at 44 + 36 · 2.""".stripMargin,
       "## Column BVH memory",
       s"""One memory holds three sections: nodes from record 0, triangles from `scene.triangleBase`, attributes from
-         |`scene.attributeBase`. All records have ${formats.recordBits} bits, the widest kind rounded up to 32-bit words; unused high bits are
-         |zero. There are ${config.columnBvhMemory.depth} records: an address has ${formats.addressBits} bits, a packed triangle id ${formats.idBits}.""".stripMargin,
+         |`scene.attributeBase`. All records have ${formats.recordBits} bits, whole words of 32; unused high bits are zero. There are
+         |${config.columnBvhMemory.depth} records: an address has ${formats.addressBits} bits, a packed triangle id ${formats.idBits}.""".stripMargin,
       "### Node",
-      """Up to four children with boxes relative to the node's corner: their planes are `origin + (low << exponent)` and
-        |`origin + (high << exponent)`, in vertex units. A kind is 0 (empty), 1 (node) or 2 (leaf). Children that are nodes are
-        |consecutive records from `firstChild`, in slot order; each leaf is one triangles record, consecutive from
-        |`firstTriangles`, in slot order. The root is record 0.""".stripMargin,
+      """Up to four children. Their boxes have planes `origin + (low << exponent)` and `origin + (high << exponent)`, in vertex units.
+        |A kind is 0 (empty), 1 (node) or 2 (leaf). In slot order, nodes are consecutive records from `firstChild`, and leaves
+        |triangles records from `firstTriangles`. The root is record 0.""".stripMargin,
       table(formats.node),
       "### Triangles",
-      """The triangles of a leaf. Triangle k has the packed id `firstTriangle + k`, and the vertices 3k, 3k + 1 and 3k + 2.
-        |Packed ids follow the leaves of one binary tree, depth first, whatever the arity.""".stripMargin,
+      """Triangle k of a leaf has the packed id `firstTriangle + k`, and the vertices 3k, 3k + 1 and 3k + 2. Packed ids follow the
+        |leaves of one binary tree, depth first.""".stripMargin,
       table(formats.triangles),
       "### Attributes",
       attributes(config),
@@ -53,9 +50,8 @@ object FormatsPage {
       table(new Load(config)),
       "## Registers",
       s"""Words of ${RegisterMap.dataBits} bits. A number starts at a word of its own, low word first. Commands, status, errors and counters have the
-         |same addresses in every design; words without a register read as 0. A write of 1 to `control.start` starts a frame, and
-         |clears the errors and counters of the last one. Registers that can be written hold still while a frame runs. The device
-         |takes a value above the limit (`to` …) as the limit; without a limit, any value that fits is legal
+         |same addresses in every design. Words without a register read as 0. A write of 1 to `control.start` clears errors and
+         |counters, and starts a frame, during which registers hold still. A value above the limit (`to` …) counts as the limit
          |([errors](errors.md)).""".stripMargin,
       registers(config)
     )
@@ -65,17 +61,16 @@ object FormatsPage {
   private def attributes(config: ColonnadeConfig): String = {
     val slots = RecordFormats.facesPerRecord(config)
     val face  =
-      s"""What shading needs of a face: unit normals of its corners and its plane, and the index of its material. The face with packed
-         |id t is in record `scene.attributeBase + t / $slots`, slot `t % $slots`.""".stripMargin
+      s"""Unit normals of a face's corners and plane, and its material. The face with packed id t is in record
+         |`scene.attributeBase + t / $slots`, slot `t % $slots`.""".stripMargin
     val colours =
       if (config.geometry.cornerColours)
         "A face also has a linear colour for each vertex, all ones 1.0."
       else
-        """With `geometry.cornerColours` a record holds one face, which also has the linear colours `colours[0]` to `colours[2]` of its
-          |corners: channels of 12 bits, all ones 1.0.""".stripMargin
+        """With `geometry.cornerColours` a record holds one face, with linear colours `colours[0]` to `colours[2]` of its corners:
+          |channels of 12 bits, all ones 1.0.""".stripMargin
     val textures =
-      """With `geometry.textureBytes` the red and green channels of a textured face are positions u and v in the atlas, texels with 3
-        |fraction bits.""".stripMargin
+      """With `geometry.textureBytes` red and green of a textured face are u and v in the atlas, texels with 3 fraction bits.""".stripMargin
     s"$face $colours $textures"
   }
 

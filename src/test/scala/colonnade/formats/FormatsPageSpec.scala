@@ -25,6 +25,11 @@ class FormatsPageSpec extends AnyFlatSpec with Matchers {
     }
   }
 
+  it should "join fields of one letter, with or without a prefix" in {
+    val fields = Seq(("y", 12, "u4"), ("x", 0, "u4"), ("a.y", 8, "u4"), ("a.x", 4, "u4"))
+    FieldFamily.of(fields).map(each => each.pattern -> each.positions) shouldBe Seq("yx" -> "12, 0", "a.yx" -> "8, 4")
+  }
+
   it should "refuse a family with a gap" in {
     an[IllegalArgumentException] should be thrownBy
       FieldFamily.of(Seq(("a[0]", 0, "u1"), ("a[1]", 1, "u1"), ("a[2]", 3, "u1")))
