@@ -150,7 +150,8 @@ class Stage:
 
     def _configuration(self) -> str:
         """The configuration, with the generated pages in the navigation."""
-        text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").replace("[host]", f"[{ROOT / 'host'}]")
+        sources = ", ".join(str(package.parent) for package in PACKAGES)
+        text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").replace("[host, lab]", f"[{sources}]")
         head, navigation = text.split("\nnav:\n")
         sections = {
             part.partition(":")[0]: part.rstrip("\n") for part in re.split(r"^  - (?=\w)", navigation, flags=re.M)
