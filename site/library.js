@@ -129,38 +129,38 @@ export class Library {
 
   /** The nearest pixel of each that is not missing (Uint8Array). */
   nearest(missing, width) {
-    return this.result([missing], Int32Array, missing.length, (from, to) => this.wasm.colonnade_room_nearest(from, width, missing.length / width, to));
+    return this.result([missing], Int32Array, missing.length, (from, to) => this.wasm.colonnade_environment_nearest(from, width, missing.length / width, to));
   }
 
   /** Unit normals of depth towards the camera, view space, three of each pixel; the noise of the depth. */
   normals(depth, holes, { fx, fy, cx, cy }, width, height) {
     let noise;
     const normals = this.result([depth, holes, Float64Array.of(fx, fy, cx, cy)], Float64Array, 3 * depth.length, (d, h, lens, to) => {
-      noise = this.wasm.colonnade_room_normals(d, h, width, height, lens, to);
+      noise = this.wasm.colonnade_environment_normals(d, h, width, height, lens, to);
     });
     return { normals, noise };
   }
 
   /** The plane m with m · p = 1 at points, three numbers each, by least squares. */
   plane(points) {
-    return this.result([points], Float64Array, 3, (from, to) => this.wasm.colonnade_room_plane(from, points.length / 3, to));
+    return this.result([points], Float64Array, 3, (from, to) => this.wasm.colonnade_environment_plane(from, points.length / 3, to));
   }
 
   /** The bytes of the device's cube for an object: world = rotation · its own axes. */
   cubeWords(radiance, rotation) {
-    return this.result([radiance, Float64Array.from(rotation.flat())], Uint8Array, CUBE_BYTES, (...pointers) => this.wasm.colonnade_room_cube(...pointers));
+    return this.result([radiance, Float64Array.from(rotation.flat())], Uint8Array, CUBE_BYTES, (...pointers) => this.wasm.colonnade_environment_cube(...pointers));
   }
 
   /** The radiance that the bytes of a cube hold. */
   radianceOf(words) {
-    return this.result([words], Float64Array, (3 * words.length) / 4, (from, to) => this.wasm.colonnade_room_radiance(from, words.length / 4, to));
+    return this.result([words], Float64Array, (3 * words.length) / 4, (from, to) => this.wasm.colonnade_environment_radiance(from, words.length / 4, to));
   }
 
   /** The light of a photo around a point, where its surface is seen from there, and its mean elsewhere; the share that is seen. */
   lightAt({ points, normals, colours }, point) {
     let share;
     const radiance = this.result([points, normals, colours, Float64Array.from(point)], Float64Array, FINE_VALUES, (p, n, c, at, to) => {
-      share = this.wasm.colonnade_room_seen(p, n, c, points.length / 3, at, to);
+      share = this.wasm.colonnade_environment_seen(p, n, c, points.length / 3, at, to);
     });
     return { radiance, share };
   }
@@ -168,7 +168,7 @@ export class Library {
   /** The register `gather.parallax` of a point in a box, for an object whose cube has this edge. */
   parallax(box, point, edge) {
     const inside = point.map((value, axis) => Math.max(box[0][axis] + INSIDE, Math.min(box[1][axis] - INSIDE, value)));
-    return this.withArrays([Float64Array.from(box.flat()), Float64Array.from(inside)], (bounds, at) => this.wasm.colonnade_room_parallax(bounds, at, edge));
+    return this.withArrays([Float64Array.from(box.flat()), Float64Array.from(inside)], (bounds, at) => this.wasm.colonnade_environment_parallax(bounds, at, edge));
   }
 
   /** Starts a frame: `writes` are pairs of word address and value. */

@@ -10,7 +10,7 @@ void bind_fixed_order(nb::module_& module);
 void bind_live(nb::module_& module);
 void bind_model(nb::module_& module);
 void bind_packer(nb::module_& module);
-void bind_room(nb::module_& module);
+void bind_surroundings(nb::module_& module);
 void bind_view(nb::module_& module);
 
 NB_MODULE(_core, module) {
@@ -23,6 +23,6 @@ NB_MODULE(_core, module) {
   bind_live(module);
   bind_model(module);
   bind_packer(module);
-  bind_room(module);
+  bind_surroundings(module);
   bind_view(module);
 }

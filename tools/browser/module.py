@@ -27,12 +27,17 @@ CPP = (
 )
 SOURCES = (
     ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{DRIVER / 'include'}")),
-    ("c++", LIBRARY / "colonnade_room.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")),
+    ("c++", LIBRARY / "colonnade_environment.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")),
     *(("c++", LIVE / f"{name}.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")) for name in ("live", "kernels")),
     *(("cc", file, ("-std=c11", f"-I{DRIVER / 'include'}")) for file in sorted((DRIVER / "src").glob("colonnade_*.c"))),
     ("cc", LIBRARY / "colonnade_view_size.c", ("-std=c11", f"-I{DRIVER / 'include'}")),
 )
-HEADERS = (LIBRARY / "colonnade_model.h", LIBRARY / "colonnade_room.h", LIVE / "live.h", DRIVER / "include" / "colonnade_view.h")
+HEADERS = (
+    LIBRARY / "colonnade_model.h",
+    LIBRARY / "colonnade_environment.h",
+    LIVE / "live.h",
+    DRIVER / "include" / "colonnade_view.h",
+)
 
 
 def compile_module(output: Path) -> None:

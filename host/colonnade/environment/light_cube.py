@@ -106,7 +106,7 @@ class LightCube:
         from colonnade import _core
 
         texels = np.asarray(self.texels, np.float64)
-        return LightCube(_core.turned_cube(texels.reshape(-1, 3), texels.shape[1], rotation))
+        return LightCube(_core.rotated_cube(texels.reshape(-1, 3), texels.shape[1], rotation))
 
     def words(self) -> NDArray[np.uint8]:
         """The words of the device's memory, uint8 [texels, 4], low byte first.

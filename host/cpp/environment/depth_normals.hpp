@@ -13,7 +13,7 @@
 
 #include "nearest.hpp"
 
-namespace colonnade::room {
+namespace colonnade::environment {
 
 using Vector = std::array<double, 3>;
 
@@ -22,20 +22,20 @@ struct Lens {
 };
 
 struct DepthNormals {
-    std::vector<Vector> normals;  ///< unit, view space, towards the camera
+    std::vector<Vector> normals;  ///< unit, view space, facing the camera
     int planes;                   ///< large ones
     double onPlanes;              ///< share of the pixels that lie on one
 };
 
 /// Radius of the windows that measure the noise, and the least and largest radius of those that give normals, pixels.
-constexpr int noiseRadius = 14, leastRadius = 2, mostRadius = 11;
+constexpr int noiseRadius = 14, minRadius = 2, maxRadius = 11;
 /// Share of the windows that is flat; their largest residual is the noise. A residual of rounding alone counts as `leastNoise`.
 constexpr double flatShare = 0.3, leastNoise = 1e-4;
 /// Slope error of a window that is accepted, radians, and distance over which a sensor's noise is correlated, pixels.
 constexpr double slopeError = 0.06, correlation = 2.5;
 /// Pixels that vote for large planes, about, a quarter of which are tried as their centres; votes of the smallest plane.
 constexpr double voters = 4800;
-constexpr int mostPlanes = 128, leastVotes = 20;
+constexpr int planeLimit = 128, leastVotes = 20;
 /// A pixel lies on a plane if its depth differs by this many times the noise, or by this share of the depth, and its
 /// window's normal by this angle, as a cosine.
 constexpr double deviations = 3.0, leastTolerance = 0.002, agreement = 0.85;
@@ -110,13 +110,13 @@ public:
         return std::max(*flat, leastNoise);
     }
 
-    DepthNormals normals(double noise, int maxPlanes = mostPlanes) {
+    DepthNormals normals(double noise, int maxPlanes = planeLimit) {
         tolerance_ = std::max(deviations * noise, leastTolerance);
         const double size = std::sqrt(noise * lens_.fx * std::sqrt(12.0) * correlation / slopeError);
-        const int radius = std::clamp(static_cast<int>(std::nearbyint(size / 2)), leastRadius, mostRadius);
+        const int radius = std::clamp(static_cast<int>(std::nearbyint(size / 2)), minRadius, maxRadius);
         std::vector<std::uint8_t> isUnknown = fitWindows(windowsOf(radius));
         const std::vector<Vector> planes = largePlanes(isUnknown, maxPlanes);
-        std::vector<Vector> chosen = local_;
+        std::vector<Vector> assigned = local_;
         std::vector<double> best(size_, 0.5), on(size_, 1.0);
         const std::vector<double> area = boxSums(on, radius / 2);
         for (const Vector& plane : planes) {
@@ -125,17 +125,17 @@ public:
             for (std::size_t i = 0; i < size_; ++i)
                 if (sums[i] / area[i] > best[i]) {
                     best[i] = sums[i] / area[i];
-                    chosen[i] = plane;
+                    assigned[i] = plane;
                     isUnknown[i] = false;
                 }
         }
         const std::vector<std::int32_t> nearest = nearestKnown(isUnknown.data(), width_, height_);
         DepthNormals result{std::vector<Vector>(size_), static_cast<int>(planes.size()), 0};
         for (std::size_t i = 0; i < size_; ++i) {
-            const Vector& plane = chosen[nearest[i] < 0 ? i : nearest[i]];
-            Vector normal = towards(plane);
+            const Vector& plane = assigned[nearest[i] < 0 ? i : nearest[i]];
+            Vector normal = facing(plane);
             // A plane seen from behind its own ray, at a hole or an edge, faces the camera
-            result.normals[i] = dot(normal, rays_[i]) >= 0 ? towards(rays_[i]) : normal;
+            result.normals[i] = dot(normal, rays_[i]) >= 0 ? facing(rays_[i]) : normal;
             result.onPlanes += best[i] > 0.5;
         }
         result.onPlanes /= static_cast<double>(size_);
@@ -157,7 +157,7 @@ private:
             for (int x = radius; x < width_ - radius; ++x) use(static_cast<std::size_t>(y) * width_ + x);
     }
 
-    static Vector towards(const Vector& plane) {
+    static Vector facing(const Vector& plane) {
         const double length = std::sqrt(dot(plane, plane));
         return {-plane[0] / length, -plane[1] / length, -plane[2] / length};
     }
@@ -296,4 +296,4 @@ private:
     double tolerance_ = 0;
 };
 
-} // namespace colonnade::room
+} // namespace colonnade::environment

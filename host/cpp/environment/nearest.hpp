@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace colonnade::room {
+namespace colonnade::environment {
 
 /// Passes features along one line of pixels. Features are numbers of pixels, or -1; `across` is the line's own coordinate.
 class FeatureLine {
@@ -29,15 +29,15 @@ public:
 
 private:
     std::int64_t along(std::int32_t feature) const { return isRow_ ? feature % width_ : feature / width_; }
-    std::int64_t aside(std::int32_t feature) const {
+    std::int64_t across(std::int32_t feature) const {
         const std::int64_t distance = (isRow_ ? feature / width_ : feature % width_) - across_;
         return distance * distance;
     }
-    std::int64_t squaredTo(std::int32_t feature, std::int64_t i) const { return (along(feature) - i) * (along(feature) - i) + aside(feature); }
+    std::int64_t squaredTo(std::int32_t feature, std::int64_t i) const { return (along(feature) - i) * (along(feature) - i) + across(feature); }
     /// Whether no pixel of the line is nearer to the feature between two others.
     bool isHidden(std::int32_t before, std::int32_t feature, std::int32_t after) const {
         const std::int64_t a = along(feature) - along(before), b = along(after) - along(feature), c = a + b;
-        return c * aside(feature) - b * aside(before) - a * aside(after) - a * b * c > 0;
+        return c * across(feature) - b * across(before) - a * across(after) - a * b * c > 0;
     }
 
     std::int32_t* features_;
@@ -56,4 +56,4 @@ inline std::vector<std::int32_t> nearestKnown(const std::uint8_t* missing, std::
     return features;
 }
 
-} // namespace colonnade::room
+} // namespace colonnade::environment

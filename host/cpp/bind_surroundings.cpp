@@ -1,10 +1,10 @@
-/// Normals of depth maps and light cubes (cpp/room) for Python.
+/// Normals of depth maps and light cubes (cpp/environment) for Python.
 #include <nanobind/stl/array.h>
 
 #include <cstring>
 
 #include "binding.hpp"
-#include "room/light_cube.hpp"
+#include "environment/light_cube.hpp"
 
 using namespace nanobind::literals;
 using namespace colonnade;
@@ -16,7 +16,7 @@ template <class T> using Map = nb::ndarray<const T, nb::ndim<2>, nb::c_contig, n
 using Rows = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Rotation = nb::ndarray<const double, nb::shape<3, 3>, nb::c_contig, nb::device::cpu>;
 
-const room::Vector* vectorsOf(const Rows& rows) { return reinterpret_cast<const room::Vector*>(rows.data()); }
+const environment::Vector* vectorsOf(const Rows& rows) { return reinterpret_cast<const environment::Vector*>(rows.data()); }
 
 template <class T, class Values> nb::object arrayOf(const Values& values, std::initializer_list<std::size_t> shape) {
     T* data;
@@ -25,51 +25,51 @@ template <class T, class Values> nb::object arrayOf(const Values& values, std::i
     return nb::cast(result);
 }
 
-room::DepthMap mapOf(const Map<double>& depth, const Map<bool>& holes, const std::array<double, 4>& lens) {
+environment::DepthMap mapOf(const Map<double>& depth, const Map<bool>& holes, const std::array<double, 4>& lens) {
     if (holes.shape(0) != depth.shape(0) || holes.shape(1) != depth.shape(1) || depth.size() == 0) throw std::invalid_argument("depth and holes have different sizes, or none");
     return {depth.data(), reinterpret_cast<const std::uint8_t*>(holes.data()), {lens[0], lens[1], lens[2], lens[3]}, static_cast<int>(depth.shape(1)), static_cast<int>(depth.shape(0))};
 }
 
 nb::tuple depthNormals(const Map<double>& depth, const Map<bool>& holes, const std::array<double, 4>& lens, double noise, int maxPlanes) {
-    room::DepthMap map = mapOf(depth, holes, lens);
-    const room::DepthNormals found = released([&] { return map.normals(noise, maxPlanes); });
+    environment::DepthMap map = mapOf(depth, holes, lens);
+    const environment::DepthNormals found = released([&] { return map.normals(noise, maxPlanes); });
     return nb::make_tuple(arrayOf<double>(found.normals, {depth.shape(0), depth.shape(1), 3}), found.planes, found.onPlanes);
 }
 
 nb::object nearestKnown(const Map<bool>& missing) {
     const auto* pixels = reinterpret_cast<const std::uint8_t*>(missing.data());
-    return arrayOf<std::int32_t>(released([&] { return room::nearestKnown(pixels, missing.shape(1), missing.shape(0)); }), {missing.size()});
+    return arrayOf<std::int32_t>(released([&] { return environment::nearestKnown(pixels, missing.shape(1), missing.shape(0)); }), {missing.size()});
 }
 
-nb::object turnedCube(const Rows& radiance, int size, const Rotation& rotation) {
-    if (radiance.shape(0) != room::texelCount(size)) throw std::invalid_argument("a cube has six square faces");
-    return arrayOf<double>(room::turnedCube(vectorsOf(radiance), size, rotation.data()), {6, room::cubeFace, room::cubeFace, 3});
+nb::object rotatedCube(const Rows& radiance, int size, const Rotation& rotation) {
+    if (radiance.shape(0) != environment::texelCount(size)) throw std::invalid_argument("a cube has six square faces");
+    return arrayOf<double>(environment::rotatedCube(vectorsOf(radiance), size, rotation.data()), {6, environment::cubeFace, environment::cubeFace, 3});
 }
 
 nb::object cubeWords(const Rows& radiance, const nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>& lights) {
     if (lights.shape(0) != radiance.shape(0)) throw std::invalid_argument("the numbers of texels differ");
     std::uint32_t* words;
     auto result = makeArray<std::uint32_t>({radiance.shape(0)}, words);
-    for (std::size_t i = 0; i < radiance.shape(0); ++i) words[i] = room::cubeWord(vectorsOf(radiance)[i], lights.data()[i]);
+    for (std::size_t i = 0; i < radiance.shape(0); ++i) words[i] = environment::cubeWord(vectorsOf(radiance)[i], lights.data()[i]);
     return nb::cast(result);
 }
 
-nb::tuple seenLight(const Rows& points, const Rows& normals, const Rows& colours, const room::Vector& point) {
-    const std::size_t count = points.shape(0), texels = room::texelCount(room::fineFace);
+nb::tuple seenLight(const Rows& points, const Rows& normals, const Rows& colours, const environment::Vector& point) {
+    const std::size_t count = points.shape(0), texels = environment::texelCount(environment::fineFace);
     if (normals.shape(0) != count || colours.shape(0) != count) throw std::invalid_argument("the numbers of pixels differ");
-    const room::SeenLight light = released([&] { return room::seenLight(vectorsOf(points), vectorsOf(normals), vectorsOf(colours), count, point); });
+    const environment::SeenLight light = released([&] { return environment::seenLight(vectorsOf(points), vectorsOf(normals), vectorsOf(colours), count, point); });
     return nb::make_tuple(arrayOf<double>(light.radiance, {texels, 3}), arrayOf<std::uint32_t>(light.pixels, {texels}), arrayOf<bool>(light.isBright, {texels}),
                           arrayOf<double>(light.distance, {texels}));
 }
 
 } // namespace
 
-void bind_room(nb::module_& module) {
+void bind_surroundings(nb::module_& module) {
     module.def("depth_noise", [](const Map<double>& depth, const Map<bool>& holes) { return mapOf(depth, holes, {1, 1, 0, 0}).noise(); }, "depth"_a, "holes"_a);
     module.def("depth_normals", &depthNormals, "depth"_a, "holes"_a, "lens"_a, "noise"_a, "max_planes"_a);
     module.def("nearest_known", &nearestKnown, "missing"_a);
-    module.def("turned_cube", &turnedCube, "radiance"_a, "size"_a, "rotation"_a);
+    module.def("rotated_cube", &rotatedCube, "radiance"_a, "size"_a, "rotation"_a);
     module.def("cube_words", &cubeWords, "radiance"_a, "lights"_a);
     module.def("seen_light", &seenLight, "points"_a, "normals"_a, "colours"_a, "point"_a);
-    module.def("box_distance", &room::boxDistance, "low"_a, "high"_a, "point"_a);
+    module.def("box_distance", &environment::boxDistance, "low"_a, "high"_a, "point"_a);
 }

@@ -7,7 +7,7 @@
 
 #include "depth_normals.hpp"
 
-namespace colonnade::room {
+namespace colonnade::environment {
 
 /// Texels along the edge of a face: of the device's cube, and while light is collected; directions averaged along one's edge.
 constexpr int cubeFace = 16, fineFace = 32, subsamples = 4;
@@ -47,16 +47,16 @@ inline std::size_t texelOf(const Vector& direction, int size) {
         if (std::fabs(direction[other]) > std::fabs(direction[axis])) axis = other;
     const double length = std::fabs(direction[axis]);
     std::size_t index = 2 * axis + (direction[axis] < 0);
-    for (int turn = 1; turn < 3; ++turn) {
-        const double place = std::floor((direction[(axis + turn) % 3] / length + 1) * (size / 2.0));
-        index = index * size + static_cast<std::size_t>(std::min(std::max(place, 0.0), size - 1.0));
+    for (int step = 1; step < 3; ++step) {
+        const double texel = std::floor((direction[(axis + step) % 3] / length + 1) * (size / 2.0));
+        index = index * size + static_cast<std::size_t>(std::min(std::max(texel, 0.0), size - 1.0));
     }
     return index;
 }
 
 /// The device's cube of another space: a direction d of it is `rotation` · d of this one, row by row. A texel has the mean
 /// over its solid angle.
-inline std::vector<Vector> turnedCube(const Vector* radiance, int size, const double* rotation) {
+inline std::vector<Vector> rotatedCube(const Vector* radiance, int size, const double* rotation) {
     std::vector<Vector> texels(texelCount(cubeFace));
     for (std::size_t i = 0; i < texels.size(); ++i) {
         const int column = static_cast<int>(i) % cubeFace, row = static_cast<int>(i) / cubeFace % cubeFace, face = static_cast<int>(i) / (cubeFace * cubeFace);
@@ -65,9 +65,9 @@ inline std::vector<Vector> turnedCube(const Vector* radiance, int size, const do
             double line = 0;
             for (int across = 0; across < subsamples; ++across) {
                 const Texel sub = texelAt(face, subsamples * row + down, subsamples * column + across, subsamples * cubeFace);
-                Vector turned;
-                for (int axis = 0; axis < 3; ++axis) turned[axis] = dot({rotation[3 * axis], rotation[3 * axis + 1], rotation[3 * axis + 2]}, sub.direction);
-                const Vector& light = radiance[texelOf(turned, size)];
+                Vector rotated;
+                for (int axis = 0; axis < 3; ++axis) rotated[axis] = dot({rotation[3 * axis], rotation[3 * axis + 1], rotation[3 * axis + 2]}, sub.direction);
+                const Vector& light = radiance[texelOf(rotated, size)];
                 for (int channel = 0; channel < 3; ++channel) texels[i][channel] += light[channel] * sub.weight;
                 line += sub.weight;
             }
@@ -177,4 +177,4 @@ inline int parallaxOf(double distance, double edge) {
     return 0;
 }
 
-} // namespace colonnade::room
+} // namespace colonnade::environment
