@@ -1,6 +1,5 @@
 package colonnade
 
-import chiseltest._
 import colonnade.bus._
 import colonnade.column.FakePathTracer
 import colonnade.config.{ColonnadeConfig, ShellConfig}
@@ -10,7 +9,7 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 /** The device in its shell, with fake path tracers and a memory of random latency. */
-class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
+class ColonnadeAxiSpec extends AnyFlatSpec with OneSimulation {
   behavior of "ColonnadeAxi"
 
   private val config: ColonnadeConfig = TestConfigs.tiny.copy(
@@ -31,11 +30,8 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     Seq.fill(config.columnBvhMemory.depth)(BigInt(new RecordFormats(config).recordBits, random))
   }
 
-  private def onBench(seed: Int)(body: ShellBench => Unit): Unit = {
-    test(new ColonnadeAxi(config, shell, new FakePathTracer(_))).withAnnotations(Simulation.verilator) { dut =>
-      body(new ShellBench(dut, config, shell, new Random(seed)))
-    }
-  }
+  private def onBench(seed: Int)(body: ShellBench => Unit)(dut: ColonnadeAxi): Unit =
+    body(new ShellBench(dut, config, shell, new Random(seed)))
 
   private def expectPicture(bench: ShellBench, scene: Seq[BigInt]): Unit = {
     for (y <- 0 until h; x <- 0 until w) {
@@ -46,9 +42,7 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     bench.memory.written.clear()
   }
 
-  it should "identify itself, refuse accesses that mean nothing, and interrupt while an enabled status bit is set" in onBench(
-    1
-  ) { bench =>
+  private def registers(bench: ShellBench): Unit = {
     val host = bench.host
     assert(host("identity") == BigInt("434c4e44", 16) && host("version") == ShellMap.version)
     val hash = (0 until 8).map(i => f"${host(s"formatHash[$i]")}%08x").mkString
@@ -80,9 +74,6 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     host.set("interrupt.status", 4)
     assert(!bench.interrupt && host("interrupt.status") == 1)
   }
-
-  it should "load images and write frames, one after the other, and refuse images by name" in
-    onBench(3)(loadsAndFrames)
 
   private def loadsAndFrames(bench: ShellBench): Unit = {
     bench.size(w, h)
@@ -129,9 +120,6 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     assert(bench.memory.read.forall(address => address >= 0x10000 && address < 0x10000 + bytes))
     assert(bench.load(good).isEmpty)
   }
-
-  it should "refuse a misaligned framebuffer, end a frame whose writes fail, and recover by a soft reset" in
-    onBench(5)(errorsAndResets)
 
   private def errorsAndResets(bench: ShellBench): Unit = {
     val scene = records(1)
@@ -208,4 +196,10 @@ class ColonnadeAxiSpec extends AnyFlatSpec with ChiselScalatestTester {
     assert(bench.until("frameDone") == allDone)
     expectPicture(bench, scene)
   }
+
+  inOneSimulation(new ColonnadeAxi(config, shell, new FakePathTracer(_)))(
+    "identify itself, refuse accesses that mean nothing, and interrupt while an enabled status bit is set" -> onBench(1)(registers),
+    "load images and write frames, one after the other, and refuse images by name" -> onBench(3)(loadsAndFrames),
+    "refuse a misaligned framebuffer, end a frame whose writes fail, and recover by a soft reset" -> onBench(5)(errorsAndResets)
+  )
 }

@@ -2,7 +2,7 @@ package colonnade.bus
 
 import chisel3.{assert => _, _}
 import chiseltest._
-import colonnade.{Simulation, TestConfigs}
+import colonnade.{OneSimulation, Simulation, TestConfigs}
 import colonnade.axi.AxiPins
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.Pixel
@@ -47,7 +47,7 @@ private class GuardedWriter(config: ColonnadeConfig, shell: ShellConfig) extends
 /** A pixel of a test. */
 private final case class Shot(x: Int, y: Int, r: Int, g: Int, b: Int, isObject: Boolean)
 
-class FramebufferWriterSpec extends AnyFlatSpec with ChiselScalatestTester {
+class FramebufferWriterSpec extends AnyFlatSpec with OneSimulation {
   behavior of "FramebufferWriter"
 
   private def encoded(shot: Shot, format: Int): Seq[Int] = {
@@ -185,18 +185,19 @@ class FramebufferWriterSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
 
-  for (order <- WriteOrder.values)
-    it should s"write to a memory that takes addresses and data in the order $order, and end abandoned bursts" in {
-      val (configuration, shell) = (config(2, 8), ShellConfig(8))
-      test(new GuardedWriter(configuration, shell)).withAnnotations(Simulation.verilator) { dut =>
-        val bench = new Bench(dut, configuration, shell, new Random(order.id), order)
+  private val (pair, narrow, wide) = (config(2, 8), ShellConfig(8), ShellConfig(16))
+
+  inOneSimulation(new GuardedWriter(pair, narrow))(WriteOrder.values.toSeq.map { order =>
+    s"write to a memory that takes addresses and data in the order $order, and end abandoned bursts" ->
+      { dut: GuardedWriter =>
+        val bench = new Bench(dut, pair, narrow, new Random(order.id), order)
         bench.settings(0x1000, 64, 0, (0x1000, 0x1000 + 64 * 24))
         val shots = bench.shots(16, 24)
         bench.frame(bench.mixed(shots))
         for (shot <- shots) assert(bench.memory.dump(0x1000 + 64 * shot.y + 4 * shot.x, 4) == encoded(shot, 0))
         for (_ <- 0 until 20) bench.abandon(bench.random.nextInt(60))
       }
-    }
+  }: _*)
 
   it should "write whole rows as bursts when pixels come tile by tile" in {
     val (configuration, shell) = (config(1, 8), ShellConfig(8))
@@ -208,10 +209,9 @@ class FramebufferWriterSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "write nothing outside the window, report it, and forget it with the next frame" in {
-    val (configuration, shell) = (config(2, 8), ShellConfig(16))
-    test(new GuardedWriter(configuration, shell)).withAnnotations(Simulation.verilator) { dut =>
-      val bench = new Bench(dut, configuration, shell, new Random(4))
+  inOneSimulation(new GuardedWriter(pair, wide))(
+    "write nothing outside the window, report it, and forget it with the next frame" -> { dut =>
+      val bench = new Bench(dut, pair, wide, new Random(4))
       val shots = bench.shots(16, 12)
       for ((first, last) <- Seq((2, 12), (0, 9), (3, 3))) {
         bench.memory.written.clear()
@@ -224,13 +224,9 @@ class FramebufferWriterSpec extends AnyFlatSpec with ChiselScalatestTester {
       bench.settings(0x8000, 64, 0, (0, 0x10000))
       bench.frame(bench.mixed(shots))
       assert(!dut.windowError.peekBoolean())
-    }
-  }
-
-  it should "stop writing after an error, report it, and write the next frame" in {
-    val (configuration, shell) = (config(2, 8), ShellConfig(16))
-    test(new GuardedWriter(configuration, shell)).withAnnotations(Simulation.verilator) { dut =>
-      val bench = new Bench(dut, configuration, shell, new Random(5))
+    },
+    "stop writing after an error, report it, and write the next frame" -> { dut =>
+      val bench = new Bench(dut, pair, wide, new Random(5))
       for (code <- Seq(2, 3)) {
         bench.settings(0, 64, 0, (0, 0x10000))
         bench.memory.response = address => if (address == 64 * 3) code else 0
@@ -244,5 +240,5 @@ class FramebufferWriterSpec extends AnyFlatSpec with ChiselScalatestTester {
         assert(!dut.responseError.peekBoolean() && bench.memory.written.size == 16 * 64)
       }
     }
-  }
+  )
 }

@@ -1,14 +1,14 @@
 package colonnade.formats
 
 import chiseltest._
-import colonnade.Simulation
+import colonnade.OneSimulation
 import colonnade.config.{ColonnadeConfig, ConfigIO}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
 import scala.util.Random
 
-class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+class RegisterFileSpec extends AnyFlatSpec with OneSimulation with Matchers {
   behavior of "RegisterFile"
 
   private val config: ColonnadeConfig =
@@ -47,8 +47,8 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
   private def shown(unit: RegisterFile, register: Register): BigInt =
     LayoutSpec.number(unit.io.frame, register.name).peek().litValue & ones(register)
 
-  it should "store every setting, clamp it for the hardware, and read it back" in {
-    test(new RegisterFile(config)).withAnnotations(Simulation.verilator) { unit =>
+  inOneSimulation(new RegisterFile(config))(
+    "store every setting, clamp it for the hardware, and read it back" -> { unit =>
       val random = new Random(8)
       val values = settings.map(r => r -> BigInt(r.width, random))
       values.foreach { case (register, bits) => writeWhole(unit, register, bits) }
@@ -56,18 +56,15 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
         readWhole(unit, register) shouldBe bits
         if (!register.name.endsWith("Base")) shown(unit, register) shouldBe register.limit.fold(bits)(bits.min)
       }
-    }
-  }
-
-  it should "clamp registers above their limits only" in {
-    val limited = settings.filter(_.limit.nonEmpty)
-    limited.map(_.name) should contain allOf (
-      "shading.lights",
-      "frame.unitShift",
-      "camera.stepShift",
-      "scene.recordCount"
-    )
-    test(new RegisterFile(config)).withAnnotations(Simulation.verilator) { unit =>
+    },
+    "clamp registers above their limits only" -> { unit =>
+      val limited = settings.filter(_.limit.nonEmpty)
+      limited.map(_.name) should contain allOf (
+        "shading.lights",
+        "frame.unitShift",
+        "camera.stepShift",
+        "scene.recordCount"
+      )
       for (register <- limited.sortBy(_.name != "scene.recordCount"); limit <- register.limit)
         withClue(s"${register.name}: ") {
           for (value <- Seq(limit - 1, limit + 1, ones(register), limit).filter(_ >= 0)) {
@@ -76,13 +73,10 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
             readWhole(unit, register) shouldBe value
           }
         }
-    }
-  }
-
-  it should "end a section at the base of the next one" in {
-    val Seq(count, triangles, attributes) =
-      Seq("recordCount", "triangleBase", "attributeBase").map(name => settings.find(_.name == s"scene.$name").get)
-    test(new RegisterFile(config)) { unit =>
+    },
+    "end a section at the base of the next one" -> { unit =>
+      val Seq(count, triangles, attributes) =
+        Seq("recordCount", "triangleBase", "attributeBase").map(name => settings.find(_.name == s"scene.$name").get)
       for {
         (written, legal) <- Seq(
           Seq(30, 10, 20) -> Seq(30, 10, 20),
@@ -95,11 +89,8 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
         Seq(count, triangles, attributes).zip(written).foreach { case (r, value) => writeWhole(unit, r, value) }
         Seq(count, triangles, attributes).map(shown(unit, _).toInt) shouldBe legal
       }
-    }
-  }
-
-  it should "read status, errors and counters" in {
-    test(new RegisterFile(config)).withAnnotations(Simulation.verilator) { unit =>
+    },
+    "read status, errors and counters" -> { unit =>
       val random = new Random(9)
       for (register <- registers if register.access == Access.ReadOnly) withClue(s"${register.name}: ") {
         val bits = BigInt(register.width, random)
@@ -110,11 +101,8 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
         }
         readWhole(unit, register) shouldBe bits
       }
-    }
-  }
-
-  it should "start a frame by a write of 1, for one cycle" in {
-    test(new RegisterFile(config)) { unit =>
+    },
+    "start a frame by a write of 1, for one cycle" -> { unit =>
       val start = registers.find(_.name == "control.start").get.address
       unit.io.start.expect(false)
       unit.io.register.write.poke(true)
@@ -129,11 +117,8 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       unit.io.register.write.poke(true)
       unit.io.register.address.poke(start + 1)
       unit.io.start.expect(false)
-    }
-  }
-
-  it should "ignore every write while a frame runs" in {
-    test(new RegisterFile(config)) { unit =>
+    },
+    "ignore every write while a frame runs" -> { unit =>
       val width = settings.find(_.name == "frame.width").get
       writeWhole(unit, width, 640)
       unit.io.device.status.busy.poke(true)
@@ -143,15 +128,12 @@ class RegisterFileSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       unit.io.register.address.poke(0)
       unit.io.register.writeData.poke(1)
       unit.io.start.expect(false)
-    }
-  }
-
-  it should "read 0 from unknown addresses and from write-only registers" in {
-    test(new RegisterFile(config)) { unit =>
+    },
+    "read 0 from unknown addresses and from write-only registers" -> { unit =>
       val size = RegisterMap.size(registers)
       read(unit, (1 << RegisterFile.addressBits(config)) - 1) shouldBe 0
       if (size < (1 << RegisterFile.addressBits(config))) read(unit, size) shouldBe 0
       read(unit, 0) shouldBe 0
     }
-  }
+  )
 }

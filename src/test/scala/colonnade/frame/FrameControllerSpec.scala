@@ -2,12 +2,12 @@ package colonnade.frame
 
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.{Simulation, TestConfigs}
+import colonnade.{OneSimulation, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
+class FrameControllerSpec extends AnyFlatSpec with OneSimulation {
   behavior of "FrameController"
 
   private val columns  = 3
@@ -141,8 +141,8 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  it should "dispatch every tile of several frames once, in Morton order" in {
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+  inOneSimulation(new FrameController(config))(
+    "dispatch every tile of several frames once, in Morton order" -> { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       for ((wide, high) <- Seq((64, 48), (1, 1), (60, 9), (8, 100), (8, 8))) {
@@ -152,11 +152,8 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.status.busy.expect(false)
         assert(bench.aborts == 0)
       }
-    }
-  }
-
-  it should "dispatch tiles outside the object's rectangle to the background" in {
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+    },
+    "dispatch tiles outside the object's rectangle to the background" -> { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       for (
@@ -167,41 +164,15 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         val pixels = for (x <- x0 until x1; y <- y0 until y1) yield (x / tileSize * tileSize, y / tileSize * tileSize)
         bench.expectTiles(64, 48, pixels.toSet)
       }
-    }
-  }
-
-  it should "dispatch the tiles of the environment's window apart from the object's, which are divided" in {
-    test(
-      new FrameController(withColumns(TestConfigs.withEnvironment(TestConfigs.environment)))
-    ).withAnnotations(Simulation.verilator) { dut =>
-      dut.clock.setTimeout(0)
-      val bench  = new Bench(dut)
-      val window = dut.io.window
-      for ((hasWindow, right, tiles) <- Seq((true, 64, 47), (false, 64, 0), (true, 17, 17))) {
-        window.enabled.poke(hasWindow)
-        window.rect.x0.poke(0)
-        window.rect.y0.poke(0)
-        window.rect.x1.poke(right)
-        window.rect.y1.poke(48)
-        assert(bench.frame(64, 48, watchdog = 0, rect = Some((9, 9, 15, 15))).nonEmpty)
-        bench.expectTiles(64, 48, _ == (8, 8), tile => hasWindow && tile._1 < right, isDivided = hasWindow)
-        assert(bench.columns.map(_.others(TileKind.OfEnvironment).size).sum == tiles)
-      }
-    }
-  }
-
-  it should "end a frame without pixels at once" in {
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+    },
+    "end a frame without pixels at once" -> { dut =>
       val bench = new Bench(dut)
       for ((wide, high) <- Seq((0, 0), (0, 8), (8, 0))) {
         assert(bench.frame(wide, high, watchdog = 0).exists(_ < 10))
         bench.expectTiles(0, 0)
       }
-    }
-  }
-
-  it should "dispatch tiles to ready columns without a pause" in {
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+    },
+    "dispatch tiles to ready columns without a pause" -> { dut =>
       dut.io.frame.pixelsWide.poke(64)
       dut.io.frame.pixelsHigh.poke(64)
       dut.io.frame.objectRect.x1.poke(64)
@@ -217,11 +188,8 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.clock.step()
       }
       assert(dut.io.tiles.count(_.ofObject.valid.peekBoolean()) == 0)
-    }
-  }
-
-  it should "abort a frame that hangs, with an error that the next start clears" in {
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+    },
+    "abort a frame that hangs, with an error that the next start clears" -> { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       for (stuck <- 0 until columns) {
@@ -233,11 +201,8 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.io.watchdogError.expect(false)
         bench.expectTiles(64, 64)
       }
-    }
-  }
-
-  it should "end although the memory is silent, and start no frame before it is idle" in {
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+    },
+    "end although the memory is silent, and start no frame before it is idle" -> { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       // The frame is aborted, and ends after as many cycles again
@@ -256,25 +221,19 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       assert((bench.starts, bench.aborts, bench.timeouts) == ((1, 0, 0)))
       dut.io.watchdogError.expect(false)
       bench.expectTiles(32, 32)
-    }
-  }
-
-  it should "not end without a watchdog, or while the sink stalls" in {
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+    },
+    "not end without a watchdog" -> { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       assert(bench.frame(16, 16, watchdog = 0, stuck = Some(1), limit = 600).isEmpty)
-    }
-    test(new FrameController(config)).withAnnotations(Simulation.verilator) { dut =>
+    },
+    "not end while the sink stalls" -> { dut =>
       dut.clock.setTimeout(0)
       val bench = new Bench(dut)
       bench.stalls = true
       assert(bench.frame(16, 16, watchdog = 50, stuck = Some(1), limit = 600).isEmpty)
-    }
-  }
-
-  it should "ignore a start while a frame runs" in {
-    test(new FrameController(config)) { dut =>
+    },
+    "ignore a start while a frame runs" -> { dut =>
       dut.io.frame.pixelsWide.poke(8)
       dut.io.frame.pixelsHigh.poke(8)
       dut.io.memoryIsIdle.poke(true)
@@ -284,6 +243,26 @@ class FrameControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.clock.step()
         dut.io.frameStart.expect(false)
         dut.io.status.busy.expect(true)
+      }
+    }
+  )
+
+  it should "dispatch the tiles of the environment's window apart from the object's, which are divided" in {
+    test(
+      new FrameController(withColumns(TestConfigs.withEnvironment(TestConfigs.environment)))
+    ).withAnnotations(Simulation.verilator) { dut =>
+      dut.clock.setTimeout(0)
+      val bench  = new Bench(dut)
+      val window = dut.io.window
+      for ((hasWindow, right, tiles) <- Seq((true, 64, 47), (false, 64, 0), (true, 17, 17))) {
+        window.enabled.poke(hasWindow)
+        window.rect.x0.poke(0)
+        window.rect.y0.poke(0)
+        window.rect.x1.poke(right)
+        window.rect.y1.poke(48)
+        assert(bench.frame(64, 48, watchdog = 0, rect = Some((9, 9, 15, 15))).nonEmpty)
+        bench.expectTiles(64, 48, _ == (8, 8), tile => hasWindow && tile._1 < right, isDivided = hasWindow)
+        assert(bench.columns.map(_.others(TileKind.OfEnvironment).size).sum == tiles)
       }
     }
   }
