@@ -6,6 +6,8 @@ import json
 import shutil
 import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +69,19 @@ class Tab:
         while self.frames() <= before:
             assert time.monotonic() < end, self.page.locator("#error").inner_text() or "no frame came"
             time.sleep(0.02)
+
+    @contextmanager
+    def another_frame(self) -> Iterator[None]:
+        """Wait for a whole frame after what is done."""
+        before = self.frames()
+        yield
+        self.wait(before)
+
+    def press(self, key: str) -> None:
+        """Move the object or the camera, and wait for its frame."""
+        with self.another_frame():
+            self.page.focus("#stage")
+            self.page.keyboard.press(key)
 
     def frames(self) -> int:
         return int(self.page.get_attribute("body", "data-frames") or 0)

@@ -172,8 +172,12 @@ LONGEST = "test_starting_pages.py"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest file, so that no worker is left alone with it at the end."""
+    """Begin with the longest file, so that no worker is left alone with it at the end; skip what needs Verilator."""
     items.sort(key=lambda item: item.path.name != LONGEST)
+    if shutil.which("verilator") is None:
+        for item in items:
+            if item.get_closest_marker("verilator"):
+                item.add_marker(pytest.mark.skip(reason="Verilator is not installed"))
 
 
 @pytest.fixture
@@ -200,11 +204,12 @@ def quick_simulators(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """Chromium, if the machine has one."""
-    from playwright.sync_api import sync_playwright
+    from playwright.sync_api import expect, sync_playwright
 
     program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if program is None:
         pytest.skip("no Chromium: install it with `apt-get install chromium`")
+    expect.set_options(timeout=30_000)  # as long as the pages of the tests wait, on a busy machine
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield browser

@@ -109,7 +109,7 @@ def test_the_first_picture_is_that_of_the_readme(context: BrowserContext) -> Non
     expected = render_model(manifest, scene.image, own | {"gather.bounces": 0}).is_object
     is_object = np.reshape([hit == "1" for hit in hits], (480, 640))
     assert (expected & is_object).sum() > 0.98 * (expected | is_object).sum() > 2000
-    expect(tab.page.locator("#samples")).to_contain_text("is added", timeout=30_000)
+    expect(tab.page.locator("#samples")).to_contain_text("is added")
     assert tab.is_quiet()
 
 
@@ -124,31 +124,26 @@ def test_a_room_equals_the_host_and_a_drag_turns_the_object(context: BrowserCont
         np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
         np.testing.assert_array_equal(np.reshape(picture["ratios"], frame.ratio.shape), frame.ratio)
         pictures.append(picture["triangles"])
-        before = tab.frames()
-        tab.page.focus("#stage")
-        tab.page.keyboard.press("ArrowLeft")
-        tab.wait(before)
+        tab.press("ArrowLeft")
     assert pictures[0] != pictures[1] and frame.ratio.min() < 3000
     photographed = tab.page.evaluate("document.getElementById('picture').toDataURL()")
-    before = tab.frames()
-    tab.page.uncheck("input[name=photo]")
-    tab.wait(before)
+    with tab.another_frame():
+        tab.page.uncheck("input[name=photo]")
     assert tab.page.evaluate("document.getElementById('picture').toDataURL()") != photographed
     # Another camera, and back
-    unmoved, before = tab.picture()["triangles"], tab.frames()
-    tab.page.select_option("select[name=drag]", "camera")
-    tab.page.focus("#stage")
-    tab.page.keyboard.press("ArrowRight")
-    tab.wait(before)
+    unmoved = tab.picture()["triangles"]
+    with tab.another_frame():
+        tab.page.select_option("select[name=drag]", "camera")
+        tab.page.focus("#stage")
+        tab.page.keyboard.press("ArrowRight")
     expect(tab.page.locator("#notes")).to_contain_text("the camera is not that of the photo")
     picture = tab.picture()
     frame = host_frame(picture, load_mesh("teapot"), "edge", is_in_room=True)
     np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
     np.testing.assert_array_equal(np.reshape(picture["triangles"], frame.triangle.shape), frame.triangle)
     assert frame.is_object.sum() > 100 and picture["triangles"] != pictures[1]
-    before = tab.frames()
-    tab.page.click("#home")
-    tab.wait(before)
+    with tab.another_frame():
+        tab.page.click("#home")
     assert tab.picture()["triangles"] == unmoved
     tab.page.select_option("select[name=design]", "tiny")
     expect(tab.page.locator("#notes")).to_contain_text("this hardware has no maps of a room")
@@ -169,12 +164,9 @@ def test_a_room_lights_the_object_and_passes_are_added(context: BrowserContext) 
         assert frame.is_object.sum() > 100 and frame.ratio.min() < 3500
         np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
         np.testing.assert_array_equal(np.reshape(picture["ratios"], frame.ratio.shape), frame.ratio)
-        before = tab.frames()
-        page.focus("#stage")
-        page.keyboard.press("ArrowLeft")
-        tab.wait(before)
+        tab.press("ArrowLeft")
 
-    expect(page.locator("#samples")).to_have_text("pass 64 of 64 is added", timeout=30_000)
+    expect(page.locator("#samples")).to_have_text("pass 64 of 64 is added")
     view, middle = page.evaluate("[colonnade.pass, colonnade.middle]")
     writes = page.evaluate("colonnade.renderer.writes(colonnade.pass)")
     sample = samples_of_frame(64, len(light["lamps"]))[63]
@@ -184,9 +176,9 @@ def test_a_room_lights_the_object_and_passes_are_added(context: BrowserContext) 
         right, up, _ = camera_axes(np.subtract(lamp["position"], middle), (0, 1, 0))
         expected = lamp["position"] + lamp["radius"] * (point[0] * right + point[1] * up)
         np.testing.assert_allclose(placed["position"], expected, atol=1e-12)
-    lit, before = page.evaluate("document.getElementById('picture').toDataURL()"), tab.frames()
-    page.uncheck("input[name=gather]")
-    tab.wait(before)
+    lit = page.evaluate("document.getElementById('picture').toDataURL()")
+    with tab.another_frame():
+        page.uncheck("input[name=gather]")
     assert page.evaluate("document.getElementById('picture').toDataURL()") != lit
     expect(page.locator("#notes")).to_contain_text("rough metal is diffuse")
     assert tab.is_quiet()
@@ -196,10 +188,10 @@ def test_a_photo_and_its_depth_are_a_room(context: BrowserContext) -> None:
     """Relit from its maps it is the photo again, and the device sees it as a room of the page."""
     folder = ROOT / "scenes" / "rooms" / "living"
     tab = Tab(context, "#pixel=4&design=edge&material=mirror&photo=0")
-    page, before = tab.page, tab.frames()
-    page.set_input_files("#file", [folder / name for name in ("render.png", "depth.png", "meta.json")])
-    expect(page.locator("#notes")).to_contain_text("one white lamp", timeout=20_000)
-    tab.wait(before)
+    page = tab.page
+    with tab.another_frame():
+        page.set_input_files("#file", [folder / name for name in ("render.png", "depth.png", "meta.json")])
+        expect(page.locator("#notes")).to_contain_text("one white lamp")
     picture = tab.picture()
     size = picture["height"], picture["width"]
     linear = np.reshape(picture["colours"], (*size, 3)) / 4095
@@ -212,9 +204,8 @@ def test_a_photo_and_its_depth_are_a_room(context: BrowserContext) -> None:
     # The room of the page has this lens, pose and depth: the projection to the maps is in proportion to the object
     manifest = Manifest.load(ROOT / "configs" / "golden" / "edge.json")
     own, scale = registers_of(picture, manifest), page.evaluate("colonnade.room.object.scale")
-    before = tab.frames()
-    page.select_option("select[name=room]", "living")
-    tab.wait(before)
+    with tab.another_frame():
+        page.select_option("select[name=room]", "living")
     other = registers_of(tab.picture(), manifest)
     for i, axis in itertools.product(range(3), "xyz"):
         assert own[f"environment.rotation[{i}].{axis}"] == other[f"environment.rotation[{i}].{axis}"]
@@ -223,30 +214,26 @@ def test_a_photo_and_its_depth_are_a_room(context: BrowserContext) -> None:
         )
         assert ours * 0.29 == pytest.approx(theirs * scale, rel=1e-6, abs=1e-12)
     # Without meta.json
-    before = tab.frames()
-    page.set_input_files("#file", [folder / name for name in ("render.png", "depth.png")])
-    expect(page.locator("#notes")).to_contain_text("the photo's width is taken as 65°", timeout=20_000)
-    expect(page.locator("#notes")).to_contain_text("the vertical is that of the floor")
-    tab.wait(before)
+    with tab.another_frame():
+        page.set_input_files("#file", [folder / name for name in ("render.png", "depth.png")])
+        expect(page.locator("#notes")).to_contain_text("the photo's width is taken as 65°")
+        expect(page.locator("#notes")).to_contain_text("the vertical is that of the floor")
     # A double click moves the object, and a photo alone is refused
-    before, hits = tab.frames(), tab.picture()["triangles"]
-    page.check("input[name=photo]")
-    tab.wait(before)
-    before = tab.frames()
-    box = page.locator("#picture").bounding_box()
-    assert box is not None
-    page.mouse.dblclick(box["x"] + 0.35 * box["width"], box["y"] + 0.9 * box["height"])
-    tab.wait(before)
+    hits = tab.picture()["triangles"]
+    with tab.another_frame():
+        page.check("input[name=photo]")
+    with tab.another_frame():
+        box = page.locator("#picture").bounding_box()
+        assert box is not None
+        page.mouse.dblclick(box["x"] + 0.35 * box["width"], box["y"] + 0.9 * box["height"])
     assert tab.picture()["triangles"] != hits
-    before = tab.frames()
-    page.set_input_files("#file", folder / "render.png")
-    tab.wait(before)  # the frame after an error leaves it
+    with tab.another_frame():  # the frame after an error leaves it
+        page.set_input_files("#file", folder / "render.png")
     expect(page.locator("#error")).to_contain_text("render.png is a photo without depth")
     # Its light, in hardware that gathers it
-    before = tab.frames()
-    page.select_option("select[name=design]", "textured")
-    expect(page.locator("#notes")).to_contain_text("of the directions around the object", timeout=20_000)
-    tab.wait(before)
+    with tab.another_frame():
+        page.select_option("select[name=design]", "textured")
+        expect(page.locator("#notes")).to_contain_text("of the directions around the object")
     share, parallax = page.evaluate("[colonnade.light.share, colonnade.light.parallax]")
     assert 0.1 < share < 0.6 and parallax in (2, 3)
     assert tab.is_quiet()
@@ -272,12 +259,11 @@ def test_a_click_follows_a_ray_and_the_link_holds_it(context: BrowserContext) ->
     expect(page.locator("#rays tr.chosen")).to_contain_text("reflection")
     assert page.locator("#steps li").count() == page.evaluate("colonnade.rays[1].steps.length")
 
-    before = tab.frames()
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + 40, y - 20, steps=3)
-    page.mouse.up()
-    tab.wait(before)
+    with tab.another_frame():
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 40, y - 20, steps=3)
+        page.mouse.up()
     link = page.evaluate("location.hash")
     assert "azimuth=" in link and "follow=" in link
     other = Tab(context, link)
@@ -290,11 +276,10 @@ def test_files_are_read_and_what_is_left_out_is_said(context: BrowserContext, tm
     tab = Tab(context, "#pixel=4")
     page = tab.page
     (tmp_path / "four.obj").write_text(OBJ)
-    before = tab.frames()
-    page.set_input_files("#file", tmp_path / "four.obj")
-    expect(page.locator("#mesh")).to_have_text("four.obj")
-    expect(page.locator("#notes")).to_have_text("lines, points and curves are left out")
-    tab.wait(before)
+    with tab.another_frame():
+        page.set_input_files("#file", tmp_path / "four.obj")
+        expect(page.locator("#mesh")).to_have_text("four.obj")
+        expect(page.locator("#notes")).to_have_text("lines, points and curves are left out")
     assert page.evaluate("[colonnade.packed.triangles, colonnade.mesh.hasColours]") == [4, True]
     colours = np.reshape(tab.picture()["colours"], (-1, 3))
     assert len(np.unique(colours, axis=0)) > 50
@@ -307,10 +292,9 @@ def test_files_are_read_and_what_is_left_out_is_said(context: BrowserContext, tm
     expect(page.locator("#error")).to_have_text("huge.ply is damaged, or no PLY file")
     tab.drop("cycle.gltf", json.dumps(triangle_document() | {"nodes": [{"children": [0]}]}))
     expect(page.locator("#error")).to_have_text("mesh cycle.gltf: node 0 is its own ancestor: export it again")
-    before = tab.frames()
-    tab.drop("one.gltf", json.dumps(triangle_document()))
-    expect(page.locator("#mesh")).to_have_text("one.gltf")
-    tab.wait(before)
+    with tab.another_frame():
+        tab.drop("one.gltf", json.dumps(triangle_document()))
+        expect(page.locator("#mesh")).to_have_text("one.gltf")
     assert page.evaluate("colonnade.packed.triangles") == 1
     assert page.locator("#error").is_hidden()
     assert tab.is_quiet()
@@ -338,13 +322,11 @@ def test_controls_and_the_size_of_a_phone(browser: Browser) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
     stage, form = page.locator("#stage").bounding_box(), page.locator("#controls").bounding_box()
     assert stage is not None and form is not None and form["y"] >= stage["y"] + stage["height"] - 1
-    before = tab.frames()
-    page.select_option("select[name=material]", "glass")
-    expect(page.locator("#notes")).to_have_text("this hardware has neither mirrors nor glass")
-    tab.wait(before)
-    before = tab.frames()
-    page.select_option("select[name=design]", "lean")
-    tab.wait(before)
+    with tab.another_frame():
+        page.select_option("select[name=material]", "glass")
+        expect(page.locator("#notes")).to_have_text("this hardware has neither mirrors nor glass")
+    with tab.another_frame():
+        page.select_option("select[name=design]", "lean")
     expect(page.locator("#notes li")).to_have_count(0)
     expect(page.locator("#figures")).to_contain_text("refracted rays")
     page.touchscreen.tap(180, 190)
@@ -400,25 +382,22 @@ def test_sliders_have_their_pictures_and_their_costs(context: BrowserContext) ->
     expect(page.locator("input[name=precision]")).to_have_value("5")
     expect(page.locator("#precision-value")).to_have_text("32b32s64d")
     sharp = tab.picture()["colours"]
-    before = tab.frames()
-    page.fill("input[name=precision]", "0")
-    expect(page.locator("#precision-value")).to_have_text("16b16s32d")
-    tab.wait(before)
+    with tab.another_frame():
+        page.fill("input[name=precision]", "0")
+        expect(page.locator("#precision-value")).to_have_text("16b16s32d")
     expect(page.locator("#costs")).to_contain_text("PSNR, lowest")
     expect(page.locator("#study")).to_contain_text("colonnade explore scenes/studies/mixed-precision.toml")
     assert tab.picture()["colours"] != sharp
     assert "design=16b16s32d" in page.evaluate("location.hash")
-    before = tab.frames()
-    page.fill("input[name=vertexBits]", "0")
-    expect(page.locator("#vertexBits-value")).to_have_text("12")
-    expect(page.locator("#precision-value")).to_have_text("32b32s64d")
-    tab.wait(before)
+    with tab.another_frame():
+        page.fill("input[name=vertexBits]", "0")
+        expect(page.locator("#vertexBits-value")).to_have_text("12")
+        expect(page.locator("#precision-value")).to_have_text("32b32s64d")
     expect(page.locator("#study")).to_contain_text("vertices-contexts.toml")
     assert tab.picture()["colours"] != sharp
-    before = tab.frames()
-    page.fill("input[name=contexts]", "0")
-    expect(page.locator("#contexts-value")).to_have_text("4")
-    tab.wait(before)
+    with tab.another_frame():
+        page.fill("input[name=contexts]", "0")
+        expect(page.locator("#contexts-value")).to_have_text("4")
     assert tab.picture()["colours"] == sharp, "contexts change no pixel"
     # Other hardware: they are folded, and have the values of edge
     page.select_option("select[name=design]", "lean")

@@ -75,9 +75,8 @@ def test_the_page_of_any_link_has_a_picture_and_works(context: BrowserContext, l
         expect(page.locator("#notes")).to_contain_text("which the page does not have: this is textured")
     assert page.locator("#error").is_hidden() and page.locator("#busy").is_hidden()
     assert page.locator("#path").is_hidden()
-    before = tab.frames()
-    page.select_option("select[name=material]", "mirror")
-    tab.wait(before)
+    with tab.another_frame():
+        page.select_option("select[name=material]", "mirror")
     assert tab.is_quiet()
 
 
@@ -102,20 +101,25 @@ def test_an_error_of_a_file_shows_at_once_and_the_mesh_stays(context: BrowserCon
     tab = Tab(context, "#room=living&material=metal")
     page = tab.page
     expect(page.locator("#samples")).to_contain_text("is added")
-    is_hidden = page.evaluate("document.getElementById('error').hidden")
-    frames = tab.frames()
+    is_hidden, frames = page.evaluate(
+        """() => {
+          const error = document.getElementById("error");
+          const note = () => error.hidden || (window.framesAtError ??= colonnade.frames);
+          new MutationObserver(note).observe(error, { attributes: true, childList: true });
+          return [error.hidden, colonnade.frames];
+        }"""
+    )
     content = gltf_documents.REFUSED["doubled.gltf"][1].decode()
     tab.drop("doubled.gltf", content)
     assert page.evaluate("document.getElementById('busy').textContent") == "Reading the files…"
     expect(page.locator("#error")).to_have_text("mesh doubled.gltf: node 1 has two parents: export it again")
-    assert is_hidden and tab.frames() == frames
+    assert is_hidden and page.evaluate("framesAtError") == frames
     expect(page.locator("#busy")).to_be_hidden()
     tab.wait(frames)
     assert page.locator("#mesh").inner_text() == "teapot.ply" and page.locator("#error").is_visible()
     # The mesh of before is that of the next material, too
-    before = tab.frames()
-    page.select_option("select[name=material]", "glass")
-    tab.wait(before)
+    with tab.another_frame():
+        page.select_option("select[name=material]", "glass")
     assert page.evaluate("colonnade.packed.triangles") == 6320
     assert tab.is_quiet()
 
@@ -152,22 +156,21 @@ def test_each_work_shows_what_it_is(context: BrowserContext) -> None:
 def test_hardware_that_cannot_hold_the_mesh_is_not_taken(context: BrowserContext) -> None:
     tab = Tab(context, "#pixel=4")
     page = tab.page
-    rows, before = range(250), tab.frames()
-    vertices = "".join(f"v {x} {(x * x + z * z) % 7 / 3} {z}\n" for x in rows for z in rows)
-    corners = [250 * x + z + 1 for x in rows[1:] for z in rows[1:]]
-    faces = "".join(f"f {at} {at - 1} {at - 251} {at - 250}\n" for at in corners)
-    tab.drop("grid.obj", vertices + faces)
-    expect(page.locator("#mesh")).to_have_text("grid.obj", timeout=30_000)
-    tab.wait(before)
-    before, colours = tab.frames(), tab.picture()["colours"]
-    page.select_option("select[name=design]", "tiny")
-    expect(page.locator("#error")).to_contain_text("mesh grid.obj needs ")
-    tab.wait(before)
+    rows = range(250)
+    with tab.another_frame():
+        vertices = "".join(f"v {x} {(x * x + z * z) % 7 / 3} {z}\n" for x in rows for z in rows)
+        corners = [250 * x + z + 1 for x in rows[1:] for z in rows[1:]]
+        faces = "".join(f"f {at} {at - 1} {at - 251} {at - 250}\n" for at in corners)
+        tab.drop("grid.obj", vertices + faces)
+        expect(page.locator("#mesh")).to_have_text("grid.obj")
+    colours = tab.picture()["colours"]
+    with tab.another_frame():
+        page.select_option("select[name=design]", "tiny")
+        expect(page.locator("#error")).to_contain_text("mesh grid.obj needs ")
     expect(page.locator("select[name=design]")).to_have_value("textured")
     assert tab.picture()["colours"] == colours and page.locator("#error").is_visible()
-    before = tab.frames()
-    page.select_option("select[name=material]", "mirror")
-    tab.wait(before)
+    with tab.another_frame():
+        page.select_option("select[name=material]", "mirror")
     assert page.locator("#error").is_hidden() and tab.picture()["colours"] != colours
     assert tab.is_quiet()
 
@@ -192,28 +195,22 @@ def test_a_worker_that_does_not_answer_is_replaced(context: BrowserContext) -> N
     expect(page.locator("#samples")).to_have_text("pass 4 of 4 is added")
     count = page.evaluate("colonnade.renderer.workers.length")
     page.evaluate(ENDLESS, [-count, "read"])
-    before = tab.frames()
-    tab.drop("four.obj", OBJ)
-    says = "a worker has not answered for 20 s while {}: it is replaced, and the page goes on with what it had"
-    expect(page.locator("#error")).to_have_text(says.format("reading the file"))
-    tab.wait(before)
+    with tab.another_frame():
+        tab.drop("four.obj", OBJ)
+        says = "a worker has not answered for 20 s while {}: it is replaced, and the page goes on with what it had"
+        expect(page.locator("#error")).to_have_text(says.format("reading the file"))
     assert page.locator("#mesh").inner_text() == "teapot.ply" and tab.picture()["colours"] == first
 
-    before = tab.frames()
-    tab.drop("four.obj", OBJ)
-    expect(page.locator("#mesh")).to_have_text("four.obj")
-    tab.wait(before)
+    with tab.another_frame():
+        tab.drop("four.obj", OBJ)
+        expect(page.locator("#mesh")).to_have_text("four.obj")
     assert page.locator("#error").is_hidden()
     expect(page.locator("#samples")).to_have_text("pass 4 of 4 is added")
     page.evaluate(ENDLESS, [-1, "frame"])
-    before = tab.frames()
-    page.focus("#stage")
-    page.keyboard.press("ArrowLeft")
+    tab.press("ArrowLeft")
     expect(page.locator("#error")).to_have_text(says.format("rendering"))
-    tab.wait(before)
     assert page.evaluate("colonnade.packed.triangles") == 4
-    before = tab.frames()
-    page.evaluate("location.hash = '#pixel=4&design=edge'")
-    tab.wait(before)
+    with tab.another_frame():
+        page.evaluate("location.hash = '#pixel=4&design=edge'")
     assert page.locator("#error").is_hidden()
     assert tab.is_quiet()

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 
 import pytest
@@ -14,7 +13,7 @@ from colonnade.design.generator import design_for
 from colonnade.design.toolchain import project_root
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 def test_verilog_is_clean() -> None:
     design = design_for("tiny")
     command = ["verilator", "--lint-only", "-Wall", str(project_root() / "tools" / "lint.vlt")]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import shutil
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -25,7 +24,6 @@ from colonnade.mesh.load import load_mesh
 from colonnade.scene.model import MeshSource, Scene
 from colonnade.scene_image.device_image import device_image
 
-NEEDS_SIMULATOR = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 SIZE = (20, 6)
 #: `test_shell.py` has the same design: its simulator is built once.
 CONFIG = ("tiny", ("array.columns=2",))
@@ -118,7 +116,7 @@ def frame_of(device: Device, packed: DeviceScene) -> tuple[np.ndarray, dict[str,
     return device.render(packed, SIZE), device.counters()
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 def test_all_transports_make_the_same_accesses_and_the_picture_is_the_models(
     design: GeneratedDesign, packed: DeviceScene, tmp_path: Path
 ) -> None:
@@ -150,7 +148,7 @@ def test_all_transports_make_the_same_accesses_and_the_picture_is_the_models(
     assert sum(one[:2] == ("write", CONTROL) for one in accesses[0]) == 2
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 @pytest.mark.parametrize("make", [ModelDevice, ShellDevice.simulated])
 def test_threads_that_share_a_device_have_their_own_pictures(
     make: Callable[..., Device], packed: DeviceScene, monkeypatch: pytest.MonkeyPatch
@@ -189,7 +187,7 @@ def test_a_memory_that_no_bus_has_is_refused(memory: int) -> None:
         ShellDevice.simulated(*CONFIG, memory=memory)
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 def test_a_device_says_what_is_wrong(design: GeneratedDesign, packed: DeviceScene, tmp_path: Path) -> None:
     """Its memory is a file from a bus address on, which has the image when it is loaded."""
     registers = packed.registers(SIZE)

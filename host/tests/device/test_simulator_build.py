@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -143,7 +142,7 @@ def test_a_path_that_make_does_not_accept_is_rejected(
     assert not any(folder.iterdir())
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 @pytest.mark.matrix
 def test_a_checkout_may_have_any_name(tmp_path: Path) -> None:
     place = tmp_path / "o'd d`touch pwn`;\"#:x\\y"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +12,7 @@ ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.matrix
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 @pytest.mark.parametrize(
     "command",
     [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -107,7 +106,7 @@ def test_model_and_reference_show_the_same_objects(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_hits(tmp_path / "h.npz").numbers(), hits.numbers())
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 def test_hardware_shows_the_objects_of_the_model(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(TWO)
     report = verify(tmp_path / "a.toml", "small", (), (), (96, 72))

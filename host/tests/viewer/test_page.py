@@ -65,7 +65,7 @@ def test_the_page_keeps_its_policy_and_saves_its_camera(page: Page, server: View
     page.mouse.move(500, 300, steps=4)
     page.mouse.up()
     page.keyboard.press("s")
-    expect(page.locator("#status")).to_have_text("The camera is in scene.toml.", timeout=30_000)
+    expect(page.locator("#status")).to_have_text("The camera is in scene.toml.")
     assert "position = [" in file.read_text() and text != file.read_text()
     page.reload()
     page.wait_for_selector("body[data-frames]")
@@ -93,7 +93,7 @@ def test_a_page_of_another_site_gets_nothing(
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Hostile) as hostile:
         threading.Thread(target=hostile.serve_forever, daemon=True).start()
         page.goto(f"http://127.0.0.1:{hostile.server_address[1]}/")
-        page.wait_for_function("window.found", timeout=30_000)
+        page.wait_for_function("window.found")
         assert not [name for name, value in page.evaluate("found").items() if value]
         for frame in page.frames[1:]:
             assert frame.locator("#picture").count() == 0

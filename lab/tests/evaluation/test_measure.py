@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,7 +33,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "measurements"
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 def test_cached_counters_are_used_unless_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = measured("cube")
     assert first["mesh"]["name"] == "cube"

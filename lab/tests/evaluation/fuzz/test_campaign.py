@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -29,8 +28,6 @@ from colonnade_lab.evaluation.fuzz.environments import environment_cases
 from colonnade_lab.evaluation.fuzz.registers import EXCLUDED, INTERVALS
 from colonnade_lab.evaluation.fuzz.simulator import SimulatedFrame, run_cases
 
-needs_verilator = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
-
 #: Configurations and their number of frames.
 DESIGNS = (("tiny", 120), pytest.param("small", 120, marks=pytest.mark.matrix))
 
@@ -51,7 +48,7 @@ PIPELINED = (
 )
 
 
-@needs_verilator
+@pytest.mark.verilator
 @pytest.mark.parametrize(("config", "frames"), DESIGNS)
 def test_corrupt_frames_equal_the_models_and_leave_no_state(config: str, frames: int) -> None:
     report = campaign.fuzz(design_for(config, ()), frames, seed=1)
@@ -63,7 +60,7 @@ def test_corrupt_frames_equal_the_models_and_leave_no_state(config: str, frames:
     assert counts["registers"]["changed"] > 0
 
 
-@needs_verilator
+@pytest.mark.verilator
 @pytest.mark.matrix
 @pytest.mark.parametrize(("config", "overrides", "frames"), SHAPES)
 def test_every_preset_agrees_with_its_model_on_corrupt_frames(
@@ -74,7 +71,7 @@ def test_every_preset_agrees_with_its_model_on_corrupt_frames(
     assert report["legal_failures"] == 0
 
 
-@needs_verilator
+@pytest.mark.verilator
 def test_pipelines_and_shared_triangle_units_agree_on_corrupt_frames() -> None:
     """Also on the error bit of a triangles record that is illegal: a unit's events depend on no input of the cycle."""
     report = campaign.fuzz(design_for("tiny", PIPELINED), 60, seed=1)
@@ -82,7 +79,7 @@ def test_pipelines_and_shared_triangle_units_agree_on_corrupt_frames() -> None:
     assert report["legal_failures"] == 0
 
 
-@needs_verilator
+@pytest.mark.verilator
 def test_inverted_bounds_are_as_empty_for_a_pipeline_as_for_the_model() -> None:
     """On each axis: the lower plane above the upper one, by much, by little, and by no more than the pads."""
     design = design_for("tiny", PIPELINED)
@@ -141,7 +138,7 @@ def test_records_of_another_page_are_those_of_its_lines() -> None:
     assert len(content) > 4096
 
 
-@needs_verilator
+@pytest.mark.verilator
 def test_a_wrong_model_is_found_and_its_frame_is_reproducible(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = campaign.model_frame
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 
 import numpy as np
@@ -83,7 +82,7 @@ def test_the_kind_reaches_registers_and_cube(manifest: Manifest, cases: tuple[Ca
     }
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 def test_hardware_and_model_agree_on_corrupt_frames_that_gather() -> None:
     """The campaign counts them. Long version: ``colonnade fuzz --config textured --frames 1000``."""
     report = fuzz(design_for("small", OPTIONS), 60, seed=1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +16,6 @@ from colonnade_lab.evaluation.fuzz.campaign import fuzz
 from colonnade_lab.evaluation.fuzz.corruption import KINDS, corrupt_case
 from colonnade_lab.evaluation.fuzz.environments import environment_cases
 
-NEEDS_SIMULATOR = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 FRAMES = 16
 SLIC = ("physicalAttributeMemory.encoding=slic",)
 
@@ -27,7 +25,7 @@ def manifest() -> Manifest:
     return manifest_for("small").manifest
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 @pytest.mark.parametrize("options", [(), pytest.param(SLIC, marks=pytest.mark.matrix)], ids=["two-level", "SLIC"])
 def test_hardware_and_model_agree_on_corrupt_maps(options: tuple[str, ...]) -> None:
     """Pixels, ratios, counters and error bits, and the legal frame after each. Long version:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -47,7 +46,7 @@ def recorded(cycles: int) -> dict[str, Recording]:
     return record("tiny", overrides, PORTS, Stimulus.of_benchmark("cube", (24, 18), cycles))
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 def test_recordings_are_of_one_unit_and_its_paths_from_the_first_to_the_last_cycle() -> None:
     whole = recorded(900)
     assert set(whole) == set(REPLAYED)
