@@ -1,16 +1,40 @@
-"""A frame of the RTL is that of the bit-exact model."""
+"""Frames of the RTL are those of the bit-exact model."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from colonnade.common.framebuffer import Frame
+from colonnade.design.generator import GeneratedDesign
+from colonnade.device.bit_exact import render_model
+from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.scene_image.file import SceneImage
+
+#: Beside `small`, for frames in a room, so that their tests have one simulator: gathered light, pipelines, two marches
+#: of maps that two columns share.
+IN_ROOM = (
+    *("frame.gather=true", "array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
+    *("units.marches=2", "physicalAttributeMemory.columnsPerCopy=2"),
+)
 
 
 def assert_equal(rtl: Frame, model: Frame) -> None:
     """Neither has errors; pixels, hits and the counters that do not depend on timing are the same."""
     assert rtl.errors == model.errors == []
     np.testing.assert_array_equal(rtl.colour, model.colour)
+    np.testing.assert_array_equal(rtl.ratio, model.ratio)
     np.testing.assert_array_equal(rtl.triangle, model.triangle)
     np.testing.assert_array_equal(rtl.distance, model.distance)
     assert {name: rtl.counters[name] for name in model.counters} == model.counters
+
+
+def equal_frames(
+    design: GeneratedDesign, image: SceneImage, registers: Sequence[Mapping[str, int]], stalls: Stalls
+) -> list[Frame]:
+    """The frames of the RTL, each of which is that of the model."""
+    frames = list(render_rtl(design, image, list(registers), stalls).frames)
+    for frame, settings in zip(frames, registers, strict=True):
+        assert_equal(frame, render_model(design.manifest, image, settings))
+    return frames

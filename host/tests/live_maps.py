@@ -12,6 +12,11 @@ from colonnade.maps.image import AttributeImage
 from colonnade.maps.live import encode_still
 from colonnade.maps.slic import encode_slic
 
+#: A design with maps of 96 by 72 pixels.
+SMALL_MAPS = tuple(
+    f"physicalAttributeMemory.{size}" for size in "width=96 height=72 mapBytes=4096 planeBytes=4096".split()
+)
+
 
 def live_maps(room: Path, manifest: Manifest) -> EncodedEnvironment:
     """The maps of the room in a folder, for a design; in a design with SLIC maps only the planes are the encoder's."""

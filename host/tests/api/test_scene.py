@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
+from live_maps import SMALL_MAPS
 
 import colonnade
 from colonnade.design.toolchain import project_root
@@ -124,8 +125,7 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
 def test_what_a_scene_leaves_open_is_a_warning_once_for_it(tmp_path: Path) -> None:
     """Whatever is rendered of it: frames, a film, or a change."""
     write_attic(tmp_path / "attic", 96, 72)
-    maps = ("width=96", "height=72", "mapBytes=4096", "planeBytes=4096")
-    options = {"overrides": [f"physicalAttributeMemory.{one}" for one in maps], "size": (96, 72), "encoder": "live"}
+    options = {"overrides": SMALL_MAPS, "size": (96, 72), "encoder": "live"}
     scene = colonnade.Scene("cube", background={"room": "attic"}, motion={"turn": 60.0}, folder=tmp_path)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -73,8 +73,14 @@ def begun() -> Iterator[list[subprocess.Popen[str]]]:
         process.kill()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU])
-@pytest.mark.parametrize(("kind", "programs"), [("pool", 4), ("alone", 2), ("busy", 0)])
+@pytest.mark.parametrize(
+    ("kind", "programs", "number"),
+    [
+        *(("pool", 4, number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)),
+        *((kind, programs, signal.SIGINT) for kind, programs in (("alone", 2), ("busy", 0))),
+        *((kind, programs, signal.SIGTERM) for kind, programs in (("alone", 2), ("busy", 0))),
+    ],
+)
 def test_a_signal_to_the_parent_ends_everything(
     kind: str, programs: int, number: signal.Signals, tmp_path: Path, begun: list[subprocess.Popen[str]]
 ) -> None:

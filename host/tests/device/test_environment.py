@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from colonnade_lab.evaluation.environment_march import DeviceMarch
 from colonnade_lab.evaluation.studies.ar_losses import PLACEMENTS
+from equal_frames import IN_ROOM, assert_equal, equal_frames
 from live_maps import live_maps
 
 from colonnade.common.types import Floats
@@ -46,7 +46,6 @@ from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 
 ROOMS = Path(__file__).parents[3] / "scenes" / "rooms"
-NEEDS_SIMULATOR = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 TABLE = Scene(
     MeshSource(name="teapot:4"),
     placement=Placement((322.0, 306.0), 0.58, 25.0),
@@ -69,7 +68,7 @@ STILL_ROOMS = (
 )
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 @pytest.mark.parametrize(
     ("kind", "options"),
     [
@@ -94,7 +93,7 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, 
     still = replace(scene, more_lights=(), paths=Paths(bounces=0))
     views = [(scene, True), (scene, False), (still, False), (beside, False)]
     registers: list[dict[str, int]] = [
-        frame_registers(view, image.header, design.manifest, 40, 30, held, relit) for view, relit in views
+        frame_registers(view, image.header, design.manifest, 24, 18, held, relit) for view, relit in views
     ]
     # A large offset shows on which side of the surface a ray starts
     registers.append(registers[1] | {"shading.offset": 64 * registers[1]["shading.offset"]})
@@ -102,19 +101,12 @@ def test_hardware_renders_the_rooms_of_the_model(kind: str, options: tuple[str, 
     sunk = frame_registers(sunken(scene, held, image.header.extent), image.header, design.manifest, 80, 60, held, False)
     assert sunk["environment.occlusion"] == 1
     registers += [sunk, sunk | {"environment.occlusionTolerance": 0}, sunk | {"environment.occlusion": 0}]
-    simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
-    for frame, settings in zip(simulated.frames, registers, strict=True):
-        model = render_model(design.manifest, image, settings)
-        assert frame.errors == model.errors == []
-        np.testing.assert_array_equal(frame.colour, model.colour)
-        np.testing.assert_array_equal(frame.ratio, model.ratio)
-        np.testing.assert_array_equal(frame.triangle, model.triangle)
-        assert {name: frame.counters[name] for name in model.counters} == model.counters
-    first = simulated.frames[0]
+    frames = equal_frames(design, image, registers, Stalls(20, 5))
+    first = frames[0]
     assert first.is_object.any()
     assert first.ratio is not None and first.ratio.min() < 4096, "there is a shadow"
     assert (first.counters["marchSteps"] > 0) == (kind != "diffuse")
-    hidden, exact, whole = simulated.frames[-3:]
+    hidden, exact, whole = frames[-3:]
     assert 0 < hidden.is_object.sum() < whole.is_object.sum()
     assert not (exact.is_object & ~hidden.is_object).any(), "a smaller tolerance hides more"
     for frame in (hidden, exact, whole):
@@ -163,7 +155,7 @@ MOVES = (
 )
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 @pytest.mark.parametrize("kind", [pytest.param("diffuse", marks=pytest.mark.matrix), "glass"])
 def test_hardware_sees_the_rooms_of_the_model_from_any_camera(kind: str) -> None:
     """Relit and in the shadow window, with an object that the room hides; and maps whose registers are any bits."""
@@ -193,24 +185,16 @@ def test_hardware_sees_the_rooms_of_the_model_from_any_camera(kind: str) -> None
             if name.startswith(("environment.matrix", "environment.offset", "environment.exponent"))
         }
         registers.append(registers[2] | wild)
-    simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
-    for frame, settings in zip(simulated.frames, registers, strict=True):
-        model = render_model(design.manifest, image, settings)
-        assert frame.errors == model.errors == []
-        np.testing.assert_array_equal(frame.colour, model.colour)
-        np.testing.assert_array_equal(frame.ratio, model.ratio)
-        np.testing.assert_array_equal(frame.triangle, model.triangle)
-        assert {name: frame.counters[name] for name in model.counters} == model.counters
-    assert all(frame.counters["marchSteps"] > 0 for frame in simulated.frames[:8:2])
-    hidden, whole = simulated.frames[2 * len(MOVES) : 2 * len(MOVES) + 2]
+    frames = equal_frames(design, image, registers, Stalls(20, 5))
+    assert all(frame.counters["marchSteps"] > 0 for frame in frames[:8:2])
+    hidden, whole = frames[2 * len(MOVES) : 2 * len(MOVES) + 2]
     assert 0 < hidden.is_object.sum() < whole.is_object.sum()
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 def test_a_room_after_an_abort_is_right() -> None:
     """Pixels are in all stages when the watchdog aborts: none is in the next frame."""
-    units = ("units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3", "units.marches=2")
-    design = design_for("small", ("array.rows=3", *units))
+    design = design_for("small", IN_ROOM)
     held = live_maps(ROOMS / "living", design.manifest)
     mesh, material = load_mesh("teapot:4"), Material(kind="glass")
     image = with_environment(
@@ -225,9 +209,7 @@ def test_a_room_after_an_abort_is_right() -> None:
     model = render_model(design.manifest, image, settings)
     assert model.is_object.any() and sum(frame.errors == ["watchdog"] for frame in frames) > 3
     for frame in frames[1::2]:
-        assert frame.errors == model.errors == []
-        np.testing.assert_array_equal(frame.colour, model.colour)
-        assert {name: frame.counters[name] for name in model.counters} == model.counters
+        assert_equal(frame, model)
 
 
 def sunken(scene: Scene, held: EncodedEnvironment, extent: Extent) -> Scene:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from equal_frames import IN_ROOM, equal_frames
 from live_maps import live_maps
 
 from colonnade.design.generator import design_for
@@ -23,10 +23,10 @@ from colonnade.scene_image.packer import pack
 
 ROOMS = Path(__file__).parents[3] / "scenes" / "rooms"
 GATHERS = ("units.shadeInterval=3", "frame.gather=true")
-#: As in `edge`: shared triangle units, pipelines, so many paths that a choice among them takes a cycle.
+#: As in `edge`: shared triangle units, so many paths that a choice among them takes a cycle.
 MANY = (
-    *("array.rows=4", "units.triangleRows=2", "units.triangleLanes=2", "units.pathContexts=64", "units.rayInterval=1"),
-    *("units.marches=2", "units.extraSlices=true"),
+    *("array.rows=4", "units.triangleRows=2", "units.triangleLanes=2", "units.pathContexts=64"),
+    "units.extraSlices=true",
 )
 SCENE = Scene(
     MeshSource(name="teapot:4"),
@@ -58,19 +58,22 @@ def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, i
     return registers | points | metal | facets | {"gather.bounces": bounces, "gather.parallax": seed % 4}
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 @pytest.mark.parametrize(
     ("options", "in_room"),
     [
-        (("physicalAttributeMemory=null", "array.columns=1", "geometry.arity=2", "frame.emission=true"), False),
-        ((), True),
-        pytest.param(MANY, True, marks=pytest.mark.matrix),
+        (
+            (*GATHERS, "physicalAttributeMemory=null", "array.columns=1", "geometry.arity=2", "frame.emission=true"),
+            False,
+        ),
+        (IN_ROOM, True),
+        pytest.param((*IN_ROOM, *MANY), True, marks=pytest.mark.matrix),
     ],
     ids=["one column", "in a room", "many paths in a room"],
 )
 def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_room: bool) -> None:
     """All kinds of materials, also where no bounce is traced; no, one and four gathered rays; a stalled sink."""
-    design = design_for("small", (*GATHERS, *options))
+    design = design_for("small", options)
     mesh = load_mesh("teapot:4")
     placed = replace(SCENE, placement=Placement((322.0, 306.0), 0.58), background=Background(room=ROOMS / "living"))
     scene, held = (placed, live_maps(ROOMS / "living", design.manifest)) if in_room else (SCENE, None)
@@ -94,16 +97,7 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
     if held is not None:
         for settings in registers[1::2]:
             settings["environment.boundingPlanes"] = 0  # Mirrors and glass see the cube
-    simulated = render_rtl(design, image, list(registers), Stalls(20, 5))
-    for frame, settings in zip(simulated.frames, registers, strict=True):
-        model = render_model(design.manifest, image, settings)
-        assert frame.errors == model.errors == []
-        np.testing.assert_array_equal(frame.triangle, model.triangle)
-        np.testing.assert_array_equal(frame.colour, model.colour)
-        if held is not None:
-            np.testing.assert_array_equal(frame.ratio, model.ratio)
-        assert {name: frame.counters[name] for name in model.counters} == model.counters
-    none, one, four, *_ = simulated.frames
+    none, one, four, *_ = equal_frames(design, image, registers, Stalls(20, 5))
     assert none.counters["raysGather"] == 0 < one.counters["raysGather"] < four.counters["raysGather"]
     assert (one.colour != none.colour).any(axis=2)[one.is_object].mean() > 0.3
     if one.ratio is not None and none.ratio is not None and four.ratio is not None:

@@ -22,7 +22,7 @@ from colonnade.render.composite import composited
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
 
-WIDTH, HEIGHT = 44, 33
+WIDTH, HEIGHT = 28, 21
 UNWRITTEN = 0xA5
 
 

@@ -44,7 +44,7 @@ from colonnade.scene_image.device_image import device_image, load_cycles, maps_i
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.packer import pack
 
-WIDTH, HEIGHT = 44, 33
+WIDTH, HEIGHT = 28, 21
 PAGE = 4096
 UNWRITTEN = 0xA5
 CACHE = {

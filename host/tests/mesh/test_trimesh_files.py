@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import logging
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +16,34 @@ from interchange_files import MESH, POINTS, SQUARE, TEXTURED, L, archive, dae, t
 from PIL import Image
 from textured_files import FOUR, png
 
+from colonnade.common import decoder_process
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
-from colonnade.mesh.files import trimesh_files
+from colonnade.mesh.files import trimesh_files, trimesh_program
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
+
+
+@pytest.fixture(autouse=True)
+def reader(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read in this process, since the start of another one takes a second; `test_hostile_meshes.py` starts it."""
+
+    def decode(module: str, *arguments: object, data: bytes) -> subprocess.CompletedProcess[bytes]:
+        out, errors, status = io.TextIOWrapper(io.BytesIO()), io.StringIO(), 0
+        with monkeypatch.context() as patch, warnings.catch_warnings():
+            patch.setattr(sys, "argv", [module, *map(str, arguments)])
+            patch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
+            patch.setattr(sys, "stdout", out)
+            patch.setattr(sys, "stderr", errors)
+            patch.setattr(logging.getLogger("trimesh"), "handlers", [])
+            patch.setattr(trimesh_program, "limit_this_process", lambda *_: None)
+            try:
+                trimesh_program._main()
+            except SystemExit as end:
+                status = int(end.code or 0)
+            return subprocess.CompletedProcess([], status, out.detach().getvalue(), errors.getvalue().encode())
+
+    monkeypatch.setattr(trimesh_files, "decode", decode)
 
 
 def loaded(folder: Path, name: str, content: bytes | str) -> Mesh:
@@ -240,6 +265,7 @@ def test_invalid_files_are_one_line(name: str, content: bytes | str, message: st
 
 
 def test_a_reader_that_does_not_start_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trimesh_files, "decode", decoder_process.decode)
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with pytest.raises(UserError, match="trimesh_program does not start: no reason given: install Colonnade"):
         loaded(tmp_path, "a.3mf", threemf())

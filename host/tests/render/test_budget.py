@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,7 +37,7 @@ def test_the_estimate_is_that_of_the_rtl() -> None:
         assert estimated_cycles(manifest, counters, True) == pytest.approx(counters["cycles"], rel=0.25)
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 def test_rtl_and_model_have_the_samples_of_one_budget(told: list[str]) -> None:
     scene = replace(GATHERS, frame=FrameSize(*SIZE, budget=3e-4))
     rtl, model = (render(RenderRequest(scene, "small", OPTIONS, backend)) for backend in ("rtl", "model"))

@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from live_maps import SMALL_MAPS
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -28,9 +29,6 @@ from colonnade.scene.parser import load_scene
 from colonnade.scene.view import make_view
 
 SIZE = (32, 24)
-#: An attribute memory for maps of this size.
-MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
-ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
 
 ALONE = """
 mesh.name = "teapot:2"
@@ -74,7 +72,7 @@ def same(one: RenderResult, other: RenderResult) -> bool:
 
 
 def in_environment(file: Path, backend: str, frames: int) -> list[RenderResult]:
-    return list(render_frames(RenderRequest(file, "small", ROOM, backend, (96, 72), frames, samples=1)))
+    return list(render_frames(RenderRequest(file, "small", SMALL_MAPS, backend, (96, 72), frames, samples=1)))
 
 
 @pytest.mark.parametrize("backend", ["model", "reference"])
@@ -92,7 +90,7 @@ def test_without_a_motion_the_object_turns_once(folder: Path) -> None:
     frames = in_environment(scene_file(folder, standing()), "model", 4)
     for index, frame in enumerate(frames):
         turned = scene_file(folder, standing(10.0 + 90.0 * index))
-        assert same(frame, render(RenderRequest(turned, "small", ROOM, "model", (96, 72), samples=1)))
+        assert same(frame, render(RenderRequest(turned, "small", SMALL_MAPS, "model", (96, 72), samples=1)))
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
 from colonnade_lab.evaluation.verify import equality, verify
+from live_maps import SMALL_MAPS
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
@@ -23,11 +23,7 @@ from colonnade.render.frames import render, render_frames
 from colonnade.render.request import Backend, RenderRequest
 from colonnade.render.result import RenderResult
 
-NEEDS_SIMULATOR = pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 SIZE = (40, 30)
-#: An attribute memory for maps of 96 by 72 pixels.
-MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
-ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
 
 EVERYTHING = """
 mesh.name = "teapot:3"
@@ -71,7 +67,7 @@ def of(file: Path, backend: Backend, samples: int | None = None, config: str = "
     return render(RenderRequest(file, config, (), backend, SIZE, samples=samples))
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 @pytest.mark.parametrize("config", ["tiny", "16b16s32d", pytest.param("24b20s40d", marks=pytest.mark.matrix)])
 def test_the_hardware_renders_the_passes_of_the_model(folder: Path, config: str) -> None:
     file = scene_file(folder, EVERYTHING)
@@ -83,7 +79,7 @@ def test_the_hardware_renders_the_passes_of_the_model(folder: Path, config: str)
     assert np.count_nonzero((rtl.sums.coverage > 0) & (rtl.sums.coverage < 5)) > 0
 
 
-@NEEDS_SIMULATOR
+@pytest.mark.verilator
 def test_verify_compares_frames_of_several_samples(folder: Path) -> None:
     file = scene_file(folder, SOFT + "frame.samples = 3\n")
     report = verify(file, "tiny", (), ["teapot:3"], SIZE)
@@ -116,7 +112,7 @@ def test_soft_shadows_converge_to_the_reference(folder: Path) -> None:
 @pytest.mark.parametrize("backend", ["model", "reference"])
 def test_frames_of_a_motion_are_exposed(folder: Path, backend: Backend) -> None:
     """The passes of each frame are the frames of its moments; the last frame rests."""
-    request = RenderRequest(scene_file(folder, STANDING), "small", ROOM, backend, (96, 72), 3)
+    request = RenderRequest(scene_file(folder, STANDING), "small", SMALL_MAPS, backend, (96, 72), 3)
     frames = list(render_frames(request))
     assert [frame.report.share for frame in frames] == [0.0, 0.5, 1.0]
     still = STANDING.replace(", shutter = 1.0", "")
@@ -134,12 +130,12 @@ def test_frames_of_a_motion_are_exposed(folder: Path, backend: Backend) -> None:
 def test_the_photo_shows_through_in_proportion(folder: Path) -> None:
     """Pixels without object and shadow are the photo; those at the object's edge mix it with the object."""
     file = scene_file(folder, STANDING)
-    result = render(RenderRequest(file, "small", ROOM, "model", (96, 72)))
+    result = render(RenderRequest(file, "small", SMALL_MAPS, "model", (96, 72)))
     assert result.sums.ratio is not None
     lit = (result.sums.coverage == 0) & (result.sums.ratio == 4 * 4096).all(axis=2)
     soft = (result.sums.ratio % 4096 != 0).any(axis=2) & (result.sums.coverage == 0)
     assert lit.any() and soft.any()
-    relit = render(RenderRequest(file, "small", ROOM, "model", (96, 72), relit=True))
+    relit = render(RenderRequest(file, "small", SMALL_MAPS, "model", (96, 72), relit=True))
     whole = result.sums.coverage == 4
     np.testing.assert_array_equal(result.image[whole], relit.image[whole])
     assert result.report.counters["raysPrimary"] == relit.report.counters["raysPrimary"]
@@ -149,7 +145,7 @@ def test_an_object_in_a_photo_has_several_samples_unless_named(folder: Path, tol
     """The default is that of four samples, and is reported; a mirror's salt and pepper goes."""
 
     def rendered(text: str, **options: Any) -> RenderResult:
-        return render(RenderRequest(scene_file(folder, text), "small", ROOM, "model", (96, 72), **options))
+        return render(RenderRequest(scene_file(folder, text), "small", SMALL_MAPS, "model", (96, 72), **options))
 
     still = re.sub(r"frame.samples = 4\n|, radius = 0.2|, shutter = 1.0", "", STANDING)
     result = rendered(still)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 from colonnade_lab.evaluation.studies.generated_rooms import generated_room
 from colonnade_lab.evaluation.studies.synthetic_attic import DEPTH_STEP, write_room
+from live_maps import SMALL_MAPS
 from PIL import Image
 
 from colonnade.capture.video import frames_of_video
@@ -44,9 +44,8 @@ from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
 
 SIZE, VIEWS, STEP, NOISE = (96, 72), 3, 0.2, 0.004
-#: An attribute memory for maps of this size.
-MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
-ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
+#: One unit, and an attribute memory for maps of this size.
+ROOM = ("array.rows=1", "array.columns=1", *SMALL_MAPS)
 SCENE = """
 mesh.name = "teapot:3"
 object.size = 0.5
@@ -237,7 +236,7 @@ def test_a_camera_of_a_capture_has_any_pose_and_lens(folder: Path) -> None:
     np.testing.assert_allclose(rays, camera.directions(*SIZE) @ camera.to_world[:, :3].T @ pose.rotation, atol=1e-9)
 
 
-@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+@pytest.mark.verilator
 @pytest.mark.parametrize("keyframes", [1, 2])
 def test_the_hardware_renders_the_frames_of_the_model(folder: Path, keyframes: int) -> None:
     common = {"size": (32, 24), "frames": 2, "keyframes": keyframes}

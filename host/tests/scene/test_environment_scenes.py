@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
+from live_maps import SMALL_MAPS
 
 from colonnade.cli.main import cli
 from colonnade.common.image_io import encode_srgb
@@ -25,9 +26,6 @@ from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
 
 SIZE = (96, 72)
-#: An attribute memory for maps of this size.
-MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
-ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
 
 IN_ATTIC = 'mesh.name = "teapot:4"\nbackground.room = "attic"\n'
 STANDING = IN_ATTIC + "object = {stand_at = [48, 43], size = 0.6}\n"
@@ -44,8 +42,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def both(folder: Path, text: str) -> tuple[RenderResult, RenderResult]:
     """The frames of the model and of the reference."""
     (folder / "scene.toml").write_text(text)
-    model = render(RenderRequest(folder / "scene.toml", "small", ROOM, "model", SIZE, relit=True))
-    return model, render(RenderRequest(folder / "scene.toml", "small", ROOM, "reference", SIZE, relit=True))
+    model = render(RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, "model", SIZE, relit=True))
+    return model, render(RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, "reference", SIZE, relit=True))
 
 
 def assert_alike(model: RenderResult, reference: RenderResult) -> None:
@@ -158,7 +156,7 @@ def test_what_cannot_be_is_one_line(
     folder: Path, tmp_path: Path, text: str, options: tuple[str, ...], message: str
 ) -> None:
     (folder / "scene.toml").write_text(text)
-    sets = [word for override in ROOM for word in ("--set", override)]
+    sets = [word for override in SMALL_MAPS for word in ("--set", override)]
     hardware = () if "--config" in options else ("--config", "small", *sets)
     common = ["render", str(folder / "scene.toml"), "--backend", "model", *hardware, *options]
     result = CliRunner().invoke(cli, [*common, "--output", str(tmp_path / "f.png")])

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 from click.testing import CliRunner
 from colonnade_lab.evaluation.studies.synthetic_attic import attic, write_attic
+from live_maps import SMALL_MAPS
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
@@ -31,9 +32,6 @@ from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
 
 SIZE = (96, 72)
-#: An attribute memory for maps of this size.
-MEMORY = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
-ROOM = tuple(f"physicalAttributeMemory.{key}={value}" for key, value in MEMORY.items())
 
 MIRROR = """
 mesh.name = "teapot:4"
@@ -57,7 +55,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def frame(folder: Path, text: str, backend: str = "model", **options: object) -> RenderResult:
     (folder / "scene.toml").write_text(text)
-    return render(RenderRequest(folder / "scene.toml", "small", ROOM, backend, SIZE, **{"samples": 1, **options}))
+    return render(RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, backend, SIZE, **{"samples": 1, **options}))
 
 
 def decibels(one: RenderResult, other: RenderResult, mask: np.ndarray | None = None) -> float:
@@ -161,7 +159,7 @@ def test_corners_of_faces_are_packed_darker_by_the_headroom(folder: Path, monkey
     packed: list[object] = []
     whole = device_scene.pack
     monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given[-2]) or whole(*given))
-    prepared = DeviceScene.of(load_scene(folder / "scene.toml"), manifest_for("small", ROOM).manifest)
+    prepared = DeviceScene.of(load_scene(folder / "scene.toml"), manifest_for("small", SMALL_MAPS).manifest)
     assert packed == [prepared.scene.headroom] and prepared.scene.headroom > 1
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from colonnade_lab.evaluation.studies.synthetic_attic import write_attic
+from live_maps import SMALL_MAPS
 
 from colonnade.cli.main import cli
 from colonnade.design.manifest import Manifest
@@ -75,8 +76,7 @@ def test_an_image_of_maps_is_the_device_image_without_the_scene(hardware: Manife
 def test_pack_writes_the_maps_of_a_room_alone(tmp_path: Path) -> None:
     write_attic(tmp_path / "attic", 96, 72)
     (tmp_path / "scene.toml").write_text('mesh.name = "cube"\n')
-    memory = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
-    settings = [word for key, value in memory.items() for word in ("--set", f"physicalAttributeMemory.{key}={value}")]
+    settings = [word for override in SMALL_MAPS for word in ("--set", override)]
     command = ["pack", tmp_path / "scene.toml", "--output", tmp_path / "out", "--encoder", "live", *settings]
     files = ["--device-image", tmp_path / "image", "--maps-image", tmp_path / "maps"]
 

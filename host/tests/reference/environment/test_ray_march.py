@@ -153,7 +153,7 @@ def test_the_device_passes_closely_behind_a_thin_board(gap: float, passes: bool)
 
 
 def test_the_command_prints_a_table_and_writes_json(tmp_path: Path) -> None:
-    write_attic(tmp_path / "attic", 160, 120)
+    write_attic(tmp_path / "attic", 96, 72)
     output = tmp_path / "r.json"
     result = CliRunner().invoke(cli, ["study", "rays", str(tmp_path / "attic"), "--json", str(output)])
     assert result.exit_code == 0, result.output

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 from colonnade.design.generator import design_for
 from colonnade.environment.sequence import load_sequence
 from colonnade.scene.parser import load_scene
+from live_maps import SMALL_MAPS
 
 from colonnade_lab.evaluation.demonstration import measure, walk
 from colonnade_lab.evaluation.demonstration.measure import FrameCost
@@ -18,8 +18,7 @@ from colonnade_lab.evaluation.studies.synthetic_attic import RoomModel, attic_pa
 from colonnade_lab.report.live_page import MEGAHERTZ, Energy, Way, figures, page
 
 SIZE = (96, 72)
-ROOM = tuple(f"physicalAttributeMemory.{key}" for key in ("width=96", "height=72", "mapBytes=4096", "planeBytes=4096"))
-SINGLE = ("array.rows=1", "array.columns=1", *ROOM)
+SINGLE = ("array.rows=1", "array.columns=1", *SMALL_MAPS)
 
 
 def test_the_camera_loops_by_30_centimetres_and_10_degrees() -> None:
@@ -42,9 +41,7 @@ def test_photos_have_soft_edges_and_exact_maps() -> None:
     assert np.abs(view.photo.astype(int) - hard.photo).mean() < 25
 
 
-@pytest.mark.parametrize(
-    "rtl", [[], pytest.param([1], marks=pytest.mark.skipif(shutil.which("verilator") is None, reason="no Verilator"))]
-)
+@pytest.mark.parametrize("rtl", [[], pytest.param([1], marks=pytest.mark.verilator)])
 def test_costs_of_frames(tmp_path: Path, rtl: list[int]) -> None:
     sequence = load_sequence(walk.write_walk(tmp_path, SIZE, 3))
     (tmp_path / "scene.toml").write_text(walk.walk_scene(*SIZE))

@@ -31,10 +31,9 @@ def test_furniture_hides_the_object_behind_it() -> None:
 
 def test_thin_things_hide_the_object_behind_them() -> None:
     """Cells of one pixel hold stems, leaves and rungs."""
-    for seed in REPORT[:2]:
-        case = replace(behind_thin_things(seed), mesh="teapot:4")
-        result = measure(case, case.room("thin", *SIZE), load_mesh(case.mesh))
-        assert result.pixels > 200 and result.right >= 0.98 > result.without
+    case = replace(behind_thin_things(REPORT[0]), mesh="teapot:4")
+    result = measure(case, case.room("thin", *SIZE), load_mesh(case.mesh))
+    assert result.pixels > 200 and result.right >= 0.98 > result.without
 
 
 def test_the_reference_hides_what_furniture_hides() -> None:

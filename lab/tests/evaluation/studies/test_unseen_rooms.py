@@ -83,7 +83,7 @@ def test_the_commands_refuse_bad_seeds() -> None:
 
 def test_a_room_is_measured() -> None:
     """Right and wrong rays are all rays, and the maps fit the memory."""
-    report = measure_seed(3, with_dists=False, size=(320, 240))
+    report = measure_seed(3, with_dists=False, size=(160, 120))
     assert report.kind == "lean-to" and report.rays > 1000 and report.dists is None
     assert min(report.full, report.planes, report.device, report.true) > 0.9
     np.testing.assert_allclose(report.device + sum(report.causes.values()), 1.0)
