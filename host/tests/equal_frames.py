@@ -12,6 +12,13 @@ from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.scene_image.file import SceneImage
 
+#: Limits of the frames, and banks that can be stalled.
+HELD = ("columnBvhMemory.holdable=true", "frame.maxBounces=4", "frame.lights=2")
+#: Beside `tiny`: three units, two of which share two triangle units, and pipelines for all rays of a column.
+PIPELINED = (
+    *("array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
+    *("units.triangleRows=2", "units.triangleLanes=2", *HELD),
+)
 #: Beside `small`, for frames in a room, so that their tests have one simulator: gathered light, pipelines, two marches
 #: of maps that two columns share.
 IN_ROOM = (

@@ -10,10 +10,10 @@ import numpy.typing as npt
 import pytest
 from colonnade_lab.evaluation.fuzz.cases import coloured, textured
 from colonnade_lab.evaluation.throughput import figures, records_taken
-from equal_frames import equal_frames
+from equal_frames import PIPELINED, equal_frames
 
 from colonnade.common.errors import UserError
-from colonnade.design.generator import GeneratedDesign, design_for, manifest_for
+from colonnade.design.generator import design_for, manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
@@ -140,10 +140,8 @@ def test_mirrors_glass_and_lights_equal_the_model(
     assert (counters["raysRefraction"] > 0) == (material.kind == "glass")
 
 
-@pytest.fixture(scope="module")
-def holdable() -> GeneratedDesign:
-    """Three units with two banks that can be stalled."""
-    return design_for("tiny", ("array.rows=3", "columnBvhMemory.holdable=true"))
+#: Three units with two banks that can be stalled.
+HOLDABLE = ("array.rows=3", "columnBvhMemory.holdable=true")
 
 
 @pytest.mark.parametrize(
@@ -156,8 +154,9 @@ def holdable() -> GeneratedDesign:
     ],
     ids=str,
 )
-def test_random_memory_latency_changes_only_time(holdable: GeneratedDesign, stalls: Stalls) -> None:
+def test_random_memory_latency_changes_only_time(stalls: Stalls) -> None:
     """With random stalls of banks and sink, frames equal the model's and take longer."""
+    holdable = design_for("tiny", HOLDABLE)
     image = pack(load_mesh("teapot:3"), holdable.manifest)
     flat = replace(TEAPOT, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True))
     registers = [frame_registers(view, image.header, holdable.manifest, 40, 30) for view in (TEAPOT, flat)]
@@ -167,13 +166,18 @@ def test_random_memory_latency_changes_only_time(holdable: GeneratedDesign, stal
         assert frame.counters["cycles"] > 1.05 * quicker.counters["cycles"]
 
 
-@pytest.mark.parametrize("stalls", [Stalls(), Stalls(percent=40, memory_percent=60, seed=2)], ids=str)
-def test_counters_account_for_every_cycle_and_record(holdable: GeneratedDesign, stalls: Stalls) -> None:
+@pytest.mark.parametrize(
+    ("options", "stalls"),
+    [(HOLDABLE, Stalls()), (HOLDABLE, Stalls(percent=40, memory_percent=60, seed=2)), (PIPELINED, Stalls())],
+    ids=["sequential", "stalled", "pipelines"],
+)
+def test_counters_account_for_every_cycle_and_record(options: tuple[str, ...], stalls: Stalls) -> None:
     """Each context is in one state, units are busy at most all cycles, and each record taken has a reason."""
-    image = pack(load_mesh("teapot:3"), holdable.manifest)
-    settings = frame_registers(TEAPOT, image.header, holdable.manifest, 40, 30)
-    frame = render_rtl(holdable, image, [settings], stalls).frames[0]
-    report = frame_report("rtl", holdable.manifest, image.header, frame).as_json()
+    design = design_for("tiny", options)
+    image = pack(load_mesh("teapot:3"), design.manifest)
+    settings = frame_registers(TEAPOT, image.header, design.manifest, 40, 30)
+    frame = render_rtl(design, image, [settings], stalls).frames[0]
+    report = frame_report("rtl", design.manifest, image.header, frame).as_json()
     found, counters = figures(report), report["counters"]
     assert all(0 < share < 1 for share in found["stalls"].values()), found["stalls"]
     assert all(0 < share < 1 for share in found["utilisation"].values()), found["utilisation"]

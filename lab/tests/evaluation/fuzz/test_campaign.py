@@ -18,6 +18,7 @@ from colonnade.design.generator import design_for, manifest_for
 from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.device.verilator import render_rtl
 from colonnade.scene_image.dram_image import dram_image, line_layout
+from equal_frames import PIPELINED
 
 from colonnade_lab.evaluation.fuzz import campaign
 from colonnade_lab.evaluation.fuzz.cases import legal_cases
@@ -33,19 +34,6 @@ DESIGNS = (("tiny", 120), pytest.param("small", 120, marks=pytest.mark.matrix))
 
 #: The shape of each preset with one column, and frames.
 SHAPES = tuple((config, ("array.columns=1",), 240) for config in ("tiny", "small", "edge", "lean", "diffuse", "fpga"))
-
-#: Pipelines for all rays of a column, as in `test_path_unit`.
-PIPELINED = (
-    *(
-        "array.rows=3",
-        "units.pathContexts=24",
-        "units.rayInterval=1",
-        "units.shadeInterval=3",
-        "units.triangleRows=2",
-        "units.triangleLanes=2",
-    ),
-    *("columnBvhMemory.holdable=true", "frame.maxBounces=4", "frame.lights=2"),
-)
 
 
 @pytest.mark.verilator

@@ -198,8 +198,11 @@ class ColonnadeAxiSpec extends AnyFlatSpec with OneSimulation {
   }
 
   inOneSimulation(new ColonnadeAxi(config, shell, new FakePathTracer(_)))(
-    "identify itself, refuse accesses that mean nothing, and interrupt while an enabled status bit is set" -> onBench(1)(registers),
-    "load images and write frames, one after the other, and refuse images by name" -> onBench(3)(loadsAndFrames),
-    "refuse a misaligned framebuffer, end a frame whose writes fail, and recover by a soft reset" -> onBench(5)(errorsAndResets)
+    "identify itself, refuse accesses that mean nothing, and interrupt while an enabled status bit is set" ->
+      onBench(1)(registers),
+    "load images and write frames, one after the other, and refuse images by name" ->
+      onBench(3)(loadsAndFrames),
+    "refuse a misaligned framebuffer, end a frame whose writes fail, and recover by a soft reset" ->
+      onBench(5)(errorsAndResets)
   )
 }

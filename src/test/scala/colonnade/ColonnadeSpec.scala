@@ -89,7 +89,7 @@ class ColonnadeSpec extends AnyFlatSpec with OneSimulation {
     val (pixels, cycles) = device.frame { () =>
       cycle += 1
       dut.io.load.ready.expect(false)
-      cycle > 1000
+      cycle > 1000 * configuration.array.columns
     }(read)
     assert(pixels.size == 16 && cycles > 1000)
     assert(device.read("errors.watchdog") == 0)

@@ -41,9 +41,10 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     banks                     <- Seq(1, 2)
     snooping                  <- Seq(true, false)
   } {
+    val name = s"serve $contexts contexts from $banks banks and $recordBuffers buffers, snooping $snooping"
     // `make test` has each pair of values
     val tag = Always.unless((banks == 2) ^ snooping ^ contexts == 4)
-    it should s"serve $contexts contexts from $banks banks and $recordBuffers buffers, snooping $snooping" taggedAs tag in {
+    it should name taggedAs tag in {
       val config = variant(contexts, banks, snooping, recordBuffers)
       test(new RecordFetch(config)).withAnnotations(Simulation.verilator) { dut =>
         new Column(dut, config, new Random(contexts * 10 + banks)).run(fetches = 200)
@@ -62,9 +63,10 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   for {
     (contexts, recordBuffers) <- Seq((1, 1), (4, 1), (6, 2), (6, 4))
     extraSlices               <- Seq(false, true)
-  }
-    it should s"serve $contexts contexts and $recordBuffers buffers when records come later, extra slices $extraSlices" taggedAs
-      Always.unless(extraSlices ^ contexts + recordBuffers != 5 ^ recordBuffers == 4) in {
+  } {
+    val later = s"$contexts contexts and $recordBuffers buffers when records come later"
+    val tag   = Always.unless(extraSlices ^ contexts + recordBuffers != 5 ^ recordBuffers == 4)
+    it should s"serve $later, extra slices $extraSlices" taggedAs tag in {
       val plain  = variant(contexts, banks = 2, snooping = true, recordBuffers)
       val shape  = if (extraSlices) withExtraSlices(plain) else plain
       val cached = TestConfigs.withCache().columnBvhMemory.cache
@@ -73,6 +75,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
         new Column(dut, config, new Random(contexts)).run(fetches = 300)
       }
     }
+  }
 
   it should "report an address outside the section of its kind and request every other one" in {
     val config = variant(contexts = 1, banks = 1, snooping = true)
