@@ -91,7 +91,7 @@ def reference(painting: int, kind: Kind) -> np.ndarray:
     return encode_srgb(render_reference(mesh, view).image)
 
 
-def shown(mesh: Mesh, config: str, overrides: tuple[str, ...], material: Material) -> np.ndarray:
+def device_frame(mesh: Mesh, config: str, overrides: tuple[str, ...], material: Material) -> np.ndarray:
     """The model's frame."""
     device = render_model(replace(SCENE, material=material), mesh, manifest_for(config, overrides).manifest, SIZE)
     return encode_srgb(device.image)
@@ -103,7 +103,7 @@ def test_the_device_shows_the_texture_of_the_reference(config: str) -> None:
     kinds: tuple[Kind, ...] = ("diffuse", "mirror", "glass")
     for kind in kinds:
         found, plain = (
-            psnr(reference(256, kind), shown(sphere(256), config, options, Material(kind=kind)))
+            psnr(reference(256, kind), device_frame(sphere(256), config, options, Material(kind=kind)))
             for options in (settings(16384), ())
         )
         print(f"{config}, {kind}: {found:.1f} dB, {plain:.1f} dB with one colour")
@@ -112,7 +112,7 @@ def test_the_device_shows_the_texture_of_the_reference(config: str) -> None:
 
 def test_more_bytes_keep_more_of_a_texture() -> None:
     mesh, sizes = sphere(1024), (5632, 16384, 21632)
-    frames = [shown(mesh, "32b32s64d", settings(size), Material(kind="diffuse")) for size in sizes]
+    frames = [device_frame(mesh, "32b32s64d", settings(size), Material(kind="diffuse")) for size in sizes]
     found = [psnr(reference(1024, "diffuse"), frame) for frame in frames]
     print("dB in 5,632, 16,384 and 21,632 bytes: " + ", ".join(f"{one:.1f}" for one in found))
     assert found == sorted(found) and found[-1] > found[0] + 1.0
@@ -125,6 +125,6 @@ def test_a_duck_shows_its_coat(tmp_path: Path) -> None:
     assert mesh.textures[0].size == (1024, 1024)
     view = make_view(SCENE, mesh.extent, *SIZE, mesh.materials)
     expected = encode_srgb(render_reference(mesh, view).image)
-    found = psnr(expected, shown(mesh, "32b32s64d", settings(16384), Material()))
+    found = psnr(expected, device_frame(mesh, "32b32s64d", settings(16384), Material()))
     print(f"duck, a picture of 3,145,728 bytes in 16,384: {found:.1f} dB")
     assert found > 22.0
