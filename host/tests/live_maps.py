@@ -9,6 +9,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.environment.load import load_environment
 from colonnade.maps.encoded import EncodedEnvironment, layout_of
 from colonnade.maps.image import AttributeImage
+from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import encode_still
 from colonnade.maps.slic import encode_slic
 
@@ -18,8 +19,18 @@ SMALL_MAPS = tuple(
 )
 
 
+_MADE: dict[tuple[Path, AttributeLayout], EncodedEnvironment] = {}
+
+
 def live_maps(room: Path, manifest: Manifest) -> EncodedEnvironment:
-    """The maps of the room in a folder, for a design; in a design with SLIC maps only the planes are the encoder's."""
+    """The maps of the room in a folder, made once; in a design with SLIC maps only the planes are the encoder's."""
+    key = room, layout_of(manifest)
+    if key not in _MADE:
+        _MADE[key] = _made(room, manifest)
+    return _MADE[key]
+
+
+def _made(room: Path, manifest: Manifest) -> EncodedEnvironment:
     environment, layout = load_environment(room), layout_of(manifest)
     if layout.encoding == "twoLevel":
         return EncodedEnvironment.of(environment, manifest, "live")
