@@ -99,7 +99,7 @@ class ColonnadeSpec extends AnyFlatSpec with OneSimulation {
   for ((rows, columns, banks, latency) <- Seq((1, 1, 1, 1), (3, 2, 2, 1), (2, 3, 4, 4))) {
     val configuration = config(rows, columns, banks, latency)
     val errors        = Seq(
-      "end a frame that hangs with an error, and render the next one" -> hanging(configuration) _,
+      "end a frame that hangs with an error, and render the next one"    -> hanging(configuration) _,
       "not abort a frame whose sink stalls, nor load while a frame runs" -> stalled(configuration) _
     )
     inOneSimulation(new Colonnade(configuration, new FakePathTracer(_)))(

@@ -26,10 +26,10 @@ trait OneSimulation extends ChiselScalatestTester { this: AnyFlatSpec =>
   private def folder(name: String) = TargetDirAnnotation(s"test_run_dir/${getClass.getSimpleName}_${name.hashCode}")
 
   private def clear(port: Data): Unit = port match {
-    case parts: Aggregate => parts.getElements.foreach(clear)
+    case parts: Aggregate                                                       => parts.getElements.foreach(clear)
     case leaf: Element if DataMirror.directionOf(leaf) == ActualDirection.Input =>
       leaf match {
-        case bool:   Bool => bool.poke(false)
+        case bool: Bool   => bool.poke(false)
         case number: UInt => number.poke(0)
         case number: SInt => number.poke(0)
         case other        => throw new IllegalArgumentException(s"an input of type $other")
