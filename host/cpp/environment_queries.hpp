@@ -105,7 +105,7 @@ private:
         Reply reply;
         reply << static_cast<int>(point.kind) << point.x << point.y << point.entry << point.isHidden;
         reply << point.travel << point.travelExponent << point.steps;
-        if (point.kind == EnvironmentPoint::Kind::miss) return reply.all(std::array<int, 10>{}) << point.isIllegal;
+        if (point.kind == HitKind::miss) return reply.all(std::array<int, 10>{}) << point.isIllegal;
         const EnvironmentTexel texel = march.texelOf(point, view);
         return reply.all(march.hitPosition(origin, direction, point))
                    .all(texel.albedo)

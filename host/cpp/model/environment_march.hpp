@@ -58,7 +58,7 @@ public:
             miss.isIllegal = cell.isIllegal;
             return miss;
         }
-        point.kind = EnvironmentPoint::Kind::map;
+        point.kind = HitKind::map;
         const Normalised fall = normalise(UnsignedWide(dir), f_), rate = normalise(UnsignedWide(w) * fall.mantissa, f_);
         point.travel = reciprocal(rate.mantissa);
         point.travelExponent = 1 + f_ - rate.exponent - fall.exponent + view.exponent;
@@ -67,7 +67,7 @@ public:
 
     /// Albedo and normal of a point, the normal rotated to object space.
     EnvironmentTexel texelOf(const EnvironmentPoint& point, const EnvironmentView& view) const {
-        const bool isBoundingPlane = point.kind == EnvironmentPoint::Kind::boundingPlane;
+        const bool isBoundingPlane = point.kind == HitKind::boundingPlane;
         const Rgb12 albedo = isBoundingPlane ? image_.boundingPlane(point.entry).albedo : image_.albedoAt(point.x, point.y);
         const Normal12 normal = isBoundingPlane ? image_.boundingPlane(point.entry).normal : image_.normalAt(point.x, point.y);
         EnvironmentTexel texel{{albedo.r, albedo.g, albedo.b}, {}, albedo.isIllegal || normal.isIllegal};
@@ -91,7 +91,7 @@ public:
     /// Whether a point of the map hides a hit of the object on the same ray, `distance` grid steps away along the dominant axis. A point that
     /// is in contact with the hit, or with the start of a bounced ray, hides nothing; neither does one that the camera does not see.
     bool hides(const EnvironmentPoint& point, const Vector& direction, Wide distance, bool isDirectView, const EnvironmentView& view) const {
-        if (point.kind != EnvironmentPoint::Kind::map || point.isHidden) return false;
+        if (point.kind != HitKind::map || point.isHidden) return false;
         Wide travelled = 0;
         for (const Wide way : wayTo(direction, point)) travelled = std::max(travelled, way < 0 ? ~way : way);
         return travelled + view.occlusionTolerance < distance && (isDirectView || travelled > view.occlusionTolerance);
@@ -122,10 +122,10 @@ private:
                 bestQuotient = normalised.mantissa;
                 bestExponent = length;
                 point.entry = i;
-                point.kind = EnvironmentPoint::Kind::boundingPlane;
+                point.kind = HitKind::boundingPlane;
             }
         }
-        if (point.kind == EnvironmentPoint::Kind::miss) return;
+        if (point.kind == HitKind::miss) return;
         // travel = distance / dir · p2
         const Normalised depth = normalise(magnitude(ray.from[2]), f_);
         const Normalised rate = normalise(bestQuotient, f_);

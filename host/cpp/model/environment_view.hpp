@@ -34,10 +34,13 @@ struct EnvironmentTexel {
     bool isIllegal;
 };
 
+/// What of the environment a ray hits.
+enum class HitKind { miss, map, boundingPlane };
+
 /// The point where a ray hits the environment, with the albedo and normal of pixel (x, y) or of a bounding plane's entry. Its distance from
 /// the origin is travel · 2^travelExponent ray directions. `isHidden`: the point is on the extension of an occluded surface.
 struct EnvironmentPoint {
-    enum class Kind { miss, map, boundingPlane } kind;
+    HitKind kind;
     int x, y, entry;
     bool isHidden;
     std::int64_t travel;

@@ -192,7 +192,7 @@ private:
 
     /// Completes the point of a hit.
     bool reportHit(const MapRay& ray, const EnvironmentView& view, const MarchState& state, EnvironmentPoint& point) const {
-        point.kind = EnvironmentPoint::Kind::map;
+        point.kind = HitKind::map;
         point.isHidden = state.isBehind;
         // A hidden hit takes the last visible pixel of its plane
         const std::array<int, 2> pixel = state.isBehind ? pixelOf(ray, state.first) : std::array<int, 2>{pixelOf(ray, 0, state.hitS, sizes_.width), pixelOf(ray, 1, state.hitS, sizes_.height)};
