@@ -19,9 +19,9 @@ final class HitResolver(
   import m.formats._
   import m.program._
 
-  val kind:          UInt = Reg(UInt(HitKind.bits.W))
-  val boundingPlane: UInt = Reg(UInt(layout.boundingPlaneIndexBits.W))
-  val exponent:      SInt = Reg(SInt(shiftBits.W)) // the distance is quotient · 2^exponent times the scaled direction
+  val kind:          HitKind.Type = Reg(HitKind())
+  val boundingPlane: UInt         = Reg(UInt(layout.boundingPlaneIndexBits.W))
+  val exponent: SInt = Reg(SInt(shiftBits.W)) // the distance is quotient · 2^exponent times the scaled direction
 
   val index: UInt = Reg(UInt(view.boundingPlanes.getWidth.W)) // of a bounding plane, or of a plane of the frustum
 
@@ -33,7 +33,7 @@ final class HitResolver(
 
   /** In a step: nothing is hit yet. */
   def clear(): Unit = {
-    set(kind, HitKind.miss.U)
+    set(kind, HitKind.miss)
     set(exponent, 0.S)
     set(boundingPlane, 0.U)
     set(m.quotient, 0.U)
@@ -41,8 +41,8 @@ final class HitResolver(
 
   /** Connects the result, which is valid in `Finish`. */
   def result(to: MarchResult): Unit = {
-    val isMap  = kind === HitKind.map.U
-    val isMiss = kind === HitKind.miss.U
+    val isMap  = kind === HitKind.map
+    val isMiss = kind === HitKind.miss
     to.kind             := kind
     to.x                := Mux(isMap, hitPixel.x, 0.U)
     to.y                := Mux(isMap, hitPixel.y, 0.U)
@@ -61,7 +61,7 @@ final class HitResolver(
     }
     step(HitDistance) {
       m.multiply(hitDistance.zext, m.uvwDir(2))
-      set(kind, HitKind.map.U)
+      set(kind, HitKind.map)
       texel.requestPixel()
     }
     step(set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct)))
@@ -117,9 +117,9 @@ final class HitResolver(
     step {
       val quotient = Mux(m.quotient(f), m.quotient, (m.quotient << 1)(f, 0))
       val rate     = m.exponents(0).zext - m.exponent.zext +& Mux(m.quotient(f), (f + 1).S, f.S)
-      val isFirst  = kind === HitKind.miss.U && !request.isFromCamera
+      val isFirst  = kind === HitKind.miss && !request.isFromCamera
       val isNearer = isFirst || rate > rateExponent || (rate === rateExponent && quotient > rateMantissa)
-      set(kind, HitKind.boundingPlane.U, !request.isFromCamera)
+      set(kind, HitKind.boundingPlane, !request.isFromCamera)
       set(rateMantissa, quotient, isNearer)
       set(rateExponent, rate, isNearer)
       set(boundingPlane, index, isNearer && !request.isFromCamera)
@@ -129,7 +129,7 @@ final class HitResolver(
       branch(ClipPlane.when(request.isFromCamera, "from a camera"), BoundingPlane.otherwise)
     }
     step(BoundingPlanesDone) {
-      val isMiss = kind === HitKind.miss.U
+      val isMiss = kind === HitKind.miss
       texel.requestBoundingPlane(boundingPlane, !isMiss)
       branch(Finish.when(isMiss, "miss"), Repeat.until(texel.isRequested, "planes.req is ready"))
     }

@@ -31,13 +31,9 @@ object HitDistance {
   def apply(config: PathConfig): UInt = UInt((config.numbers.sceneBits + 1).W)
 }
 
-/** Kinds of [[MarchResult]]. */
-object HitKind {
-  val bits: Int = 2
-
-  val miss:          Int = 0
-  val map:           Int = 1
-  val boundingPlane: Int = 2
+/** What of the environment a ray hits. */
+object HitKind extends ChiselEnum {
+  val miss, map, boundingPlane = Value
 }
 
 /** The point of the environment that a ray hits. Fields that do not belong to its kind are 0. */
@@ -46,7 +42,7 @@ final class MarchResult(config: PathConfig) extends Bundle {
   private val layout  = AttributeLayout.of(config)
 
   val context = Context(config)
-  val kind    = UInt(HitKind.bits.W) // see HitKind
+  val kind    = HitKind()
 
   /** `map`: the pixel with the point's albedo and normal. */
   val x = UInt(layout.xBits.W)

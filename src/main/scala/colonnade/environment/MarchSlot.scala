@@ -38,7 +38,7 @@ final class MarchSlot(config: PathConfig) extends Module {
   io.answer.valid                := result.valid
   io.answer.bits.isOcclusionTest := order.request.isOcclusionTest
   io.answer.bits.isHit           :=
-    Mux(order.request.isOcclusionTest, result.bits.hidesObject, result.bits.kind =/= HitKind.miss.U)
+    Mux(order.request.isOcclusionTest, result.bits.hidesObject, result.bits.kind =/= HitKind.miss)
   surface.context := result.bits.context
   surface.point   := result.bits.point
   surface.normal  := result.bits.normal

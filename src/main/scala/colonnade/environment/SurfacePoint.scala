@@ -39,8 +39,8 @@ final class SurfacePoint(
 
   /** Connects the result, which is valid in `Finish`. */
   def result(to: MarchResult): Unit = {
-    val isHit  = resolver.kind =/= HitKind.miss.U
-    val isSeen = resolver.kind === HitKind.map.U && !stepper.isBehind
+    val isHit  = resolver.kind =/= HitKind.miss
+    val isSeen = resolver.kind === HitKind.map && !stepper.isBehind
     to.albedo      := Mux(isHit, texel.albedo, 0.U.asTypeOf(texel.albedo))
     to.hidesObject := isSeen && isNearer && isAway
     for (axis <- 0 until 3) {

@@ -164,7 +164,8 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
       val words   = answers.map(answer => view.words ++ answer.request.ray.words)
       val models  = Model.attributes(config, scene.words, words, "march").map(MarchCase.answer.zip(_).toMap)
       for ((Answer(request, surface, isVisible), expected) <- answers.zip(models)) {
-        val isHit = if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss
+        val isHit =
+          if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss.litValue
         assert(surface.nonEmpty == isHit && isVisible == (request.isOcclusionTest && !isHit), s"of $request")
         for (bits <- surface) {
           val values = new Packed(new EnvironmentSurface(config)).unpack(bits)

@@ -35,7 +35,7 @@ class MarchSlotSpec extends AnyFlatSpec with ChiselScalatestTester {
         orders.check(random.shuffle(rays), willing, isSlow = willing < 1)
       }
       val all = answers.flatten
-      for (kind <- Seq(HitKind.miss, HitKind.map, HitKind.boundingPlane)) assert(all.exists(_("kind") == kind))
+      for (kind <- HitKind.all) assert(all.exists(_("kind") == kind.litValue))
       for (bit <- 0 to 1; name <- Seq("hidesObject", "isIllegal")) assert(all.exists(_(name) == bit), name)
     }
   }

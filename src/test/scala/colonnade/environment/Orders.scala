@@ -109,7 +109,7 @@ final class Orders(
       .map(MarchCase.answer.zip(_).toMap)
     for ((((bits, expected), ray), index) <- found.zip(expected).zip(rays).zipWithIndex) {
       val values = meant(bits)
-      val isHit  = if (isTest(index)) expected("hidesObject") == 1 else expected("kind") != HitKind.miss
+      val isHit  = if (isTest(index)) expected("hidesObject") == 1 else expected("kind") != HitKind.miss.litValue
       assert(values("isHit") == (if (isHit) 1 else 0), s"of $ray in $view")
       assert(values("isOcclusionTest") == (if (isTest(index)) 1 else 0))
       assert(values("context") == ray.context && values("shadows") == 1 - index % 2)
