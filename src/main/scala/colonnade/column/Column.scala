@@ -50,7 +50,7 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   val environment = Option.when(config.columnsPerCopy > 1)(AttributePort.ofColumn(config))
 
   /** To the [[SharedLightCube]]. */
-  val cube = Option.when(config.frame.gather)(new CubePort)
+  val cube = CubePort(config)
 
   val events = Output(new EventSums(config, 1)) // delayed by one cycle
 }

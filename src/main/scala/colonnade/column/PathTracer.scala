@@ -36,7 +36,7 @@ final class PathTracerIO(config: ColonnadeConfig) extends Bundle {
   val texture = config.geometry.texture.map(_ => new TexturePort(PathConfig(config)))
 
   /** To the light cube. */
-  val cube = Option.when(config.frame.gather)(new CubePort)
+  val cube = CubePort(config)
 
   /** A pixel of a tile of the environment leaves; no pixel is in flight, and no request waits. */
   val environmentLeaves = Output(Bool())

@@ -20,7 +20,7 @@ final class EnvironmentRaysIO(config: PathConfig) extends Bundle {
   val hitDistance = Input(HitDistance(config)) // of an occlusion test, in the cycle after its `req`
 
   /** A context whose point goes to the shader once more, since no ray has been stored in its place. */
-  val again = Option.when(config.gathersInRoom)(Flipped(Valid(Context(config))))
+  val again = Flipped(Valid(Context(config)))
 
   /** The result: a point to shade, a context whose ray misses, or one whose occlusion test finds its hit visible. */
   val surface = Decoupled(new EnvironmentSurface(config))
@@ -73,7 +73,7 @@ final class EnvironmentRays(config: PathConfig) extends Module {
   private val chosen    = Reg(Context(config))
   private val isOffered = RegNext(!isTaken && isChosen && !io.surface.fire, false.B)
   when(result.fire && result.bits.isHit) { hasPoint(result.bits.surface.context) := true.B }
-  for (again <- io.again) when(again.valid) { hasPoint(again.bits) := true.B }
+  when(io.again.valid) { hasPoint(io.again.bits) := true.B }
   private val others = VecInit(hasPoint.zip(UIntToOH(chosen, config.contexts).asBools).map { case (has, isLast) =>
     has && !(isChosen && isLast)
   })

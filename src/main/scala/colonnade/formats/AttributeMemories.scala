@@ -59,7 +59,7 @@ object AttributeMemories {
   def cubeTexel: CubeTexel = new CubeTexel
 
   private def lightCube(config: ColonnadeConfig): Seq[(String, Int, Int)] =
-    if (config.frame.gather) Seq(("light.cube", 6 << (2 * cubeLog), cubeTexel.getWidth)) else Nil
+    Gather(config).toSeq.map(_ => ("light.cube", 6 << (2 * cubeLog), cubeTexel.getWidth))
 
   /** Types of the words of the texture memory, as [[layouts]]. */
   def textureLayouts: Seq[(String, () => Bundle)] =

@@ -137,7 +137,7 @@ final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
   val scene       = new SceneMap(RecordFormats.idBits(config))
   val environment = config.physicalAttributeMemory.map(_ => new EnvironmentView(numbers))
   val dram        = config.columnBvhMemory.cache.map(_ => new SceneInDram)
-  val gather      = Option.when(config.frame.gather)(new Gather)
+  val gather      = Gather(config)
 }
 
 object FrameRegisters {
@@ -242,7 +242,7 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
   val planeReads  = environmentCounter
 
   /** Rays that diffuse surfaces gather. */
-  val raysGather = Option.when(config.frame.gather)(counter)
+  val raysGather = Gather(config).map(_ => counter)
 }
 
 object Counters {

@@ -13,7 +13,7 @@ object RegisterLimits {
     val numbers   = config.numbers
     val one       = BigInt(1) << NumberFormats.lightFraction
     val materials = (0 until config.frame.materials).flatMap { index =>
-      Seq(s"materials[$index].kind" -> MaterialKind.last(config.frame.gather), s"materials[$index].reflectance" -> one)
+      Seq(s"materials[$index].kind" -> MaterialKind.last(config), s"materials[$index].reflectance" -> one)
     }
     val records = Seq("recordCount", "triangleBase", "triangleRecords", "attributeBase").map(name =>
       s"scene.$name" -> BigInt(config.columnBvhMemory.depth)

@@ -58,6 +58,8 @@ final class Gather extends Bundle {
 }
 
 object Gather {
+  def apply(config: ColonnadeConfig): Option[Gather] = Option.when(config.frame.gather)(new Gather)
+
   val maxBounces: Int = 4
   val countBits:  Int = NumberFormats.bitLength(maxBounces)
 
@@ -79,7 +81,7 @@ object MaterialKind {
   def roughMetal: UInt = 3.U(bits.W)
 
   /** The largest number of a kind. */
-  def last(gather: Boolean): BigInt = if (gather) 3 else 2
+  def last(config: ColonnadeConfig): BigInt = if (Lobe(config).nonEmpty) 3 else 2
 
   /** Whether the path goes on at once, without a look at the lights. */
   def isSpecular(kind: UInt): Bool = kind === mirror || kind === glass
@@ -93,6 +95,10 @@ final class Lobe extends Bundle {
 }
 
 object Lobe {
+
+  /** Of a device with gathered light. */
+  def apply(config: ColonnadeConfig): Option[Lobe] = Gather(config).map(_ => new Lobe)
+
   val alphaBits:     Int = 8
   val facetFraction: Int = 10 // fraction bits of the width at mirrors and glass
   val slopeFraction: Int = 6
@@ -142,5 +148,5 @@ final class Material(config: ColonnadeConfig) extends Bundle {
   val reflectance = ifBounces(FrameRegisters.weight)
 
   /** Rough metal, mirrors and glass. */
-  val lobe = Option.when(config.frame.gather)(new Lobe)
+  val lobe = Lobe(config)
 }

@@ -3,6 +3,7 @@ package colonnade.frame
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.Gather
 import colonnade.unit.AttributeFetch
 
 /** Events of a column BVH controller in one cycle; names as in `Counters`. */
@@ -69,7 +70,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val planeReads  = ifEnvironment(perColumn)
 
   /** With gathered light. */
-  val raysGather = Option.when(config.frame.gather)(perColumn)
+  val raysGather = Gather(config).map(_ => perColumn)
 
   /** A level, not an event: the maximum of all units. */
   val deepestStack = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)

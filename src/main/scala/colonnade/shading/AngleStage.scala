@@ -5,7 +5,7 @@ import chisel3.util.{log2Ceil, PriorityEncoder, Reverse}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.{ModuloSchedule, Timed}
 import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.formats.Light
+import colonnade.formats.{Light, Lobe}
 import colonnade.numbers.{Normalise, Rounding}
 
 /** Ports of [[AngleStage]]. Vectors come a component at a time, x first. */
@@ -33,7 +33,7 @@ final class AngleStageIO(config: PathConfig) extends Bundle {
 
 /** Cycles of [[AngleStage]]. */
 final class AngleCycles(config: PathConfig) {
-  val normal:  Int = if (config.frame.gather) LobeAxisStage.axis0 else 7
+  val normal:  Int = Lobe(config).fold(7)(_ => LobeAxisStage.axis0)
   val dot:     Int = normal.max(12)
   val square:  Int = dot + 4
   val angle:   Int = dot + 5

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, Valid}
 import colonnade.common.{Context, ContextTable, ReservedQueue}
 import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.formats.{FrameRegisters, Material, MaterialKind, Rgb, Vec3}
+import colonnade.formats.{FrameRegisters, Lobe, Material, MaterialKind, Rgb, Vec3}
 
 /** A hit on a mirror or glass. */
 final class BounceHit(config: PathConfig) extends Bundle {
@@ -13,7 +13,7 @@ final class BounceHit(config: PathConfig) extends Bundle {
   val backSide = Bool()
 
   /** The normal is that of a microfacet. */
-  val isRough = Option.when(config.frame.gather)(Bool())
+  val isRough = Lobe(config).map(_ => Bool())
 }
 
 /** Components of vectors that are known early: the geometric normal, turned against the ray, and the ray's direction. */
@@ -41,7 +41,7 @@ final class BounceQueueIO(config: PathConfig) extends Bundle {
   val albedo     = Flipped(new AlbedoSources(config))
 
   /** The normals of microfacets, of the rough ones of the hits. */
-  val facet = Option.when(config.frame.gather)(Flipped(Valid(Vec(3, SInt((ScatterStage.facetBits + 1).W)))))
+  val facet = Lobe(config).map(_ => Flipped(Valid(Vec(3, SInt((ScatterStage.facetBits + 1).W)))))
 
   // To and from bounce units, which may answer in any order
   val request = Decoupled(new BounceRequest(config))

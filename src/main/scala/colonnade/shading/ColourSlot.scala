@@ -1,7 +1,6 @@
 package colonnade.shading
 
 import chisel3._
-import chisel3.util.Valid
 import colonnade.common.Context
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.FrameRegisters
@@ -10,54 +9,43 @@ import colonnade.formats.FrameRegisters
 final private[shading] class ColourOperation(config: PathConfig) extends Bundle {
   val context    = Context(config)
   val isBounce   = Bool()
-  val isStraight = Bool()
-  val hasSurface = Bool()
+  val isStraight = Bool()       // the path's throughput is 1, its radiance 0
+  val end        = new ShownEnd // of the path, or of the Fresnel reflection
+  val goesBack   = Bool()
   val occlusions = Vec(config.frame.lights, Occlusion())
   val needsRatio = Bool()
 
-  /** Of a bounce: what the path lets through, and the weight of the Fresnel reflection. */
+  /** What the path lets through at a bounce, and the weight of the Fresnel reflection. */
   val tint    = Option.when(config.frame.hasBounces)(Vec(3, FrameRegisters.weight))
   val fresnel = Option.when(config.frame.hasBounces)(FrameRegisters.weight)
-
-  /** Of an end: the path goes on with a gathered ray. */
-  val gathers = Option.when(config.frame.gather)(Bool())
-
-  /** The path ends in the light cube, or the Fresnel reflection does. */
-  val showsCube = Option.when(config.frame.gather)(Bool())
-
-  /** Of an end: its colour is what a point of the environment has gathered; that replaces the point's ambient light. */
-  val goesBack    = Option.when(config.gathersInRoom)(Bool())
-  val hasGathered = Option.when(config.gathersInRoom)(Bool())
 }
 
-/** A channel and a light of an operation in the stages of [[ColourUnit]]. */
+/** What a slot of [[ColourUnit]] computes in a channel; the table of factors and terms is there. */
+private[shading] object ColourPass extends ChiselEnum {
+  val end        = Value // what a path shows where it ends, and its colour
+  val reflection = Value // the surface that a Fresnel reflection shows
+  val throughput = Value // the path's throughput after a bounce, or after a surface that gathers; its radiance
+}
+
+/** A channel of an operation, and a light of its surface, in the stages of [[ColourUnit]]. */
 final private[shading] class ColourSlot(config: PathConfig) extends Bundle {
-  private val bits = NumberFormats.colourBits
-
-  val context = Context(config)
-  val isValid = Bool()
-
-  /** The operation's last one; of its path, not of a reflected surface. */
-  val isLast     = Bool()
-  val isPath     = Bool()
-  val isBounce   = Bool()
-  val hasSurface = Bool()
+  val isValid    = Bool()
+  val context    = Context(config)
+  val pass       = ColourPass()
+  val end        = new ShownEnd
+  val goesBack   = Bool()
   val needsRatio = Bool()
+  val isLast     = Bool() // the operation's last slot
   val channel    = UInt(2.W)
 
   /** The first light of the channel, the last one. */
   val isFirstLight = Bool()
   val isLastLight  = Bool()
 
-  /** The path's radiance and throughput. */
-  val radiance = UInt(bits.W)
+  /** The path's radiance and throughput; the light that the surface adds. */
+  val radiance = UInt(NumberFormats.colourBits.W)
   val weight   = UInt((NumberFormats.lightFraction + 1).W)
-  val emission = Option.when(config.frame.emission)(UInt(bits.W))
+  val emission = Option.when(config.frame.emission)(UInt(NumberFormats.colourBits.W))
 
-  /** The path gathers; the light of the cube where the ray ends there, from the second stage on. */
-  val gathers = Option.when(config.frame.gather)(Bool())
-  val cube    = Option.when(config.frame.gather)(Valid(UInt(NumberFormats.lightBits.W)))
-
-  val goesBack    = Option.when(config.gathersInRoom)(Bool())
-  val hasGathered = Option.when(config.gathersInRoom)(Bool()) // the radiance is that light
+  def isIn(pass: ColourPass.Type): Bool = this.pass === pass
 }

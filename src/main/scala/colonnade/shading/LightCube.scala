@@ -3,7 +3,7 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.{Cat, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
-import colonnade.config.PathConfig
+import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.formats.{AttributeMemories, CubeTexel, Gather, Vec3}
 import colonnade.numbers.{DigitRecurrence, Fixed, Normalise, Rounding}
 import colonnade.ray.RayFormats
@@ -12,6 +12,10 @@ import colonnade.ray.RayFormats
 final class CubePort extends Bundle {
   val read = Valid(UInt(LightCube.addressBits.W))
   val word = Input(AttributeMemories.cubeTexel)
+}
+
+object CubePort {
+  def apply(config: ColonnadeConfig): Option[CubePort] = Gather(config).map(_ => new CubePort)
 }
 
 /** The context whose light is read. */

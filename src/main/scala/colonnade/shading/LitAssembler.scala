@@ -34,7 +34,7 @@ final class LitAssemblerIO(config: PathConfig) extends Bundle {
   val light  = Flipped(Valid(new LightOnSurface(config)))
 
   /** The components of the gathered ray's direction. */
-  val scatter = Option.when(config.frame.gather)(Vec(3, Flipped(Valid(ScatterStage.component))))
+  val scatter = new LitSurface(config).scatter.map(_ => Vec(3, Flipped(Valid(ScatterStage.component))))
 
   val albedo = Flipped(new AlbedoSources(config))
 
@@ -93,7 +93,7 @@ final class LitAssembler(config: PathConfig, places: Int) extends Module {
   lit.context := label.context
   lit.albedo  := albedo.albedo
   for (albedo <- label.environment) when(albedo.valid)(lit.albedo := albedo.bits)
-  lit.isOfEnvironment.foreach(_ := isEnvironment)
+  lit.isOfEnvironment := isEnvironment
   for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
     channel                                           := Mux(isEnvironment, 0.U, value)
   for ((to, from) <- lit.origin.axes.zip(origins)) to := Fixed(new RayFormats(config.numbers).scene, from.bits)

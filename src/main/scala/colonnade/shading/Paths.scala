@@ -5,48 +5,73 @@ import colonnade.common.Context
 import colonnade.config.PathConfig
 import colonnade.formats.{FrameRegisters, Rgb}
 
-/** The last surface of a path. */
+/** What a path shows where its ray ends. A Fresnel reflection shows one of the first three. */
+object PathEnd extends ChiselEnum {
+
+  /** No surface: the colour of the background, or light of the [[LightCube]]. */
+  val background, cube = Value
+
+  val lit        = Value // a surface in the ambient light and that of the lights
+  val directView = Value // a surface of the environment that the camera sees: with its shadow ratio
+
+  /** A point of the environment in direct view whose own ray has met the object. The path's radiance replaces the ambient
+    * light.
+    */
+  val gathered = Value
+
+  val gathers = Value // a surface without ambient light: the path goes on with a gathered ray
+
+  /** Whether a device has such ends. */
+  private[shading] def has(config: PathConfig, end: Type): Boolean =
+    if (end == directView) config.hasEnvironment
+    else if (end == gathered) config.gathersInRoom
+    else config.frame.gather || (end != cube && end != gathers)
+
+  /** Whether a path ends so. False in a device that has no such ends. */
+  def is(config: PathConfig, path: Type, end: Type): Bool = if (has(config, end)) path === end else false.B
+}
+
+/** What the stages of [[ColourUnit]] ask of a [[PathEnd]]; none of it takes a register in a device without such ends. */
+final private[shading] class ShownEnd extends Bundle {
+  val hasSurface, isInCube, hasGathered, gathers = Bool()
+}
+
+private[shading] object ShownEnd {
+  def apply(config: PathConfig, end: PathEnd.Type): ShownEnd = {
+    val shown = Wire(new ShownEnd)
+    shown.isInCube    := PathEnd.is(config, end, PathEnd.cube)
+    shown.hasSurface  := !PathEnd.is(config, end, PathEnd.background) && !shown.isInCube
+    shown.hasGathered := PathEnd.is(config, end, PathEnd.gathered)
+    shown.gathers     := PathEnd.is(config, end, PathEnd.gathers)
+    shown
+  }
+}
+
+/** The end of a path's ray. */
 final class PathTermination(config: PathConfig) extends Bundle {
-  val context      = Context(config)
-  val isBackground = Bool() // there is no surface: the path ends with the background's colour
+  val context    = Context(config)
+  val end        = PathEnd()
   val isStraight = Option.when(config.frame.hasBounces)(Bool()) // the path's throughput is 1, its radiance 0
   val occlusions = Vec(config.frame.lights, Occlusion())        // by light: the shadow rays' outcomes
 
-  /** The camera sees the environment's surface directly: the shadow ratio is needed as well. */
-  val isDirectView = if (config.hasEnvironment) Some(Bool()) else None
-
-  /** The surface gathers light: the path goes on, without ambient light. */
-  val gathers = Option.when(config.frame.gather)(Bool())
-
-  /** Without a surface, the path ends in the light cube; the path has gathered, so it does not see lights there. */
-  val endsInCube  = Option.when(config.frame.gather)(Bool())
-  val isScattered = Option.when(config.frame.gather)(Bool())
-
-  /** The surface is of the environment. In direct view, the ray that it has gathered is complete: its light replaces the
-    * ambient light, unless the path is straight. A path in direct view that ends elsewhere is that ray.
-    */
-  val isOfEnvironment = Option.when(config.gathersInRoom)(Bool())
+  val isScattered = Bool() // the path has gathered: it sees no lights in the cube
+  val goesBack    = Bool() // the ray is that of a point of the environment, which is lit by the path's colour
 }
 
 /** A path that goes on after the light of its surface is added. */
 final class ContinuedPath(config: PathConfig) extends Bundle {
-  val context = Context(config)
-
-  /** The ray that a point of the environment has gathered is complete: the point is lit. */
-  val isBack = Option.when(config.gathersInRoom)(Bool())
+  val context  = Context(config)
+  val goesBack = Bool() // as in [[PathTermination]]: the colour is the path's radiance
 }
 
 /** The change of a path's throughput at a mirror or glass. */
 final class BounceUpdate(config: PathConfig) extends Bundle {
-  val context  = Context(config)
-  val isFirst  = Bool()                // the first bounce of its path
-  val albedo   = Rgb(FrameRegisters.colour)
-  val isTinted = Bool()                // the path is tinted by the albedo
-  val fresnel  = FrameRegisters.weight // the Fresnel term: the weight of the deferred reflection
-
-  /** The reflection shows the remembered surface, lit by all lights, or the light cube; otherwise the background's colour. */
-  val hasSurface = if (config.hasEnvironment) Some(Bool()) else None
-  val showsCube  = if (config.gathersInRoom) Some(Bool()) else None
+  val context    = Context(config)
+  val isFirst    = Bool()                // the first bounce of its path
+  val albedo     = Rgb(FrameRegisters.colour)
+  val isTinted   = Bool()                // the path is tinted by the albedo
+  val fresnel    = FrameRegisters.weight // the Fresnel term: the weight of the deferred reflection
+  val reflection = PathEnd()             // what it shows; a surface is lit by all lights
 }
 
 /** The colour of a path. */

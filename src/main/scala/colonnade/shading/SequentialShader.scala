@@ -92,12 +92,13 @@ final class SequentialShader(config: PathConfig) extends Shader(config) {
   cosine.io.falloff            := point.bits.falloff
   when(cosine.io.angle.fire) {
     val Seq(x, y, z) = surface.origin.axes.map(Fixed(scene, _))
-    isHeld      := true.B
-    light       := point.bits.light
-    isLast      := point.bits.isLast
-    lit.context := surface.context
-    lit.albedo  := albedo
-    lit.origin  := Vec3.of(x, y, z)
+    isHeld              := true.B
+    light               := point.bits.light
+    isLast              := point.bits.isLast
+    lit.context         := surface.context
+    lit.albedo          := albedo
+    lit.origin          := Vec3.of(x, y, z)
+    lit.isOfEnvironment := surface.isEnvironment
     for ((to, from) <- lit.emission.zip(material.emission); (channel, value) <- to.channels.zip(from.channels))
       channel := Mux(surface.isEnvironment, 0.U, value)
     when(point.bits.light === 0.U) {

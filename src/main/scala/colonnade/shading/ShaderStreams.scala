@@ -38,8 +38,7 @@ final class LitSurface(config: PathConfig) extends Bundle {
   val emission = Option.when(config.frame.emission)(Rgb(FrameRegisters.colour)) // the light that the surface adds
   val scatter  = Option.when(config.frame.gather)(ScatterStage.dir)             // of the ray that gathers light there
 
-  /** It is of the environment. */
-  val isOfEnvironment = Option.when(config.gathersInRoom)(Bool())
+  val isOfEnvironment = Bool()
 }
 
 /** A ray that leaves a mirror or glass. */

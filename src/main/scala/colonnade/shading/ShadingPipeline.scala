@@ -126,7 +126,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
 
   private def lobeAt(cycles: Seq[Int]): Lobe = material(config, io.materials, roughAt(cycles).material).lobe.get
 
-  if (config.frame.gather) {
+  if (roughs.nonEmpty) {
     val stage = Module(new LobeAxisStage(config)).io
     stage.phase        := phase
     stage.isRough      := roughAt(Seq(0)).isRough && !hit.isBounce
@@ -138,7 +138,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     bright.peak.get    := lobeAt(Seq(cycles.cosine + 8)).peak
   }
 
-  private val isFacet = Option.when(config.frame.gather) {
+  private val isFacet = roughs.map { _ =>
     val flag = latchFlag(0)(isActive && hit.isBounce && isRoughBounce)
     Seq.iterate(flag, ScatterStage.facet0 / interval + 1)(now => latchFlag(now.last)(now.at(now.last)))
   }
@@ -185,7 +185,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     component.bits  := scatter.get.scatter
   }
   require(
-    !config.frame.gather || cycles.direct > xyz(ScatterStage.dir0).last,
+    roughs.isEmpty || cycles.direct > xyz(ScatterStage.dir0).last,
     "lights come before the direction that gathers"
   )
   private val facing = latch(cycles.angle) {

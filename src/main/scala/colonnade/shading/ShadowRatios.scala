@@ -35,7 +35,8 @@ final class ShadowRatiosIO(config: PathConfig, bits: Int) extends Bundle {
   * each. The result is offered 13 cycles after the last channel. A ratio of 2 or more is the largest number.
   */
 final class ShadowRatios(config: PathConfig, bits: Int) extends Module {
-  private val fraction = NumberFormats.lightFraction
+  private val fraction  = NumberFormats.lightFraction
+  private val mayExceed = PathEnd.has(config, PathEnd.gathered) // a part its whole
 
   val io = IO(new ShadowRatiosIO(config, bits))
 
@@ -56,8 +57,8 @@ final class ShadowRatios(config: PathConfig, bits: Int) extends Module {
   // The integer digit of a channel that comes
   private val part           = io.load.bits.part
   private val isOne          = part === io.whole
-  private val (digit, above) = if (config.gathersInRoom) DigitRecurrence.step(part, io.whole, bits) else (false.B, part)
-  private val isTooLarge     = if (config.gathersInRoom) above >= io.whole else false.B
+  private val (digit, above) = if (mayExceed) DigitRecurrence.step(part, io.whole, bits) else (false.B, part)
+  private val isTooLarge     = if (mayExceed) above >= io.whole else false.B
 
   private val ratios = Seq.tabulate(3) { channel =>
     val whole     = Reg(UInt(bits.W))

@@ -14,7 +14,7 @@ final class ShadowRequest(config: PathConfig) extends Bundle {
   val light   = UInt(log2Ceil(config.frame.lights.max(2)).W)
 
   /** The ray is the one that gathers light at the surface instead. */
-  val isGathered = Option.when(config.frame.gather)(Bool())
+  val isGathered = Bool()
 }
 
 final class ShadowRaysIO(config: PathConfig) extends Bundle {
@@ -68,13 +68,13 @@ final class ShadowRays(config: PathConfig) extends Module {
   private val light = if (config.frame.lights == 1) io.lights.head else io.lights(request.light)
   when(moves) {
     ray.context  := request.context
-    ray.isShadow := !request.isGathered.getOrElse(false.B)
+    ray.isShadow := !request.isGathered
     ray.origin   := origin
     for (((dir, position), from) <- ray.dir.axes.zip(light.position.axes).zip(origin.axes)) {
       val shifted = Rounding.narrow((position.pad(scene.width) << io.unitShift).asSInt, scene.width)
       dir := shifted -& from.integer
     }
-    for (scatter <- scatter; isGathered <- request.isGathered) when(isGathered) {
+    for (scatter <- scatter) when(request.isGathered) {
       ray.dir.axes.zip(scatter.axes).foreach { case (to, from) => to := from }
     }
   }

@@ -4,10 +4,10 @@ import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.formats.{Shading, Vec3}
+import colonnade.formats.{Gather, Shading, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayRequest
-import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay}
+import colonnade.shading.{BounceResult, BounceUpdate, BouncedRay, PathEnd}
 
 /** Ports of [[BounceScheduler]] that an environment adds. */
 final class DeferredBounceIO(config: PathConfig) extends Bundle {
@@ -19,7 +19,7 @@ final class DeferredBounceIO(config: PathConfig) extends Bundle {
 
   /** The Fresnel reflection, or the ray with which a path continues; whether it may march: the path has not gathered. */
   val ray     = Valid(new RayRequest(config))
-  val marches = Option.when(config.gathersInRoom)(Output(Bool()))
+  val marches = Output(Bool())
 }
 
 /** Rays that may meet the light cube. */
@@ -37,7 +37,7 @@ final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val start   = Flipped(Valid(Context(config))) // a context gets a new pixel
 
   /** The path of `in`. */
-  val path = Option.when(config.frame.gather)(Input(new BouncingPath))
+  val path = Gather(config).map(_ => Input(new BouncingPath))
 
   /** From the shader; to the colour unit and to ray set-up. */
   val in     = Flipped(Decoupled(new BouncedRay(config)))
@@ -47,7 +47,7 @@ final class BounceSchedulerIO(config: PathConfig) extends Bundle {
   val bounced      = Valid(new Bounced(config)) // a bounce that is issued
   val isRefraction = Output(Bool())
   val environment  = if (config.hasEnvironment) Some(new DeferredBounceIO(config)) else None
-  val leaves       = Option.when(config.frame.gather)(new LeavingRays(config))
+  val leaves       = new LeavingRays(config)
 }
 
 /** Issues bounces at mirrors and glass. In the same cycle, the colour unit gets the update of the path's throughput, and
@@ -74,11 +74,10 @@ final class BounceScheduler(config: PathConfig) extends Module {
   private val bounce  = Wire(Decoupled(new PendingBounce(config)))
   private val context = WireInit(result.context)
   private val update  = io.update.bits
-  bounce.valid := io.in.valid
-  bounce.bits  := incoming
-  io.in.ready  := bounce.ready
-  update.hasSurface.foreach(_ := false.B)
-  update.showsCube.foreach(_ := false.B)
+  bounce.valid      := io.in.valid
+  bounce.bits       := incoming
+  io.in.ready       := bounce.ready
+  update.reflection := PathEnd.background
   io.environment.foreach(deferBounces)
 
   // Trace its ray as long as the path has bounces left
@@ -101,13 +100,13 @@ final class BounceScheduler(config: PathConfig) extends Module {
   io.bounced.bits.isTraced := isTraced
   io.bounced.bits.isInside := bounce.bits.isRefraction === bounce.bits.isTinted
   io.isRefraction          := bounce.bits.isRefraction
-  for (leaves <- io.leaves) {
-    leaves.ray.valid                               := io.bounced.valid
-    leaves.ray.bits                                := io.ray.bits
-    for (environment <- io.environment) leaves.ray := environment.ray
-    leaves.mayBypass                               := (bounce.valid && !isTraced) ||
-      io.environment.map(environment => io.in.valid && hasReflection(environment)).getOrElse(false.B)
-  }
+
+  // The ray may leave the object
+  io.leaves.ray.valid                               := io.bounced.valid
+  io.leaves.ray.bits                                := io.ray.bits
+  for (environment <- io.environment) io.leaves.ray := environment.ray
+  io.leaves.mayBypass                               := (bounce.valid && !isTraced) ||
+    io.environment.map(environment => io.in.valid && hasReflection(environment)).getOrElse(false.B)
 
   /** The bounce from the shader has a Fresnel reflection, which is resolved first. */
   private def hasReflection(environment: DeferredBounceIO): Bool =
@@ -133,15 +132,14 @@ final class BounceScheduler(config: PathConfig) extends Module {
     bounce.valid := isHeld || (io.in.valid && !isDeferred)
     io.in.ready  := Mux(isDeferred, !bounce.fire, bounce.ready && !isHeld)
     when(isHeld) {
-      bounce.bits                                                      := resumed
-      context                                                          := resumedBy.context
-      update.hasSurface.get                                            := !resumedBy.isBackground
-      for ((to, from) <- update.showsCube.zip(resumedBy.showsCube)) to := from
+      bounce.bits       := resumed
+      context           := resumedBy.context
+      update.reflection := resumedBy.end
     }
 
-    environment.ray.valid                                         := bounce.fire || environment.fresnelReflection.valid
-    for (marches <- environment.marches; path <- io.path) marches := isHeld || !path.isScattered
-    environment.ray.bits                                          := rayOf(
+    environment.ray.valid := bounce.fire || environment.fresnelReflection.valid
+    environment.marches   := io.path.map(isHeld || !_.isScattered).getOrElse(true.B)
+    environment.ray.bits  := rayOf(
       Mux(bounce.fire, context, result.context),
       Mux(bounce.fire, bounce.bits.origin, io.in.bits.fresnelOrigin.get),
       Mux(bounce.fire, bounce.bits.dir, result.reflection)
@@ -162,7 +160,7 @@ final class BounceScheduler(config: PathConfig) extends Module {
 final private class PendingBounce(config: PathConfig) extends Bundle {
   private val (update, result) = (new BounceUpdate(config), new BounceResult(config))
 
-  val isFirst      = Option.when(config.frame.gather)(Bool())
+  val isFirst      = Gather(config).map(_ => Bool())
   val albedo       = update.albedo.cloneType
   val isTinted     = Bool()
   val fresnel      = update.fresnel.cloneType

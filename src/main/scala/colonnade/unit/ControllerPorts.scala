@@ -6,7 +6,7 @@ import colonnade.common.Context
 import colonnade.config.PathConfig
 import colonnade.environment.{EnvironmentAccepts, EnvironmentRequest}
 import colonnade.formats.Gather
-import colonnade.shading.{ContinuedPath, Occlusion, PathTermination, ShadowRequest}
+import colonnade.shading.{ContinuedPath, Occlusion, PathEnd, PathTermination, ShadowRequest}
 
 /** The state of a context. */
 object ContextState extends ChiselEnum {
@@ -39,7 +39,7 @@ final class Shaded(config: PathConfig) extends Bundle {
 
   /** By light, for a surface that ends the path. */
   val needsShadowRays = Vec(config.frame.lights, Bool())
-  val isOfEnvironment = Option.when(config.gathersInRoom)(Bool())
+  val isOfEnvironment = Bool()
 }
 
 /** A context whose path continues from a mirror or glass. */
@@ -53,9 +53,8 @@ final class Bounced(config: PathConfig) extends Bundle {
 
 /** A context whose deferred Fresnel reflection is complete, so that its bounce may resume. */
 final class ResumedBounce(config: PathConfig) extends Bundle {
-  val context      = Context(config)
-  val isBackground = Bool() // the reflection shows the background, or the light cube
-  val showsCube    = Option.when(config.gathersInRoom)(Bool())
+  val context = Context(config)
+  val end     = PathEnd() // what the reflection shows
 }
 
 /** Control of rays that miss the object or whose hit may be hidden, if there may be an environment. */
@@ -82,7 +81,7 @@ final class EnvironmentControl(config: PathConfig) extends Bundle {
   val resume = Decoupled(new ResumedBounce(config)) // a deferred bounce that may resume
 
   /** A context whose point is to be shaded again, after what it has gathered is known; then its `hit` comes. */
-  val again = Option.when(config.gathersInRoom)(Valid(Context(config)))
+  val again = Valid(Context(config))
 }
 
 /** Allocation of a context, seen from the stage that gives it a pixel. */
@@ -128,8 +127,7 @@ final class PixelControl(config: PathConfig) extends Bundle {
 
 /** Control of gathered rays. */
 final class GatherControl(config: PathConfig) extends Bundle {
-  val bounces   = Input(UInt(Gather.countBits.W))           // the register
-  val continued = Flipped(Valid(new ContinuedPath(config))) // the light of a surface that gathers is added
+  val bounces = Input(UInt(Gather.countBits.W)) // the register
 
   /** A context whose sample point is read; in the next cycle, the rays that its path has gathered. */
   val sample = Flipped(Valid(Context(config)))
@@ -163,8 +161,9 @@ final class RtControllerIO(config: PathConfig) extends Bundle {
   /** A path that has ended, and a context whose colour is complete. */
   val end         = Decoupled(new PathTermination(config))
   val accumulated = Flipped(Valid(Context(config)))
+  val continued   = Flipped(Valid(new ContinuedPath(config))) // the light of a surface is added, and its path goes on
   val pixel       = Flipped(new PixelControl(config))
-  val gather      = Option.when(config.frame.gather)(new GatherControl(config))
+  val gather      = Gather(config).map(_ => new GatherControl(config))
 
   /** Numbers of contexts that are idle, in ray set-up, and waiting for the environment march or in it. */
   val idleCount        = contextCount

@@ -44,11 +44,11 @@ final class EnvironmentPort(config: PathConfig) extends Module {
 
   // March
   stage.req :<>= control.req
-  control.accepts                                       := stage.accepts
-  control.miss                                          := stage.miss
-  for ((to, from) <- stage.again.zip(control.again)) to := from
-  control.visible                                       := stage.visible
-  stage.hitDistance                                     := io.hitDistance
+  stage.again       := control.again
+  control.accepts   := stage.accepts
+  control.miss      := stage.miss
+  control.visible   := stage.visible
+  stage.hitDistance := io.hitDistance
   io.surfaces :<>= stage.surface
   control.hit.valid := stage.surface.fire
   control.hit.bits  := stage.surface.bits.context
@@ -69,7 +69,7 @@ final class EnvironmentPort(config: PathConfig) extends Module {
   private val isBounce  = bounceRay.map(_.valid).getOrElse(false.B)
   private val ray       = bounceRay.fold(primary)(bounce => Mux(bounce.valid, bounce.bits, primary))
   private val dir       = Normalise.together(ray.dir.axes, new MarchFormats(config).f)
-  private val isStored  = io.bounces.map(bounces => isBounce && bounces.marches.getOrElse(true.B)).getOrElse(false.B)
+  private val isStored  = io.bounces.map(bounces => isBounce && bounces.marches).getOrElse(false.B)
   stage.ray.valid           := io.view.enabled && (isStored || io.primary.fire)
   stage.ray.bits.context    := ray.context
   stage.ray.bits.ray.origin := ray.origin

@@ -30,7 +30,7 @@ final class PathEvents(config: PathConfig) extends Bundle {
   val contextsShading     = contexts
   val raysEnvironment     = Option.when(config.hasEnvironment)(Bool())
   val contextsEnvironment = Option.when(config.hasEnvironment)(contexts)
-  val raysGather          = Option.when(config.frame.gather)(Bool())
+  val raysGather          = Bool()
   val illegalRecord       = Bool() // an illegal texel
 }
 
@@ -63,7 +63,7 @@ object PathCounters {
       shader.lit.fire +: shader.bounced.map(_.fire).toSeq
     )
 
-    events.raysGather.foreach(_ := shadowRays.ray.fire && !shadowRays.ray.bits.isShadow)
+    events.raysGather := shadowRays.ray.fire && !shadowRays.ray.bits.isShadow
     events.raysEnvironment.foreach(_ := controller.environment.get.req.fire)
     events.contextsEnvironment.foreach(_ := controller.environmentCount.get)
     events.illegalRecord := shader.isIllegalTexel.getOrElse(false.B)

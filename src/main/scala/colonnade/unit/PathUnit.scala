@@ -22,7 +22,7 @@ final class PathUnitIO(config: PathConfig) extends Bundle {
   val texture = config.geometry.texture.map(_ => new TexturePort(config))
 
   /** To the light cube. */
-  val cube = Option.when(config.frame.gather)(new CubePort)
+  val cube = CubePort(config)
 
   /** A pixel of a tile of the environment leaves; no pixel is in flight. */
   val environmentLeaves = Output(Bool())
@@ -49,7 +49,7 @@ final class PathUnit(config: PathConfig) extends Module {
 
   // A gathered ray waits where a ray may leave that is not traced: the light cube accepts one in a cycle
   private val isGathered  = shadowRays.ray.valid && !shadowRays.ray.bits.isShadow
-  private val mayLeave    = bounces.flatMap(_.leaves).map(_.mayBypass).getOrElse(false.B)
+  private val mayLeave    = bounces.map(_.leaves.mayBypass).getOrElse(false.B)
   private val surfaceRays = Wire(chiselTypeOf(shadowRays.ray))
   surfaceRays.bits     := shadowRays.ray.bits
   surfaceRays.valid    := shadowRays.ray.valid && !(isGathered && mayLeave)
@@ -100,6 +100,7 @@ final class PathUnit(config: PathConfig) extends Module {
   io.environmentLeaves := assembler.environmentLeaves
 
   // Gathered rays: their sample points, and the light that they meet
+  colourUnit.cube.texel := DontCare
   for (cube <- io.cube; gathers <- controller.gather; registers <- io.registers.gather) {
     val points = Module(new SamplePoints(config)).io
     points.gather             := registers
@@ -109,15 +110,14 @@ final class PathUnit(config: PathConfig) extends Module {
     points.pixel.bits.pixel.y := primaryRays.allocated.bits.pixel.y
     points.count              := gathers.count
     points.port :<>= shader.sample.get
-    gathers.bounces   := registers.bounces
-    gathers.continued := colourUnit.continued.get
-    gathers.sample    := shader.sample.get.read
+    gathers.bounces := registers.bounces
+    gathers.sample  := shader.sample.get.read
     for (bounces <- bounces; path <- bounces.path) {
       gathers.bounced := bounces.in.bits.bounce.context
       path            := gathers.bouncedPath
     }
     val light    = Module(new LightCube(config)).io
-    val leaving  = bounces.get.leaves.get.ray
+    val leaving  = bounces.get.leaves.ray
     val scatters = surfaceRays.fire && isGathered
     light.parallax  := registers.parallax
     light.ray.valid := leaving.valid || scatters
@@ -126,7 +126,7 @@ final class PathUnit(config: PathConfig) extends Module {
     light.ray.bits.origin                                            := ray.origin
     for ((to, from) <- light.ray.bits.dir.axes.zip(ray.dir.axes)) to := Rounding.narrow(from, to.getWidth)
     assert(!(leaving.valid && scatters), "two rays leave in a cycle")
-    light.port :<>= colourUnit.cube.get
+    light.port :<>= colourUnit.cube
     cube :<>= light.memory
   }
 
@@ -134,7 +134,7 @@ final class PathUnit(config: PathConfig) extends Module {
   // one: a choice among many contexts takes a cycle, and so does a slice before one among few
   private val bounced = {
     val now = bounces.map(_.bounced).getOrElse(0.U.asTypeOf(controller.bounced))
-    if (config.frame.gather && !config.isLarge) TimingSlice.valid(now) else now
+    if (io.cube.nonEmpty && !config.isLarge) TimingSlice.valid(now) else now
   }
   controller.allocation :<>= primaryRays.control
   controller.trace :<>= trace.control
@@ -142,11 +142,12 @@ final class PathUnit(config: PathConfig) extends Module {
   controller.shaded.valid                := lit.valid
   controller.shaded.bits.context         := lit.bits.context
   controller.shaded.bits.needsShadowRays := lit.bits.needsShadowRays
-  for ((to, from) <- controller.shaded.bits.isOfEnvironment.zip(lit.bits.isOfEnvironment)) to := from
-  controller.bounced                                                                          := bounced
-  controller.fetchFailed                                                                      := trace.attributeError
-  controller.accumulated.valid                                                                := colourUnit.colour.valid
-  controller.accumulated.bits := colourUnit.colour.bits.context
+  controller.shaded.bits.isOfEnvironment := lit.bits.isOfEnvironment
+  controller.bounced                     := bounced
+  controller.fetchFailed                 := trace.attributeError
+  controller.accumulated.valid           := colourUnit.colour.valid
+  controller.accumulated.bits            := colourUnit.colour.bits.context
+  controller.continued                   := colourUnit.continued
   bounces.foreach(_.start := primaryRays.start)
   environment.foreach(_.control :<>= controller.environment.get)
   io.isIdle := controller.idleCount === config.contexts.U && assembler.isIdle

@@ -1,10 +1,10 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Mux1H, PopCount, RegEnable}
+import chisel3.util.{Mux1H, PopCount}
 import colonnade.common.{Choice, First}
 import colonnade.config.PathConfig
-import colonnade.formats.Gather
+import colonnade.shading.PathEnd
 
 import scala.collection.mutable
 
@@ -33,26 +33,18 @@ final class RtController(config: PathConfig) extends Module {
   private val isStraight = Reg(Vec(contexts, Bool()))
 
   /** The camera sees the environment directly in this pixel. */
-  private val isDirectView = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+  private val isDirectView = ifEnvironment
 
   /** The ray is a Fresnel reflection whose path's bounce is deferred. */
-  private val isFresnelReflection =
-    if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
-  private val hasEnvironment = io.environment.map(_.enabled).getOrElse(false.B)
+  private val isFresnelReflection = ifEnvironment
+  private val hasEnvironment      = io.environment.map(_.enabled).getOrElse(false.B)
 
   /** A hit of the ray still needs an occlusion test; it is tested. */
-  private val mayBeHidden = if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
-  private val isOcclusionTest =
-    if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
-  private val hasOcclusion = io.environment.map(_.occlusion).getOrElse(false.B) && hasEnvironment
+  private val mayBeHidden     = ifEnvironment
+  private val isOcclusionTest = ifEnvironment
+  private val hasOcclusion    = io.environment.map(_.occlusion).getOrElse(false.B) && hasEnvironment
 
-  /** The path has gathered rays, so many. After the first one it meets the light cube, not the environment. */
-  private val isScattered = if (config.frame.gather) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
-  private val gathered    = Option.when(config.frame.gather)(new FlagTable(config, UInt(Gather.countBits.W)))
-
-  /** The surface is of the environment. */
-  private val isOfEnvironment = Option.when(config.gathersInRoom)(new FlagTable(config, Bool()))
-
+  private val gather  = GatherProgress(config, io.gather)
   private val shadows = new ShadowProgress(config)
   io.idleCount     := count(isAt(ContextState.idle), atReset = contexts)
   io.raySetupCount := count(isAt(ContextState.raySetup))
@@ -62,10 +54,9 @@ final class RtController(config: PathConfig) extends Module {
   io.allocation.free := free
   move(io.allocation.allocate, free.bits, ContextState.raySetup)
   when(io.allocation.allocate) {
-    isShadow(free.bits)                             := false.B
-    isStraight(free.bits)                           := true.B
-    hasColour(free.bits)                            := false.B
-    if (config.frame.gather) isScattered(free.bits) := false.B
+    isShadow(free.bits)   := false.B
+    isStraight(free.bits) := true.B
+    hasColour(free.bits)  := false.B
     if (config.hasEnvironment) {
       isFresnelReflection(free.bits) := false.B
       isDirectView(free.bits)        := false.B
@@ -73,6 +64,8 @@ final class RtController(config: PathConfig) extends Module {
       isOcclusionTest(free.bits)     := false.B
     }
   }
+
+  gather.start(io.allocation.allocate, free.bits)
 
   // Trace its ray
   private val ended = choose(isAt(ContextState.resolve), true.B)
@@ -85,9 +78,9 @@ final class RtController(config: PathConfig) extends Module {
   private val resolved   = ended.now.bits
   private val hasVisible = io.trace.hasHit && !mayBeHidden(resolved)
   io.trace.startsShading := ended.now.valid && !isShadow(resolved) && hasVisible
-  io.trace.isPrimary     := isStraight(resolved) && !isScattered(resolved)
+  io.trace.isPrimary     := isStraight(resolved) && !gather.hasGathered(resolved)
   io.trace.readsDistance := 0.U.asTypeOf(io.trace.readsDistance)
-  private val isOfRoom   = if (config.gathersInRoom) isStraight(resolved) && isScattered(resolved) else false.B
+  private val isOfRoom   = isStraight(resolved) && gather.hasGathered(resolved)
   private val afterTrace = Mux(isOfRoom, ContextState.lit, afterObject(resolved, afterMiss(resolved)))
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
   private val lightsLeft = shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusion)
@@ -98,32 +91,31 @@ final class RtController(config: PathConfig) extends Module {
   }
 
   // Results of the shader. A point of the environment has its shadow rays before it gathers, and none when it is back
-  private val needs  = io.shaded.bits.needsShadowRays.asUInt
-  private val isBack = io.shaded.bits.isOfEnvironment.map(_ && isScattered(io.shaded.bits.context)).getOrElse(false.B)
-  move(io.shaded.valid, io.shaded.bits.context, afterLights(io.shaded.bits.context, needs.orR && !isBack))
-  for (table <- isOfEnvironment; shaded <- io.shaded.bits.isOfEnvironment)
-    table.write(io.shaded.valid, io.shaded.bits.context, shaded)
-  shadows.begin(io.shaded.valid, io.shaded.bits.context, needs)
+  private val shaded = io.shaded.bits
+  private val needs  = shaded.needsShadowRays.asUInt
+  private val isBack = shaded.isOfEnvironment && gather.hasGathered(shaded.context)
+  move(io.shaded.valid, shaded.context, afterLights(shaded.context, needs.orR && !isBack))
+  gather.shade(shaded, io.shaded.valid)
+  shadows.begin(io.shaded.valid, shaded.context, needs)
   private val bounced  = io.bounced.bits.context
   private val untraced = afterObject(bounced, ContextState.accumulatePending)
   move(io.bounced.valid, bounced, Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced))
   when(io.bounced.valid) {
     isStraight(bounced) := false.B
     if (config.hasEnvironment)
-      mayBeHidden(bounced) := hasOcclusion && !io.bounced.bits.isInside && !isScattered(bounced)
+      mayBeHidden(bounced) := hasOcclusion && !io.bounced.bits.isInside && !gather.hasGathered(bounced)
   }
   move(io.fetchFailed.valid, io.fetchFailed.bits, ContextState.accumulatePending)
 
   // Issue rays from surfaces: shadow rays, one light after the other, and rays that gather light. A Fresnel reflection has
   // no shadow rays, so its previous ray is none
   private val isTested = isAt(ContextState.shadowTest)
-  private val gathers  = isAt(ContextState.gatherPending)
-  private val next     = choose(
-    if (config.frame.gather) isTested.zip(gathers).map { case (tested, gathers) => tested || gathers } else isTested,
-    io.shadow.ready
-  )
+  private val mayIssue = isTested.zip(isAt(ContextState.gatherPending)).map { case (isTested, gathers) =>
+    isTested || (gather.isBuilt && gathers)
+  }
+  private val next         = choose(mayIssue, io.shadow.ready)
   private val leaving      = next.now.bits
-  private val isGathered   = if (config.frame.gather) !VecInit(isTested)(leaving) else false.B
+  private val isGathered   = gather.isBuilt && !VecInit(isTested)(leaving)
   private val leaves       = io.shadow.ready && next.now.valid
   private val issuesShadow = leaves && !isGathered
   io.shadow.valid        := next.now.valid
@@ -132,68 +124,52 @@ final class RtController(config: PathConfig) extends Module {
   shadows.trace(issuesShadow, leaving, io.shadow.bits.light)
   move(leaves, leaving, ContextState.raySetup)
   when(leaves) { isShadow(leaving) := !isGathered }
-  for (gather <- io.gather) {
-    val issues  = leaves && isGathered
-    val isFirst = !isScattered(leaving)
-    io.shadow.bits.isGathered.get := isGathered
-    when(issues) {
-      isScattered(leaving)                           := true.B
-      if (config.gathersInRoom) mayBeHidden(leaving) := false.B
-    }
-    gathered.get.write(issues, leaving, Mux(isFirst, 1.U, gathered.get.read(next) + 1.U))
-    if (config.gathersInRoom) shadows.keep(issues && isFirst, next)
-
-    val sampled = Choice(RegEnable(gather.sample, gather.sample.valid), gather.sample)
-    gather.count := Mux(
-      RegEnable(isScattered(gather.sample.bits), gather.sample.valid),
-      gathered.get.read(sampled),
-      0.U
-    )
-    gather.bouncedPath.isStraight  := isStraight(gather.bounced)
-    gather.bouncedPath.isScattered := isScattered(gather.bounced)
+  io.shadow.bits.isGathered := isGathered
+  gather.issue(leaves && isGathered, next, shadows.occlusions(next))
+  if (config.hasEnvironment) when(leaves && isGathered) { mayBeHidden(leaving) := false.B }
+  for (gathering <- io.gather) {
+    gathering.bouncedPath.isStraight  := isStraight(gathering.bounced)
+    gathering.bouncedPath.isScattered := gather.hasGathered(gathering.bounced)
   }
 
   // End paths: all shadow rays of the surface are traced, or the path meets the background
   private val isEnding = state.zip(isFresnelReflection).map { case (at, reflection) =>
     at === ContextState.accumulatePending || (at === ContextState.lit && !reflection)
   }
-  private val last   = choose(isEnding, io.end.ready)
-  private val ending = last.now
-  io.end.valid             := ending.valid
-  io.end.bits.context      := ending.bits
-  io.end.bits.isBackground := state(ending.bits) === ContextState.accumulatePending
+  private val last        = choose(isEnding, io.end.ready)
+  private val ending      = last.now
+  private val isLit       = state(ending.bits) === ContextState.lit
+  private val isOfPoint   = isLit && gather.isOfEnvironment(last)
+  private val isScattered = gather.hasGathered(ending.bits)
+  private val gathers     = isLit && !isOfPoint && gather.mayGather(last)
+  private val isInCube    = gather.isOn && (isScattered || !isStraight(ending.bits))
+  private val hasReturned = gather.isBuilt && !isStraight(ending.bits)
+  private val occlusions  = shadows.occlusions(last)
+  private val seen        = Mux(hasReturned, PathEnd.gathered, PathEnd.directView)
+  private val surface = Mux(isOfPoint && isDirectView(ending.bits), seen, Mux(gathers, PathEnd.gathers, PathEnd.lit))
+  io.end.valid        := ending.valid
+  io.end.bits.context := ending.bits
+  io.end.bits.end     := Mux(isLit, surface, Mux(isInCube, PathEnd.cube, PathEnd.background))
   io.end.bits.isStraight.foreach(_ := isStraight(ending.bits))
-  io.end.bits.occlusions := VecInit(shadows.occlusions(last))
-  io.end.bits.isDirectView.foreach(_ := isDirectView(ending.bits))
-  for (gather <- io.gather) {
-    val hasGathered = isScattered(ending.bits)
-    val mayGather   = Mux(hasGathered, gathered.get.read(last) < gather.bounces, gather.bounces =/= 0.U)
-    val isOfRoom    = isOfEnvironment.map(_.read(last).asBool && !io.end.bits.isBackground).getOrElse(false.B)
-    io.end.bits.gathers.get     := mayGather && !isOfRoom && !io.end.bits.isBackground
-    io.end.bits.isScattered.get := hasGathered
-    io.end.bits.endsInCube.get  := gather.bounces =/= 0.U && (hasGathered || !isStraight(ending.bits))
-    for (isOfEnvironment <- io.end.bits.isOfEnvironment) {
-      isOfEnvironment := isOfRoom
-      when(isOfRoom && hasGathered) { io.end.bits.occlusions := VecInit(shadows.kept(last)) }
-    }
-  }
+  io.end.bits.occlusions  := VecInit(occlusions)
+  io.end.bits.isScattered := isScattered
+  io.end.bits.goesBack    := gather.isBuilt && isDirectView(ending.bits) && !isOfPoint && !gathers
+  when(isOfPoint && isScattered) { io.end.bits.occlusions := VecInit(gather.before(last, occlusions)) }
   move(io.end.fire, ending.bits, ContextState.accumulating)
 
   // A path's colour is complete; or the light of a surface is added and the path gathers, or goes back to its point of the
   // environment with what it has gathered, and the point is shaded again
-  private val continued   = io.gather.map(_.continued)
-  private val isContinued = continued.map(_.valid).getOrElse(false.B)
-  private val accumulated =
-    continued.fold(io.accumulated.bits)(path => Mux(path.valid, path.bits.context, io.accumulated.bits))
-  private val goesBack = continued.flatMap(_.bits.isBack).getOrElse(false.B)
-  for (path <- continued) assert(!(io.accumulated.valid && path.valid), "a path is complete or goes on")
-  private val afterLight = Mux(goesBack, ContextState.environmentMarch, ContextState.gatherPending)
-  move(io.accumulated.valid || isContinued, accumulated, Mux(isContinued, afterLight, ContextState.done))
+  private val goesOn      = gather.isBuilt && io.continued.valid
+  private val goesBack    = io.continued.bits.goesBack
+  private val accumulated = Mux(goesOn, io.continued.bits.context, io.accumulated.bits)
+  private val afterLight  = Mux(goesBack, ContextState.environmentMarch, ContextState.gatherPending)
+  assert(!(io.accumulated.valid && goesOn), "a path is complete or goes on")
+  move(io.accumulated.valid || goesOn, accumulated, Mux(goesOn, afterLight, ContextState.done))
   when(io.accumulated.valid) { hasColour(accumulated) := true.B }
-  if (config.frame.gather) when(isContinued) { isStraight(accumulated) := false.B }
-  for (environment <- io.environment; again <- environment.again) {
-    again.valid := isContinued && goesBack
-    again.bits  := accumulated
+  when(goesOn) { isStraight(accumulated) := false.B }
+  for (environment <- io.environment) {
+    environment.again.valid := goesOn && goesBack
+    environment.again.bits  := accumulated
   }
 
   // Retire pixels
@@ -253,11 +229,13 @@ final class RtController(config: PathConfig) extends Module {
       at === ContextState.resumeBounce || (at === ContextState.lit && reflection)
     }
     val resumable = choose(isResumable, environment.resume.ready).now
-    environment.resume.valid             := resumable.valid
-    environment.resume.bits.context      := resumable.bits
-    environment.resume.bits.isBackground := state(resumable.bits) === ContextState.resumeBounce
-    for (showsCube <- environment.resume.bits.showsCube; gather <- io.gather)
-      showsCube := environment.resume.bits.isBackground && gather.bounces =/= 0.U
+    environment.resume.valid        := resumable.valid
+    environment.resume.bits.context := resumable.bits
+    environment.resume.bits.end     := Mux(
+      state(resumable.bits) === ContextState.lit,
+      PathEnd.lit,
+      Mux(gather.isOn, PathEnd.cube, PathEnd.background)
+    )
     move(environment.resume.fire, resumable.bits, ContextState.shading)
     when(environment.resume.fire) { isFresnelReflection(resumable.bits) := false.B }
   }
@@ -278,17 +256,19 @@ final class RtController(config: PathConfig) extends Module {
 
   /** The next state of a ray that leaves the object, and otherwise has the state `alone`. */
   private def afterObject(context: UInt, alone: ContextState.Type): ContextState.Type =
-    Mux(hasEnvironment && !isScattered(context), ContextState.environmentPending, alone)
+    Mux(hasEnvironment && !gather.hasGathered(context), ContextState.environmentPending, alone)
 
   /** The next state of a context whose shadow rays are traced, unless one is left. A point of the environment that the
     * camera sees gathers before it is lit.
     */
   private def afterLights(context: UInt, isLeft: Bool): ContextState.Type = {
-    val gathers =
-      if (config.gathersInRoom) isDirectView(context) && !isScattered(context) && io.gather.get.bounces =/= 0.U
-      else false.B
+    val gathers = gather.isOn && isDirectView(context) && !gather.hasGathered(context)
     Mux(isLeft, ContextState.shadowTest, Mux(gathers, ContextState.gatherPending, ContextState.lit))
   }
+
+  /** A flag of each context, that is false without an environment. */
+  private def ifEnvironment: Vec[Bool] =
+    if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
 
   private def isAt(wanted: ContextState.Type): Seq[Bool] = state.map(_ === wanted)
 

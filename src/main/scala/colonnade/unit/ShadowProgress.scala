@@ -17,10 +17,6 @@ private[unit] final class ShadowProgress(config: PathConfig) {
   private val current = new FlagTable(config, UInt(log2Ceil(lights.max(2)).W))
   private val results = Seq.fill(lights)(new FlagTable(config, UInt(Occlusion.getWidth.W)))
 
-  /** Of points of the environment, while the rays that they gather are traced. */
-  private val before =
-    Option.when(config.gathersInRoom)(new FlagTable(config, UInt((lights * Occlusion.getWidth).W)))
-
   /** A surface is known, and the lights that it needs a shadow ray to. */
   def begin(valid: Bool, context: UInt, lights: UInt): Unit = needs.write(valid, context, lights)
 
@@ -44,16 +40,6 @@ private[unit] final class ShadowProgress(config: PathConfig) {
     for ((result, number) <- results.zipWithIndex)
       result.write(valid && light === number.U, choice.now.bits, occlusion.asUInt)
     VecInit(needed.asBools.zipWithIndex.map { case (needs, number) => needs && light < number.U }).asUInt.orR
-  }
-
-  /** Keeps the results of a context for later, while they may change. */
-  def keep(valid: Bool, choice: Choice): Unit =
-    before.foreach(_.write(valid, choice.now.bits, VecInit(occlusions(choice)).asUInt))
-
-  /** What was kept, by light. */
-  def kept(choice: Choice): Seq[Occlusion.Type] = {
-    val all = before.map(_.read(choice).asTypeOf(Vec(lights, UInt(Occlusion.getWidth.W))))
-    all.toSeq.flatten.map(Occlusion.safe(_)._1)
   }
 
   /** The results, by light. */

@@ -27,8 +27,7 @@ object ColourEvent {
   ) extends ColourEvent
 
   /** @param occlusions by light, 0: none, 1: transmissive, 2: opaque */
-  final case class End(isBackground: Boolean, occlusions: Seq[Int], isDirectView: Boolean, isOfRoom: Boolean)
-      extends ColourEvent
+  final case class End(isBackground: Boolean, occlusions: Seq[Int], isDirectView: Boolean) extends ColourEvent
 
   /** A surface that gathers light; a path ends in light of the cube. */
   final case class Gather(occlusions: Seq[Int]) extends ColourEvent
@@ -132,9 +131,8 @@ final class ColourScript(config: ColonnadeConfig, random: Random) {
   private def end(mayBeDirect: Boolean): Seq[ColourEvent] = {
     val occlusions   = this.occlusions()
     val isDirectView = config.hasEnvironment && mayBeDirect && random.nextBoolean()
-    val isOfRoom     = isDirectView || (config.hasEnvironment && random.nextBoolean())
-    if (random.nextInt(4) == 0) Seq(End(isBackground = true, occlusions, isDirectView = false, isOfRoom))
-    else Seq(Remember(surface()), End(isBackground = false, occlusions, isDirectView, isOfRoom))
+    if (random.nextInt(4) == 0) Seq(End(isBackground = true, occlusions, isDirectView = false))
+    else Seq(Remember(surface()), End(isBackground = false, occlusions, isDirectView))
   }
 }
 
@@ -202,33 +200,31 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
         pokeUInt(port.bits.albedo, albedo)
         port.bits.isTinted.poke(isTinted)
         port.bits.fresnel.pokeRaw(fresnel)
-        port.bits.hasSurface.foreach(_.poke(hasSurface))
-        port.bits.showsCube.foreach(_.poke(light.nonEmpty))
+        port.bits.reflection.poke(if (hasSurface) PathEnd.lit else beyond(light))
       }
     }
     io.end.valid.poke(end.nonEmpty)
     val isScattered = random.nextBoolean()
     for ((context, event) <- end) {
-      val dark                                               = Seq.fill(config.frame.lights)(0)
-      val (isBackground, occlusions, isDirectView, isOfRoom) = event match {
-        case End(isBackground, occlusions, isDirectView, isOfRoom) => (isBackground, occlusions, isDirectView, isOfRoom)
-        case Gather(occlusions)                                    => (false, occlusions, random.nextBoolean(), false)
-        case GoBack(light, occlusions)                             => (light.nonEmpty, occlusions, true, false)
-        case EndWithGathered(occlusions)                           => (false, occlusions, true, true)
-        case _                                                     => (true, dark, false, random.nextBoolean())
+      val dark               = Seq.fill(config.frame.lights)(0)
+      val (kind, occlusions) = event match {
+        case End(true, occlusions, _)       => (PathEnd.background, occlusions)
+        case End(false, occlusions, isSeen) => (if (isSeen) PathEnd.directView else PathEnd.lit, occlusions)
+        case Gather(occlusions)             => (PathEnd.gathers, occlusions)
+        case GoBack(light, occlusions)      => (light.fold(PathEnd.lit)(_ => PathEnd.cube), occlusions)
+        case EndWithGathered(occlusions)    => (PathEnd.gathered, occlusions)
+        case _                              => (PathEnd.cube, dark)
       }
       io.end.bits.context.poke(context)
-      io.end.bits.isBackground.poke(isBackground)
+      io.end.bits.end.poke(kind)
+      io.end.bits.goesBack.poke(event.isInstanceOf[GoBack])
       io.end.bits.isStraight.foreach(_.poke(isStraight(context)))
-      io.end.bits.isDirectView.foreach(_.poke(isDirectView))
-      io.end.bits.isOfEnvironment.foreach(_.poke(isOfRoom))
       io.end.bits.occlusions.zip(occlusions).foreach { case (port, what) => port.poke(Occlusion.all(what)) }
-      io.end.bits.gathers.foreach(_.poke(event.isInstanceOf[Gather]))
-      io.end.bits.endsInCube.foreach(_.poke(lightOf(event).nonEmpty))
-      io.end.bits.isScattered.foreach(_.poke(isScattered))
+      io.end.bits.isScattered.poke(isScattered)
     }
     // The light stays until the next one comes
-    for (cube <- io.cube) {
+    if (config.frame.gather) {
+      val cube = io.cube
       requested.last.foreach(light => pokeTexel(cube.texel, light))
       val reader = cube.read.bits.context.peekInt().toInt
       val light  = (end ++ bounce).find(_._1 == reader).flatMap { case (_, event) => lightOf(event) }
@@ -247,17 +243,17 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       val ended   = waits(context).getOrElse(throw new AssertionError(s"context $context has not ended"))
       val ratio   = io.colour.bits.ratio.filter { _ =>
         ended match {
-          case End(isBackground, _, isDirectView, _) => isDirectView && !isBackground
-          case other                                 => other.isInstanceOf[EndWithGathered]
+          case End(isBackground, _, isDirectView) => isDirectView && !isBackground
+          case other                              => other.isInstanceOf[EndWithGathered]
         }
       }
       colours(context) +=
         (io.colour.bits.colour.channels.map(_.peekInt().toInt) -> ratio.map(_.channels.map(_.peekRaw().toInt)))
       waits(context) = None
     }
-    for (continued <- io.continued if continued.valid.peekBoolean()) {
-      val context = continued.bits.context.peekInt().toInt
-      val isBack  = continued.bits.isBack.exists(_.peekBoolean())
+    if (io.continued.valid.peekBoolean()) {
+      val context = io.continued.bits.context.peekInt().toInt
+      val isBack  = io.continued.bits.goesBack.peekBoolean()
       assert(waits(context).exists(event => if (isBack) event.isInstanceOf[GoBack] else event.isInstanceOf[Gather]))
       waits(context) = None
       isStraight(context) = false
@@ -272,6 +268,8 @@ final class ColourDriver(io: ColourUnitIO, config: ColonnadeConfig) {
       waits(context) = Some(ended)
     }
   }
+
+  private def beyond(light: Option[Seq[Int]]): PathEnd.Type = light.fold(PathEnd.background)(_ => PathEnd.cube)
 
   /** The light of the cube that a path meets. */
   private def lightOf(event: ColourEvent): Option[Seq[Int]] = event match {

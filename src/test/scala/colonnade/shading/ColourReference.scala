@@ -52,9 +52,9 @@ final class ColourReference(
         radiance = add(throughput, leaving(what, light))
         throughput = throughput.zip(what.albedo).map { case (weight, tint) => weight * (tint + (tint >> 11)) >> 12 }
         None
-      case EndInCube(light)                        => Some(add(throughput, light) -> None)
-      case End(true, _, _, _)                      => Some(add(throughput, background) -> None)
-      case End(false, occlusions, isDirectView, _) =>
+      case EndInCube(light)                     => Some(add(throughput, light) -> None)
+      case End(true, _, _)                      => Some(add(throughput, background) -> None)
+      case End(false, occlusions, isDirectView) =>
         val what  = surface.get
         val light = visible(what, occlusions)
         Some(add(throughput, leaving(what, light)) -> Option.when(isDirectView)(ratio(light, unshadowed(what))))

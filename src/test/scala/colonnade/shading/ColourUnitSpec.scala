@@ -78,16 +78,16 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
           info(f"$name: $each%.1f cycles")
           assert(each <= most + 0.7)
           if (name.contains("bounce"))
-            play(Seq.fill(contexts)(Seq(End(true, seen.direct.map(_ => 0), isDirectView = false, isOfRoom = false))), 0)
+            play(Seq.fill(contexts)(Seq(End(true, seen.direct.map(_ => 0), isDirectView = false))), 0)
         }
         val none   = seen.direct.map(_ => 0)
         val opaque = seen.direct.map(_ => 2)
         cycles("an end at a surface", 3 * lights)(_ =>
-          End(false, none, isDirectView = hasEnvironment, isOfRoom = hasEnvironment)
+          End(false, none, isDirectView = hasEnvironment)
         )
-        cycles("an end in the background", 3)(_ => End(true, none, isDirectView = false, isOfRoom = false))
+        cycles("an end in the background", 3)(_ => End(true, none, isDirectView = false))
         cycles("an end where one is shadowed", 3 * lights + 1)(context =>
-          End(false, if (context == 0) opaque else none, isDirectView = hasEnvironment, isOfRoom = hasEnvironment)
+          End(false, if (context == 0) opaque else none, isDirectView = hasEnvironment)
         )
         if (maxBounces > 0) {
           cycles("a bounce", 3)(_ => Bounce(Seq.fill(3)(1000), isTinted = true, 99, hasSurface = false))

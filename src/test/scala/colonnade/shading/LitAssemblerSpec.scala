@@ -77,7 +77,7 @@ class LitAssemblerSpec extends AnyFlatSpec with ChiselScalatestTester {
         scatter.foreach(surface.fields("scatter") = _)
         for (emission <- material.emission)
           surface.fields("emission") = if (isPoint) Seq.fill(3)(BigInt(0)) else peek(emission)
-        for (_ <- label.environment) surface.fields("isOfEnvironment") = Seq(if (isPoint) 1 else 0)
+        surface.fields("isOfEnvironment") = Seq(if (isPoint) 1 else 0)
         lights ++= (0 until count).map(surface -> _)
         colours ++= Option.when(config.geometry.cornerColours)(surface)
         texels ++= Option.when(by == "texel")(surface)

@@ -76,7 +76,7 @@ class ShadowRaysSpec extends AnyFlatSpec with ChiselScalatestTester {
       if (offers) {
         request.bits.context.poke(asks(sent)._1)
         val light = asks(sent)._2
-        request.bits.isGathered.foreach(_.poke(light == dut.io.lights.size))
+        request.bits.isGathered.poke(light == dut.io.lights.size)
         request.bits.light.poke(light % dut.io.lights.size)
       }
       val takes = random.nextDouble() >= stalls

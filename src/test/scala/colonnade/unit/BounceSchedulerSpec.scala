@@ -5,7 +5,7 @@ import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.ray.RayRequest
-import colonnade.shading.{BounceUpdate, BouncedRay}
+import colonnade.shading.{BounceUpdate, BouncedRay, PathEnd}
 import colonnade.{Packed, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
@@ -44,13 +44,13 @@ private class BounceSchedulerHarness(config: ColonnadeConfig) extends Module {
   val update  = IO(Output(UInt(unit.update.bits.getWidth.W)))
   val ray     = IO(Output(UInt(unit.ray.bits.getWidth.W)))
   val stored  = unit.environment.map(environment => IO(Output(UInt(environment.ray.bits.getWidth.W))))
-  val leaving = unit.leaves.map(leaves => IO(Output(UInt(leaves.ray.bits.getWidth.W))))
+  val leaving = IO(Output(UInt(unit.leaves.ray.bits.getWidth.W)))
   io :<>= unit
   unit.in.bits                                                   := in.asTypeOf(unit.in.bits)
   update                                                         := unit.update.bits.asUInt
   ray                                                            := unit.ray.bits.asUInt
   for (stored <- stored; environment <- unit.environment) stored := environment.ray.bits.asUInt
-  for (leaving <- leaving; leaves <- unit.leaves) leaving        := leaves.ray.bits.asUInt
+  leaving                                                        := unit.leaves.ray.bits.asUInt
 }
 
 private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, random: Random, enabled: Boolean) {
@@ -61,13 +61,10 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
   private val ray     = new Packed(new RayRequest(config))
   private val most    = 2
 
-  /** What a resolved reflection shows. */
-  private case class Resumed(hasSurface: Boolean, showsCube: Boolean)
-
-  /** Bounces to issue, by context; those whose reflection is resolved. */
+  /** Bounces to issue, by context; those whose reflection is resolved, and what it shows. */
   private var waiting  = Map.empty[Int, Fields]
   private var deferred = Set.empty[Int]
-  private var resumed  = Map.empty[Int, Resumed]
+  private var resumed  = Map.empty[Int, PathEnd.Type]
   private var offered  = Option.empty[Int]
   private val counts   = Array.fill(config.units.pathContexts)(0)
   private val straight = Array.fill(config.units.pathContexts)(false)
@@ -116,29 +113,26 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     dut.io.ray.ready.poke(takesRay)
     val resumes = deferred.headOption.filter(_ => isWilling)
     val isMiss  = random.nextBoolean()
-    val isCube  = isMiss && random.nextBoolean()
+    val end     = if (!isMiss) PathEnd.lit else if (random.nextBoolean()) PathEnd.cube else PathEnd.background
     for (resume <- dut.io.environment.map(_.resume)) {
       resume.valid.poke(resumes.nonEmpty)
       resume.bits.context.poke(resumes.getOrElse(0))
-      resume.bits.isBackground.poke(isMiss)
-      resume.bits.showsCube.foreach(_.poke(isCube))
+      resume.bits.end.poke(end)
     }
 
     val isIssued = takesUpdate && dut.io.update.valid.peekBoolean()
     val reflects = dut.io.environment.exists(_.fresnelReflection.valid.peekBoolean())
     dut.io.bounced.valid.expect(isIssued)
     dut.io.environment.foreach(_.ray.valid.expect(isIssued || reflects))
-    for (leaves <- dut.io.leaves) {
-      leaves.ray.valid.expect(isIssued || reflects)
-      val isTraced = takesRay && dut.io.ray.valid.peekBoolean()
-      if (leaves.ray.valid.peekBoolean() && !isTraced) leaves.mayBypass.expect(true, "what is not traced is announced")
-    }
+    dut.io.leaves.ray.valid.expect(isIssued || reflects)
+    if ((isIssued || reflects) && !(takesRay && dut.io.ray.valid.peekBoolean()))
+      dut.io.leaves.mayBypass.expect(true, "what is not traced is announced")
     if (isIssued) issue(update.unpack(dut.update.peekInt()), takesRay)
     else assert(!(takesRay && dut.io.ray.valid.peekBoolean()))
     if (reflects) defer()
     for (context <- resumes if dut.io.environment.get.resume.ready.peekBoolean()) {
       deferred -= context
-      resumed += context -> Resumed(!isMiss, isCube)
+      resumed += context -> end
     }
     if (offered.nonEmpty && dut.io.in.ready.peekBoolean()) {
       assert(offered.exists(context => !waiting.contains(context) || deferred(context)), "a bounce is lost")
@@ -158,8 +152,7 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     assert(fields("fresnel") == fresnel(context, bounce))
     val isFirst = if (dut.io.path.isEmpty) counts(context) == 0 else straight(context)
     assert(fields("isFirst") == (if (isFirst) 1 else 0))
-    for (hasSurface <- fields.get("hasSurface")) assert(hasSurface == flag(resumed.get(context).exists(_.hasSurface)))
-    for (showsCube <- fields.get("showsCube")) assert(showsCube == flag(resumed.get(context).exists(_.showsCube)))
+    assert(fields("reflection") == resumed.getOrElse(context, PathEnd.background).litValue)
 
     val isTraced     = counts(context) < most
     val isRefraction = bounce("bounce.isRefraction") == 1
@@ -176,11 +169,9 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
       assert(sent == expected ++ Map("context" -> BigInt(context), "isShadow" -> BigInt(0)))
       counts(context) += 1
     } else untraced += 1
-    for (port <- dut.stored ++ dut.leaving) checkStored(port, context, expected)
-    dut.io.environment.flatMap(_.marches).foreach(_.expect(
-      !gathered(context),
-      "a path that has gathered marches no more"
-    ))
+    for (port <- dut.stored.toSeq :+ dut.leaving) checkStored(port, context, expected)
+    for (environment <- dut.io.environment)
+      environment.marches.expect(!gathered(context), "a path that has gathered marches no more")
     waiting -= context
     resumed -= context
     issued += 1
@@ -191,12 +182,10 @@ private class Bounces(dut: BounceSchedulerHarness, config: ColonnadeConfig, rand
     val bounce  = waiting(context)
     assert(hasReflection(context, bounce) && !deferred(context))
     dut.io.environment.get.fresnelReflection.bits.expect(context)
-    for (port <- dut.stored ++ dut.leaving)
+    for (port <- dut.stored.toSeq :+ dut.leaving)
       checkStored(port, context, way(bounce, "fresnelOrigin", "bounce.reflection"))
     deferred += context
   }
-
-  private def flag(is: Boolean): Int = if (is) 1 else 0
 
   private def hasReflection(context: Int, bounce: Fields): Boolean = enabled && fresnel(context, bounce) != 0
 

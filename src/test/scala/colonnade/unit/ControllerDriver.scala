@@ -2,7 +2,7 @@ package colonnade.unit
 
 import chisel3._
 import chiseltest._
-import colonnade.shading.Occlusion
+import colonnade.shading.{Occlusion, PathEnd}
 
 import scala.util.Random
 
@@ -29,7 +29,7 @@ private class ControllerDriver(
   dut.io.gather.foreach(_.bounces.poke(gathers))
 
   /** Points of the environment gather. */
-  private val isInRoom = dut.io.end.bits.isOfEnvironment.nonEmpty && gathers > 0
+  private val isInRoom = dut.io.environment.nonEmpty && gathers > 0
 
   /** Gathered rays of all paths; those of points of the environment that have met the object. */
   var gathered, returned = 0
@@ -120,7 +120,7 @@ private class ControllerDriver(
     val (scattered, shadowed) =
       shown(dut.io.shadow.valid, dut.io.shadow.bits.context, needsShadow ++ scattering)
         .partition(scattering.contains)
-    if ((scattered ++ shadowed).nonEmpty) dut.io.shadow.bits.isGathered.foreach(_.expect(scattered.nonEmpty))
+    if ((scattered ++ shadowed).nonEmpty) dut.io.shadow.bits.isGathered.expect(scattered.nonEmpty)
     val ended = shown(dut.io.end.valid, dut.io.end.bits.context, ending)
     for (index <- resolved) {
       dut.io.trace.hasHit.poke(contexts(index).hasHit)
@@ -162,22 +162,16 @@ private class ControllerDriver(
     for (index <- shadowed.headOption)
       assert(contexts(index).shadowPending.contains(dut.io.shadow.bits.light.peekInt().toInt))
     for (index <- ended) {
-      dut.io.end.bits.isBackground.expect(contexts(index).isBackground)
-      dut.io.end.bits.isStraight.foreach(_.expect(contexts(index).isStraight))
-      dut.io.end.bits.isDirectView.foreach(_.expect(contexts(index).isDirectView))
-      dut.io.end.bits.gathers.foreach(_.expect(isGathering(contexts(index))))
-      dut.io.end.bits.isScattered.foreach(_.expect(contexts(index).gathered > 0))
-      dut.io.end.bits.endsInCube.foreach(
-        _.expect(gathers > 0 && (contexts(index).gathered > 0 || !contexts(index).isStraight))
-      )
-      val context  = contexts(index)
+      val context = contexts(index)
+      dut.io.end.bits.end.expect(endOf(context))
+      dut.io.end.bits.isStraight.foreach(_.expect(context.isStraight))
+      dut.io.end.bits.isScattered.expect(context.gathered > 0)
+      dut.io.end.bits.goesBack.expect(isReturning(context))
       val isOfRoom = context.isOfEnvironment && context.gathered > 0
       if (!context.isBackground)
         dut.io.end.bits.occlusions.zip(if (isOfRoom) context.kept else context.occlusions).foreach {
           case (port, occlusion) => port.expect(occlusion)
         }
-      if (!context.isBackground || context.isDirectView)
-        dut.io.end.bits.isOfEnvironment.foreach(_.expect(context.isOfEnvironment))
     }
     val sampled = one(at(ContextState.shading)).filter(_ => dut.io.gather.nonEmpty)
     for (gather <- dut.io.gather; index <- sampled) {
@@ -194,8 +188,8 @@ private class ControllerDriver(
       environment.req.bits.isOcclusionTest.expect(contexts(index).isOcclusionTest)
     }
     for (environment <- dut.io.environment; index <- resumed) {
-      environment.resume.bits.isBackground.expect(contexts(index).isBackground)
-      environment.resume.bits.showsCube.foreach(_.expect(contexts(index).isBackground && gathers > 0))
+      val isMiss = contexts(index).isBackground
+      environment.resume.bits.end.expect(if (!isMiss) PathEnd.lit else beyond(gathers > 0))
     }
 
     val events = new ControllerEvents
@@ -208,7 +202,7 @@ private class ControllerDriver(
     val measured = marched.filter(index => events.march && contexts(index).isOcclusionTest)
     dut.io.trace.readsDistance.valid.expect(measured.nonEmpty)
     for (index <- measured) dut.io.trace.readsDistance.bits.expect(index)
-    for (again <- dut.io.environment.flatMap(_.again)) {
+    for (again <- dut.io.environment.map(_.again)) {
       val returns = events.continued.filter(_._2).map(_._1)
       again.valid.expect(returns.nonEmpty)
       returns.foreach(again.bits.expect(_))
@@ -274,7 +268,7 @@ private class ControllerDriver(
     }
     change(ended.filter(_ => events.end)) { context =>
       context.gathers = isGathering(context)
-      context.goesBack = !context.gathers && isInRoom && context.isDirectView && !context.isOfEnvironment
+      context.goesBack = isReturning(context)
       context.state = ContextState.accumulating
     }
     change(events.continued.map(_._1)) { context =>
@@ -355,6 +349,19 @@ private class ControllerDriver(
   /** The surface at which its path ends gathers light. */
   private def isGathering(context: ContextModel): Boolean =
     !context.isBackground && !context.isOfEnvironment && context.gathered < gathers
+
+  /** Its ray is that of a point of the environment. */
+  private def isReturning(context: ContextModel): Boolean =
+    !isGathering(context) && isInRoom && context.isDirectView && !context.isOfEnvironment
+
+  private def endOf(context: ContextModel): PathEnd.Type =
+    if (context.isBackground) beyond(gathers > 0 && (context.gathered > 0 || !context.isStraight))
+    else if (isGathering(context)) PathEnd.gathers
+    else if (!context.isDirectView || !context.isOfEnvironment) PathEnd.lit
+    else if (context.isStraight) PathEnd.directView
+    else PathEnd.gathered
+
+  private def beyond(isCube: Boolean): PathEnd.Type = if (isCube) PathEnd.cube else PathEnd.background
 
   private def afterLights(context: ContextModel): ContextState.Type =
     if (context.shadowPending.nonEmpty) ContextState.shadowTest

@@ -47,7 +47,7 @@ private class ControllerEvents {
     dut.io.shaded.valid.poke(shaded.nonEmpty)
     for ((context, needs, isOfEnvironment) <- shaded) {
       dut.io.shaded.bits.context.poke(context)
-      dut.io.shaded.bits.isOfEnvironment.foreach(_.poke(isOfEnvironment))
+      dut.io.shaded.bits.isOfEnvironment.poke(isOfEnvironment)
       dut.io.shaded.bits.needsShadowRays.zip(needs).foreach { case (port, need) => port.poke(need) }
     }
     dut.io.bounced.valid.poke(bounced.nonEmpty)
@@ -58,11 +58,9 @@ private class ControllerEvents {
     }
     name(dut.io.fetchFailed, fetchFailed)
     name(dut.io.accumulated, accumulated)
-    for (port <- dut.io.gather.map(_.continued)) {
-      port.valid.poke(continued.nonEmpty)
-      port.bits.context.poke(continued.map(_._1).getOrElse(other))
-      port.bits.isBack.foreach(_.poke(continued.exists(_._2)))
-    }
+    dut.io.continued.valid.poke(continued.nonEmpty)
+    dut.io.continued.bits.context.poke(continued.map(_._1).getOrElse(other))
+    dut.io.continued.bits.goesBack.poke(continued.exists(_._2))
     for (environment <- dut.io.environment) {
       environment.enabled.poke(hasEnvironment)
       environment.req.ready.poke(march)

@@ -58,6 +58,7 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
           anyRay() + ("context" -> BigInt(context))
         }
         port.bounces.get.ray.valid.poke(bounced.nonEmpty)
+        port.bounces.get.marches.poke(true)
         bounced.foreach(fields => dut.bounce.poke(rays.pack(fields)))
         port.objectRays.ready.poke(random.nextBoolean())
 
@@ -124,14 +125,14 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
         march.valid.poke(false)
         assert(shaded() == Seq(point))
         port.bounces.get.ray.valid.poke(true)
-        port.bounces.get.marches.get.poke(false)
+        port.bounces.get.marches.poke(false)
         dut.bounce.poke(rays.pack(rays.unpack(BigInt(rays.width, random)) + ("context" -> context)))
         assert(shaded().isEmpty)
         port.bounces.get.ray.valid.poke(false)
-        port.control.again.get.valid.poke(true)
-        port.control.again.get.bits.poke(context)
+        port.control.again.valid.poke(true)
+        port.control.again.bits.poke(context)
         dut.clock.step()
-        port.control.again.get.valid.poke(false)
+        port.control.again.valid.poke(false)
         assert(shaded() == Seq(point))
       }
     }

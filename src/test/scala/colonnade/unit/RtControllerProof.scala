@@ -5,7 +5,7 @@ import chisel3.experimental.SourceInfo
 import chisel3.util.{log2Ceil, PopCount, UIntToOH, Valid}
 import colonnade.TestParts._
 import colonnade.config.{ColonnadeConfig, PathConfig}
-import colonnade.shading.Occlusion
+import colonnade.shading.{Occlusion, PathEnd}
 
 /** Drives an [[RtController]] with any events of its stages. A stage answers for each context that it holds once, at any
   * time and in any order. A model of each path says where its context is, and what the controller has to do next.
@@ -28,6 +28,7 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
   private val mayHide     = environment.map(_.occlusion).headOption.getOrElse(false.B) && enabled
   private val isFirst     = RegNext(false.B, true.B)
   for (flag <- Seq(enabled, mayHide)) assume(isFirst || flag === RegNext(flag), "constant in a frame")
+  assume(!io.continued.valid, "no path gathers")
 
   private val paths                          = RegInit(VecInit.fill(used)(0.U.asTypeOf(new PathModel(lights))))
   private def path(context: UInt): PathModel = paths(context(0))
@@ -133,9 +134,13 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
   // Paths end
   private val end   = io.end.bits
   private val ended = path(end.context)
-  private val isLit = io.end.valid && !end.isBackground
+  private val isLit = io.end.valid && end.end =/= PathEnd.background
   offer(Place.toEnd, (io.end.valid, end.context), io.end.ready, "a path ends, once")
-  assert(!io.end.valid || end.isBackground === !ended.hasSurface, "a path ends at its surface or the background")
+  private val surface = Mux(ended.isDirectView, PathEnd.directView, PathEnd.lit)
+  assert(
+    !io.end.valid || end.end === Mux(ended.hasSurface, surface, PathEnd.background),
+    "a path ends at its surface, or one of the environment that the camera sees, or the background"
+  )
   assert(!isLit || ended.lightsLeft === 0.U, "a path ends after its shadow rays")
   for (light <- 0 until lights)
     assert(
@@ -144,8 +149,6 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
     )
   for (isStraight <- end.isStraight)
     assert(!io.end.valid || isStraight === ended.isPrimary, "straight without a bounce")
-  for (isDirectView <- end.isDirectView)
-    assert(!io.end.valid || isDirectView === ended.isDirectView, "a direct view of the environment")
   on(io.end.fire, end.context)(_.place := Place.colour)
   on(io.accumulated) { path =>
     path.hasColour := true.B
@@ -220,7 +223,7 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
     val resume = environment.resume
     offer(Place.toResume, (resume.valid, resume.bits.context), resume.ready, "a deferred bounce resumes, once")
     assert(
-      !resume.valid || resume.bits.isBackground === !path(resume.bits.context).hasSurface,
+      !resume.valid || resume.bits.end === Mux(path(resume.bits.context).hasSurface, PathEnd.lit, PathEnd.background),
       "a reflection of a surface or the background"
     )
     on(resume.fire, resume.bits.context) { path =>
@@ -234,7 +237,7 @@ private[unit] final class RtControllerProof(config: ColonnadeConfig) extends Mod
     cover(environment.visible.valid, "a hit is visible")
     cover(environment.hit.valid && path(environment.hit.bits).isTest, "a hit is hidden")
     if (!isLarge) {
-      cover(resume.fire && !resume.bits.isBackground, "a reflection has a surface")
+      cover(resume.fire && resume.bits.end === PathEnd.lit, "a reflection has a surface")
       cover(io.end.valid && ended.isDirectView && ended.isShadow, "a shadow on the environment")
     }
   }
