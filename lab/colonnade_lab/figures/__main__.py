@@ -13,7 +13,8 @@ from colonnade.design.toolchain import project_root
 
 from colonnade_lab.figures import pages, pictures
 from colonnade_lab.figures.catalog import catalog, selected
-from colonnade_lab.figures.data import commands_of, problems
+from colonnade_lab.figures.data import commands_of, digest_table, problems
+from colonnade_lab.figures.digests import emit
 from colonnade_lab.figures.measure import measure, require_libraries
 
 
@@ -26,7 +27,13 @@ def main() -> None:
     if parts == ("list",):
         for entry in catalog().values():
             print(f"{entry.name}: {'; '.join(commands_of(entry))}")
-    elif parts == ("check",):
+    elif parts == ("digests",):
+        emit(catalog().values())
+        for line in digest_table(docs):
+            print(line)
+    elif parts in (("check",), ("check", "--quick")):
+        if parts == ("check",):
+            emit(catalog().values())
         found = [*problems(docs), *pages.problems(docs), *pictures.problems(docs)]
         for problem in found:
             print(f"figures: {problem}", file=sys.stderr)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from colonnade.design.toolchain import project_root
 
+from colonnade_lab.explore.points import points_of
 from colonnade_lab.explore.study_file import load_study
 
 #: Stands for the file that a command writes its report to.
@@ -15,6 +17,19 @@ REPORT = "REPORT"
 
 #: Stand for the liberty files of a library in a command, and name the variables that hold their paths.
 LIBRARIES = ("ASAP7", "SKY130")
+
+
+@dataclass(frozen=True)
+class Design:
+    """A configuration, and changes to it, ``key.path=value``."""
+
+    config: str
+    overrides: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its name in data files."""
+        return " ".join((self.config, *self.overrides))
 
 
 @dataclass(frozen=True)
@@ -29,6 +44,8 @@ class Entry:
         overrides: Changes to the configuration, ``key.path=value``.
         report: The file that the commands write, below the root, where they take no name of one.
         libraries: Those of `LIBRARIES` that the commands need.
+        designs: Those whose Verilog decides the figures, also of the model, which equals it; None: the configuration.
+        sources: Names of the host's sources that decide them, too (`digests.SOURCES`).
     """
 
     name: str
@@ -37,6 +54,18 @@ class Entry:
     overrides: tuple[str, ...] = ()
     report: str | None = None
     libraries: tuple[str, ...] = ()
+    designs: tuple[Design, ...] | None = None
+    sources: tuple[str, ...] = ("tree",)
+
+    @property
+    def hardware(self) -> tuple[Design, ...]:
+        """The designs whose Verilog decides the figures."""
+        return (Design(self.config, self.overrides),) if self.designs is None else self.designs
+
+
+def _alone(source: str) -> dict[str, Any]:
+    """What decides figures without hardware."""
+    return {"designs": (), "sources": (source,)}
 
 
 def _colonnade(*arguments: str) -> dict[str, tuple[str, ...]]:
@@ -58,10 +87,13 @@ def _verify(name: str, config: str, *options: str) -> Entry:
 
 def _study(name: str, *libraries: str) -> Entry:
     path = Path("scenes") / "studies" / f"{name}.toml"
-    design = load_study(project_root() / path).study.design
+    file = load_study(project_root() / path)
+    design = file.study.design
+    designs = tuple(Design(design.config, point.overrides) for point in points_of(file))
+    report = f"out/{name}/study.json"
     options = (option for library in libraries for option in ("--library", f"{library.lower()}={library}"))
     command = ("colonnade", "explore", str(path), *options, "--output", f"out/{name}")
-    return Entry(name, design.config, {"": command}, design.set, f"out/{name}/study.json", libraries)
+    return Entry(name, design.config, {"": command}, design.set, report, libraries, designs)
 
 
 #: Meshes for small arrays, whose frames take millions of cycles.
@@ -136,7 +168,8 @@ def _paper_maps() -> Entry:
             commands[f"-{encoding}, {frame}"] = picture(encoding, frame, *hardware(encoding), "--backend", "model")
             pair = (f"out/maps-{name}-{frame}.png" for name in ("reference", encoding))
             commands[f"{encoding}, {frame}"] = ("colonnade", "compare", *pair, "--json", REPORT)
-    return Entry("paper-maps", "small", commands, (hardware("slic")[-1],), libraries=("ASAP7",))
+    encoding = hardware("slic")[-1]
+    return Entry("paper-maps", "small", commands, (encoding,), libraries=("ASAP7",), sources=("maps", "tree"))
 
 
 def _gather() -> Entry:
@@ -163,15 +196,16 @@ def _light() -> Entry:
     """Frames in known rooms against a path tracer, and a pass of the RTL over one of them, with gathered light."""
     scenes = [f"out/light/panorama-{rays}/attic-rough.toml" for rays in (1, 2)]
     # Its meshes need more records than those of the benchmark
-    larger = ("--set", "columnBvhMemory.depth=262144")
-    hardware = ("--config", "edge", "--set", "frame.gather=true", *larger, "--backend", "rtl")
+    design = Design("edge", ("frame.gather=true", "columnBvhMemory.depth=262144"))
+    larger = (part for override in design.overrides for part in ("--set", override))
+    hardware = ("--config", design.config, *larger, "--backend", "rtl")
     options = ("--samples", "1", "--size", "640x480", "--json", REPORT)
     commands = {
         "frames": ("tools/light", "frames", "--json", REPORT),
         "pass": ("colonnade", "render", scenes[0], *hardware, *options),
         "two": ("colonnade", "render", scenes[1], *hardware, *options),
     }
-    return Entry("light", "textured", commands)
+    return Entry("light", "textured", commands, designs=(design,))
 
 
 def catalog() -> dict[str, Entry]:
@@ -196,8 +230,9 @@ def catalog() -> dict[str, Entry]:
                     for room in (*_ROOMS, _ATTIC)
                 },
             },
+            **_alone("maps"),
         ),
-        Entry("room-lights", "small", _colonnade("study", "light", *_ROOMS, _ATTIC)),
+        Entry("room-lights", "small", _colonnade("study", "light", *_ROOMS, _ATTIC), **_alone("roomLight")),
         Entry(
             "live-rooms",
             "small",
@@ -205,15 +240,16 @@ def catalog() -> dict[str, Entry]:
                 "rooms": ("colonnade", "study", "live", *_ROOMS, _ATTIC, "--json", REPORT),
                 "generated": ("colonnade", "study", "live", "--rooms", _SEEDS, "--json", REPORT),
             },
+            **_alone("live"),
         ),
-        Entry("live-paths", "small", _colonnade("study", "live-paths", _MOVED)),
+        Entry("live-paths", "small", _colonnade("study", "live-paths", _MOVED), **_alone("live")),
         Entry(
             "moved-rooms",
             "edge",
             {"": ("tools/room-frames", "edge", "160x120", "--moved", "--compare", f"--json={REPORT}")},
         ),
-        Entry("moving-frames", "small", _colonnade("study", "moved-frames", _MOVED)),
-        Entry("captures", "small", _colonnade("study", "captures", *_ROOMS, _ATTIC)),
+        Entry("moving-frames", "small", _colonnade("study", "moved-frames", _MOVED), sources=("live", "tree")),
+        Entry("captures", "small", _colonnade("study", "captures", *_ROOMS, _ATTIC), **_alone("maps")),
         _samples(),
         _gather(),
         _light(),

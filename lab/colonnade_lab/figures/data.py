@@ -17,8 +17,9 @@ from colonnade.design.toolchain import project_root
 
 from colonnade_lab.explore.figures import area_figures
 from colonnade_lab.figures.catalog import REPORT, Entry, catalog
+from colonnade_lab.figures.digests import digests_of, stale
 
-#: Lists the entries that nobody has measured on today's hardware yet. It is absent if there are none.
+#: Lists the entries without a file, or with one of other hardware than today's. It is absent if there are none.
 UNMEASURED = "unmeasured.txt"
 
 #: The preset whose values a configuration has for keys that it lacks; and with the sections that the preset lacks.
@@ -77,7 +78,7 @@ class Data:
 
 
 def unmeasured(docs: Path) -> list[str]:
-    """The entries that are declared as not measured."""
+    """The entries that are declared as not measured on today's hardware."""
     file = docs / "data" / UNMEASURED
     return file.read_text(encoding="utf-8").split() if file.is_file() else []
 
@@ -103,16 +104,15 @@ def problems(docs: Path) -> Iterator[str]:
         if name not in entries:
             yield f"data/{UNMEASURED}: {name} is no part of tools/figures"
     for name, entry in entries.items():
-        if (name in files) == (name in declared):
-            yield (
-                f"data/{UNMEASURED}: {name} is measured: take it from the list"
-                if name in files
-                else f"data/{name}.json is missing: run tools/figures {name}"
-            )
-        elif name in files:
-            problem = problem_of(entry, json.loads((docs / "data" / f"{name}.json").read_text(encoding="utf-8")))
-            if problem:
-                yield f"data/{name}.json: {problem}: run tools/figures {name}"
+        if name not in files:
+            if name not in declared:
+                yield f"data/{name}.json is missing: run tools/figures {name}"
+            continue
+        problem = problem_of(entry, json.loads((docs / "data" / f"{name}.json").read_text(encoding="utf-8")))
+        if problem and name not in declared:
+            yield f"data/{name}.json: {problem}: run tools/figures {name}"
+        elif not problem and name in declared and None not in digests_of(entry).values():
+            yield f"data/{UNMEASURED}: {name} is measured: take it from the list"
     yield from _size_problems(Data(docs), entries)
 
 
@@ -145,7 +145,15 @@ def _sizes(entry: Entry, content: Mapping[str, Any]) -> Iterator[tuple[str, str,
 
 
 def problem_of(entry: Entry, content: Mapping[str, Any]) -> str | None:
-    """Why a data file is not of today's hardware; None if it is."""
+    """Why a data file is not of today's hardware and sources; None if it is, as far as digests are cached."""
+    different = config_problem(entry, content)
+    if different is None and (changes := list(stale(entry, content.get("digests", {})))):
+        different = f"{', '.join(changes)} (measured at {str(content.get('commit'))[:8]})"
+    return different
+
+
+def config_problem(entry: Entry, content: Mapping[str, Any]) -> str | None:
+    """Why a data file is not of today's configuration; None if it is."""
     try:
         config = manifest_for(entry.config, entry.overrides).manifest.config
     except UserError as error:
@@ -190,15 +198,19 @@ def commit() -> tuple[str | None, bool]:
 
 
 def is_current(entry: Entry, content: Mapping[str, Any]) -> bool:
-    """Whether a data file is of the commands, the configuration and the sources of the checkout."""
-    if (
-        content.get("is_modified", True)
-        or content.get("commit") is None
-        or content.get("command") != commands_of(entry)
-    ):
-        return False
-    unchanged = _git("diff", "--quiet", content["commit"], "--", *SOURCES)
-    return unchanged is not None and problem_of(entry, content) is None
+    """Whether a data file is of the commands, the configuration and the digests of the checkout."""
+    return content.get("command") == commands_of(entry) and problem_of(entry, content) is None
+
+
+def digest_table(docs: Path) -> Iterator[str]:
+    """One line for each digest of each data file: file, commit, state, digest, what it is of."""
+    data = Data(docs)
+    for name, entry in catalog().items():
+        content, today = data.get(name) or {}, digests_of(entry)
+        for what, measured in content.get("digests", {}).items():
+            known = today.get(what)
+            state = "not cached" if known is None else "current" if known == measured else "stale"
+            yield f"{name:<20} {str(content['commit'])[:8]} {state:<10} {measured[:16]} {what}"
 
 
 def commands_of(entry: Entry) -> list[str]:

@@ -20,7 +20,8 @@ from colonnade.design.toolchain import project_root
 
 from colonnade_lab.common.parallel import processors
 from colonnade_lab.figures.catalog import LIBRARIES, REPORT, Entry
-from colonnade_lab.figures.data import Data, commands_of, commit, declare_measured, is_current, problem_of, text_of
+from colonnade_lab.figures.data import Data, commands_of, commit, config_problem, declare_measured, is_current, text_of
+from colonnade_lab.figures.digests import digests_of, emit
 from colonnade_lab.figures.kept import kept, record_lines
 
 
@@ -43,11 +44,13 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
         UserError: A command failed.
     """
     known = Data(docs).get(entry.name)
+    emit([entry])
     if known is not None and not again and is_current(entry, known):
         print(f"figures: {entry.name} is of these sources", flush=True)
         return
     print(f"figures: {entry.name}", flush=True)
     head, is_modified = commit()
+    digests = digests_of(entry)
     config = manifest_for(entry.config, entry.overrides).manifest.config
     begin = time.monotonic()
     reports = {part: _report(entry, command) for part, command in entry.commands.items()}
@@ -60,11 +63,12 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
         "seconds": round(max(seconds, _seconds_before(known, entry, head)), 1),
         "processors": processors(),
         "config": config,
+        "digests": digests,
         "result": kept(reports.get("", {part: each for part, each in reports.items() if part[:1] != "-"})),
     }
     reported = reports.get("", {}).get("config")
     # Some reports have the name of the configuration alone
-    problem = problem_of(entry, {"config": reported}) if isinstance(reported, Mapping) else None
+    problem = config_problem(entry, {"config": reported}) if isinstance(reported, Mapping) else None
     if problem is not None:
         raise UserError(f"{entry.name}: the report of {text_of(next(iter(entry.commands.values())))}: {problem}")
     (docs / "data").mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,98 @@
+"""Digests of what figures are measured on: the Verilog of configurations, and sources of the host.
+
+A digest is the SHA-256 of texts without comments, imports and white space that no meaning depends on, in any order: a
+renamed file is the same text.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from colonnade.common import cache
+from colonnade.design.config_name import find_configuration
+from colonnade.design.generator import design_for, source_hash
+from colonnade.design.toolchain import cache_directory, project_root
+
+from colonnade_lab.common.parallel import in_order, processors
+from colonnade_lab.figures.catalog import Design, Entry
+
+#: Files of the host that decide figures, by what they are called in data files.
+SOURCES: Mapping[str, tuple[str, ...]] = {
+    "live": ("host/cpp/live/*.[ch]*",),
+    "maps": tuple(f"host/colonnade/maps/{each}.py" for each in ("*_encoder", "*_fit", "slic", "palette", "heap")),
+    "roomLight": ("host/colonnade/environment/*_fit.py", "host/colonnade/maps/room_light.py"),
+    "tree": ("host/cpp/*bvh.hpp", "host/cpp/reinsertion.hpp"),
+}
+
+#: Strings, which stay, and comments and includes, of C++ and Verilog; comments, docstrings and imports of Python.
+_C = re.compile(r'("(?:\\.|[^"\\\n])*")|//[^\n]*|/\*.*?\*/|^[ \t]*#[ \t]*(?:include|pragma once)[^\n]*', re.S | re.M)
+_PYTHON = re.compile(
+    r'("(?:\\.|[^"\\\n])+")|#[^\n]*|^[ \t]*""".*?"""|^[ \t]*(?:from \S+ )?import (?:\([^)]*\)|[^\n]*)', re.S | re.M
+)
+
+
+def digest_of(files: Iterable[Path]) -> str:
+    """The digest of files of C++, SystemVerilog or Python."""
+    digests = (hashlib.sha256(_normal(file).encode()).hexdigest() for file in files)
+    return hashlib.sha256("\n".join(sorted(digests)).encode()).hexdigest()
+
+
+def _normal(file: Path) -> str:
+    is_python = file.suffix == ".py"
+    text = (_PYTHON if is_python else _C).sub(lambda found: found[1] or "", file.read_text(encoding="utf-8"))
+    if is_python:
+        # Indentation has a meaning
+        return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
+    return re.sub(r" ?([^\w ]) ?", r"\1", " ".join(text.split()))
+
+
+def digests_of(entry: Entry) -> dict[str, str | None]:
+    """What an entry would be measured on: digests by configuration, and of sources; None if they are not cached."""
+    root, texts = project_root(), {}
+    for name in entry.sources:
+        texts[name] = digest_of(file for pattern in SOURCES[name] for file in root.glob(pattern))
+    return {design.name: _cached(design) for design in entry.hardware} | texts
+
+
+def emit(entries: Iterable[Entry]) -> None:
+    """Generate the Verilog of entries, each configuration once; its digests are cached.
+
+    Raises:
+        UserError: The generator refuses a configuration.
+    """
+    designs = dict.fromkeys(design for entry in entries for design in entry.hardware)
+    missing = [design for design in designs if _cached(design) is None]
+    for number, _ in enumerate(in_order(_store, missing, processors())):
+        print(f"figures: Verilog of {missing[number].name}", flush=True)
+
+
+def _store(design: Design) -> None:
+    file, key = _place(design)
+    cache.store(file, key, {"digest": digest_of(design_for(design.config, design.overrides).sources)})
+
+
+def _cached(design: Design) -> str | None:
+    content = cache.stored(*_place(design))
+    return None if content is None else str(content["digest"])
+
+
+def _place(design: Design) -> tuple[Path, dict[str, str]]:
+    """The file of a digest in the cache, and its key."""
+    root = project_root()
+    preset = find_configuration(design.config, design.overrides, root).path.read_bytes()
+    key = {"generator": source_hash(root), "design": design.name, "preset": hashlib.sha256(preset).hexdigest()}
+    name = hashlib.sha256("\n".join(key.values()).encode()).hexdigest()[:20]
+    return cache_directory(root) / "digests" / f"{name}.json", key
+
+
+def stale(entry: Entry, measured: Mapping[str, str]) -> Iterator[str]:
+    """One line for each configuration or source whose digest is another one than that of a data file."""
+    today = digests_of(entry)
+    for name in sorted(today.keys() ^ measured.keys()):
+        yield f"it has no digest of {name}" if name in today else f"its digest of {name} belongs to no measurement"
+    for name, digest in today.items():
+        if digest is not None and measured.get(name, digest) != digest:
+            yield f"{'sources' if name in SOURCES else 'the Verilog'} of {name} changed"
