@@ -1,4 +1,4 @@
-"""Normals of a depth map (host/cpp/environment/depth_normals.hpp): planes of windows, and large planes of the whole map."""
+"""Normals of a depth map (host/cpp/environment/depth_normals.hpp): planes of windows, and large planes of all of it."""
 
 from __future__ import annotations
 
