@@ -38,12 +38,12 @@ final private[shading] class ShownEnd extends Bundle {
 
 private[shading] object ShownEnd {
   def apply(config: PathConfig, end: PathEnd.Type): ShownEnd = {
-    val shown = Wire(new ShownEnd)
-    shown.isInCube    := PathEnd.is(config, end, PathEnd.cube)
-    shown.hasSurface  := !PathEnd.is(config, end, PathEnd.background) && !shown.isInCube
-    shown.hasGathered := PathEnd.is(config, end, PathEnd.gathered)
-    shown.gathers     := PathEnd.is(config, end, PathEnd.gathers)
-    shown
+    val flags = Wire(new ShownEnd)
+    flags.isInCube    := PathEnd.is(config, end, PathEnd.cube)
+    flags.hasSurface  := !PathEnd.is(config, end, PathEnd.background) && !flags.isInCube
+    flags.hasGathered := PathEnd.is(config, end, PathEnd.gathered)
+    flags.gathers     := PathEnd.is(config, end, PathEnd.gathers)
+    flags
   }
 }
 

@@ -39,6 +39,7 @@ private class EnvironmentMarchesHarness(config: ColonnadeConfig) extends Module 
   marches.io.maps.zip(maps.io.ports).foreach { case (march, port) => SlowMaps.connect(march, port, isSlow = true.B) }
   private val rays = Module(new EnvironmentRays(config)).io
   marches.io.paths :<>= rays.marches
+  rays.again          := 0.U.asTypeOf(rays.again) // no path gathers
   rays.isMapCamera    := paths.isMapCamera
   rays.ray.valid      := paths.ray.valid
   rays.ray.bits       := paths.ray.bits.asTypeOf(rays.ray.bits)
