@@ -94,8 +94,7 @@ static struct colonnade_camera orbiting(const struct colonnade_view *view, const
     double axes[3][3], away[3], depth = 0;
     for (int axis = 0; axis < 3; ++axis)
         for (int i = 0; i < 3; ++i) axes[axis][i] = from->pose.rotation[i][axis] / ONE;
-    for (int i = 0; i < 3; ++i)
-        depth += axes[2][i] * (double)(view->object.position[i] - from->pose.position[i]) / METRE;
+    for (int i = 0; i < 3; ++i) depth += axes[2][i] * (double)(view->object.position[i] - from->pose.position[i]) / METRE;
     for (int i = 0; i < 3; ++i) away[i] = -orbit->distance * depth * axes[2][i];
     const double right[3] = {axes[0][0], axes[0][1], axes[0][2]};
     double *const vectors[4] = {axes[0], axes[1], axes[2], away};

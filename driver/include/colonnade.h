@@ -77,13 +77,13 @@ struct colonnade_design {
     uint32_t frame_registers; /* byte address of the first frame register; all up to device_end are such */
     uint32_t errors;          /* byte address of the first error bit, each in a word of its own */
     uint32_t error_count;
-    uint32_t counters;        /* byte address of the first counter, each in two words */
+    uint32_t counters; /* byte address of the first counter, each in two words */
     uint32_t counter_count;
-    uint32_t tile_size;       /* pixels */
-    uint32_t posted_writes;   /* writes to the device's registers that the shell takes while a frame runs */
-    uint32_t scene_page;      /* byte address of `dram.page` and of `control.invalidate`; 0 if no scene lies in DRAM */
+    uint32_t tile_size;     /* pixels */
+    uint32_t posted_writes; /* writes to the device's registers that the shell takes while a frame runs */
+    uint32_t scene_page;    /* byte address of `dram.page` and of `control.invalidate`; 0 if no scene lies in DRAM */
     uint32_t invalidate;
-    uint32_t map_count; /* memories of a room's maps; 0: the device has no room */
+    uint32_t map_count;                               /* memories of a room's maps; 0: the device has no room */
     struct colonnade_memory maps[COLONNADE_MAX_MAPS]; /* an image's section for maps[i] has the target i + 1 */
 };
 

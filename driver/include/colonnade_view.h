@@ -24,7 +24,7 @@ enum {
     COLONNADE_VIEW_WINDOW = 8,
     COLONNADE_VIEW_GATHER = 2 * COLONNADE_VIEW_RAYS,
     COLONNADE_VIEW_WORDS = COLONNADE_VIEW_FRAME + COLONNADE_VIEW_CAMERA + COLONNADE_VIEW_LIGHTS * COLONNADE_VIEW_LIGHT +
-                           COLONNADE_VIEW_ENVIRONMENT + COLONNADE_VIEW_WINDOW + COLONNADE_VIEW_GATHER
+        COLONNADE_VIEW_ENVIRONMENT + COLONNADE_VIEW_WINDOW + COLONNADE_VIEW_GATHER
 };
 
 /* World = rotation * local + position. */
@@ -63,10 +63,10 @@ struct colonnade_view_scene {
     uint32_t frame_address, camera_address, lights_address, environment_address, window_address;
     uint32_t gather_address; /* 0: the sample points are constant */
     uint32_t lights, constants;
-    struct colonnade_factor steps;  /* grid steps in a metre */
-    int64_t offset[3];              /* grid position of the mesh's origin, negated, 2^-16 steps */
-    int32_t low[3], high[3];        /* the object's bounds, vertex units */
-    struct colonnade_factor metres; /* metres in a grid step */
+    struct colonnade_factor steps;      /* grid steps in a metre */
+    int64_t offset[3];                  /* grid position of the mesh's origin, negated, 2^-16 steps */
+    int32_t low[3], high[3];            /* the object's bounds, vertex units */
+    struct colonnade_factor metres;     /* metres in a grid step */
     struct colonnade_factor projection; /* 1 / (1024 * depthUnit), in a grid step */
     int64_t map_lens[4];                /* fx, fy, cx, cy of the maps, 2^-32 of their pixels */
     struct colonnade_pose map_pose;     /* of the maps' camera */
@@ -98,8 +98,8 @@ struct colonnade_view {
 };
 
 /* Reads a view file, which `colonnade pack --view-file` writes. Poses and lights are those of its scene. */
-enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design,
-                                         const void *data, size_t bytes);
+enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design, const void *data,
+                                         size_t bytes);
 
 /* The rotation of a unit quaternion x, y, z, w, 2^-30 each. */
 enum colonnade_error colonnade_rotation(int32_t rotation[3][3], const int32_t quaternion[4]);
@@ -109,8 +109,7 @@ enum colonnade_error colonnade_view_set_camera(struct colonnade_view *view, cons
 /* Where the object is, 2^-32 m; until the first call it is where the file has it. */
 enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, const struct colonnade_pose *object);
 /* Light `index` of the scene, 0 to its count - 1; until the first call it is that of the file. */
-enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index,
-                                              const struct colonnade_light *light);
+enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index, const struct colonnade_light *light);
 
 /* Pass `index` of a frame of 1, 2, 4, ... 64 passes: the host's pixel shift and sample points (docs/sampling.md). It holds
  * until the next call, whatever moves; until the first one a frame has one pass. */

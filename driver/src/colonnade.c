@@ -235,8 +235,7 @@ enum colonnade_error colonnade_reset(struct colonnade *device, uint32_t attempts
 
 uint32_t colonnade_device_errors(struct colonnade *device) {
     uint32_t bits = 0;
-    for (uint32_t i = 0; i < device->design->error_count; ++i)
-        bits |= (get(device, device->design->errors + 4 * i) & 1u) << i;
+    for (uint32_t i = 0; i < device->design->error_count; ++i) bits |= (get(device, device->design->errors + 4 * i) & 1u) << i;
     return bits;
 }
 
@@ -248,18 +247,15 @@ uint64_t colonnade_counter(struct colonnade *device, uint32_t index) {
 
 const char *colonnade_error_name(enum colonnade_error error) {
     static const char *const names[] = {
-        "ok",          "noDevice",    "unknownVersion", "otherFormat", "notAnImage", "notAFrame",
-        "truncated",   "tooLarge",    "misaligned",     "badRegister", "badFormat",  "noFrame",
-        "busy",        "timeout",     "busResponse",    "badSection",  "badLength",  "noPhoto",
-        "frameInvalid", "noScene",    "notAView",       "badPose",     "badLens",    "tooFar",
-        "noLight",     "noSample",
+        "ok",          "noDevice",   "unknownVersion", "otherFormat", "notAnImage",   "notAFrame", "truncated",
+        "tooLarge",    "misaligned", "badRegister",    "badFormat",   "noFrame",      "busy",      "timeout",
+        "busResponse", "badSection", "badLength",      "noPhoto",     "frameInvalid", "noScene",   "notAView",
+        "badPose",     "badLens",    "tooFar",         "noLight",     "noSample",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }
 
-uint32_t colonnade_mmio_read(void *context, uint32_t address) {
-    return ((volatile uint32_t *)context)[address / 4];
-}
+uint32_t colonnade_mmio_read(void *context, uint32_t address) { return ((volatile uint32_t *)context)[address / 4]; }
 
 void colonnade_mmio_write(void *context, uint32_t address, uint32_t value) {
     ((volatile uint32_t *)context)[address / 4] = value;

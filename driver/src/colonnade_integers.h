@@ -40,9 +40,7 @@ static inline uint64_t colonnade_largest(const int64_t vector[3]) {
 static inline int64_t colonnade_shift_left(int64_t value, int bits) { return (int64_t)((uint64_t)value << bits); }
 
 /* value / 2^bits, towards minus infinity. */
-static inline int64_t colonnade_floor(int64_t value, int bits) {
-    return value >> (bits < 63 ? bits : 63);
-}
+static inline int64_t colonnade_floor(int64_t value, int bits) { return value >> (bits < 63 ? bits : 63); }
 
 /* value / 2^bits to nearest; bits may be negative, if the result has 63 bits. |value| < 2^62. */
 static inline int64_t colonnade_nearest(int64_t value, int bits) {

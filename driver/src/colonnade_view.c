@@ -142,8 +142,7 @@ static void set_directions(struct colonnade_view *view, const struct colonnade_w
     }
     uint32_t *to = colonnade_computed(view) + VIEW_CAMERA + 3 * colonnade_mac_words(scene);
     for (int i = 0; i < 3; ++i)
-        for (int axis = 0; axis < 3; ++axis)
-            to = colonnade_set_mac(scene, to, results[i][axis], scene->more_mac_bits);
+        for (int axis = 0; axis < 3; ++axis) to = colonnade_set_mac(scene, to, results[i][axis], scene->more_mac_bits);
     *to = (uint32_t)rays->shift;
 }
 

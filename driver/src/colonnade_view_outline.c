@@ -33,8 +33,8 @@ static void find_box(struct colonnade_view *view, const struct colonnade_work *w
 
 /* The half-plane of the pixels whose rays lie on one side of a plane through the eye: normal * ray >= 0. The normal has no
  * component along an axis. Answers whether it cuts the frame. */
-static bool find_half_plane(const struct colonnade_view *view, const struct colonnade_view_rays *rays, const int32_t normal[3], int axis,
-                            int32_t half_plane[3]) {
+static bool find_half_plane(const struct colonnade_view *view, const struct colonnade_view_rays *rays, const int32_t normal[3],
+                            int axis, int32_t half_plane[3]) {
     const int b = (axis + 1) % 3, c = (axis + 2) % 3;
     const int32_t *step_x = rays->step_x, *step_y = rays->step_y, *direction = rays->first;
     const int64_t x = (int64_t)normal[b] * step_x[b] + (int64_t)normal[c] * step_x[c];

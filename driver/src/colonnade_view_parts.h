@@ -47,8 +47,7 @@ static inline uint32_t colonnade_mac_words(const struct colonnade_view_scene *sc
 }
 
 /* Sets such a register to value * 2^shift, which has `more_mac_bits` below at most, and answers the place behind it. */
-static inline uint32_t *colonnade_set_mac(const struct colonnade_view_scene *scene, uint32_t *words, int64_t value,
-                                          int shift) {
+static inline uint32_t *colonnade_set_mac(const struct colonnade_view_scene *scene, uint32_t *words, int64_t value, int shift) {
     const uint64_t bits = (uint64_t)value << shift;
     if (scene->more_mac_bits == 0) {
         *words++ = colonnade_bits(value, scene->mac_bits);

@@ -6,7 +6,8 @@ enum { WORLD_BITS = 60 };
 
 bool colonnade_is_lens(int64_t fx, int64_t fy, int64_t cx, int64_t cy) {
     const int64_t least = COLONNADE_PIXEL / 16, most = COLONNADE_PIXEL << 24;
-    return colonnade_is_within(fx, least, most) && colonnade_is_within(fy, least, most) && colonnade_is_within(cx, -most, most) && colonnade_is_within(cy, -most, most);
+    return colonnade_is_within(fx, least, most) && colonnade_is_within(fy, least, most) &&
+           colonnade_is_within(cx, -most, most) && colonnade_is_within(cy, -most, most);
 }
 
 bool colonnade_is_place(const int64_t position[3]) { return colonnade_block_length(position) <= WORLD_BITS; }

@@ -48,22 +48,20 @@ static bool set_projection(struct colonnade_view *view, const struct colonnade_w
 
     uint32_t *to = colonnade_computed(view) + VIEW_ENVIRONMENT;
     for (int i = 0; i < 9; ++i) to = colonnade_set_mac(scene, to, colonnade_nearest(matrix[i / 3][i % 3], down), more);
-    for (int row = 0; row < 3; ++row)
-        to = colonnade_set_mac(scene, to, colonnade_nearest(offset[row], whole + shift), more);
+    for (int row = 0; row < 3; ++row) to = colonnade_set_mac(scene, to, colonnade_nearest(offset[row], whole + shift), more);
     *to++ = (uint32_t)(shift + scene->more_grid_bits);
     *to++ = (uint32_t)scaled & (2 * (uint32_t)limit + 1);
-    for (int i = 0; i < 9; ++i)
-        *to++ = colonnade_bits(colonnade_nearest(work->axes[i % 3][i / 3], 60 - ROTATION_FRACTION), 16);
+    for (int i = 0; i < 9; ++i) *to++ = colonnade_bits(colonnade_nearest(work->axes[i % 3][i / 3], 60 - ROTATION_FRACTION), 16);
     return true;
 }
 
 /* Lengths from the eye, in 2^unit steps of 2^-16, of 28 bits. */
 struct lengths {
     int unit;
-    int32_t rows[2][3][3];              /* axes of the camera, and of the world, in the object's axes, 2^-30 */
-    int32_t planes[3][2];               /* the object's box */
+    int32_t rows[2][3][3]; /* axes of the camera, and of the world, in the object's axes, 2^-30 */
+    int32_t planes[3][2];  /* the object's box */
     int32_t lights[COLONNADE_VIEW_LIGHTS][3];
-    int32_t walls[3][2];                /* the room's box, in the world's axes */
+    int32_t walls[3][2]; /* the room's box, in the world's axes */
 };
 
 /* The product of a camera's or the world's axis with a vector in the object's axes. */
@@ -107,9 +105,8 @@ static void find_lengths(const struct colonnade_view *view, const struct colonna
 /* Corners of the object's box with a margin, in vertex units, along the axes of the camera (0) or of the world (1). */
 static void find_corners(const struct colonnade_view_scene *scene, const struct lengths *lengths, int which, int32_t margin,
                          int32_t corners[8][3]) {
-    const int32_t wider =
-        (int32_t)colonnade_nearest(colonnade_shift_left(margin, scene->grid_fraction + 16), lengths->unit) +
-        (margin != 0 ? 2 : 0); /* the rounding of corners and lights */
+    const int32_t wider = (int32_t)colonnade_nearest(colonnade_shift_left(margin, scene->grid_fraction + 16), lengths->unit) +
+                          (margin != 0 ? 2 : 0); /* the rounding of corners and lights */
     for (int corner = 0; corner < 8; ++corner)
         for (int i = 0; i < 3; ++i) {
             int32_t point[3];

@@ -173,15 +173,20 @@ static void call(struct colonnade *device, const struct colonnade_bus *bus, uint
     switch (which) {
     case 0: load(device); break;
     case 1: open_frame(device, file, frame); break;
-    case 2: case 3: set_frame(device, frame); break;
-    case 4: case 5: start(device); break;
+    case 2:
+    case 3: set_frame(device, frame); break;
+    case 4:
+    case 5: start(device); break;
     case 6: set_photo(device); break;
     case 7: colonnade_wait(device, take(), take() % 16); break;
     case 8: colonnade_result(device); break;
     case 9: colonnade_acknowledge(device, take32()); break;
     case 10: colonnade_enable_interrupts(device, take32()); break;
     case 11: colonnade_reset(device, take() % 16); break;
-    case 12: colonnade_counter(device, take32()); colonnade_device_errors(device); break;
+    case 12:
+        colonnade_counter(device, take32());
+        colonnade_device_errors(device);
+        break;
     case 13: colonnade_set_scene(device, take_address()); break;
     case 14: probe(device, bus); break;
     default: colonnade_error_name((enum colonnade_error)take32()); break;

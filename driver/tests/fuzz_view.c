@@ -63,8 +63,7 @@ static struct colonnade_pose take_pose(void) {
         parts[i] = take() < 64 ? 0 : (int)take() - 128;
         square += parts[i] * parts[i];
     }
-    for (int i = 0; i < 4; ++i)
-        quaternion[i] = (int32_t)((square > 0 ? parts[i] / sqrt(square) : i == 3) * (double)(1 << 30));
+    for (int i = 0; i < 4; ++i) quaternion[i] = (int32_t)((square > 0 ? parts[i] / sqrt(square) : i == 3) * (double)(1 << 30));
     CHECK(colonnade_rotation(pose.rotation, quaternion) == COLONNADE_OK);
     if (take() < extremes) pose.rotation[take() % 3][take() % 3] += (int32_t)pick(-200, 200);
     for (int axis = 0; axis < 3; ++axis) pose.position[axis] = coordinate(8);
@@ -217,8 +216,8 @@ static void change(struct colonnade_view *view) {
     }
     case 1: {
         const bool is_wrong = take() < 16;
-        struct colonnade_camera camera = {take_pose(), lens_number(0), lens_number(1), lens_number(2), lens_number(3),
-                                          view->camera.width, view->camera.height};
+        struct colonnade_camera camera = {take_pose(),    lens_number(0),     lens_number(1),     lens_number(2),
+                                          lens_number(3), view->camera.width, view->camera.height};
         if (take() < 128) camera.width = (uint32_t)pick(1, view->scene.max_width);
         if (take() < 128) camera.height = (uint32_t)pick(1, view->scene.max_height);
         int64_t *const numbers[] = {&camera.fx, &camera.fy, &camera.cx, &camera.cy, &camera.pose.position[0]};

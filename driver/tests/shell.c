@@ -91,12 +91,8 @@ uint32_t shell_read(void *context, uint32_t address) {
 static void command(struct shell *shell, uint32_t value) {
     uint32_t *status = &shell->registers[AT(status)];
     switch (value) {
-    case START:
-        require((*status & (QUEUED | LOADING | RESETTING)) == 0, "a start", shell, 4 * AT(control), value);
-        break;
-    case LOAD:
-        require(*status == 0, "a load", shell, 4 * AT(control), value);
-        break;
+    case START: require((*status & (QUEUED | LOADING | RESETTING)) == 0, "a start", shell, 4 * AT(control), value); break;
+    case LOAD: require(*status == 0, "a load", shell, 4 * AT(control), value); break;
     default:
         require(value == RESET, "no command", shell, 4 * AT(control), value);
         memset(shell->device, 0, sizeof shell->device);
@@ -134,22 +130,15 @@ void shell_write(void *context, uint32_t address, uint32_t value) {
         require((shell->registers[AT(version)] & 0xFFFF) >= 3, "no register of this version", shell, address, value);
     require(words[i].bits == 32 || value >> words[i].bits == 0, "the value does not fit", shell, address, value);
     switch (words[i].access) {
-    case READ_ONLY:
-        require(false, "a write to a read-only register", shell, address, value);
-        break;
-    case NOT_LOADING:
-        require((status & LOADING) == 0, "a register of the image", shell, address, value);
-        break;
+    case READ_ONLY: require(false, "a write to a read-only register", shell, address, value); break;
+    case NOT_LOADING: require((status & LOADING) == 0, "a register of the image", shell, address, value); break;
     case WITH_ENVIRONMENT:
-        require((shell->registers[AT(capabilities)] & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0,
-                "no environment", shell, address, value);
+        require((shell->registers[AT(capabilities)] & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0, "no environment",
+                shell, address, value);
         require(changes, "a register of the photo", shell, address, value);
         break;
-    case NOT_QUEUED:
-        require(changes, "a register of a frame", shell, address, value);
-        break;
-    default:
-        break;
+    case NOT_QUEUED: require(changes, "a register of a frame", shell, address, value); break;
+    default: break;
     }
     if (address == 4 * AT(control)) command(shell, value);
     else if (address == 4 * AT(interrupt_status)) shell->registers[address / 4] &= ~value;

@@ -142,10 +142,14 @@ static void test_maps(struct shell *shell, struct colonnade *device) {
         uint32_t word, value;
         enum colonnade_error error;
     } wrong[] = {
-        {0, 0, COLONNADE_NOT_AN_IMAGE},         {11, 8, COLONNADE_OTHER_FORMAT},
-        {FIRST, 0, COLONNADE_BAD_SECTION},      {FIRST, 3, COLONNADE_BAD_SECTION},
-        {FIRST, UINT32_MAX, COLONNADE_BAD_SECTION},      {SECOND + 1, 9, COLONNADE_BAD_SECTION},
-        {SECOND + 1, UINT32_MAX, COLONNADE_BAD_SECTION}, {12, 3, COLONNADE_BAD_SECTION},
+        {0, 0, COLONNADE_NOT_AN_IMAGE},
+        {11, 8, COLONNADE_OTHER_FORMAT},
+        {FIRST, 0, COLONNADE_BAD_SECTION},
+        {FIRST, 3, COLONNADE_BAD_SECTION},
+        {FIRST, UINT32_MAX, COLONNADE_BAD_SECTION},
+        {SECOND + 1, 9, COLONNADE_BAD_SECTION},
+        {SECOND + 1, UINT32_MAX, COLONNADE_BAD_SECTION},
+        {12, 3, COLONNADE_BAD_SECTION},
         {12, UINT32_MAX, COLONNADE_BAD_SECTION},
     };
     struct colonnade_image image = {NULL, 384, 4096, {4096, 4096 + 384}};

@@ -111,8 +111,7 @@ void _start(void) {
     text[8] = '\n';
     call(64, 1, (long)text, 9);
     call(93, 0, 0, 0);
-    for (;;) {
-    }
+    for (;;) {}
 }
 #else
 #include <stdio.h>

@@ -6,7 +6,10 @@
 enum { STEPS = 10, FRAME_AND_IMAGE_END = 3 };
 
 static const struct colonnade_design design = {
-    .device_end = 0x8010, .frame_registers = 0x8000, .tile_size = 16, .posted_writes = 4,
+    .device_end = 0x8010,
+    .frame_registers = 0x8000,
+    .tile_size = 16,
+    .posted_writes = 4,
 };
 static const uint8_t writes[8];
 static const struct colonnade_frame frame = {writes, 1, 10, 2};

@@ -216,8 +216,7 @@ int main(int argc, char** argv) {
     check("set frame", colonnade_set_frame(&device, &frame));
     const std::uint32_t tile = colonnade_design.tile_size, stride = (frame.width + tile - 1) / tile * tile * 4;
     memory.framebuffer.resize(std::size_t{stride} * frame.height);
-    const colonnade_framebuffer framebuffer = {
-        kFramebuffer, stride, COLONNADE_XRGB8888, {kFramebuffer, kFramebuffer + memory.framebuffer.size()}};
+    const colonnade_framebuffer framebuffer = {kFramebuffer, stride, COLONNADE_XRGB8888, {kFramebuffer, kFramebuffer + memory.framebuffer.size()}};
     const std::uint64_t begin = bus.cycles();
     check("start", colonnade_start(&device, &framebuffer));
     check("wait", colonnade_wait(&device, COLONNADE_FRAME_DONE, kAttempts));

@@ -18,8 +18,7 @@ namespace {
 using Integers = nb::ndarray<const std::int32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
 /// Moves a vector into a numpy array without a copy.
-template <typename T>
-nb::object array(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
+template <typename T> nb::object array(std::vector<T>&& values, std::initializer_list<std::size_t> shape) {
     auto* owned = new std::vector<T>(std::move(values));
     nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
     return nb::cast(nb::ndarray<nb::numpy, T>(owned->data(), shape, owner));
@@ -75,5 +74,5 @@ nb::dict buildBvh(const Integers& vertices, const Integers& faces, unsigned perR
 
 void bind_bvh(nb::module_& module) {
     module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "triangles_per_record"_a, "arity"_a, "box_bits"_a, "stack_depth"_a,
-                          "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the arrays of tests/trees.py.");
+               "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the arrays of tests/trees.py.");
 }

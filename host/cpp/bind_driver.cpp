@@ -162,8 +162,8 @@ private:
 
 void bind_driver(nb::module_& module) {
     nb::class_<Driver>(module, "Driver")
-        .def(nb::init<nb::object, const std::array<std::uint32_t, 8>&, const std::map<std::string, std::uint32_t>&, const Memories&>(), "transport"_a,
-             "format_hash"_a, "numbers"_a, "maps"_a)
+        .def(nb::init<nb::object, const std::array<std::uint32_t, 8>&, const std::map<std::string, std::uint32_t>&, const Memories&>(), "transport"_a, "format_hash"_a,
+             "numbers"_a, "maps"_a)
         .def("probe", &Driver::probe)
         .def("load", &Driver::load, "image"_a, "address"_a, "window"_a, "is_maps"_a)
         .def("set_scene", &Driver::setScene, "address"_a)

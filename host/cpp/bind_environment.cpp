@@ -23,8 +23,7 @@ EnvironmentView viewOf(const Values& registers) {
 
 class EnvironmentModel {
 public:
-    EnvironmentModel(const Values& numbers, const Values& sizes, const FieldTuples& layouts)
-        : numbers_(numbers), image_(AttributeSizes(sizes), layoutsOf(layouts)) {}
+    EnvironmentModel(const Values& numbers, const Values& sizes, const FieldTuples& layouts) : numbers_(numbers), image_(AttributeSizes(sizes), layoutsOf(layouts)) {}
 
     void load(const std::string& memory, const Records& words) { image_.load(memory, words.data(), words.shape(0), words.shape(1)); }
 
@@ -75,8 +74,9 @@ void bind_environment(nb::module_& module) {
         .def(nb::init<const Values&, const Values&, const FieldTuples&>(), "numbers"_a, "sizes"_a, "layouts"_a,
              "From the manifest's numbers, and its attributes' sizes and layouts: word -> field -> (offset, width, signed).")
         .def("load", &EnvironmentModel::load, "memory"_a, "words"_a, "Loads a memory, by its name in the manifest: uint8 [words, bytes], low byte first.")
-        .def("march", &EnvironmentModel::march, "registers"_a, "origins"_a, "directions"_a, "is_from_camera"_a = false,
-             "Finds where rays hit the environment, or what a camera's rays see of its maps. Origins int64 [n, 3], grid steps; directions int64 [n, 3], components of shadeBits bits and a sign. Registers: "
-             "matrix[0..2].{x,y,z}, offset.{x,y,z}, offsetShift, exponent, boundingPlanes. Returns kind int64 [n] (0 miss, 1 map, 2 bounding plane), the map's pixel "
-             "x, y, the bounding plane's entry, is_hidden bool, travel float64 (in ray directions from the origin), steps.");
+        .def(
+            "march", &EnvironmentModel::march, "registers"_a, "origins"_a, "directions"_a, "is_from_camera"_a = false,
+            "Finds where rays hit the environment, or what a camera's rays see of its maps. Origins int64 [n, 3], grid steps; directions int64 [n, 3], components of shadeBits bits and a sign. Registers: "
+            "matrix[0..2].{x,y,z}, offset.{x,y,z}, offsetShift, exponent, boundingPlanes. Returns kind int64 [n] (0 miss, 1 map, 2 bounding plane), the map's pixel "
+            "x, y, the bounding plane's entry, is_hidden bool, travel float64 (in ray directions from the origin), steps.");
 }

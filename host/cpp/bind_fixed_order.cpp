@@ -63,6 +63,8 @@ void bind_fixed_order(nb::module_& module) {
     module.def("exp", [](const Numbers& x) { return eachOf(x, fixed_order::exp); }, "x"_a);
     module.def("power", [](const Numbers& x, double y) { return eachOf(x, [y](double value) { return fixed_order::power(value, y); }); }, "x"_a, "y"_a);
     module.def("arccos", [](const Numbers& x) { return eachOf(x, fixed_order::arccos); }, "x"_a);
-    module.def("cosine", [](const Numbers& x, int quarters) { return eachOf(x, [quarters](double value) { return fixed_order::cosine(value, quarters); }); }, "x"_a, "quarters"_a);
+    module.def(
+        "cosine", [](const Numbers& x, int quarters) { return eachOf(x, [quarters](double value) { return fixed_order::cosine(value, quarters); }); }, "x"_a,
+        "quarters"_a);
     module.def("arctan2", &arctan2, "y"_a, "x"_a);
 }

@@ -90,8 +90,7 @@ public:
     }
 
     /// Sets up rays and tests each against its own box, for comparison with exact arithmetic.
-    nb::dict testBoxes(const Vectors& origins, const Vectors& directions, const Vectors& corners, const Vectors& exponents, const Vectors& low,
-                       const Vectors& high) {
+    nb::dict testBoxes(const Vectors& origins, const Vectors& directions, const Vectors& corners, const Vectors& exponents, const Vectors& low, const Vectors& high) {
         const std::size_t count = origins.shape(0);
         bool *enters, *isHit;
         std::int64_t *heading, *origin, *shear;
@@ -128,17 +127,23 @@ public:
         const Counters& c = device_.counters;
         const auto value = [](std::uint64_t count) { return static_cast<std::int64_t>(count); };
         Values values = {{"raysPrimary", value(c.raysPrimary)},
-                {"raysShadow", value(c.raysShadow)},
-                {"raysReflection", value(c.raysReflection)},
-                {"raysRefraction", value(c.raysRefraction)},
-                {"raysInBox", value(c.raysInBox)},
-                {"nodeReads", value(c.nodeReads)},     {"boxTests", value(c.boxTests)},     {"triangleTests", value(c.triangleTests)},
-                {"hits", value(c.hits)},               {"deepestStack", value(c.deepestStack)}};
-        if (environment_) values.merge(Values{{"raysEnvironment", value(c.raysEnvironment)}, {"marchSteps", value(c.marchSteps)}, {"albedoReads", value(c.albedoReads)}, {"normalReads", value(c.albedoReads)}});
+                         {"raysShadow", value(c.raysShadow)},
+                         {"raysReflection", value(c.raysReflection)},
+                         {"raysRefraction", value(c.raysRefraction)},
+                         {"raysInBox", value(c.raysInBox)},
+                         {"nodeReads", value(c.nodeReads)},
+                         {"boxTests", value(c.boxTests)},
+                         {"triangleTests", value(c.triangleTests)},
+                         {"hits", value(c.hits)},
+                         {"deepestStack", value(c.deepestStack)}};
+        if (environment_)
+            values.merge(Values{{"raysEnvironment", value(c.raysEnvironment)},
+                                {"marchSteps", value(c.marchSteps)},
+                                {"albedoReads", value(c.albedoReads)},
+                                {"normalReads", value(c.albedoReads)}});
         if (gathers_) values["raysGather"] = value(c.raysGather);
         return values;
     }
-
 
     std::map<std::string, bool> errors() const {
         const Errors& e = device_.errors;
@@ -166,18 +171,22 @@ private:
 
 void bind_model(nb::module_& module) {
     nb::class_<Model>(module, "Model", "The untimed, bit-exact model of the device.")
-        .def(nb::init<const Values&, const FieldTuples&, const Values&>(), "numbers"_a, "layouts"_a, "limits"_a,
-             "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh), record layouts (record -> field -> (offset, width, signed)) and register limits.")
+        .def(
+            nb::init<const Values&, const FieldTuples&, const Values&>(), "numbers"_a, "layouts"_a, "limits"_a,
+            "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh), record layouts (record -> field -> (offset, width, signed)) and register limits.")
         .def("load", &Model::load, "records"_a, "Loads the column memory: uint8 [records, bytes].")
         .def("add_environment", &Model::addEnvironment, "sizes"_a, "layouts"_a, "Adds a physical-attribute memory with the manifest's attribute sizes and layouts.")
-        .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a, "Loads one of its memories, by its name in the manifest: uint8 [words, bytes], low byte first.")
+        .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a,
+             "Loads one of its memories, by its name in the manifest: uint8 [words, bytes], low byte first.")
         .def("add_texture", &Model::addTexture, "sizes"_a, "layouts"_a, "Adds a texture memory with the manifest's texture sizes and layouts.")
         .def("load_texture", &Model::loadTexture, "memory"_a, "words"_a, "As load_environment, for a memory of the textures.")
         .def("load_cube", &Model::loadCube, "words"_a, "Loads the light cube: uint8 [words, bytes], low byte first.")
         .def("start", &Model::start, "registers"_a, "Starts a frame: loads the registers (name -> value); clears counters and errors.")
-        .def("rows", &Model::rows, "first"_a, "last"_a,
-             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
-        .def("trace", &Model::trace, "origins"_a, "directions"_a, "Packed ids of the closest hits, int64 [n], -1 for a miss. Origins and directions: int64 [n, 3], grid steps.")
+        .def(
+            "rows", &Model::rows, "first"_a, "last"_a,
+            "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
+        .def("trace", &Model::trace, "origins"_a, "directions"_a,
+             "Packed ids of the closest hits, int64 [n], -1 for a miss. Origins and directions: int64 [n, 3], grid steps.")
         .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a, "high"_a,
              "Tests each ray against one box (planes corner + (low << exponent), corner + (high << exponent), vertex units). Returns enters (the object's box), is_hit, "
              "and the prepared ray in its permuted frame: heading int64 [n, 4] (axis, three signs), origin int64 [n, 3], shear int64 [n, 2].")

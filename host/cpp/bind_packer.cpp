@@ -40,7 +40,8 @@ void checkFaces(const Rows<std::int32_t>& faces, std::size_t vertices) {
 
 nb::dict quantise(const Rows<double>& vertices, const Rows<std::int32_t>& faces, int vertexBits) {
     checkFaces(faces, vertices.shape(0));
-    const packer::QuantisedMesh mesh = released([&] { return packer::quantise(rowsOf<mesh::Vector>(vertices), vertices.shape(0), rowsOf<mesh::Face>(faces), faces.shape(0), vertexBits); });
+    const packer::QuantisedMesh mesh =
+        released([&] { return packer::quantise(rowsOf<mesh::Vector>(vertices), vertices.shape(0), rowsOf<mesh::Face>(faces), faces.shape(0), vertexBits); });
     nb::dict result;
     result["vertices"] = arrayOf<std::int32_t>(mesh.vertices, {mesh.vertices.size(), 3});
     result["faces"] = arrayOf<std::int32_t>(mesh.faces, {mesh.faces.size(), 3});
@@ -93,9 +94,11 @@ public:
 
     nb::object order() const { return arrayOf<std::uint32_t>(tree_.order, {tree_.order.size()}); }
 
-    nb::object records(const CornerRows<double>& normals, const Column<std::uint8_t>& materials, const Column<bool>& isClear, const std::optional<CornerRows<std::int64_t>>& colours) const {
+    nb::object records(const CornerRows<double>& normals, const Column<std::uint8_t>& materials, const Column<bool>& isClear,
+                       const std::optional<CornerRows<std::int64_t>>& colours) const {
         const auto faces = static_cast<std::size_t>(1 + *std::max_element(mesh_.meshFaces.begin(), mesh_.meshFaces.end()));
-        if (std::min({normals.shape(0), materials.shape(0), isClear.shape(0)}) < faces || (colours && colours->shape(0) < faces)) throw std::invalid_argument("a face has no attributes");
+        if (std::min({normals.shape(0), materials.shape(0), isClear.shape(0)}) < faces || (colours && colours->shape(0) < faces))
+            throw std::invalid_argument("a face has no attributes");
         const packer::FaceAttributes attributes{rowsOf<std::array<mesh::Vector, 3>>(normals), materials.data(), reinterpret_cast<const std::uint8_t*>(isClear.data()),
                                                 colours ? rowsOf<std::array<mesh::Row<std::int64_t>, 3>>(*colours) : nullptr};
         const std::vector<std::uint8_t> records = released([&] { return packer_->records(attributes); });
@@ -116,21 +119,24 @@ nb::tuple mergeRows(const Rows<double>& rows) {
     return nb::make_tuple(arrayOf<double>(merged.rows, {merged.rows.size(), 3}), arrayOf<std::int64_t>(merged.index, {merged.index.size()}));
 }
 
-nb::object clean(const Rows<double>& vertices, const Rows<std::int32_t>& faces, const std::optional<CornerRows<double>>& normals, double leastCosine, std::size_t sourceFaces) {
+nb::object clean(const Rows<double>& vertices, const Rows<std::int32_t>& faces, const std::optional<CornerRows<double>>& normals, double leastCosine,
+                 std::size_t sourceFaces) {
     if (normals && normals->shape(0) != faces.shape(0)) throw std::invalid_argument("a face has no normals");
     const mesh::CleanMesh mesh = released([&] {
-        return mesh::clean({vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), normals ? vectorOf<mesh::Corners>(*normals) : std::vector<mesh::Corners>()}, leastCosine, sourceFaces);
+        return mesh::clean({vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), normals ? vectorOf<mesh::Corners>(*normals) : std::vector<mesh::Corners>()},
+                           leastCosine, sourceFaces);
     });
     if (!mesh.error.empty()) return nb::cast(mesh.error);
     const std::size_t count = mesh.faces.size();
-    return nb::make_tuple(arrayOf<double>(mesh.vertices, {mesh.vertices.size(), 3}), arrayOf<std::int32_t>(mesh.faces, {count, 3}), arrayOf<std::int64_t>(mesh.sources, {count}),
-                          arrayOf<double>(mesh.normals.normals, {count, 3, 3}), arrayOf<bool>(mesh.winding.reversed, {count}), arrayOf<bool>(mesh.winding.isOpen, {count}),
+    return nb::make_tuple(arrayOf<double>(mesh.vertices, {mesh.vertices.size(), 3}), arrayOf<std::int32_t>(mesh.faces, {count, 3}),
+                          arrayOf<std::int64_t>(mesh.sources, {count}), arrayOf<double>(mesh.normals.normals, {count, 3, 3}),
+                          arrayOf<bool>(mesh.winding.reversed, {count}), arrayOf<bool>(mesh.winding.isOpen, {count}),
                           nb::make_tuple(mesh.winding.mixed, mesh.winding.inverted, mesh.normals.flipped, mesh.normals.replaced, mesh.normals.missing));
 }
 
-template <class Pixel>
-Pixels<double> sampled(const nb::ndarray<const Pixel, nb::ndim<3>, nb::c_contig, nb::device::cpu>& pixels, const nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& uvs,
-                   int wrapU, int wrapV, bool isNearest, const std::optional<Column<double>>& values) {
+template <class Pixel> Pixels<double> sampled(const nb::ndarray<const Pixel, nb::ndim<3>, nb::c_contig, nb::device::cpu>& pixels,
+                                              const nb::ndarray<const double, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>& uvs, int wrapU, int wrapV, bool isNearest,
+                                              const std::optional<Column<double>>& values) {
     const auto extent = [&](std::size_t axis) { return static_cast<std::int64_t>(pixels.shape(axis)); };
     if (pixels.size() == 0 || (values && (sizeof(Pixel) > 1 || values->shape(0) < 256))) throw std::invalid_argument("there are no pixels, or too few values");
     const mesh::Picture<Pixel> picture{pixels.data(), extent(0), extent(1), extent(2), static_cast<mesh::Wrap>(wrapU), static_cast<mesh::Wrap>(wrapV), isNearest};
@@ -139,10 +145,8 @@ Pixels<double> sampled(const nb::ndarray<const Pixel, nb::ndim<3>, nb::c_contig,
     const double *table = values ? values->data() : nullptr, *uv = uvs.data();
     nb::gil_scoped_release release;
     for (std::size_t i = 0; i < uvs.shape(0); ++i, uv += 2, out += picture.channels)
-        if (table)
-            picture.sample(uv, [table](Pixel code) { return table[static_cast<std::uint8_t>(code)]; }, out);
-        else
-            picture.sample(uv, [](Pixel value) { return static_cast<double>(value); }, out);
+        if (table) picture.sample(uv, [table](Pixel code) { return table[static_cast<std::uint8_t>(code)]; }, out);
+        else picture.sample(uv, [](Pixel value) { return static_cast<double>(value); }, out);
     return result;
 }
 
@@ -151,7 +155,8 @@ Pixels<double> sampled(const nb::ndarray<const Pixel, nb::ndim<3>, nb::c_contig,
 void bind_packer(nb::module_& module) {
     module.def("quantise", &quantise, "vertices"_a, "faces"_a, "vertex_bits"_a);
     nb::class_<Packing>(module, "Packing")
-        .def(nb::init<const Rows<std::int32_t>&, const Rows<std::int32_t>&, const Column<std::int64_t>&, const Values&, const FieldTuples&>(), "vertices"_a, "faces"_a, "mesh_faces"_a, "format"_a, "layouts"_a)
+        .def(nb::init<const Rows<std::int32_t>&, const Rows<std::int32_t>&, const Column<std::int64_t>&, const Values&, const FieldTuples&>(), "vertices"_a, "faces"_a,
+             "mesh_faces"_a, "format"_a, "layouts"_a)
         .def("sections", &Packing::sections)
         .def("statistics", &Packing::statistics)
         .def("order", &Packing::order)

@@ -26,8 +26,13 @@ template <class T, class Values> nb::object arrayOf(const Values& values, std::i
 }
 
 environment::DepthMap mapOf(const Map<double>& depth, const Map<bool>& holes, const std::array<double, 4>& lens) {
-    if (holes.shape(0) != depth.shape(0) || holes.shape(1) != depth.shape(1) || depth.size() == 0) throw std::invalid_argument("depth and holes have different sizes, or none");
-    return {depth.data(), reinterpret_cast<const std::uint8_t*>(holes.data()), {lens[0], lens[1], lens[2], lens[3]}, static_cast<int>(depth.shape(1)), static_cast<int>(depth.shape(0))};
+    if (holes.shape(0) != depth.shape(0) || holes.shape(1) != depth.shape(1) || depth.size() == 0)
+        throw std::invalid_argument("depth and holes have different sizes, or none");
+    return {depth.data(),
+            reinterpret_cast<const std::uint8_t*>(holes.data()),
+            {lens[0], lens[1], lens[2], lens[3]},
+            static_cast<int>(depth.shape(1)),
+            static_cast<int>(depth.shape(0))};
 }
 
 nb::tuple depthNormals(const Map<double>& depth, const Map<bool>& holes, const std::array<double, 4>& lens, double noise, int maxPlanes) {

@@ -33,8 +33,7 @@ colonnade_pose poseOf(const Position& position, const Rotation& rotation) {
 
 class TargetView {
 public:
-    TargetView(const std::array<std::uint32_t, 8>& formatHash, std::uint32_t first, std::uint32_t end, const nb::bytes& file)
-        : file_(file.c_str(), file.size()) {
+    TargetView(const std::array<std::uint32_t, 8>& formatHash, std::uint32_t first, std::uint32_t end, const nb::bytes& file) : file_(file.c_str(), file.size()) {
         colonnade_design design{};
         std::copy(formatHash.begin(), formatHash.end(), design.format_hash);
         design.frame_registers = deviceBase + 4 * first;

@@ -81,8 +81,7 @@ inline std::vector<std::uint32_t> readWeights(std::uint64_t most) {
 class BinaryBuilder {
 public:
     BinaryBuilder(const std::vector<Box>& boxes, unsigned perRecord, unsigned heightLimit)
-        : boxes_(boxes), perRecord_(perRecord), heightLimit_(heightLimit ? heightLimit : UINT32_MAX),
-          weights_(readWeights(leafRecords(boxes.size(), perRecord))) {}
+        : boxes_(boxes), perRecord_(perRecord), heightLimit_(heightLimit ? heightLimit : UINT32_MAX), weights_(readWeights(leafRecords(boxes.size(), perRecord))) {}
 
     BinaryTree build() {
         const auto count = static_cast<std::uint32_t>(boxes_.size());
@@ -92,7 +91,10 @@ public:
         tree_.nodes.reserve(2 * static_cast<std::size_t>(count));
         addNode(0, count);
 
-        struct Task { std::int32_t node; unsigned depth; };
+        struct Task {
+            std::int32_t node;
+            unsigned depth;
+        };
         std::vector<Task> tasks{{0, 0}};
         while (!tasks.empty()) {
             const Task task = tasks.back();
@@ -176,8 +178,7 @@ private:
         return static_cast<int>(offset * bins / (std::int64_t{high[axis]} - low[axis] + 1));
     }
 
-    Split binned(std::uint32_t begin, std::uint32_t end, const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high,
-                              unsigned height) const {
+    Split binned(std::uint32_t begin, std::uint32_t end, const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high, unsigned height) const {
         Split best;
         for (int axis = 0; axis < 3; ++axis) {
             if (low[axis] == high[axis]) continue;

@@ -26,9 +26,7 @@ namespace colonnade {
 /// Holds the maps and replies to queries about them.
 class EnvironmentQueries {
 public:
-    void begin(const std::map<std::string, std::int64_t>& sizes, const std::map<std::string, Layout>& layouts) {
-        image_.emplace(AttributeSizes(sizes), layouts);
-    }
+    void begin(const std::map<std::string, std::int64_t>& sizes, const std::map<std::string, Layout>& layouts) { image_.emplace(AttributeSizes(sizes), layouts); }
 
     void load(std::istream& words) {
         std::string memory;
@@ -37,8 +35,7 @@ public:
         std::vector<std::uint8_t> bytes;
         for (std::string digits; words >> digits; ++count) {
             digits.insert(0, 2 * stride - digits.size(), '0');
-            for (std::size_t end = 2 * stride; end > 0; end -= 2)
-                bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
+            for (std::size_t end = 2 * stride; end > 0; end -= 2) bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
         }
         image().load(memory, bytes.data(), count, stride);
     }
@@ -107,9 +104,7 @@ private:
         reply << point.travel << point.travelExponent << point.steps;
         if (point.kind == HitKind::miss) return reply.all(std::array<int, 10>{}) << point.isIllegal;
         const EnvironmentTexel texel = march.texelOf(point, view);
-        return reply.all(march.hitPosition(origin, direction, point))
-                   .all(texel.albedo)
-                   .all(texel.normal)
+        return reply.all(march.hitPosition(origin, direction, point)).all(texel.albedo).all(texel.normal)
                << march.hides(point, direction, hitDistance, isSeen, view) << (point.isIllegal || texel.isIllegal);
     }
 

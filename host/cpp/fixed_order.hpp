@@ -12,8 +12,7 @@ namespace colonnade::fixed_order {
 
 /// Product of matrices: out [rows, columns] = a [rows, inner] · b [inner, columns], all row-major. Each element is summed
 /// by ascending inner index. Elements of a block are summed side by side, which does not change any sum.
-template <class T>
-inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows, std::size_t inner, std::size_t columns) {
+template <class T> inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows, std::size_t inner, std::size_t columns) {
     constexpr std::size_t lanes = 32 / sizeof(T), down = 4, across = 2 * lanes;
     typedef T Lanes __attribute__((vector_size(32)));
     const auto load = [](const T* from) __attribute__((always_inline)) {

@@ -14,15 +14,14 @@ void bind_surroundings(nb::module_& module);
 void bind_view(nb::module_& module);
 
 NB_MODULE(_core, module) {
-  module.doc() =
-      "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, registers as a target computes them.";
-  bind_environment(module);
-  bind_bvh(module);
-  bind_driver(module);
-  bind_fixed_order(module);
-  bind_live(module);
-  bind_model(module);
-  bind_packer(module);
-  bind_surroundings(module);
-  bind_view(module);
+    module.doc() = "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, registers as a target computes them.";
+    bind_environment(module);
+    bind_bvh(module);
+    bind_driver(module);
+    bind_fixed_order(module);
+    bind_live(module);
+    bind_model(module);
+    bind_packer(module);
+    bind_surroundings(module);
+    bind_view(module);
 }

@@ -137,7 +137,9 @@ private:
         BinaryTree tree;
         tree.nodes.reserve(nodes_.size());
         tree.order.reserve(order_.size());
-        struct Task { std::int32_t node, parent; };
+        struct Task {
+            std::int32_t node, parent;
+        };
         std::vector<Task> tasks{{root_, -1}};
         while (!tasks.empty()) {
             const Task task = tasks.back();

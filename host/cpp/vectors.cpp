@@ -261,8 +261,7 @@ int main() try {
         else if (kind == "registers") {
             if (environment.maps()) scene.device().load(*environment.maps());
             scene.device().start(readNumbers(words));
-        }
-        else if (kind == "pixel") replyPixel(query, scene.device());
+        } else if (kind == "pixel") replyPixel(query, scene.device());
         else if (kind == "sizes") environment.begin(readNumbers(words), scene.layouts());
         else if (kind == "words") environment.load(words);
         else if (environment.knows(kind)) environment.reply(kind, query, numbers).print();

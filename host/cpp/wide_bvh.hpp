@@ -44,7 +44,11 @@ public:
         wide.arity = arity_;
         const double rootArea = std::max<double>(1.0, static_cast<double>(tree_.nodes[0].box.halfArea()));
 
-        struct Task { std::int32_t binary; std::uint32_t index; unsigned depth, stack; };
+        struct Task {
+            std::int32_t binary;
+            std::uint32_t index;
+            unsigned depth, stack;
+        };
         std::vector<Task> tasks{{0, 0, 1, stackDepth_}};
         append(wide);
         while (!tasks.empty()) {

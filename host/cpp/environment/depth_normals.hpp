@@ -187,8 +187,11 @@ private:
             for (std::size_t i = 0; i < size_; ++i) values[i] = valueOf(1.0 / depth_[i], i);
             return boxSums(std::move(values), radius);
         };
-        Windows result{radius, sumsOf([](double w, std::size_t) { return w; }), sumsOf([&](double w, std::size_t i) { return w * u(i); }),
-                       sumsOf([&](double w, std::size_t i) { return w * v(i); }), sumsOf([](double w, std::size_t) { return w * w; }),
+        Windows result{radius,
+                       sumsOf([](double w, std::size_t) { return w; }),
+                       sumsOf([&](double w, std::size_t i) { return w * u(i); }),
+                       sumsOf([&](double w, std::size_t i) { return w * v(i); }),
+                       sumsOf([](double w, std::size_t) { return w * w; }),
                        sumsOf([&](double, std::size_t i) { return holes_[i] ? 1.0 : 0.0; })};
         eachCentre(radius, [&](std::size_t i) {
             const double total = result.value[i];

@@ -92,8 +92,7 @@ inline std::uint32_t cubeWord(const Vector& radiance, bool isLight) {
 /// The radiance of such a word, without a light.
 inline Vector radianceOf(std::uint32_t word) {
     Vector radiance;
-    for (int channel = 0; channel < 3; ++channel)
-        radiance[channel] = static_cast<double>((word >> (14 - 7 * channel) & cubeMantissa) << (word >> 21 & 15)) / cubeOne;
+    for (int channel = 0; channel < 3; ++channel) radiance[channel] = static_cast<double>((word >> (14 - 7 * channel) & cubeMantissa) << (word >> 21 & 15)) / cubeOne;
     return radiance;
 }
 
@@ -108,7 +107,8 @@ struct SeenLight {
 /// `points`, `normals` and linear `colours` of pixels; those count that face the point, and are not behind others.
 inline SeenLight seenLight(const Vector* points, const Vector* normals, const Vector* colours, std::size_t count, const Vector& point) {
     const std::size_t texels = texelCount(fineFace);
-    SeenLight light{std::vector<Vector>(texels), std::vector<std::uint32_t>(texels), std::vector<std::uint8_t>(texels), std::vector<double>(texels, std::numeric_limits<double>::infinity())};
+    SeenLight light{std::vector<Vector>(texels), std::vector<std::uint32_t>(texels), std::vector<std::uint8_t>(texels),
+                    std::vector<double>(texels, std::numeric_limits<double>::infinity())};
     struct Found {
         std::size_t pixel, texel;
         double distance;

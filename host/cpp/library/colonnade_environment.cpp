@@ -14,7 +14,9 @@ template <class Values> void copy(const Values& values, void* out) { std::memcpy
 
 } // namespace
 
-void colonnade_environment_nearest(const std::uint8_t* missing, std::int32_t width, std::int32_t height, std::int32_t* nearest) { copy(nearestKnown(missing, width, height), nearest); }
+void colonnade_environment_nearest(const std::uint8_t* missing, std::int32_t width, std::int32_t height, std::int32_t* nearest) {
+    copy(nearestKnown(missing, width, height), nearest);
+}
 
 double colonnade_environment_normals(const double* depth, const std::uint8_t* holes, std::int32_t width, std::int32_t height, const double* lens, double* normals) {
     DepthMap map(depth, holes, {lens[0], lens[1], lens[2], lens[3]}, width, height);

@@ -92,7 +92,8 @@ const char* checkFit(const packer::Sections& sections, const bvh::Bvh& tree) {
     const auto depth = static_cast<std::size_t>(library->number("depth"));
     if (sections.recordCount > depth) return refuse("the mesh needs " + std::to_string(sections.recordCount) + " records, this design has " + std::to_string(depth));
     const std::size_t ids = std::size_t{1} << library->format.layouts.at("triangles").at("firstTriangle").width;
-    if (tree.order.size() >= ids) return refuse("the mesh has " + std::to_string(tree.order.size()) + " triangles, packed ids of this design reach " + std::to_string(ids - 2));
+    if (tree.order.size() >= ids)
+        return refuse("the mesh has " + std::to_string(tree.order.size()) + " triangles, packed ids of this design reach " + std::to_string(ids - 2));
     if (library->format.bvh && static_cast<int>(tree.tree.stackBound) > library->format.stackDepth)
         return refuse("the mesh needs a stack of " + std::to_string(tree.tree.stackBound) + " entries, this design has " + std::to_string(library->format.stackDepth));
     return nullptr;
@@ -140,8 +141,8 @@ const char* colonnade_model_open(const char* design) {
     return nullptr;
 }
 
-const char* colonnade_model_pack(const double* vertices, std::uint32_t vertexCount, const std::int32_t* faces, std::uint32_t faceCount, const double* normals, const double* colours,
-                           std::uint32_t isGlass, colonnade_packed* packed) {
+const char* colonnade_model_pack(const double* vertices, std::uint32_t vertexCount, const std::int32_t* faces, std::uint32_t faceCount, const double* normals,
+                                 const double* colours, std::uint32_t isGlass, colonnade_packed* packed) {
     mesh::RawMesh raw;
     raw.vertices.resize(vertexCount);
     raw.faces.resize(faceCount);

@@ -44,8 +44,8 @@ const char *colonnade_model_open(const char *design);
 /* Cleans and packs a mesh, and loads it into the model. `normals`: three for each face, of any length, 0 for none; or NULL.
  * `colours`: linear red, green, blue at the corners, 0 to 1, for a design with corner colours; or NULL. Faces have entry 0 of
  * the material table. */
-const char *colonnade_model_pack(const double *vertices, uint32_t vertex_count, const int32_t *faces, uint32_t face_count,
-                           const double *normals, const double *colours, uint32_t is_glass, struct colonnade_packed *packed);
+const char *colonnade_model_pack(const double *vertices, uint32_t vertex_count, const int32_t *faces, uint32_t face_count, const double *normals, const double *colours,
+                                 uint32_t is_glass, struct colonnade_packed *packed);
 
 /* Loads records in place of a packed mesh. */
 const char *colonnade_model_load(const uint8_t *records, uint32_t count);

@@ -22,8 +22,8 @@ struct Block {
 class DepthBlocks {
 public:
     DepthBlocks(int width, int height, int columns, int rows)
-        : width_(width), height_(height), stride_(16 * columns), lines_(16 * rows), depth_(static_cast<std::size_t>(stride_) * lines_), w_(depth_.size()), lengths_(depth_.size()),
-          blocks_(static_cast<std::size_t>(4 * columns) * 4 * rows) {}
+        : width_(width), height_(height), stride_(16 * columns), lines_(16 * rows), depth_(static_cast<std::size_t>(stride_) * lines_), w_(depth_.size()),
+          lengths_(depth_.size()), blocks_(static_cast<std::size_t>(4 * columns) * 4 * rows) {}
 
     void read(const std::uint32_t* depth, const Camera& camera) {
         if (camera.fx != fx_ || camera.fy != fy_ || camera.cx != cx_ || camera.cy != cy_) measureRays(camera);

@@ -41,7 +41,8 @@ struct Halves {
 
     /// Each cell goes to the nearer of two centres.
     void assign(const Cells& cells, const std::int32_t* total, const Point& a, const Point& b) {
-        const std::int16_t axis[3] = {static_cast<std::int16_t>(b.at[0] - a.at[0]), static_cast<std::int16_t>(b.at[1] - a.at[1]), static_cast<std::int16_t>(b.at[2] - a.at[2])};
+        const std::int16_t axis[3] = {static_cast<std::int16_t>(b.at[0] - a.at[0]), static_cast<std::int16_t>(b.at[1] - a.at[1]),
+                                      static_cast<std::int16_t>(b.at[2] - a.at[2])};
         split(cells, total, axis, static_cast<std::int32_t>((product(b, b) - product(a, a)) >> 1));
     }
     void split(const Cells& cells, const std::int32_t* total, const std::int16_t* axis, std::int32_t threshold) {

@@ -4,8 +4,8 @@
 
 // Each loop is compiled for every processor, and once more for those with AVX2; the program takes the better one. The
 // values are the same. Sanitizers cannot instrument the choice, and other compilers than GCC for x86-64 do not offer it.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__) && defined(__gnu_linux__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(COLONNADE_LIVE_ONE_PROCESSOR)
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__) && !defined(COLONNADE_LIVE_ONE_PROCESSOR)
 #define FOR_PROCESSORS __attribute__((target_clones("avx2", "default")))
 #else
 #define FOR_PROCESSORS
@@ -16,12 +16,12 @@ namespace colonnade::live {
 namespace {
 
 /// Calls a function with the number of cells as a constant.
-#define WITH_CELLS(count, call)        \
-    switch (count) {                   \
-    case 4: call(4); break;            \
-    case 16: call(16); break;          \
-    case 64: call(64); break;          \
-    default: call(256); break;         \
+#define WITH_CELLS(count, call) \
+    switch (count) { \
+    case 4: call(4); break; \
+    case 16: call(16); break; \
+    case 64: call(64); break; \
+    default: call(256); break; \
     }
 
 template <int n> INLINE void sums(const Cells& cells, std::int32_t sum[3], std::int64_t& squares) {
@@ -141,7 +141,7 @@ FOR_PROCESSORS int nearestEntry(const PaletteTable& palette, const Point& point)
     return least & (maxEntries - 1);
 }
 
-FOR_PROCESSORS void sumCells(const Cells& cells, std::int32_t sum[3], std::int64_t& squares) {
+FOR_PROCESSORS void sumCells(const Cells& cells, std::int32_t sum[3], std::int64_t& squares){
 #define CALL(n) sums<n>(cells, sum, squares)
     WITH_CELLS(cells.count, CALL)
 #undef CALL
@@ -160,7 +160,7 @@ FOR_PROCESSORS std::int64_t halveCells(const std::int16_t* fine, int edge, std::
     return std::int64_t{4} * sixteenths;
 }
 
-FOR_PROCESSORS void covariances(const Cells& cells, const Point& about, const std::int16_t* mask, std::int32_t out[6]) {
+FOR_PROCESSORS void covariances(const Cells& cells, const Point& about, const std::int16_t* mask, std::int32_t out[6]){
 #define CALL(n) covariance<n>(cells, about, mask, out)
     WITH_CELLS(cells.count, CALL)
 #undef CALL
@@ -174,7 +174,7 @@ FOR_PROCESSORS Cluster above(const Cells& cells, const std::int16_t axis[3], std
     return cluster;
 }
 
-FOR_PROCESSORS void nearestOfFour(const Cells& cells, const Point centres[4], Cluster clusters[4], std::uint8_t* which) {
+FOR_PROCESSORS void nearestOfFour(const Cells& cells, const Point centres[4], Cluster clusters[4], std::uint8_t* which){
 #define CALL(n) four<n>(cells, centres, clusters, which)
     WITH_CELLS(cells.count, CALL)
 #undef CALL

@@ -28,8 +28,8 @@ struct PlaneOutput {
 class PlaneMap {
 public:
     PlaneMap(int width, int height, int columns, int rows, int planes, int heapWords, int boundingPlanes)
-        : planes_(planes), boundingPlanes_(boundingPlanes), blocks_(width, height, columns, rows), regions_(std::min(planes - 1, maxPlanes - 1), columns, rows), tiles_(columns, rows, heapWords),
-          near_(static_cast<std::size_t>(columns) * rows) {}
+        : planes_(planes), boundingPlanes_(boundingPlanes), blocks_(width, height, columns, rows), regions_(std::min(planes - 1, maxPlanes - 1), columns, rows),
+          tiles_(columns, rows, heapWords), near_(static_cast<std::size_t>(columns) * rows) {}
 
     /// Encodes a frame: depth in steps of 2^-16 m, colours of three bytes a pixel in sRGB.
     void encode(const std::uint32_t* depth, const std::uint8_t* colours, const ColourFields& fields, const Camera& camera, double toleranceMetres, PlaneOutput& output) {

@@ -24,7 +24,8 @@ public:
           modes_{std::vector<std::int64_t>(tiles_.size() * planeModes), planeWords, planeModes}, selected_(tiles_.size()), heap_(heapWords) {}
 
     /// Chooses the planes of all tiles; those of the table are the device's.
-    void choose(const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table, std::int64_t tolerance, std::uint16_t* descriptors, std::uint16_t* heap) {
+    void choose(const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table, std::int64_t tolerance, std::uint16_t* descriptors,
+                std::uint16_t* heap) {
         const std::vector<std::uint8_t> bySize = table.bySize();
         const std::int64_t least = budget_.price() * 5 / 8;
         for (int tile = 0; tile < static_cast<int>(tiles_.size()); ++tile) fit(tile, blocks, labels, table, bySize, tolerance, least);
@@ -52,8 +53,8 @@ private:
     static constexpr int startOf(int cells) { return cells == 16 ? 0 : cells == 64 ? 16 : 80; }
     int which(int tile, int mode, int cell) const { return tiles_[tile].members[planesOf[mode] / 4][startOf(planeCells[mode]) + cell]; }
 
-    void fit(int number, const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table, const std::vector<std::uint8_t>& bySize, std::int64_t tolerance,
-             std::int64_t least) {
+    void fit(int number, const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table, const std::vector<std::uint8_t>& bySize,
+             std::int64_t tolerance, std::int64_t least) {
         const int column = number % columns_, row = number / columns_, across = blocks.blockColumns();
         Tile& tile = tiles_[number];
         std::int64_t* costs = modes_.of(number);

@@ -67,7 +67,8 @@ struct PlaneSums {
     /// The plane of least squares; false if the pixels lie on a line. Additions, products and quotients of doubles in this
     /// order, none of them fused, so the plane is the same on every processor.
     bool solve(Plane& plane) const {
-        const double count = static_cast<double>(n), meanX = static_cast<double>(x) / count, meanY = static_cast<double>(y) / count, meanW = static_cast<double>(w) / count;
+        const double count = static_cast<double>(n), meanX = static_cast<double>(x) / count, meanY = static_cast<double>(y) / count,
+                     meanW = static_cast<double>(w) / count;
         const double varianceX = static_cast<double>(xx) / count - meanX * meanX, varianceY = static_cast<double>(yy) / count - meanY * meanY;
         const double mixed = static_cast<double>(xy) / count - meanX * meanY;
         const double alongX = static_cast<double>(xw) / count - meanX * meanW, alongY = static_cast<double>(yw) / count - meanY * meanW;

@@ -27,7 +27,8 @@ template <class Fields> class VectorMap {
 public:
     explicit VectorMap(const VectorSizes& sizes)
         : sizes_(sizes), palette_(sizes.paletteSize), tiles_(sizes.tiles()), entries_(static_cast<std::size_t>(sizes.tiles()) * vectorModes),
-          modes_{std::vector<std::int64_t>(static_cast<std::size_t>(sizes.tiles()) * vectorModes), vectorWords, vectorModes}, selected_(sizes.tiles()), heap_(sizes.heapWords) {
+          modes_{std::vector<std::int64_t>(static_cast<std::size_t>(sizes.tiles()) * vectorModes), vectorWords, vectorModes}, selected_(sizes.tiles()),
+          heap_(sizes.heapWords) {
         std::fill(std::begin(all_), std::end(all_), std::int16_t{-1});
     }
 
@@ -67,7 +68,9 @@ private:
         std::int64_t cheapest = impossible;
         int words = 0;
         // Whether finer cells or more entries than those of `cheapest` may pay for a mode: even a perfect fit leaves what is within the cells
-        const auto mayPay = [&](int mode, int level) { return cheapest == impossible || cheapest - sums.cost(sums.within(level)) > least * std::max(1, vectorWords[mode] - words); };
+        const auto mayPay = [&](int mode, int level) {
+            return cheapest == impossible || cheapest - sums.cost(sums.within(level)) > least * std::max(1, vectorWords[mode] - words);
+        };
         const auto take = [&](int mode, std::int64_t cost) {
             costs[mode] = cost;
             if (cost < cheapest) {
@@ -177,7 +180,8 @@ private:
         }
         const int pointer = mode == 0 ? words[0] : heap_.put(words, vectorWords[mode]);
         if (pointer < 0) return false;
-        descriptor = static_cast<std::uint32_t>(mode) | static_cast<std::uint32_t>(pointer) << 3 | static_cast<std::uint32_t>(own.at[0]) << 16 | static_cast<std::uint32_t>(own.at[1]) << 24;
+        descriptor = static_cast<std::uint32_t>(mode) | static_cast<std::uint32_t>(pointer) << 3 | static_cast<std::uint32_t>(own.at[0]) << 16 |
+                     static_cast<std::uint32_t>(own.at[1]) << 24;
         return true;
     }
 

@@ -16,9 +16,7 @@ using Vector = Row<double>;
 using Face = Row<std::int32_t>;
 
 template <class T> Row<T> difference(const Row<T>& a, const Row<T>& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-template <class T> Row<T> cross(const Row<T>& a, const Row<T>& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+template <class T> Row<T> cross(const Row<T>& a, const Row<T>& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 inline double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 inline double length(const Vector& a) { return std::sqrt(dot(a, a)); }
 

@@ -161,7 +161,8 @@ private:
     int windingNumber(const Vector& point, std::size_t part) const {
         double angle = 0;
         for (const std::size_t face : facesOf_[part]) {
-            const Vector a = difference(vertices_[faces_[face][0]], point), b = difference(vertices_[faces_[face][1]], point), c = difference(vertices_[faces_[face][2]], point);
+            const Vector a = difference(vertices_[faces_[face][0]], point), b = difference(vertices_[faces_[face][1]], point),
+                         c = difference(vertices_[faces_[face][2]], point);
             const double la = length(a), lb = length(b), lc = length(c);
             angle += fixed_order::arctan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
         }

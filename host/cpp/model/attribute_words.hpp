@@ -72,8 +72,7 @@ public:
 
     void load(const std::uint8_t* words, std::size_t count, std::size_t stride) {
         if (stride < wordBytes) throw std::invalid_argument("heap words must have 16 bits");
-        for (std::size_t i = 0; i < std::min(count, words_.size()); ++i)
-            words_[i] = static_cast<std::uint16_t>(words[i * stride] | words[i * stride + 1] << 8);
+        for (std::size_t i = 0; i < std::min(count, words_.size()); ++i) words_[i] = static_cast<std::uint16_t>(words[i * stride] | words[i * stride + 1] << 8);
     }
     bool covers(int address) const { return static_cast<std::size_t>(address) < words_.size(); }
     int word(int address) const { return covers(address) ? words_[address] : 0; }
@@ -81,9 +80,7 @@ public:
     int high(int address) const { return word(address) >> 8; }
 
     /// Element `index` of a mask at `address` with elements of `bits` (1, 2 or 4) bits.
-    int select(int address, int index, int bits) const {
-        return (word(wordOf(address, index, bits)) >> (index * bits % 16)) & ((1 << bits) - 1);
-    }
+    int select(int address, int index, int bits) const { return (word(wordOf(address, index, bits)) >> (index * bits % 16)) & ((1 << bits) - 1); }
 
     /// Address of the word with that element.
     static int wordOf(int address, int index, int bits) { return address + index * bits / 16; }
@@ -108,8 +105,7 @@ public:
         return values;
     }
     PlaneWord plane(std::size_t index, const std::string& prefix) const {
-        return {field(index, prefix + "a"), field(index, prefix + "b"), field(index, prefix + "c"),
-                static_cast<int>(field(index, prefix + "exponent"))};
+        return {field(index, prefix + "a"), field(index, prefix + "b"), field(index, prefix + "c"), static_cast<int>(field(index, prefix + "exponent"))};
     }
 
 private:

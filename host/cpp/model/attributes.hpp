@@ -58,7 +58,8 @@ public:
 
     void loadDescriptors(const AttributeWords& words) {
         for (std::size_t i = 0; i < std::min(words.count(), descriptors_.size()); ++i)
-            descriptors_[i] = {static_cast<int>(words.field(i, "mode")), static_cast<int>(words.field(i, "pointer")),
+            descriptors_[i] = {static_cast<int>(words.field(i, "mode")),
+                               static_cast<int>(words.field(i, "pointer")),
                                {static_cast<int>(words.field(i, "entries[0]")), static_cast<int>(words.field(i, "entries[1]"))}};
     }
     void loadEntries(const AttributeWords& words, const char* axes) {
@@ -152,8 +153,7 @@ public:
         const int count = tile.count(), known = sizes_.planes - 1;
         if (count == 1) return {sizes_.tileLog, 1, {tile.pointer & known, 0, 0, 0}, false};
         TileInfo info{cellLog(tile), count, {}, !heap_.covers(tile.pointer + count / 2 - 1)};
-        for (int i = 0; i < count; ++i)
-            info.ids[i] = (i % 2 ? heap_.high(tile.pointer + i / 2) : heap_.low(tile.pointer + i / 2)) & known;
+        for (int i = 0; i < count; ++i) info.ids[i] = (i % 2 ? heap_.high(tile.pointer + i / 2) : heap_.low(tile.pointer + i / 2)) & known;
         return info;
     }
 

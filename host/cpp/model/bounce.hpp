@@ -38,8 +38,7 @@ inline MirrorDirections mirrorAbout(const WideVector& about, const Surface& surf
     // Reflection d · (n·n) − 2 (n·d) · n, both factors to shadeBits
     const int drop = bitLength(nn) - n.shadeBits, keep = n.shadeBits - 4;
     const std::int64_t square = static_cast<std::int64_t>(floorShift(nn, drop)), along = static_cast<std::int64_t>(floorShift(result.cosine, drop));
-    for (int a = 0; a < 3; ++a)
-        result.reflection[a] = static_cast<std::int64_t>(floorShift<Wide>(Wide(square) * surface.dir[a] + 2 * Wide(along) * normal[a], keep));
+    for (int a = 0; a < 3; ++a) result.reflection[a] = static_cast<std::int64_t>(floorShift<Wide>(Wide(square) * surface.dir[a] + 2 * Wide(along) * normal[a], keep));
     result.direction = result.reflection;
     if (material.kind != MaterialKind::glass) return result;
 
@@ -58,8 +57,7 @@ inline MirrorDirections mirrorAbout(const WideVector& about, const Surface& surf
     const bool odd = exponent & 1;
     const Wide root = floorShift<Wide>(squareRoot(odd ? radicand.mantissa >> 1 : radicand.mantissa), -((exponent + (odd ? 1 : 0)) / 2));
     const Wide directionScale = floorShift<Wide>(Wide(eta) * square, n.etaFraction), normalScale = floorShift<Wide>(Wide(eta) * along, n.etaFraction) - root;
-    for (int a = 0; a < 3; ++a)
-        result.direction[a] = static_cast<std::int64_t>(floorShift<Wide>(directionScale * surface.dir[a] + normalScale * normal[a], keep));
+    for (int a = 0; a < 3; ++a) result.direction[a] = static_cast<std::int64_t>(floorShift<Wide>(directionScale * surface.dir[a] + normalScale * normal[a], keep));
     result.isRefraction = true;
     return result;
 }

@@ -110,7 +110,9 @@ private:
             const PlaneWord& plane = image_.boundingPlane(i).plane;
             const std::int64_t distance = planeDistance(ray, plane, i).value;
             const std::int64_t centreU = std::int64_t(sizes_.width) << (f_ - mapLog - 1), centreV = std::int64_t(sizes_.height) << (f_ - mapLog - 1);
-            const auto fromCentre = [&](int axis, std::int64_t centre) { return ray.dir[axis] - static_cast<std::int64_t>(floorShift<Wide>(Wide(centre) * ray.dir[2], f_)); };
+            const auto fromCentre = [&](int axis, std::int64_t centre) {
+                return ray.dir[axis] - static_cast<std::int64_t>(floorShift<Wide>(Wide(centre) * ray.dir[2], f_));
+            };
             const Wide dir = Wide(plane.a) * fromCentre(0, centreU) + Wide(plane.b) * fromCentre(1, centreV) + Wide(plane.c) * ray.dir[2];
             if (distance <= 0 || dir <= 0) continue;
             const Normalised rate = normalise(magnitude(dir), f_), way = normalise(magnitude(distance), f_);

@@ -23,9 +23,9 @@ inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, co
 
 /// The manifest's `numbers` (docs/numbers.md), and the configuration values that traversal depends on.
 struct Numbers {
-    int vertexBits, boxBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
-        entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits,
-        boxPadLog, stepFraction, stepReach, nodeBits, nearFraction, nearBits, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
+    int vertexBits, boxBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits, entrySlackShift,
+        entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits, boxPadLog, stepFraction, stepReach, nodeBits,
+        nearFraction, nearBits, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
     int arity, trianglesPerRecord, stackDepth;
     bool bvh;
 
@@ -159,15 +159,13 @@ public:
         const Layout& triangles = layouts.at("triangles");
         firstTriangle_ = triangles.at("firstTriangle");
         count_ = triangles.at("count");
-        for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
-            vertices_.push_back(vectorOf(triangles, "vertices[" + std::to_string(vertex) + "]"));
+        for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex) vertices_.push_back(vectorOf(triangles, "vertices[" + std::to_string(vertex) + "]"));
         for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) isTransmissive_.push_back(triangles.at("isClear[" + std::to_string(triangle) + "]"));
         const Layout& attributes = layouts.at("attributes");
         for (int face = 0; attributes.count("faces[" + std::to_string(face) + "].material"); ++face) {
             const std::string prefix = "faces[" + std::to_string(face) + "].";
             FaceFields fields;
-            for (int corner = 0; corner < 3; ++corner)
-                fields.normals[corner] = vectorOf(attributes, prefix + "normals[" + std::to_string(corner) + "]");
+            for (int corner = 0; corner < 3; ++corner) fields.normals[corner] = vectorOf(attributes, prefix + "normals[" + std::to_string(corner) + "]");
             fields.geometricNormal = vectorOf(attributes, prefix + "geometricNormal");
             fields.hasColours = attributes.count(prefix + "colours[0].r") != 0;
             for (int corner = 0; corner < 3 && fields.hasColours; ++corner)
@@ -215,8 +213,7 @@ public:
         result.firstTriangle = static_cast<std::uint32_t>(firstTriangle_.read(record));
         result.count = static_cast<int>(count_.read(record));
         result.isLegal = result.count > 0 && result.count <= trianglesPerRecord_;
-        for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex)
-            result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
+        for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex) result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
         for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) result.isTransmissive[triangle] = isTransmissive_[triangle].read(record) != 0;
         return result;
     }
@@ -245,9 +242,7 @@ private:
     static VectorFields vectorOf(const Layout& layout, const std::string& name, const char* components = "xyz") {
         return {layout.at(name + "." + components[0]), layout.at(name + "." + components[1]), layout.at(name + "." + components[2])};
     }
-    static Vector read(const VectorFields& fields, const std::uint8_t* record) {
-        return {fields[0].read(record), fields[1].read(record), fields[2].read(record)};
-    }
+    static Vector read(const VectorFields& fields, const std::uint8_t* record) { return {fields[0].read(record), fields[1].read(record), fields[2].read(record)}; }
 
     int arity_, trianglesPerRecord_, maxExponent_;
     VectorFields origin_, exponent_;

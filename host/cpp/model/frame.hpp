@@ -16,8 +16,7 @@ struct Pixel {
 class Device : public PathTracer {
 public:
     /// `limits`: the largest value of each register that the device accepts, by name.
-    Device(const Numbers& numbers, const std::map<std::string, Layout>& layouts, Registers limits = {})
-        : PathTracer(numbers, layouts), limits_(std::move(limits)) {}
+    Device(const Numbers& numbers, const std::map<std::string, Layout>& layouts, Registers limits = {}) : PathTracer(numbers, layouts), limits_(std::move(limits)) {}
 
     /// Loads the column memory: `count` records of `bytes` bytes.
     void load(const std::uint8_t* records, std::size_t count, std::size_t bytes) { memory_.load(records, count, bytes); }

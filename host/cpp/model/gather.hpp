@@ -32,7 +32,7 @@ inline const std::array<SamplePoint, 2 * coordinateBits>& pixelMatrix() {
         struct Dimension {
             int degree, coefficients;
             std::array<std::uint64_t, 3> first;
-            std::uint8_t SamplePoint::*byte;
+            std::uint8_t SamplePoint::* byte;
         };
         for (const auto& [degree, coefficients, first, byte] : {Dimension{2, 1, {1, 3, 0}, &SamplePoint::u}, Dimension{3, 1, {1, 3, 1}, &SamplePoint::v}}) {
             std::vector<std::uint64_t> m(first.begin(), first.begin() + degree);

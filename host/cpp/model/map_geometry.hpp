@@ -80,12 +80,11 @@ protected:
     std::int64_t reciprocal(std::uint64_t mantissa) const { return static_cast<std::int64_t>(divide(std::uint64_t(1) << (f_ - 1), mantissa, f_)); }
 
     /// A component of the ray's position at s.
-    std::int64_t positionAt(const MapRay& ray, int axis, std::int64_t s) const {
-        return ray.position[axis] + (ray.direction[axis] * s >> f_);
-    }
+    std::int64_t positionAt(const MapRay& ray, int axis, std::int64_t s) const { return ray.position[axis] + (ray.direction[axis] * s >> f_); }
 
     PlaneDistance planeDistance(const MapRay& ray, const PlaneWord& plane, int id) const {
-        const std::int64_t du = ray.position[0] - (std::int64_t(sizes_.width) << (f_ - mapLog - 1)), dv = ray.position[1] - (std::int64_t(sizes_.height) << (f_ - mapLog - 1));
+        const std::int64_t du = ray.position[0] - (std::int64_t(sizes_.width) << (f_ - mapLog - 1)),
+                           dv = ray.position[1] - (std::int64_t(sizes_.height) << (f_ - mapLog - 1));
         const int up = planeFraction - f_ - plane.e;
         return {id, floorShift<std::int64_t>(ray.position[2], -up) - ((plane.a * du + plane.b * dv) >> f_) - plane.c,
                 floorShift<std::int64_t>(ray.direction[2], -up) - ((plane.a * ray.direction[0] + plane.b * ray.direction[1]) >> f_), plane.e};

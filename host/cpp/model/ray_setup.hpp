@@ -76,7 +76,8 @@ template <class Integer> void enterBox(Ray& ray, const RayRequest& request, cons
     for (int a = 0; a < 2; ++a) {
         const Crossing<Integer> side = cross(a, sidePad);
         const int drop = n.reciprocalFraction - ray.exponent[a];
-        const Integer sideTNear = saturate(floorShift<Integer>(side.tNear * ray.reciprocal[a], drop)), sideTFar = saturate(floorShift<Integer>(side.tFar * ray.reciprocal[a], drop) + 1);
+        const Integer sideTNear = saturate(floorShift<Integer>(side.tNear * ray.reciprocal[a], drop)),
+                      sideTFar = saturate(floorShift<Integer>(side.tFar * ray.reciprocal[a], drop) + 1);
         tNear = std::max(tNear, sideTNear - slack(sideTNear));
         tFar = std::min(tFar, saturate(sideTFar + slack(sideTFar)));
     }
@@ -102,7 +103,8 @@ inline bool isNarrow(const RayRequest& request, const Numbers& n) {
     UnsignedWide all = 0;
     for (const Wide position : request.origin) all |= magnitude(position);
     const int bits = bitLength(all), unitBits = std::max(bits - n.gridFraction, n.vertexBits) + 3;
-    return std::max({bits, bitLength(magnitude(request.tMax)), unitBits + n.reciprocalFraction, n.shearFraction + n.entryBits, n.gridFraction + n.entryBits, n.gridBits}) < 60;
+    return std::max(
+               {bits, bitLength(magnitude(request.tMax)), unitBits + n.reciprocalFraction, n.shearFraction + n.entryBits, n.gridFraction + n.entryBits, n.gridBits}) < 60;
 }
 
 inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Numbers& n) {
@@ -126,8 +128,7 @@ inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Num
             ray.reciprocal[a] = std::int64_t(1) << n.reciprocalFraction;
             ray.exponent[a] = n.reciprocalFraction;
         } else {
-            ray.reciprocal[a] = static_cast<std::int64_t>(divide(dominant.mantissa, minor.mantissa, n.reciprocalDigits)
-                                                          << (n.reciprocalFraction - n.reciprocalDigits));
+            ray.reciprocal[a] = static_cast<std::int64_t>(divide(dominant.mantissa, minor.mantissa, n.reciprocalDigits) << (n.reciprocalFraction - n.reciprocalDigits));
             ray.exponent[a] = exponent;
         }
     }

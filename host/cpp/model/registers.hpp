@@ -62,8 +62,8 @@ struct Frame {
         bounds = {vector("bounds.low"), vector("bounds.high")};
         for (int i = 0; registers.count(entry("lights", i) + "colour.r"); ++i) {
             const std::string name = entry("lights", i);
-            lighting.lights.push_back({position(name + "position"), vector(name + "colour", "rgb"), take(name + "reachMantissa"),
-                                       static_cast<int>(take(name + "reachExponent"))});
+            lighting.lights.push_back(
+                {position(name + "position"), vector(name + "colour", "rgb"), take(name + "reachMantissa"), static_cast<int>(take(name + "reachExponent"))});
         }
         lighting.lights.resize(std::min(lighting.lights.size(), static_cast<std::size_t>(take("shading.lights"))));
         lighting.ambient = vector("ambient", "rgb");
@@ -76,9 +76,13 @@ struct Frame {
         lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
         for (int i = 0; registers.count(entry("materials", i) + "albedo.r"); ++i) {
             const std::string name = entry("materials", i);
-            lighting.materials.push_back({vector(name + "albedo", "rgb"), takeIfThere(name + "hasCornerColours") != 0, takeIfThere(name + "hasTexture") != 0,
-                                          registers.count(name + "emission.r") ? vector(name + "emission", "rgb") : Vector{}, static_cast<MaterialKind>(takeIfThere(name + "kind")),
-                                          {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")}, takeIfThere(name + "reflectance"),
+            lighting.materials.push_back({vector(name + "albedo", "rgb"),
+                                          takeIfThere(name + "hasCornerColours") != 0,
+                                          takeIfThere(name + "hasTexture") != 0,
+                                          registers.count(name + "emission.r") ? vector(name + "emission", "rgb") : Vector{},
+                                          static_cast<MaterialKind>(takeIfThere(name + "kind")),
+                                          {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")},
+                                          takeIfThere(name + "reflectance"),
                                           {takeIfThere(name + "lobe.alpha"), takeIfThere(name + "lobe.slope"), takeIfThere(name + "lobe.peak")}});
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));

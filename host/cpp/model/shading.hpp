@@ -186,15 +186,15 @@ inline Illumination illuminate(const WideVector& origin, const WideVector& norma
         const int exponent = n.mantissaBits + light.reachExponent - square.exponent - 2 * shift;
         const std::int64_t maximum = std::int64_t(4) << n.lightFraction;
         const Wide quotient = divide(static_cast<std::uint64_t>(light.reachMantissa), divisor.mantissa, n.cosineFraction);
-        const std::int64_t falloff = exponent > 3 ? maximum : static_cast<std::int64_t>(std::min<Wide>(maximum, floorShift<Wide>(quotient, n.cosineFraction - n.lightFraction - exponent)));
+        const std::int64_t falloff =
+            exponent > 3 ? maximum : static_cast<std::int64_t>(std::min<Wide>(maximum, floorShift<Wide>(quotient, n.cosineFraction - n.lightFraction - exponent)));
         cosine = (cosine * falloff) >> n.lightFraction;
     }
     // The brightest that the product of a cosine and a falloff may be
     cosine = std::min(cosine, (std::int64_t(16) << n.cosineFraction) - 1);
     Illumination result{};
     const std::int64_t maxLight = (std::int64_t(1) << n.lightBits) - 1;
-    for (int channel = 0; channel < 3; ++channel)
-        result.direct[channel] = std::min(maxLight, (light.colour[channel] * cosine) >> n.cosineFraction);
+    for (int channel = 0; channel < 3; ++channel) result.direct[channel] = std::min(maxLight, (light.colour[channel] * cosine) >> n.cosineFraction);
     result.needsShadowRay = shadows && facingLight > 0;
     const int dominant = dominantAxis(toLight);
     result.shadowRay = {origin, toLight, static_cast<Wide>(magnitude(toLight[dominant]))};

@@ -155,8 +155,8 @@ private:
         return pixel;
     }
 
-    bool marchCells(const MapRay& ray, const TileInfo& info, const std::array<PlaneDistance, 4>& depths, const std::array<int, 2>& tile, const std::array<AxisSteps, 2>& axes,
-                      std::int64_t tEnter, std::int64_t tExit, MarchState& state, EnvironmentPoint& point) const {
+    bool marchCells(const MapRay& ray, const TileInfo& info, const std::array<PlaneDistance, 4>& depths, const std::array<int, 2>& tile,
+                    const std::array<AxisSteps, 2>& axes, std::int64_t tEnter, std::int64_t tExit, MarchState& state, EnvironmentPoint& point) const {
         const int cellLog = info.cellLog2, perTile = 1 << (sizes_.tileLog - cellLog);
         const auto start = pixelOf(ray, {tile, sizes_.tileLog, tEnter >> guardBits});
         std::array<int, 2> cell;
@@ -195,7 +195,8 @@ private:
         point.kind = HitKind::map;
         point.isHidden = state.isBehind;
         // A hidden hit takes the last visible pixel of its plane
-        const std::array<int, 2> pixel = state.isBehind ? pixelOf(ray, state.first) : std::array<int, 2>{pixelOf(ray, 0, state.hitS, sizes_.width), pixelOf(ray, 1, state.hitS, sizes_.height)};
+        const std::array<int, 2> pixel =
+            state.isBehind ? pixelOf(ray, state.first) : std::array<int, 2>{pixelOf(ray, 0, state.hitS, sizes_.width), pixelOf(ray, 1, state.hitS, sizes_.height)};
         point.x = pixel[0];
         point.y = pixel[1];
         const std::int64_t w = std::max<std::int64_t>(1, positionAt(ray, 2, state.hitS));

@@ -97,7 +97,8 @@ private:
             const bool isHit = testTriangle(state.ray, record.vertices[i], memory_.idOf(record, i), numbers_, hit);
             log.addTriangle(record.vertices[i], memory_.idOf(record, i), isHit);
             if (!isHit) continue;
-            if (state.isShadow) state.occlusion = std::max(state.occlusion, record.isTransmissive[i] && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
+            if (state.isShadow)
+                state.occlusion = std::max(state.occlusion, record.isTransmissive[i] && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
             else state.best = hit;
         }
     }

@@ -144,8 +144,7 @@ template <class Product> bool testTriangle(const Ray& ray, const std::array<Vect
     const Wide numerator = Wide(weights[1]) * (Wide(z[1]) - z[0]) + Wide(weights[2]) * (Wide(z[2]) - z[0]);
 
     const Normalised dividend = normalise(magnitude(numerator), n.mantissaBits), divisor = normalise(sum, n.mantissaBits);
-    const Wide quotient = floorShift<Wide>(divide(dividend.mantissa, divisor.mantissa, n.distanceDigits),
-                                           n.distanceDigits - (dividend.exponent - divisor.exponent));
+    const Wide quotient = floorShift<Wide>(divide(dividend.mantissa, divisor.mantissa, n.distanceDigits), n.distanceDigits - (dividend.exponent - divisor.exponent));
     const Wide t = numerator < 0 ? z[0] - quotient : z[0] + quotient;
     if (t < 0 || !best.isReplacedBy(t, id)) return false;
 

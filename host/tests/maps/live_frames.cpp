@@ -32,8 +32,16 @@ int main() {
         std::vector<std::uint16_t> planeDescriptors(tiles), planeHeap(s[5]);
         std::vector<std::uint64_t> planes(s[4]), bounding(3 * s[6]);
         std::vector<float> error(tiles), nearest(tiles), furthest(tiles);
-        colonnade_live_maps maps{{descriptors[0].data(), palettes[0].data(), heaps[0].data()}, {descriptors[1].data(), palettes[1].data(), heaps[1].data()}, planeDescriptors.data(), planes.data(),
-                                 planeHeap.data(), bounding.data(), error.data(), nearest.data(), furthest.data(), 0};
+        colonnade_live_maps maps{{descriptors[0].data(), palettes[0].data(), heaps[0].data()},
+                                 {descriptors[1].data(), palettes[1].data(), heaps[1].data()},
+                                 planeDescriptors.data(),
+                                 planes.data(),
+                                 planeHeap.data(),
+                                 bounding.data(),
+                                 error.data(),
+                                 nearest.data(),
+                                 furthest.data(),
+                                 0};
         colonnade_live_encode(live, &frame, &maps);
         for (int map = 0; map < 2; ++map) {
             put(descriptors[map]);

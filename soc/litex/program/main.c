@@ -39,8 +39,7 @@ static void on_interrupt(void) {
 
 static void wait_for_interrupt(void *context) {
     (void)context;
-    for (uint32_t spin = 0; !interrupt_came && spin < SPINS; ++spin) {
-    }
+    for (uint32_t spin = 0; !interrupt_came && spin < SPINS; ++spin) {}
     interrupt_came = false;
 }
 
@@ -53,8 +52,7 @@ static void end(const char *what, enum colonnade_error error) {
     printf("colonnade: %s: %s\n", what, colonnade_error_name(error));
     uart_sync();
     simulation_finish_write(1);
-    for (;;) {
-    }
+    for (;;) {}
 }
 
 static void check(const char *what, enum colonnade_error error) {
@@ -104,8 +102,7 @@ static uint32_t compute_view(struct record *record, struct colonnade_frame *fram
 
 static void load_image(void) {
     const uint8_t *data = (const uint8_t *)IMAGE;
-    printf("colonnade: an image without its end: %s\n",
-           colonnade_error_name(colonnade_check_image(&colonnade_design, data, IMAGE_BYTES - 128)));
+    printf("colonnade: an image without its end: %s\n", colonnade_error_name(colonnade_check_image(&colonnade_design, data, IMAGE_BYTES - 128)));
     const struct colonnade_image image = {data, IMAGE_BYTES, IMAGE, {IMAGE, IMAGE + IMAGE_BYTES}};
     uint32_t start = now();
     check("load", colonnade_load(&device, &image, ATTEMPTS));
@@ -127,8 +124,7 @@ int main(void) {
 
     const struct colonnade_bus bus = {colonnade_mmio_read, colonnade_mmio_write, wait_for_interrupt, (void *)COLONNADE_BASE};
     check("probe", colonnade_probe(&device, &bus, &colonnade_design));
-    printf("colonnade: found, frames of up to %ux%u, capabilities %03x\n", (unsigned)device.max_width,
-           (unsigned)device.max_height, (unsigned)device.capabilities);
+    printf("colonnade: found, frames of up to %ux%u, capabilities %03x\n", (unsigned)device.max_width, (unsigned)device.max_height, (unsigned)device.capabilities);
     load_image();
 
     struct record *records = (struct record *)RECORDS;
@@ -145,8 +141,7 @@ int main(void) {
         colonnade_view_accept(&view);
         check("start", colonnade_start(&device, &framebuffer));
         uint32_t started = now();
-        printf("colonnade: view %u: %u words in %u cycles, set and started in %u\n", (unsigned)i, (unsigned)frame.count,
-               (unsigned)computed, (unsigned)(started - start));
+        printf("colonnade: view %u: %u words in %u cycles, set and started in %u\n", (unsigned)i, (unsigned)frame.count, (unsigned)computed, (unsigned)(started - start));
 
         if (i + 1 < FRAMES) {
             records[i + 1].camera = records[i].camera;
@@ -159,10 +154,8 @@ int main(void) {
         check("frame", colonnade_result(&device));
         /* The processor's own view of the frame */
         flush_cpu_dcache();
-        printf("colonnade: frame %u: crc32 %08x, hits %u, %u cycles of the array\n", (unsigned)i,
-               (unsigned)crc32((const unsigned char *)base, FRAME_BYTES),
-               (unsigned)colonnade_counter(&device, COLONNADE_COUNTER_HITS),
-               (unsigned)colonnade_counter(&device, COLONNADE_COUNTER_CYCLES));
+        printf("colonnade: frame %u: crc32 %08x, hits %u, %u cycles of the array\n", (unsigned)i, (unsigned)crc32((const unsigned char *)base, FRAME_BYTES),
+               (unsigned)colonnade_counter(&device, COLONNADE_COUNTER_HITS), (unsigned)colonnade_counter(&device, COLONNADE_COUNTER_CYCLES));
     }
     end("end", COLONNADE_OK);
 }

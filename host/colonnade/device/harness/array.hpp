@@ -175,12 +175,10 @@ private:
     }
 
     template <class Value> static void requireEqual(const Value& outer, const Value& inner, const char* port) {
-        if (std::memcmp(&outer, &inner, sizeof outer) != 0)
-            throw std::runtime_error(std::string("the simulator's models disagree on port ") + port);
+        if (std::memcmp(&outer, &inner, sizeof outer) != 0) throw std::runtime_error(std::string("the simulator's models disagree on port ") + port);
     }
 
-    template <class Memory>
-    static void storeInBank(Memory& memory, unsigned bank, std::uint64_t address, const void* record, std::size_t bytes) {
+    template <class Memory> static void storeInBank(Memory& memory, unsigned bank, std::uint64_t address, const void* record, std::size_t bytes) {
         if (address % banksOfColumn != bank) return;
         const std::uint64_t row = address / banksOfColumn;
         if (row < sizeof memory / sizeof memory[0]) std::memcpy(&memory[row], record, bytes);

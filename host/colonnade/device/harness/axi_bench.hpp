@@ -250,7 +250,8 @@ private:
         top_.m_axi_scene_arready = scene_.addressReady;
     }
     void sampleScene() {
-        const Address ar{top_.m_axi_scene_araddr, top_.m_axi_scene_arlen, top_.m_axi_scene_arsize, top_.m_axi_scene_arburst, top_.m_axi_scene_arid, top_.m_axi_scene_arprot};
+        const Address ar{top_.m_axi_scene_araddr,  top_.m_axi_scene_arlen, top_.m_axi_scene_arsize,
+                         top_.m_axi_scene_arburst, top_.m_axi_scene_arid,  top_.m_axi_scene_arprot};
         const bool isTaken = scene_.offersBeat && top_.m_axi_scene_rready;
         if (sceneAr_.transfers(top_.m_axi_scene_arvalid, top_.m_axi_scene_arready, ar)) scene_.takeAddress(ar);
         if (isTaken) scene_.takeBeat();

@@ -20,8 +20,8 @@ enum class Order {
     mixed               ///< each burst in another order
 };
 constexpr unsigned orders = 10;
-constexpr const char* orderNames[orders] = {"any", "dataValidFirst", "firstBeatFirst", "wholeBurstFirst", "addressValidFirst",
-                                            "addressFirst", "together", "lateAddress", "lateData", "mixed"};
+constexpr const char* orderNames[orders] = {"any",          "dataValidFirst", "firstBeatFirst", "wholeBurstFirst", "addressValidFirst",
+                                            "addressFirst", "together",       "lateAddress",    "lateData",        "mixed"};
 
 enum class Silent { none, aw, w, b, ar, r, sceneAr, sceneR };
 constexpr unsigned silentChannels = 7;

@@ -10,9 +10,7 @@ struct Variables {
 
 #define HAS_STATE(i) (1U == static_cast<std::uint32_t>(variables->state[i]))
 
-__attribute__((noinline)) void countOf4(Variables* variables) {
-    variables->count = 7U & ((3U & (HAS_STATE(0) + HAS_STATE(1))) + (3U & (HAS_STATE(2) + HAS_STATE(3))));
-}
+__attribute__((noinline)) void countOf4(Variables* variables) { variables->count = 7U & ((3U & (HAS_STATE(0) + HAS_STATE(1))) + (3U & (HAS_STATE(2) + HAS_STATE(3)))); }
 
 __attribute__((noinline)) void countOf8(Variables* variables) {
     variables->count = 0xfU & ((7U & ((3U & (HAS_STATE(0) + HAS_STATE(1))) + (3U & (HAS_STATE(2) + HAS_STATE(3))))) +

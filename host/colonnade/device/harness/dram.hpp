@@ -23,8 +23,7 @@ public:
     Dram(Top& top, const DramOptions& options) : Dram(top, options, own_) {}
 
     /// A DRAM whose content is `memory`, which others may change.
-    Dram(Top& top, const DramOptions& options, Bytes& memory)
-        : top_(top), options_(options), random_(options.seed), memory_(memory) {}
+    Dram(Top& top, const DramOptions& options, Bytes& memory) : top_(top), options_(options), random_(options.seed), memory_(memory) {}
 
     /// Writes a record, as the host would.
     void store(std::uint64_t address, const void* record, std::size_t bytes) {

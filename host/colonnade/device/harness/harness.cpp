@@ -103,10 +103,12 @@ public:
     explicit Harness(const Options& options)
         : random_(options.seed), stallPercent_(options.stallPercent), checkInterval_(std::max(1u, options.checkInterval))
 #ifdef MEMORY_BANKS
-        , stalls_(options)
+          ,
+          stalls_(options)
 #endif
 #ifdef DRAM_BUS_BYTES
-        , dram_(top_, options.dram)
+          ,
+          dram_(top_, options.dram)
 #endif
     {
 #ifndef MEMORY_BANKS
@@ -240,27 +242,27 @@ private:
         dram_.take();
 #endif
         quiet_ += takes;
-#define TAKE(column)                                                                                                                      \
-    if (takes && top_.io_pixels_##column##_valid) {                                                                                       \
-        PixelBytes& pixel = at(top_.io_pixels_##column##_bits_x, top_.io_pixels_##column##_bits_y);                                       \
-        pixel.colour[0] = top_.io_pixels_##column##_bits_colour_r;                                                                        \
-        pixel.colour[1] = top_.io_pixels_##column##_bits_colour_g;                                                                        \
-        pixel.colour[2] = top_.io_pixels_##column##_bits_colour_b;                                                                        \
-        pixel.isObject = top_.io_pixels_##column##_bits_isObject;                                                                         \
-        TAKE_RATIO(column)                                                                                                                \
-        TAKE_HIT(column)                                                                                                                  \
+#define TAKE(column) \
+    if (takes && top_.io_pixels_##column##_valid) { \
+        PixelBytes& pixel = at(top_.io_pixels_##column##_bits_x, top_.io_pixels_##column##_bits_y); \
+        pixel.colour[0] = top_.io_pixels_##column##_bits_colour_r; \
+        pixel.colour[1] = top_.io_pixels_##column##_bits_colour_g; \
+        pixel.colour[2] = top_.io_pixels_##column##_bits_colour_b; \
+        pixel.isObject = top_.io_pixels_##column##_bits_isObject; \
+        TAKE_RATIO(column) \
+        TAKE_HIT(column) \
     }
 #ifdef RATIO
-#define TAKE_RATIO(column)                                                                                                                \
-    pixel.ratio[0] = RATIO(column, r);                                                                                                    \
-    pixel.ratio[1] = RATIO(column, g);                                                                                                    \
+#define TAKE_RATIO(column) \
+    pixel.ratio[0] = RATIO(column, r); \
+    pixel.ratio[1] = RATIO(column, g); \
     pixel.ratio[2] = RATIO(column, b);
 #else
 #define TAKE_RATIO(column)
 #endif
 #ifdef HIT_DISTANCE
-#define TAKE_HIT(column)                                                                                                                  \
-    pixel.triangle = top_.io_pixels_##column##_bits_hit_triangle;                                                                         \
+#define TAKE_HIT(column) \
+    pixel.triangle = top_.io_pixels_##column##_bits_hit_triangle; \
     pixel.distance = numberOf(HIT_DISTANCE(column));
 #else
 #define TAKE_HIT(column)
@@ -346,9 +348,16 @@ void run(const std::string& job, const Options& options) {
 int main(int argc, char** argv) try {
     std::string job;
     Options options;
-    const std::pair<const char*, unsigned*> named[] = {
-        {"--stall", &options.stallPercent}, {"--seed", &options.seed}, {"--memory", &options.memoryPercent}, {"--burst", &options.memoryBurst}, {"--check", &options.checkInterval},
-        {"--dram", &options.dram.latency}, {"--dram-interval", &options.dram.interval}, {"--dram-random", &options.dram.randomPercent}, {"--dram-errors", &options.dram.errorsPer1024}, {"--dram-silent", &options.dram.silentAfter}};
+    const std::pair<const char*, unsigned*> named[] = {{"--stall", &options.stallPercent},
+                                                       {"--seed", &options.seed},
+                                                       {"--memory", &options.memoryPercent},
+                                                       {"--burst", &options.memoryBurst},
+                                                       {"--check", &options.checkInterval},
+                                                       {"--dram", &options.dram.latency},
+                                                       {"--dram-interval", &options.dram.interval},
+                                                       {"--dram-random", &options.dram.randomPercent},
+                                                       {"--dram-errors", &options.dram.errorsPer1024},
+                                                       {"--dram-silent", &options.dram.silentAfter}};
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });

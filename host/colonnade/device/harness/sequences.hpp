@@ -104,9 +104,7 @@ public:
             if (load() != 0) report_.broken("a legal image is refused");
             set();
             if (frameIsRight()) ++exact_;
-        } catch (const Hang& hang) {
-            report_.broken(std::string("hang: ") + hang.what());
-        }
+        } catch (const Hang& hang) { report_.broken(std::string("hang: ") + hang.what()); }
         ++done_;
         failed_ += report_.count != before;
     }
@@ -115,8 +113,8 @@ public:
 
     void print() const {
         report_.print();
-        std::cout << "sequences " << done_ << " ended " << ended_ << " exact " << exact_ << " violations " << report_.count << " failed " << failed_ << " cycles " << report_.cycle << " bursts "
-                  << slaves_.bursts << " accesses " << slaves_.accesses << '\n';
+        std::cout << "sequences " << done_ << " ended " << ended_ << " exact " << exact_ << " violations " << report_.count << " failed " << failed_ << " cycles "
+                  << report_.cycle << " bursts " << slaves_.bursts << " accesses " << slaves_.accesses << '\n';
     }
 
 private:
@@ -296,7 +294,8 @@ private:
         silence(Silent::r);
         write("control", load_);
         bench_->cycles(pick(50));
-        const std::array<std::pair<unsigned, std::uint32_t>, 4> writes{{{address("control"), start_}, {address("control"), load_}, {address("image.base"), 0}, {address("image.bytes"), 1}}};
+        const std::array<std::pair<unsigned, std::uint32_t>, 4> writes{
+            {{address("control"), start_}, {address("control"), load_}, {address("image.base"), 0}, {address("image.bytes"), 1}}};
         for (const auto& [at, value] : writes) expect(bench_->write(at, value) == refused_, "a write during a load is accepted");
         expect(read("status") == loading_, "a refused command has an effect");
         slaves_.behaviour.silent = Silent::none;
@@ -311,7 +310,8 @@ private:
         write("control", start_);
         setDevice();
         write("control", start_);
-        const std::array<std::pair<unsigned, std::uint32_t>, 3> writes{{{address("control"), start_}, {address("framebuffer.stride"), job_.stride}, {job_.frame.front().address, job_.frame.front().value}}};
+        const std::array<std::pair<unsigned, std::uint32_t>, 3> writes{
+            {{address("control"), start_}, {address("framebuffer.stride"), job_.stride}, {job_.frame.front().address, job_.frame.front().value}}};
         for (const auto& [at, value] : writes) expect(bench_->write(at, value) == refused_, "a write while a frame is queued is accepted");
         expect(read("status") == (running_ | queued_), "a refused command has an effect");
         slaves_.behaviour.silent = Silent::none;
@@ -322,7 +322,8 @@ private:
     /// All that `control` refuses.
     void illegalCommands() {
         for (std::uint32_t value = 0; value < 16; ++value)
-            if (value != start_ && value != load_ && value != reset_) expect(bench_->write(address("control"), value | static_cast<std::uint32_t>(pick(2)) << 20) == refused_, "an illegal command is accepted");
+            if (value != start_ && value != load_ && value != reset_)
+                expect(bench_->write(address("control"), value | static_cast<std::uint32_t>(pick(2)) << 20) == refused_, "an illegal command is accepted");
         expect(bench_->write(job_.deviceStart, 1) == refused_, "control.start of the device is accepted");
         expect(bench_->read(address("control")).response == refused_, "control is read");
     }
@@ -434,14 +435,20 @@ private:
         awaitIdle("a frame does not end, in spite of the watchdog");
     }
 
-    const std::vector<std::pair<const char*, void (Sequences::*)()>> kinds_{
-        {"errors of the memory", &Sequences::errorsOfTheMemory}, {"a silent channel", &Sequences::silentChannel},
-        {"soft resets", &Sequences::softResets},                 {"hard resets", &Sequences::hardResets},
-        {"commands during a load", &Sequences::commandsDuringLoad}, {"queued frames", &Sequences::queuedFrames},
-        {"illegal commands", &Sequences::illegalCommands},       {"illegal accesses", &Sequences::illegalAccesses},
-        {"any accesses", &Sequences::anyAccesses},               {"a narrow window", &Sequences::narrowWindow},
-        {"ends of the addresses", &Sequences::endsOfTheAddresses}, {"a misaligned framebuffer", &Sequences::misalignedFramebuffer},
-        {"a damaged image", &Sequences::damagedImage},           {"noisy registers", &Sequences::noisyRegisters}};
+    const std::vector<std::pair<const char*, void (Sequences::*)()>> kinds_{{"errors of the memory", &Sequences::errorsOfTheMemory},
+                                                                            {"a silent channel", &Sequences::silentChannel},
+                                                                            {"soft resets", &Sequences::softResets},
+                                                                            {"hard resets", &Sequences::hardResets},
+                                                                            {"commands during a load", &Sequences::commandsDuringLoad},
+                                                                            {"queued frames", &Sequences::queuedFrames},
+                                                                            {"illegal commands", &Sequences::illegalCommands},
+                                                                            {"illegal accesses", &Sequences::illegalAccesses},
+                                                                            {"any accesses", &Sequences::anyAccesses},
+                                                                            {"a narrow window", &Sequences::narrowWindow},
+                                                                            {"ends of the addresses", &Sequences::endsOfTheAddresses},
+                                                                            {"a misaligned framebuffer", &Sequences::misalignedFramebuffer},
+                                                                            {"a damaged image", &Sequences::damagedImage},
+                                                                            {"noisy registers", &Sequences::noisyRegisters}};
 
     const SequenceJob& job_;
     const unsigned busBytes_;

@@ -154,7 +154,8 @@ void run(const std::string& job, std::map<std::string, unsigned>& options, const
 } // namespace
 
 int main(int argc, char** argv) try {
-    std::map<std::string, unsigned> options{{"--bus", 0}, {"--memory", 0}, {"--base", 0}, {"--latency", 1}, {"--stall", 0}, {"--order", 0}, {"--seed", 1}, {"--sequences", 0}};
+    std::map<std::string, unsigned> options{{"--bus", 0},   {"--memory", 0}, {"--base", 0}, {"--latency", 1},
+                                            {"--stall", 0}, {"--order", 0},  {"--seed", 1}, {"--sequences", 0}};
     std::string job, shared;
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];

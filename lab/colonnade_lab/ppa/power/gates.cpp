@@ -90,8 +90,7 @@ public:
             if (!source.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) throw std::runtime_error("too few inputs");
             for (std::size_t i = 0; i < inputs_.size(); ++i) {
                 const char value = static_cast<char>(bytes[i / 8] >> (i % 8) & 1);
-                if (inputs_[i] >= 0 && values_[static_cast<unsigned>(inputs_[i])] != value)
-                    schedule(inputDelay, {static_cast<unsigned>(inputs_[i]), -1, 0, value});
+                if (inputs_[i] >= 0 && values_[static_cast<unsigned>(inputs_[i])] != value) schedule(inputDelay, {static_cast<unsigned>(inputs_[i]), -1, 0, value});
             }
             settle();
             write(sink);
@@ -284,8 +283,7 @@ private:
         for (const Port& port : memory.ports)
             for (std::size_t i = 0; i < port.dataOut.size(); ++i) {
                 const char bit = port.isRead ? memory.words.at(port.readAddress)[i] : static_cast<char>(0);
-                if (port.dataOut[i].net >= 0 && value(port.dataOut[i]) != bit)
-                    schedule(memoryDelay, {static_cast<unsigned>(port.dataOut[i].net), -1, 0, bit});
+                if (port.dataOut[i].net >= 0 && value(port.dataOut[i]) != bit) schedule(memoryDelay, {static_cast<unsigned>(port.dataOut[i].net), -1, 0, bit});
             }
     }
 
