@@ -13,6 +13,8 @@ CACHE = {"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2,
 CACHE |= {"busBytes": 32, "parity": True}
 PLAIN, CACHED = ("array.columns=2",), ("array.columns=2", f"columnBvhMemory.cache={json.dumps(CACHE)}")
 
+IN_ROOM = ("array.columns=2", 'physicalAttributeMemory={"width":96,"height":72}', "frame.maxBounces=1")
+
 
 @pytest.mark.parametrize(
     ("overrides", "sequences"),
@@ -20,6 +22,7 @@ PLAIN, CACHED = ("array.columns=2",), ("array.columns=2", f"columnBvhMemory.cach
         pytest.param(PLAIN, 140, id="scene in memories"),
         pytest.param(CACHED, 70, id="scene in DRAM"),
         pytest.param(PLAIN, 10_000, id="scene in memories, many", marks=pytest.mark.matrix),
+        pytest.param(IN_ROOM, 2_000, id="with maps of a room, many", marks=pytest.mark.matrix),
         pytest.param(CACHED, 3_000, id="scene in DRAM, many", marks=pytest.mark.matrix),
     ],
 )

@@ -205,6 +205,7 @@ private:
         write("framebuffer.windowEnd", job_.framebuffer.end());
         write("framebuffer.stride", job_.stride);
         write("framebuffer.format", 0);
+        if (job_.registers.count("photo.enabled")) write("photo.enabled", 0);
     }
 
     void prepare() {
@@ -334,7 +335,7 @@ private:
         for (int i = 0; i < 20; ++i) {
             expect(bench_->write(address("framebuffer.stride"), 64, static_cast<unsigned>(pick(15))) == refused_, "a part of a word is written");
             expect(bench_->write(address("framebuffer.stride"), 1u << 24) == refused_, "a value that does not fit is accepted");
-            const unsigned missing = pick(2) != 0 ? 0x104 + 4 * static_cast<unsigned>(pick(1000)) : job_.deviceEnd + 4 * static_cast<unsigned>(pick(1000));
+            const unsigned missing = pick(2) != 0 ? 0x108 + 4 * static_cast<unsigned>(pick(1000)) : job_.deviceEnd + 4 * static_cast<unsigned>(pick(1000));
             expect(bench_->write(missing, 0) == refused_ && bench_->read(missing).response == refused_, "a missing register is accessed");
             auto entry = std::next(job_.registers.begin(), static_cast<std::ptrdiff_t>(pick(job_.registers.size())));
             if (entry->second.access == "ro") expect(bench_->write(entry->second.address, 0) == refused_, "a read-only register is written");
