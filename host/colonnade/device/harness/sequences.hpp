@@ -205,7 +205,7 @@ private:
         write("framebuffer.windowEnd", job_.framebuffer.end());
         write("framebuffer.stride", job_.stride);
         write("framebuffer.format", 0);
-        if (job_.registers.count("photo.enabled")) write("photo.enabled", 0);
+        bench_->write(address("photo.enabled"), 0); // refused by a shell without maps
     }
 
     void prepare() {
