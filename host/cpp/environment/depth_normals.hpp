@@ -93,8 +93,10 @@ public:
     /// `depth`: metres along z, filled; `holes`: pixels whose depth was filled from a neighbour.
     DepthMap(const double* depth, const std::uint8_t* holes, const Lens& lens, int width, int height)
         : depth_(depth), holes_(holes), lens_(lens), width_(width), height_(height), size_(static_cast<std::size_t>(width) * height), rays_(size_) {
-        for (std::size_t i = 0; i < size_; ++i)
-            rays_[i] = {(static_cast<double>(i % width) + 0.5 - lens.cx) / lens.fx, (static_cast<double>(i / width) + 0.5 - lens.cy) / lens.fy, 1.0};
+        for (std::size_t i = 0; i < size_; ++i) {
+            const std::size_t column = i % width, row = i / width;
+            rays_[i] = {(static_cast<double>(column) + 0.5 - lens.cx) / lens.fx, (static_cast<double>(row) + 0.5 - lens.cy) / lens.fy, 1.0};
+        }
     }
 
     /// Root mean square error of the depth on flat surfaces, as a share of the depth.
@@ -181,7 +183,10 @@ private:
         radius = std::min(radius, (std::min(width_, height_) - 1) / 2);
         const double count = (2 * radius + 1) * (2 * radius + 1), spread = count * radius * (radius + 1) / 3.0;
         const auto u = [&](std::size_t i) { return static_cast<double>(i % width_) - width_ / 2.0; };
-        const auto v = [&](std::size_t i) { return static_cast<double>(i / width_) - height_ / 2.0; };
+        const auto v = [&](std::size_t i) {
+            const std::size_t row = i / width_;
+            return static_cast<double>(row) - height_ / 2.0;
+        };
         const auto sumsOf = [&](auto valueOf) {
             std::vector<double> values(size_);
             for (std::size_t i = 0; i < size_; ++i) values[i] = valueOf(1.0 / depth_[i], i);
