@@ -25,7 +25,7 @@ from colonnade.device.simulator_build import (
 
 _TOP = "ColonnadeAxi"
 _SEQUENCES = ("axi_rules.hpp", "axi_slave.hpp", "axi_bench.hpp", "sequences.hpp")
-_HARNESS = ("shell.cpp", "shell_memory.hpp", "bus_bytes.hpp", "dram.hpp", *_SEQUENCES)
+_HARNESS = ("shell.cpp", "shell_memory.hpp", "bus_bytes.hpp", "dram.hpp", "dram_timing.hpp", *_SEQUENCES)
 
 
 def build_shell_simulator(design: GeneratedDesign, progress: Progress = QUIET) -> Path:

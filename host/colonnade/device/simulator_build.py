@@ -58,7 +58,7 @@ FAST = Optimisation("-O3", 20000)
 #: For frames so small that compiling takes longer than simulating.
 QUICK = Optimisation("-O0", 2**31 - 1)
 
-_HARNESS = ("harness.cpp", "array.hpp", "dram.hpp")
+_HARNESS = ("harness.cpp", "array.hpp", "dram.hpp", "dram_timing.hpp")
 
 #: Paths that make and the shell take as one word.
 _PLAIN_PATH = re.compile(r"[\w/.+@%,-]+", re.ASCII)

@@ -39,8 +39,9 @@ class Stalls:
         memory_percent: Percentage of cycles in which each bank is stalled, 0 to 99; needs `is_holdable`.
         memory_burst: Longest stall of a bank, cycles; lengths are uniform from 1.
         check_interval: Cycles between checks of the coupling of the simulator's models.
-        dram_latency: Cycles from a read to its first data, for designs with a cache.
+        dram_latency: Cycles from a read to its first data, for designs with a cache; with `dram_banks`, of an open row.
         dram_interval: Cycles from a beat of DRAM to the next one.
+        dram_banks: Banks of a DRAM with rows and refresh, a power of two; 0: every read takes the same latency.
         dram_random: Percentage of cycles in which DRAM accepts or delivers nothing; reads then overtake each other.
         dram_errors: Beats of 1024 that DRAM answers with an error in the first frame.
         dram_silent: Reads of the first frame after which DRAM answers no more until the frame has ended; 0: all.
@@ -53,6 +54,7 @@ class Stalls:
     check_interval: int = 64
     dram_latency: int = 100
     dram_interval: int = 1
+    dram_banks: int = 0
     dram_random: int = 0
     dram_errors: int = 0
     dram_silent: int = 0
@@ -67,7 +69,7 @@ class Stalls:
         """Command-line options of the harness."""
         dram = [
             *("--dram", str(self.dram_latency), "--dram-random", str(self.dram_random)),
-            *("--dram-interval", str(self.dram_interval)),
+            *("--dram-interval", str(self.dram_interval), "--dram-banks", str(self.dram_banks)),
             *("--dram-errors", str(self.dram_errors), "--dram-silent", str(self.dram_silent)),
         ]
         memory = ["--memory", str(self.memory_percent), "--burst", str(self.memory_burst)]

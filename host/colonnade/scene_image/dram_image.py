@@ -24,6 +24,21 @@ def line_layout(manifest: Manifest) -> dict[str, int]:
     return line
 
 
+def moved_bytes(manifest: Manifest) -> int:
+    """Bytes that the DRAM port moves for a line: whole beats of ``columnBvhMemory.cache.busBytes``.
+
+    Raises:
+        UserError: See `line_layout`.
+    """
+    bus = int(manifest.config["columnBvhMemory"]["cache"]["busBytes"])
+    return -(-line_layout(manifest)["bytes"] // bus) * bus
+
+
+def dram_lines(records: int, manifest: Manifest) -> int:
+    """Lines of so many records; see `line_layout`."""
+    return -(-records // line_layout(manifest)["records"])
+
+
 def dram_image(image: SceneImage, manifest: Manifest) -> bytes:
     """All lines of a scene; bytes between them are 0.
 
@@ -32,7 +47,7 @@ def dram_image(image: SceneImage, manifest: Manifest) -> bytes:
     """
     line = line_layout(manifest)
     count, size = image.records.shape
-    lines = -(-count // line["records"])
+    lines = dram_lines(count, manifest)
     records = np.zeros((lines * line["records"], size), dtype=np.uint8)
     records[:count] = image.records
     content = np.zeros((lines, line["pitch"]), dtype=np.uint8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +13,13 @@ from colonnade.common.framebuffer import Frame
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.device.bit_exact import render_model
-from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.device.harness_job import parse_output
+from colonnade.device.simulator_build import build_simulator
+from colonnade.device.verilator import Stalls, render_rtl, run_program, write_job
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
+from colonnade.scene_image.dram_image import moved_bytes
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
@@ -68,8 +72,8 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
     design = design_with(rows, columns, banks, buffers, sizes)
     image, registers = scene_of(design, 10, 8)
     expected = render_model(design.manifest, image, registers)
-    for seed, (latency, random) in enumerate([(1, 0), (40, 0), (7, 60), (120, 20)]):
-        stalls = Stalls(percent=10 * seed, seed=seed, dram_latency=latency, dram_random=random)
+    for seed, (latency, random, open_rows) in enumerate([(1, 0, 0), (40, 0, 8), (7, 60, 0), (120, 20, 2)]):
+        stalls = Stalls(10 * seed, seed, dram_latency=latency, dram_random=random, dram_banks=open_rows)
         first, second = render_rtl(design, image, [registers, registers], stalls).frames
         assert_same(first, expected)
         assert_same(second, expected)
@@ -96,6 +100,24 @@ def test_frames_of_the_preset_for_fpgas() -> None:
     for stalls in (Stalls(dram_latency=15, dram_interval=2), Stalls(percent=20, seed=3, dram_latency=40)):
         for frame in render_rtl(design, image, [registers, registers], stalls).frames:
             assert_same(frame, expected)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    ["one of everything", "four banks and two buses", pytest.param("no shared cache", marks=pytest.mark.matrix)],
+)
+def test_the_port_moves_the_beats_of_the_lines_that_are_counted(tmp_path: Path, shape: str) -> None:
+    """Whole beats: a line of 160 bytes moves 256 over a bus of 128."""
+    design = design_with(*SHAPES[shape])
+    bus = int(design.manifest.config["columnBvhMemory"]["cache"]["busBytes"])
+    image, registers = scene_of(design, 32, 24)
+    program = build_simulator(design)
+    job, _ = write_job(tmp_path, design.manifest, image, [registers, registers])
+    for banks in (0, 8):
+        options = Stalls(dram_banks=banks).options
+        for frame in parse_output(run_program([str(program), *options, job.name], tmp_path, lambda share: None)):
+            reads = frame.values["counters.dramReads"]
+            assert frame.values["dram.beats"] * bus == reads * moved_bytes(design.manifest) > 0
 
 
 def test_a_scene_that_fits_is_read_once() -> None:

@@ -47,13 +47,18 @@ if TYPE_CHECKING:
     "--dram-latency",
     type=click.IntRange(1, 100_000),
     metavar="CYCLES",
-    help="Cycles from a read of DRAM to its first data, with a cache.  [default: 100]",
+    help="Cycles from a read of DRAM, with --dram-banks of an open row, to its first data.  [default: 100]",
 )
 @click.option(
     "--dram-interval",
     type=click.IntRange(1, 1000),
     metavar="CYCLES",
     help="Cycles from a beat of DRAM to the next one.  [default: 1]",
+)
+@click.option(
+    "--dram-banks",
+    type=click.Choice(("0", "1", "2", "4", "8", "16")),
+    help="Banks of a DRAM with rows and refresh; 0: every read takes the same latency.  [default: 0]",
 )
 @click.option("--plot", type=FILE, metavar="FILE", help="Plot the utilisation of each stage as PNG.")
 @strict_option
@@ -66,10 +71,9 @@ def bench(
     jobs: int | None,
     reuse: bool,
     mirror: bool,
-    dram_latency: int | None,
-    dram_interval: int | None,
     plot: Path | None,
     json_file: Path | None,
+    **memory: int | str | None,
 ) -> None:
     """Render each benchmark mesh with the RTL; print rays per cycle and the bottleneck. If the hardware supports
     bounces, render each mesh again as a mirror with one reflection.
@@ -95,6 +99,7 @@ def bench(
 
     terminal = progress.for_terminal()
     names = meshes or MESHES
+    dram = {name: int(value) for name, value in memory.items() if value is not None}
 
     def measured(mirror: bool) -> dict[str, Any]:
         table = _table()
@@ -108,12 +113,11 @@ def bench(
             partial(_show, table),
             reuse=reuse,
             mirror=mirror,
-            dram_latency=dram_latency,
-            dram_interval=dram_interval,
+            dram=dram,
         )
         in_box, bounds = report["geomean_rays_per_cycle_in_box"], report["geomean_bounds"]
         means = (in_box, report["geomean_rays_per_cycle"], bounds["perfect_memory"], bounds["perfect_units"])
-        table.print("geometric mean", None, None, *means, None, None, None, "")
+        table.print("geometric mean", None, None, *means, None, None, None, None, "")
         echo(
             f"{in_box:.3f} in-box rays per cycle: "
             f"{report['ratio_to_paper']:.1f} times the paper's {paper.RAYS_PER_CYCLE}"
@@ -145,6 +149,7 @@ def _table() -> Table:
             Column("memory", 6, ".3f", group="bound, perfect"),
             Column("units", 6, ".3f", group="bound, perfect"),
             Column("reads/ray", 9, ".2f"),
+            Column("DRAM bytes", 10, ".1f"),
             Column("snooped", 7, ".0%"),
             Column("busy", 4, ".0%"),
             Column("busiest", 14, is_text=True),
@@ -164,6 +169,7 @@ def _show(table: Table, name: str, result: Mapping[str, Any]) -> None:
         bounds["perfect_memory"],
         bounds["perfect_units"],
         result["per_ray"]["record_reads"],
+        result["per_ray"].get("dram_bytes"),
         result["snoop_share"],
         result["utilisation"][busiest],
         busiest,

@@ -20,6 +20,7 @@ from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.report import frame_report, mesh_report
 from colonnade.scene.model import Scene
+from colonnade.scene_image.dram_image import moved_bytes
 from colonnade.scene_image.file import SceneImage
 
 
@@ -31,8 +32,7 @@ def measure_frame(
     size: tuple[int, int],
     *,
     reuse: bool = True,
-    dram_latency: int | None = None,
-    dram_interval: int | None = None,
+    dram: Mapping[str, int] | None = None,
 ) -> dict[str, Any]:
     """Render a frame with the RTL.
 
@@ -43,11 +43,11 @@ def measure_frame(
         mesh: The mesh.
         size: Width and height, pixels.
         reuse: Use the cached counters of the same Verilog, scene image, registers and memory.
-        dram_latency: Cycles from a read of DRAM to its first data, for designs with a cache; None: those of `Stalls`.
-        dram_interval: Cycles from a beat of DRAM to the next one; None: that of `Stalls`.
+        dram: Fields of `Stalls` about the DRAM of designs with a cache.
 
     Returns:
-        `colonnade.render.report.frame_report` with ``config_hash``, ``cycles_per_second`` and ``seconds``.
+        `colonnade.render.report.frame_report` with ``config_hash``, ``cycles_per_second``, ``seconds``, and with a
+        cache ``dram_line_bytes``, those that the DRAM port moves for a line.
     """
     design = design_for(config, overrides)
     manifest = design.manifest
@@ -56,18 +56,20 @@ def measure_frame(
     prepared = DeviceScene.of(scene, manifest, mesh)
     image, registers = prepared.image, prepared.registers(size)
     pack_seconds = time.perf_counter() - begun
-    memory = {"dram_latency": dram_latency, "dram_interval": dram_interval}
-    stalls = Stalls(**{name: cycles for name, cycles in memory.items() if cycles is not None})
+    stalls = Stalls(**(dram or {}))
     key = _key(design, image, registers)
+    of_today: dict[str, Any] = {"config": manifest.config, "config_hash": manifest.config_hash}
     if manifest.config["columnBvhMemory"]["cache"] is not None:
+        of_today["dram_line_bytes"] = moved_bytes(manifest)
         key["dramLatency"] = stalls.dram_latency
         if stalls.dram_interval != 1:
             key["dramInterval"] = stalls.dram_interval
+        if stalls.dram_banks:
+            key["dramBanks"] = stalls.dram_banks
     name = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()[:24]
     file = cache_directory(project_root()) / "measurements" / f"{name}.json"
     cached = cache.stored(file, key) if reuse else None
     if cached is not None:
-        of_today = {"config": manifest.config, "config_hash": manifest.config_hash}
         return cached | of_today | {"mesh": asdict(mesh_report(image.header))}
     build_simulator(design)
     begun = time.perf_counter()
@@ -77,7 +79,7 @@ def measure_frame(
     require_no_errors(frame.errors)
     report = {
         **frame_report("rtl", manifest, image.header, frame).as_json(),
-        "config_hash": manifest.config_hash,
+        **of_today,
         "cycles_per_second": simulated.cycles_per_second,
         "seconds": {"pack": pack_seconds, "run": run_seconds},
     }

@@ -72,7 +72,8 @@ def figures(report: Mapping[str, Any]) -> dict[str, Any]:
 
     Returns:
         ``utilisation``: busy share of each unit and port, 0 to 1. ``bottleneck``: the busiest of them. ``stalls``:
-        shares of all context cycles, with sum 1. ``per_ray``: work per in-box ray. ``snoop_share``: snooped share of
+        shares of all context cycles, with sum 1. ``per_ray``: work per in-box ray, with a cache also ``dram_bytes``, in
+        whole beats of the port. ``snoop_share``: snooped share of
         the records taken. ``limits``: in-box rays per cycle at full utilisation of each unit or port. ``bounds``: the
         lowest limit of the units, and of the ports.
     """
@@ -81,11 +82,13 @@ def figures(report: Mapping[str, Any]) -> dict[str, Any]:
     use = utilisation(counters, cycles, shape)
     resources = {name: share for name, share in use.items() if name != PATH_UNIT}
     rate = report["rays_per_cycle_in_box"]
+    line = report.get("dram_line_bytes")
+    dram = {} if line is None else {"dram_bytes": _ratio(counters["dramReads"] * line, counters["raysInBox"])}
     return {
         "utilisation": use,
         "bottleneck": max(resources, key=lambda name: resources[name]),
         "stalls": stalls(counters, cycles, shape),
-        "per_ray": per_ray(counters),
+        "per_ray": per_ray(counters) | dram,
         "snoop_share": _ratio(counters["snoopHits"], records_taken(counters)),
         "limits": {name: _bound(rate, [share]) for name, share in resources.items()},
         "bounds": {

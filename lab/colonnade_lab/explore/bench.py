@@ -32,8 +32,7 @@ def bench(
     *,
     reuse: bool = False,
     mirror: bool = False,
-    dram_latency: int | None = None,
-    dram_interval: int | None = None,
+    dram: Mapping[str, int] | None = None,
 ) -> dict[str, Any]:
     """Render each mesh once and collect its figures. All meshes are loaded before the first frame.
 
@@ -47,14 +46,13 @@ def bench(
         finished: Called after each mesh, in order.
         reuse: Use the cached result of an earlier run.
         mirror: Render the meshes as mirrors with one reflection.
-        dram_latency: Cycles from a read of DRAM to its first data; None: the default.
-        dram_interval: Cycles from a beat of DRAM to the next one; None: the default, 1.
+        dram: Fields of `colonnade.device.verilator.Stalls` about DRAM.
 
     Returns:
         The report that `colonnade bench --json` writes.
 
     Raises:
-        UserError: A DRAM latency for a configuration that reads no DRAM.
+        UserError: `dram` for a configuration that reads no DRAM.
     """
     scene = load_scene(project_root() / "scenes" / "object.toml")
     size = size or (scene.frame.width, scene.frame.height)
@@ -63,16 +61,15 @@ def bench(
         loaded = [replace(object_mesh(scene.with_mesh(name), corner_colours=True), name=name) for name in names]
     design, manifest = design_of(config, overrides, progress)
     check_size(size, manifest)
-    memory = {"dram_latency": dram_latency, "dram_interval": dram_interval}
-    given = [f"--{name.replace('_', '-')}" for name, cycles in memory.items() if cycles is not None]
-    if given and manifest.config["columnBvhMemory"]["cache"] is None:
-        raise UserError(f"this configuration reads no DRAM: {given[0]} needs columnBvhMemory.cache")
+    if dram and manifest.config["columnBvhMemory"]["cache"] is None:
+        option = next(iter(dram)).replace("_", "-")
+        raise UserError(f"this configuration reads no DRAM: --{option} needs columnBvhMemory.cache")
     jobs = []
     for name, mesh in zip(names, loaded, strict=True):
         own = scene.with_mesh(name)
         frame = frame_of(name, _as_mirror(own) if mirror else own, mesh, name)
         title = f"cycles of {name}{' as a mirror' * mirror}"
-        jobs.append(cycles_job(title, design, manifest, frame, size, reuse=reuse, **memory))
+        jobs.append(cycles_job(title, design, manifest, frame, size, reuse=reuse, dram=dram))
     results = run_in_order(
         jobs,
         parallel,

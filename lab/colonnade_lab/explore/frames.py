@@ -90,8 +90,7 @@ def cycles_job(
     size: tuple[int, int],
     *,
     reuse: bool = True,
-    dram_latency: int | None = None,
-    dram_interval: int | None = None,
+    dram: Mapping[str, int] | None = None,
 ) -> Job:
     """The job that renders a frame with the RTL and counts its cycles.
 
@@ -102,20 +101,11 @@ def cycles_job(
         frame: The frame.
         size: Width and height, pixels.
         reuse: Use the cached counters of the same Verilog and scene image.
-        dram_latency: Cycles from a read of DRAM to its first data, for designs with a cache; None: the default.
-        dram_interval: Cycles from a beat of DRAM to the next one; None: the default, 1.
+        dram: Fields of `colonnade.device.verilator.Stalls` about the DRAM of designs with a cache.
     """
-    identity = {"config": manifest.config, "frame": frame.identity, "size": size, "dramLatency": dram_latency}
-    if dram_interval is not None:
-        identity["dramInterval"] = dram_interval
-    arguments = {
-        "scene": frame.scene,
-        "mesh": frame.mesh,
-        "size": size,
-        "reuse": reuse,
-        "dram_latency": dram_latency,
-        "dram_interval": dram_interval,
-    }
+    memory = dict(dram or {})
+    identity = {"config": manifest.config, "frame": frame.identity, "size": size, "dram": memory}
+    arguments = {"scene": frame.scene, "mesh": frame.mesh, "size": size, "reuse": reuse, "dram": memory}
     return Job(KINDS["cycles"], title, identity, {**design, **arguments})
 
 

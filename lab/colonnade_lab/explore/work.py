@@ -83,16 +83,14 @@ def cycles(
     mesh: Mesh,
     size: Size,
     reuse: bool,
-    dram_latency: int | None,
-    dram_interval: int | None = None,
+    dram: Mapping[str, int],
 ) -> None:
     """Render a frame with the RTL and take its counters."""
     from colonnade_lab.evaluation.bench import mesh_result
     from colonnade_lab.evaluation.measure import measure_frame
 
     with _configuration(config) as path:
-        memory = {"dram_latency": dram_latency, "dram_interval": dram_interval}
-        report = measure_frame(str(path), overrides, scene, mesh, size, reuse=reuse, **memory)
+        report = measure_frame(str(path), overrides, scene, mesh, size, reuse=reuse, dram=dram)
     write_result(folder, mesh_result(report))
 
 

@@ -52,6 +52,12 @@ def test_records_are_own_reads_and_snoop_hits(rtl_report: MakeReport) -> None:
     )
 
 
+def test_bytes_of_dram_are_those_of_whole_beats(rtl_report: MakeReport) -> None:
+    report = rtl_report(0.5)
+    report["counters"]["dramReads"] = 25
+    assert throughput.figures(report | {"dram_line_bytes": 192})["per_ray"]["dram_bytes"] == 25 * 192 / 50
+
+
 def test_bounds_assume_full_utilisation_of_the_busiest(rtl_report: MakeReport) -> None:
     assert throughput.figures(rtl_report(0.5))["bounds"] == pytest.approx(
         {"perfect_memory": 0.625, "perfect_units": 1.0}

@@ -115,13 +115,12 @@ def test_mirrors_are_other_frames(simulators: Simulators) -> None:
     assert (scene.material.kind, scene.paths.bounces) == ("mirror", 1)
 
 
-def test_dram_of_another_latency_is_another_measurement(simulators: Simulators) -> None:
+def test_another_dram_is_another_measurement(simulators: Simulators) -> None:
     names = ("lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes")
     cache = json.dumps(dict(zip(names, (16, 4, 8, 32, 4, 8, 16), strict=True)) | {"parity": False})
-    for latency in (None, 50, 100, 50):
-        options = (f"columnBvhMemory.cache={cache}",)
-        bench("tiny", options, ("cube",), (16, 12), 1, reuse=True, dram_latency=latency)
-    assert [job.arguments["dram_latency"] for job in simulators.ran] == [None, 50, 100]
+    for dram in ({}, {"dram_latency": 50}, {"dram_banks": 8}, {"dram_latency": 50}):
+        bench("tiny", (f"columnBvhMemory.cache={cache}",), ("cube",), (16, 12), 1, reuse=True, dram=dram)
+    assert [job.arguments["dram"] for job in simulators.ran] == [{}, {"dram_latency": 50}, {"dram_banks": 8}]
 
 
 def test_a_study_shares_the_results(simulators: Simulators, tmp_path: Path) -> None:
@@ -149,7 +148,7 @@ def test_what_is_wrong_is_said_before_the_first_frame(simulators: Simulators) ->
     with pytest.raises(UserError, match=r"frame\.maxWidth"):
         bench("tiny", (), ("cube",), (9999, 12), 1)
     with pytest.raises(UserError, match=r"columnBvhMemory\.cache"):
-        measured("cube", dram_latency=50)
+        measured("cube", dram={"dram_latency": 50})
     simulators.reason = NOT_FOUND
     with pytest.raises(UserError, match=NOT_FOUND):
         measured("cube")

@@ -1,7 +1,7 @@
 // A model of DRAM behind the device's AXI4 read port, for designs with a cache (DRAM_BUS_BYTES).
 //
-// Reads take `latency` cycles and then deliver a beat per cycle, or every `interval` cycles, in the order of the reads. With
-// `randomPercent`, addresses and beats are refused or withheld in that share of the cycles, and reads of different ids
+// Reads take `latency` cycles, with `banks` also those of rows and refresh (dram_timing.hpp), and then deliver a beat per cycle,
+// or every `interval` cycles, in the order of the reads. With `randomPercent`, addresses and beats are refused or withheld in that share of the cycles, and reads of different ids
 // overtake each other. A read beyond the scene is answered with DECERR. Two failures end with the first frame: with
 // `errorsPer1024`, so many of 1024 beats are answered with SLVERR; with `silentAfter`, reads are answered no more after so many.
 #pragma once
@@ -12,8 +12,10 @@
 #include <stdexcept>
 #include <vector>
 
+#include "dram_timing.hpp"
+
 struct DramOptions {
-    unsigned latency = 100, randomPercent = 0, errorsPer1024 = 0, silentAfter = 0, seed = 1, interval = 1;
+    unsigned latency = 100, randomPercent = 0, errorsPer1024 = 0, silentAfter = 0, seed = 1, interval = 1, banks = 0;
 };
 
 #ifdef DRAM_BUS_BYTES
@@ -23,7 +25,8 @@ public:
     Dram(Top& top, const DramOptions& options) : Dram(top, options, own_) {}
 
     /// A DRAM whose content is `memory`, which others may change.
-    Dram(Top& top, const DramOptions& options, Bytes& memory) : top_(top), options_(options), random_(options.seed), memory_(memory) {}
+    Dram(Top& top, const DramOptions& options, Bytes& memory)
+        : top_(top), options_(options), timing_(dramTiming(options.banks, options.latency)), random_(options.seed), memory_(memory) {}
 
     /// Writes a record, as the host would.
     void store(std::uint64_t address, const void* record, std::size_t bytes) {
@@ -54,6 +57,7 @@ public:
         ++now_;
         if (top_.io_memory_r_valid && top_.io_memory_r_ready) {
             offers_ = false;
+            ++beats_;
             next_ = now_ + options_.interval - 1;
             if (++reads_[chosen_].sent == reads_[chosen_].beats) {
                 reads_.erase(reads_.begin() + static_cast<std::ptrdiff_t>(chosen_));
@@ -64,8 +68,11 @@ public:
         const std::uint64_t address = top_.io_memory_ar_bits_addr;
         const unsigned length = (top_.io_memory_ar_bits_len + 1u) << top_.io_memory_ar_bits_size;
         if (address / 4096 != (address + length - 1) / 4096) throw std::runtime_error("a burst crosses a page of 4 KB");
-        reads_.push_back({address, now_ + options_.latency, top_.io_memory_ar_bits_len + 1u, 0, static_cast<unsigned>(top_.io_memory_ar_bits_id)});
+        reads_.push_back({address, timing_->due(now_, address, length), top_.io_memory_ar_bits_len + 1u, 0, static_cast<unsigned>(top_.io_memory_ar_bits_id)});
     }
+
+    /// Beats that the port has moved.
+    std::uint64_t beats() const { return beats_; }
 
     /// From now on no read fails.
     void stopFailing() { options_.errorsPer1024 = options_.silentAfter = 0; }
@@ -101,12 +108,13 @@ private:
 
     Top& top_;
     DramOptions options_;
+    std::unique_ptr<DramTiming> timing_;
     std::mt19937 random_;
     Bytes own_;
     Bytes& memory_;
     std::deque<Read> reads_;
     std::size_t chosen_ = 0;
     bool offers_ = false, fails_ = false;
-    std::uint64_t now_ = 0, answered_ = 0, next_ = 0;
+    std::uint64_t now_ = 0, answered_ = 0, beats_ = 0, next_ = 0;
 };
 #endif

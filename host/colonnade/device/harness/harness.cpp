@@ -6,12 +6,12 @@
 //   write ADDRESS VALUE      writes one register word
 //   frame FILE WIDTH HEIGHT START WATCHDOG  starts a frame by a write to register START, waits for its end, and writes
 //                            its pixels (struct PixelBytes, row by row); WATCHDOG is in cycles, 0 for none;
-//                            prints "simulated CYCLES SECONDS"
+//                            prints "simulated CYCLES SECONDS", and for designs with a cache "value dram.beats N", the beats of its DRAM port
 //   read NAME ADDRESS WORDS  prints "value NAME VALUE"
 //
 // Options: --stall PERCENT of cycles in which the pixel sink is not ready; --seed N; for designs with memory stalls:
 // --memory PERCENT of cycles in which each bank is stalled, --burst N, the longest stall in cycles;
-// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-interval N, --dram-random PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
+// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-interval N, --dram-banks N, --dram-random PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
 // --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
 // With WAVEFORM defined, --waveform FILE writes the signals of the frames as VCD; the time unit is a cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
@@ -198,6 +198,9 @@ public:
         write(startAddress, 1);
         const auto begun = std::chrono::steady_clock::now();
         const std::uint64_t first = cycles_;
+#ifdef DRAM_BUS_BYTES
+        const std::uint64_t firstBeat = dram_.beats();
+#endif
         auto lastReport = begun;
         quiet_ = 0;
         mayChangeRegisters_ = false;
@@ -225,6 +228,9 @@ public:
         const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
         std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(pixels_.data()), static_cast<std::streamsize>(pixels_.size() * sizeof(PixelBytes)));
         std::cout << "simulated " << cycles_ - first << ' ' << seconds.count() << '\n';
+#ifdef DRAM_BUS_BYTES
+        std::cout << "value dram.beats " << dram_.beats() - firstBeat << '\n';
+#endif
     }
 
 private:
@@ -355,6 +361,7 @@ int main(int argc, char** argv) try {
                                                        {"--check", &options.checkInterval},
                                                        {"--dram", &options.dram.latency},
                                                        {"--dram-interval", &options.dram.interval},
+                                                       {"--dram-banks", &options.dram.banks},
                                                        {"--dram-random", &options.dram.randomPercent},
                                                        {"--dram-errors", &options.dram.errorsPer1024},
                                                        {"--dram-silent", &options.dram.silentAfter}};
