@@ -109,6 +109,16 @@ def mesh_option(command: Command) -> Command:
     )(command)
 
 
+def simplify_option(command: Command) -> Command:
+    """Add ``--simplify``, the number of triangles of a large mesh."""
+    return click.option(
+        "--simplify",
+        type=click.IntRange(min=4),
+        metavar="N",
+        help="Simplify the scene's mesh to N triangles if it has more, in place of the scene's mesh.simplify.",
+    )(command)
+
+
 def strict_option(command: Command) -> Command:
     """Add ``--strict``, which makes a note on a mesh or a configuration an error."""
 

@@ -17,6 +17,7 @@ from colonnade.cli.options import (
     json_option,
     mesh_option,
     require_outputs,
+    simplify_option,
     size_option,
     strict_option,
 )
@@ -27,6 +28,7 @@ from colonnade.maps.encoders import Encoder
 @click.argument("scene", type=SCENE)
 @configuration_options
 @mesh_option
+@simplify_option
 @background_option
 @encoder_option
 @click.option(
@@ -58,6 +60,7 @@ def pack(
     config: str,
     overrides: tuple[str, ...],
     mesh: str | None,
+    simplify: int | None,
     background: Path | None,
     encoder: Encoder,
     output: Path,
@@ -100,6 +103,8 @@ def pack(
     described = load_scene(scene, background)
     if mesh is not None:
         described = described.with_mesh(mesh)
+    if simplify is not None:
+        described = described.with_simplified_mesh(simplify)
     if maps_image is not None and described.background.room is None:
         raise UserError(
             f"--maps-image holds the maps of a room, and {scene} has none: give background.room or --background"

@@ -22,6 +22,7 @@ from colonnade.cli.options import (
     mesh_option,
     require_outputs,
     require_suffix,
+    simplify_option,
     size_option,
     strict_option,
 )
@@ -69,6 +70,7 @@ def _is_scene(word: str) -> bool:
 )
 @size_option("Frame size in pixels, e.g. 640x480.  [default: that of the scene]")
 @mesh_option
+@simplify_option
 @background_option
 @partial(encoder_option, default=None, note="  [default: offline; with --sequence live]")
 @click.option("--relit", is_flag=True, help="Show the room shaded by the scene's lights instead of its photo.")
@@ -135,6 +137,7 @@ def render(
     backend: Backend,
     size: str | None,
     mesh: str | None,
+    simplify: int | None,
     background: Path | None,
     encoder: Encoder | None,
     relit: bool,
@@ -204,6 +207,7 @@ def render(
         frames=frames or 1,
         samples=samples,
         mesh=mesh,
+        simplify=simplify,
         background=background,
         sequence=sequence,
         keyframes=keyframes,

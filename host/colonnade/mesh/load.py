@@ -34,29 +34,56 @@ from colonnade.mesh.materials.palette import MAX_MATERIALS, coloured_materials, 
 from colonnade.mesh.materials.relief import Relief
 from colonnade.mesh.materials.swatches import with_swatches
 from colonnade.mesh.materials.texture import Texture
+from colonnade.mesh.simplify import simplified
 
 TEAPOT_LEVEL = 10
 TEAPOT_LIMIT = 200
+SUBDIVISION_LIMIT = 5
 
 
-def load_mesh(name_or_path: str | Path, crease: float | None = None, corner_colours: bool = False) -> Mesh:
+def load_mesh(
+    name_or_path: str | Path, crease: float | None = None, corner_colours: bool = False, simplify: int | None = None
+) -> Mesh:
     """Load the mesh of a name or a file, and report its notes (`colonnade.common.notes`).
 
     Names are ``teapot`` and ``teapot:LEVEL``, the solids (``sphere:TRIANGLES``, ``cube`` …), the well-known meshes
-    (``bunny`` …), and the files without their suffix in the folders of the environment variable COLONNADE_MESHES.
+    (``bunny`` …), and the files without their suffix in the folders of the environment variable COLONNADE_MESHES. With
+    ``:N`` each triangle of a file of these is cut in four, N times.
 
     Args:
         name_or_path: The name or file.
         crease: Angle up to which edges are smooth, degrees, in place of the file's normals. None: the file's normals,
             without them the default angle.
         corner_colours: Keep the colours of the corners. Otherwise a face has one colour, the mean of its corners.
+        simplify: Simplify a mesh of more triangles to about so many; a line tells both numbers. None: all of them.
 
     Raises:
         UserError: The mesh does not exist or cannot be rendered.
     """
     mesh = _loaded(name_or_path, crease, corner_colours)
     notes.report(mesh.notes)
-    return mesh
+    return mesh if simplify is None or len(mesh.faces) <= simplify else _simplified(mesh, simplify)
+
+
+def _simplified(mesh: Mesh, triangles: int) -> Mesh:
+    parts = simplified(mesh, triangles)
+    result = clean_mesh(
+        parts.vertices,
+        parts.faces,
+        name=mesh.name,
+        materials=mesh.materials,
+        face_materials=mesh.face_materials[parts.owners],
+        normals=parts.corner_normals,
+        colours=parts.corner_colours,
+        textures=mesh.textures,
+        uvs=parts.corner_uvs,
+        sources=(mesh.source_faces[parts.owners].astype(np.int64), mesh.source_count),
+    )
+    line = f"mesh {mesh.name}: {len(mesh.faces):,} triangles are simplified to {len(result.faces):,}"
+    if parts.seams:
+        line += f", of which {parts.seams:,} across seams of textures have the coordinates of one side"
+    notes.tell(line)
+    return replace(result, notes=mesh.notes)
 
 
 def _loaded(name_or_path: str | Path, crease: float | None, corner_colours: bool) -> Mesh:
@@ -65,8 +92,10 @@ def _loaded(name_or_path: str | Path, crease: float | None, corner_colours: bool
         return clean_mesh(*built, name=text, crease=crease)
     looks_like_path = os.sep in text or Path(text).suffix.lower() in SUFFIXES
     if isinstance(name_or_path, str) and not looks_like_path and not is_file(Path(text)):
-        found = catalog.find(text)
-        mesh = _read(found.path, found.subdivisions, crease, corner_colours)
+        base, colon, number = text.partition(":")
+        found = catalog.find(base)
+        cuts = _size(text, number, 0, 0, SUBDIVISION_LIMIT, bool(colon))
+        mesh = _read(found.path, found.subdivisions + cuts, crease, corner_colours)
         return replace(mesh, name=text)
     return _read(Path(text), 0, crease, corner_colours)
 

@@ -54,6 +54,8 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         scene = scene.with_mesh(request.mesh)
     elif request.mesh is not None:
         scene.require_one_object("a mesh replaces that of a single object")
+    if request.simplify is not None:
+        scene = scene.with_simplified_mesh(request.simplify)
     scene, note = with_requested_samples(scene, request)
     scene = exposed(scene)
     if scene.frame.denoise and request.backend == "reference":

@@ -32,6 +32,7 @@ class RenderRequest:
         frames: Number of frames, from 1. The first shows the scene at rest. Of a sequence its first ones.
         samples: Samples of a pixel, from 1; None: those of the scene, or a default.
         mesh: A mesh that replaces the scene's, or its name or file.
+        simplify: Number of triangles to which a named mesh of more is simplified; None: that of the scene.
         background: Folder of a room that replaces the scene's background.
         sequence: Views of a room, one for each frame, which replace the scene's background and motion.
         keyframes: Of a sequence, every so many frames have maps; None: as its file says.
@@ -54,6 +55,7 @@ class RenderRequest:
     frames: int = 1
     samples: int | None = None
     mesh: str | Mesh | None = None
+    simplify: int | None = None
     background: Path | None = None
     sequence: RoomSequence | None = None
     keyframes: int | None = None

@@ -37,9 +37,10 @@ def joined_mesh(scene: Scene, environment: Environment | None, corner_colours: b
     meshes, poses = [], []
     taken: list[tuple[Floats, float]] = []
     for number, described in enumerate(scene.objects, 1):
-        key = f"{described.mesh.source} {described.mesh.crease}"
+        own = described.mesh
+        key = f"{own.source} {own.crease} {own.simplify}"
         if key not in loaded:
-            loaded[key] = load_mesh(described.mesh.source, described.mesh.crease, corner_colours)
+            loaded[key] = load_mesh(own.source, own.crease, corner_colours, own.simplify)
             report_replaced(loaded[key], described.material)
         mesh = replace(loaded[key], materials=with_overrides(loaded[key].materials, described.material))
         poses.append(_pose(described, mesh, environment, f"object {number}", taken))

@@ -180,6 +180,22 @@ def test_mesh_too_large_names_the_setting(object_scene: Path, tmp_path: Path) ->
     assert "64" in line
 
 
+def test_a_mesh_is_simplified_by_the_option_or_the_scene(object_scene: Path, tmp_path: Path) -> None:
+    scene, report = tmp_path / "scene.toml", tmp_path / "r.json"
+    scene.write_text(object_scene.read_text().replace('name = "teapot"', 'name = "teapot"\nsimplify = 500'))
+    packed = ("--config", "tiny", "--strict", "--output", tmp_path / "packed", "--json", report)
+    for options, after in (((), 500), (("--simplify", 200), 200), (("--mesh", "torus"), 500)):
+        result = run("pack", scene, *packed, *options)
+        name, before = ("torus", "2,304") if "torus" in options else ("teapot", "6,320")
+        assert result.exit_code == 0, result.output
+        count = json.loads(report.read_text())["mesh"]["triangles"]
+        assert 0.9 * after < count <= after
+        assert f"mesh {name}: {before} triangles are simplified to {count}\n" in result.stderr
+    result = render_mesh(object_scene, "torus", tmp_path, "--simplify", 100)
+    assert result.exit_code == 0 and "2,304 triangles are simplified to 100" in result.stderr
+    assert "--simplify" in refused(run("pack", object_scene.parent / "objects.toml", *packed, "--simplify", 100))
+
+
 @pytest.mark.parametrize(
     ("override", "words"),
     [

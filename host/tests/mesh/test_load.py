@@ -50,6 +50,7 @@ def test_normals_are_weighted_by_angle() -> None:
         ("sphere:2", 320),
         ("sphere:1000", 980),
         ("sphere", 5120),
+        ("rock:1000", 980),
     ],
 )
 def test_solids(name: str, triangles: int) -> None:
@@ -61,6 +62,16 @@ def test_solids(name: str, triangles: int) -> None:
         volume = np.einsum("mx,mx->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
         edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         assert volume > 0 and (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+
+
+def test_a_rock_is_rough() -> None:
+    """Faces lie askew to the sphere's, those beside each other to different sides."""
+    first, second = load_mesh("rock:20000"), load_mesh("rock:20000")
+    np.testing.assert_array_equal(first.vertices, second.vertices)
+    corners = first.vertices[first.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    assert np.mean((normals[1:] * normals[:-1]).sum(axis=1)) < 0.9
 
 
 def test_midpoints_keep_the_surface() -> None:
@@ -119,6 +130,7 @@ def test_a_missing_mesh_is_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         ("fandisk", "COLONNADE_MESHES"),
         ("sphere:many", "must be from 0"),
         ("teapot:0", "must be from 1"),
+        ("nothing:2", "no mesh nothing: name a file"),
     ):
         with pytest.raises(UserError, match=message):
             load_mesh(name)
@@ -136,6 +148,10 @@ def test_names_are_found_in_the_users_folders(tmp_path: Path, monkeypatch: pytes
     assert len(load_mesh("mine").faces) == 1
     duck = load_mesh("duck")
     assert (len(duck.faces), duck.name) == (16, "duck")
+    cut = load_mesh("mine:2")
+    assert (len(cut.faces), cut.name) == (16, "mine:2")
+    with pytest.raises(UserError, match=r"mesh mine:6: the number after the colon must be from 0 to 5$"):
+        load_mesh("mine:6")
 
 
 def test_the_extents_outline_spans_the_box() -> None:

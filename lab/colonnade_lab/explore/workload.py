@@ -39,7 +39,7 @@ def frames_of(file: StudyFile) -> list[Frame]:
         for source in workload.meshes or (None,):
             try:
                 own = scene if source is None else scene.with_mesh(source)
-                key = name if own.objects else f"{own.mesh_source} {own.mesh.crease}"
+                key = name if own.objects else f"{own.mesh_source} {own.mesh.crease} {own.mesh.simplify}"
                 if key not in meshes:
                     meshes[key] = object_mesh(own, scene_room(own) if own.objects else None, corner_colours=True)
             except UserError as error:

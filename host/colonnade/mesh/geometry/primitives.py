@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from random import Random
 
 import numpy as np
 import numpy.typing as npt
@@ -57,6 +58,26 @@ def sphere(size: int = 4) -> Geometry:
     face_triangles = np.concatenate([upward, downward])
     faces = (face_triangles[None] + (np.arange(20) * len(i))[:, None, None]).reshape(-1, 3)
     return vertices, faces.astype(np.int32)
+
+
+def rock(size: int = 100_000) -> Geometry:
+    """A sphere of ``size`` triangles that is displaced along its radii: by waves of all scales, and by a hash of each
+    vertex's position about half as long as an edge.
+    """
+    vertices, faces = sphere(size)
+    height, random = np.zeros(len(vertices)), Random(1)
+    for octave in range(8):
+        x, y, z, phase = (4.0 * random.random() - 2.0 for _ in range(4))
+        wave = fixed_order.sin(2.0**octave * (vertices[:, 0] * x + vertices[:, 1] * y + vertices[:, 2] * z) + phase)
+        height += 0.2 * 0.6**octave * wave
+    words = (vertices + 0.0).view(np.uint64) * np.array(
+        [0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64
+    )
+    hashed = words[:, 0] ^ (words[:, 1] >> np.uint64(7)) ^ (words[:, 2] >> np.uint64(13))
+    hashed = (hashed ^ (hashed >> np.uint64(32))) * np.uint64(0xD6E8FEB86659FD93)
+    height += (hashed >> np.uint64(11)) * 2.0**-53 * 2.0 / math.sqrt(len(faces) / 20)
+    radii = 1.0 + height
+    return vertices * (radii / radii.max())[:, None], faces
 
 
 def cube() -> Geometry:
@@ -137,6 +158,7 @@ def square() -> Geometry:
 #: Solids with a size, ``name:SIZE``: function, default, smallest and largest size.
 SIZED: dict[str, tuple[Callable[[int], Geometry], int, int, int]] = {
     "sphere": (sphere, 4, 0, 4_000_000),
+    "rock": (rock, 100_000, 11, 4_000_000),
     "torus": (torus, 48, 3, 2000),
     "cylinder": (cylinder, 64, 3, 1_000_000),
     "cone": (cone, 64, 3, 1_000_000),

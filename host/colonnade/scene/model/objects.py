@@ -12,7 +12,7 @@ from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
 from colonnade.mesh.materials.materials import Kind
-from colonnade.scene.model.values import STRICT, File, Float, LinearColour, RoomPixel, Text, WorldVector
+from colonnade.scene.model.values import STRICT, File, Float, LinearColour, RoomPixel, Text, Triangles, WorldVector
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -23,11 +23,13 @@ class MeshSource:
         name, path: One of them.
         crease: Angle up to which edges are smooth, degrees, in place of the file's normals. None: the file's normals,
             without them 60 degrees.
+        simplify: Number of triangles to which a mesh of more is simplified. None: all are kept.
     """
 
     name: Text | None = None
     path: File | None = None
     crease: Annotated[Float, Interval(ge=0.0, le=180.0)] | None = None
+    simplify: Triangles | None = None
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Self:

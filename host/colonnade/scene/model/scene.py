@@ -81,7 +81,16 @@ class Scene:
             UserError: The scene has several objects.
         """
         self.require_one_object("a mesh replaces that of a single object")
-        return replace(self, mesh=MeshSource(name=name_or_path, crease=self.mesh.crease))
+        return replace(self, mesh=replace(self.mesh, name=name_or_path, path=None))
+
+    def with_simplified_mesh(self, triangles: int) -> Scene:
+        """The scene with its mesh simplified to so many triangles.
+
+        Raises:
+            UserError: The scene has several objects.
+        """
+        self.require_one_object("--simplify is of a single object, simplify in the mesh of each [[object]] of its own")
+        return replace(self, mesh=replace(self.mesh, simplify=triangles))
 
     def with_environment(self, folder: Path) -> Scene:
         """The scene in the room of a folder."""

@@ -33,6 +33,7 @@ Fraction = Annotated[Float, Interval(ge=0.0, le=1.0)]
 Diameter = Annotated[Float, Interval(ge=0.0, le=1e6)]
 Intensity = Annotated[Float, Interval(ge=0.0, le=15.0)]
 MapPixel = Annotated[Float, Interval(ge=0.0, le=MAX_EDGE)]
+Triangles = Annotated[int, Strict(), Interval(ge=4)]
 Text = Annotated[str, Field(min_length=1)]
 File = Annotated[Path, BeforeValidator(_require_text)]
 
