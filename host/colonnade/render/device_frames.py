@@ -23,7 +23,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.render.samples import within_budget
 from colonnade.scene.model import Scene
-from colonnade.scene_image.inspect import coarse_line
+from colonnade.scene_image.inspect import coarse_line, dense_line
 
 
 def device_frames(
@@ -98,6 +98,8 @@ def rendered(
     for frame, (passes, seconds, rate) in zip(frames, found, strict=True):
         require_no_errors(passes.frame.errors)
         maps, header = frame.prepared.maps, frame.prepared.image.header
+        if (line := dense_line(header, int(passes.frame.is_object.sum()))) is not None:
+            notes.tell(line)
         report = replace(
             frame_report(request.backend, frame.prepared.manifest, header, passes.frame),
             seconds=seconds,

@@ -8,9 +8,12 @@ from typing import Any
 
 from colonnade.common.terminal_text import one_line
 from colonnade.design.manifest import Manifest
+from colonnade.scene_image.dram_image import dram_lines
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.header import ImageHeader
 
+#: Triangles of the largest mesh that caches mostly hold: fewer would not be faster.
+_LARGE = 100_000
 #: Steps of the grid along an object's longest edge from which its rounding is fine.
 FINE_UNITS = 1024
 
@@ -89,6 +92,16 @@ def coarse_line(header: ImageHeader) -> str | None:
     )
 
 
+def dense_line(header: ImageHeader, pixels: int) -> str | None:
+    """The line on a large mesh of more than four triangles for each of the ``pixels`` that show it; None for others."""
+    if header.triangles <= max(_LARGE, 4 * pixels) or pixels == 0:
+        return None
+    return (
+        f"mesh {one_line(header.mesh)} has more than four triangles for each pixel that shows it:"
+        " --simplify gives fewer, which are traced faster"
+    )
+
+
 def _step(header: ImageHeader) -> str:
     """The step of the grid: in a room, whose world is in metres, in millimetres."""
     return f"{1e3 / header.frame.scale:.3g} mm" if header.room is not None else f"{1 / header.frame.scale:.3g} units"
@@ -111,10 +124,13 @@ def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[
         f"box         {header.bounds_low} to {header.bounds_high} units, {header.frame.scale:.6g} units per mesh unit"
     )
     used = f"{header.record_count:,} records of {header.record_bits} bits"
+    size = f"{header.record_count * header.record_bits // 8:,} bytes per column"
     if manifest is not None:
-        depth = int(manifest.memories["columnBvh"]["depth"])
-        used += f", {header.record_count / depth:.1%} of {depth:,}"
-    lines.append(f"memory      {used} ({header.record_count * header.record_bits // 8:,} bytes per column)")
+        shape = manifest.memories["columnBvh"]
+        used += f", {header.record_count / int(shape['depth']):.1%} of {int(shape['depth']):,}"
+        if "line" in shape:
+            size = f"{dram_lines(header.record_count, manifest) * shape['line']['pitch']:,} bytes of DRAM"
+    lines.append(f"memory      {used} ({size})")
     lines += [f"  {name:<10}{count:>9,} records from {first:,}" for name, first, count in sections(header) if count]
     return (
         lines

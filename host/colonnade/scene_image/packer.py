@@ -168,7 +168,11 @@ def _check_fits(name: str, manifest: Manifest, tree: TreeStatistics, record_coun
     ids = 1 << manifest.layouts["triangles"].fields["firstTriangle"].width
     # Ids have one bit more than addresses, and all ones is no id
     enough = 1 << (max(record_count, triangles // 2 + 1) - 1).bit_length()
-    advice = f"raise columnBvhMemory.depth to {enough}" if enough <= MAX_MEMORY_DEPTH else "use a coarser mesh"
+    advice = "simplify the mesh (--simplify)"
+    if manifest.memories["columnBvh"].get("line") is None:
+        advice += ", or take a preset whose scene lies in DRAM, such as edge"
+    if enough <= MAX_MEMORY_DEPTH:
+        advice = f"raise columnBvhMemory.depth to {enough}, {advice}"
     if record_count > depth:
         raise UserError(f"mesh {name} needs {record_count:,} records, columnBvhMemory.depth is {depth:,}: {advice}")
     stack_depth = int(manifest.config["columnBvhMemory"]["stackDepth"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,12 +15,14 @@ from trees import LEAF, NODE
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
+from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
+from colonnade.design.toolchain import project_root
 from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene_image.file import SceneImage
-from colonnade.scene_image.inspect import describe, report_lines
-from colonnade.scene_image.packer import QuantisedMesh, memory_use, pack, quantise
+from colonnade.scene_image.inspect import dense_line, describe, report_lines
+from colonnade.scene_image.packer import MAX_MEMORY_DEPTH, QuantisedMesh, memory_use, pack, quantise
 
 MakeManifest = Callable[..., Manifest]
 
@@ -189,9 +192,24 @@ def test_one_triangle_and_a_flat_square(make_manifest: MakeManifest) -> None:
 def test_too_many_records_are_refused(make_manifest: MakeManifest) -> None:
     with pytest.raises(
         UserError,
-        match=r"teapot needs 7,\d\d\d records, columnBvhMemory.depth is 4,096: raise columnBvhMemory.depth to 8192$",
+        match=r"teapot needs 7,\d\d\d records, columnBvhMemory.depth is 4,096: raise columnBvhMemory.depth to 8192,"
+        r" simplify the mesh \(--simplify\), or take a preset whose scene lies in DRAM, such as edge$",
     ):
         pack(load_mesh("teapot"), make_manifest(depth=4096))
+
+
+@pytest.mark.parametrize("triangles", [125_000, pytest.param(1_000_000, marks=pytest.mark.matrix)])
+def test_a_preset_with_its_scene_in_dram_takes_a_large_mesh(triangles: int) -> None:
+    manifest = manifest_for("edge").manifest
+    header = pack(load_mesh(f"sphere:{triangles}"), manifest).header
+    assert header.record_count > 1 << 17
+    (memory,) = (line for line in report_lines(header, manifest) if line.startswith("memory"))
+    assert memory.endswith(f"({-(-header.record_count // 4) * 256:,} bytes of DRAM)")
+
+
+def test_presets_with_their_scenes_in_dram_have_addresses_of_22_bits() -> None:
+    memories = [json.loads(file.read_text())["columnBvhMemory"] for file in (project_root() / "configs").glob("*.json")]
+    assert {memory["depth"] for memory in memories if memory["cache"]} == {MAX_MEMORY_DEPTH}
 
 
 def test_too_deep_a_tree_is_refused(make_manifest: MakeManifest) -> None:
@@ -243,3 +261,11 @@ def test_the_other_side_of_a_face_is_the_same_face(manifest: Manifest) -> None:
     mesh = two_sided(load_mesh("octahedron"))
     assert (len(mesh.faces), mesh.source_count) == (8, 16)
     assert pack(mesh, manifest).header.triangles == 8
+
+
+def test_a_large_mesh_on_few_pixels_gets_a_line(manifest: Manifest) -> None:
+    header = replace(pack(load_mesh("cube"), manifest).header, triangles=400_001)
+    line = dense_line(header, 100_000)
+    assert line is not None and line.startswith("mesh cube has more than four triangles for each pixel")
+    assert dense_line(header, 100_001) is None and dense_line(header, 0) is None
+    assert dense_line(replace(header, triangles=100_000), 1) is None
