@@ -129,6 +129,14 @@ def _samples() -> Entry:
     return Entry("samples", "small", commands)
 
 
+def _large() -> Entry:
+    """Meshes of a million triangles, which no cache holds, on DRAM of one latency and on DRAM with rows."""
+    meshes = ("--mesh", "bunny:2", "--mesh", "rock:1000000", "--no-mirror", "--size", "320x240")
+    command = ("colonnade", "bench", "--config", "edge", "--reuse", *meshes)
+    banks = ("--dram-banks", "8", "--json", REPORT)
+    return Entry("bench-large", "edge", {"latency": (*command, "--json", REPORT), "banks": (*command, *banks)})
+
+
 def _paper_unit() -> Entry:
     """The paper's unit, which traces and shades by itself, with the formats and functions of `edge`."""
     alone = ("triangleRows=1", "triangleLanes=1", "marches=1", "pathContexts=16", "rayInterval=32", "shadeInterval=128")
@@ -212,6 +220,7 @@ def catalog() -> dict[str, Entry]:
     """All entries by name. Those that the pages need most come first."""
     entries = (
         _bench("edge"),
+        _large(),
         _area("edge", "ASAP7"),
         _bench("diffuse"),
         _area("diffuse", "ASAP7"),
