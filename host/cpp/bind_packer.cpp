@@ -1,14 +1,16 @@
 /// The packer (cpp/packer) and the operations on meshes (cpp/mesh) for Python.
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/vector.h>
 
 #include <cstring>
 #include <memory>
 #include <optional>
 
 #include "binding.hpp"
+#include "mesh/atlas.hpp"
 #include "mesh/cleaning.hpp"
-#include "mesh/texture.hpp"
+#include "mesh/roughness.hpp"
 #include "packer/records.hpp"
 #include "packer/surface_offset.hpp"
 
@@ -150,6 +152,38 @@ template <class Pixel> Pixels<double> sampled(const nb::ndarray<const Pixel, nb:
     return result;
 }
 
+using Positions = nb::ndarray<const double, nb::shape<-1, 3, 2>, nb::c_contig, nb::device::cpu>;
+using Texture = std::tuple<nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>, int, int, bool>;
+
+mesh::Picture<std::uint8_t> pictureOf(const Texture& texture) {
+    const auto& [pixels, wrapU, wrapV, isNearest] = texture;
+    return {pixels.data(), static_cast<std::int64_t>(pixels.shape(0)), static_cast<std::int64_t>(pixels.shape(1)), 3, static_cast<mesh::Wrap>(wrapU), static_cast<mesh::Wrap>(wrapV), isNearest};
+}
+
+nb::tuple metalOf(const Texture& map, const Positions& uvs, double metallic, double roughness) {
+    bool* isMetal;
+    double *found, factors[] = {metallic, roughness};
+    nb::tuple result = nb::make_tuple(makeArray({uvs.shape(0)}, isMetal), makeArray({uvs.shape(0)}, found));
+    const mesh::Picture<std::uint8_t> picture = pictureOf(map);
+    for (std::size_t i = 0; i < uvs.shape(0); ++i) {
+        const mesh::FaceMetal metal = mesh::metalOf(picture, uvs.data() + 6 * i, factors);
+        isMetal[i] = metal.isMetal;
+        found[i] = metal.roughness;
+    }
+    return result;
+}
+
+nb::object atlas(const Positions& uvs, const Column<std::int32_t>& textures, const Rows<double>& factors, const std::vector<Texture>& pictures, const Column<double>& linear, std::int64_t edge) {
+    std::vector<mesh::Picture<std::uint8_t>> own;
+    for (const Texture& each : pictures) own.push_back(pictureOf(each));
+    std::vector<mesh::Paint> paints;
+    for (std::size_t i = 0; i < textures.shape(0); ++i) paints.push_back({textures.data()[i], rowsOf<mesh::Vector>(factors)[i]});
+    const auto made = released([&] { return mesh::AtlasMaker(own, linear.data(), edge).make(vectorOf<mesh::Triangle>(uvs), paints); });
+    if (!made) return nb::none();
+    const auto side = static_cast<std::size_t>(edge);
+    return nb::make_tuple(arrayOf<double>(made->colours, {side, side, 3}), arrayOf<double>(made->uvs, {made->uvs.size(), 3, 2}), made->scale);
+}
+
 } // namespace
 
 void bind_packer(nb::module_& module) {
@@ -171,4 +205,8 @@ void bind_packer(nb::module_& module) {
     module.def("clean", &clean, "vertices"_a, "faces"_a, "normals"_a.none(), "least_cosine"_a, "source_faces"_a);
     module.def("sampled", &sampled<std::uint8_t>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
     module.def("sampled", &sampled<float>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
+    module.def("atlas", &atlas, "uvs"_a, "textures"_a, "factors"_a, "pictures"_a, "linear"_a, "edge"_a,
+               "Colours, texture coordinates and scale of an atlas; None for more paints than tiles. `textures` and `factors` are those of each face, -1 for none.");
+    module.def("metal_of", &metalOf, "map"_a, "uvs"_a, "metallic"_a, "roughness"_a);
+    module.def("merged_values", &mesh::mergedValues, "values"_a, "weights"_a, "kinds"_a, "count"_a);
 }

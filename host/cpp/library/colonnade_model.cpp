@@ -4,10 +4,14 @@
 #include <memory>
 #include <sstream>
 
+#include "live/vector_map.hpp"
+#include "mesh/atlas.hpp"
 #include "mesh/cleaning.hpp"
+#include "mesh/roughness.hpp"
 #include "model/frame.hpp"
 #include "packer/records.hpp"
 #include "packer/surface_offset.hpp"
+#include "srgb.hpp"
 
 namespace {
 
@@ -15,6 +19,8 @@ using namespace colonnade;
 
 /// Up to this angle, 60 degrees, edges are smooth (host/colonnade/mesh/geometry/cleaning.py).
 constexpr double leastCosine = 0.5000000000000001 - 1e-9;
+/// Equal frames that the live encoder takes for a still (host/colonnade/maps/live.py).
+constexpr int stillRounds = 3;
 
 struct Register {
     std::string name;
@@ -37,9 +43,11 @@ struct Library {
     std::vector<Register> registers;
     std::vector<std::uint32_t> words;
     Registers limits;
-    std::map<std::string, std::int64_t> mapSizes;
-    std::map<std::string, Layout> mapLayouts;
+    std::map<std::string, std::int64_t> mapSizes, textureSizes;
+    std::map<std::string, Layout> mapLayouts, textureLayouts;
     std::unique_ptr<AttributeImage> maps;
+    std::unique_ptr<TextureImage> texture;
+    std::map<std::string, std::vector<std::uint8_t>> textureWords;
     std::unique_ptr<Device> device;
     std::unique_ptr<Packed> packed;
     std::vector<std::uint8_t> records;
@@ -61,14 +69,14 @@ const char* refuse(const std::string& error) {
 const char* readDesign(std::istringstream& design) {
     std::string kind, record, name;
     while (design >> kind) {
-        if (kind == "number" || kind == "size") {
+        if (kind == "number" || kind == "size" || kind == "textureSize") {
             std::int64_t value;
             design >> name >> value;
-            (kind == "number" ? library->numbers : library->mapSizes)[name] = value;
-        } else if (kind == "layout" || kind == "map") {
+            (kind == "number" ? library->numbers : kind == "size" ? library->mapSizes : library->textureSizes)[name] = value;
+        } else if (kind == "layout" || kind == "map" || kind == "textureMap") {
             Field field;
             design >> record >> name >> field.offset >> field.width >> field.isSigned;
-            (kind == "layout" ? library->format.layouts : library->mapLayouts)[record][name] = field;
+            (kind == "layout" ? library->format.layouts : kind == "map" ? library->mapLayouts : library->textureLayouts)[record][name] = field;
         } else if (kind == "register") {
             Register each;
             std::int64_t limit;
@@ -81,11 +89,68 @@ const char* readDesign(std::istringstream& design) {
     return nullptr;
 }
 
-std::array<mesh::Row<std::int64_t>, 3> colourCodes(const double* colours) {
+mesh::Picture<std::uint8_t> pictureOf(const colonnade_texture& texture) {
+    return {texture.pixels, texture.height, texture.width, 3, static_cast<mesh::Wrap>(texture.wrap_u), static_cast<mesh::Wrap>(texture.wrap_v), texture.is_nearest != 0};
+}
+
+/// Three corners of a face, backwards if the face was reversed.
+template <class Corners> Corners turned(Corners corners, bool isReversed) {
+    if (isReversed) std::reverse(corners.begin(), corners.end());
+    return corners;
+}
+
+using Codes = std::array<mesh::Row<std::int64_t>, 3>;
+
+/// The codes at the corners of clean faces; in those of textured ones red and green are positions in the atlas.
+std::vector<Codes> cornerCodes(const colonnade_mesh& mesh, const mesh::CleanMesh& clean, const std::vector<mesh::Triangle>* uvs) {
     const double white = static_cast<double>((1 << library->number("colourBits")) - 1);
-    std::array<mesh::Row<std::int64_t>, 3> codes;
-    for (int i = 0; i < 9; ++i) codes[i / 3][i % 3] = static_cast<std::int64_t>(std::rint(std::clamp(colours[i], 0.0, 1.0) * white));
+    std::vector<Codes> codes(clean.faces.size());
+    for (std::size_t i = 0; i < codes.size(); ++i) {
+        const std::int64_t source = clean.sources[i];
+        const colonnade_surface& surface = mesh.surfaces[mesh.surface_of[source]];
+        if (surface.texture >= 0 && uvs) {
+            const std::int64_t fraction = std::int64_t{1} << lookUp(library->textureSizes, "fractionBits"), edge = lookUp(library->textureSizes, "width");
+            for (int corner = 0; corner < 3; ++corner)
+                for (int axis = 0; axis < 2; ++axis)
+                    codes[i][corner][axis] =
+                        std::clamp<std::int64_t>(static_cast<std::int64_t>(std::rint((*uvs)[i][corner][axis] * static_cast<double>(fraction))), 0, edge * fraction - 1);
+        } else if (surface.has_colours) {
+            Codes own;
+            for (int at = 0; at < 9; ++at) {
+                const double colour = mesh.colours ? std::clamp(mesh.colours[9 * source + at], 0.0, 1.0) : 1.0;
+                own[at / 3][at % 3] = static_cast<std::int64_t>(std::rint(colour * surface.factor[at % 3] * white));
+            }
+            codes[i] = turned(own, clean.winding.reversed[i]);
+        }
+    }
     return codes;
+}
+
+/// Encodes an atlas, or zeros without one, for the texture memory.
+void encodeAtlas(const std::optional<mesh::Atlas>& atlas) {
+    const AttributeSizes sizes = AttributeSizes::ofTexture(library->textureSizes);
+    const live::VectorSizes own{static_cast<int>(sizes.tileColumns), static_cast<int>(sizes.tileRows), 1 << sizes.tileLog, static_cast<int>(sizes.paletteSize),
+                                static_cast<int>(lookUp(library->textureSizes, "mapHeapWords"))};
+    std::vector<std::uint32_t> descriptors(own.tiles());
+    std::vector<std::uint64_t> palette(own.paletteSize);
+    std::vector<std::uint16_t> heap(own.heapWords);
+    if (atlas) {
+        std::vector<std::uint8_t> codes;
+        for (const mesh::Vector& colour : atlas->colours)
+            for (const double value : colour) codes.push_back(static_cast<std::uint8_t>(std::rint(255 * srgbFromLinear(value))));
+        live::VectorMap<live::ColourFields> map(own);
+        for (int round = 0; round < stillRounds; ++round) map.encode(codes.data(), descriptors.data(), palette.data(), heap.data());
+    }
+    const auto store = [](const std::string& memory, const auto& words, std::size_t bytes) {
+        std::vector<std::uint8_t>& into = library->textureWords["texture." + memory];
+        into.clear();
+        for (const auto word : words)
+            for (std::size_t byte = 0; byte < bytes; ++byte) into.push_back(static_cast<std::uint8_t>(std::uint64_t{word} >> (8 * byte)));
+        colonnade_model_load_memory(("texture." + memory).c_str(), into.data(), static_cast<std::uint32_t>(words.size()), static_cast<std::uint32_t>(bytes));
+    };
+    store("descriptors", descriptors, 4);
+    store("palette", palette, 5);
+    store("heap", heap, 2);
 }
 
 const char* checkFit(const packer::Sections& sections, const bvh::Bvh& tree) {
@@ -141,19 +206,19 @@ const char* colonnade_model_open(const char* design) {
     return nullptr;
 }
 
-const char* colonnade_model_pack(const double* vertices, std::uint32_t vertexCount, const std::int32_t* faces, std::uint32_t faceCount, const double* normals,
-                                 const double* colours, std::uint32_t isGlass, colonnade_packed* packed) {
+const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* packed) {
+    const colonnade_mesh& given = *from;
     mesh::RawMesh raw;
-    raw.vertices.resize(vertexCount);
-    raw.faces.resize(faceCount);
-    std::memcpy(raw.vertices.data(), vertices, vertexCount * sizeof(mesh::Vector));
-    std::memcpy(raw.faces.data(), faces, faceCount * sizeof(mesh::Face));
-    if (normals) {
-        raw.normals.resize(faceCount);
-        std::memcpy(raw.normals.data(), normals, faceCount * sizeof(mesh::Corners));
+    raw.vertices.resize(given.vertex_count);
+    raw.faces.resize(given.face_count);
+    std::memcpy(raw.vertices.data(), given.vertices, given.vertex_count * sizeof(mesh::Vector));
+    std::memcpy(raw.faces.data(), given.faces, given.face_count * sizeof(mesh::Face));
+    if (given.normals) {
+        raw.normals.resize(given.face_count);
+        std::memcpy(raw.normals.data(), given.normals, given.face_count * sizeof(mesh::Corners));
     }
     auto next = std::make_unique<Packed>();
-    next->clean = mesh::clean(raw, leastCosine, faceCount);
+    next->clean = mesh::clean(raw, leastCosine, given.face_count);
     if (!next->clean.error.empty()) return refuse(next->clean.error);
     const mesh::CleanMesh& clean = next->clean;
     next->quantised = packer::quantise(clean.vertices.data(), clean.vertices.size(), clean.faces.data(), clean.faces.size(), library->format.vertexBits);
@@ -162,18 +227,36 @@ const char* colonnade_model_pack(const double* vertices, std::uint32_t vertexCou
     next->packer = std::make_unique<packer::RecordPacker>(next->quantised, next->tree, library->format);
     if (const char* error = checkFit(next->packer->sections(), next->tree)) return error;
 
-    const std::vector<std::uint8_t> materials(clean.faces.size(), 0), isClear(clean.faces.size(), isGlass != 0);
-    std::vector<std::array<mesh::Row<std::int64_t>, 3>> codes;
-    if (library->format.layouts.at("attributes").count("faces[0].colours[0].r")) {
-        codes.resize(clean.faces.size());
-        for (std::size_t i = 0; colours && i < codes.size(); ++i) {
-            codes[i] = colourCodes(colours + 9 * clean.sources[i]);
-            if (clean.winding.reversed[i]) std::reverse(codes[i].begin(), codes[i].end());
+    std::vector<std::uint8_t> materials, isClear;
+    std::vector<mesh::Triangle> uvs(clean.faces.size());
+    std::vector<mesh::Paint> paints;
+    bool isTextured = false;
+    for (std::size_t i = 0; i < clean.faces.size(); ++i) {
+        const colonnade_surface& surface = given.surfaces[given.surface_of[clean.sources[i]]];
+        materials.push_back(static_cast<std::uint8_t>(surface.entry));
+        isClear.push_back(surface.is_glass != 0);
+        paints.push_back({surface.texture, {surface.factor[0], surface.factor[1], surface.factor[2]}});
+        isTextured |= surface.texture >= 0;
+        if (given.uvs) {
+            std::memcpy(&uvs[i], given.uvs + 6 * clean.sources[i], sizeof uvs[i]);
+            uvs[i] = turned(uvs[i], clean.winding.reversed[i]);
         }
     }
+    std::optional<mesh::Atlas> atlas;
+    if (!library->textureSizes.empty() && isTextured) {
+        std::vector<mesh::Picture<std::uint8_t>> textures;
+        for (std::uint32_t i = 0; i < given.texture_count; ++i) textures.push_back(pictureOf(given.textures[i]));
+        double linear[256];
+        for (int code = 0; code < 256; ++code) linear[code] = linearFromSrgb(code / 255.0);
+        atlas = mesh::AtlasMaker(textures, linear, lookUp(library->textureSizes, "width")).make(uvs, paints);
+        if (!atlas) return "the mesh has more textured materials than the atlas has tiles";
+    }
+    if (!library->textureSizes.empty()) encodeAtlas(atlas);
+    std::vector<Codes> codes;
+    if (library->format.layouts.at("attributes").count("faces[0].colours[0].r")) codes = cornerCodes(given, clean, atlas ? &atlas->uvs : nullptr);
     library->records = next->packer->records({clean.normals.normals.data(), materials.data(), isClear.data(), codes.empty() ? nullptr : codes.data()});
     library->packed = std::move(next);
-    describe(*packed, faceCount);
+    describe(*packed, given.face_count);
     library->device->load(library->records.data(), library->packed->packer->sections().recordCount, library->format.recordBytes());
     return nullptr;
 }
@@ -187,6 +270,13 @@ const char* colonnade_model_load_memory(const char* memory, const std::uint8_t* 
     if (memory == std::string("light.cube")) {
         if (bytes != LightCube::wordBytes) return "words of the light cube have 4 bytes";
         library->device->loadCube(words, count);
+        return nullptr;
+    }
+    if (std::strncmp(memory, "texture.", 8) == 0) {
+        if (library->textureSizes.empty()) return "this design has no memory for textures";
+        if (!library->texture) library->texture = std::make_unique<TextureImage>(library->textureSizes, library->textureLayouts);
+        library->texture->load(memory, words, count, bytes);
+        library->device->load(*library->texture);
         return nullptr;
     }
     if (library->mapSizes.empty()) return "this design has no memory for a room";
@@ -248,6 +338,23 @@ std::uint32_t colonnade_model_trace(std::uint32_t x, std::uint32_t y, const colo
     *steps = library->result.data();
     return static_cast<std::uint32_t>(library->result.size());
 }
+
+const char* colonnade_model_metal(const colonnade_texture* map, const double* uvs, std::uint32_t count, const double* factors, std::uint8_t* isMetal, double* roughness) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const mesh::FaceMetal face = mesh::metalOf(pictureOf(*map), uvs + 6 * i, factors);
+        isMetal[i] = face.isMetal;
+        roughness[i] = face.roughness;
+    }
+    return nullptr;
+}
+
+const char* colonnade_model_merge(const double* values, const double* weights, const std::int32_t* kinds, std::uint32_t count, std::uint32_t left, double* merged) {
+    const std::vector<double> found = mesh::mergedValues({values, values + count}, {weights, weights + count}, {kinds, kinds + count}, left);
+    std::copy(found.begin(), found.end(), merged);
+    return nullptr;
+}
+
+const std::uint8_t* colonnade_model_texture(const char* memory) { return library->textureWords[memory].data(); }
 
 const std::uint8_t* colonnade_model_records(void) { return library->records.data(); }
 

@@ -10,6 +10,34 @@
 extern "C" {
 #endif
 
+/* A picture: rows of red, green, blue. Beyond it (wrap) 0 repeats it, 1 mirrors it, 2 repeats its border. */
+struct colonnade_texture {
+    const uint8_t *pixels;
+    int32_t width, height, wrap_u, wrap_v, is_nearest;
+};
+
+/* What faces of a mesh are: an entry of the material table, glass or not, and what their corners have, times a factor. */
+struct colonnade_surface {
+    int32_t entry, is_glass;
+    int32_t texture;     /* of base colours, sRGB; -1: none */
+    int32_t has_colours; /* of the mesh, for a design with corner colours */
+    double factor[3];
+};
+
+/* `normals`: three for each face, of any length, 0 for none; or NULL. `colours`: linear red, green, blue at the corners, 0 to
+ * 1; or NULL. `uvs`: two at each corner; NULL without textures. `surface_of`: of each face. */
+struct colonnade_mesh {
+    const double *vertices;
+    uint32_t vertex_count;
+    const int32_t *faces;
+    uint32_t face_count;
+    const double *normals, *colours, *uvs;
+    const int32_t *surface_of;
+    const struct colonnade_surface *surfaces;
+    const struct colonnade_texture *textures;
+    uint32_t texture_count;
+};
+
 /* A mesh as it is packed: sections in records, bounds in vertex units. */
 struct colonnade_packed {
     int32_t triangles, record_count, triangle_base, triangle_records, attribute_base;
@@ -30,27 +58,25 @@ struct colonnade_step {
     double values[9];  /* vertex units: origin and direction, low and high, vertices; of a hit, t in grid steps */
 };
 
-/* Every call but the last three returns NULL, or a text that says what is wrong. */
+/* Every call but the last four returns NULL, or a text that says what is wrong. */
 
 /* Opens a design, by lines of words from its manifest:
  *   number NAME VALUE                             numbers; arity, trianglesPerRecord, stackDepth, bvh, recordBits, depth
  *   layout RECORD FIELD OFFSET WIDTH SIGNED       of records
  *   register NAME ADDRESS WORDS WIDTH SIGNED LIMIT   those that are written; limit -1 for none
- * and for a design with the maps of a room:
+ * and for a design with the maps of a room, or with textures:
  *   size NAME VALUE                               of the maps
- *   map RECORD FIELD OFFSET WIDTH SIGNED          of their words */
+ *   map RECORD FIELD OFFSET WIDTH SIGNED          of their words
+ *   textureSize, textureMap                       the same of the texture memory */
 const char *colonnade_model_open(const char *design);
 
-/* Cleans and packs a mesh, and loads it into the model. `normals`: three for each face, of any length, 0 for none; or NULL.
- * `colours`: linear red, green, blue at the corners, 0 to 1, for a design with corner colours; or NULL. Faces have entry 0 of
- * the material table. */
-const char *colonnade_model_pack(const double *vertices, uint32_t vertex_count, const int32_t *faces, uint32_t face_count, const double *normals, const double *colours,
-                                 uint32_t is_glass, struct colonnade_packed *packed);
+/* Cleans and packs a mesh, and loads it, with the atlas of its textures, into the model. */
+const char *colonnade_model_pack(const struct colonnade_mesh *mesh, struct colonnade_packed *packed);
 
 /* Loads records in place of a packed mesh. */
 const char *colonnade_model_load(const uint8_t *records, uint32_t count);
 
-/* Loads one of the memories of a room's maps, or the light cube, by its name in the manifest: `count` words of `bytes` bytes. */
+/* Loads one of the memories of a room's maps or of textures, or the light cube, by its name in the manifest: `count` words of `bytes` bytes. */
 const char *colonnade_model_load_memory(const char *memory, const uint8_t *words, uint32_t count, uint32_t bytes);
 
 /* Writes registers, pairs of word address and value, low byte first, and starts a frame. */
@@ -62,6 +88,16 @@ const char *colonnade_model_rows(uint32_t first, uint32_t last, uint16_t *colour
 
 /* The steps of a pixel's rays; they are valid until the next call. */
 uint32_t colonnade_model_trace(uint32_t x, uint32_t y, const struct colonnade_step **steps);
+
+/* Which of so many faces are metal, 0 or 1, and their mean roughness, by a metallic-roughness map: `uvs` of the corners, and
+ * the factors of metallic and roughness. */
+const char *colonnade_model_metal(const struct colonnade_texture *map, const double *uvs, uint32_t count, const double *factors, uint8_t *is_metal, double *roughness);
+
+/* Merges the nearest of values of equal kinds until so many are left, by their weights; `merged` has the new value of each. */
+const char *colonnade_model_merge(const double *values, const double *weights, const int32_t *kinds, uint32_t count, uint32_t left, double *merged);
+
+/* The words of a memory of textures for the packed mesh, each of whole bytes, low byte first. */
+const uint8_t *colonnade_model_texture(const char *memory);
 
 /* The records of the packed mesh. */
 const uint8_t *colonnade_model_records(void);

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "clusters.hpp"
-#include "fixed_order.hpp"
 #include "kernels.hpp"
+#include "srgb.hpp"
 #include "tile_sums.hpp"
 
 namespace colonnade::live {
@@ -21,13 +21,11 @@ class ColourFields {
 public:
     ColourFields() : fields_(highest + 1), points_(1 << fieldBits) {
         for (int i = 0; i <= highest; ++i) {
-            const double encoded = i / static_cast<double>(highest);
-            const double linear = encoded <= 0.04045 ? encoded / 12.92 : fixed_order::power((encoded + 0.055) / 1.055, 2.4);
+            const double linear = linearFromSrgb(i / static_cast<double>(highest));
             fields_[i] = static_cast<std::uint16_t>(std::min<double>(fieldMask, linear * fieldMask + 0.5));
         }
         for (int i = 0; i <= fieldMask; ++i) {
-            const double linear = i / static_cast<double>(fieldMask);
-            const double encoded = linear <= 0.0031308 ? 12.92 * linear : 1.055 * fixed_order::power(linear, 1 / 2.4) - 0.055;
+            const double encoded = srgbFromLinear(i / static_cast<double>(fieldMask));
             points_[i] = static_cast<std::uint16_t>(std::min<double>(highest, encoded * highest + 0.5));
         }
     }

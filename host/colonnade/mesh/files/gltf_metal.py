@@ -7,18 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from colonnade.common import fixed_order
 from colonnade.common.types import Floats
-from colonnade.mesh.geometry.topology import triangle_points
 from colonnade.mesh.materials.materials import MIRROR_ROUGHNESS, MeshMaterial, coat_roughness
 from colonnade.mesh.materials.texture import Texture
-
-#: Points along an edge of a face.
-_POINTS = 4
-#: Channels of the map.
-_ROUGHNESS, _METALLIC = 1, 2
-#: Steps of the roughness.
-_STEPS = 16
 
 
 def metal_of(texture: Texture, uvs: Floats, factors: tuple[float, float]) -> tuple[NDArray[np.bool_], Floats]:
@@ -29,10 +20,10 @@ def metal_of(texture: Texture, uvs: Floats, factors: tuple[float, float]) -> tup
         uvs: Positions of the corners in it, float64 [m, 3, 2].
         factors: Of metallic and roughness.
     """
-    points = fixed_order.product(triangle_points(_POINTS), uvs)
-    values = texture.codes(points.reshape(-1, 2)).reshape(*points.shape[:2], 3).mean(axis=1) / 255
-    is_metal = np.asarray(values[:, _METALLIC] * factors[0] >= 0.5)
-    return is_metal, np.rint(_STEPS * np.clip(values[:, _ROUGHNESS] * factors[1], 0.0, 1.0)) / _STEPS
+    from colonnade import _core
+
+    is_metal, roughness = _core.metal_of(texture.compiled, np.ascontiguousarray(uvs), *factors)
+    return is_metal, roughness
 
 
 def of_map(material: MeshMaterial, is_metal: bool, roughness: float) -> MeshMaterial:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from heapq import heapify, heappop, heappush
-from itertools import chain, pairwise
 
 import numpy as np
 
@@ -31,52 +29,16 @@ def merged_roughness(
     Returns:
         Each material, with its new roughness, and by how much roughnesses changed on average over the area.
     """
+    from colonnade import _core
+
     entries, index = table_entries(materials)
     area = np.bincount(index, weights, len(entries)).tolist()
     # Roughnesses of surfaces without a coat count as those that are nearly matt
     values = [GLOSSY if one.kind == "diffuse" and not one.roughness else one.roughness for one in entries]
-    kinds: dict[MeshMaterial, list[int]] = {}
-    for number, entry in enumerate(entries):
-        kinds.setdefault(replace(entry, roughness=0.0), []).append(number)
-    for members in kinds.values():
-        members.sort(key=values.__getitem__)
-    # Groups by their first entries, and the next group of the same kind
-    place = {number: at for at, number in enumerate(chain.from_iterable(kinds.values()))}
-    groups = {number: [number] for number in range(len(entries))}
-    following = dict(chain.from_iterable(pairwise(members) for members in kinds.values()))
-    preceding = {second: first for first, second in following.items()}
-
-    def mean(group: int) -> tuple[float, float]:
-        members = groups[group]
-        total = sum(area[one] for one in members)
-        return total, sum(area[one] * values[one] for one in members) / total if total else values[group]
-
-    def offer(group: int) -> tuple[float, int, int, int, int]:
-        (first, of_first), (second, of_second) = mean(group), mean(following[group])
-        cost = first * second * (of_first - of_second) ** 2 / max(first + second, 1e-300)
-        return cost, place[group], group, len(groups[group]), len(groups[following[group]])
-
-    offers = [offer(group) for group in following]
-    heapify(offers)
-    while len(groups) > count and offers:
-        _, _, group, *sizes = heappop(offers)
-        # An offer is void when one of its groups has grown or is gone
-        if group not in following or [len(groups[group]), len(groups[following[group]])] != sizes:
-            continue
-        second = following.pop(group)
-        groups[group] += groups.pop(second)
-        if second in following:
-            following[group] = following.pop(second)
-            preceding[following[group]] = group
-            heappush(offers, offer(group))
-        if group in preceding:
-            heappush(offers, offer(preceding[group]))
-    found = list(values)
-    for group, members in groups.items():
-        if len(members) > 1:
-            for one in members:
-                found[one] = mean(group)[1]
-    change = float((weights * np.abs(np.array(found) - values)[index]).sum() / max(float(weights.sum()), 1e-300))
+    kinds = {kind: number for number, kind in enumerate(dict.fromkeys(replace(one, roughness=0.0) for one in entries))}
+    groups = [kinds[replace(one, roughness=0.0)] for one in entries]
+    found = _core.merged_values(values, area, groups, count)
+    change = float((weights * np.abs(np.subtract(found, values))[index]).sum() / max(float(weights.sum()), 1e-300))
     rounded = [
         entry.roughness if after == before else (coat_roughness(after) if entry.kind == "diffuse" else after)
         for entry, before, after in zip(entries, values, found, strict=True)

@@ -22,9 +22,9 @@ Wrap = Literal["repeat", "mirror", "clamp"]
 MAX_UV = 1e6
 
 #: Linear value of each code of 8 bits.
-_LINEAR = linear_from_srgb(np.arange(256) / 255.0)
+LINEAR = linear_from_srgb(np.arange(256) / 255.0)
 #: The same as whole numbers of 16 bits, and the code of each of these.
-_LEVELS = np.rint(_LINEAR * 65535).astype(np.int64)
+_LEVELS = np.rint(LINEAR * 65535).astype(np.int64)
 _CODES = encode_srgb(np.arange(65536) / 65535)
 #: What lies beyond the picture, as numbers of ``cpp/mesh/texture.hpp``.
 _WRAPS: dict[Wrap, int] = {"repeat": 0, "mirror": 1, "clamp": 2}
@@ -54,14 +54,20 @@ class Texture:
         return self.pixels.shape[1], self.pixels.shape[0]
 
     @property
+    def compiled(self) -> tuple[npt.NDArray[np.uint8], int, int, bool]:
+        """What the compiled half needs of it."""
+        across, down = self.wrap
+        return np.ascontiguousarray(self.pixels), _WRAPS[across], _WRAPS[down], self.is_nearest
+
+    @property
     def linear(self) -> Floats:
         """Linear colours of the pixels, float64 [height, width, 3]."""
-        return np.asarray(_LINEAR[self.pixels])
+        return np.asarray(LINEAR[self.pixels])
 
     @property
     def mean(self) -> Floats:
         """Mean linear colour, float64 [3]."""
-        sums = np.sum([_LINEAR[row].sum(axis=0) for row in self.pixels], axis=0)
+        sums = np.sum([LINEAR[row].sum(axis=0) for row in self.pixels], axis=0)
         return np.asarray(sums / (self.size[0] * self.size[1]))
 
     def halved(self) -> Texture:
@@ -81,7 +87,7 @@ class Texture:
 
     def colours(self, uvs: Floats) -> Floats:
         """Linear colours at texture coordinates, float64 [n, 2]: bilinear between pixels' centres, float64 [n, 3]."""
-        return self._filtered(uvs, self.pixels, _LINEAR)
+        return self._filtered(uvs, self.pixels, LINEAR)
 
     def codes(self, uvs: Floats) -> Floats:
         """The pixels' codes, 0 to 255, at texture coordinates, filtered as the colours, float64 [n, 3]."""
