@@ -20,9 +20,11 @@ export function designLines(manifest) {
       lines.push(
         `register ${register.name} ${register.address} ${register.words} ${register.width} ${Number(register.signed)} ${register.limit ?? -1}`,
       );
-  for (const [name, value] of Object.entries(manifest.attributes?.sizes ?? {})) lines.push(`size ${name} ${value}`);
-  for (const [record, fields] of Object.entries(manifest.attributes?.layouts ?? {}))
-    for (const field of fields) lines.push(`map ${record} ${field.name} ${field.offset} ${field.width} ${Number(field.signed)}`);
+  for (const [kinds, memory] of [[["size", "map"], manifest.attributes], [["textureSize", "textureMap"], manifest.texture]]) {
+    for (const [name, value] of Object.entries(memory?.sizes ?? {})) lines.push(`${kinds[0]} ${name} ${value}`);
+    for (const [record, fields] of Object.entries(memory?.layouts ?? {}))
+      for (const field of fields) lines.push(`${kinds[1]} ${record} ${field.name} ${field.offset} ${field.width} ${Number(field.signed)}`);
+  }
   return lines.join("\n");
 }
 

@@ -1,12 +1,15 @@
-// Reads glTF as host/colonnade/mesh/files/gltf.py does, with its errors: the triangles of the default scene with normals and
-// colours. Draco is not read.
+// Reads glTF as host/colonnade/mesh/files/gltf.py does, with its errors: the triangles of the default scene with normals,
+// colours and materials. Draco is not read.
 
 import { Corners } from "./corners.js";
 import { DRACO, READ_EXTENSIONS } from "./gltfchecks.js";
 import { COMPRESSION, GltfDocument, grouped } from "./gltfdocument.js";
+import { GltfMaterials } from "./gltfmaterials.js";
 
 /** Largest magnitude of a transform's element, in the scene. */
 const MOST_TRANSFORM = 1e100;
+/** As host/colonnade/mesh/materials/texture.py. */
+const MOST_UV = 1e6;
 const [POINTS, TRIANGLES, FAN] = [0, 4, 6];
 
 /** A mesh, as of readMesh; `files` has the other dropped files by name. */
@@ -18,13 +21,14 @@ export function readGltf(bytes, name, files) {
     if (!READ_EXTENSIONS.includes(extension)) throw document.error(`it requires the glTF extension ${extension}, which is not supported: export it without`);
   }
   const corners = new Corners();
+  const materials = new GltfMaterials(document, corners.notes);
   const vertices = [];
   const left = { "point primitive": 0, "line primitive": 0 };
   for (const { node, matrix } of nodesOf(document))
-    for (const primitive of document.entry("meshes", node.mesh).primitives ?? []) addPrimitive(document, primitive, matrix, { corners, vertices, left });
+    for (const primitive of document.entry("meshes", node.mesh).primitives ?? []) addPrimitive(document, primitive, matrix, { corners, materials, vertices, left });
   for (const [noun, count] of Object.entries(left)) if (count > 0) corners.notes.add(`${grouped(count)} ${noun}${count > 1 ? "s are" : " is"} not shown: only faces are rendered`);
   if (json.animations || json.skins) corners.notes.add("animations and skins are left out");
-  return corners.mesh(vertices);
+  return { ...corners.mesh(vertices), materials: materials.materials, textures: materials.textures };
 }
 
 /** The nodes with a mesh of the default scene, and their transforms to the scene. */
@@ -50,7 +54,7 @@ function trianglesOf(indices, mode) {
   return Array.from({ length: Math.max(0, indices.length - 2) }, (_, i) => corner(i).map((at) => indices[at]));
 }
 
-function addPrimitive(document, primitive, matrix, { corners, vertices, left }) {
+function addPrimitive(document, primitive, matrix, { corners, materials, vertices, left }) {
   const { mode = TRIANGLES, attributes = {}, extensions = {} } = primitive;
   if (mode < TRIANGLES) return void ++left[mode === POINTS ? "point primitive" : "line primitive"];
   if (mode > FAN) throw document.error(`a primitive has the unknown mode ${mode}`);
@@ -63,10 +67,10 @@ function addPrimitive(document, primitive, matrix, { corners, vertices, left }) 
   if (positions.width !== 3) throw document.error("the positions of a primitive are not of type VEC3: export it again");
   const { count } = positions;
   /** Of an attribute, the part of each vertex: a function; null if the primitive has none. */
-  const attribute = (name) => {
+  const attribute = (name, least = 3) => {
     if (attributes[name] === undefined) return null;
     const { count: own, width, values } = document.array(attributes[name]);
-    if (own !== count || width < 3) throw document.error(`a primitive has ${grouped(own)} of ${name} for ${grouped(count)} positions`);
+    if (own !== count || width < least) throw document.error(`a primitive has ${grouped(own)} of ${name} for ${grouped(count)} positions`);
     return (vertex) => values.subarray(width * vertex, width * (vertex + 1));
   };
   const indices = primitive.indices === undefined ? { isWhole: true, width: 1, values: Float64Array.from({ length: count }, (_, i) => i) } : document.array(primitive.indices);
@@ -76,27 +80,30 @@ function addPrimitive(document, primitive, matrix, { corners, vertices, left }) 
   const own = attribute("COLOR_0");
   for (let vertex = 0; own && vertex < count; ++vertex) if (!own(vertex).every(Number.isFinite)) throw document.error("a primitive has a COLOR_0 that is not a finite number: export it again");
   const normalAt = attribute("NORMAL");
-  if (primitive.material !== undefined) document.entry("materials", primitive.material);
-  const factor = noteMaterial(document.json.materials?.[primitive.material] ?? {}, corners.notes);
+  const material = materials.numberOf(primitive.material);
+  /** The positions of vertices in a texture. */
+  const positionsIn = (use) => {
+    const uvs = use && attribute(use.coordinates, 2);
+    const found = uvs && Array.from({ length: count }, (_, vertex) => use.place(uvs(vertex)));
+    if (found?.some((uv) => !uv.every((value) => Math.abs(value) <= MOST_UV))) throw document.error(`a primitive has texture coordinates beyond ${grouped(MOST_UV)}, or not finite: export it again`);
+    return found;
+  };
+  const { base, metal } = materials.materials[material];
+  const [uvs, metalUvs] = [positionsIn(base), positionsIn(metal)];
+  if (base && !uvs) corners.notes.add("faces without texture coordinates show no texture");
 
   const first = vertices.length / 3;
   for (let vertex = 0; vertex < count; ++vertex) vertices.push(...transform(matrix, positions.values.subarray(3 * vertex, 3 * vertex + 3), 1));
   const normalMatrix = cofactors(matrix);
   const isMirrored = determinant(matrix) < 0;
   const normalOf = (vertex) => transform(normalMatrix, normalAt(vertex), 0).map((value) => (isMirrored ? -value : value));
-  const colourOf = (vertex) => [0, 1, 2].map((channel) => (own?.(vertex)[channel] ?? 1) * (factor?.[channel] ?? 1));
+  // A face without positions has its plain colour, a textured one none of its vertices
+  const number = (base && !uvs) || (metal && !metalUvs) ? materials.without(material, !uvs, !metalUvs) : material;
+  const colourOf = (vertex) => [...own(vertex).subarray(0, 3)].map((value) => Math.max(0, Math.min(1, value)));
   for (const face of trianglesOf(indices.values, mode)) {
     if (isMirrored) face.reverse();
-    corners.add(face.map((vertex) => first + vertex), normalAt && face.map(normalOf), (own || factor) && face.map(colourOf));
+    corners.add(face.map((vertex) => first + vertex), normalAt && face.map(normalOf), own && !uvs && face.map(colourOf), number, uvs && face.map((vertex) => uvs[vertex]), metalUvs && face.map((vertex) => metalUvs[vertex]));
   }
-}
-
-/** The colour of a material, if it has one; notes what it has beside. */
-function noteMaterial({ pbrMetallicRoughness: surface, emissiveFactor }, notes) {
-  if (surface?.baseColorTexture) notes.add("textures are left out");
-  if (surface && (surface.metallicFactor ?? 1) > 0) notes.add("metal and roughness of the file are left out: the page has a material for the whole mesh");
-  if (emissiveFactor?.some((channel) => channel > 0)) notes.add("emission is left out");
-  return surface?.baseColorFactor;
 }
 
 // Matrices: 16 numbers, column by column

@@ -105,14 +105,17 @@ export class GltfDocument {
   content(index, uri) {
     if (uri === undefined && index === 0 && this.binary) return this.binary;
     if (uri === undefined) throw this.error(`buffer ${index} has no data`);
-    if (uri.startsWith("data:")) {
-      const code = uri.slice(uri.indexOf(",") + 1);
-      if (!uri.includes(",") || code.length % 4 !== 0 || !/^[A-Za-z0-9+/]*={0,2}$/.test(code)) throw this.error(`the data of buffer ${index} are not base64`);
-      return Uint8Array.from(atob(code), (character) => character.charCodeAt(0));
-    }
-    const found = this.files.get(unquoted(uri).split("/").pop());
+    const found = this.file(uri, `buffer ${index}`);
     if (!found) throw this.error(`its buffer ${uri} is missing: drop it together with the mesh`);
     return found;
+  }
+
+  /** The bytes of a URI: embedded, or of a dropped file, or undefined; `what` it is, for messages. */
+  file(uri, what) {
+    if (!uri.startsWith("data:")) return this.files.get(unquoted(uri).split("/").pop());
+    const code = uri.slice(uri.indexOf(",") + 1);
+    if (!uri.includes(",") || code.length % 4 !== 0 || !/^[A-Za-z0-9+/]*={0,2}$/.test(code)) throw this.error(`the data of ${what} are not base64`);
+    return Uint8Array.from(atob(code), (character) => character.charCodeAt(0));
   }
 }
 

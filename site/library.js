@@ -19,6 +19,23 @@ const [CUBE_BYTES, FINE_VALUES] = [4 * 6 * 16 ** 2, 3 * 6 * 32 ** 2];
 const INSIDE = 0.1;
 const FRACTION = 2 ** 32;
 
+/** A surface with the colours of the mesh, and a texture that no surface has. */
+export const plainSurface = (mesh, isGlass = false, factor = 1) => ({ entry: 0, isGlass, texture: -1, hasColours: Boolean(mesh.colours), factor: Array(3).fill(factor) });
+const BLANK = { pixels: new Uint8Array(3), width: 1, height: 1, wrapU: 0, wrapV: 0, isNearest: 0 };
+
+/** The words of a colonnade_texture with its pixels at an address. */
+const textureWords = ({ width, height, wrapU, wrapV, isNearest }, pixels) => [pixels, width, height, wrapU, wrapV, isNearest];
+
+/** The bytes of colonnade_surface. */
+function surfaceBytes(surfaces) {
+  const view = new DataView(new ArrayBuffer(40 * surfaces.length));
+  surfaces.forEach(({ entry, isGlass, texture, hasColours, factor }, i) => {
+    [entry, Number(isGlass), texture, Number(hasColours)].forEach((value, at) => view.setInt32(40 * i + 4 * at, value, true));
+    factor.forEach((value, at) => view.setFloat64(40 * i + 16 + 8 * at, value, true));
+  });
+  return new Uint8Array(view.buffer);
+}
+
 /** What a module of WASI needs that writes nowhere and reads nothing. */
 export function wasi() {
   const functions = {};
@@ -88,13 +105,46 @@ export class Library {
     this.withArrays([new TextEncoder().encode(designLines(manifest) + "\0")], (lines) => this.check(this.wasm.colonnade_model_open(lines)));
   }
 
-  /** Packs a mesh: vertices and normals are Float64Array, faces Int32Array; the model has it then. After an error it has the mesh before. */
-  pack(mesh, isGlass = false) {
-    const { name, vertices, faces, normals = null, colours = null } = mesh;
-    return this.withArrays([vertices, faces, normals, colours, new Int32Array(PACKED.length)], (v, f, n, c, out) => {
-      this.check(this.wasm.colonnade_model_pack(v, vertices.length / 3, f, faces.length / 3, n, c, Number(isGlass), out), name && `mesh ${name}`);
-      const values = new Int32Array(this.wasm.memory.buffer, out, PACKED.length);
-      return Object.fromEntries(PACKED.map((name, index) => [name, values[index]]));
+  /**
+   * Packs a mesh: vertices and normals are Float64Array, faces Int32Array; the model has it then. After an error it has the mesh
+   * before. `surfaces` and `surfaceOf`, of each face, are those of surfacesOf (surfaces.js).
+   */
+  pack(mesh, { surfaces, surfaceOf } = { surfaces: [plainSurface(mesh)], surfaceOf: new Int32Array(mesh.faces.length / 3) }) {
+    const { name, vertices, faces, normals = null, colours = null, uvs = null, textures = [] } = mesh;
+    const used = textures.map((texture) => (texture.pixels ? texture : BLANK));
+    return this.withArrays([vertices, faces, normals, colours, uvs, surfaceOf, surfaceBytes(surfaces), new Int32Array(PACKED.length), ...used.map(({ pixels }) => pixels)], (v, f, n, c, u, of, s, out, ...pixels) =>
+      this.withArrays([Int32Array.from(used.flatMap((texture, i) => textureWords(texture, pixels[i])))], (t) => {
+        const given = Uint32Array.of(v, vertices.length / 3, f, faces.length / 3, n, c, u, of, s, t, used.length);
+        this.withArrays([given], (pointer) => this.check(this.wasm.colonnade_model_pack(pointer, out), name && `mesh ${name}`));
+        const values = new Int32Array(this.wasm.memory.buffer, out, PACKED.length);
+        return Object.fromEntries(PACKED.map((name, index) => [name, values[index]]));
+      }),
+    );
+  }
+
+  /** Which faces are metal by a map, and their roughness; `uvs` of their corners in it. */
+  metal(texture, uvs, factors) {
+    const count = uvs.length / 6;
+    return this.withArrays([texture.pixels, uvs, Float64Array.from(factors), new Uint8Array(count), new Float64Array(count)], (pixels, u, f, is, rough) =>
+      this.withArrays([Int32Array.from(textureWords(texture, pixels))], (map) => {
+        this.check(this.wasm.colonnade_model_metal(map, u, count, f, is, rough));
+        return { isMetal: new Uint8Array(this.wasm.memory.buffer, is, count).slice(), roughness: new Float64Array(this.wasm.memory.buffer, rough, count).slice() };
+      }),
+    );
+  }
+
+  /** Values, of which those of equal kinds are merged until so many are left. */
+  merged(values, weights, kinds, left) {
+    return this.result([Float64Array.from(values), Float64Array.from(weights), Int32Array.from(kinds)], Float64Array, values.length, (v, w, k, to) => this.wasm.colonnade_model_merge(v, w, k, values.length, left, to));
+  }
+
+  /** The memories of the packed mesh's textures, as of loadMemories; none for a design without. */
+  textureMemories() {
+    const own = Object.entries(this.manifest.memories).filter(([name]) => name.startsWith("texture."));
+    return own.map(([memory, { depth, bits }]) => {
+      const bytes = Math.ceil(bits / 8);
+      const start = this.withArrays([new TextEncoder().encode(memory + "\0")], (name) => this.wasm.colonnade_model_texture(name));
+      return { memory, bytes, words: this.bytes.slice(start, start + bytes * depth) };
     });
   }
 

@@ -7,7 +7,7 @@ import { materialOf } from "./view.js";
 /** The notes of a scene (view.js) in a room, or in none. */
 export function notesOf(scene, room) {
   const { state, mesh, manifest, packed } = scene;
-  const notes = [...mesh.notes, ...(room?.notes ?? [])];
+  const notes = [...mesh.notes, ...packed.notes, ...(room?.notes ?? [])];
   const count = (number) => number.toLocaleString("en");
   if (packed.dropped) notes.push(`${count(packed.dropped)} faces without area, or there twice, are left out`);
   if (packed.reversed) notes.push(`${count(packed.reversed)} closed parts did not point outward, and do now`);
@@ -18,7 +18,8 @@ export function notesOf(scene, room) {
   if (room && !room.light) notes.push("this hardware does not gather the light of the room: choose textured");
   if (room?.light?.share) notes.push(`the photo shows ${Math.round(100 * room.light.share)} % of the directions around the object; its mean light comes from the others`);
   const material = materialOf(scene, room);
+  if (mesh.hasMaterials && material !== "file") notes.push("one material in place of those of the file");
   if (state.material === "metal" && material !== "metal") notes.push("rough metal is diffuse: hardware that gathers the light of a room renders its reflections");
-  else if (material !== state.material) notes.push("this hardware has neither mirrors nor glass");
+  else if (material !== state.material && state.material !== "file") notes.push("this hardware has neither mirrors nor glass");
   return notes;
 }

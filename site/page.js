@@ -12,7 +12,7 @@ import { RayPanel } from "./raypanel.js";
 import { Renderer, bytesOf, unpack } from "./renderer.js";
 import { RtlPanel } from "./rtlpanel.js";
 import { DEFAULTS, RANGES, followOf, followText, readState, writeState } from "./state.js";
-import { materialOf } from "./view.js";
+import { surfaceOf } from "./view.js";
 import { kindFor, placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
 
 const MOST_WORKERS = 8;
@@ -81,7 +81,7 @@ async function changeDesign() {
 }
 
 async function pack() {
-  const answer = await renderer.pack(materialOf(scene(), roomOf()) === "glass");
+  const answer = await renderer.pack(surfaceOf(scene(), roomOf()));
   packed = answer.packed;
   shown = opened;
   page.packTime = answer.milliseconds;
@@ -129,12 +129,14 @@ function failWhenIdle(error) {
 
 /** Reads and packs a file; if it cannot be, the mesh stays what it was. */
 async function readFile(name, bytes, files) {
-  const { mesh } = page;
+  const [{ mesh }, { material }] = [page, state];
   try {
     page.mesh = await renderer.read(name, bytes, files);
+    if (page.mesh.hasMaterials) state.material = "file";
     await pack();
   } catch (error) {
     page.mesh = mesh;
+    state.material = material;
     throw error;
   }
   page.file = { name, bytes, files };
@@ -207,6 +209,8 @@ function fill() {
   showCosts(data, state.design);
   for (const name of ["background", "light"]) form.elements[name].disabled = roomOf() !== null;
   element("mesh").textContent = state.mesh;
+  for (const option of form.elements.material.options) if (option.value === "file") option.disabled = !page.mesh?.hasMaterials;
+  form.elements.colour.disabled = Boolean(packed?.entries);
 }
 
 function keepLink() {

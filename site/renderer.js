@@ -91,10 +91,10 @@ export class Renderer {
   }
 
   /** Packs in the first worker, and loads the others. */
-  async pack(isGlass) {
+  async pack(surface) {
     const [first, ...others] = this.workers;
-    const { packed, records, milliseconds } = await this.ask(first, "pack", { isGlass });
-    await Promise.all(others.map((worker) => this.ask(worker, "load", { records })));
+    const { packed, records, textures, milliseconds } = await this.ask(first, "pack", surface);
+    await Promise.all(others.map((worker) => this.ask(worker, "load", { records, textures })));
     return { packed, milliseconds };
   }
 
@@ -119,7 +119,7 @@ export class Renderer {
     try {
       await this.ask(worker, "open", design);
       await this.ask(worker, "read", file);
-      return await use(worker, await this.ask(worker, "pack", { isGlass: false }));
+      return await use(worker, await this.ask(worker, "pack", { material: "diffuse", gathers: false, headroom: 1 }));
     } finally {
       worker.terminate();
     }

@@ -30,7 +30,7 @@ export const RANGES = {
 };
 const WHOLE = ["photo", "gather", "shadows", "bounces", "pixel"];
 /** The texts of names that are not free. */
-const TEXTS = { colour: /^[0-9a-f]{6}$/, background: /^[0-9a-f]{6}$/, material: /^(diffuse|metal|mirror|glass)$/ };
+const TEXTS = { colour: /^[0-9a-f]{6}$/, background: /^[0-9a-f]{6}$/, material: /^(file|diffuse|metal|mirror|glass)$/ };
 const NUMBER = /^-?\d+(\.\d+)?$/;
 
 /** The value in the range of its name that is nearest. */

@@ -4,6 +4,7 @@
 import { CUBE, START, cameraOf, isAtMaps, lightOf, onDisc, poseOf, roomCamera } from "./camera.js";
 import { decode } from "./photo.js";
 import { roomRegisters } from "./roomview.js";
+import { microfacetAlbedo } from "./surfaces.js";
 
 const LIGHT = [1.2, 1.6, 1.5];
 const GLASS = 1.5;
@@ -20,38 +21,64 @@ export const passesOf = (scene, room) => PASSES[Number(gathers(scene, room))];
 
 /** The material that the design has of the one that is chosen; metal as rough as this is diffuse where no light is gathered. */
 export function materialOf(scene, room) {
-  const { state, manifest } = scene;
+  const { state, mesh, manifest } = scene;
+  if (state.material === "file") return mesh.hasMaterials ? "file" : "diffuse";
   if (manifest.config.frame.maxBounces === 0) return "diffuse";
   return state.material === "metal" && !gathers(scene, room) ? "diffuse" : state.material;
 }
 
-/** The registers of the lobe of rough metal, and the share of light that its microfacets reflect at once (docs/gather.md). */
-function lobe() {
-  const alpha = Math.round(2 ** 8 * ROUGHNESS ** 2) / 2 ** 8;
-  return {
-    registers: {
-      "materials[0].lobe.alpha": 2 ** 8 * alpha,
-      "materials[0].lobe.slope": Math.round((2 ** 6 * (1 - alpha ** 2)) / (2 * alpha ** 2)),
-      "materials[0].lobe.peak": Math.round(-256 * Math.log2(alpha)),
-    },
-    share: 1 - ROUGHNESS ** 4 / (0.25 + 0.9 * ROUGHNESS ** 2 + 0.55 * ROUGHNESS ** 4),
+/** What packing needs to know of surfaces (worker.js). */
+export const surfaceOf = (scene, room) => ({ material: materialOf(scene, room), gathers: gathers(scene, room), headroom: room?.headroom ?? 1 });
+
+/** The registers of an entry of the material table, as host/colonnade/registers/shading.py has them. */
+function entryRegisters(index, { kind, roughness, ior, albedo, emission, hasColours, hasTexture }, { headroom, exposure, numbers }) {
+  const name = `materials[${index}]`;
+  const one = 2 ** numbers.lightFraction;
+  const white = 2 ** numbers.colourBits - 1;
+  const rgb = (part, colour) => Object.fromEntries([..."rgb"].map((channel, i) => [`${name}.${part}.${channel}`, Math.min(white, Math.round(colour[i] * white))]));
+  const registers = {
+    ...rgb("albedo", albedo.map((value) => value / (kind === "diffuse" ? headroom : 1))),
+    ...rgb("emission", emission.map((value) => (kind === "diffuse" || kind === "metal" ? value * exposure : 0))),
+    [`${name}.hasCornerColours`]: Number(hasColours),
+    [`${name}.hasTexture`]: Number(hasTexture),
+    [`${name}.kind`]: ["diffuse", "mirror", "glass", "metal"].indexOf(kind),
+    [`${name}.lobe.alpha`]: kind === "diffuse" ? 0 : Math.min(Math.round(1024 * roughness ** 2), 255),
   };
+  if (kind === "metal") {
+    const alpha = Math.min(Math.max(Math.round(2 ** 8 * roughness ** 2), 1), 255) / 2 ** 8;
+    registers[`${name}.lobe.alpha`] = 2 ** 8 * alpha;
+    registers[`${name}.lobe.slope`] = Math.round((2 ** 6 * (1 - alpha ** 2)) / (2 * alpha ** 2));
+    registers[`${name}.lobe.peak`] = Math.round(-256 * Math.log2(alpha));
+  }
+  if (kind === "glass") {
+    registers[`${name}.etaFront`] = Math.round(2 ** numbers.etaFraction / ior);
+    registers[`${name}.etaBack`] = Math.round(2 ** numbers.etaFraction * ior);
+    registers[`${name}.reflectance`] = Math.round(((ior - 1) / (ior + 1)) ** 2 * one);
+  }
+  return registers;
+}
+
+/** The entries of the material table: those of the file, or the one that the controls set. */
+function entriesOf(scene, room) {
+  const { state, mesh, packed } = scene;
+  if (packed.entries) return packed.entries;
+  const kind = materialOf(scene, room);
+  const share = kind === "metal" ? microfacetAlbedo(ROUGHNESS) : 1;
+  const albedo = colourOf(state.colour).map((value) => value * share);
+  return [{ kind, albedo, roughness: kind === "metal" ? ROUGHNESS : 0, ior: GLASS, emission: [0, 0, 0], hasColours: mesh.hasColours && kind === "diffuse", hasTexture: false }];
 }
 
 /** The registers that the mesh and the controls set. */
 function registersOf(scene, room) {
-  const { state, mesh, manifest, packed } = scene;
+  const { state, manifest, packed } = scene;
   const { numbers, config } = manifest;
-  const material = materialOf(scene, room);
-  const metal = lobe();
-  const share = { diffuse: 1 / (room?.headroom ?? 1), metal: metal.share }[material] ?? 1;
   const white = 2 ** numbers.colourBits - 1;
-  const one = 2 ** numbers.lightFraction;
+  const frame = { headroom: room?.headroom ?? 1, exposure: room?.light?.exposure ?? 1, numbers };
   const rgb = (name, colour) => Object.fromEntries([..."rgb"].map((channel, i) => [`${name}.${channel}`, Math.round(colour[i] * white)]));
   const registers = {
     ...(room ? {} : rgb("background", colourOf(state.background))),
     ...(room?.encoded ? roomRegisters(room, manifest) : {}),
-    ...rgb("materials[0].albedo", colourOf(state.colour).map((value) => value * share)),
+    ...Object.assign({}, ...entriesOf(scene, room).map((entry, index) => entryRegisters(index, entry, frame))),
     "bounds.low.x": packed.lowX, "bounds.low.y": packed.lowY, "bounds.low.z": packed.lowZ,
     "bounds.high.x": packed.highX, "bounds.high.y": packed.highY, "bounds.high.z": packed.highZ,
     "scene.recordCount": packed.recordCount,
@@ -61,18 +88,9 @@ function registersOf(scene, room) {
     "shading.offset": packed.shadingOffset,
     "shading.shadows": state.shadows,
     "shading.bounces": Math.min(state.bounces, config.frame.maxBounces),
-    "materials[0].hasCornerColours": Number(mesh.hasColours && material === "diffuse"),
-    "materials[0].kind": ["diffuse", "mirror", "glass", "metal"].indexOf(material),
-    "materials[0].lobe.alpha": 0,
     "gather.bounces": Number(gathers(scene, room)),
     "frame.watchdogCycles": 0,
   };
-  if (material === "metal") Object.assign(registers, metal.registers);
-  if (material === "glass") {
-    registers["materials[0].etaFront"] = Math.round(2 ** numbers.etaFraction / GLASS);
-    registers["materials[0].etaBack"] = Math.round(2 ** numbers.etaFraction * GLASS);
-    registers["materials[0].reflectance"] = Math.round(((GLASS - 1) / (GLASS + 1)) ** 2 * one);
-  }
   return registers;
 }
 

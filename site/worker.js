@@ -2,12 +2,13 @@
 
 import { readDepth } from "./depth.js";
 import { codesOf, encodeStill } from "./encoder.js";
-import { Library } from "./library.js";
+import { Library, plainSurface } from "./library.js";
 import { readMesh } from "./meshes.js";
 import { resizedPhoto } from "./photo.js";
 import { prepareRoom, roomBox } from "./room.js";
 import { renderRtl } from "./rtl.js";
 import { Sums, codeOf } from "./sums.js";
+import { decodePictures, surfacesOf } from "./surfaces.js";
 
 /** A band has this many rows, or fewer: a worker listens again after so many pixels. */
 const [BAND, BAND_PIXELS] = [4, 2560];
@@ -46,21 +47,28 @@ export function serve(scope) {
       lit = null;
       return {};
     },
-    read({ name, bytes, files }) {
-      read = readMesh(name, bytes, files);
-      const { vertices, faces, colours, notes } = read;
-      return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, notes };
+    async read({ name, bytes, files }) {
+      const found = readMesh(name, bytes, files);
+      await decodePictures(found);
+      read = found;
+      const { vertices, faces, colours, materials, notes } = read;
+      return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, hasMaterials: Boolean(materials), notes };
     },
-    pack({ isGlass }) {
+    /** `material`: "file", of the mesh's own materials, or one for all of it; `gathers` and `headroom` are those of frames. */
+    pack({ material, gathers, headroom }) {
       const begin = performance.now();
       const mesh = read ?? raw;
       read = null;
-      const packed = library.pack(mesh, isGlass);
+      const { manifest } = library;
+      const own = material === "file" ? surfacesOf(library, mesh, { manifest, gathers, headroom }) : null;
+      const surfaces = own ?? { surfaces: [plainSurface(mesh, material === "glass", 1 / headroom)], surfaceOf: new Int32Array(mesh.faces.length / 3) };
+      const packed = { ...library.pack(mesh, surfaces), entries: own?.entries ?? null, notes: own?.notes ?? [] };
       raw = mesh;
-      return { packed, records: library.records(packed), milliseconds: performance.now() - begin };
+      return { packed, records: library.records(packed), textures: library.textureMemories(), milliseconds: performance.now() - begin };
     },
-    load({ records }) {
+    load({ records, textures }) {
       library.load(records);
+      library.loadMemories(textures);
       return {};
     },
     /** Encodes the room of a photo and its depth, for the maps of a design (room.js). */

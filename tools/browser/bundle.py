@@ -13,11 +13,11 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
 #: Modules after those that they import.
 WORKER = (
-    *("design", "library", "corners", "gltfchecks", "gltfdocument", "gltf", "meshes", "photo", "sums"),
-    *("depth", "encoder", "room", "rtl", "worker"),
+    *("design", "library", "corners", "gltfchecks", "gltfdocument", "gltfmaterials", "gltf", "meshes", "photo", "sums"),
+    *("surfaces", "depth", "encoder", "room", "rtl", "worker"),
 )
 PAGE = (
-    *("camera", "design", "photo", "roomview", "path", "panels", "orbit", "queue", "renderer", "state"),
+    *("camera", "design", "photo", "surfaces", "roomview", "path", "panels", "orbit", "queue", "renderer", "state"),
     *("moves", "recording", "view", "notes", "picture", "raypanel", "files", "visitor", "rtlpanel", "page"),
 )
 

@@ -14,7 +14,7 @@ const { width, height, manifest } = job;
 const library = await Library.from(readFileSync(job.module));
 library.open(manifest);
 const packed = library.pack({ vertices: read(job.vertices, Float64Array), faces: read(job.faces, Int32Array) });
-const scene = { state: { ...DEFAULTS, design: job.design }, mesh: { hasColours: false }, manifest, packed };
+const scene = { state: { ...DEFAULTS, design: job.design }, mesh: { hasColours: false }, manifest, packed: { ...packed, entries: null, notes: [] } };
 library.openView(new Uint8Array(readFileSync(job.view)));
 const frames = job.pixels.map(([x, y]) => {
   const { camera, lights, registers } = ofPixel(viewOf(scene, null, width, height, START), { x, y, width, height });

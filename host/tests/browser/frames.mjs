@@ -2,7 +2,7 @@
 // It writes records.bin, and colours, triangles and counters of the frame, by the RTL too if the job names its module.
 
 import { readFileSync, writeFileSync } from "node:fs";
-import { Library } from "../../../site/library.js";
+import { Library, plainSurface } from "../../../site/library.js";
 import { renderRtl } from "../../../site/rtl.js";
 
 const folder = process.argv[2];
@@ -10,10 +10,8 @@ const read = (name, Array) => new Array(Uint8Array.from(readFileSync(`${folder}/
 const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
 const library = await Library.from(readFileSync(job.module));
 library.open(job.manifest);
-const packed = library.pack(
-  { vertices: read("vertices.bin", Float64Array), faces: read("faces.bin", Int32Array), normals: read("normals.bin", Float64Array) },
-  job.isGlass,
-);
+const mesh = { vertices: read("vertices.bin", Float64Array), faces: read("faces.bin", Int32Array), normals: read("normals.bin", Float64Array) };
+const packed = library.pack(mesh, { surfaces: [plainSurface(mesh, job.isGlass)], surfaceOf: new Int32Array(mesh.faces.length / 3) });
 writeFileSync(`${folder}/records.bin`, library.records(packed));
 writeFileSync(`${folder}/packed.json`, JSON.stringify(packed));
 const { writes, width, height } = job.frame;

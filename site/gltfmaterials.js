@@ -1,0 +1,108 @@
+// The materials of a glTF document, as host/colonnade/mesh/materials/materials.py and files/gltf_textures.py read them, with the
+// pictures of their textures, which decodePictures (surfaces.js) decodes.
+
+const [IOR, MOST_IOR] = [1.5, 4];
+const METAL = 0.5;
+/** Roughness up to which a metal emits nothing. */
+const MIRROR_ROUGHNESS = 0.35;
+const WRAPS = new Map([[33648, 1], [33071, 2]]);
+const NEAREST = 9728;
+const USED = ["transmission", "ior", "emissive_strength", "pbrSpecularGlossiness"].map((name) => `KHR_materials_${name}`);
+const LOST = { normalTexture: "normal maps", occlusionTexture: "occlusion maps" };
+
+const clamped = (value) => Math.max(0, Math.min(1, value));
+const number = (value, otherwise) => (Number.isFinite(value) ? value : otherwise);
+const colour = (values, otherwise) => (Array.isArray(values) && values.length >= 3 ? otherwise.map((value, i) => clamped(number(values[i], value))) : otherwise);
+
+export class GltfMaterials {
+  /** `notes`: a set that takes what pictures do not show. */
+  constructor(document, notes) {
+    Object.assign(this, { document, notes, textures: [], places: new Map(), materials: [], numbers: new Map() });
+  }
+
+  /** The number in `materials` of that of a primitive, which may have none. */
+  numberOf(index) {
+    if (!this.numbers.has(index)) {
+      this.numbers.set(index, this.materials.length);
+      this.materials.push(index === undefined ? { kind: "diffuse", albedo: [0.8, 0.8, 0.8], roughness: 0, ior: IOR, emission: [0, 0, 0] } : this.read(this.document.entry("materials", index)));
+    }
+    return this.numbers.get(index);
+  }
+
+  /** The number of a material without the textures for which a primitive has no positions. */
+  without(number, base, metal) {
+    const found = { ...this.materials[number], ...(base ? { base: null } : {}), ...(metal ? { metal: null } : {}) };
+    return this.materials.push(found) - 1;
+  }
+
+  /** A material; `base`, `metal` and `emissive` are the uses of its textures, or null; `factors` those of metal and roughness. */
+  read(material) {
+    const { extensions = {} } = material;
+    const extension = (name) => extensions[`KHR_materials_${name}`] ?? {};
+    const surface = this.surfaceOf(material, extensions.KHR_materials_pbrSpecularGlossiness);
+    const [metallic, roughness] = [number(surface.metallicFactor, 1), clamped(number(surface.roughnessFactor, 1))];
+    const albedo = colour(surface.baseColorFactor, [1, 1, 1]);
+    const strength = Math.max(0, number(extension("emissive_strength").emissiveStrength, 1));
+    const emission = colour(colour(material.emissiveFactor, [0, 0, 0]).map((value) => strength * value), [0, 0, 0]);
+    const given = number(extension("ior").ior, IOR);
+    const isGlass = number(extension("transmission").transmissionFactor, 0) > 0.5;
+    const [base, metal] = [surface.baseColorTexture, surface.metallicRoughnessTexture].map((info) => this.use(info));
+    const isMetal = !surface.metallicRoughnessTexture && metallic >= METAL;
+    for (const [name, what] of Object.entries(LOST)) if (material[name]) this.notes.add(`${what} are left out: the command line ${name === "normalTexture" ? "bakes" : "names"} them`);
+    if (["MASK", "BLEND"].includes(material.alphaMode)) this.notes.add("surfaces with alpha are opaque: the command line cuts them out");
+    for (const name of Object.keys(extensions)) if (!USED.includes(name)) this.notes.add(`${name} is ignored`);
+    return {
+      kind: isGlass ? "glass" : isMetal ? "mirror" : "diffuse",
+      albedo,
+      ior: given > 1 ? Math.min(given, MOST_IOR) : IOR,
+      roughness: isGlass || isMetal ? roughness : 0,
+      emission: isMetal && roughness <= MIRROR_ROUGHNESS ? [0, 0, 0] : emission,
+      base,
+      metal: isGlass ? null : metal,
+      factors: [metallic, number(surface.roughnessFactor, 1)],
+      emissive: emission.some(Boolean) ? this.use(material.emissiveTexture) : null,
+    };
+  }
+
+  surfaceOf({ pbrMetallicRoughness: surface = { metallicFactor: 0 } }, older) {
+    if (!older) return surface;
+    const { glossinessFactor, diffuseFactor, diffuseTexture } = older;
+    return { metallicFactor: 0, roughnessFactor: 1 - number(glossinessFactor, 1), baseColorFactor: diffuseFactor, baseColorTexture: diffuseTexture };
+  }
+
+  /** The use of a texture: its number in `textures`, the name of the positions in it, and a function from the file's; or null. */
+  use(info) {
+    if (!info) return null;
+    const { document } = this;
+    const entry = document.entry("textures", info.index);
+    const source = entry.extensions?.EXT_texture_webp?.source ?? entry.source;
+    if (source === undefined) {
+      this.notes.add("textures whose pictures are not PNG, JPEG or WebP are left out");
+      return null;
+    }
+    const { wrapS, wrapT, magFilter } = entry.sampler === undefined ? {} : document.entry("samplers", entry.sampler);
+    const [wrapU, wrapV, isNearest] = [WRAPS.get(wrapS) ?? 0, WRAPS.get(wrapT) ?? 0, Number(magFilter === NEAREST)];
+    const key = [source, wrapU, wrapV, isNearest].join();
+    if (!this.places.has(key)) {
+      this.places.set(key, this.textures.length);
+      this.textures.push({ picture: this.picture(source), wrapU, wrapV, isNearest });
+    }
+    const { texCoord, offset = [0, 0], rotation = 0, scale = [1, 1] } = info.extensions?.KHR_texture_transform ?? {};
+    if (![...offset, rotation, ...scale].every(Number.isFinite)) throw document.error("the transform of a texture is not valid: export it again");
+    const [cosine, sine] = [Math.cos(rotation), Math.sin(rotation)];
+    const place = ([u, v]) => [cosine * scale[0] * u + sine * scale[1] * v + offset[0], -sine * scale[0] * u + cosine * scale[1] * v + offset[1]];
+    return { texture: this.places.get(key), coordinates: `TEXCOORD_${texCoord ?? info.texCoord ?? 0}`, place };
+  }
+
+  /** The bytes of a picture's file; null if it is missing. */
+  picture(source) {
+    const { document } = this;
+    const { bufferView, uri } = document.entry("images", source);
+    if (bufferView !== undefined) {
+      const { buffer, byteOffset = 0, byteLength = 0 } = document.entry("bufferViews", bufferView);
+      return document.buffer(buffer).subarray(byteOffset, byteOffset + byteLength);
+    }
+    if (uri === undefined) throw document.error(`image ${source} has no picture: export it again`);
+    return document.file(uri, `image ${source}`);
+  }
+}

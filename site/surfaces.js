@@ -1,0 +1,155 @@
+// What the faces of a mesh are on a design: entries of its material table, and textures, colours or glass of the faces.
+
+import { hasRegister } from "./design.js";
+import { decode } from "./photo.js";
+
+/** As host/colonnade/mesh/materials/materials.py. */
+const [MIRROR_ROUGHNESS, SHARP_ROUGHNESS, GLASS_ROUGHNESS] = [0.35, 0.25, 0.5];
+/** Pixels of textures, together: more are halved; and of one mesh at most. */
+const [KEPT_PIXELS, MOST_PIXELS] = [1 << 25, 1 << 29];
+
+/** The share of light that microfacets reflect at once (docs/gather.md). */
+export const microfacetAlbedo = (roughness) => 1 - roughness ** 4 / (0.25 + 0.9 * roughness ** 2 + 0.55 * roughness ** 4);
+
+/** The pixels of a picture's bytes, red, green and blue. */
+async function decodedPicture(bytes) {
+  const bitmap = await createImageBitmap(new Blob([bytes]), { premultiplyAlpha: "none", colorSpaceConversion: "none" });
+  const { width, height } = bitmap;
+  if (width * height > MOST_PIXELS) throw new Error("too large");
+  const context = new OffscreenCanvas(width, height).getContext("2d");
+  context.drawImage(bitmap, 0, 0);
+  const { data } = context.getImageData(0, 0, width, height);
+  return { width, height, pixels: Uint8Array.from({ length: 3 * width * height }, (_, i) => data[4 * Math.floor(i / 3) + (i % 3)]) };
+}
+
+/** Decodes the pictures of a mesh's textures; surfaces of one that cannot be have their plain colours. */
+export async function decodePictures(mesh, decodePicture = decodedPicture) {
+  for (const texture of mesh.textures ?? []) Object.assign(texture, texture.picture ? await decodePicture(texture.picture).catch(() => null) : null);
+  const isMissing = (use) => use && !mesh.textures[use.texture].pixels;
+  for (const material of mesh.materials ?? [])
+    for (const name of ["base", "metal", "emissive"])
+      if (isMissing(material[name])) {
+        material[name] = null;
+        mesh.notes.push("pictures of textures are missing, damaged or of another format than PNG, JPEG and WebP: their surfaces have plain colours");
+      }
+  while ((mesh.textures ?? []).reduce((sum, { pixels }) => sum + (pixels?.length ?? 0) / 3, 0) > KEPT_PIXELS) mesh.textures.forEach(halve);
+  mesh.notes = [...new Set(mesh.notes)];
+}
+
+/** Every second pixel of a texture, as the mean of the four. */
+function halve(texture) {
+  const { width, height, pixels } = texture;
+  if (!pixels) return;
+  const [columns, rows] = [width, height].map((length) => Math.ceil(length / 2));
+  const at = (x, y, channel) => pixels[3 * (Math.min(y, height - 1) * width + Math.min(x, width - 1)) + channel];
+  const mean = (i) => {
+    const [x, y, channel] = [2 * (Math.floor(i / 3) % columns), 2 * Math.floor(i / 3 / columns), i % 3];
+    return (at(x, y, channel) + at(x + 1, y, channel) + at(x, y + 1, channel) + at(x + 1, y + 1, channel)) / 4;
+  };
+  Object.assign(texture, { width: columns, height: rows, pixels: Uint8Array.from({ length: 3 * columns * rows }, (_, i) => mean(i)) });
+}
+
+/** The mean linear colour of a texture. */
+function meanOf(texture) {
+  const sums = [0, 0, 0];
+  texture.pixels.forEach((code, i) => (sums[i % 3] += decode(code)));
+  return sums.map((sum) => (3 * sum) / texture.pixels.length);
+}
+
+/** The material that a design shows of a file's (`as_rendered`, `in_layer`); metal of at least the roughness of a lobe is "metal". */
+function rendered(material, gathers, hasBounces) {
+  const { kind, roughness, albedo } = material;
+  if (!hasBounces || kind === "diffuse" || (kind === "mirror" && !gathers && roughness > MIRROR_ROUGHNESS)) return { ...material, kind: "diffuse", roughness: 0 };
+  if (!gathers) return { ...material, roughness: 0 };
+  if (kind === "glass") return { ...material, roughness: Math.min(roughness, GLASS_ROUGHNESS) };
+  return { ...material, kind: roughness < SHARP_ROUGHNESS ? "mirror" : "metal", albedo: albedo.map((value) => value * microfacetAlbedo(roughness)) };
+}
+
+/** The areas of faces. */
+function areasOf({ vertices, faces }) {
+  const at = (corner, axis) => vertices[3 * faces[corner] + axis];
+  return Float64Array.from({ length: faces.length / 3 }, (_, face) => {
+    const [a, b] = [1, 2].map((corner) => [0, 1, 2].map((axis) => at(3 * face + corner, axis) - at(3 * face, axis)));
+    return Math.hypot(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]) / 2;
+  });
+}
+
+/** The materials of a mesh with those of metallic-roughness maps, and that of each face. */
+function mapped(library, { materials, materialOf, metalUvs, textures }) {
+  const found = [...materials];
+  const numbers = new Map();
+  const faces = Int32Array.from(materialOf);
+  materials.forEach((material, number) => {
+    if (!material.metal || material.kind !== "diffuse") return;
+    const own = [...materialOf.keys()].filter((face) => materialOf[face] === number);
+    const uvs = Float64Array.from(own.flatMap((face) => [...metalUvs.subarray(6 * face, 6 * face + 6)]));
+    const { isMetal, roughness } = library.metal(textures[material.metal.texture], uvs, material.factors);
+    own.forEach((face, i) => {
+      if (!isMetal[i]) return;
+      const key = [number, roughness[i]].join();
+      const emission = roughness[i] > MIRROR_ROUGHNESS ? material.emission : [0, 0, 0];
+      if (!numbers.has(key)) numbers.set(key, found.push({ ...material, kind: "mirror", roughness: roughness[i], emission }) - 1);
+      faces[face] = numbers.get(key);
+    });
+  });
+  return { found, faces };
+}
+
+/**
+ * The materials of a file on a design: `entries` of its table, as `rendered` has them, `surfaces` and `surfaceOf` for
+ * Library.pack, and notes. `gathers` and `headroom` are those of the frame.
+ */
+export function surfacesOf(library, mesh, { manifest, gathers, headroom }) {
+  const most = manifest.config.frame.materials;
+  const notes = [];
+  const { found, faces } = mapped(library, mesh);
+  const areas = new Float64Array(found.length);
+  areasOf(mesh).forEach((area, face) => (areas[faces[face]] += area));
+  const [hasTextures, hasCorners, hasBounces] = [Boolean(manifest.texture), hasRegister(manifest, "materials[0].hasCornerColours"), manifest.config.frame.maxBounces > 0];
+  const means = mesh.textures.map((texture) => (texture.pixels ? meanOf(texture) : null));
+  const prepared = found.map((material) => {
+    const scaled = (colour, use) => (use ? colour.map((value, i) => value * means[use.texture][i]) : colour);
+    const isTextured = Boolean(material.base) && hasTextures;
+    if (material.base && !hasTextures) notes.push("this hardware has no textures: their surfaces have mean colours");
+    const emission = scaled(material.emission, material.emissive);
+    return { ...material, emission, isTextured, paint: material.albedo, albedo: isTextured ? material.albedo : scaled(material.albedo, material.base) };
+  });
+  /** What materials differ in that share no entry: the colours of textures and corners are of no account. */
+  const keyOf = ({ kind, ior, emission, isTextured, albedo }) => JSON.stringify([kind, kind === "glass" && ior, emission, isTextured, !isTextured && !hasCorners && albedo]);
+  const merge = () => {
+    const kinds = [...new Set(prepared.map(keyOf))];
+    const merged = library.merged(prepared.map(({ roughness }) => roughness), areas, prepared.map((one) => kinds.indexOf(keyOf(one))), most);
+    const changed = prepared.filter((material, i) => material.roughness !== merged[i]).length;
+    if (changed) notes.push(`the roughness of ${changed} materials is that of similar ones: this hardware has ${most}`);
+    return prepared.map((material, i) => ({ ...material, roughness: merged[i] }));
+  };
+  const shown = (materials) => materials.map((material) => rendered(material, gathers, hasBounces));
+  const distinct = (materials) => new Set(materials.map((one) => keyOf(one) + one.roughness)).size;
+  const used = (materials) => materials.filter((_, i) => areas[i] > 0);
+  const all = shown(distinct(used(shown(prepared))) > most ? merge() : prepared);
+  const entries = [];
+  const places = new Map();
+  const order = [...all.keys()].sort((a, b) => areas[b] - areas[a]);
+  const near = (a, b) => 4 * Number(a.isTextured !== b.isTextured) + 2 * Number(a.kind !== b.kind) + Math.abs(a.roughness - b.roughness) + a.albedo.reduce((sum, value, i) => sum + Math.abs(value - b.albedo[i]), 0) / 3;
+  const surfaces = [];
+  for (const number of order) {
+    const material = all[number];
+    const key = keyOf(material) + material.roughness;
+    if (!places.has(key) && entries.length < most) places.set(key, entries.push({ ...material, hasColours: hasCorners && !material.isTextured, hasTexture: material.isTextured }) - 1);
+    if (!places.has(key)) {
+      const candidates = entries.map((entry, i) => ({ i, apart: near(entry, material) })).sort((a, b) => a.apart - b.apart);
+      places.set(key, candidates[0].i);
+      if (areas[number] > 0) notes.push(`the mesh has more kinds of materials than this hardware: ${most}; small ones are like others`);
+    }
+    const entry = places.get(key);
+    const isDiffuse = material.kind === "diffuse";
+    surfaces[number] = {
+      entry,
+      isGlass: entries[entry].kind === "glass",
+      texture: material.isTextured && entries[entry].hasTexture ? material.base.texture : -1,
+      hasColours: entries[entry].hasColours,
+      factor: (material.isTextured ? material.paint : material.albedo).map((value) => value / (isDiffuse ? headroom : 1)),
+    };
+  }
+  return { entries, surfaces, surfaceOf: faces, notes: [...new Set(notes)] };
+}
