@@ -1,10 +1,10 @@
 // The materials of a glTF document, as host/colonnade/mesh/materials/materials.py and files/gltf_textures.py read them, with the
 // pictures of their textures, which decodePictures (surfaces.js) decodes.
 
+import { MIRROR_ROUGHNESS } from "./surfaces.js";
+
 const [IOR, MOST_IOR] = [1.5, 4];
 const METAL = 0.5;
-/** Roughness up to which a metal emits nothing. */
-const MIRROR_ROUGHNESS = 0.35;
 const WRAPS = new Map([[33648, 1], [33071, 2]]);
 const NEAREST = 9728;
 const USED = ["transmission", "ior", "emissive_strength", "pbrSpecularGlossiness"].map((name) => `KHR_materials_${name}`);

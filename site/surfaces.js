@@ -3,8 +3,9 @@
 import { hasRegister } from "./design.js";
 import { decode } from "./photo.js";
 
-/** As host/colonnade/mesh/materials/materials.py. */
-const [MIRROR_ROUGHNESS, SHARP_ROUGHNESS, GLASS_ROUGHNESS] = [0.35, 0.25, 0.5];
+/** As host/colonnade/mesh/materials/materials.py: the largest roughness of a metal that emits nothing, and is nearer to a mirror. */
+export const MIRROR_ROUGHNESS = 0.35;
+const [SHARP_ROUGHNESS, GLASS_ROUGHNESS] = [0.25, 0.5];
 /** Pixels of textures, together: more are halved; and of one mesh at most. */
 const [KEPT_PIXELS, MOST_PIXELS] = [1 << 25, 1 << 29];
 
@@ -64,6 +65,9 @@ function rendered(material, gathers, hasBounces) {
   if (kind === "glass") return { ...material, roughness: Math.min(roughness, GLASS_ROUGHNESS) };
   return { ...material, kind: roughness < SHARP_ROUGHNESS ? "mirror" : "metal", albedo: albedo.map((value) => value * microfacetAlbedo(roughness)) };
 }
+
+/** An entry of the material table, in values that a message holds. */
+const entryOf = ({ kind, roughness, ior, albedo, emission, isTextured }, hasCorners) => ({ kind, roughness, ior, albedo, emission, hasColours: hasCorners && !isTextured, hasTexture: isTextured });
 
 /** The areas of faces. */
 function areasOf({ vertices, faces }) {
@@ -130,12 +134,12 @@ export function surfacesOf(library, mesh, { manifest, gathers, headroom }) {
   const entries = [];
   const places = new Map();
   const order = [...all.keys()].sort((a, b) => areas[b] - areas[a]);
-  const near = (a, b) => 4 * Number(a.isTextured !== b.isTextured) + 2 * Number(a.kind !== b.kind) + Math.abs(a.roughness - b.roughness) + a.albedo.reduce((sum, value, i) => sum + Math.abs(value - b.albedo[i]), 0) / 3;
+  const near = (a, b) => 4 * Number(a.hasTexture !== b.isTextured) + 2 * Number(a.kind !== b.kind) + Math.abs(a.roughness - b.roughness) + a.albedo.reduce((sum, value, i) => sum + Math.abs(value - b.albedo[i]), 0) / 3;
   const surfaces = [];
   for (const number of order) {
     const material = all[number];
     const key = keyOf(material) + material.roughness;
-    if (!places.has(key) && entries.length < most) places.set(key, entries.push({ ...material, hasColours: hasCorners && !material.isTextured, hasTexture: material.isTextured }) - 1);
+    if (!places.has(key) && entries.length < most) places.set(key, entries.push(entryOf(material, hasCorners)) - 1);
     if (!places.has(key)) {
       const candidates = entries.map((entry, i) => ({ i, apart: near(entry, material) })).sort((a, b) => a.apart - b.apart);
       places.set(key, candidates[0].i);

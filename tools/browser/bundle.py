@@ -13,8 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
 #: Modules after those that they import.
 WORKER = (
-    *("design", "library", "corners", "gltfchecks", "gltfdocument", "gltfmaterials", "gltf", "meshes", "photo", "sums"),
-    *("surfaces", "depth", "encoder", "room", "rtl", "worker"),
+    *("design", "library", "corners", "gltfchecks", "gltfdocument", "photo", "surfaces", "gltfmaterials", "gltf"),
+    *("meshes", "sums", "depth", "encoder", "room", "rtl", "worker"),
 )
 PAGE = (
     *("camera", "design", "photo", "surfaces", "roomview", "path", "panels", "orbit", "queue", "renderer", "state"),
@@ -38,7 +38,8 @@ def joined(names: Sequence[str]) -> str:
         if missing := set(_IMPORT.findall(text)) - set(names[:index]):
             raise ValueError(f"site/{name}.js imports {', '.join(sorted(missing))}, which is not before it")
         text = _EXPORT.sub("", _IMPORT.sub("", text))
-        for top in re.findall(r"^(?:async )?(?:function|class|const|let) (\w+)", text, re.MULTILINE):
+        tops = re.findall(r"^(?:async )?(?:function|class|const|let) (\w+|\[[^\]]*\])", text, re.MULTILINE)
+        for top in re.findall(r"\w+", " ".join(tops)):
             if top in owners:
                 raise ValueError(f"site/{name}.js and site/{owners[top]}.js both define {top}")
             owners[top] = name

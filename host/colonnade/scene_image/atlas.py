@@ -55,23 +55,22 @@ def make_atlas(mesh: Mesh, materials: Sequence[MeshMaterial], headroom: float, e
 
     textures = np.array([-1 if one.texture is None else one.texture for one in materials], dtype=np.int32)
     factors = [np.array(one.albedo) / (headroom if one.kind == "diffuse" else 1.0) for one in materials]
-    shown = textures[mesh.face_materials]
-    if mesh.corner_uvs is None or (shown < 0).all():
+    textured = textures[mesh.face_materials]
+    if mesh.corner_uvs is None or (textured < 0).all():
         return None
     found = _core.atlas(
         mesh.corner_uvs,
-        shown,
+        textured,
         np.array(factors)[mesh.face_materials],
         [texture.compiled for texture in mesh.textures],
         LINEAR,
         edge,
     )
     if found is None:
-        most, used = (edge // TILE) ** 2, np.unique(mesh.face_materials[shown >= 0])
-        raise UserError(f"mesh {mesh.name} has {len(used):,} textured materials: use at most {most:,}")
-    sizes = [3 * width * height for width, height in (mesh.textures[index].size for index in set(shown[shown >= 0]))]
+        limit, used = (edge // TILE) ** 2, np.unique(mesh.face_materials[textured >= 0])
+        raise UserError(f"mesh {mesh.name} has {len(used):,} textured materials: use at most {limit:,}")
     colours, uvs, scale = found
-    return Atlas(colours, uvs, scale, sum(sizes))
+    return Atlas(colours, uvs, scale, sum(mesh.textures[index].pixels.size for index in set(textured[textured >= 0])))
 
 
 def uv_codes(atlas: Atlas, fraction_bits: int) -> npt.NDArray[np.int64]:

@@ -94,7 +94,7 @@ mesh::Picture<std::uint8_t> pictureOf(const colonnade_texture& texture) {
 }
 
 /// Three corners of a face, backwards if the face was reversed.
-template <class Corners> Corners turned(Corners corners, bool isReversed) {
+template <class Corners> Corners inFaceOrder(Corners corners, bool isReversed) {
     if (isReversed) std::reverse(corners.begin(), corners.end());
     return corners;
 }
@@ -120,7 +120,7 @@ std::vector<Codes> cornerCodes(const colonnade_mesh& mesh, const mesh::CleanMesh
                 const double colour = mesh.colours ? std::clamp(mesh.colours[9 * source + at], 0.0, 1.0) : 1.0;
                 own[at / 3][at % 3] = static_cast<std::int64_t>(std::rint(colour * surface.factor[at % 3] * white));
             }
-            codes[i] = turned(own, clean.winding.reversed[i]);
+            codes[i] = inFaceOrder(own, clean.winding.reversed[i]);
         }
     }
     return codes;
@@ -239,7 +239,7 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
         isTextured |= surface.texture >= 0;
         if (given.uvs) {
             std::memcpy(&uvs[i], given.uvs + 6 * clean.sources[i], sizeof uvs[i]);
-            uvs[i] = turned(uvs[i], clean.winding.reversed[i]);
+            uvs[i] = inFaceOrder(uvs[i], clean.winding.reversed[i]);
         }
     }
     std::optional<mesh::Atlas> atlas;

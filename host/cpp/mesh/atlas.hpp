@@ -47,11 +47,11 @@ public:
         for (Region& region : regions_) unwrap(region, faces);
         std::vector<Pair> pixels;
         for (const Region& region : regions_) pixels.push_back(pixelsOf(region));
-        AtlasRegions places(pixels, edge_);
-        Atlas atlas{std::vector<Vector>(edge_ * edge_), std::vector<Triangle>(faces.size()), places.scale()};
+        AtlasRegions packing(pixels, edge_);
+        Atlas atlas{std::vector<Vector>(edge_ * edge_), std::vector<Triangle>(faces.size()), packing.scale()};
         for (std::size_t i = 0; i < regions_.size(); ++i) {
-            regions_[i].corner = places.corner(i);
-            regions_[i].size = places.size(i);
+            regions_[i].corner = packing.corner(i);
+            regions_[i].size = packing.size(i);
         }
         std::vector<std::uint8_t> isHidden(edge_ * edge_, 1);
         for (const Region& region : regions_) {
@@ -81,7 +81,7 @@ private:
 
     /// Samples of the texture along each axis of a texel, at most; texels around faces that count as shown, as positions are
     /// rounded.
-    static constexpr int mostSamples = 8, margin = 1;
+    static constexpr int maxSamples = 8, margin = 1;
 
     /// Moves positions by whole periods, so that they cover a small part.
     void unwrap(Region& region, const std::vector<Triangle>& faces) const {
@@ -134,7 +134,7 @@ private:
         const Pair pixels = pixelsOf(region);
         const auto [width, height] = region.size;
         const double ratio = std::max(pixels[0] / static_cast<double>(width), pixels[1] / static_cast<double>(height));
-        const int samples = std::clamp(static_cast<int>(std::ceil(ratio)), 1, mostSamples);
+        const int samples = std::clamp(static_cast<int>(std::ceil(ratio)), 1, maxSamples);
         const auto along = [&](std::int64_t texel, int sample, int axis) {
             const double at = (static_cast<double>(texel * samples + sample) + 0.5) / samples / static_cast<double>(region.size[axis]);
             return region.low[axis] + at * (region.high[axis] - region.low[axis]);

@@ -1,4 +1,4 @@
-/// The places of an atlas's regions: whole tiles, in rows.
+/// The corners and sizes of an atlas's regions: whole tiles, in rows.
 #pragma once
 
 #include <utility>
@@ -21,7 +21,7 @@ inline std::int64_t tiled(std::int64_t length) { return (length + atlasTile - 1)
 class AtlasRegions {
 public:
     /// `pixels`: of the parts of textures that are shown, width and height; at most as many as tiles. `edge`: of the atlas, texels.
-    AtlasRegions(const std::vector<Pair>& pixels, std::int64_t edge) : edge_(edge), sizes_(pixels.size()), corners_(pixels.size()), scale_(place(pixels)) {}
+    AtlasRegions(const std::vector<Pair>& pixels, std::int64_t edge) : edge_(edge), sizes_(pixels.size()), corners_(pixels.size()), scale_(fitted(pixels)) {}
 
     /// Texels for each pixel of a texture that is not enlarged, along an axis.
     double scale() const { return scale_; }
@@ -37,7 +37,7 @@ private:
     static constexpr int steps = 24;
 
     /// Places the regions at the largest scale at which they fit, small ones enlarged where that costs the others little.
-    double place(std::vector<Pair> pixels) {
+    double fitted(std::vector<Pair> pixels) {
         std::vector<bool> isSmall;
         for (const Pair& each : pixels) isSmall.push_back(each[0] <= small && each[1] <= small);
         double scale = placed(pixels);

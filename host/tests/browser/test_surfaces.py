@@ -97,8 +97,8 @@ def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: floa
 
     mesh = load_mesh(tmp_path / "sheet.gltf", corner_colours=True)
     found = json.loads((tmp_path / "entries.json").read_text())
-    shown = [in_layer(as_rendered(one, gathers=True), "surface") for one in mesh.materials]
-    keys = [(KINDS.get(one.kind, one.kind), one.roughness, one.texture is not None) for one in shown]
+    rendered = [in_layer(as_rendered(one, gathers=True), "surface") for one in mesh.materials]
+    keys = [(KINDS.get(one.kind, one.kind), one.roughness, one.texture is not None) for one in rendered]
     order = [keys.index((one["kind"], one["roughness"], one["hasTexture"])) for one in found["entries"]]
     assert sorted(order) == list(range(len(mesh.materials))) and len(order) > 4
     assert not found["notes"]
