@@ -114,6 +114,11 @@ class Accumulation:
         means = (self.objects + self.background) / self.white / self.samples
         return np.asarray(means.clip(max=1.0), dtype=np.float64)
 
+    def before(self, sky: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """The object before a picture of everything else, linear; its samples that miss the object show that."""
+        others = (self.samples - self.coverage)[..., None]
+        return np.asarray(((self.objects / self.white + sky * others) / self.samples).clip(max=1.0))
+
     def over(
         self, photo: npt.NDArray[np.float64], strength: npt.NDArray[np.uint8] | None = None
     ) -> npt.NDArray[np.float64]:

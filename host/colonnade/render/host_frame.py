@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport
 from colonnade.render.result import RenderResult
+from colonnade.render.sky import sky_of
 from colonnade.scene.model import Denoiser, Scene
 
 
@@ -60,12 +62,17 @@ class HostFrame:
         """The picture of sums, with those of all layers: linear, float64 [height, width, 3]."""
         if self.relit:
             return sums.image()
-        return composited(sums, self.prepared.photo, self.prepared.strength, self.look, self.number)
+        return composited(sums, self.prepared.photo, self.prepared.strength, self.look, self.number, self.sky)
+
+    @cached_property
+    def sky(self) -> Floats | None:
+        """What is behind the object in place of the device's background (`sky_of`)."""
+        return sky_of(self.passes, self.prepared.image.header.extent, self.size)
 
     def pixels(self, passes: FramePasses, is_whole: bool = True) -> npt.NDArray[np.uint8]:
         """The picture of passes, as `RenderResult.pixels` has it; with passes to come it is not filtered."""
         sums = self._sums(passes) if is_whole else passes.whole
-        if self.relit or self.prepared.photo is None:
+        if self.relit or (self.prepared.photo is None and self.sky is None):
             return sums.pixels()
         return encode_srgb(self.image(sums))
 

@@ -28,6 +28,7 @@ from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
+from colonnade.render.sky import sky_of
 from colonnade.scene.cameras import check_camera
 from colonnade.scene.lit_room import LitRoom, lit_room, scene_room, view_photo
 from colonnade.scene.model import Scene
@@ -158,7 +159,7 @@ def traced_frames(
             layers[layer] = layers[layer] + sums if layer in layers else sums
         assert first is not None
         sums = layers.pop("surface").with_layers(layers.values())
-        image = composited(sums, photo, room.strength, look, number)
+        image = composited(sums, photo, room.strength, look, number, sky_of(passes, mesh.extent, size))
         yield TracedFrame(image, first, sums, dict(rays), time.perf_counter() - begun)
 
 

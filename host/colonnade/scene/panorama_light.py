@@ -79,8 +79,6 @@ def panorama_light(scene: Scene, extent: Extent, room: Environment | None, max_l
             f"panorama {name} has no effect: the scene names its lights and gathers none, leave them out or set"
             " paths.gather = 1"
         )
-    elif room is None:
-        notes.tell(f"panorama {name} lights the object, and is not drawn behind it: background.colour is")
     if scene.names_light:
         return PanoramaLight(scene, panorama, True)
     found, rest = split_lights(panorama, max_lights)

@@ -163,7 +163,9 @@ def _check_combinations(data: Mapping[str, Any], in_room: bool) -> None:
         raise ValueError("background.photo is the view of one camera: leave out motion.camera")
     if "grain" in camera and not in_room:
         raise ValueError("camera.grain is of the photo of a room: it needs background.room")
-    for key in ("panorama_yaw", "panorama_exposure"):
+    if in_room and "backdrop" in background:
+        raise ValueError("background.backdrop is of scenes without a room: leave it out")
+    for key in ("panorama_yaw", "panorama_exposure", "backdrop"):
         if key in background and "panorama" not in background:
             raise ValueError(f"background.{key} is of a panorama: it needs background.panorama")
     if not in_room and "second_view" in background:

@@ -34,6 +34,8 @@ def of_a_device(scene: Scene) -> Scene:
     if keys:
         named = f"{' and '.join(keys)} {'is' if len(keys) == 1 and not gathers else 'are'}"
         notes.report([f"{named} of colonnade render: frames that a device shows by itself have one sample a pixel"])
+    if scene.background.shows_panorama:
+        notes.tell("colonnade render draws the panorama behind the object; a device by itself shows background.colour")
     return scene.with_samples(1)
 
 

@@ -81,6 +81,8 @@ class Background:
             along -z.
         panorama_exposure: Factor of its radiance. None: in a room with a photo, fitted where both show something; 1
             elsewhere.
+        backdrop: Without a room, what is behind the object: the ``panorama``, or the ``colour``. None: the panorama if
+            there is one.
         shadows: The object's shadow in a room's photo: ``photo``, none where the photo has a shadow of the room, or
             ``whole``. None: ``photo`` for lights that the scene does not name, if the room has an albedo map.
         colours: Colours of the room in reflections and refractions: ``photo``, those of its photo, or ``albedo``, its
@@ -95,8 +97,14 @@ class Background:
     panorama: File | None = None
     panorama_yaw: Annotated[Float, Interval(ge=-360.0, le=360.0)] = 0.0
     panorama_exposure: Annotated[Float, Interval(ge=1e-6, le=1e6)] | None = None
+    backdrop: Literal["panorama", "colour"] | None = None
     shadows: Literal["photo", "whole"] | None = None
     colours: Literal["photo", "albedo"] | None = None
+
+    @property
+    def shows_panorama(self) -> bool:
+        """Whether frames that the host adds up show the panorama behind the object."""
+        return self.panorama is not None and self.room is None and self.backdrop != "colour"
 
 
 @dataclass(frozen=True, config=STRICT)
