@@ -189,20 +189,23 @@ private:
         else addForm(index, slots - 1, stack, children);
     }
 
-    /// Rounds child boxes outward to multiples of 2^exponent from the node's low corner.
+    /// Rounds child boxes outward to multiples of 2^exponent, and the node's low corner down to one. The lattice of a child lies
+    /// in its parent's, so the rounded boxes of children give the same node as their exact boxes.
     void quantise(WideTree& wide, std::uint32_t index, const Box& box, const std::vector<std::int32_t>& children) const {
         const std::int64_t maximum = (std::int64_t{1} << boxBits_) - 1;
         for (int a = 0; a < 3; ++a) {
-            const std::int64_t origin = box.low[a], extent = box.high[a] - origin;
             int exponent = 0;
-            while (((extent + (std::int64_t{1} << exponent) - 1) >> exponent) > maximum) ++exponent;
-            wide.origin[index * 3 + a] = static_cast<std::uint32_t>(origin);
+            const auto floored = [&](std::int64_t at) { return at >> exponent; };
+            const auto raised = [&](std::int64_t at) { return (at + (std::int64_t{1} << exponent) - 1) >> exponent; };
+            while (raised(box.high[a]) - floored(box.low[a]) > maximum) ++exponent;
+            const std::int64_t origin = floored(box.low[a]);
+            wide.origin[index * 3 + a] = static_cast<std::uint32_t>(origin << exponent);
             wide.exponent[index * 3 + a] = static_cast<std::uint8_t>(exponent);
             for (std::size_t slot = 0; slot < children.size(); ++slot) {
                 const Box& child = tree_.nodes[children[slot]].box;
                 const std::size_t at = (index * std::size_t{arity_} + slot) * 3 + a;
-                wide.low[at] = static_cast<std::uint16_t>((child.low[a] - origin) >> exponent);
-                wide.high[at] = static_cast<std::uint16_t>((child.high[a] - origin + (std::int64_t{1} << exponent) - 1) >> exponent);
+                wide.low[at] = static_cast<std::uint16_t>(floored(child.low[a]) - origin);
+                wide.high[at] = static_cast<std::uint16_t>(raised(child.high[a]) - origin);
             }
         }
     }

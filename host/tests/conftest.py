@@ -22,7 +22,7 @@ MakeManifest = Callable[..., Manifest]
 def manifest_data(
     *,
     vertex_bits: int = 16,
-    box_bits: int = 8,
+    box_bits: int = 7,
     mac: int = 32,
     arity: int = 4,
     per_record: int = 2,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,10 +16,11 @@ from hypothesis import strategies as st
 from trees import EMPTY, LEAF, NODE, Bvh, build_bvh
 
 Integers = npt.NDArray[np.int32]
+Wide = npt.NDArray[np.int64]
 
 
 def build(vertices: Integers, faces: Integers, **changes: Any) -> Bvh:
-    options = {"triangles_per_record": 2, "arity": 4, "box_bits": 8, "stack_depth": 48} | changes
+    options = {"triangles_per_record": 2, "arity": 4, "box_bits": 7, "stack_depth": 48} | changes
     return build_bvh(vertices, faces, **options)
 
 
@@ -82,7 +84,7 @@ def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, 
     count=st.integers(1, 300),
     spread=st.sampled_from([1, 3, 1000]),
     per_record=st.sampled_from([1, 2]),
-    box_bits=st.integers(4, 12),
+    box_bits=st.integers(4, 7),
     stack_depth=st.sampled_from([4, 8, 10, 12, 48]),
 )
 def test_boxes_contain_their_triangles_in_an_order_that_arity_and_box_bits_do_not_change(
@@ -90,13 +92,77 @@ def test_boxes_contain_their_triangles_in_an_order_that_arity_and_box_bits_do_no
 ) -> None:
     vertices, faces = random_triangles(seed, count, spread)
     options = {"triangles_per_record": per_record, "stack_depth": stack_depth}
-    trees = [build(vertices, faces, arity=arity, box_bits=bits, **options) for arity, bits in ((2, 8), (4, box_bits))]
+    trees = [build(vertices, faces, arity=arity, box_bits=bits, **options) for arity, bits in ((2, 7), (4, box_bits))]
     balanced = (-(-count // per_record) - 1).bit_length()
-    for tree, bits in zip(trees, (8, box_bits), strict=True):
+    for tree, bits in zip(trees, (7, box_bits), strict=True):
         check_tree(tree, vertices, faces, per_record, bits)
         assert tree.statistics.stack_bound <= max(stack_depth, balanced)
     np.testing.assert_array_equal(trees[0].order, trees[1].order)
     assert sorted(trees[0].leaf_first.tolist()) == sorted(trees[1].leaf_first.tolist())
+
+
+def planes_of_children(tree: Bvh, vertices: Integers, faces: Integers) -> tuple[Wide, Wide]:
+    """The boxes of all children, int64 [n, arity, 3]: a leaf's is exact, a node's the union of those in its own record."""
+    present = (tree.kinds != EMPTY)[..., None]
+    shift, origin = tree.exponent[:, None, :].astype(np.int64), tree.origin[:, None, :].astype(np.int64)
+    own_low = np.where(present, origin + (tree.low.astype(np.int64) << shift), 1 << 40).min(axis=1)
+    own_high = np.where(present, origin + (tree.high.astype(np.int64) << shift), -1).max(axis=1)
+    corners = vertices[faces[tree.order]].astype(np.int64)
+    last = tree.leaf_first + tree.leaf_count - 1
+    leaf_low = np.minimum(corners[tree.leaf_first].min(axis=1), corners[last].min(axis=1))
+    leaf_high = np.maximum(corners[tree.leaf_first].max(axis=1), corners[last].max(axis=1))
+    low, high = np.zeros(tree.low.shape, np.int64), np.zeros(tree.low.shape, np.int64)
+    for kind, first, (lows, highs) in (
+        (NODE, tree.first_child, (own_low, own_high)),
+        (LEAF, tree.first_triangles, (leaf_low, leaf_high)),
+    ):
+        is_kind = tree.kinds == kind
+        index = (first[:, None] + np.cumsum(is_kind, axis=1) - 1)[is_kind]
+        low[is_kind], high[is_kind] = lows[index], highs[index]
+    return low, high
+
+
+def check_nested(tree: Bvh, vertices: Integers, faces: Integers, box_bits: int) -> None:
+    """Each node is the function of its children's records that docs/numbers.md, section 3 gives."""
+    low, high = planes_of_children(tree, vertices, faces)
+    present = (tree.kinds != EMPTY)[..., None]
+    whole_low, whole_high = np.where(present, low, 1 << 40).min(axis=1), np.where(present, high, -1).max(axis=1)
+    exponent = np.zeros(whole_low.shape, np.int64)
+    while (wide := -(-whole_high >> exponent) - (whole_low >> exponent) >= 1 << box_bits).any():
+        exponent += wide
+    np.testing.assert_array_equal(tree.exponent, exponent)
+    np.testing.assert_array_equal(tree.origin, whole_low >> exponent << exponent)
+    shift, corner = exponent[:, None], (whole_low >> exponent)[:, None]
+    np.testing.assert_array_equal(tree.low, np.where(present, (low >> shift) - corner, 0))
+    np.testing.assert_array_equal(tree.high, np.where(present, -(-high >> shift) - corner, 0))
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    count=st.integers(1, 2000),
+    spread=st.sampled_from([1, 3, 1000]),
+    vertex_bits=st.sampled_from([10, 16, 19]),
+    box_bits=st.integers(4, 7),
+    arity=st.sampled_from([2, 4]),
+)
+def test_a_node_follows_from_the_records_of_its_children(
+    seed: int, count: int, spread: int, vertex_bits: int, box_bits: int, arity: int
+) -> None:
+    vertices, faces = random_triangles(seed, count, spread, vertex_bits)
+    check_nested(build(vertices, faces, arity=arity, box_bits=box_bits), vertices, faces, box_bits)
+
+
+@pytest.mark.matrix
+def test_a_million_nodes_follow_from_the_records_of_their_children() -> None:
+    nodes = 0
+    for seed in itertools.count():
+        vertices, faces = random_triangles(seed, 60_000, (1, 30, 60_000)[seed % 3], (16, 19)[seed % 2])
+        tree = build(vertices, faces, triangles_per_record=1 + seed % 2)
+        check_nested(tree, vertices, faces, 7)
+        nodes += len(tree.kinds)
+        if nodes >= 1_000_000:
+            break
 
 
 @dataclass
@@ -211,7 +277,7 @@ def test_one_triangle_has_a_root_with_one_leaf(arity: int) -> None:
     tree = build(vertices, faces, arity=arity)
     assert tree.kinds.tolist() == [[LEAF] + [EMPTY] * (arity - 1)]
     assert tree.statistics.stack_bound == 0
-    check_tree(tree, vertices, faces, 2, 8)
+    check_tree(tree, vertices, faces, 2, 7)
 
 
 @pytest.mark.parametrize("count", [2, 3, 500, 4000])
@@ -220,7 +286,7 @@ def test_triangles_in_one_place_are_halved(count: int) -> None:
     vertices = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0]], dtype=np.int32)
     faces = np.tile(np.array([[0, 1, 2]], dtype=np.int32), (count, 1))
     tree = build(vertices, faces)
-    check_tree(tree, vertices, faces, 2, 8)
+    check_tree(tree, vertices, faces, 2, 7)
     assert len(tree.leaf_first) == -(-count // 2)
 
 
@@ -242,7 +308,7 @@ def test_a_tree_too_deep_for_the_stack_is_balanced() -> None:
     for arity in (2, 4):
         tree = build(vertices, faces, stack_depth=max(short, 18), arity=arity)
         assert tree.statistics.stack_bound <= max(short, 18)
-        check_tree(tree, vertices, faces, 2, 8)
+        check_tree(tree, vertices, faces, 2, 7)
 
 
 def test_the_order_does_not_depend_on_the_arity_when_balanced() -> None:

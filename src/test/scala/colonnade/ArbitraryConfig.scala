@@ -19,8 +19,8 @@ object ArbitraryConfig {
   } yield ArrayConfig(rows, columns, contexts)
 
   private val geometry = for {
-    vertexBits         <- Gen.chooseNum(10, 24)
-    boxBits            <- Gen.chooseNum(4, 12)
+    vertexBits         <- Gen.chooseNum(10, 19)
+    boxBits            <- Gen.chooseNum(4, 7)
     triangleBits       <- Gen.option(width)
     arity              <- Gen.oneOf(2, 4)
     trianglesPerRecord <- Gen.oneOf(1, 2)

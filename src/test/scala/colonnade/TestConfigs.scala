@@ -11,7 +11,7 @@ object TestConfigs {
     PrecisionConfig(mac = 32, sqrt = 32, div = 64),
     GeometryConfig(
       vertexBits = 16,
-      boxBits = 8,
+      boxBits = 7,
       triangleBits = None,
       arity = 4,
       trianglesPerRecord = 2,
@@ -141,7 +141,7 @@ object TestConfigs {
     withPrecision(16, 16, 32),
     withPrecision(24, 20, 40),
     withPrecision(64, 64, 64),
-    tiny.copy(geometry = tiny.geometry.copy(vertexBits = 20))
+    tiny.copy(geometry = tiny.geometry.copy(vertexBits = 19))
   )
 
   /** With corner colours, from the presets' precision to the narrowest; the last one also has textures. */

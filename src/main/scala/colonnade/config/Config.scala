@@ -57,7 +57,7 @@ object PrecisionConfig {
   */
 final case class GeometryConfig(
     vertexBits:         Int = 16,
-    boxBits:            Int = 8,
+    boxBits:            Int = 7,
     triangleBits:       Option[Int] = Some(24),
     arity:              Int = 4,
     trianglesPerRecord: Int = 2,
@@ -65,8 +65,8 @@ final case class GeometryConfig(
     cornerColours:      Boolean = false,
     textureBytes:       Int = 0
 ) {
-  Require.within("geometry.vertexBits", vertexBits, 10, 24)
-  Require.within("geometry.boxBits", boxBits, 4, 12)
+  Require.within("geometry.vertexBits", vertexBits, 10, 19)
+  Require.within("geometry.boxBits", boxBits, 4, 7)
   triangleBits.foreach(Require.within("geometry.triangleBits", _, 16, 64))
   Require.oneOf("geometry.arity", arity, Seq(2, 4))
   Require.oneOf("geometry.trianglesPerRecord", trianglesPerRecord, Seq(1, 2))

@@ -21,7 +21,9 @@ private[config] object ConfigMigration {
       renamed("units", "shortPaths", "extraSlices"),
       zeroIsDefault("units", "marches"),
       zeroIsDefault("units", "pathContexts")
-    )
+    ),
+    // Fewer bits change the box tests of a frame, not its picture
+    Seq(replaced("geometry", "boxBits")(bits => Seq("boxBits" -> bits.numOpt.fold(bits)(value => ujson.Num(value.min(7))))))
   )
 
   /** The present version; a file without one has version 1. */

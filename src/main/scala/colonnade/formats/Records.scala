@@ -15,7 +15,7 @@ object ChildKind {
   def illegal: UInt = 3.U(bits.W)
 }
 
-/** A node: up to `arity` child boxes relative to the node's corner.
+/** A node: up to `arity` child boxes relative to the node's corner, which is a multiple of 2^exponent on each axis.
   *
   * A child's planes are `origin + (low << exponent)` and `origin + (high << exponent)`, in vertex units. Children of
   * kind node lie at consecutive records from `firstChild`, in slot order; children of kind leaf are one triangles

@@ -58,8 +58,8 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
       "precision.mac"               -> (16, 64),
       "precision.sqrt"              -> (16, 64),
       "precision.div"               -> (16, 64),
-      "geometry.vertexBits"         -> (10, 24),
-      "geometry.boxBits"            -> (4, 12),
+      "geometry.vertexBits"         -> (10, 19),
+      "geometry.boxBits"            -> (4, 7),
       "geometry.triangleBits"       -> (16, 64),
       "columnBvhMemory.depth"       -> (16, 1 << 22),
       "columnBvhMemory.stackDepth"  -> (4, 256),
@@ -149,7 +149,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     }
   }
 
-  it should "migrate keys of version 1" in {
+  it should "migrate keys of older versions" in {
     def migrated(settings: (String, ujson.Value)*) = ConfigIO.read(ujson.Obj.from(settings))
     val maps                                       = PhysicalAttributeMemoryConfig()
     for ((shared, columns) <- Seq(true -> 256, false -> 1))
@@ -162,6 +162,9 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
       UnitsConfig(marches = 3, pathContexts = 9)
     migrated("physicalAttributeMemory" -> ujson.Obj("encoding" -> "slic")).physicalAttributeMemory shouldBe
       Some(maps.copy(encoding = MapEncoding.Slic))
+    for ((bits, present) <- Seq(12 -> 7, 8 -> 7, 5 -> 5))
+      migrated("version" -> 2, "geometry" -> ujson.Obj("boxBits" -> bits)).geometry shouldBe
+        GeometryConfig(boxBits = present)
   }
 
   it should "refuse newer versions, and keys of older versions in newer ones" in {

@@ -31,8 +31,8 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
     Seq("geometry.arity=2", "geometry.trianglesPerRecord=1"),
     Seq("geometry.cornerColours=true"),
     Seq("geometry.cornerColours=true", "geometry.textureBytes=16384"),
-    Seq("geometry.vertexBits=24", "geometry.boxBits=4", "columnBvhMemory.depth=16"),
-    Seq("geometry.vertexBits=10", "geometry.boxBits=12", "precision=16b16s16d", "geometry.triangleBits=null"),
+    Seq("geometry.vertexBits=19", "geometry.boxBits=4", "columnBvhMemory.depth=16"),
+    Seq("geometry.vertexBits=10", "geometry.boxBits=7", "precision=16b16s16d", "geometry.triangleBits=null"),
     Seq(
       "precision=64b64s64d",
       "geometry.triangleBits=null",

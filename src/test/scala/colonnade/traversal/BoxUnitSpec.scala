@@ -44,7 +44,7 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
         origin = Seq.fill(3)(BigInt(900)),
         shift = Seq.fill(3)(0),
         low = Seq.fill(4)(Seq.fill(3)(BigInt(0))),
-        high = Seq.fill(4)(Seq.fill(3)(BigInt(255)))
+        high = Seq.fill(4)(Seq.fill(3)(BigInt(127)))
       )
       val kinds = for (a <- 0 to 3; b <- 0 to 3; c <- 0 to 3; d <- 0 to 3) yield Seq(a, b, c, d)
       compare(
