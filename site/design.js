@@ -5,8 +5,6 @@ export function designLines(manifest) {
   const { geometry, columnBvhMemory } = manifest.config;
   const numbers = {
     ...manifest.numbers,
-    arity: geometry.arity,
-    trianglesPerRecord: geometry.trianglesPerRecord,
     bvh: Number(geometry.bvh),
     stackDepth: columnBvhMemory.stackDepth,
     recordBits: manifest.records.bits,

@@ -7,11 +7,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "wide_bvh.hpp"
+#include "packer/tree.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 namespace bvh = colonnade::bvh;
+namespace packer = colonnade::packer;
+using colonnade::nodeChildren;
 
 namespace {
 
@@ -24,40 +26,45 @@ template <typename T> nb::object array(std::vector<T>&& values, std::initializer
     return nb::cast(nb::ndarray<nb::numpy, T>(owned->data(), shape, owner));
 }
 
-std::vector<bvh::Box> boxesOf(const Integers& vertices, const Integers& faces) {
-    std::vector<bvh::Box> boxes(faces.shape(0));
-    const std::int32_t limit = 1 << 28;
-    for (std::size_t i = 0; i < faces.shape(0); ++i)
-        for (std::size_t corner = 0; corner < 3; ++corner) {
-            const std::int32_t vertex = faces(i, corner);
+packer::QuantisedMesh meshOf(const Integers& vertices, const Integers& faces) {
+    packer::QuantisedMesh mesh;
+    for (std::size_t i = 0; i < vertices.shape(0); ++i) {
+        mesh.vertices.push_back({vertices(i, 0), vertices(i, 1), vertices(i, 2)});
+        for (const std::int32_t coordinate : mesh.vertices.back())
+            if (coordinate < 0 || coordinate > 1 << 28) throw std::invalid_argument("a coordinate is out of range");
+    }
+    for (std::size_t i = 0; i < faces.shape(0); ++i) {
+        mesh.faces.push_back({faces(i, 0), faces(i, 1), faces(i, 2)});
+        mesh.meshFaces.push_back(static_cast<std::int64_t>(i));
+        for (const std::int32_t vertex : mesh.faces.back())
             if (vertex < 0 || static_cast<std::size_t>(vertex) >= vertices.shape(0)) throw std::invalid_argument("a face names a vertex that does not exist");
-            bvh::Box point;
-            for (std::size_t a = 0; a < 3; ++a) {
-                if (vertices(vertex, a) < 0 || vertices(vertex, a) > limit) throw std::invalid_argument("a coordinate is out of range");
-                point.low[a] = point.high[a] = vertices(vertex, a);
-            }
-            boxes[i].add(point);
-        }
-    return boxes;
+    }
+    return mesh;
 }
 
-nb::dict buildBvh(const Integers& vertices, const Integers& faces, unsigned perRecord, unsigned arity, unsigned boxBits, unsigned stackDepth) {
+nb::dict buildBvh(const Integers& vertices, const Integers& faces, int children, int boxBits, int stackDepth) {
     if (faces.shape(0) == 0) throw std::invalid_argument("no triangles");
-    if (perRecord < 1 || (arity != 2 && arity != 4) || boxBits < 1 || boxBits > 16) throw std::invalid_argument("unsupported tree parameters");
-    const std::vector<bvh::Box> boxes = boxesOf(vertices, faces);
+    if (children < 2 || children > nodeChildren || boxBits < 1 || boxBits > 16) throw std::invalid_argument("unsupported tree parameters");
+    const packer::QuantisedMesh mesh = meshOf(vertices, faces);
+    const std::vector<std::array<colonnade::mesh::Vector, 3>> normals(mesh.faces.size());
+    const std::vector<std::uint8_t> zeros(mesh.faces.size());
+    packer::RecordFormat format;
+    format.children = children;
+    format.boxBits = boxBits;
+    format.stackDepth = stackDepth;
     bvh::Bvh built;
     {
         nb::gil_scoped_release release;
-        built = bvh::build(boxes, perRecord, arity, boxBits, stackDepth);
+        built = packer::buildTree(mesh, {normals.data(), zeros.data(), zeros.data(), nullptr}, format);
     }
     bvh::WideTree& tree = built.tree;
     const std::size_t nodes = tree.nodes(), leaves = tree.leafFirst.size(), triangles = built.order.size();
     nb::dict out;
     out["origin"] = array(std::move(tree.origin), {nodes, 3});
     out["exponent"] = array(std::move(tree.exponent), {nodes, 3});
-    out["kinds"] = array(std::move(tree.kinds), {nodes, arity});
-    out["low"] = array(std::move(tree.low), {nodes, arity, 3});
-    out["high"] = array(std::move(tree.high), {nodes, arity, 3});
+    out["kinds"] = array(std::move(tree.kinds), {nodes, std::size_t{nodeChildren}});
+    out["low"] = array(std::move(tree.low), {nodes, std::size_t{nodeChildren}, 3});
+    out["high"] = array(std::move(tree.high), {nodes, std::size_t{nodeChildren}, 3});
     out["first_child"] = array(std::move(tree.firstChild), {nodes});
     out["first_triangles"] = array(std::move(tree.firstTriangles), {nodes});
     out["leaf_first"] = array(std::move(tree.leafFirst), {leaves});
@@ -73,6 +80,6 @@ nb::dict buildBvh(const Integers& vertices, const Integers& faces, unsigned perR
 }  // namespace
 
 void bind_bvh(nb::module_& module) {
-    module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "triangles_per_record"_a, "arity"_a, "box_bits"_a, "stack_depth"_a,
+    module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "children"_a, "box_bits"_a, "stack_depth"_a,
                "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the arrays of tests/trees.py.");
 }

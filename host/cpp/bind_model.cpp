@@ -171,9 +171,8 @@ private:
 
 void bind_model(nb::module_& module) {
     nb::class_<Model>(module, "Model", "The untimed, bit-exact model of the device.")
-        .def(
-            nb::init<const Values&, const FieldTuples&, const Values&>(), "numbers"_a, "layouts"_a, "limits"_a,
-            "From the manifest's numbers (with arity, trianglesPerRecord, stackDepth, bvh), record layouts (record -> field -> (offset, width, signed)) and register limits.")
+        .def(nb::init<const Values&, const FieldTuples&, const Values&>(), "numbers"_a, "layouts"_a, "limits"_a,
+             "From the manifest's numbers (with stackDepth, bvh), record layouts (record -> field -> (offset, width, signed)) and register limits.")
         .def("load", &Model::load, "records"_a, "Loads the column memory: uint8 [records, bytes].")
         .def("add_environment", &Model::addEnvironment, "sizes"_a, "layouts"_a, "Adds a physical-attribute memory with the manifest's attribute sizes and layouts.")
         .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a,

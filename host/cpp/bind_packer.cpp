@@ -56,18 +56,27 @@ nb::dict quantise(const Rows<double>& vertices, const Rows<std::int32_t>& faces,
 /// A quantised mesh and its tree, ready to be written as records.
 class Packing {
 public:
-    Packing(const Rows<std::int32_t>& vertices, const Rows<std::int32_t>& faces, const Column<std::int64_t>& meshFaces, const Values& format, const FieldTuples& layouts)
-        : format_{layoutsOf(layouts),         valueOf(format, "recordBits"),         valueOf(format, "vertexBits"), valueOf(format, "boxBits"),
-                  valueOf(format, "arity"),   valueOf(format, "trianglesPerRecord"), valueOf(format, "stackDepth"), valueOf(format, "normalFraction"),
-                  valueOf(format, "bvh") != 0} {
+    Packing(const Rows<std::int32_t>& vertices, const Rows<std::int32_t>& faces, const Column<std::int64_t>& meshFaces, const CornerRows<double>& normals,
+            const Column<std::uint8_t>& materials, const Column<bool>& isClear, const std::optional<CornerRows<std::int64_t>>& colours, const Values& format,
+            const FieldTuples& layouts)
+        : format_{layoutsOf(layouts),          valueOf(format, "recordBits"), valueOf(format, "vertexBits"),
+                  valueOf(format, "boxBits"),  valueOf(format, "stackDepth"), valueOf(format, "normalFraction"),
+                  valueOf(format, "children"), valueOf(format, "bvh") != 0},
+          normals_(normals), materials_(materials), isClear_(isClear), colours_(colours) {
         checkFaces(faces, vertices.shape(0));
         if (faces.shape(0) == 0 || meshFaces.shape(0) != faces.shape(0)) throw std::invalid_argument("the numbers of faces differ, or are 0");
+        if (format_.children < 2 || format_.children > nodeChildren) throw std::invalid_argument("a node has 2 to 4 children");
         mesh_.vertices = vectorOf<packer::Units>(vertices);
         mesh_.faces = vectorOf<mesh::Face>(faces);
         mesh_.meshFaces = vectorOf<std::int64_t>(meshFaces);
+        const auto count = static_cast<std::size_t>(1 + *std::max_element(mesh_.meshFaces.begin(), mesh_.meshFaces.end()));
+        if (std::min({normals.shape(0), materials.shape(0), isClear.shape(0)}) < count || (colours && colours->shape(0) < count))
+            throw std::invalid_argument("a face has no attributes");
+        const packer::FaceAttributes attributes{rowsOf<std::array<mesh::Vector, 3>>(normals_), materials_.data(), reinterpret_cast<const std::uint8_t*>(isClear_.data()),
+                                                colours_ ? rowsOf<std::array<mesh::Row<std::int64_t>, 3>>(*colours_) : nullptr};
         nb::gil_scoped_release release;
-        tree_ = packer::buildTree(mesh_, format_);
-        packer_ = std::make_unique<packer::RecordPacker>(mesh_, tree_, format_);
+        tree_ = packer::buildTree(mesh_, attributes, format_);
+        packer_ = std::make_unique<packer::RecordPacker>(mesh_, attributes, tree_, format_);
     }
 
     nb::dict sections() const {
@@ -94,16 +103,13 @@ public:
         return result;
     }
 
-    nb::object order() const { return arrayOf<std::uint32_t>(tree_.order, {tree_.order.size()}); }
+    nb::object faces() const {
+        const std::vector<std::int64_t> faces = packer_->faces();
+        return arrayOf<std::int64_t>(faces, {faces.size()});
+    }
 
-    nb::object records(const CornerRows<double>& normals, const Column<std::uint8_t>& materials, const Column<bool>& isClear,
-                       const std::optional<CornerRows<std::int64_t>>& colours) const {
-        const auto faces = static_cast<std::size_t>(1 + *std::max_element(mesh_.meshFaces.begin(), mesh_.meshFaces.end()));
-        if (std::min({normals.shape(0), materials.shape(0), isClear.shape(0)}) < faces || (colours && colours->shape(0) < faces))
-            throw std::invalid_argument("a face has no attributes");
-        const packer::FaceAttributes attributes{rowsOf<std::array<mesh::Vector, 3>>(normals), materials.data(), reinterpret_cast<const std::uint8_t*>(isClear.data()),
-                                                colours ? rowsOf<std::array<mesh::Row<std::int64_t>, 3>>(*colours) : nullptr};
-        const std::vector<std::uint8_t> records = released([&] { return packer_->records(attributes); });
+    nb::object records() const {
+        const std::vector<std::uint8_t> records = released([&] { return packer_->records(); });
         return arrayOf<std::uint8_t>(records, {packer_->sections().recordCount, format_.recordBytes()});
     }
 
@@ -111,6 +117,10 @@ private:
     static int valueOf(const Values& values, const char* key) { return static_cast<int>(lookUp(values, key)); }
 
     packer::RecordFormat format_;
+    const CornerRows<double> normals_;  // the packer refers to these
+    const Column<std::uint8_t> materials_;
+    const Column<bool> isClear_;
+    const std::optional<CornerRows<std::int64_t>> colours_;
     packer::QuantisedMesh mesh_;
     bvh::Bvh tree_;
     std::unique_ptr<packer::RecordPacker> packer_;
@@ -189,12 +199,13 @@ nb::object atlas(const Positions& uvs, const Column<std::int32_t>& textures, con
 void bind_packer(nb::module_& module) {
     module.def("quantise", &quantise, "vertices"_a, "faces"_a, "vertex_bits"_a);
     nb::class_<Packing>(module, "Packing")
-        .def(nb::init<const Rows<std::int32_t>&, const Rows<std::int32_t>&, const Column<std::int64_t>&, const Values&, const FieldTuples&>(), "vertices"_a, "faces"_a,
-             "mesh_faces"_a, "format"_a, "layouts"_a)
+        .def(nb::init<const Rows<std::int32_t>&, const Rows<std::int32_t>&, const Column<std::int64_t>&, const CornerRows<double>&, const Column<std::uint8_t>&,
+                      const Column<bool>&, const std::optional<CornerRows<std::int64_t>>&, const Values&, const FieldTuples&>(),
+             "vertices"_a, "faces"_a, "mesh_faces"_a, "normals"_a, "materials"_a, "is_clear"_a, "colours"_a.none(), "format"_a, "layouts"_a)
         .def("sections", &Packing::sections)
         .def("statistics", &Packing::statistics)
-        .def("order", &Packing::order)
-        .def("records", &Packing::records, "normals"_a, "materials"_a, "is_clear"_a, "colours"_a.none());
+        .def("faces", &Packing::faces)
+        .def("records", &Packing::records);
     module.def(
         "surface_offset",
         [](int gridFraction, int weightBits, int mantissaBits, int distanceDigits, int largestTriangle) {

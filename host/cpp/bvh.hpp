@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -54,13 +55,16 @@ struct BinaryTree {
 /// Fraction bits of `readWeights`.
 constexpr int readWeightFraction = 8;
 
-/// Number of leaf records for `triangles` triangles.
-inline std::uint64_t leafRecords(std::uint64_t triangles, unsigned perRecord) { return (triangles + perRecord - 1) / perRecord; }
+/// Whether two triangles share a leaf: they are a pair.
+using IsPair = std::function<bool(std::uint32_t, std::uint32_t)>;
 
-/// Height of a balanced tree over `triangles` triangles; 0 for one leaf.
-inline unsigned balancedHeight(std::uint64_t triangles, unsigned perRecord) {
+/// Number of leaf records for `triangles` triangles, if all are pairs.
+inline std::uint64_t leafRecords(std::uint64_t triangles) { return (triangles + 1) / 2; }
+
+/// Height of a balanced tree over `triangles` triangles without pairs; 0 for one leaf.
+inline unsigned balancedHeight(std::uint64_t triangles) {
     unsigned height = 0;
-    while ((std::uint64_t{1} << height) < leafRecords(triangles, perRecord)) ++height;
+    while ((std::uint64_t{1} << height) < triangles) ++height;
     return height;
 }
 
@@ -80,8 +84,8 @@ inline std::vector<std::uint32_t> readWeights(std::uint64_t most) {
 /// Builds the binary tree. No leaf is deeper than `heightLimit` (0: no limit), which must be at least the balanced height.
 class BinaryBuilder {
 public:
-    BinaryBuilder(const std::vector<Box>& boxes, unsigned perRecord, unsigned heightLimit)
-        : boxes_(boxes), perRecord_(perRecord), heightLimit_(heightLimit ? heightLimit : UINT32_MAX), weights_(readWeights(leafRecords(boxes.size(), perRecord))) {}
+    BinaryBuilder(const std::vector<Box>& boxes, const IsPair& isPair, unsigned heightLimit)
+        : boxes_(boxes), isPair_(isPair), heightLimit_(heightLimit ? heightLimit : UINT32_MAX), weights_(readWeights(leafRecords(boxes.size()))) {}
 
     BinaryTree build() {
         const auto count = static_cast<std::uint32_t>(boxes_.size());
@@ -100,7 +104,7 @@ public:
             const Task task = tasks.back();
             tasks.pop_back();
             const std::uint32_t begin = tree_.nodes[task.node].begin, end = tree_.nodes[task.node].end;
-            if (end - begin <= perRecord_) continue;
+            if (records(begin, end) == 1) continue;
             const std::uint32_t middle = partition(begin, end, heightLimit_ - task.depth - 1);
             const std::int32_t left = addNode(begin, middle), right = addNode(middle, end);
             tree_.nodes[task.node].left = left;
@@ -131,13 +135,16 @@ private:
         return static_cast<std::int32_t>(tree_.nodes.size() - 1);
     }
 
-    Cost cost(std::uint64_t leftArea, std::uint64_t leftCount, std::uint64_t rightArea, std::uint64_t rightCount) const {
-        return Cost{leftArea} * weights_[leafRecords(leftCount, perRecord_)] + Cost{rightArea} * weights_[leafRecords(rightCount, perRecord_)];
+    Cost cost(std::uint64_t leftArea, std::uint64_t leftRecords, std::uint64_t rightArea, std::uint64_t rightRecords) const {
+        return Cost{leftArea} * weights_[leftRecords] + Cost{rightArea} * weights_[rightRecords];
     }
 
-    bool fits(std::uint64_t left, std::uint64_t right, unsigned height) const {
-        return balancedHeight(left, perRecord_) <= height && balancedHeight(right, perRecord_) <= height;
+    /// Leaf records of `order[begin, end)`: exact for two triangles at most, else as if all were pairs.
+    std::uint64_t records(std::uint32_t begin, std::uint32_t end) const {
+        return end - begin == 2 && !isPair_(tree_.order[begin], tree_.order[begin + 1]) ? 2 : leafRecords(end - begin);
     }
+
+    bool fits(std::uint64_t left, std::uint64_t right, unsigned height) const { return balancedHeight(left) <= height && balancedHeight(right) <= height; }
 
     /// Partitions `order[begin, end)` into two sides that each fit a tree of `height`; returns the start of the right side.
     std::uint32_t partition(std::uint32_t begin, std::uint32_t end, unsigned height) {
@@ -170,7 +177,7 @@ private:
         for (int a = 1; a < 3; ++a)
             if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
         sortAlong(begin, end, axis);
-        return begin + static_cast<std::uint32_t>((leafRecords(count, perRecord_) + 1) / 2 * perRecord_);
+        return begin + static_cast<std::uint32_t>((leafRecords(count) + 1) / 2 * 2);
     }
 
     int binOf(std::uint32_t triangle, int axis, const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high) const {
@@ -203,15 +210,15 @@ private:
                 left += count[bin];
                 const std::uint32_t right = end - begin - left;
                 if (left == 0 || right == 0 || !fits(left, right, height)) continue;
-                const Cost value = cost(side.halfArea(), left, rightArea[bin + 1], right);
+                const Cost value = cost(side.halfArea(), leafRecords(left), rightArea[bin + 1], leafRecords(right));
                 if (value < best.cost) best = {value, axis, static_cast<std::uint32_t>(bin)};
             }
         }
         return best;
     }
 
-    /// The best split of a few triangles along any axis; the balanced split always fits. The left side fills whole records,
-    /// which saves 1 % of the records for 0.5 % more reads.
+    /// The best split of a few triangles along any axis; the balanced split always fits. The left side has an even number of
+    /// triangles, which saves 1 % of the records for 0.5 % more reads.
     Split sweep(std::uint32_t begin, std::uint32_t end, unsigned height) {
         const std::uint32_t count = end - begin;
         std::array<std::uint64_t, sweepBelow> rightArea{};
@@ -226,8 +233,8 @@ private:
             side = Box{};
             for (std::uint32_t left = 1; left < count; ++left) {
                 side.add(boxes_[tree_.order[begin + left - 1]]);
-                if (left % perRecord_ != 0 || !fits(left, count - left, height)) continue;
-                const Cost value = cost(side.halfArea(), left, rightArea[left], count - left);
+                if ((left % 2 != 0 && count > 2) || !fits(left, count - left, height)) continue;
+                const Cost value = cost(side.halfArea(), records(begin, begin + left), rightArea[left], records(begin + left, end));
                 if (value < best.cost) best = {value, axis, left};
             }
         }
@@ -242,7 +249,7 @@ private:
     }
 
     const std::vector<Box>& boxes_;
-    const unsigned perRecord_;
+    const IsPair& isPair_;
     const unsigned heightLimit_;
     const std::vector<std::uint32_t> weights_;
     BinaryTree tree_;

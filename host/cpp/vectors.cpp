@@ -2,7 +2,7 @@
 //
 //   numbers key=value ...                                   (first line; no reply)
 //   setup  isShadow origin[3] direction[3] low[3] high[3] -> enters axis negative[3] origin[3] boxOrigin[3] shear[2] reciprocal[2] exponent[2] entry limit
-//   box    axis negative[3] boxOrigin[3] reciprocal[2] exponent[2] limit, origin[3] exponent[3] firstChild firstTriangles (kind low[3] high[3])*arity
+//   box    axis negative[3] boxOrigin[3] reciprocal[2] exponent[2] limit, origin[3] exponent[3] firstChild firstTriangles (kind low[3] high[3])*4
 //                                                         -> tests count (slot near)*count
 //   triangle axis negative[3] origin[3] shear[2] vertices[9] -> isHit t weights[3] backSide
 //   limit  t                                              -> tMaxUnits
@@ -75,7 +75,7 @@ void replyBox(Query& query, const Numbers& n) {
     for (auto& exponent : node.exponent) exponent = static_cast<int>(query.number());
     node.firstChild = static_cast<std::uint32_t>(query.number());
     node.firstTriangles = static_cast<std::uint32_t>(query.number());
-    for (int child = 0; child < n.arity; ++child) {
+    for (int child = 0; child < nodeChildren; ++child) {
         node.kinds[child] = static_cast<Child>(query.number());
         for (auto& low : node.low[child]) low = static_cast<std::int32_t>(query.number());
         for (auto& high : node.high[child]) high = static_cast<std::int32_t>(query.number());

@@ -1,23 +1,21 @@
-/// The tree in the hardware's layout: nodes of two or four children with boxes quantised relative to their node.
-///
-/// Collapsing the binary tree keeps the order of the leaves, so the packed ids do not depend on the arity.
+/// The tree in the hardware's layout: nodes of up to four children with boxes quantised relative to their node.
 #pragma once
 
 #include <unordered_map>
 
+#include "model/formats.hpp"
 #include "reinsertion.hpp"
 
 namespace colonnade::bvh {
 
 enum class Kind : std::uint8_t { empty = 0, node = 1, leaf = 2 };
 
-/// Flat arrays with one entry per node, times the arity where stated. `firstTriangles` counts from the first leaf record.
+/// Flat arrays with one entry per node, times `nodeChildren` where stated. `firstTriangles` counts from the first leaf record.
 struct WideTree {
-    unsigned arity = 0;
     std::vector<std::uint32_t> origin;                       ///< nodes × 3, vertex units
     std::vector<std::uint8_t> exponent;                      ///< nodes × 3
-    std::vector<std::uint8_t> kinds;                         ///< nodes × arity
-    std::vector<std::uint16_t> low, high;                    ///< nodes × arity × 3
+    std::vector<std::uint8_t> kinds;                         ///< nodes × nodeChildren
+    std::vector<std::uint16_t> low, high;                    ///< nodes × nodeChildren × 3
     std::vector<std::uint32_t> firstChild, firstTriangles;   ///< nodes; 0 without such a child
     std::vector<std::uint32_t> leafFirst, leafCount;         ///< leaf records: packed id of the first triangle, number of triangles
     unsigned depth = 0;                                      ///< nodes on the longest path from the root
@@ -31,17 +29,17 @@ struct WideTree {
 /// Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs"). Dynamic programming over the binary tree finds it, within a limit of the stack.
 class Collapser {
 public:
-    /// `stackDepth`: at least the height of the tree, which is the least stack bound of all collapses.
-    Collapser(const BinaryTree& tree, unsigned arity, unsigned boxBits, unsigned stackDepth)
-        : tree_(tree), arity_(arity), boxBits_(boxBits), stackDepth_(stackDepth), heights_(heights(tree)), free_(tree.nodes.size()) {
+    /// `most`: children of a node, 2 to `nodeChildren`. `stackDepth`: at least the height of the tree, which is the least stack bound
+    /// of all collapses.
+    Collapser(const BinaryTree& tree, unsigned most, unsigned boxBits, unsigned stackDepth)
+        : tree_(tree), most_(most), boxBits_(boxBits), stackDepth_(stackDepth), heights_(heights(tree)), free_(tree.nodes.size()) {
         for (std::size_t i = tree.nodes.size(); i-- > 0;)
             if (!tree.nodes[i].isLeaf())
-                for (unsigned slots = 1; slots < arity_; ++slots) free_[i][slots - 1] = findForm(static_cast<std::int32_t>(i), slots, unlimited);
+                for (unsigned slots = 1; slots < most_; ++slots) free_[i][slots - 1] = findForm(static_cast<std::int32_t>(i), slots, unlimited);
     }
 
     WideTree collapse() {
         WideTree wide;
-        wide.arity = arity_;
         const double rootArea = std::max<double>(1.0, static_cast<double>(tree_.nodes[0].box.halfArea()));
 
         struct Task {
@@ -66,13 +64,13 @@ public:
                 const BinaryNode& child = tree_.nodes[children[slot]];
                 if (child.isLeaf()) {
                     if (!hasKind(wide, task.index, slot, Kind::leaf)) wide.firstTriangles[task.index] = static_cast<std::uint32_t>(wide.leafFirst.size());
-                    wide.kinds[task.index * arity_ + slot] = static_cast<std::uint8_t>(Kind::leaf);
+                    wide.kinds[task.index * nodeChildren + slot] = static_cast<std::uint8_t>(Kind::leaf);
                     wide.leafFirst.push_back(child.begin);
                     wide.leafCount.push_back(child.end - child.begin);
                     wide.cost += static_cast<double>(child.box.halfArea()) / rootArea;
                 } else {
                     if (!hasKind(wide, task.index, slot, Kind::node)) wide.firstChild[task.index] = static_cast<std::uint32_t>(wide.nodes());
-                    wide.kinds[task.index * arity_ + slot] = static_cast<std::uint8_t>(Kind::node);
+                    wide.kinds[task.index * nodeChildren + slot] = static_cast<std::uint8_t>(Kind::node);
                     pending.push_back({children[slot], static_cast<std::uint32_t>(wide.nodes()), task.depth + 1, below});
                     append(wide);
                 }
@@ -87,9 +85,9 @@ private:
     void append(WideTree& wide) const {
         wide.origin.insert(wide.origin.end(), 3, 0);
         wide.exponent.insert(wide.exponent.end(), 3, 0);
-        wide.kinds.insert(wide.kinds.end(), arity_, 0);
-        wide.low.insert(wide.low.end(), arity_ * 3, 0);
-        wide.high.insert(wide.high.end(), arity_ * 3, 0);
+        wide.kinds.insert(wide.kinds.end(), nodeChildren, 0);
+        wide.low.insert(wide.low.end(), nodeChildren * 3, 0);
+        wide.high.insert(wide.high.end(), nodeChildren * 3, 0);
         wide.firstChild.push_back(0);
         wide.firstTriangles.push_back(0);
     }
@@ -97,7 +95,7 @@ private:
     /// Whether a slot before `slot` has a child of this kind.
     bool hasKind(const WideTree& wide, std::uint32_t node, std::size_t slot, Kind kind) const {
         for (std::size_t i = 0; i < slot; ++i)
-            if (wide.kinds[node * arity_ + i] == static_cast<std::uint8_t>(kind)) return true;
+            if (wide.kinds[node * nodeChildren + i] == static_cast<std::uint8_t>(kind)) return true;
         return false;
     }
 
@@ -157,7 +155,7 @@ private:
 
     WideNode asNode(std::int32_t index, unsigned stack) {
         WideNode best;
-        for (unsigned children = std::min(arity_, stack + 1); children >= 2; --children) {
+        for (unsigned children = std::min(most_, stack + 1); children >= 2; --children) {
             if (stack != unlimited && split(index, children, unlimited).form.cost + tree_.nodes[index].box.halfArea() > best.form.cost) continue;
             const Form below = split(index, children, stack - (children - 1)).form;
             if (!below.isFeasible()) continue;
@@ -203,7 +201,7 @@ private:
             wide.exponent[index * 3 + a] = static_cast<std::uint8_t>(exponent);
             for (std::size_t slot = 0; slot < children.size(); ++slot) {
                 const Box& child = tree_.nodes[children[slot]].box;
-                const std::size_t at = (index * std::size_t{arity_} + slot) * 3 + a;
+                const std::size_t at = (std::size_t{index} * nodeChildren + slot) * 3 + a;
                 wide.low[at] = static_cast<std::uint16_t>(floored(child.low[a]) - origin);
                 wide.high[at] = static_cast<std::uint16_t>(raised(child.high[a]) - origin);
             }
@@ -215,8 +213,8 @@ private:
         std::vector<unsigned> bound(wide.nodes(), 0);
         for (std::size_t node = wide.nodes(); node-- > 0;) {
             unsigned children = 0, deepest = 0, nodeChild = 0;
-            for (unsigned slot = 0; slot < arity_; ++slot) {
-                const auto kind = static_cast<Kind>(wide.kinds[node * arity_ + slot]);
+            for (int slot = 0; slot < nodeChildren; ++slot) {
+                const auto kind = static_cast<Kind>(wide.kinds[node * nodeChildren + slot]);
                 if (kind == Kind::empty) continue;
                 ++children;
                 if (kind == Kind::node) deepest = std::max(deepest, bound[wide.firstChild[node] + nodeChild++]);
@@ -227,7 +225,7 @@ private:
     }
 
     const BinaryTree& tree_;
-    const unsigned arity_, boxBits_, stackDepth_;
+    const unsigned most_, boxBits_, stackDepth_;
     const std::vector<unsigned> heights_;
     std::vector<std::array<Form, 3>> free_;             ///< forms without a limit of the stack, by node and slots
     std::unordered_map<std::uint64_t, Form> limited_;  ///< forms within a stack, by node, slots and stack
@@ -240,16 +238,15 @@ struct Bvh {
     unsigned heightLimit = 0;          ///< height limit that the stack required; 0 for none
 };
 
-/// Builds the tree for one arity. If the binary tree is higher than the stack is deep, it is built again with that limit. The
-/// packed ids do not depend on the arity, since the height is the least stack bound of all arities. The caller must check whether
-/// the returned tree fits the stack.
-inline Bvh build(const std::vector<Box>& boxes, unsigned perRecord, unsigned arity, unsigned boxBits, unsigned stackDepth) {
-    const unsigned limit = std::max(stackDepth, balancedHeight(boxes.size(), perRecord));
-    BinaryTree tree = BinaryBuilder(boxes, perRecord, 0).build();
+/// Builds the tree. If the binary tree is higher than the stack is deep, it is built again with that limit. The caller must check
+/// whether the returned tree fits the stack.
+inline Bvh build(const std::vector<Box>& boxes, const IsPair& isPair, unsigned most, unsigned boxBits, unsigned stackDepth) {
+    const unsigned limit = std::max(stackDepth, balancedHeight(boxes.size()));
+    BinaryTree tree = BinaryBuilder(boxes, isPair, 0).build();
     const bool isTooHigh = heights(tree)[0] > limit;
-    if (isTooHigh) tree = BinaryBuilder(boxes, perRecord, limit).build();
+    if (isTooHigh) tree = BinaryBuilder(boxes, isPair, limit).build();
     tree = Reinsertion(std::move(tree), limit).optimise();
-    WideTree wide = Collapser(tree, arity, boxBits, limit).collapse();
+    WideTree wide = Collapser(tree, most, boxBits, limit).collapse();
     return {std::move(wide), std::move(tree.order), isTooHigh ? limit : 0};
 }
 

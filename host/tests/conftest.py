@@ -24,8 +24,6 @@ def manifest_data(
     vertex_bits: int = 16,
     box_bits: int = 7,
     mac: int = 32,
-    arity: int = 4,
-    per_record: int = 2,
     bvh: bool = True,
     depth: int = 131072,
     stack_depth: int = 48,
@@ -54,7 +52,7 @@ def manifest_data(
         "distanceDigits": min(32, mac),
         "etaFraction": 13,
     }
-    layouts = _layouts(vertex_bits, box_bits, arity, per_record, address)
+    layouts = _layouts(vertex_bits, box_bits, address)
     widest = max(sum(width for _, width, _ in fields) for fields in layouts.values())
     return {
         "version": 2,
@@ -64,8 +62,6 @@ def manifest_data(
             "geometry": {
                 "vertexBits": vertex_bits,
                 "boxBits": box_bits,
-                "arity": arity,
-                "trianglesPerRecord": per_record,
                 "bvh": bvh,
                 "cornerColours": False,
                 "textureBytes": 0,
@@ -87,7 +83,7 @@ def manifest_data(
         "streams": {"pixel": [], "load": []},
         "memories": {"columnBvh": {"depth": depth, "bits": -(-widest // 32) * 32, "banks": 2}},
         "attributes": None,
-        "formatHash": f"{vertex_bits:02x}{box_bits:02x}{mac:02x}{arity}{per_record}{bvh:d}".ljust(64, "0"),
+        "formatHash": f"{vertex_bits:02x}{box_bits:02x}{mac:02x}{bvh:d}".ljust(64, "0"),
         "configHash": "0" * 64,
     }
 
@@ -99,14 +95,14 @@ def _vector(name: str, width: int, signed: bool = False) -> FieldList:
     return [(f"{name}.{axis}", width, signed) for axis in "xyz"]
 
 
-def _layouts(vertex: int, box: int, arity: int, per_record: int, address: int) -> dict[str, FieldList]:
+def _layouts(vertex: int, box: int, address: int) -> dict[str, FieldList]:
     node = _vector("origin", vertex) + _vector("exponent", (vertex - box + 1).bit_length())
     node += [("firstChild", address, False), ("firstTriangles", address, False)]
-    for child in range(arity):
+    for child in range(4):
         node += [(f"kinds[{child}]", 2, False), *_vector(f"low[{child}]", box), *_vector(f"high[{child}]", box)]
-    triangles: FieldList = [("firstTriangle", address + 1, False), ("count", per_record.bit_length(), False)]
-    triangles += [(f"isClear[{k}]", 1, False) for k in range(per_record)]
-    for corner in range(3 * per_record):
+    triangles: FieldList = [("count", 2, False)]
+    triangles += [(f"isClear[{k}]", 1, False) for k in range(2)]
+    for corner in range(6):
         triangles += _vector(f"vertices[{corner}]", vertex)
     attributes: FieldList = []
     for face in range(2):

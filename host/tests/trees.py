@@ -16,15 +16,15 @@ EMPTY, NODE, LEAF = 0, 1, 2
 
 @dataclass(frozen=True)
 class Bvh:
-    """A tree of n nodes with `arity` children, l leaves and m triangles.
+    """A tree of n nodes, l leaves and m triangles.
 
     A child's planes are ``origin + (low << exponent)`` and ``origin + (high << exponent)``, in vertex units.
 
     Attributes:
         origin: uint32 [n, 3], vertex units.
         exponent: uint8 [n, 3].
-        kinds: uint8 [n, arity]: EMPTY, NODE or LEAF.
-        low, high: uint16 [n, arity, 3].
+        kinds: uint8 [n, 4]: EMPTY, NODE or LEAF.
+        low, high: uint16 [n, 4, 3].
         first_child: uint32 [n], node index of the first NODE child; the others follow in slot order.
         first_triangles: uint32 [n], leaf index of the first LEAF child; the others follow in slot order.
         leaf_first, leaf_count: uint32 [l], packed id of a leaf's first triangle, and number of its triangles.
@@ -49,29 +49,26 @@ def build_bvh(
     vertices: npt.NDArray[np.int32],
     faces: npt.NDArray[np.int32],
     *,
-    triangles_per_record: int,
-    arity: int,
+    children: int,
     box_bits: int,
     stack_depth: int,
 ) -> Bvh:
     """Build the tree over triangles with integer vertices.
 
-    The order of the triangles depends on neither arity nor box bits. The tree needs at most ``stack_depth`` entries,
+    The order of the triangles depends on neither children nor box bits. The tree needs at most ``stack_depth`` entries,
     unless a balanced tree needs more. The caller must compare ``statistics.stack_bound``.
 
     Args:
         vertices: int32 [n, 3], vertex units, from 0.
         faces: int32 [m, 3], at least one.
-        triangles_per_record: Largest number of triangles in a leaf.
-        arity: 2 or 4.
+        children: Most children of a node, 2 to 4.
         box_bits: Bits of a child's plane relative to its node.
         stack_depth: Entries of the traversal stack.
     """
     arrays: dict[str, Any] = _core.build_bvh(
         np.ascontiguousarray(vertices, dtype=np.int32),
         np.ascontiguousarray(faces, dtype=np.int32),
-        triangles_per_record,
-        arity,
+        children,
         box_bits,
         stack_depth,
     )

@@ -22,8 +22,6 @@ def new_model(manifest: Manifest) -> Any:
     config = manifest.config
     numbers = {
         **manifest.numbers,
-        "arity": config["geometry"]["arity"],
-        "trianglesPerRecord": config["geometry"]["trianglesPerRecord"],
         "stackDepth": config["columnBvhMemory"]["stackDepth"],
         "bvh": int(config["geometry"]["bvh"]),
     }

@@ -109,7 +109,7 @@ class DeviceScene:
         maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest, encode or encoder)
         mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
         materials = with_overrides(mesh.materials, lit.scene.material)
-        image = pack(mesh, manifest, materials, lit.scene.headroom, encoder)
+        image = pack(mesh, manifest, materials, lit.scene.headroom, encoder, scene.mesh.children)
         if maps is not None:
             image = with_environment(image, maps, manifest)
         if manifest.gathers:

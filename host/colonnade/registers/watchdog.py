@@ -18,6 +18,9 @@ RAY_CYCLES = 1_000
 NODE_CYCLES = 12
 TRIANGLE_CYCLES = 24
 
+#: Triangles of a leaf.
+TRIANGLES = 2
+
 #: Nodes, and triangle records, that each ray of a column visits, one ray after the other. No ray visits as many on
 #: the eight meshes of the benchmark (`make verify`), and contexts overlap: a single ray may visit many times as many.
 #: A design without a tree visits all records.
@@ -44,7 +47,7 @@ def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest:
         nodes, leaves = min(nodes, TREE_VISITS), min(leaves, TREE_VISITS)
     memory = manifest.config["columnBvhMemory"]
     fetch = rows + (DRAM_CYCLES if memory["cache"] else int(memory["readLatency"])) + NODE_CYCLES
-    walk = nodes * fetch + leaves * (fetch + TRIANGLE_CYCLES * int(geometry["trianglesPerRecord"]))
+    walk = nodes * fetch + leaves * (fetch + TRIANGLE_CYCLES * TRIANGLES)
     lights = registers["shading.lights"] if registers["shading.shadows"] else 0
     is_shiny = any(value != 0 for name, value in registers.items() if name.endswith(".kind"))
     bounces = registers["shading.bounces"] if is_shiny else 0

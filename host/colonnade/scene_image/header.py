@@ -104,7 +104,7 @@ class ImageHeader:
         format_hash: Format hash of the manifest that it was packed for.
         mesh: Name of the mesh.
         source_triangles: Faces of the mesh file.
-        triangles: Packed triangles; ids start at 0.
+        triangles: Packed triangles.
         record_bits, record_count: Width and number of the column memory's records.
         triangle_base, triangle_records, attribute_base: Bounds of the sections, in records.
         bounds_low, bounds_high: The object's bounding box, vertex units, inclusive.

@@ -1,7 +1,7 @@
 """The packer: converts a mesh to the records of the column memory.
 
-The C++ packer (``cpp/packer``) quantises the vertices, drops degenerate triangles, builds the tree, rotates the corners
-of triangles that share an edge with the other one of their record, and fills the records by the manifest's layouts.
+The C++ packer (``cpp/packer``) quantises the vertices, drops degenerate triangles, and builds the tree. Its leaves are
+pairs of triangles with a common edge, or triangles. It fills the records by the manifest's layouts.
 The sections are nodes, triangles and attributes, in this order. Addresses in nodes are absolute.
 """
 
@@ -72,6 +72,7 @@ def pack(
     materials: Sequence[MeshMaterial] | None = None,
     headroom: float = 1.0,
     encoder: Encoder = "offline",
+    children: int = 4,
 ) -> SceneImage:
     """Pack a mesh into a scene image for a design.
 
@@ -81,6 +82,7 @@ def pack(
         materials: Materials that replace the mesh's. The records only contain which faces are glass.
         headroom: Factor of the scene's lights, by which the corner colours of diffuse faces are darker.
         encoder: Of textures.
+        children: Most children of a node, 2 to 4.
 
     Raises:
         UserError: The mesh does not fit, or has corner colours or textures that the design lacks; the message names the
@@ -89,32 +91,29 @@ def pack(
     from colonnade import _core
 
     quantised = quantise(mesh, int(manifest.config["geometry"]["vertexBits"]))
-    packing: Any = _core.Packing(
-        quantised.vertices,
-        quantised.faces,
-        quantised.mesh_faces,
-        record_format(manifest),
-        field_places(manifest.layouts),
-    )
-    sections, order = packing.sections(), packing.order()
-    tree = TreeStatistics(**packing.statistics())
-    _check_fits(mesh.name, manifest, tree, sections["record_count"], len(order))
-
     materials = mesh.materials if materials is None else tuple(materials)
     entries, index = table_entries(materials)
     is_glass = np.array([material.kind == "glass" for material in materials])
     atlas = _atlas(mesh, manifest, materials, headroom)
-    records = packing.records(
+    packing: Any = _core.Packing(
+        quantised.vertices,
+        quantised.faces,
+        quantised.mesh_faces,
         mesh.corner_normals,
         index.astype(np.uint8)[mesh.face_materials],
         is_glass[mesh.face_materials],
         _corner_colours(mesh, manifest, materials, headroom, atlas),
+        record_format(manifest) | {"children": children},
+        field_places(manifest.layouts),
     )
+    sections, faces = packing.sections(), packing.faces()
+    tree = TreeStatistics(**packing.statistics())
+    _check_fits(mesh.name, manifest, tree, sections["record_count"])
     header = ImageHeader(
         format_hash=manifest.format_hash,
         mesh=mesh.name,
         source_triangles=mesh.source_count,
-        triangles=len(order),
+        triangles=len(quantised.faces),
         record_bits=manifest.record_bits,
         frame=quantised.frame,
         extent=mesh.extent,
@@ -123,14 +122,15 @@ def pack(
         parts=mesh.parts,
         **sections,
     )
-    image = SceneImage(header, records, mesh.source_faces[quantised.mesh_faces[order]])
+    sources = np.where(faces < 0, -1, mesh.source_faces[quantised.mesh_faces[faces]])
+    image = SceneImage(header, packing.records(), sources.astype(np.int32))
     return with_textures(image, atlas, len({material.texture for material in materials} - {None}), manifest, encoder)
 
 
 def record_format(manifest: Manifest) -> dict[str, int]:
     """What records depend on beside their layouts, as the C++ packer names it."""
     geometry = manifest.config["geometry"]
-    names = ("vertexBits", "boxBits", "arity", "trianglesPerRecord", "bvh")
+    names = ("vertexBits", "boxBits", "bvh")
     return {
         **{name: int(geometry[name]) for name in names},
         "recordBits": manifest.record_bits,
@@ -163,11 +163,9 @@ def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
     return use
 
 
-def _check_fits(name: str, manifest: Manifest, tree: TreeStatistics, record_count: int, triangles: int) -> None:
+def _check_fits(name: str, manifest: Manifest, tree: TreeStatistics, record_count: int) -> None:
     depth = int(manifest.memories["columnBvh"]["depth"])
-    ids = 1 << manifest.layouts["triangles"].fields["firstTriangle"].width
-    # Ids have one bit more than addresses, and all ones is no id
-    enough = 1 << (max(record_count, triangles // 2 + 1) - 1).bit_length()
+    enough = 1 << (record_count - 1).bit_length()
     advice = "simplify the mesh (--simplify)"
     if manifest.memories["columnBvh"].get("line") is None:
         advice += ", or take a preset whose scene lies in DRAM, such as edge"
@@ -181,8 +179,6 @@ def _check_fits(name: str, manifest: Manifest, tree: TreeStatistics, record_coun
             f"mesh {name} needs a stack of {tree.stack_bound} entries even with a balanced tree,"
             f" columnBvhMemory.stackDepth is {stack_depth}: raise columnBvhMemory.stackDepth"
         )
-    if triangles >= ids:
-        raise UserError(f"mesh {name} has {triangles:,} triangles, packed ids reach {ids - 2:,}: {advice}")
 
 
 def _atlas(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], headroom: float) -> Atlas | None:

@@ -156,9 +156,6 @@ void encodeAtlas(const std::optional<mesh::Atlas>& atlas) {
 const char* checkFit(const packer::Sections& sections, const bvh::Bvh& tree) {
     const auto depth = static_cast<std::size_t>(library->number("depth"));
     if (sections.recordCount > depth) return refuse("the mesh needs " + std::to_string(sections.recordCount) + " records, this design has " + std::to_string(depth));
-    const std::size_t ids = std::size_t{1} << library->format.layouts.at("triangles").at("firstTriangle").width;
-    if (tree.order.size() >= ids)
-        return refuse("the mesh has " + std::to_string(tree.order.size()) + " triangles, packed ids of this design reach " + std::to_string(ids - 2));
     if (library->format.bvh && static_cast<int>(tree.tree.stackBound) > library->format.stackDepth)
         return refuse("the mesh needs a stack of " + std::to_string(tree.tree.stackBound) + " entries, this design has " + std::to_string(library->format.stackDepth));
     return nullptr;
@@ -194,8 +191,6 @@ const char* colonnade_model_open(const char* design) {
     format.recordBits = library->number("recordBits");
     format.vertexBits = library->number("vertexBits");
     format.boxBits = library->number("boxBits");
-    format.arity = library->number("arity");
-    format.trianglesPerRecord = library->number("trianglesPerRecord");
     format.stackDepth = library->number("stackDepth");
     format.normalFraction = library->number("normalFraction");
     format.bvh = library->number("bvh") != 0;
@@ -223,10 +218,6 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
     const mesh::CleanMesh& clean = next->clean;
     next->quantised = packer::quantise(clean.vertices.data(), clean.vertices.size(), clean.faces.data(), clean.faces.size(), library->format.vertexBits);
     if (next->quantised.faces.empty()) return "no triangle keeps an area in this design's vertex units";
-    next->tree = packer::buildTree(next->quantised, library->format);
-    next->packer = std::make_unique<packer::RecordPacker>(next->quantised, next->tree, library->format);
-    if (const char* error = checkFit(next->packer->sections(), next->tree)) return error;
-
     std::vector<std::uint8_t> materials, isClear;
     std::vector<mesh::Triangle> uvs(clean.faces.size());
     std::vector<mesh::Paint> paints;
@@ -254,7 +245,11 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
     if (!library->textureSizes.empty()) encodeAtlas(atlas);
     std::vector<Codes> codes;
     if (library->format.layouts.at("attributes").count("faces[0].colours[0].r")) codes = cornerCodes(given, clean, atlas ? &atlas->uvs : nullptr);
-    library->records = next->packer->records({clean.normals.normals.data(), materials.data(), isClear.data(), codes.empty() ? nullptr : codes.data()});
+    const packer::FaceAttributes attributes{clean.normals.normals.data(), materials.data(), isClear.data(), codes.empty() ? nullptr : codes.data()};
+    next->tree = packer::buildTree(next->quantised, attributes, library->format);
+    next->packer = std::make_unique<packer::RecordPacker>(next->quantised, attributes, next->tree, library->format);
+    if (const char* error = checkFit(next->packer->sections(), next->tree)) return error;
+    library->records = next->packer->records();
     library->packed = std::move(next);
     describe(*packed, given.face_count);
     library->device->load(library->records.data(), library->packed->packer->sections().recordCount, library->format.recordBytes());

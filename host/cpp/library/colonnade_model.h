@@ -61,7 +61,7 @@ struct colonnade_step {
 /* Every call but the last four returns NULL, or a text that says what is wrong. */
 
 /* Opens a design, by lines of words from its manifest:
- *   number NAME VALUE                             numbers; arity, trianglesPerRecord, stackDepth, bvh, recordBits, depth
+ *   number NAME VALUE                             numbers; stackDepth, bvh, recordBits, depth
  *   layout RECORD FIELD OFFSET WIDTH SIGNED       of records
  *   register NAME ADDRESS WORDS WIDTH SIGNED LIMIT   those that are written; limit -1 for none
  * and for a design with the maps of a room, or with textures:

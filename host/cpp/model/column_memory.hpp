@@ -43,20 +43,14 @@ public:
     }
 
     const Triangles* trianglesAt(std::size_t address) const {
-        address &= addressMask();
         if (address < triangleBase_ || address >= attributeBase_) return nullptr;
         const std::size_t index = address - triangleBase_;
         return index < triangles_.size() ? &triangles_[index] : &unwritten_.triangles;
     }
 
-    /// Packed id of a record's triangle.
-    std::uint64_t idOf(const Triangles& record, int index) const { return (record.firstTriangle + static_cast<std::uint32_t>(index)) & decoder_.idMask(); }
-
     const Face* faceOf(std::uint64_t id) const {
-        const auto perRecord = static_cast<std::uint64_t>(decoder_.facesPerRecord());
-        const std::size_t address = attributeBase_ + id / perRecord;
-        if (address >= recordCount_) return nullptr;
-        const std::size_t index = (address - attributeBase_) * perRecord + id % perRecord;
+        const std::size_t index = id - leafTriangles * triangleBase_;
+        if (attributeBase_ + index / static_cast<std::size_t>(decoder_.facesPerRecord()) >= recordCount_) return nullptr;
         return index < faces_.size() ? &faces_[index] : &unwritten_.face;
     }
 

@@ -15,6 +15,9 @@ namespace colonnade {
 
 using Vector = std::array<std::int64_t, 3>;
 
+/// Children of a node, and triangles of a leaf, at most.
+constexpr int nodeChildren = 4, leafTriangles = 2;
+
 inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, const std::string& key) {
     const auto found = values.find(key);
     if (found == values.end()) throw std::invalid_argument("the manifest names no value '" + key + "'");
@@ -26,7 +29,7 @@ struct Numbers {
     int vertexBits, boxBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits, entrySlackShift,
         entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits, boxPadLog, stepFraction, stepReach, nodeBits,
         nearFraction, nearBits, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
-    int arity, trianglesPerRecord, stackDepth;
+    int stackDepth;
     bool bvh;
 
     explicit Numbers(const std::map<std::string, std::int64_t>& values) {
@@ -63,8 +66,6 @@ struct Numbers {
         etaFraction = take("etaFraction");
         rootBits = take("rootBits");
         maxExponent = take("maxExponent");
-        arity = take("arity");
-        trianglesPerRecord = take("trianglesPerRecord");
         stackDepth = take("stackDepth");
         bvh = take("bvh") != 0;
     }
@@ -119,17 +120,16 @@ struct Node {
     bool isLegal;
     Vector origin;
     std::array<int, 3> exponent;
-    std::array<Child, 4> kinds;
-    std::array<std::array<std::int32_t, 3>, 4> low, high;
+    std::array<Child, nodeChildren> kinds;
+    std::array<std::array<std::int32_t, 3>, nodeChildren> low, high;
     std::uint32_t firstChild, firstTriangles;
 };
 
 struct Triangles {
     bool isLegal;
-    std::uint32_t firstTriangle;
     int count;
-    std::array<bool, 2> isTransmissive;
-    std::array<std::array<Vector, 3>, 2> vertices;
+    std::array<bool, leafTriangles> isTransmissive;
+    std::array<std::array<Vector, 3>, leafTriangles> vertices;
 };
 
 struct Face {
@@ -143,24 +143,22 @@ struct Face {
 /// Decodes records by the manifest's layouts. The fields are resolved once, for speed.
 class RecordDecoder {
 public:
-    RecordDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers)
-        : arity_(numbers.arity), trianglesPerRecord_(numbers.trianglesPerRecord), maxExponent_(numbers.maxExponent) {
+    RecordDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers) : maxExponent_(numbers.maxExponent) {
         const Layout& node = layouts.at("node");
         origin_ = vectorOf(node, "origin");
         exponent_ = vectorOf(node, "exponent");
         firstChild_ = node.at("firstChild");
         firstTriangles_ = node.at("firstTriangles");
-        for (int child = 0; child < arity_; ++child) {
+        for (int child = 0; child < nodeChildren; ++child) {
             const std::string index = "[" + std::to_string(child) + "]";
             kinds_.push_back(node.at("kinds" + index));
             low_.push_back(vectorOf(node, "low" + index));
             high_.push_back(vectorOf(node, "high" + index));
         }
         const Layout& triangles = layouts.at("triangles");
-        firstTriangle_ = triangles.at("firstTriangle");
         count_ = triangles.at("count");
-        for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex) vertices_.push_back(vectorOf(triangles, "vertices[" + std::to_string(vertex) + "]"));
-        for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) isTransmissive_.push_back(triangles.at("isClear[" + std::to_string(triangle) + "]"));
+        for (int vertex = 0; vertex < 3 * leafTriangles; ++vertex) vertices_.push_back(vectorOf(triangles, "vertices[" + std::to_string(vertex) + "]"));
+        for (int triangle = 0; triangle < leafTriangles; ++triangle) isTransmissive_.push_back(triangles.at("isClear[" + std::to_string(triangle) + "]"));
         const Layout& attributes = layouts.at("attributes");
         for (int face = 0; attributes.count("faces[" + std::to_string(face) + "].material"); ++face) {
             const std::string prefix = "faces[" + std::to_string(face) + "].";
@@ -177,9 +175,8 @@ public:
 
     int facesPerRecord() const { return static_cast<int>(faces_.size()); }
 
-    /// Bit masks of a record address and of a packed triangle id.
-    std::uint32_t addressMask() const { return maskOf(firstChild_); }
-    std::uint32_t idMask() const { return maskOf(firstTriangle_); }
+    /// Bit mask of a record address.
+    std::uint32_t addressMask() const { return static_cast<std::uint32_t>((std::uint64_t(1) << firstChild_.width) - 1); }
 
     /// Decodes the node at an address.
     Node node(const std::uint8_t* record, std::size_t at) const {
@@ -189,7 +186,7 @@ public:
         for (int axis = 0; axis < 3; ++axis) result.exponent[axis] = static_cast<int>(exponent[axis]);
         result.firstChild = static_cast<std::uint32_t>(firstChild_.read(record));
         result.firstTriangles = static_cast<std::uint32_t>(firstTriangles_.read(record));
-        for (int child = 0; child < arity_; ++child) {
+        for (int child = 0; child < nodeChildren; ++child) {
             result.kinds[child] = static_cast<Child>(kinds_[child].read(record));
             const Vector low = read(low_[child], record), high = read(high_[child], record);
             for (int axis = 0; axis < 3; ++axis) {
@@ -198,23 +195,22 @@ public:
             }
         }
         bool hasNodes = false, isKnown = true, isSmall = true;
-        for (int child = 0; child < arity_; ++child) {
+        for (int child = 0; child < nodeChildren; ++child) {
             hasNodes = hasNodes || result.kinds[child] == Child::node;
             isKnown = isKnown && result.kinds[child] != Child::illegal;
         }
         for (int axis = 0; axis < 3; ++axis) isSmall = isSmall && result.exponent[axis] <= maxExponent_;
-        const bool isBelow = result.firstChild > at && result.firstChild <= addressMask() - static_cast<std::uint32_t>(arity_);
+        const bool isBelow = result.firstChild > at && result.firstChild <= addressMask() - static_cast<std::uint32_t>(nodeChildren);
         result.isLegal = isKnown && isSmall && (isBelow || !hasNodes);
         return result;
     }
 
     Triangles triangles(const std::uint8_t* record) const {
         Triangles result{};
-        result.firstTriangle = static_cast<std::uint32_t>(firstTriangle_.read(record));
         result.count = static_cast<int>(count_.read(record));
-        result.isLegal = result.count > 0 && result.count <= trianglesPerRecord_;
-        for (int vertex = 0; vertex < 3 * trianglesPerRecord_; ++vertex) result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
-        for (int triangle = 0; triangle < trianglesPerRecord_; ++triangle) result.isTransmissive[triangle] = isTransmissive_[triangle].read(record) != 0;
+        result.isLegal = result.count > 0 && result.count <= leafTriangles;
+        for (int vertex = 0; vertex < 3 * leafTriangles; ++vertex) result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
+        for (int triangle = 0; triangle < leafTriangles; ++triangle) result.isTransmissive[triangle] = isTransmissive_[triangle].read(record) != 0;
         return result;
     }
 
@@ -238,15 +234,14 @@ private:
         Field material;
     };
 
-    static std::uint32_t maskOf(const Field& field) { return static_cast<std::uint32_t>((std::uint64_t(1) << field.width) - 1); }
     static VectorFields vectorOf(const Layout& layout, const std::string& name, const char* components = "xyz") {
         return {layout.at(name + "." + components[0]), layout.at(name + "." + components[1]), layout.at(name + "." + components[2])};
     }
     static Vector read(const VectorFields& fields, const std::uint8_t* record) { return {fields[0].read(record), fields[1].read(record), fields[2].read(record)}; }
 
-    int arity_, trianglesPerRecord_, maxExponent_;
+    int maxExponent_;
     VectorFields origin_, exponent_;
-    Field firstChild_, firstTriangles_, firstTriangle_, count_;
+    Field firstChild_, firstTriangles_, count_;
     std::vector<Field> kinds_, isTransmissive_;
     std::vector<VectorFields> low_, high_, vertices_;
     std::vector<FaceFields> faces_;

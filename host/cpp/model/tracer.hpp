@@ -79,6 +79,7 @@ private:
     }
 
     void testRecord(TraceState& state, std::size_t address) {
+        address &= memory_.addressMask();
         const Triangles* const found = memory_.trianglesAt(address);
         if (!found) {
             errors.illegalRecord = true;
@@ -94,8 +95,9 @@ private:
         for (int i = 0; i < record.count; ++i) {
             ++counters.triangleTests;
             Hit hit = state.best;
-            const bool isHit = testTriangle(state.ray, record.vertices[i], memory_.idOf(record, i), numbers_, hit);
-            log.addTriangle(record.vertices[i], memory_.idOf(record, i), isHit);
+            const std::uint64_t id = leafTriangles * address + static_cast<std::uint64_t>(i);
+            const bool isHit = testTriangle(state.ray, record.vertices[i], id, numbers_, hit);
+            log.addTriangle(record.vertices[i], id, isHit);
             if (!isHit) continue;
             if (state.isShadow)
                 state.occlusion = std::max(state.occlusion, record.isTransmissive[i] && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
@@ -124,7 +126,7 @@ private:
                 }
                 ++counters.nodeReads;
                 const Node& node = *found;
-                std::array<Entered, 4> entered;
+                std::array<Entered, nodeChildren> entered;
                 int count = 0;
                 if (node.isLegal) count = testBoxes(state.ray, node, best.t, numbers_, entered, counters.boxTests);
                 else errors.illegalRecord = true;
@@ -146,9 +148,9 @@ private:
         }
     }
 
-    void logNode(std::uint32_t address, const Node& node, const std::array<Entered, 4>& entered, int count) const {
+    void logNode(std::uint32_t address, const Node& node, const std::array<Entered, nodeChildren>& entered, int count) const {
         log.addRead(RayStep::Kind::node, address);
-        for (int slot = 0; slot < numbers_.arity; ++slot) {
+        for (int slot = 0; slot < nodeChildren; ++slot) {
             if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
             const bool isHit = std::any_of(entered.begin(), entered.begin() + count, [slot](const Entered& child) { return child.slot == slot; });
             log.addChild(node, slot, entryOf(node, {slot, 0}).address, isHit);

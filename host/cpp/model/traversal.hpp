@@ -86,12 +86,12 @@ struct RelativeNode {
 };
 
 /// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
-inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, 4>& entered, std::uint64_t& tests) {
+inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, nodeChildren>& entered, std::uint64_t& tests) {
     const RelativeNode relative(ray, node, tMaxUnits(tMax, n), n);
     const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1, high = (std::int64_t(1) << (n.nearBits - 1)) - 1;
     const std::array<int, 3> axes = {ray.objectAxis(0), ray.objectAxis(1), ray.objectAxis(2)};
     int count = 0;
-    for (int slot = 0; slot < n.arity; ++slot) {
+    for (int slot = 0; slot < nodeChildren; ++slot) {
         if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
         ++tests;
         std::int64_t tNear = relative.origin, tFar = relative.tMax;

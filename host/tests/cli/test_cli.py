@@ -207,7 +207,7 @@ def test_a_mesh_is_simplified_by_the_option_or_the_scene(object_scene: Path, tmp
         ("precision=32b65s64d", "65"),
         ("array.rows=0", "array.rows"),
         ("array.rows=many", "array.rows"),
-        ("geometry.arity=3", "geometry.arity"),
+        ("array.contexts=17", "array.contexts"),
         ("array.rows", "key.path=value"),
     ],
 )

@@ -203,9 +203,9 @@ CASES |= {
 }
 CASES |= {
     "image-deep-header": Case(
-        "inspect x.image", "corrupt", {"x.image": b"CLNDIMG3" + struct.pack("<I", 200_000) + b"[" * 200_100}
+        "inspect x.image", "corrupt", {"x.image": b"CLNDIMG4" + struct.pack("<I", 200_000) + b"[" * 200_100}
     ),
-    "image-long-header": Case("inspect x.image", "truncated", {"x.image": b"CLNDIMG3\xff\xff\xff\xff" + b" " * 99}),
+    "image-long-header": Case("inspect x.image", "truncated", {"x.image": b"CLNDIMG4\xff\xff\xff\xff" + b" " * 99}),
     "image-other-version": Case("inspect x.image", "another version", {"x.image": b"CLNDIMG1" + b" " * 99}),
     "image-none": Case("inspect none", "run colonnade pack"),
     "image-named-300": Case(f"inspect {'i' * 300}", "File name too long"),

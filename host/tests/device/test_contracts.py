@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from leaves import packed_triangles
 
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
@@ -20,9 +22,15 @@ Integers = npt.NDArray[np.int64]
 PRECISIONS = ("small", "32b32s64d", "24b24s48d", "16b16s32d")
 
 
-def loaded_model(mesh: str, precision: str, *overrides: str) -> tuple[Any, Any, Manifest]:
+def loaded_model(
+    mesh: str, precision: str, *overrides: str, materials: int = 1, children: int = 4
+) -> tuple[Any, Any, Manifest]:
+    """The model with a mesh whose faces have so many materials in turn."""
     manifest = manifest_for(precision, overrides).manifest
-    image = pack(load_mesh(mesh), manifest)
+    loaded = load_mesh(mesh)
+    of_faces = (np.arange(len(loaded.faces)) % materials).astype(np.uint8)
+    colours = tuple(replace(loaded.materials[0], albedo=(0.5 / (1 + k),) * 3) for k in range(materials))
+    image = pack(replace(loaded, materials=colours, face_materials=of_faces), manifest, children=children)
     model = new_model(manifest)
     load_scene(model, image)
     model.start(frame_registers(Scene(MeshSource(name=mesh)), image.header, manifest, 64, 64))
@@ -31,15 +39,8 @@ def loaded_model(mesh: str, precision: str, *overrides: str) -> tuple[Any, Any, 
 
 def grid_vertices(image: Any, manifest: Manifest) -> Integers:
     """Corners of all packed triangles on the hardware's grid, int64 [n, 3, 3]."""
-    header, per_record = image.header, manifest.config["geometry"]["trianglesPerRecord"]
-    fields = manifest.layouts["triangles"].unpack(image.records[header.triangle_base : header.attribute_base])
-
-    def vertex(number: int) -> Integers:
-        return np.stack([fields[f"vertices[{number}].{axis}"] for axis in "xyz"], axis=1)
-
-    corners = [np.stack([vertex(3 * k + j) for j in range(3)], axis=1) for k in range(per_record)]
     shift = manifest.numbers["gridFraction"]
-    units = np.concatenate([c[fields["count"] > k] for k, c in enumerate(corners)])
+    _, units = packed_triangles(image, manifest)
     return units << shift if shift >= 0 else np.rint(units / 2.0**-shift).astype(np.int64)
 
 
@@ -70,6 +71,34 @@ def test_no_ray_from_inside_slips_through_an_edge_or_a_vertex(mesh: str, precisi
     count = 100_000 // (2 * len(PRECISIONS)) + 1
     origins, targets = inner_points(corners, count, random), points_on_edges(corners, count, random)
     assert int((model.trace(origins, targets - origins) < 0).sum()) == 0
+
+
+@pytest.mark.parametrize("materials", [1, 2])
+def test_ties_fall_the_same_way_with_and_without_a_tree(materials: int) -> None:
+    """Rays meet edges and vertices, where triangles of two materials are at one distance."""
+    found = []
+    for bvh in ("true", "false"):
+        model, image, manifest = loaded_model("sphere:3", "small", f"geometry.bvh={bvh}", materials=materials)
+        corners = grid_vertices(image, manifest)
+        corners = corners[np.lexsort(corners.reshape(len(corners), -1).T)]
+        random = np.random.default_rng(materials)
+        origins, targets = inner_points(corners, 2000, random), points_on_edges(corners, 2000, random)
+        hits = model.trace(origins, targets - origins)
+        assert (hits >= 0).all()
+        found.append(image.source_faces[hits])
+    np.testing.assert_array_equal(found[0], found[1])
+
+
+def test_a_binary_tree_has_the_hits_of_a_wide_one() -> None:
+    found = []
+    for children in (2, 4):
+        model, image, _ = loaded_model("sphere:3", "small", children=children)
+        random = np.random.default_rng(7)
+        origins = random.integers(0, 1 << 20, size=(2000, 3))
+        hits = model.trace(origins, random.integers(-(1 << 20), 1 << 20, size=(2000, 3)))
+        found.append(np.where(hits < 0, -1, image.source_faces[hits]))
+    assert (found[0] >= 0).sum() > 1000
+    np.testing.assert_array_equal(found[0], found[1])
 
 
 def wrongly_culled(count: int, precision: str, seed: int) -> tuple[int, int]:

@@ -63,7 +63,7 @@ def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, i
     ("options", "in_room"),
     [
         (
-            (*GATHERS, "physicalAttributeMemory=null", "array.columns=1", "geometry.arity=2", "frame.emission=true"),
+            (*GATHERS, "physicalAttributeMemory=null", "array.columns=1", "frame.emission=true"),
             False,
         ),
         (IN_ROOM, True),

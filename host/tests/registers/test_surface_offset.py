@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from leaves import packed_triangles
 
 from colonnade.common.types import Floats
 from colonnade.design.generator import manifest_for
@@ -41,23 +42,17 @@ def plane(random: np.random.Generator, divisions: int) -> tuple[Mesh, Floats]:
     return clean_mesh(vertices, faces, name="plane"), axes[2]
 
 
-def faces_of(image: SceneImage, manifest: Manifest) -> tuple[Integers, Integers]:
-    """Corners on the grid [n, 3, 3] and stored normals [n, 3] of the packed triangles."""
+def faces_of(image: SceneImage, manifest: Manifest) -> tuple[Integers, Integers, Integers]:
+    """Rising packed ids [n], corners on the grid [n, 3, 3] and stored normals [n, 3] of the triangles."""
     header, shift = image.header, manifest.numbers["gridFraction"]
-    records = manifest.layouts["triangles"].unpack(image.records[header.triangle_base : header.attribute_base])
-    corners = np.zeros((header.triangles, 3, 3), dtype=np.int64)
-    for k in range(manifest.config["geometry"]["trianglesPerRecord"]):
-        used = records["count"] > k
-        for j in range(3):
-            values = np.stack([records[f"vertices[{3 * k + j}].{axis}"] for axis in "xyz"], axis=1)
-            corners[records["firstTriangle"][used] + k, j] = values[used]
+    ids, corners = packed_triangles(image, manifest)
     attributes = manifest.layouts["attributes"].unpack(image.records[header.attribute_base :])
     slots = manifest.layouts["attributes"].count_of("faces[{}].material")
     normals = np.zeros((slots * len(attributes["faces[0].material"]), 3), dtype=np.int64)
     for k in range(slots):
         normals[k::slots] = np.stack([attributes[f"faces[{k}].geometricNormal.{axis}"] for axis in "xyz"], axis=1)
     on_grid = corners << shift if shift >= 0 else np.rint(corners / 2.0**-shift).astype(np.int64)
-    return on_grid, normals[: header.triangles]
+    return ids, on_grid, normals[ids - 2 * header.triangle_base]
 
 
 def nearest_even(value: int, bits: int) -> int:
@@ -108,7 +103,7 @@ def hits_of_their_own_plane(precision: str, divisions: int, seed: int, share: fl
     model = new_model(manifest)
     load_scene(model, image)
     model.start(frame_registers(Scene(MeshSource(name="cube")), image.header, manifest, 64, 64))
-    corners, normals = faces_of(image, manifest)
+    ids, corners, normals = faces_of(image, manifest)
 
     # Rays from the scene's whole range at points of random triangles
     chosen = random.integers(len(corners), size=RAYS)
@@ -120,15 +115,16 @@ def hits_of_their_own_plane(precision: str, divisions: int, seed: int, share: fl
     nothing = np.zeros((RAYS, 3), dtype=np.int64)
     rays = model.test_boxes(origins, directions, nothing, nothing, nothing, nothing)
     first = model.trace(origins, directions)
+    place = np.searchsorted(ids, first)
 
     # From there off the surface, at angles to the plane beyond that of the rounded normals and slopes
     offset = round(share * surface_offset(numbers, image.header.largest_triangle))
     least = 2.0**-11 + 2**0.5 * (2.0 ** -numbers["shearDigits"] + 2.0 ** (1 - numbers["mantissaBits"]))
     starts, leaving = [], []
     for i in np.flatnonzero(first >= 0):
-        point = hit_point(rays, i, corners[first[i]], numbers)
+        point = hit_point(rays, i, corners[place[i]], numbers)
         assert point is not None, "the model's hit is one by docs/numbers.md"
-        stored = normals[first[i]] * (1 if normals[first[i]] @ away[i] > 0 else -1)
+        stored = normals[place[i]] * (1 if normals[place[i]] @ away[i] > 0 else -1)
         starts.append([p + nearest_even(offset * int(f), 11) for p, f in zip(point, stored, strict=True)])
         unit = normal if normal @ stored > 0 else -normal
         across = np.cross(unit, random.normal(size=3))

@@ -26,7 +26,7 @@ SIZE = (24, 18)
 GATHERS = Scene(MeshSource(name="teapot:4"), paths=Paths(gather=1), frame=FrameSize(*SIZE))
 #: As in `test_gather.py`, so that the simulator is there.
 DESIGN = ("units.shadeInterval=3", "frame.gather=true", "physicalAttributeMemory=null", "array.columns=1")
-OPTIONS = (*DESIGN, "geometry.arity=2", "frame.emission=true")
+OPTIONS = (*DESIGN, "frame.emission=true")
 
 
 def test_the_estimate_is_that_of_the_rtl() -> None:

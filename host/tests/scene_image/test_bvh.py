@@ -1,4 +1,4 @@
-"""The BVH: conservative boxes, every triangle once, the same order for all arities, and valid bounds."""
+"""The BVH: conservative boxes, every triangle once, the same order for any number of children, and valid bounds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Wide = npt.NDArray[np.int64]
 
 
 def build(vertices: Integers, faces: Integers, **changes: Any) -> Bvh:
-    options = {"triangles_per_record": 2, "arity": 4, "box_bits": 7, "stack_depth": 48} | changes
+    options = {"children": 4, "box_bits": 7, "stack_depth": 48} | changes
     return build_bvh(vertices, faces, **options)
 
 
@@ -34,7 +34,14 @@ def random_triangles(seed: int, count: int, spread: int, bits: int = 16) -> tupl
     return vertices, np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
 
 
-def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, box_bits: int) -> None:
+def is_pair(corners: Integers) -> bool:
+    """Whether two triangles, [2, 3, 3], share an edge in opposite directions."""
+    first, second = corners.tolist()
+    edges = [(first[k], first[k - 2]) for k in range(3)]
+    return any((second[k - 2], second[k]) in edges for k in range(3))
+
+
+def check_tree(tree: Bvh, vertices: Integers, faces: Integers, box_bits: int) -> None:
     """Traverse the tree and check each box against those of its ancestors."""
     seen: list[int] = []
     maximum = (1 << 28, -1)
@@ -65,7 +72,7 @@ def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, 
                 continue
             assert kind == LEAF
             first, count = int(tree.leaf_first[next_leaf]), int(tree.leaf_count[next_leaf])
-            assert 1 <= count <= per_record
+            assert count == 1 or (count == 2 and is_pair(vertices[faces[tree.order[first : first + 2]]]))
             seen += range(first, first + count)
             points = vertices[faces[tree.order[first : first + count]]].reshape(-1, 3)
             assert (points >= inner_low).all() and (points <= inner_high).all()
@@ -83,26 +90,27 @@ def check_tree(tree: Bvh, vertices: Integers, faces: Integers, per_record: int, 
     seed=st.integers(0, 2**32 - 1),
     count=st.integers(1, 300),
     spread=st.sampled_from([1, 3, 1000]),
-    per_record=st.sampled_from([1, 2]),
     box_bits=st.integers(4, 7),
     stack_depth=st.sampled_from([4, 8, 10, 12, 48]),
 )
-def test_boxes_contain_their_triangles_in_an_order_that_arity_and_box_bits_do_not_change(
-    seed: int, count: int, spread: int, per_record: int, box_bits: int, stack_depth: int
+def test_boxes_contain_their_triangles_in_an_order_that_children_and_box_bits_do_not_change(
+    seed: int, count: int, spread: int, box_bits: int, stack_depth: int
 ) -> None:
     vertices, faces = random_triangles(seed, count, spread)
-    options = {"triangles_per_record": per_record, "stack_depth": stack_depth}
-    trees = [build(vertices, faces, arity=arity, box_bits=bits, **options) for arity, bits in ((2, 7), (4, box_bits))]
-    balanced = (-(-count // per_record) - 1).bit_length()
+    trees = [
+        build(vertices, faces, children=children, box_bits=bits, stack_depth=stack_depth)
+        for children, bits in ((2, 7), (4, box_bits))
+    ]
+    balanced = (count - 1).bit_length()
     for tree, bits in zip(trees, (7, box_bits), strict=True):
-        check_tree(tree, vertices, faces, per_record, bits)
+        check_tree(tree, vertices, faces, bits)
         assert tree.statistics.stack_bound <= max(stack_depth, balanced)
     np.testing.assert_array_equal(trees[0].order, trees[1].order)
     assert sorted(trees[0].leaf_first.tolist()) == sorted(trees[1].leaf_first.tolist())
 
 
 def planes_of_children(tree: Bvh, vertices: Integers, faces: Integers) -> tuple[Wide, Wide]:
-    """The boxes of all children, int64 [n, arity, 3]: a leaf's is exact, a node's the union of those in its own record."""
+    """The boxes of all children, int64 [n, 4, 3]: a leaf's is exact, a node's the union of those in its own record."""
     present = (tree.kinds != EMPTY)[..., None]
     shift, origin = tree.exponent[:, None, :].astype(np.int64), tree.origin[:, None, :].astype(np.int64)
     own_low = np.where(present, origin + (tree.low.astype(np.int64) << shift), 1 << 40).min(axis=1)
@@ -144,13 +152,13 @@ def check_nested(tree: Bvh, vertices: Integers, faces: Integers, box_bits: int) 
     spread=st.sampled_from([1, 3, 1000]),
     vertex_bits=st.sampled_from([10, 16, 19]),
     box_bits=st.integers(4, 7),
-    arity=st.sampled_from([2, 4]),
+    children=st.sampled_from([2, 4]),
 )
 def test_a_node_follows_from_the_records_of_its_children(
-    seed: int, count: int, spread: int, vertex_bits: int, box_bits: int, arity: int
+    seed: int, count: int, spread: int, vertex_bits: int, box_bits: int, children: int
 ) -> None:
     vertices, faces = random_triangles(seed, count, spread, vertex_bits)
-    check_nested(build(vertices, faces, arity=arity, box_bits=box_bits), vertices, faces, box_bits)
+    check_nested(build(vertices, faces, children=children, box_bits=box_bits), vertices, faces, box_bits)
 
 
 @pytest.mark.matrix
@@ -158,7 +166,7 @@ def test_a_million_nodes_follow_from_the_records_of_their_children() -> None:
     nodes = 0
     for seed in itertools.count():
         vertices, faces = random_triangles(seed, 60_000, (1, 30, 60_000)[seed % 3], (16, 19)[seed % 2])
-        tree = build(vertices, faces, triangles_per_record=1 + seed % 2)
+        tree = build(vertices, faces)
         check_nested(tree, vertices, faces, 7)
         nodes += len(tree.kinds)
         if nodes >= 1_000_000:
@@ -174,7 +182,7 @@ class Subtree:
 
 
 def binary_tree(tree: Bvh, vertices: Integers, faces: Integers) -> Subtree:
-    """The tree of arity 2 with exact boxes."""
+    """The tree of two children a node with exact boxes."""
 
     def below(node: int) -> tuple[Subtree, Integers]:
         found, node_child, leaf_child = [], int(tree.first_child[node]), int(tree.first_triangles[node])
@@ -231,9 +239,8 @@ def least_area(subtree: Subtree, stack: int) -> float:
 )
 def test_no_collapse_within_the_stack_reads_fewer_nodes(seed: int, count: int, spread: int, stack_depth: int) -> None:
     vertices, faces = random_triangles(seed, count, spread)
-    options = {"triangles_per_record": 1, "stack_depth": stack_depth}
-    binary = binary_tree(build(vertices, faces, arity=2, **options), vertices, faces)
-    tree = build(vertices, faces, arity=4, **options)
+    binary = binary_tree(build(vertices, faces, children=2, stack_depth=stack_depth), vertices, faces)
+    tree = build(vertices, faces, stack_depth=stack_depth)
     corners = vertices[faces].reshape(-1, 3, 3)
     leaves = sum(half_area(triangle) for triangle in corners)
     assert tree.statistics.cost * binary.area == pytest.approx(least_area(binary, stack_depth) + leaves, rel=1e-9)
@@ -266,18 +273,18 @@ def test_large_triangles_among_small_ones_move_up() -> None:
     )
     large = moved(np.arange(0, 32_000, 10_000, dtype=np.int32), [[0, 0, 0], [31_000, 30_009, 0], [31_000, 0, 30_009]])
     vertices = np.concatenate([small, large]).reshape(-1, 3)
-    tree = build(vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3), triangles_per_record=1, arity=2)
+    tree = build(vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3), children=2)
     level = levels(tree)
-    assert max(level[len(small) + i] for i in range(len(large))) <= 4 < max(level.values())
+    assert max(level[len(small) + i] for i in range(len(large))) <= 5 < 8 <= max(level.values())
 
 
-@pytest.mark.parametrize("arity", [2, 4])
-def test_one_triangle_has_a_root_with_one_leaf(arity: int) -> None:
+@pytest.mark.parametrize("children", [2, 4])
+def test_one_triangle_has_a_root_with_one_leaf(children: int) -> None:
     vertices, faces = random_triangles(1, 1, 1)
-    tree = build(vertices, faces, arity=arity)
-    assert tree.kinds.tolist() == [[LEAF] + [EMPTY] * (arity - 1)]
+    tree = build(vertices, faces, children=children)
+    assert tree.kinds.tolist() == [[LEAF] + [EMPTY] * 3]
     assert tree.statistics.stack_bound == 0
-    check_tree(tree, vertices, faces, 2, 7)
+    check_tree(tree, vertices, faces, 7)
 
 
 @pytest.mark.parametrize("count", [2, 3, 500, 4000])
@@ -286,8 +293,8 @@ def test_triangles_in_one_place_are_halved(count: int) -> None:
     vertices = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0]], dtype=np.int32)
     faces = np.tile(np.array([[0, 1, 2]], dtype=np.int32), (count, 1))
     tree = build(vertices, faces)
-    check_tree(tree, vertices, faces, 2, 7)
-    assert len(tree.leaf_first) == -(-count // 2)
+    check_tree(tree, vertices, faces, 7)
+    assert len(tree.leaf_first) == count
 
 
 def one_sided(count: int = 3000) -> tuple[Integers, Integers]:
@@ -302,24 +309,24 @@ def one_sided(count: int = 3000) -> tuple[Integers, Integers]:
 
 def test_a_tree_too_deep_for_the_stack_is_balanced() -> None:
     vertices, faces = one_sided()
-    free = build(vertices, faces, stack_depth=256, arity=2)
+    free = build(vertices, faces, stack_depth=256, children=2)
     assert free.statistics.height_limit == 0
     short = free.statistics.stack_bound - 2
-    for arity in (2, 4):
-        tree = build(vertices, faces, stack_depth=max(short, 18), arity=arity)
+    for children in (2, 4):
+        tree = build(vertices, faces, stack_depth=max(short, 18), children=children)
         assert tree.statistics.stack_bound <= max(short, 18)
-        check_tree(tree, vertices, faces, 2, 7)
+        check_tree(tree, vertices, faces, 7)
 
 
-def test_the_order_does_not_depend_on_the_arity_when_balanced() -> None:
+def test_the_order_does_not_depend_on_the_children_when_balanced() -> None:
     vertices, faces = one_sided()
     for stack_depth in (12, 16, 20, 4):
-        trees = [build(vertices, faces, stack_depth=stack_depth, arity=arity) for arity in (2, 4)]
+        trees = [build(vertices, faces, stack_depth=stack_depth, children=children) for children in (2, 4)]
         np.testing.assert_array_equal(trees[0].order, trees[1].order)
         assert trees[0].statistics.height_limit == trees[1].statistics.height_limit
 
 
 def test_a_tree_that_does_not_fit_reports_its_needs() -> None:
     vertices, faces = random_triangles(3, 4096, 1000)
-    tree = build(vertices, faces, stack_depth=4, arity=2)
-    assert tree.statistics.stack_bound == 11  # 2,048 leaves, balanced
+    tree = build(vertices, faces, stack_depth=4, children=2)
+    assert tree.statistics.stack_bound == 12  # 4,096 leaves, balanced

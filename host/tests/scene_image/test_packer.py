@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from leaves import packed_triangles
 from trees import LEAF, NODE
 
 from colonnade.common.errors import UserError
@@ -25,20 +26,6 @@ from colonnade.scene_image.inspect import dense_line, describe, report_lines
 from colonnade.scene_image.packer import MAX_MEMORY_DEPTH, QuantisedMesh, memory_use, pack, quantise
 
 MakeManifest = Callable[..., Manifest]
-
-
-def packed_triangles(image: SceneImage, manifest: Manifest) -> dict[int, list[list[int]]]:
-    """The corners of each triangle in the records, by packed id."""
-    header = image.header
-    section = image.records[header.triangle_base : header.triangle_base + header.triangle_records]
-    fields = manifest.layouts["triangles"].unpack(section)
-    result: dict[int, list[list[int]]] = {}
-    for row in range(len(section)):
-        for k in range(int(fields["count"][row])):
-            corners = [[int(fields[f"vertices[{3 * k + j}].{axis}"][row]) for axis in "xyz"] for j in range(3)]
-            assert int(fields["firstTriangle"][row]) + k not in result
-            result[int(fields["firstTriangle"][row]) + k] = corners
-    return result
 
 
 def geometric_normals(quantised: QuantisedMesh) -> Floats:
@@ -87,28 +74,26 @@ def test_nothing_left_is_refused() -> None:
 
 
 @pytest.mark.parametrize("vertex_bits", [10, 16, 19])
-@pytest.mark.parametrize("per_record", [1, 2])
-def test_records_hold_the_mesh_whatever_the_layout(
-    make_manifest: MakeManifest, vertex_bits: int, per_record: int
-) -> None:
-    """The packed ids are equal for arity 2, arity 4 and no tree."""
+def test_records_hold_the_mesh_with_any_tree_or_none(make_manifest: MakeManifest, vertex_bits: int) -> None:
+    """The leaves have the same order with and without a tree."""
     mesh = load_mesh("sphere:3")
     quantised = quantise(mesh, vertex_bits)
-    triangles, faces = [], []
-    for changes in ({"arity": 4}, {"arity": 2}, {"bvh": False}):
-        manifest = make_manifest(vertex_bits=vertex_bits, per_record=per_record, **changes)
-        image = pack(mesh, manifest)
+    leaves = []
+    for children, bvh in ((4, True), (2, True), (4, False)):
+        manifest = make_manifest(vertex_bits=vertex_bits, bvh=bvh)
+        image = pack(mesh, manifest, children=children)
         assert image.records.shape == (image.header.record_count, manifest.record_bits // 8)
-        triangles.append(packed_triangles(image, manifest))
-        faces.append(image.source_faces)
-    assert triangles[0] == triangles[1]
-    assert sorted(triangles[0]) == list(range(len(quantised.faces)))
-    for packed, face in enumerate(faces[0]):
-        corners = quantised.vertices[mesh.faces[np.flatnonzero(mesh.source_faces == face)[0]]].tolist()
-        rotations = [corners[j:] + corners[:j] for j in range(3)]
-        assert triangles[0][packed] in rotations and triangles[2][packed] in rotations
-    np.testing.assert_array_equal(faces[0], faces[1])
-    np.testing.assert_array_equal(faces[0], faces[2])
+        leaves.append(image.records[image.header.triangle_base : image.header.attribute_base].tobytes())
+        ids, triangles = packed_triangles(image, manifest)
+        np.testing.assert_array_equal(np.flatnonzero(image.source_faces >= 0), ids)
+        faces = np.full(image.header.source_triangles, -1)
+        faces[mesh.source_faces] = np.arange(len(mesh.faces))
+        faces = faces[image.source_faces[ids]]
+        assert sorted(faces.tolist()) == sorted(quantised.mesh_faces.tolist())
+        for face, corners in zip(faces, triangles.tolist(), strict=True):
+            source = quantised.vertices[mesh.faces[face]].tolist()
+            assert corners in [source[j:] + source[:j] for j in range(3)]
+    assert leaves[0] == leaves[2]
 
 
 def test_nodes_reach_every_leaf_and_only_those(manifest: Manifest) -> None:
@@ -136,11 +121,11 @@ def test_attributes_lie_in_the_order_of_packed_ids_and_corners(manifest: Manifes
     quantised = quantise(mesh, 16)
     fields = manifest.layouts["attributes"].unpack(image.records[image.header.attribute_base :])
     flat = geometric_normals(quantised)
-    triangles = packed_triangles(image, manifest)
-    for packed, face in enumerate(image.source_faces):
-        row, slot = divmod(packed, 2)
+    for packed, triangle in zip(*packed_triangles(image, manifest), strict=True):
+        row, slot = divmod(int(packed) - 2 * image.header.triangle_base, 2)
+        face = image.source_faces[packed]
         corners = quantised.vertices[mesh.faces[face]].tolist()
-        order = [corners.index(corner) for corner in triangles[packed]]
+        order = [corners.index(corner) for corner in triangle.tolist()]
         for a, axis in enumerate("xyz"):
             for j in range(3):
                 expected = np.rint(mesh.corner_normals[face, order[j], a] * 2047)
@@ -149,29 +134,54 @@ def test_attributes_lie_in_the_order_of_packed_ids_and_corners(manifest: Manifes
         assert fields[f"faces[{slot}].material"][row] == 0
 
 
-def test_a_common_edge_comes_first_in_both_triangles_of_a_leaf(manifest: Manifest) -> None:
-    """The triangle unit tests such a leaf as a pair. A common edge of one direction, and other leaves, stay."""
+def counts(image: SceneImage, manifest: Manifest) -> list[int]:
+    """Triangles of each leaf."""
+    section = image.records[image.header.triangle_base : image.header.attribute_base]
+    return [int(count) for count in manifest.layouts["triangles"].unpack(section)["count"]]
+
+
+def test_pairs_have_a_common_edge_of_opposite_directions_which_comes_first(manifest: Manifest) -> None:
+    """Triangles with a common edge of one direction, or a common corner, are leaves of their own."""
     a, b, c, d, e = ([0, 0, 0], [9, 0, 0], [0, 9, 0], [9, 9, 1], [4, 4, 9])
-    leaves = [[[c, a, b], [d, b, a]], [[a, b, c], [d, a, b]], [[a, b, c], [e, d, c]], [[b, c, a]]]
+    parts = [[[c, a, b], [d, b, a]], [[a, b, c], [d, a, b]], [[a, b, c], [e, d, c]], [[b, c, a]]]
     away = [[0, 0, 0], [100, 0, 0], [0, 100, 0], [100, 100, 0]]
-    corners = np.array([triangle for leaf in leaves for triangle in leaf], dtype=np.float64)
+    corners = np.array([triangle for part in parts for triangle in part], dtype=np.float64)
     corners += np.repeat(np.array(away, dtype=np.float64), [2, 2, 2, 1], axis=0)[:, None]
     mesh = clean_mesh(corners.reshape(-1, 3), np.arange(21, dtype=np.int32).reshape(-1, 3), "pairs")
+    mesh = replace(mesh, corner_normals=np.broadcast_to([0.0, 0.0, 1.0], mesh.corner_normals.shape).copy())
     image = pack(mesh, manifest)
-    units, triangles = quantise(mesh, 16), packed_triangles(image, manifest)
+    assert sorted(counts(image, manifest)) == [1, 1, 1, 1, 1, 2]
+    units, triangles = quantise(mesh, 16), dict(zip(*packed_triangles(image, manifest), strict=True))
     rotated = {}
-    for packed, face in enumerate(image.source_faces):
-        source = units.vertices[units.faces[np.flatnonzero(units.mesh_faces == face)[0]]].tolist()
-        rotated[int(face)] = source.index(triangles[packed][0])
+    for packed, triangle in triangles.items():
+        face = int(image.source_faces[packed])
+        rotated[face] = (
+            units.vertices[units.faces[np.flatnonzero(units.mesh_faces == face)[0]]]
+            .tolist()
+            .index(triangle[0].tolist())
+        )
     assert [rotated[face] for face in range(7)] == [1, 1, 0, 0, 0, 0, 0]
-    pair = [triangles[int(np.flatnonzero(image.source_faces == face)[0])] for face in (0, 1)]
-    assert pair[0][:2] == pair[1][1::-1]
+    first, second = (triangles[int(np.flatnonzero(image.source_faces == face)[0])].tolist() for face in (0, 1))
+    assert first[:2] == second[1::-1]
 
 
-def test_most_leaves_of_a_mesh_have_a_common_edge_first(manifest: Manifest) -> None:
-    triangles = packed_triangles(pack(load_mesh("teapot:4"), manifest), manifest)
-    pairs = sum(triangles[k][:2] == triangles[k + 1][1::-1] for k in range(len(triangles) - 1))
-    assert pairs > 0.3 * len(triangles)
+@pytest.mark.parametrize("differs", ["material", "normal", "nothing"])
+def test_a_pair_has_one_material_and_one_normal_at_each_end_of_its_edge(manifest: Manifest, differs: str) -> None:
+    mesh = load_mesh("square")
+    if differs == "material":
+        mesh = replace(mesh, materials=mesh.materials * 2, face_materials=np.arange(2, dtype=np.uint8))
+    if differs == "normal":
+        normals = mesh.corner_normals.copy()
+        normals[1, :, 0] += 0.1
+        mesh = replace(mesh, corner_normals=unit_vectors(normals))
+    assert counts(
+        pack(mesh, manifest, [replace(m, albedo=(0.1 * k, 0, 0)) for k, m in enumerate(mesh.materials)]), manifest
+    ) == ([2] if differs == "nothing" else [1, 1])
+
+
+def test_most_leaves_of_a_mesh_are_pairs(manifest: Manifest) -> None:
+    found = counts(pack(load_mesh("teapot:4"), manifest), manifest)
+    assert sum(count == 2 for count in found) > 0.9 * len(found)
 
 
 def test_the_box_is_tight(manifest: Manifest) -> None:
@@ -182,9 +192,9 @@ def test_the_box_is_tight(manifest: Manifest) -> None:
 
 def test_one_triangle_and_a_flat_square(make_manifest: MakeManifest) -> None:
     for name, count in (("triangle", 1), ("square", 2)):
-        for changes in ({}, {"arity": 2}, {"bvh": False}):
-            manifest = make_manifest(**changes)
-            image = pack(load_mesh(name), manifest)
+        for children, bvh in ((4, True), (2, True), (4, False)):
+            manifest = make_manifest(bvh=bvh)
+            image = pack(load_mesh(name), manifest, children=children)
             assert image.header.triangles == count
             assert image.header.record_count == (3 if manifest.bvh else 2)
 
@@ -221,9 +231,9 @@ def test_too_deep_a_tree_is_refused(make_manifest: MakeManifest) -> None:
 
 def test_a_short_stack_gets_a_balanced_tree(make_manifest: MakeManifest) -> None:
     mesh = load_mesh("teapot")
-    free = pack(mesh, make_manifest(arity=2)).header.tree
+    free = pack(mesh, make_manifest(), children=2).header.tree
     assert free is not None and free.height_limit == 0
-    tree = pack(mesh, make_manifest(arity=2, stack_depth=free.stack_bound - 1)).header.tree
+    tree = pack(mesh, make_manifest(stack_depth=free.stack_bound - 1), children=2).header.tree
     assert tree is not None
     assert tree.stack_bound < free.stack_bound
     assert tree.height_limit > 0

@@ -43,7 +43,7 @@ class DeviceMarch:
         attributes = manifest.attributes
         if attributes is None:
             raise ValueError("the design has no physical-attribute memory")
-        numbers = dict(manifest.numbers) | dict.fromkeys(("arity", "trianglesPerRecord", "stackDepth", "bvh"), 0)
+        numbers = dict(manifest.numbers) | dict.fromkeys(("stackDepth", "bvh"), 0)
         self._model: Any = _core.EnvironmentModel(numbers, dict(attributes.sizes), field_places(attributes.layouts))
         for memory, words in memory_words(image):
             self._model.load(memory, words)

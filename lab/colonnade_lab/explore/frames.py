@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
@@ -44,6 +44,11 @@ class Frame:
     mesh: Mesh
     source: str | None
     identity: Mapping[str, Any]
+
+    def with_children(self, children: Literal[2, 4]) -> Frame:
+        """The frame with so many children of a node at most."""
+        scene = replace(self.scene, mesh=replace(self.scene.mesh, children=children))
+        return replace(self, scene=scene, identity={**self.identity, "children": children})
 
 
 def frame_of(name: str, scene: Scene, mesh: Mesh, source: str | None) -> Frame:

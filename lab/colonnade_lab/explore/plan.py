@@ -124,12 +124,12 @@ class Plan:
                     )
         if study.tests is not None:
             found.pictures |= {frame.name: self._picture(point, manifest, frame) for frame in self.frames}
-            if study.tests.same_pictures and baseline is not None:
+            if study.tests.same_pictures and baseline is not None and baseline[0].children == point.children:
                 found.models = {frame.name: self._picture(*baseline, frame) for frame in self.frames}
                 found.support += found.models.values()
         identity = {"config": manifest.config}
         if study.cycles is not None:
-            for frame in self._frames_of(study.cycles.meshes):
+            for frame in self._frames_of(point, study.cycles.meshes):
                 title = f"cycles of {point.name}, {frame.name}"
                 found.cycles[frame.name] = cycles_job(title, design, manifest, frame, study.workload.size)
         for library in self.libraries:
@@ -139,7 +139,7 @@ class Plan:
             if study.area is not None:
                 found.areas[library] = area
             if study.power is not None:
-                for frame in self._frames_of(study.power.meshes):
+                for frame in self._frames_of(point, study.power.meshes):
                     run: dict[str, Any] = {
                         "size": study.power.size,
                         "window": study.power.cycles,
@@ -155,7 +155,7 @@ class Plan:
         return found
 
     def _picture(self, point: Point, manifest: Manifest, frame: Frame) -> Job:
-        size = self.study.workload.size
+        size, frame = self.study.workload.size, frame.with_children(point.children)
         overrides = (*self._base, *point.overrides[self._prefix :])
         # A picture does not depend on the array
         sections = {key: value for key, value in manifest.config.items() if key not in _ARRAY_SECTIONS}
@@ -164,8 +164,9 @@ class Plan:
         arguments = {"config": self._config, "overrides": overrides, "scene": frame.scene, "mesh": frame.mesh}
         return _job("picture", f"picture of {point.name}, {frame.name}", facts, arguments | {"size": size})
 
-    def _frames_of(self, meshes: Sequence[str]) -> list[Frame]:
-        return [frame for frame in self.frames if not meshes or frame.source in meshes]
+    def _frames_of(self, point: Point, meshes: Sequence[str]) -> list[Frame]:
+        frames = [frame for frame in self.frames if not meshes or frame.source in meshes]
+        return [frame.with_children(point.children) for frame in frames]
 
 
 class PointJobs:

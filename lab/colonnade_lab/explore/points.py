@@ -6,7 +6,8 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from colonnade.common.errors import UserError
 from colonnade.common.limits import MAX_DESIGNS
@@ -27,11 +28,13 @@ class Point:
         name: Unique name, e.g. ``32b32s64d, contexts=8``.
         values: Its values of the axes, and of the fields of a named point.
         overrides: All changes to the study's configuration, ``key.path=value``.
+        children: Most children of a node of the packer's tree.
     """
 
     name: str
     values: Mapping[str, FieldValue]
     overrides: tuple[str, ...]
+    children: Literal[2, 4] = 4
 
 
 def point_of(file: StudyFile, values: Mapping[str, FieldValue], name: str | None = None) -> Point:
@@ -65,7 +68,7 @@ def points_of(file: StudyFile) -> list[Point]:
         where = ("axes",) if of_axes > len(study.point) else ("point",)
         advice = "vary fewer values, or search" if study.combine == "grid" else "give fewer"
         raise file.error(where, f"the study has more than {MAX_DESIGNS:,} points: {advice}")
-    points = [point_of(file, point.set, point.name) for point in study.point]
+    points = [replace(point_of(file, point.set, point.name), children=point.children) for point in study.point]
     points += [point_of(file, values) for values in _combinations(file)]
     names = [point.name for point in points]
     twice = next((name for name, count in Counter(names).items() if count > 1), None)

@@ -77,10 +77,12 @@ class NamedPoint:
     Attributes:
         name: Its name in tables and plots.
         set: Fields and their values.
+        children: Most children of a node of the packer's tree.
     """
 
     name: Annotated[str, MinLen(1)]
     set: Mapping[str, FieldValue] = field(default_factory=dict)
+    children: Literal[2, 4] = 4
 
 
 @dataclass(frozen=True, config=_STRICT)
@@ -116,7 +118,7 @@ class Tests:
     """Box tests, triangle tests and node reads of the bit-exact model, and the records of the scene.
 
     Attributes:
-        same_pictures: The pictures of each point must equal those of the baseline.
+        same_pictures: The pictures of each point with the baseline's `children` must equal those of the baseline.
     """
 
     same_pictures: StrictBool = False

@@ -24,7 +24,7 @@ SOURCES: Mapping[str, tuple[str, ...]] = {
     "live": ("host/cpp/live/*.[ch]*",),
     "maps": tuple(f"host/colonnade/maps/{each}.py" for each in ("*_encoder", "*_fit", "slic", "palette", "heap")),
     "roomLight": ("host/colonnade/environment/*_fit.py", "host/colonnade/maps/room_light.py"),
-    "tree": ("host/cpp/*bvh.hpp", "host/cpp/reinsertion.hpp"),
+    "tree": ("host/cpp/*bvh.hpp", "host/cpp/reinsertion.hpp", "host/cpp/packer/tree.hpp"),
 }
 
 #: Strings, which stay, and comments and includes, of C++ and Verilog; comments, docstrings and imports of Python.

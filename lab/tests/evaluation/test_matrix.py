@@ -38,7 +38,6 @@ SHAPES = {
     "slow memory": ("columnBvhMemory.readLatency=6",),
     "tiles of 4": ("frame.tileSize=4",),
     "tiles of 32": ("frame.tileSize=32",),
-    "binary tree": ("geometry.arity=2",),
     "no tree": ("geometry.bvh=false",),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -57,9 +58,9 @@ def test_one_by_one_varies_each_axis_alone(tmp_path: Path) -> None:
 
 
 def test_named_points_come_first_and_may_be_the_baseline(tmp_path: Path) -> None:
-    lean = '[[point]]\nname = "lean"\nset = { "geometry.triangleBits" = 24 }\n'
+    lean = '[[point]]\nname = "lean"\nset = { "geometry.triangleBits" = 24 }\nchildren = 2\n'
     file = study(tmp_path, STUDY.replace("32b32s64d", "lean", 1) + lean)
-    assert points_of(file)[0] == point_of(file, {"geometry.triangleBits": 24}, "lean")
+    assert points_of(file)[0] == replace(point_of(file, {"geometry.triangleBits": 24}, "lean"), children=2)
 
 
 def refused(folder: Path, text: str) -> str:

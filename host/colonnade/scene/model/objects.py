@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from annotated_types import Interval
 from pydantic import StrictBool, model_validator
@@ -24,12 +24,14 @@ class MeshSource:
         crease: Angle up to which edges are smooth, degrees, in place of the file's normals. None: the file's normals,
             without them 60 degrees.
         simplify: Number of triangles to which a mesh of more is simplified. None: all are kept.
+        children: Most children of a node of the packer's tree: 2 is a binary tree, as in the source paper.
     """
 
     name: Text | None = None
     path: File | None = None
     crease: Annotated[Float, Interval(ge=0.0, le=180.0)] | None = None
     simplify: Triangles | None = None
+    children: Literal[2, 4] = 4
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Self:

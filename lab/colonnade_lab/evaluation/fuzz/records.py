@@ -45,7 +45,7 @@ def _set_field(random: np.random.Generator, records: Bytes, header: ImageHeader,
     return f"{kind} {address}: {field.name} = {value}"
 
 
-_CONTROL_FIELDS = {"exponent", "firstChild", "firstTriangles", "kinds", "firstTriangle", "count", "isClear", "material"}
+_CONTROL_FIELDS = {"exponent", "firstChild", "firstTriangles", "kinds", "count", "isClear", "material"}
 
 
 def _redirect(random: np.random.Generator, records: Bytes, header: ImageHeader, manifest: Manifest) -> str:

@@ -74,7 +74,7 @@ def test_the_model_of_a_room_is_defined_on_all_words_and_registers(options: tupl
     manifest = manifest_for("small", options).manifest
     assert manifest.attributes is not None
     random = np.random.default_rng(7)
-    numbers = dict(manifest.numbers) | dict.fromkeys(("arity", "trianglesPerRecord", "stackDepth", "bvh"), 0)
+    numbers = dict(manifest.numbers) | dict.fromkeys(("stackDepth", "bvh"), 0)
     model = _core.EnvironmentModel(numbers, dict(manifest.attributes.sizes), field_places(manifest.attributes.layouts))
     for name, place in manifest.memories.items():
         if name == "columnBvh":

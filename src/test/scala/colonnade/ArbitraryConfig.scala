@@ -19,18 +19,16 @@ object ArbitraryConfig {
   } yield ArrayConfig(rows, columns, contexts)
 
   private val geometry = for {
-    vertexBits         <- Gen.chooseNum(10, 19)
-    boxBits            <- Gen.chooseNum(4, 7)
-    triangleBits       <- Gen.option(width)
-    arity              <- Gen.oneOf(2, 4)
-    trianglesPerRecord <- Gen.oneOf(1, 2)
-    bvh                <- flag
-    cornerColours      <- flag
-    textureBytes       <- Gen.oneOf(Seq(0) ++ (if (cornerColours) Seq(5314, 16384, 21632) else Nil))
-  } yield GeometryConfig(vertexBits, boxBits, triangleBits, arity, trianglesPerRecord, bvh, cornerColours, textureBytes)
+    vertexBits    <- Gen.chooseNum(10, 19)
+    boxBits       <- Gen.chooseNum(4, 7)
+    triangleBits  <- Gen.option(width)
+    bvh           <- flag
+    cornerColours <- flag
+    textureBytes  <- Gen.oneOf(Seq(0) ++ (if (cornerColours) Seq(5314, 16384, 21632) else Nil))
+  } yield GeometryConfig(vertexBits, boxBits, triangleBits, bvh, cornerColours, textureBytes)
 
-  private def units(arity: Int) = for {
-    boxLanes      <- Gen.oneOf(Seq(1, 2, 4).filter(_ <= arity))
+  private val units = for {
+    boxLanes      <- Gen.oneOf(1, 2, 4)
     triangleLanes <- Gen.chooseNum(1, 4)
     triangleRows  <- Gen.chooseNum(1, UnitsConfig.maxTriangleRows)
     marches       <- Gen.chooseNum(1, UnitsConfig.maxMarches)
@@ -154,7 +152,7 @@ object ArbitraryConfig {
     array     <- array
     precision <- precision
     geometry  <- geometry
-    units     <- units(geometry.arity)
+    units     <- units
     memory    <- memory
     maps      <- Gen.option(physicalAttributeMemory)
     frame     <- frame

@@ -93,10 +93,8 @@ object Model {
   }
 
   private def traversal(config: ColonnadeConfig): Seq[(String, Int)] = Seq(
-    "arity"              -> config.geometry.arity,
-    "trianglesPerRecord" -> config.geometry.trianglesPerRecord,
-    "stackDepth"         -> config.columnBvhMemory.stackDepth,
-    "bvh"                -> (if (config.geometry.bvh) 1 else 0)
+    "stackDepth" -> config.columnBvhMemory.stackDepth,
+    "bvh"        -> (if (config.geometry.bvh) 1 else 0)
   )
 
   private lazy val program: Path = synchronized {

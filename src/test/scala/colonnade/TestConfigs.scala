@@ -13,8 +13,6 @@ object TestConfigs {
       vertexBits = 16,
       boxBits = 7,
       triangleBits = None,
-      arity = 4,
-      trianglesPerRecord = 2,
       bvh = true,
       cornerColours = false,
       textureBytes = 0

@@ -48,28 +48,22 @@ object PrecisionConfig {
   * @param vertexBits         a vertex coordinate, unsigned, in the object's cube
   * @param boxBits            a child box's coordinate relative to its node
   * @param triangleBits       operands of the triangle test; `precision.mac` unless set
-  * @param arity              children of a node
-  * @param trianglesPerRecord triangles of one leaf record
   * @param bvh                false: every ray tests every triangle (the exhaustive baseline)
   * @param cornerColours      a face holds a colour for each corner, and a material may take its albedo from them
   * @param textureBytes       of the texture memory; with one, a material may take the colours of the corners as positions
   *                           in it; 0: no textures
   */
 final case class GeometryConfig(
-    vertexBits:         Int = 16,
-    boxBits:            Int = 7,
-    triangleBits:       Option[Int] = Some(24),
-    arity:              Int = 4,
-    trianglesPerRecord: Int = 2,
-    bvh:                Boolean = true,
-    cornerColours:      Boolean = false,
-    textureBytes:       Int = 0
+    vertexBits:    Int = 16,
+    boxBits:       Int = 7,
+    triangleBits:  Option[Int] = Some(24),
+    bvh:           Boolean = true,
+    cornerColours: Boolean = false,
+    textureBytes:  Int = 0
 ) {
   Require.within("geometry.vertexBits", vertexBits, 10, 19)
   Require.within("geometry.boxBits", boxBits, 4, 7)
   triangleBits.foreach(Require.within("geometry.triangleBits", _, 16, 64))
-  Require.oneOf("geometry.arity", arity, Seq(2, 4))
-  Require.oneOf("geometry.trianglesPerRecord", trianglesPerRecord, Seq(1, 2))
   Require("geometry.textureBytes", textureBytes == 0 || cornerColours, "needs geometry.cornerColours=true")
 
   /** The texture memory, if there is one. */
@@ -201,7 +195,6 @@ final case class ColonnadeConfig(
     physicalAttributeMemory: Option[PhysicalAttributeMemoryConfig] = None,
     frame:                   FrameConfig = FrameConfig()
 ) {
-  Require.oneOf("units.boxLanes", units.boxLanes, Seq(1, 2, 4).filter(_ <= geometry.arity))
   Require(
     "frame.gather",
     !frame.gather || units.shadeInterval < UnitsConfig.sequentialShadeInterval,

@@ -22,8 +22,14 @@ private[config] object ConfigMigration {
       zeroIsDefault("units", "marches"),
       zeroIsDefault("units", "pathContexts")
     ),
-    // Fewer bits change the box tests of a frame, not its picture
-    Seq(replaced("geometry", "boxBits")(bits => Seq("boxBits" -> bits.numOpt.fold(bits)(value => ujson.Num(value.min(7))))))
+    // These change the tests of a frame, not its picture
+    Seq(
+      replaced("geometry", "boxBits") { bits =>
+        Seq("boxBits" -> bits.numOpt.fold(bits)(value => ujson.Num(value.min(7))))
+      },
+      replaced("geometry", "arity")(_ => Nil),
+      replaced("geometry", "trianglesPerRecord")(_ => Nil)
+    )
   )
 
   /** The present version; a file without one has version 1. */

@@ -23,8 +23,8 @@ object FormatsPage {
         |triangles records from `firstTriangles`. The root is record 0.""".stripMargin,
       table(formats.node),
       "### Triangles",
-      """Triangle k of a leaf has the packed id `firstTriangle + k`, and the vertices 3k, 3k + 1 and 3k + 2. Packed ids follow the
-        |leaves of one binary tree, depth first.""".stripMargin,
+      """A pair with a common edge, or one triangle. Triangle k of the leaf at address a has the packed id 2a + k, and the vertices
+        |3k, 3k + 1 and 3k + 2.""".stripMargin,
       table(formats.triangles),
       "### Attributes",
       attributes(config),
@@ -61,8 +61,8 @@ object FormatsPage {
   private def attributes(config: ColonnadeConfig): String = {
     val slots = RecordFormats.facesPerRecord(config)
     val face  =
-      s"""Unit normals of a face's corners and plane, and its material. The face with packed id t is in record
-         |`scene.attributeBase + t / $slots`, slot `t % $slots`.""".stripMargin
+      s"""Unit normals of a face's corners and plane, and its material. The face with packed id t has number
+         |f = t − 2 · `scene.triangleBase`, and is in record `scene.attributeBase + f / $slots`, slot `f % $slots`.""".stripMargin
     val colours =
       if (config.geometry.cornerColours)
         "A face also has a linear colour for each vertex, all ones 1.0."

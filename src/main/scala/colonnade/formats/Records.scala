@@ -15,7 +15,7 @@ object ChildKind {
   def illegal: UInt = 3.U(bits.W)
 }
 
-/** A node: up to `arity` child boxes relative to the node's corner, which is a multiple of 2^exponent on each axis.
+/** A node: up to [[NodeRecord.children]] child boxes relative to the node's corner, which is a multiple of 2^exponent on each axis.
   *
   * A child's planes are `origin + (low << exponent)` and `origin + (high << exponent)`, in vertex units. Children of
   * kind node lie at consecutive records from `firstChild`, in slot order; children of kind leaf are one triangles
@@ -29,9 +29,9 @@ final class NodeRecord(config: ColonnadeConfig) extends Bundle {
   val exponent       = Vec3(UInt(RecordFormats.exponentBits(config).W))
   val firstChild     = UInt(address.W)
   val firstTriangles = UInt(address.W)
-  val kinds          = Vec(geometry.arity, UInt(ChildKind.bits.W)) // see [[ChildKind]]
-  val low            = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
-  val high           = Vec(geometry.arity, Vec3(UInt(geometry.boxBits.W)))
+  val kinds          = Vec(NodeRecord.children, UInt(ChildKind.bits.W)) // see [[ChildKind]]
+  val low            = Vec(NodeRecord.children, Vec3(UInt(geometry.boxBits.W)))
+  val high           = Vec(NodeRecord.children, Vec3(UInt(geometry.boxBits.W)))
 
   /** The guarantees that every reader relies on: known kinds, boxes within two cubes, and child nodes at higher addresses,
     * so that no traversal returns to a node. The record fetch reports other illegal child addresses.
@@ -41,28 +41,36 @@ final class NodeRecord(config: ColonnadeConfig) extends Bundle {
   def isLegal(at: UInt): Bool = {
     val isKnown  = !kinds.map(_ === ChildKind.illegal).reduce(_ || _)
     val isSmall  = exponent.axes.map(_ <= config.numbers.maxExponent.U).reduce(_ && _)
-    val isBelow  = firstChild > at && !firstChild.head(address - log2Ceil(geometry.arity)).andR
+    val isBelow  = firstChild > at && !firstChild.head(address - log2Ceil(NodeRecord.children)).andR
     val hasNodes = kinds.map(_ === ChildKind.node).reduce(_ || _)
     isKnown && isSmall && (isBelow || !hasNodes)
   }
 }
 
-/** The triangles of a leaf; the k-th has the packed id `firstTriangle + k`. */
+object NodeRecord {
+  val children: Int = 4
+}
+
+/** The triangles of a leaf, a pair with a common edge or one triangle; the k-th has the packed id `2 * address + k`. */
 final class TrianglesRecord(config: ColonnadeConfig) extends Bundle {
   private val geometry = config.geometry
 
-  val firstTriangle = UInt(RecordFormats.idBits(config).W) // packed id of triangle 0
-
-  /** From 1 to `trianglesPerRecord`. */
-  val count = UInt(NumberFormats.bitLength(geometry.trianglesPerRecord).W)
+  /** 1 or 2. */
+  val count = UInt(NumberFormats.bitLength(TrianglesRecord.most).W)
 
   /** By triangle: its material transmits light, see `shading.shadowTransmittance`. */
-  val isClear = Vec(geometry.trianglesPerRecord, Bool())
+  val isClear = Vec(TrianglesRecord.most, Bool())
 
   /** Three per triangle, in vertex units. */
-  val vertices = Vec(3 * geometry.trianglesPerRecord, Vec3(UInt(geometry.vertexBits.W)))
+  val vertices = Vec(3 * TrianglesRecord.most, Vec3(UInt(geometry.vertexBits.W)))
 
-  def isLegal: Bool = count =/= 0.U && count <= geometry.trianglesPerRecord.U
+  def isLegal: Bool = count =/= 0.U && count <= TrianglesRecord.most.U
+}
+
+object TrianglesRecord {
+
+  /** Most triangles of a leaf. */
+  val most: Int = 2
 }
 
 /** The attributes of one face for shading. Normals have unit length. */
@@ -80,7 +88,9 @@ final class Face(config: ColonnadeConfig) extends Bundle {
   val material = UInt(RecordFormats.materialBits.W) // index into the material table
 }
 
-/** Faces in the order of packed ids: face t is in record `attributeBase + t / facesPerRecord`, slot `t % facesPerRecord`. */
+/** Faces in the order of leaves, two for each. That of the packed id t is number f = t − 2 · triangleBase: in record
+  * `attributeBase + f / facesPerRecord`, slot `f % facesPerRecord`.
+  */
 final class AttributesRecord(config: ColonnadeConfig) extends Bundle {
   val faces = Vec(RecordFormats.facesPerRecord(config), new Face(config))
 }

@@ -3,7 +3,7 @@ package colonnade.frame
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.Gather
+import colonnade.formats.{Gather, NodeRecord}
 import colonnade.unit.AttributeFetch
 
 /** Events of a column BVH controller in one cycle; names as in `Counters`. */
@@ -38,7 +38,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val raysRefraction   = perColumn
   val raysInBox        = perUnit
   val nodeReads        = perUnit
-  val boxTests         = sum(units * config.geometry.arity)
+  val boxTests         = sum(units * NodeRecord.children)
   val triangleTests    = perUnit
   val hits             = perColumn
   val recordReads      = sum(columns * config.columnBvhMemory.banks)

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.common.Context
 import colonnade.config.TraversalConfig
-import colonnade.formats.RecordFormats
+import colonnade.formats.{NodeRecord, RecordFormats}
 import colonnade.numbers.Fixed
 import colonnade.ray.{BoxRay, RayFormats}
 
@@ -31,9 +31,9 @@ final class BoxCandidate(config: TraversalConfig) extends Bundle {
 /** The children that the ray enters: the first `count` of `children`, sorted by entry distance. */
 final class BoxResult(config: TraversalConfig) extends Bundle {
   val context  = Context(config)
-  val count    = UInt(log2Ceil(config.geometry.arity + 1).W)
-  val children = Vec(config.geometry.arity, new EnteredChild(config))
+  val count    = UInt(log2Ceil(NodeRecord.children + 1).W)
+  val children = Vec(NodeRecord.children, new EnteredChild(config))
 
   /** Children tested: those that are not empty. */
-  val tests = UInt(log2Ceil(config.geometry.arity + 1).W)
+  val tests = UInt(log2Ceil(NodeRecord.children + 1).W)
 }

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Mux1H, PopCount, Queue, RegEnable, ShiftRegister}
 import colonnade.common.{Context, ReservedQueue}
 import colonnade.config.TraversalConfig
-import colonnade.formats.{ChildKind, RecordFormats}
+import colonnade.formats.{ChildKind, NodeRecord, RecordFormats}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
@@ -27,7 +27,7 @@ final class BoxUnitIO(config: TraversalConfig) extends Bundle {
   * computes.
   */
 class BoxUnit(config: TraversalConfig) extends Module {
-  private val arity = config.geometry.arity
+  private val arity = NodeRecord.children
   private val lanes = config.units.boxLanes
   private val beats = arity / lanes
 
@@ -96,7 +96,7 @@ class BoxUnit(config: TraversalConfig) extends Module {
 
 /** What the result needs of a node besides the sorted children. */
 private[traversal] final class NodeTag(config: TraversalConfig) extends Bundle {
-  private val arity   = config.geometry.arity
+  private val arity   = NodeRecord.children
   private val address = UInt(RecordFormats.addressBits(config).W)
 
   val context        = Context(config)

@@ -5,6 +5,7 @@ import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.{Context, TimingSlice}
 import colonnade.config.TraversalConfig
 import colonnade.numbers.Rounding
+import colonnade.formats.NodeRecord
 
 /** The next step of a ray: a record to visit, or the end of traversal. */
 final class TraversalStep(config: TraversalConfig) extends Bundle {
@@ -48,7 +49,7 @@ final class TraversalStackIO(config: TraversalConfig) extends Bundle {
   * round-robin arbiter selects between results and resumptions.
   */
 class TraversalStack(config: TraversalConfig) extends Module {
-  private val arity      = config.geometry.arity
+  private val arity      = NodeRecord.children
   private val contexts   = config.contexts
   private val stackDepth = config.columnBvhMemory.stackDepth
 

@@ -3,7 +3,7 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.config.PartConfig
-import colonnade.formats.Vec3
+import colonnade.formats.{TrianglesRecord, Vec3}
 import colonnade.ray.TriangleRay
 
 final class TriangleSequencerIO(config: PartConfig) extends Bundle {
@@ -32,7 +32,7 @@ final class TriangleSequencer(config: PartConfig) extends Module {
 
   import TriangleStep._
 
-  private val perRecord = config.geometry.trianglesPerRecord
+  private val perRecord = TrianglesRecord.most
   private val indexBits = log2Ceil(perRecord).max(1)
 
   private val candidate = Reg(new TriangleCandidate(config))
@@ -99,7 +99,7 @@ final class TriangleSequencer(config: PartConfig) extends Module {
 
   io.tag.valid               := issues
   io.tag.bits.context        := candidate.context
-  io.tag.bits.id             := record.firstTriangle + index
+  io.tag.bits.id             := candidate.address ## index
   io.tag.bits.isLast         := isEnd
   io.tag.bits.isPair         := isPair
   io.tag.bits.isTransmissive := VecInit(

@@ -10,6 +10,7 @@ import colonnade.ray.{RayFormats, TriangleRay}
 /** One ray to test against the triangles of one record. */
 final class TriangleCandidate(config: PartConfig) extends Bundle {
   val context = Context(config)
+  val address = UInt(RecordFormats.addressBits(config).W)
   val record  = new RecordFormats(config).triangles
   val ray     = new TriangleRay(config.numbers)
 }

@@ -70,6 +70,7 @@ final class FetchStage(config: TraversalConfig) extends Module {
 
   io.triangles.valid        := isFor(RecordKind.triangles)
   io.triangles.bits.context := response.context
+  io.triangles.bits.address := response.address
   io.triangles.bits.record  := formats.asTriangles(response.record)
   io.triangles.bits.ray     := triangleRay
 

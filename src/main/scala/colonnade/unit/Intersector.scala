@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Arbiter, Decoupled, DecoupledIO, Pipe, Valid}
 import colonnade.common.{Context, TimingSlice}
 import colonnade.config.TraversalConfig
-import colonnade.formats.{RecordFormats, SceneMap}
+import colonnade.formats.{NodeRecord, RecordFormats, SceneMap}
 import colonnade.ray.PreparedRay
 import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanesIO, TriangleResult}
 
@@ -14,7 +14,7 @@ final class IntersectorEvents(config: TraversalConfig) extends Bundle {
 
   val raysInBox         = Bool()
   val nodeReads         = Bool()
-  val boxTests          = UInt(log2Ceil(config.geometry.arity + 1).W)
+  val boxTests          = UInt(log2Ceil(NodeRecord.children + 1).W)
   val triangleTests     = Bool()
   val busyBoxUnit       = Bool()
   val busyTriangleUnit  = UInt(log2Ceil(config.units.triangleLanes + 1).W)

@@ -31,9 +31,10 @@ object SurfaceHit {
   /** The record with the attributes of a triangle. */
   def attributeAddress(config: PathConfig, scene: SceneMap, id: UInt): UInt = {
     val slotBits = RecordFormats.faceSlotBits(config)
+    val face     = id -% (scene.triangleBase ## 0.U(1.W))
     // With one face per record the sum may be too large: all ones is no legal address
-    if (slotBits == 0) Rounding.saturate(scene.attributeBase +& id, id.getWidth)
-    else scene.attributeBase + (id >> slotBits)
+    if (slotBits == 0) Rounding.saturate(scene.attributeBase +& face, id.getWidth)
+    else scene.attributeBase + (face >> slotBits)
   }
 }
 

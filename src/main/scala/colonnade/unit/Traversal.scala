@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.Context
 import colonnade.config.TraversalConfig
-import colonnade.formats.{ChildKind, RecordFormats, SceneMap}
+import colonnade.formats.{ChildKind, NodeRecord, RecordFormats, SceneMap}
 import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalStack, TraversalStep}
 
 final class TraversalIO(config: TraversalConfig) extends Bundle {
@@ -24,7 +24,7 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
   val steps = Decoupled(new TraversalStep(config))
 
   /** For the counters. */
-  val boxTests = Output(UInt(log2Ceil(config.geometry.arity + 1).W))
+  val boxTests = Output(UInt(log2Ceil(NodeRecord.children + 1).W))
   val busy     = Output(Bool())
   val deepest  = Output(UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W))
   val overflow = Output(Bool())

@@ -53,7 +53,7 @@ class PathTracerSpec extends AnyFlatSpec with ChiselScalatestTester {
     "no tree, one context, one path, no snooping",
     TestConfigs.withPrecision(16, 16, 32).copy(
       array = tiny.array.copy(contexts = 1),
-      geometry = tiny.geometry.copy(bvh = false, trianglesPerRecord = 1),
+      geometry = tiny.geometry.copy(bvh = false),
       columnBvhMemory = tiny.columnBvhMemory.copy(snooping = false, banks = 1),
       frame = tiny.frame.copy(hits = false),
       units = tiny.units.copy(pathContexts = 1)

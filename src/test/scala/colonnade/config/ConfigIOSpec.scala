@@ -163,7 +163,10 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     migrated("physicalAttributeMemory" -> ujson.Obj("encoding" -> "slic")).physicalAttributeMemory shouldBe
       Some(maps.copy(encoding = MapEncoding.Slic))
     for ((bits, present) <- Seq(12 -> 7, 8 -> 7, 5 -> 5))
-      migrated("version" -> 2, "geometry" -> ujson.Obj("boxBits" -> bits)).geometry shouldBe
+      migrated(
+        "version"  -> 2,
+        "geometry" -> ujson.Obj("boxBits" -> bits, "arity" -> 2, "trianglesPerRecord" -> 1)
+      ).geometry shouldBe
         GeometryConfig(boxBits = present)
   }
 
@@ -191,7 +194,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     refusal("tiny", "array.columns=257") shouldBe "array.columns is 257; it must be from 1 to 256"
     refusal("tiny", "units.rayInterval=16") shouldBe "units.rayInterval is 16; it must be one of 1, 32"
     refusal("tiny", "units.shadeInterval=1") shouldBe "units.shadeInterval is 1; it must be one of 3, 128"
-    refusal("tiny", "geometry.arity=3") shouldBe "geometry.arity is 3; it must be one of 2, 4"
+    refusal("tiny", "units.boxLanes=3") shouldBe "units.boxLanes is 3; it must be one of 1, 2, 4"
     refusal("tiny", "frame.tileSize=5") shouldBe "frame.tileSize is 5; it must be one of 4, 8, 16, 32"
   }
 

@@ -28,7 +28,6 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
 
   private val variants: Seq[ColonnadeConfig] = Seq(
     Nil,
-    Seq("geometry.arity=2", "geometry.trianglesPerRecord=1"),
     Seq("geometry.cornerColours=true"),
     Seq("geometry.cornerColours=true", "geometry.textureBytes=16384"),
     Seq("geometry.vertexBits=19", "geometry.boxBits=4", "columnBvhMemory.depth=16"),

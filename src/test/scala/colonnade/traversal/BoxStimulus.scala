@@ -2,6 +2,7 @@ package colonnade.traversal
 
 import colonnade.Model
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.NodeRecord
 
 import scala.util.Random
 
@@ -101,7 +102,7 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
     val any   = one()
     val shift = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits))
     val most  = (BigInt(1) << numbers.boxBits) - 1
-    val arity = config.geometry.arity
+    val arity = NodeRecord.children
     val cuts  = Seq.fill(2 * arity)(below(most + 1)).sorted.grouped(2).map(pair => (pair.head, pair.last)).toSeq
     val along = if (any.negative.last) cuts else cuts.reverse // from the farthest to the nearest
     val boxes =
@@ -132,7 +133,7 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
     val shift  = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits + 2))
     val origin = shift.map(s => below(cube).min(cube - 1) >> (if (random.nextInt(3) == 0) 0 else s.min(3)))
     val kinds  =
-      Seq.fill(config.geometry.arity)(if (random.nextInt(8) == 0) random.nextInt(4) else 1 + random.nextInt(2))
+      Seq.fill(NodeRecord.children)(if (random.nextInt(8) == 0) random.nextInt(4) else 1 + random.nextInt(2))
     val boxes = kinds.map(_ => Seq.tabulate(3)(a => interval(shift(a))))
     BoxCase(
       axis = random.nextInt(3),

@@ -3,26 +3,25 @@ package colonnade.traversal
 import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.NodeRecord
 import colonnade.{Always, Packed, PackedStreams, PackedUnit, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
 class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
-  private val binary = TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(arity = 2))
-
   behavior of "BoxUnit"
 
   private def lanes(config: ColonnadeConfig, count: Int) = config.copy(units = config.units.copy(boxLanes = count))
 
-  private val laneVariants = Seq(lanes(TestConfigs.tiny, 1), lanes(TestConfigs.tiny, 4), lanes(binary, 1))
+  private val laneVariants = Seq(lanes(TestConfigs.tiny, 1), lanes(TestConfigs.tiny, 4))
 
   private def shape(config: ColonnadeConfig) =
-    s"${config.precision}, arity ${config.geometry.arity}, ${config.units.boxLanes} lanes"
+    s"${config.precision}, ${config.units.boxLanes} lanes"
 
   for (
     (config, i) <-
-      (TestConfigs.formats ++ (binary +: laneVariants) :+ TestConfigs.withExtraSlices(TestConfigs.tiny)).zipWithIndex
+      (TestConfigs.formats ++ laneVariants :+ TestConfigs.withExtraSlices(TestConfigs.tiny)).zipWithIndex
   )
     it should s"follow the model under random stalls, format $i (${shape(config)})" taggedAs
       (if (i < TestConfigs.formats.size) Always.ifExtreme(config) else Always) in
@@ -56,11 +55,11 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
       )
     }
 
-  for (config <- Seq(TestConfigs.tiny, binary) ++ laneVariants)
+  for (config <- TestConfigs.tiny +: laneVariants)
     it should s"keep its lanes busy without gaps (${shape(config)})" in
       test(new PackedBoxUnit(config)) { dut =>
         val nodes   = 40
-        val beats   = config.geometry.arity / config.units.boxLanes
+        val beats   = NodeRecord.children / config.units.boxLanes
         val cycles  = compare(dut, config, new BoxStimulus(config, seed = 3)(nodes), offered = 1, accepted = 1)
         val latency = 5 + beats
         assert(cycles == beats * (nodes - 1) + latency)

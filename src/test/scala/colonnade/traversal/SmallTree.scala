@@ -2,6 +2,7 @@ package colonnade.traversal
 
 import colonnade.Model
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.NodeRecord
 import colonnade.traversal.StackReference.Child
 
 import scala.util.Random
@@ -11,7 +12,7 @@ final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
   import SmallTree._
 
   private val random = new Random(seed)
-  private val arity  = config.geometry.arity
+  private val arity  = NodeRecord.children
 
   /** Nodes by address, as cases without a ray. Children of a kind are consecutive, in slot order. */
   val nodes: Vector[BoxCase] = {

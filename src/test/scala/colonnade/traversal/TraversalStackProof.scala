@@ -4,6 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Fill, PriorityEncoder, RegEnable}
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.NodeRecord
 import colonnade.numbers.Fixed
 
 /** Drives results, resumptions, starts, tMax and stalls of all contexts as freely as the contract of the stack allows.
@@ -13,7 +14,7 @@ import colonnade.numbers.Fixed
   * but for its sign. These bits identify an entry, because any two entries may differ in them.
   */
 private[traversal] final class TraversalStackProof(config: ColonnadeConfig) extends Module {
-  private val arity      = config.geometry.arity
+  private val arity      = NodeRecord.children
   private val contexts   = config.array.contexts
   private val stackDepth = config.columnBvhMemory.stackDepth
   require(contexts == 2)

@@ -4,6 +4,7 @@ import chisel3._
 import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.NodeRecord
 import colonnade.traversal.StackReference.Child
 import colonnade.{Always, Proofs, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -12,9 +13,8 @@ import scala.collection.mutable
 import scala.util.Random
 
 class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
-  private def config(arity: Int, stackDepth: Int, contexts: Int): ColonnadeConfig = TestConfigs.tiny.copy(
+  private def config(stackDepth: Int, contexts: Int): ColonnadeConfig = TestConfigs.tiny.copy(
     array = TestConfigs.tiny.array.copy(contexts = contexts),
-    geometry = TestConfigs.tiny.geometry.copy(arity = arity),
     columnBvhMemory = TestConfigs.tiny.columnBvhMemory.copy(stackDepth = stackDepth)
   )
 
@@ -24,11 +24,11 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
   behavior of "TraversalStack"
 
   for {
-    (arity, stackDepth, contexts) <- Seq((4, 16, 4), (2, 5, 3), (4, 6, 8), (4, 4, 1))
-    extraSlices                   <- Seq(false, true)
+    (stackDepth, contexts) <- Seq((16, 4), (5, 3), (6, 8), (4, 1))
+    extraSlices            <- Seq(false, true)
   }
-    it should s"walk like the reference under random stalls, arity $arity, $stackDepth entries, $contexts contexts, extra slices $extraSlices" in {
-      val plain = config(arity, stackDepth, contexts)
+    it should s"walk like the reference under random stalls, $stackDepth entries, $contexts contexts, extra slices $extraSlices" in {
+      val plain = config(stackDepth, contexts)
       val shape = if (extraSlices) withExtraSlices(plain) else plain
       test(new TraversalStack(shape)) { dut =>
         for ((accepted, seed) <- Seq((1.0, 1), (0.4, 2))) {
@@ -37,10 +37,10 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
       }
     }
 
-  for ((arity, cycles, extraSlices) <- Seq((2, 11, false), (2, 12, true), (4, 10, false)))
-    it should s"neither lose, duplicate nor reorder entries, and cull only those beyond tMax, arity $arity, extra slices $extraSlices" taggedAs Always
-      .unless(arity == 2) in {
-      val plain = config(arity, stackDepth = 4, contexts = 2)
+  for ((cycles, extraSlices) <- Seq((10, false), (11, true)))
+    it should s"neither lose, duplicate nor reorder entries, and cull only those beyond tMax, extra slices $extraSlices" taggedAs Always
+      .unless(extraSlices) in {
+      val plain = config(stackDepth = 4, contexts = 2)
       val shape = if (extraSlices) withExtraSlices(plain) else plain
       prove(cycles) {
         new TraversalStackProof(
@@ -53,7 +53,7 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
     }
 
   it should "pop one entry per cycle while it culls those beyond tMax" in {
-    val shape = config(arity = 4, stackDepth = 16, contexts = 2)
+    val shape = config(stackDepth = 16, contexts = 2)
     test(new TraversalStack(shape)) { dut =>
       val driver = new StackDriver(dut, shape, seed = 1)
       for (round <- 0 until 3)
@@ -66,7 +66,7 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
   }
 
   it should "pop an entry every two cycles with extra slices" in {
-    val shape = withExtraSlices(config(arity = 4, stackDepth = 16, contexts = 2))
+    val shape = withExtraSlices(config(stackDepth = 16, contexts = 2))
     test(new TraversalStack(shape)) { dut =>
       val driver = new StackDriver(dut, shape, seed = 1)
       for (round <- 0 until 3)
@@ -78,7 +78,7 @@ class TraversalStackSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
   }
 
   it should "push one child per cycle, and give the nearest child in the next cycle" in {
-    val shape = config(arity = 4, stackDepth = 16, contexts = 2)
+    val shape = config(stackDepth = 16, contexts = 2)
     test(new TraversalStack(shape)) { dut =>
       val driver = new StackDriver(dut, shape, seed = 1)
       for (count <- 1 to 4)
@@ -101,7 +101,7 @@ private final case class Resumed(context: Int) extends StackOperation
 /** Drives the stack like the traversal unit: each context has at most one operation in flight. */
 private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: Int) {
   private val contexts  = config.array.contexts
-  private val arity     = config.geometry.arity
+  private val arity     = NodeRecord.children
   private val random    = new Random(seed)
   private val reference = new StackReference(contexts, config.columnBvhMemory.stackDepth)
   private val tMaxUnits = Array.fill(contexts)(BigInt(1000))

@@ -3,18 +3,19 @@ package colonnade.traversal
 import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
+import colonnade.formats.TrianglesRecord
 import colonnade.numbers.Fixed
 import org.scalatest.matchers.should.Matchers
 
 /** A record's triangles with their ray; none stands for a record with an illegal count. */
-final case class TestCandidate(context: Int, firstTriangle: Int, ray: TestRay, triangles: Seq[TestTriangle])
+final case class TestCandidate(context: Int, address: Int, ray: TestRay, triangles: Seq[TestTriangle])
 
 /** One result: of which candidate, whether it is its last, and the hit. */
 final case class ExpectedResult(candidate: TestCandidate, index: Int, isLast: Boolean, hit: ExpectedHit)
 
 /** Drives a [[TriangleUnit]] and holds it against the model. */
 final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus) extends Matchers {
-  private val perRecord = config.geometry.trianglesPerRecord
+  private val perRecord = TrianglesRecord.most
 
   private val miss = ExpectedHit(isHit = false, 0, Seq.fill(3)(BigInt(0)), backSide = false)
 
@@ -94,14 +95,14 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
       val hit = result.hit
       (peek(hit.t), hit.weights.map(peek), hit.backSide.peekBoolean()) shouldBe
         ((expected.hit.t, expected.hit.weights, expected.hit.backSide))
-      hit.id.peekInt() shouldBe expected.candidate.firstTriangle + expected.index
+      hit.id.peekInt() shouldBe TrianglesRecord.most * expected.candidate.address + expected.index
     }
   }
 
   def poke(bits: TriangleCandidate, candidate: TestCandidate): Unit = {
     val ray = bits.ray
     bits.context.poke(candidate.context.U)
-    bits.record.firstTriangle.poke(candidate.firstTriangle.U)
+    bits.address.poke(candidate.address.U)
     val largest = (1 << bits.record.count.getWidth) - 1
     val illegal = if (candidate.context % 2 == 0 && 3 * largest > bits.record.vertices.size) largest else 0
     bits.record.count.poke((if (candidate.triangles.isEmpty) illegal else candidate.triangles.size).U)

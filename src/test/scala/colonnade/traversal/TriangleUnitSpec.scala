@@ -27,8 +27,8 @@ class TriangleUnitSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       }
     }
 
-  it should "test records of one triangle with two division lanes" in {
-    val config = TestConfigs.tiny.copy(geometry = TestConfigs.tiny.geometry.copy(trianglesPerRecord = 1))
+  it should "follow the model with two division lanes" in {
+    val config = TestConfigs.tiny
     test(new TriangleUnit(config, distanceLanes = 2)).withAnnotations(simulation) { unit =>
       val harness = new TriangleHarness(config, new TriangleStimulus(config, seed = 10))
       harness.run(unit, harness.random(300), bubbles = 0, stalls = 0)._2 should be > 60

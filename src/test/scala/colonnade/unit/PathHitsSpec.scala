@@ -97,7 +97,7 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
   /** Hits that were shaded, hits whose attributes have an illegal address, and hits whose distance was asked for alone. */
   var (shaded, refused, measured) = (0, 0, 0)
 
-  private val (attributeBase, recordCount) = (16, 24)
+  private val (triangleBase, attributeBase, recordCount) = (8, 16, 24)
 
   private def chance(times: Int): Boolean = random.nextInt(times) == 0
 
@@ -109,7 +109,7 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     dut.clock.setTimeout(0)
     dut.io.scene.recordCount.poke(recordCount)
     dut.io.scene.attributeBase.poke(attributeBase)
-    dut.io.scene.triangleBase.poke(8)
+    dut.io.scene.triangleBase.poke(triangleBase)
     dut.io.start.poke(true)
     dut.clock.step()
     dut.io.start.poke(false)
@@ -179,7 +179,7 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     for (context <- context; now = all(context)) {
       now.hasHit = !chance(3)
       now.occlusion = Occlusion.all(random.nextInt(3))
-      now.id = random.nextInt(2 * (recordCount - attributeBase) + 3)
+      now.id = 2 * triangleBase + random.nextInt(2 * (recordCount - attributeBase) + 3)
       result.bits.context.poke(context)
       result.bits.hasHit.poke(now.hasHit)
       result.bits.occlusion.poke(now.occlusion)
@@ -264,14 +264,14 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     if (trace.attributeError.valid.peekBoolean()) {
       val now = all(trace.attributeError.bits.peekInt().toInt)
       now.state shouldBe shading
-      attributeBase + now.id / 2 should be >= recordCount
+      attributeBase - triangleBase + now.id / 2 should be >= recordCount
       refused += 1
       retire(now)
     }
     if (trace.hits.valid.peekBoolean()) {
       val now = all(trace.hits.bits.context.peekInt().toInt)
       now.state shouldBe shading
-      val faces = records(attributeBase + now.id / 2)
+      val faces = records(attributeBase - triangleBase + now.id / 2)
       dut.foundRay.expect(now.ray)
       dut.foundHit.expect(now.details)
       dut.foundFace.expect((faces >> (faceBits * (now.id % 2))) & ((BigInt(1) << faceBits) - 1))

@@ -2,12 +2,12 @@ package colonnade.unit
 
 import colonnade.Packed
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.formats.RecordFormats
+import colonnade.formats.{NodeRecord, RecordFormats, TrianglesRecord}
 
 import scala.util.Random
 
 /** A few large triangles in the object's cube with a camera in front of it: records in the packer's layout, and registers.
-  * Nodes hold `arity` groups of leaves, split along x.
+  * Nodes hold groups of leaves, split along x.
   */
 final class SmallScene(
     config:        ColonnadeConfig,
@@ -22,12 +22,11 @@ final class SmallScene(
 
   private val random   = new Random(seed)
   private val numbers  = config.numbers
-  private val arity    = config.geometry.arity
   private val formats  = new RecordFormats(config)
   private val vertices = 1 << numbers.vertexBits
 
   private val leaves: Vector[Leaf] =
-    Seq.fill(triangleCount)(triangle()).sortBy(_.map(_.head).sum).grouped(config.geometry.trianglesPerRecord).toVector
+    Seq.fill(triangleCount)(triangle()).sortBy(_.map(_.head).sum).grouped(TrianglesRecord.most).toVector
 
   /** Nodes as groups of leaves, breadth first, none without a tree; leaves in the order of their records. */
   private val (nodes, ordered) = {
@@ -47,8 +46,10 @@ final class SmallScene(
 
   val records: Seq[BigInt] =
     nodes.map(_(nodes.size)) ++
-      ordered.zip(ordered.scanLeft(0)(_ + _.size)).map { case (leaf, first) => triangles(leaf, first) } ++
-      ordered.flatten.grouped(RecordFormats.facesPerRecord(config)).map(attributes)
+      ordered.map(triangles) ++
+      ordered.flatMap(leaf => leaf.padTo(TrianglesRecord.most, leaf.head)).grouped(
+        RecordFormats.facesPerRecord(config)
+      ).map(attributes)
 
   /** The host's registers, by name. */
   val registers: Map[String, BigInt] = {
@@ -138,7 +139,8 @@ final class SmallScene(
     Seq.fill(3)(middle.map(_ + random.nextInt(2 * reach) - reach))
   }
 
-  private def cut(these: Vector[Leaf]): Seq[Vector[Leaf]] = these.grouped((these.size + arity - 1) / arity).toSeq
+  private def cut(these: Vector[Leaf]): Seq[Vector[Leaf]] =
+    these.grouped((these.size + NodeRecord.children - 1) / NodeRecord.children).toSeq
 
   private def node(groups: Seq[Vector[Leaf]], firstChild: BigInt, firstTriangles: BigInt): BigInt = {
     val limit                                = (1 << numbers.boxBits) - 1
@@ -164,12 +166,12 @@ final class SmallScene(
     new Packed(formats.node).pack(fields)
   }
 
-  private def triangles(leaf: Leaf, first: Int): BigInt = {
+  private def triangles(leaf: Leaf): BigInt = {
     val points = leaf.flatten.zipWithIndex.flatMap { case (point, i) =>
       vector(s"vertices[$i]", "xyz", point.map(BigInt(_)))
     }
     new Packed(formats.triangles).pack(
-      points.toMap ++ Map("firstTriangle" -> BigInt(first), "count" -> BigInt(leaf.size)) ++
+      points.toMap ++ Map("count" -> BigInt(leaf.size)) ++
         leaf.indices.map(k => s"isClear[$k]" -> BigInt(random.nextInt(2)))
     )
   }

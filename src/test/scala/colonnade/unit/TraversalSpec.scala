@@ -19,14 +19,14 @@ import scala.util.Random
 class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "Traversal"
 
-  private def config(contexts: Int, arity: Int, bvh: Boolean = true): ColonnadeConfig = TestConfigs.tiny.copy(
+  private def config(contexts: Int, bvh: Boolean = true): ColonnadeConfig = TestConfigs.tiny.copy(
     array = TestConfigs.tiny.array.copy(contexts = contexts),
-    geometry = TestConfigs.tiny.geometry.copy(arity = arity, bvh = bvh)
+    geometry = TestConfigs.tiny.geometry.copy(bvh = bvh)
   )
 
-  for ((contexts, arity) <- Seq((5, 4), (2, 2)))
-    it should s"walk trees of arity $arity with $contexts contexts like the reference" in {
-      val shape = config(contexts, arity)
+  for (contexts <- Seq(5, 2))
+    it should s"walk trees with $contexts contexts like the reference" in {
+      val shape = config(contexts)
       test(new TraversalHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
         for ((accepted, shrinks, seed) <- Seq((1.0, false, 1), (0.4, true, 2), (0.8, true, 3)))
           new TreeWalkers(dut, shape, seed).run(rays = 40, accepted, shrinks)
@@ -34,7 +34,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
 
   it should "treat an illegal node as empty and report it" in {
-    val shape = config(contexts = 1, arity = 4)
+    val shape = config(contexts = 1)
     val most  = (BigInt(1) << RecordFormats.addressBits(shape)) - 1
     val tree  = new SmallTree(shape, rayCount = 1, seed = 4)
     val root  = tree.fields(tree.nodes.head, "node.")
@@ -42,7 +42,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
 
     def changed(fields: (String, Int)*): Map[String, BigInt] =
       root ++ fields.map { case (name, value) => name -> BigInt(value) }
-    val last   = most.toInt - shape.geometry.arity
+    val last   = most.toInt - NodeRecord.children
     val leaves = (0 until 4).map(slot => s"kinds[$slot]" -> 2)
     val cases  = Seq(
       (changed(), 0, true),
@@ -83,7 +83,7 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "visit every triangle record without a tree" in
-    test(new TraversalHarness(config(contexts = 2, arity = 4, bvh = false))) { dut =>
+    test(new TraversalHarness(config(contexts = 2, bvh = false))) { dut =>
       dut.io.scene.triangleBase.poke(5)
       dut.io.scene.triangleRecords.poke(4)
       dut.io.steps.ready.poke(true)

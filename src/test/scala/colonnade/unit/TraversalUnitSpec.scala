@@ -5,7 +5,7 @@ import chisel3.util.{Decoupled, Valid}
 import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.{ColonnadeConfig, PathConfig}
-import colonnade.formats.{RecordBroadcast, RecordFormats, SceneMap}
+import colonnade.formats.{NodeRecord, RecordBroadcast, RecordFormats, SceneMap}
 import colonnade.ray.{PreparedRay, SetupCase, SetupRequest}
 import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleLanes
@@ -37,7 +37,7 @@ class TraversalUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   traces(
     TestConfigs.withPrecision(16, 16, 32).copy(
       array = tiny.array.copy(contexts = 1),
-      geometry = tiny.geometry.copy(bvh = false, trianglesPerRecord = 1),
+      geometry = tiny.geometry.copy(bvh = false),
       columnBvhMemory = tiny.columnBvhMemory.copy(snooping = false, banks = 1),
       frame = tiny.frame.copy(maxBounces = 0),
       units = tiny.units.copy(pathContexts = 3)
@@ -108,7 +108,7 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
   private val lostLeaves = brokenNode.toSeq.flatMap { address =>
     val fields = node.unpack(made.records(address))
     val first  = fields("firstTriangles").toInt
-    first until first + (0 until config.geometry.arity).count(slot => fields(s"kinds[$slot]") == 2)
+    first until first + (0 until NodeRecord.children).count(slot => fields(s"kinds[$slot]") == 2)
   }
   private val brokenLeaf = Option.when(isIllegal)(base + 3)
   private val end        = if (isIllegal) beyond - 1 else beyond

@@ -3,7 +3,7 @@ package colonnade.unit
 import colonnade.Model
 import colonnade.Packed
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordFormats
+import colonnade.formats.{RecordFormats, TrianglesRecord}
 import colonnade.shading.Occlusion
 
 /** Finds what rays meet in a small scene by the model's test of each triangle, without a tree. */
@@ -20,7 +20,7 @@ final class TriangleSearch(config: ColonnadeConfig, scene: SmallScene) {
       k <- 0 until fields("count").toInt
     } yield {
       val vertices = (3 * k until 3 * k + 3).map(i => Seq("x", "y", "z").map(axis => fields(s"vertices[$i].$axis")))
-      address -> Triangle(fields("firstTriangle") + k, fields(s"isClear[$k]") == 1, vertices)
+      address -> Triangle(TrianglesRecord.most * address + k, fields(s"isClear[$k]") == 1, vertices)
     }
   }
 
