@@ -77,6 +77,11 @@ BLENDED = Loss.of(
     "not blended",
     "from alpha 1/2 on it is opaque, else a tinted pane or not shown",
 )
+COVERED = Loss.of(
+    "partly transparent material",
+    "not blended",
+    "from alpha 1/2 on it is opaque, else a tinted pane: frame.samples of 2 or more blend it",
+)
 COARSE_CUTS = Loss.of("alpha mask", "cut coarsely", "its outline has more detail than the mesh may have faces")
 EMISSION = Loss.of(
     "emissive mirror or glass", "not emitting", "only diffuse surfaces do", "emissive mirrors or glasses"
@@ -89,6 +94,9 @@ PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror
 PARTLY_GLASS = Loss.of("partly transmissive material", "rounded to opaque or glass", "above 1/2 is glass")
 LAMPS = Loss.of("slightly rough surface", "without highlights", "frame.samples of 2 or more render those of lamps")
 COATS = Loss.of("glossy material", "matt", "paths.gather = 1 and frame.samples of 2 or more render its reflections")
+CLEAR_COATS = Loss.of(
+    "clear coat", "not shown", "paths.gather = 1 and frame.samples of 2 or more render its reflections"
+)
 HIGHLIGHTS = Loss.of("glossy material", "diffuse", "highlights are not rendered")
 NEGATIVE_SHININESS = Loss.of(
     "material's negative Ns", "taken as 0", "highlights are not rendered", "materials' negative Ns"

@@ -13,6 +13,7 @@ from colonnade.mesh.materials.palette import (
     with_corner_albedo,
     with_face_colours,
     with_rendered_metal,
+    with_whole_surfaces,
     without_emission,
     without_textures,
 )
@@ -37,18 +38,21 @@ class SurfaceFeatures:
         corner_colours: Colours at the corners of faces.
         textures: A texture memory.
         emission: Emission of materials.
+        glass: Glass and mirrors.
     """
 
     materials: int
     corner_colours: bool = False
     textures: bool = False
     emission: bool = False
+    glass: bool = True
 
     @classmethod
     def of(cls, manifest: Manifest) -> SurfaceFeatures:
         """Those of a manifest."""
         materials = int(manifest.config["frame"]["materials"])
-        return cls(materials, manifest.corner_colours, manifest.texture is not None, manifest.emission)
+        glass = int(manifest.config["frame"]["maxBounces"]) > 0
+        return cls(materials, manifest.corner_colours, manifest.texture is not None, manifest.emission, glass)
 
 
 def object_mesh(scene: Scene, environment: Environment | None = None, corner_colours: bool = False) -> Mesh:
@@ -75,6 +79,10 @@ def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     Of more colours than the material table holds, after the scene's values have overridden those of the mesh, plain
     ones move to the corners of faces, or else similar roughnesses, then similar colours are merged.
     """
+    has_passes = scene.frame.samples is None and scene.paths.gather > 0
+    if not features.glass or not (has_passes or (scene.frame.samples or 1) > 1):
+        mesh, lines = with_whole_surfaces(mesh)
+        notes.report(lines)
     overridden = replace(mesh, materials=with_overrides(mesh.materials, scene.material))
     notes.report(with_rendered_metal(overridden, scene.paths.gather > 0, may_have_layers(scene))[1])
     mesh, _ = with_rendered_metal(mesh, scene.paths.gather > 0, may_have_layers(scene))

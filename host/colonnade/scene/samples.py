@@ -29,6 +29,7 @@ class Sample:
         lights: Point of each light's disc of radius 1; missing ones are the centre.
         gather: Sample point of each gathered ray of a path, two bytes (docs/gather.md).
         layer: What the pass shows.
+        coverage: Below it materials are there; None: of the only pass (`in_pass`).
     """
 
     pixel: Point = (0.0, 0.0)
@@ -37,6 +38,11 @@ class Sample:
     lights: tuple[Point, ...] = ()
     gather: tuple[tuple[int, int], ...] = ((128, 128),) * MAX_GATHERED
     layer: Layer = "surface"
+    coverage: float | None = None
+
+    def coverage_of(self, entry: int) -> float | None:
+        """The threshold of an entry of the material table: those of several do not follow each other."""
+        return None if self.coverage is None else (self.coverage + entry * _GOLDEN) % 1.0
 
     def light(self, index: int) -> Point:
         """The point of a light's disc."""
@@ -45,6 +51,8 @@ class Sample:
 
 #: Samples of a pixel in the photo of a room, unless the scene or the command names others.
 PHOTO_SAMPLES = 4
+#: Steps between numbers that are spread evenly: the golden ratio.
+_GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 #: The middle of everything.
 CENTRE = Sample()
 
@@ -57,8 +65,10 @@ def samples_of_frame(count: int, lights: int) -> tuple[Sample, ...]:
         count: Number of samples, from 1.
         lights: Number of lights.
     """
-    pixel, time, lens, *others = (square_points(count, dimension) for dimension in range(3 + lights + MAX_GATHERED))
+    dimensions = 3 + lights + MAX_GATHERED
+    pixel, time, lens, *others = (square_points(count, dimension) for dimension in range(dimensions))
     on_lights, gather = others[:lights], [(points * 256).astype(np.int64) for points in others[lights:]]
+    coverage = square_points(count, dimensions)[:, 0] if count > 1 else None
     return tuple(
         Sample(
             pixel=(float(pixel[index, 0] - 0.5), float(pixel[index, 1] - 0.5)),
@@ -66,6 +76,7 @@ def samples_of_frame(count: int, lights: int) -> tuple[Sample, ...]:
             lens=disc_point(*lens[index]),
             lights=tuple(disc_point(*points[index]) for points in on_lights),
             gather=tuple((int(points[index, 0]), int(points[index, 1])) for points in gather),
+            coverage=None if coverage is None else float(coverage[index]),
         )
         for index in range(count)
     )

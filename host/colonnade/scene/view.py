@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
-from colonnade.mesh.materials.materials import MARKS, PLAIN, MeshMaterial, as_rendered, in_layer
+from colonnade.mesh.materials.materials import MARKS, PLAIN, MeshMaterial, as_rendered, in_layer, in_pass
 from colonnade.mesh.materials.mesh import Extent
 from colonnade.scene.cameras import (
     WorldCamera,
@@ -193,8 +193,11 @@ def make_view(
         ),
         materials=_dimmed(
             tuple(
-                in_layer(as_rendered(one, scene.paths.gather > 0), scene.sample.layer)
-                for one in with_overrides(materials, scene.material)
+                in_layer(
+                    as_rendered(in_pass(one, scene.sample.coverage_of(entry)), scene.paths.gather > 0),
+                    scene.sample.layer,
+                )
+                for entry, one in enumerate(with_overrides(materials, scene.material))
             ),
             scene.headroom,
             scene.exposure,
@@ -217,15 +220,16 @@ def make_view(
 def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tuple[MeshMaterial, ...]:
     """Replace values of a mesh's materials by those that the scene gives.
 
-    An albedo replaces corner colours and textures too, another kind the roughness.
+    An albedo replaces corner colours and textures too, another kind the roughness, coverage and clear coat.
     """
     given = {
         key: value for key in ("kind", "albedo", "ior", "roughness") if (value := getattr(overrides, key)) is not None
     }
     if "albedo" in given:
         given |= {"has_corner_colours": False, "texture": None}
+    other: dict[str, Any] = {"roughness": 0.0, "coverage": 1.0, "clear_coat": PLAIN.clear_coat}
     return tuple(
-        replace(material, **({} if material.kind == given.get("kind", material.kind) else {"roughness": 0.0}) | given)
+        replace(material, **({} if material.kind == given.get("kind", material.kind) else other) | given)
         for material in materials
     )
 

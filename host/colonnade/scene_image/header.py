@@ -166,7 +166,7 @@ class ImageHeader:
         extent = {name: np.array(value, dtype=np.float64) for name, value in values["extent"].items()}
         values["extent"] = Extent(**extent)
         values["materials"] = tuple(
-            MeshMaterial(**{**material, **{key: tuple(material[key]) for key in ("albedo", "emission")}})
+            MeshMaterial(**{key: tuple(one) if isinstance(one, list) else one for key, one in material.items()})
             for material in values["materials"]
         )
         values["tree"] = TreeStatistics(**values["tree"]) if values["tree"] else None

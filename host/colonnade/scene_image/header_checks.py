@@ -56,6 +56,8 @@ def check_header(header: Any) -> None:
         _require(isinstance(material["has_corner_colours"], bool))
         _numbers(material["emission"], 3)
         _number(material.get("roughness", 0.0))
+        _number(material.get("coverage", 1.0))
+        _numbers(material.get("clear_coat", [0.0, 0.0]), 2)
         if material["texture"] is not None:
             _count(material["texture"])
     for part in _list(header["parts"]):

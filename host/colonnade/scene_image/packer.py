@@ -93,7 +93,7 @@ def pack(
     quantised = quantise(mesh, int(manifest.config["geometry"]["vertexBits"]))
     materials = mesh.materials if materials is None else tuple(materials)
     entries, index = table_entries(materials)
-    is_glass = np.array([material.kind == "glass" for material in materials])
+    is_glass = np.array([material.kind == "glass" or material.coverage < 0.5 for material in materials])
     atlas = _atlas(mesh, manifest, materials, headroom)
     packing: Any = _core.Packing(
         quantised.vertices,

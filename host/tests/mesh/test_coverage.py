@@ -99,6 +99,18 @@ def test_blending_is_rounded_and_noted(tmp_path: Path) -> None:
     assert plain.notes == () and plain.materials[0].kind == "diffuse"
 
 
+def test_the_factor_of_a_blended_material_is_its_coverage(tmp_path: Path) -> None:
+    """Of one with a picture, too, whose own alpha is cut at 1/2; without any it is left out."""
+    white = np.full((4, 4, 4), 255, np.uint8)
+    for factor in (0.25, 0.75):
+        mesh = masked(tmp_path, white, factor, alphaMode="BLEND")
+        assert [(one.kind, one.coverage) for one in mesh.materials] == [("diffuse", factor)] and mesh.notes == ()
+        cut = masked(tmp_path, disc(64, 200, 0), factor, alphaMode="BLEND")
+        assert cut.materials[0].coverage == factor and 0.0 < area(cut) < np.sqrt(3) / 2
+    with pytest.raises(UserError, match="all its faces are transparent"):
+        masked(tmp_path, white, 0.0, alphaMode="BLEND")
+
+
 def test_an_outline_with_more_detail_than_faces_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coverage, "MAX_SPLIT_FACES", 500)
     picture = disc(64)

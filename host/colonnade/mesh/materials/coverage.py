@@ -4,6 +4,7 @@ A face whose texels are all below the cutoff is dropped. One with texels on both
 first, until its pieces are as small as a texel or the mesh has `MAX_SPLIT_FACES`. What is left is cut along a line.
 The alpha of corners multiplies that of the texture. Without one it is linear on a face, so the line is exact.
 Of blended materials the cutoff is 1/2, and faces that are thinner everywhere become tinted panes without refraction.
+Their factor is the coverage of the material, which passes show (`colonnade.mesh.materials.materials.in_pass`).
 """
 
 from __future__ import annotations
@@ -80,11 +81,17 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
         has_mask = texture is not None and texture.alpha is not None
         has_corners = surface.alphas is not None and bool((surface.alphas[faces] < 1.0).any())
         if not has_mask and not has_corners:
-            shown, thin = _uniform(material.alpha, faces, losses)
-            whole.append(shown)
-            panes.append(_panes(surface, texture, material.alpha.factor, thin))
+            if material.alpha.blends and material.alpha.factor > 0.0:
+                materials[number] = replace(materials[number], coverage=material.alpha.factor)
+                whole.append(faces)
+            elif material.alpha.factor >= material.alpha.cutoff:
+                whole.append(faces)
             continue
-        cut = _Cut(surface, texture if has_mask else None, material.alpha, has_corners)
+        alpha = material.alpha
+        if alpha.blends and alpha.factor > 0.0:
+            materials[number] = replace(materials[number], coverage=alpha.factor)
+            alpha = replace(alpha, factor=1.0)
+        cut = _Cut(surface, texture if has_mask else None, alpha, has_corners)
         inside, mixed, outside = cut.sorted(faces)
         whole.append(inside)
         if len(mixed):
@@ -104,16 +111,6 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
     if not len(found.owners):
         raise UserError("all its faces are transparent by their alpha: export it with alphaMode OPAQUE")
     return _split(surface, found[np.argsort(found.owners, kind="stable")])
-
-
-def _uniform(alpha: Alpha, faces: Indices, losses: Losses) -> tuple[Indices, Indices]:
-    """Of faces with one alpha, those that are shown, and those that are panes."""
-    none = faces[:0]
-    if alpha.blends:
-        losses.add(lost.BLENDED, int(alpha.factor < 1.0))
-    if alpha.factor >= alpha.cutoff:
-        return faces, none
-    return none, faces if alpha.blends and alpha.factor >= _THIN else none
 
 
 def _panes(

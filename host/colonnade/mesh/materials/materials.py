@@ -6,6 +6,7 @@
 | mirror | metallic factor of at least ½; faces of a map (`gltf_metal`) | `Pm` of at least ½, or `illum` 3 or 5 |
 | roughness of mirrors and glass, or of the coat of a diffuse surface below ½ | roughness factor | `Pr` |
 | glass | transmission factor above ½ | `d` below ½, else `Tr` from ½ to 1, or `illum` 4, 6, 7 or 9 |
+| clear coat | `KHR_materials_clearcoat`, its factors | – |
 | alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
 | index of refraction | `KHR_materials_ior` | `Ni` |
 | emission of a diffuse surface | emissive factor times `KHR_materials_emissive_strength`, at most 1 | `Ke`, as `Kd` |
@@ -48,6 +49,7 @@ USED_EXTENSIONS = (
     "KHR_materials_ior",
     "KHR_materials_emissive_strength",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_clearcoat",
 )
 #: Textures whose readers count what is lost of them.
 _READ_TEXTURES = ("baseColorTexture", "diffuseTexture", "normalTexture")
@@ -58,7 +60,7 @@ HIGHLIGHT_ROUGHNESS = 0.125
 #: The kind of a surface that spreads light cube and lights in a lobe, as the layers of a frame have it (`in_layer`).
 ROUGH_METAL = "rough metal"
 #: The layers of a frame, which are added: surfaces, their coats, and what the marks of lamps do not show.
-Layer = Literal["surface", "coat", "highlight", "glass highlight"]
+Layer = Literal["surface", "coat", "clear coat", "highlight", "glass highlight"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 #: The layers of lights alone, and the radiance of a lamp that surfaces already show in the device's numbers, by its
 #: mark: what a mirror brings is at most 1, and glass reflects so little of the mark that all of it counts.
@@ -96,6 +98,8 @@ class MeshMaterial:
         texture: The surface has the colours of this one of `Mesh.textures`, times `albedo`.
         emission: Linear, 0 to 1: the light that a diffuse surface or rough metal emits towards the eye.
         alpha: Transparency of the file's material; a loaded mesh has none.
+        coverage: The share of its surface that is there: each pass of a frame shows all of it, or what is behind.
+        clear_coat: The share of its surface under a clear coat, and the roughness of that.
     """
 
     kind: str = "diffuse"
@@ -106,8 +110,12 @@ class MeshMaterial:
     emission: Vector = (0.0, 0.0, 0.0)
     alpha: Alpha | None = None
     roughness: float = 0.0
+    coverage: float = 1.0
+    clear_coat: tuple[float, float] = (0.0, 0.0)
 
 
+#: What is not there: glass without refraction and tint.
+CLEAR = MeshMaterial("glass", (1.0, 1.0, 1.0), 1.0)
 #: Material of meshes without one, and what is not in a layer.
 PLAIN, BLACK = MeshMaterial(), MeshMaterial(albedo=(0.0, 0.0, 0.0))
 
@@ -127,7 +135,26 @@ def as_rendered(material: MeshMaterial, gathers: bool) -> MeshMaterial:
         limit = GLASS_ROUGHNESS if material.kind == "glass" else 1.0
         return replace(material, roughness=min(material.roughness, limit))
     is_diffuse = material.kind == "mirror" and material.roughness > MIRROR_ROUGHNESS
-    return replace(material, kind="diffuse" if is_diffuse else material.kind, roughness=0.0)
+    kind = "diffuse" if is_diffuse else material.kind
+    return replace(material, kind=kind, roughness=0.0, clear_coat=PLAIN.clear_coat)
+
+
+def in_pass(material: MeshMaterial, threshold: float | None) -> MeshMaterial:
+    """A material in a pass of a frame: itself or `CLEAR`, as often as its coverage says.
+
+    Args:
+        material: The material.
+        threshold: Of the pass, 0 to 1; None, the only one: from half coverage on itself, else a pane of its colour.
+    """
+    if material.coverage >= 1.0:
+        return material
+    whole = replace(material, coverage=1.0)
+    if threshold is not None:
+        return whole if threshold < material.coverage else CLEAR
+    if material.coverage >= 0.5:
+        return whole
+    red, green, blue = (1.0 - material.coverage * (1.0 - value) for value in material.albedo)
+    return replace(CLEAR, albedo=(red, green, blue))
 
 
 def microfacet_albedo(roughness: float) -> float:
@@ -141,6 +168,13 @@ def in_layer(material: MeshMaterial, layer: Layer) -> MeshMaterial:
 
     Rough metal has the mean of the light that microfacets do not hide from each other.
     """
+    share, roughness = material.clear_coat
+    material = replace(material, clear_coat=PLAIN.clear_coat)
+    if material == CLEAR:
+        return CLEAR
+    if layer == "clear coat":
+        kind = "mirror" if roughness < SHARP_ROUGHNESS else ROUGH_METAL
+        return MeshMaterial(kind, (share * COAT_REFLECTANCE,) * 3, roughness=roughness) if share > 0 else BLACK
     if material.kind == "mirror":
         is_sharp = material.roughness < SHARP_ROUGHNESS
         red, green, blue = (value * microfacet_albedo(material.roughness) for value in material.albedo)
@@ -187,15 +221,20 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
     metallic = _number(surface.get("metallicFactor"), 1.0) if "metallicRoughnessTexture" not in surface else 0.0
     roughness = _number(surface.get("roughnessFactor"), 1.0)
     alpha = _gltf_alpha(material, surface)
+    coating = extensions.get("KHR_materials_clearcoat", {})
+    share = _share(_number(coating.get("clearcoatFactor"), 0.0))
+    coat = (share, _share(_number(coating.get("clearcoatRoughnessFactor"), 0.0)) if share > 0 else 0.0)
     if _number(transmission, 0.0) > 0.5:
         share = alpha.factor if alpha is not None and alpha.blends else 1.0
         red, green, blue = (1.0 - share + share * value for value in colour)
-        return MeshMaterial("glass", (red, green, blue), _ior(ior), roughness=_share(roughness))
+        return MeshMaterial("glass", (red, green, blue), _ior(ior), roughness=_share(roughness), clear_coat=coat)
     if metallic >= 0.5:
         emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else _DARK
-        return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
-    coat = coat_roughness(roughness)
-    return MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha, roughness=coat)
+        found = MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
+    else:
+        gloss = coat_roughness(roughness)
+        found = MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha, roughness=gloss)
+    return replace(found, clear_coat=coat)
 
 
 def _gltf_alpha(material: Mapping[str, Any], surface: Mapping[str, Any]) -> Alpha | None:

@@ -13,7 +13,16 @@ from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.materials.materials import BLACK, MARKS, SMOOTH_ROUGHNESS, MeshMaterial, as_rendered, in_layer
+from colonnade.mesh.materials.materials import (
+    BLACK,
+    MARKS,
+    PLAIN,
+    SMOOTH_ROUGHNESS,
+    MeshMaterial,
+    as_rendered,
+    in_layer,
+    in_pass,
+)
 from colonnade.mesh.materials.mesh import Mesh
 
 #: Limit of the 8-bit material index of a face.
@@ -158,6 +167,17 @@ def _untextured(material: MeshMaterial, mesh: Mesh) -> MeshMaterial:
     return replace(material, albedo=(red, green, blue), texture=None)
 
 
+def with_whole_surfaces(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
+    """A mesh whose partly covering materials are opaque, or panes, in one pass (`in_pass`), and a line on this."""
+    found = Losses()
+    found.add(lost.COVERED, sum(material.coverage < 1.0 for material in mesh.materials))
+    materials = tuple(
+        in_pass(_untextured(material, mesh) if material.coverage < 0.5 else material, None)
+        for material in mesh.materials
+    )
+    return replace(mesh, materials=materials), found.lines(f"mesh {mesh.name}")
+
+
 def with_rendered_metal(mesh: Mesh, gathers: bool, has_layers: bool = False) -> tuple[Mesh, tuple[str, ...]]:
     """A mesh whose rough metal, glass and coats are as the device shows them (`as_rendered`), and lines on the losses.
 
@@ -168,11 +188,17 @@ def with_rendered_metal(mesh: Mesh, gathers: bool, has_layers: bool = False) -> 
     """
     found = Losses()
     materials = tuple(
-        as_rendered(material, gathers and (has_layers or material.kind != "diffuse")) for material in mesh.materials
+        as_rendered(
+            material if has_layers else replace(material, clear_coat=PLAIN.clear_coat),
+            gathers and (has_layers or material.kind != "diffuse"),
+        )
+        for material in mesh.materials
     )
     left_out: dict[lost.Loss, set[MeshMaterial]] = {}
     for material, rendered in zip(mesh.materials, materials, strict=True):
         smooth = replace(material, roughness=0.0)  # a map gives a material several roughnesses
+        if material.clear_coat[0] > 0.0 and not (gathers and has_layers):
+            left_out.setdefault(lost.CLEAR_COATS, set()).add(smooth)
         if rendered.kind != material.kind:
             left_out.setdefault(lost.ROUGH_METAL, set()).add(smooth)
         elif rendered.roughness == 0.0 and material.roughness > SMOOTH_ROUGHNESS:
