@@ -111,6 +111,17 @@ def test_the_factor_of_a_blended_material_is_its_coverage(tmp_path: Path) -> Non
         masked(tmp_path, white, 0.0, alphaMode="BLEND")
 
 
+def test_a_clear_coat_of_gltf_is_read(tmp_path: Path) -> None:
+    """Its factors; what is not a share is clipped."""
+    for given, expected in (
+        ({"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25}, (0.5, 0.25)),
+        ({"clearcoatFactor": 3.0}, (1.0, 0.0)),
+        ({"clearcoatRoughnessFactor": 0.25}, (0.0, 0.0)),
+    ):
+        mesh = masked(tmp_path, np.full((4, 4, 4), 255, np.uint8), extensions={"KHR_materials_clearcoat": given})
+        assert [one.clear_coat for one in mesh.materials] == [expected] and mesh.notes == ()
+
+
 def test_an_outline_with_more_detail_than_faces_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coverage, "MAX_SPLIT_FACES", 500)
     picture = disc(64)

@@ -205,7 +205,7 @@ def test_what_a_gltf_file_loses_is_named(tmp_path: Path) -> None:
         "normalTexture": {"index": 0},
         "emissiveFactor": [1, 0, 0],
         "alphaMode": "BLEND",
-        "extensions": {"KHR_materials_clearcoat": {}},
+        "extensions": {"KHR_materials_sheen": {}},
     }
     triangle = {"attributes": {"POSITION": 0}, "material": 0, "targets": [{"POSITION": 0}]}
     file = gltf(
@@ -228,7 +228,7 @@ def test_what_a_gltf_file_loses_is_named(tmp_path: Path) -> None:
         "1 picture of a texture is missing: surfaces have their base colour",
         "1 line primitive is not shown: only faces are rendered",
         "1 point primitive is not shown: only faces are rendered",
-        "1 use of the extension KHR_materials_clearcoat is ignored: not supported",
+        "1 use of the extension KHR_materials_sheen is ignored: not supported",
         "2 cameras are not used: the scene file has the camera",
         "1 animation is not played: nodes stand as the file places them",
         "3 lights are not used: the scene file has the lights",
