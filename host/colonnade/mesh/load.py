@@ -80,6 +80,8 @@ def _simplified(mesh: Mesh, triangles: int) -> Mesh:
         sources=(mesh.source_faces[parts.owners].astype(np.int64), mesh.source_count),
     )
     line = f"mesh {mesh.name}: {len(mesh.faces):,} triangles are simplified to {len(result.faces):,}"
+    if len(result.faces) > 1.1 * triangles:
+        line += f", not to {triangles:,}, since more would fold it"
     if parts.seams:
         line += f", of which {parts.seams:,} across seams of textures have the coordinates of one side"
     notes.tell(line)

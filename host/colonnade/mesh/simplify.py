@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh.geometry.normals import face_normals
 from colonnade.mesh.geometry.topology import Faces
@@ -43,10 +43,18 @@ def simplified(mesh: Mesh, triangles: int) -> Simplified:
     """About so many triangles, fewer than the mesh has.
 
     Normals, colours and texture coordinates of corners are interpolated on the surface before.
+
+    Raises:
+        UserError: No triangle is left.
     """
     import fast_simplification
 
-    vertices, faces = fast_simplification.simplify(mesh.vertices, mesh.faces, target_count=triangles)
+    # Its thresholds are lengths: those of a mesh as long as 1
+    scale = mesh.extent.edge
+    vertices, faces = fast_simplification.simplify(mesh.vertices / scale, mesh.faces, target_count=triangles)
+    vertices = vertices * scale
+    if len(faces) == 0:
+        raise UserError(f"mesh {mesh.name} has no shape of {triangles:,} triangles: simplify it less")
     surface = _Surface(mesh)
     corners = vertices[faces]
     middles, normals = corners.mean(axis=1), face_normals(vertices, faces)
@@ -72,6 +80,8 @@ class _Surface:
     """The faces of a mesh, searched by position and normal."""
 
     def __init__(self, mesh: Mesh) -> None:
+        from scipy.spatial import cKDTree
+
         self._corners = mesh.vertices[mesh.faces]
         self._normals = face_normals(mesh.vertices, mesh.faces)
         self._tree = cKDTree(self._corners.mean(axis=1))
@@ -95,6 +105,6 @@ class _Surface:
         u, v, w = b - a, c - a, points - a
         uu, uv, vv = (u * u).sum(-1), (u * v).sum(-1), (v * v).sum(-1)
         uw, vw = (u * w).sum(-1), (v * w).sum(-1)
-        area = uu * vv - uv * uv
+        area = np.maximum(uu * vv - uv * uv, 1e-12 * uu * vv)  # a sliver's may round to 0
         first, second = (vv * uw - uv * vw) / area, (uu * vw - uv * uw) / area
         return np.stack([1 - first - second, first, second], axis=-1)

@@ -59,4 +59,15 @@ def test_one_line_has_both_numbers_and_is_no_error() -> None:
         notes.be_strict()
         assert len(load_mesh("torus", simplify=500).faces) == 500
         assert len(load_mesh("cube", simplify=500).faces) == 12
-    assert lines == ["mesh torus: 2,304 triangles are simplified to 500"]
+        load_mesh("cylinder:500", simplify=50)
+    assert lines == [
+        "mesh torus: 2,304 triangles are simplified to 500",
+        "mesh cylinder:500: 2,000 triangles are simplified to 2,000, not to 50, since more would fold it",
+    ]
+
+
+def test_the_size_of_the_units_does_not_matter() -> None:
+    vertices, faces = sphere(2000)
+    large, small = (_simplified(clean_mesh(vertices * size, faces, "ball"), 300) for size in (1e4, 1e-4))
+    np.testing.assert_array_equal(large.faces, small.faces)
+    np.testing.assert_allclose(large.vertices, small.vertices * 1e8, rtol=1e-6, atol=1e-6)
