@@ -52,8 +52,8 @@ template <class T> MergedRows<T> mergeRows(const Row<T>* rows, std::size_t count
     return merged;
 }
 
-/// Indices of the faces to keep, ascending: with an area, and the first of each set of vertices.
-template <class T> std::vector<std::int64_t> dropFaces(const std::vector<Row<T>>& vertices, const std::vector<Row<std::int64_t>>& faces) {
+/// Indices of the faces to keep, ascending: with an area, and unless `keepsEqual` the first of each set of vertices.
+template <class T> std::vector<std::int64_t> dropFaces(const std::vector<Row<T>>& vertices, const std::vector<Row<std::int64_t>>& faces, bool keepsEqual = false) {
     std::vector<std::int64_t> candidates;
     std::vector<Row<std::int64_t>> sets;
     for (std::size_t i = 0; i < faces.size(); ++i) {
@@ -64,6 +64,7 @@ template <class T> std::vector<std::int64_t> dropFaces(const std::vector<Row<T>>
         sets.push_back(faces[i]);
         std::sort(sets.back().begin(), sets.back().end());
     }
+    if (keepsEqual) return candidates;
     const std::vector<std::int64_t> index = mergeRows(sets.data(), sets.size()).index;
     std::vector<bool> isKnown(sets.size());
     std::vector<std::int64_t> keep;

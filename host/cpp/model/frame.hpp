@@ -19,7 +19,7 @@ public:
     Device(const Numbers& numbers, const std::map<std::string, Layout>& layouts, Registers limits = {}) : PathTracer(numbers, layouts), limits_(std::move(limits)) {}
 
     /// Loads the column memory: `count` records of `bytes` bytes.
-    void load(const std::uint8_t* records, std::size_t count, std::size_t bytes) { memory_.load(records, count, bytes); }
+    void load(const std::uint8_t* records, std::size_t count, std::size_t bytes) { memory_->load(records, count, bytes); }
 
     /// Uses the contents of the physical-attribute memory, which must outlive the device.
     void load(const AttributeImage& image) { march_.emplace(numbers_, image); }
@@ -36,7 +36,7 @@ public:
         for (const auto& [name, limit] : limits_)
             if (const auto found = legal.find(name); found != legal.end()) found->second = std::min(found->second, limit);
         frame_ = Frame(legal, numbers_);
-        memory_.divide(frame_.recordCount, frame_.triangleBase, frame_.attributeBase);
+        memory_->divide(frame_.recordCount, frame_.triangleBase, frame_.attributeBase);
         counters = {};
         errors = {};
     }

@@ -73,7 +73,7 @@ protected:
 
     /// The object where a ray hits it; nothing if the record of its face is illegal.
     std::optional<ObjectPoint> pointOf(const Ray& ray, const Hit& hit) {
-        const Face* const face = memory_.faceOf(hit.id);
+        const Face* const face = memory_->faceOf(hit.id);
         errors.illegalRecord = errors.illegalRecord || !face;
         if (!face) return std::nullopt;
         const Material& material = frame_.lighting.materialOf(*face);

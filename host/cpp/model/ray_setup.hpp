@@ -9,10 +9,10 @@ namespace colonnade {
 
 using WideVector = std::array<Wide, 3>;
 
-/// A requested ray. The origin is a scene position in grid steps, the direction has any scale, tMax is along the dominant axis in grid steps.
+/// A requested ray. The origin is a scene position in grid steps, the direction has any scale, tMin and tMax are along the dominant axis in grid steps.
 struct RayRequest {
     WideVector origin, direction;
-    Wide tMax;
+    Wide tMax, tMin = 0;
 };
 
 /// A prepared ray in its permuted frame (x', y', then the dominant axis z'). docs/numbers.md, section 2, defines the fields.
@@ -25,7 +25,7 @@ struct Ray {
     std::array<std::int64_t, 2> shear, reciprocal;
     std::array<int, 2> exponent;
     std::int64_t tEntry;
-    std::int64_t tMax;
+    std::int64_t tMax, tMin;
 
     /// The object's axis that component `permuted` of the ray's frame is on.
     int objectAxis(int permuted) const {
@@ -81,6 +81,7 @@ template <class Integer> void enterBox(Ray& ray, const RayRequest& request, cons
         tNear = std::max(tNear, sideTNear - slack(sideTNear));
         tFar = std::min(tFar, saturate(sideTFar + slack(sideTFar)));
     }
+    tNear = std::max(tNear, saturate(floorShift(static_cast<Integer>(request.tMin), n.gridFraction)));
     ray.enters = tNear <= tFar;
     if (!ray.enters) return;
     if (n.gridFraction < 0) tNear = (tNear >> -n.gridFraction) << -n.gridFraction;
@@ -96,6 +97,7 @@ template <class Integer> void enterBox(Ray& ray, const RayRequest& request, cons
     ray.origin[2] = inReach(ray.negative[2] ? origin[2] - entrySteps : origin[2] + entrySteps);
     for (int a = 0; a < 3; ++a) ray.boxOrigin[a] = boxOrigin(ray.origin[a], n);
     ray.tMax = static_cast<std::int64_t>(clamp<Integer>(static_cast<Integer>(request.tMax) - entrySteps, 0, n.maxT()));
+    ray.tMin = static_cast<std::int64_t>(clamp<Integer>(static_cast<Integer>(request.tMin) - entrySteps, 0, n.maxT()));
 }
 
 /// Whether 64 bits hold the numbers of `enterBox`: not in wide formats, or from far away.
@@ -103,8 +105,8 @@ inline bool isNarrow(const RayRequest& request, const Numbers& n) {
     UnsignedWide all = 0;
     for (const Wide position : request.origin) all |= magnitude(position);
     const int bits = bitLength(all), unitBits = std::max(bits - n.gridFraction, n.vertexBits) + 3;
-    return std::max(
-               {bits, bitLength(magnitude(request.tMax)), unitBits + n.reciprocalFraction, n.shearFraction + n.entryBits, n.gridFraction + n.entryBits, n.gridBits}) < 60;
+    return std::max({bits, bitLength(magnitude(request.tMax)), bitLength(magnitude(request.tMin)), unitBits + n.reciprocalFraction, n.shearFraction + n.entryBits,
+                     n.gridFraction + n.entryBits, n.gridBits}) < 60;
 }
 
 inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Numbers& n) {

@@ -1,5 +1,7 @@
 // Rays through the records of the column memory: closest hits and occluders, with counters and errors.
 #pragma once
+#include <memory>
+
 #include "column_memory.hpp"
 #include "ray_log.hpp"
 #include "registers.hpp"
@@ -21,25 +23,34 @@ struct Errors {
 /// Result of a shadow ray, ordered by decreasing transmittance.
 enum class Occlusion { none, transmissive, opaque };
 
-/// Finds the hits of prepared rays.
+/// What an application's ray does not hit: triangles of a side, non-opaque ones, those without a bit of its mask.
+struct RayFilter {
+    bool cullsFront, cullsBack, refusesClear;
+    std::uint8_t mask;
+    const std::uint8_t* masks; ///< by packed id; null: all bits
+
+    bool accepts(const Hit& hit) const { return !(hit.backSide ? cullsBack : cullsFront) && !(refusesClear && hit.isClear) && (!masks || (masks[hit.id] & mask) != 0); }
+};
+
+/// Finds the hits of prepared rays. Copies share the column memory.
 class Tracer {
 public:
     /// The closest hit of a prepared ray.
-    Hit trace(const Ray& ray) {
+    Hit trace(const Ray& ray, const RayFilter* filter = nullptr) {
         const Hit best = Hit::none(ray.tMax);
         if (!ray.enters) return best;
         ++counters.raysInBox;
-        TraceState state{ray, best, false, Occlusion::none};
+        TraceState state{ray, best, false, filter, Occlusion::none};
         run(state);
         if (state.best.found) log.addHit(state.best.id, static_cast<double>(state.best.t));
         return state.best;
     }
 
     /// The occluders of a prepared shadow ray; the first opaque triangle ends the search.
-    Occlusion occlusion(const Ray& ray) {
+    Occlusion occlusion(const Ray& ray, const RayFilter* filter = nullptr) {
         if (!ray.enters) return Occlusion::none;
         ++counters.raysInBox;
-        TraceState state{ray, Hit::none(ray.tMax), true, Occlusion::none};
+        TraceState state{ray, Hit::none(ray.tMax), true, filter, Occlusion::none};
         run(state);
         return state.occlusion;
     }
@@ -49,10 +60,10 @@ public:
     RayLog log;
 
 protected:
-    Tracer(const Numbers& numbers, const std::map<std::string, Layout>& layouts) : numbers_(numbers), memory_(layouts, numbers) {}
+    Tracer(const Numbers& numbers, const std::map<std::string, Layout>& layouts) : numbers_(numbers), memory_(std::make_shared<ColumnMemory>(layouts, numbers)) {}
 
     Numbers numbers_;
-    ColumnMemory memory_;
+    std::shared_ptr<ColumnMemory> memory_;
     Frame frame_;
 
 private:
@@ -67,6 +78,7 @@ private:
         const Ray& ray;
         Hit best;
         bool isShadow;
+        const RayFilter* filter;
         Occlusion occlusion;
 
         bool isOver() const { return occlusion == Occlusion::opaque; }
@@ -79,8 +91,8 @@ private:
     }
 
     void testRecord(TraceState& state, std::size_t address) {
-        address &= memory_.addressMask();
-        const Triangles* const found = memory_.trianglesAt(address);
+        address &= memory_->addressMask();
+        const Triangles* const found = memory_->trianglesAt(address);
         if (!found) {
             errors.illegalRecord = true;
             return;
@@ -98,9 +110,10 @@ private:
             const std::uint64_t id = leafTriangles * address + static_cast<std::uint64_t>(i);
             const bool isHit = testTriangle(state.ray, record.vertices[i], id, numbers_, hit);
             log.addTriangle(record.vertices[i], id, isHit);
-            if (!isHit) continue;
+            hit.isClear = record.isTransmissive[i];
+            if (!isHit || (state.filter && !state.filter->accepts(hit))) continue;
             if (state.isShadow)
-                state.occlusion = std::max(state.occlusion, record.isTransmissive[i] && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
+                state.occlusion = std::max(state.occlusion, hit.isClear && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
             else state.best = hit;
         }
     }
@@ -116,7 +129,7 @@ private:
             if (next.isLeaf) {
                 testRecord(state, next.address);
                 if (state.isOver()) return;
-            } else if (const Node* const found = memory_.nodeAt(next.address); !found) {
+            } else if (const Node* const found = memory_->nodeAt(next.address); !found) {
                 errors.illegalRecord = true;
             } else {
                 // A node visit takes at least one cycle
@@ -162,7 +175,7 @@ private:
         std::uint32_t before = 0;
         for (int slot = 0; slot < child.slot; ++slot) before += node.kinds[slot] == node.kinds[child.slot];
         const bool isLeaf = node.kinds[child.slot] == Child::leaf;
-        return {isLeaf, ((isLeaf ? node.firstTriangles : node.firstChild) + before) & memory_.addressMask(), child.tNear};
+        return {isLeaf, ((isLeaf ? node.firstTriangles : node.firstChild) + before) & memory_->addressMask(), child.tNear};
     }
 };
 

@@ -11,6 +11,8 @@ struct Hit {
     std::uint64_t id;
     std::array<std::int64_t, 3> weights;
     bool backSide;
+    /// The triangle lets light through.
+    bool isClear = false;
 
     /// That of a ray that has hit nothing yet: only hits with t < `tMax` count.
     static Hit none(std::int64_t tMax) { return {false, tMax, 0, {}, false}; }
@@ -146,7 +148,7 @@ template <class Product> bool testTriangle(const Ray& ray, const std::array<Vect
     const Normalised dividend = normalise(magnitude(numerator), n.mantissaBits), divisor = normalise(sum, n.mantissaBits);
     const Wide quotient = floorShift<Wide>(divide(dividend.mantissa, divisor.mantissa, n.distanceDigits), n.distanceDigits - (dividend.exponent - divisor.exponent));
     const Wide t = numerator < 0 ? z[0] - quotient : z[0] + quotient;
-    if (t < 0 || !best.isReplacedBy(t, id)) return false;
+    if (t < ray.tMin || !best.isReplacedBy(t, id)) return false;
 
     best.found = true;
     best.t = static_cast<std::int64_t>(t);
