@@ -10,11 +10,12 @@ void bind_fixed_order(nb::module_& module);
 void bind_live(nb::module_& module);
 void bind_model(nb::module_& module);
 void bind_packer(nb::module_& module);
+void bind_rays(nb::module_& module);
 void bind_surroundings(nb::module_& module);
 void bind_view(nb::module_& module);
 
 NB_MODULE(_core, module) {
-    module.doc() = "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, registers as a target computes them.";
+    module.doc() = "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, rays, registers as a target computes them.";
     bind_environment(module);
     bind_bvh(module);
     bind_driver(module);
@@ -22,6 +23,7 @@ NB_MODULE(_core, module) {
     bind_live(module);
     bind_model(module);
     bind_packer(module);
+    bind_rays(module);
     bind_surroundings(module);
     bind_view(module);
 }

@@ -1,0 +1,6 @@
+"""Rays of an application: hits with triangle meshes, by the bit-exact model."""
+
+from colonnade.rays.intersector import RayMeshIntersector
+from colonnade.rays.scene import Hits, Scene
+
+__all__ = ["Hits", "RayMeshIntersector", "Scene"]

@@ -1,0 +1,182 @@
+"""`colonnade.rays.Scene`: meshes as arrays, and the hits of arrays of rays (docs/rays.md)."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from colonnade.common.arguments import checked
+from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
+from colonnade.design.config_name import Overrides
+from colonnade.design.generator import manifest_for
+from colonnade.design.manifest import Manifest
+from colonnade.scene_image.packer import record_format
+
+#: Bits of a batch's mode, as `driver/include/colonnade_rays.h` has them.
+CULL_FRONT, CULL_BACK, OPAQUE_ONLY, ALL_MASKS = 1 << 8, 1 << 9, 1 << 10, 0xFF
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Hits of rays, n of them.
+
+    Attributes:
+        ray: Index of the ray, int64 [n].
+        mesh: Number of the mesh, int64 [n]; -1 for a miss.
+        face: Index of the mesh's face, int64 [n]; -1 for a miss.
+        t: Distance in lengths of the ray's direction, float64 [n]; that of a miss is the ray's tfar.
+        uv: Weights of the face's second and third corner, float64 [n, 2].
+        is_back: The face's corners turn clockwise as the ray sees them, bool [n].
+        is_opaque: bool [n].
+    """
+
+    ray: NDArray[np.int64]
+    mesh: NDArray[np.int64]
+    face: NDArray[np.int64]
+    t: Floats
+    uv: Floats
+    is_back: NDArray[np.bool_]
+    is_opaque: NDArray[np.bool_]
+
+
+class Scene:
+    """Meshes that rays hit, packed for a design. Calls may come from several threads; one runs at a time.
+
+    Rays are arrays [n, 8]: origin, tnear, direction, tfar. A direction has any length; hits are those at
+    tnear ≤ t ≤ tfar. A ray that is not finite, without direction or with an empty interval misses.
+
+    Args:
+        vertices: float [n, 3], in any unit; None: a scene without a mesh.
+        faces: int [m, 3].
+        config: The design, as `colonnade generate --config` has it: the width of its vertices and triangle tests.
+        overrides: Settings of the design, "key=value".
+        refine: t and weights of a hit from the vertices as they are, in double. Where these say that the ray misses
+            the face, a neighbour of it may take its place. False: what the device answers.
+
+    Raises:
+        UserError: A mesh or a design is wrong, or they do not fit; also of the methods that add or change meshes.
+    """
+
+    @checked
+    def __init__(
+        self,
+        vertices: Any = None,
+        faces: Any = None,
+        config: str = "edge",
+        overrides: Overrides = (),
+        refine: bool = True,
+    ) -> None:
+        from colonnade import _core
+
+        self._lock = threading.Lock()
+        self._rays: Any = _core.Rays(design_text(manifest_for(config, overrides).manifest))
+        self._rays.refine(refine)
+        self._is_committed = False
+        if vertices is not None:
+            self.add(vertices, faces)
+
+    def add(self, vertices: ArrayLike, faces: ArrayLike) -> int:
+        """Add a mesh; its number."""
+        corners = _array("faces", faces, np.int64, 3)
+        if corners.size and not 0 <= corners.min() <= corners.max() < 1 << 32:
+            raise UserError("the mesh's faces name a vertex that does not exist")
+        return int(self._change("add", _array("vertices", vertices, np.float64, 3), corners.astype(np.uint32)))
+
+    def update(self, mesh: int, vertices: ArrayLike) -> None:
+        """Move the vertices of a mesh, as many as it has."""
+        self._change("update", mesh, _array("vertices", vertices, np.float64, 3))
+
+    def remove(self, mesh: int) -> None:
+        """Remove a mesh; the others keep their numbers."""
+        self._change("remove", mesh)
+
+    def enable(self, mesh: int, is_enabled: bool) -> None:
+        """Leave a mesh out, or take it in."""
+        self._change("enable", mesh, is_enabled)
+
+    def set_mask(self, mesh: int, mask: int) -> None:
+        """Let only rays with a bit in common with the mask, 0 to 255, hit a mesh."""
+        self._change("mask", mesh, mask)
+
+    def set_opaque(self, mesh: int, is_opaque: ArrayLike) -> None:
+        """Say which faces of a mesh are opaque, bool [m]."""
+        self._change("opacity", mesh, np.ascontiguousarray(is_opaque, dtype=np.uint8))
+
+    @property
+    def unit(self) -> float:
+        """A vertex unit, to which the device rounds vertices."""
+        return float(self._query("grid")[0])
+
+    @property
+    def bounds(self) -> Floats:
+        """The box of the meshes, float64 [2, 3]."""
+        return np.array(self._query("bounds"))
+
+    def closest(self, rays: ArrayLike, mode: int = 0, mask: int = ALL_MASKS) -> Hits:
+        """The closest hit of each ray, in their order. `mode` has bits `CULL_FRONT`, `CULL_BACK`, `OPAQUE_ONLY`."""
+        return Hits(**self._query("closest", _rays(rays), mode | mask << 24))
+
+    def all(self, rays: ArrayLike, mode: int = 0, mask: int = ALL_MASKS, max_hits: int = 1 << 20) -> Hits:
+        """All hits, ordered by ray and t, at most `max_hits` of each ray."""
+        return Hits(**self._query("all", _rays(rays), mode | mask << 24, max_hits))
+
+    def occluded(self, rays: ArrayLike, mode: int = 0, mask: int = ALL_MASKS) -> NDArray[np.bool_]:
+        """Whether each ray hits a face, bool [n]."""
+        result: NDArray[np.bool_] = self._query("occluded", _rays(rays), mode | mask << 24)
+        return result
+
+    def order(self, rays: ArrayLike) -> NDArray[np.uint32]:
+        """An order of rays in which near ones follow each other: the device then reads fewer records from DRAM."""
+        result: NDArray[np.uint32] = self._query("order", _rays(rays))
+        return result
+
+    def counters(self) -> dict[str, int]:
+        """Sums over all rays, by the names of the device's counters."""
+        counters: dict[str, int] = self._rays.counters()
+        return counters
+
+    def _change(self, name: str, *arguments: Any) -> Any:
+        with self._lock:
+            self._is_committed = False
+            return self._call(name, *arguments)
+
+    def _query(self, name: str, *arguments: Any) -> Any:
+        with self._lock:
+            if not self._is_committed:
+                self._call("commit")
+                self._is_committed = True
+            return self._call(name, *arguments)
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        try:
+            return getattr(self._rays, name)(*arguments)
+        except ValueError as error:
+            raise UserError(f"rays: {error}") from None
+
+
+def design_text(manifest: Manifest) -> str:
+    """A design for `colonnade_rays_open`: its numbers and layouts, one a line."""
+    numbers = {**manifest.numbers, **record_format(manifest), "depth": manifest.memories["columnBvh"]["depth"]}
+    lines = [f"number {name} {value}" for name, value in numbers.items()]
+    for record, layout in manifest.layouts.items():
+        lines += [f"layout {record} {name} {f.offset} {f.width} {int(f.signed)}" for name, f in layout.fields.items()]
+    return "\n".join(lines)
+
+
+def _array(name: str, values: ArrayLike, kind: type, width: int) -> NDArray[Any]:
+    try:
+        array: NDArray[Any] = np.ascontiguousarray(values, dtype=kind)
+    except (TypeError, ValueError) as error:
+        raise UserError(f"{name} are no array of numbers [n, {width}]") from error
+    if array.ndim != 2 or array.shape[1] != width:
+        raise UserError(f"{name} have the shape {list(array.shape)}: give [n, {width}]")
+    return array
+
+
+def _rays(rays: ArrayLike) -> Floats:
+    return _array("rays", rays, np.float64, 8)

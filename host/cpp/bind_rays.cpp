@@ -1,0 +1,221 @@
+// colonnade._core.Rays: the library of rays (driver/include/colonnade_rays.h) for Python, a device with one scene.
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+
+#include <cstring>
+#include <optional>
+#include <vector>
+
+#include "binding.hpp"
+#include "rays/conversion.hpp"
+
+using namespace nanobind::literals;
+using namespace colonnade;
+using namespace colonnade::binding;
+
+namespace {
+
+template <class T> using Eights = nb::ndarray<const T, nb::shape<-1, 8>, nb::c_contig, nb::device::cpu>;
+template <class T> using Threes = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+template <class T> using Column = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+const colonnade_rays_ray* raysOf(const Eights<double>& rays) { return reinterpret_cast<const colonnade_rays_ray*>(rays.data()); }
+
+class Rays {
+public:
+    explicit Rays(const std::string& design) {
+        check(colonnade_rays_open(design.c_str(), nullptr, &device_));
+        check(colonnade_rays_scene_new(device_, &scene_));
+    }
+    ~Rays() {
+        colonnade_rays_scene_free(scene_);
+        colonnade_rays_close(device_);
+    }
+    Rays(const Rays&) = delete;
+
+    std::uint32_t add(const Threes<double>& vertices, const Threes<std::uint32_t>& faces) {
+        std::uint32_t mesh = 0;
+        check(colonnade_rays_mesh_add(scene_, vertices.data(), vertices.shape(0), faces.data(), faces.shape(0), &mesh));
+        return mesh;
+    }
+    void update(std::uint32_t mesh, const Threes<double>& vertices) { check(colonnade_rays_mesh_update(scene_, mesh, vertices.data())); }
+    void remove(std::uint32_t mesh) { check(colonnade_rays_mesh_remove(scene_, mesh)); }
+    void enable(std::uint32_t mesh, bool isEnabled) { check(colonnade_rays_mesh_enable(scene_, mesh, isEnabled)); }
+    void mask(std::uint32_t mesh, std::uint8_t mask) { check(colonnade_rays_mesh_mask(scene_, mesh, mask)); }
+    void opacity(std::uint32_t mesh, const std::optional<Column<std::uint8_t>>& isOpaque) {
+        check(colonnade_rays_mesh_opacity(scene_, mesh, isOpaque ? isOpaque->data() : nullptr));
+    }
+    void refine(bool isRefined) { colonnade_rays_refine(scene_, isRefined); }
+    void commit() {
+        check(released([&] { return colonnade_rays_commit(scene_); }));
+    }
+
+    nb::tuple bounds() const {
+        std::array<double, 3> low, high;
+        check(colonnade_rays_bounds(scene_, low.data(), high.data()));
+        return nb::make_tuple(low, high);
+    }
+    nb::tuple grid() const {
+        double unit;
+        std::array<double, 3> corner;
+        check(colonnade_rays_grid(scene_, &unit, corner.data()));
+        return nb::make_tuple(unit, corner);
+    }
+
+    nb::dict closest(const Eights<double>& rays, std::uint32_t mode) {
+        std::vector<colonnade_rays_hit> hits(rays.shape(0));
+        check(released([&] { return colonnade_rays_closest(scene_, raysOf(rays), hits.size(), mode, hits.data()); }));
+        return columns(hits);
+    }
+    nb::dict all(const Eights<double>& rays, std::uint32_t mode, std::size_t most) {
+        std::vector<colonnade_rays_hit> hits(2 * rays.shape(0));
+        std::size_t found = 0;
+        const auto call = [&] { return colonnade_rays_all(scene_, raysOf(rays), rays.shape(0), mode, most, hits.data(), hits.size(), &found); };
+        check(released(call));
+        const bool isShort = found > hits.size();
+        hits.resize(found);
+        if (isShort) check(released(call));
+        return columns(hits);
+    }
+    Pixels<bool> occluded(const Eights<double>& rays, std::uint32_t mode) {
+        bool* isOccluded;
+        auto result = makeArray<bool>({rays.shape(0)}, isOccluded);
+        check(released([&] { return colonnade_rays_occluded(scene_, raysOf(rays), rays.shape(0), mode, reinterpret_cast<std::uint8_t*>(isOccluded)); }));
+        return result;
+    }
+    Pixels<std::uint32_t> order(const Eights<double>& rays) const {
+        std::uint32_t* order;
+        auto result = makeArray<std::uint32_t>({rays.shape(0)}, order);
+        check(colonnade_rays_order(scene_, raysOf(rays), rays.shape(0), order));
+        return result;
+    }
+
+    /// A batch from memory: its records in, 32 or 16 bytes each, and the bytes of its responses out.
+    Pixels<std::uint8_t> submit(const nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>& rays, std::uint32_t mode, const std::array<float, 3>& origin,
+                                float tnear) {
+        struct alignas(64) Line {
+            std::uint8_t bytes[64];
+        };
+        const std::size_t count = rays.shape(0), bytes = (mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_HITS ? 16 * count
+                                                         : (mode & COLONNADE_RAYS_RANGES)                        ? 8 * count
+                                                                                                                 : (count + 63) / 64 * 8;
+        if (rays.shape(1) != (mode & COLONNADE_RAYS_FAN ? 4 : 8)) throw std::invalid_argument("rays of this form have other records");
+        std::vector<Line> records(count / 2 + 1), responses(bytes / 64 + 1);
+        if (count != 0) std::memcpy(records.data()->bytes, rays.data(), 4 * rays.size());
+        colonnade_rays_batch batch{};
+        std::uint32_t done = 0;
+        batch.rays = reinterpret_cast<std::uintptr_t>(records.data());
+        batch.hits = reinterpret_cast<std::uintptr_t>(responses.data());
+        batch.count = static_cast<std::uint32_t>(count);
+        batch.mode = mode;
+        std::copy(origin.begin(), origin.end(), batch.origin);
+        batch.tnear = tnear;
+        batch.tag = 1;
+        batch.done = reinterpret_cast<std::uintptr_t>(&done);
+        check(released([&] { return colonnade_rays_submit(scene_, &batch); }));
+        check(colonnade_rays_wait(scene_));
+        if (done != 1) throw std::runtime_error("the batch is not done");
+        std::uint8_t* data;
+        auto result = makeArray<std::uint8_t>({bytes}, data);
+        std::memcpy(data, responses.data()->bytes, bytes);
+        return result;
+    }
+
+    nb::tuple face(std::uint32_t id) const {
+        std::uint32_t mesh, face;
+        check(colonnade_rays_face(scene_, id, &mesh, &face));
+        return nb::make_tuple(mesh, face);
+    }
+
+    Values counters() const {
+        colonnade_rays_sums c;
+        colonnade_rays_counters(device_, &c);
+        const auto value = [](std::uint64_t count) { return static_cast<std::int64_t>(count); };
+        return {{"rays", value(c.rays)},          {"raysRefused", value(c.rays_refused)},     {"raysInBox", value(c.rays_in_box)},     {"nodeReads", value(c.node_reads)},
+                {"boxTests", value(c.box_tests)}, {"triangleTests", value(c.triangle_tests)}, {"deepestStack", value(c.deepest_stack)}};
+    }
+
+private:
+    void check(int status) const {
+        if (status == COLONNADE_RAYS_NO_MEMORY) throw std::bad_alloc();
+        if (status != COLONNADE_RAYS_OK) {
+            const std::string error = colonnade_rays_error(device_);
+            throw std::invalid_argument(error);
+        }
+    }
+
+    static nb::dict columns(const std::vector<colonnade_rays_hit>& hits) {
+        double *t, *weights;
+        std::int64_t *mesh, *face, *ray;
+        bool *backSide, *opaque;
+        nb::dict result;
+        result["ray"] = makeArray<std::int64_t>({hits.size()}, ray);
+        result["mesh"] = makeArray<std::int64_t>({hits.size()}, mesh);
+        result["face"] = makeArray<std::int64_t>({hits.size()}, face);
+        result["t"] = makeArray<double>({hits.size()}, t);
+        result["uv"] = makeArray<double>({hits.size(), 2}, weights);
+        result["is_back"] = makeArray<bool>({hits.size()}, backSide);
+        result["is_opaque"] = makeArray<bool>({hits.size()}, opaque);
+        for (std::size_t i = 0; i < hits.size(); ++i) {
+            const colonnade_rays_hit& hit = hits[i];
+            ray[i] = hit.ray;
+            mesh[i] = hit.mesh == UINT32_MAX ? -1 : static_cast<std::int64_t>(hit.mesh);
+            face[i] = hit.face == UINT32_MAX ? -1 : static_cast<std::int64_t>(hit.face);
+            t[i] = hit.t;
+            weights[2 * i] = hit.u;
+            weights[2 * i + 1] = hit.v;
+            backSide[i] = (hit.flags & COLONNADE_RAYS_BACK_SIDE) != 0;
+            opaque[i] = (hit.flags & COLONNADE_RAYS_NON_OPAQUE) == 0;
+        }
+        return result;
+    }
+
+    colonnade_rays_device* device_ = nullptr;
+    colonnade_rays_scene* scene_ = nullptr;
+};
+
+/// Rays in the device's integers, for comparison with exact arithmetic: kind, origin [3], direction [3], tMin, tMax, product, exponent.
+nb::list converted(const Values& numbers, const Eights<float>& rays, bool isLocal, std::uint32_t mantissa, int exponent, const std::array<std::int64_t, 3>& base) {
+    const rays::RayConverter converter(Numbers(numbers), static_cast<int>(lookUp(numbers, "directionBits")), {mantissa, exponent, base});
+    nb::list result;
+    for (std::size_t i = 0; i < rays.shape(0); ++i) {
+        colonnade_rays_record record;
+        std::memcpy(&record, rays.data() + 8 * i, sizeof record);
+        const rays::ConvertedRay ray = converter.convert(record, isLocal);
+        std::array<std::int64_t, 8> values;
+        for (int a = 0; a < 3; ++a) {
+            values[a] = static_cast<std::int64_t>(ray.request.origin[a]);
+            values[3 + a] = static_cast<std::int64_t>(ray.request.direction[a]);
+        }
+        values[6] = static_cast<std::int64_t>(ray.request.tMin);
+        values[7] = static_cast<std::int64_t>(ray.request.tMax);
+        result.append(nb::make_tuple(static_cast<int>(ray.kind), values, ray.product, ray.exponent));
+    }
+    return result;
+}
+
+} // namespace
+
+void bind_rays(nb::module_& module) {
+    nb::class_<Rays>(module, "Rays", "A device that traces rays, with one scene: the calls of colonnade_rays.h, on the bit-exact model.")
+        .def(nb::init<const std::string&>(), "design"_a)
+        .def("add", &Rays::add, "vertices"_a, "faces"_a)
+        .def("update", &Rays::update, "mesh"_a, "vertices"_a)
+        .def("remove", &Rays::remove, "mesh"_a)
+        .def("enable", &Rays::enable, "mesh"_a, "is_enabled"_a)
+        .def("mask", &Rays::mask, "mesh"_a, "mask"_a)
+        .def("opacity", &Rays::opacity, "mesh"_a, "is_opaque"_a.none())
+        .def("refine", &Rays::refine, "is_refined"_a)
+        .def("commit", &Rays::commit)
+        .def("bounds", &Rays::bounds)
+        .def("grid", &Rays::grid)
+        .def("closest", &Rays::closest, "rays"_a, "mode"_a)
+        .def("all", &Rays::all, "rays"_a, "mode"_a, "most"_a)
+        .def("occluded", &Rays::occluded, "rays"_a, "mode"_a)
+        .def("order", &Rays::order, "rays"_a)
+        .def("submit", &Rays::submit, "rays"_a, "mode"_a, "origin"_a = std::array<float, 3>{}, "tnear"_a = 0.0f)
+        .def("face", &Rays::face, "id"_a)
+        .def("counters", &Rays::counters);
+    module.def("convert_rays", &converted, "numbers"_a, "rays"_a, "is_local"_a, "mantissa"_a, "exponent"_a, "base"_a);
+    module.def("nearest_float", &rays::nearestFloat, "numerator"_a, "denominator"_a, "exponent"_a);
+}

@@ -1,0 +1,237 @@
+"""Rays through scenes of meshes: hits, limits, filters, batches, bad input."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from exact_rays import EXACT, mesh_of, outside_rays, plane_hits, rays_of, truth
+
+from colonnade import UserError
+from colonnade.rays import Hits, Scene
+from colonnade.rays.scene import ALL_MASKS, CULL_BACK, CULL_FRONT, OPAQUE_ONLY
+
+SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+#: From above and from below through the first face of `SQUARE`.
+DOWN, UP = [0.7, 0.2, 2, 0, 0, 0, -1, np.inf], [0.7, 0.2, -2, 0, 0, 0, 1, np.inf]
+#: Bits of a batch's mode, and answers of 16 bytes.
+RANGES, OCCLUDED, FAN, MASKS = 1, 2, 1 << 4, ALL_MASKS << 24
+ANSWER = np.dtype([("t", "f4"), ("id", "u4"), ("u", "f4"), ("v", "f4")])
+
+
+def test_refined_hits_are_those_of_the_mesh_as_it_is() -> None:
+    vertices, faces = mesh_of("torus")
+    rays = outside_rays(vertices, 1500, seed=1)
+    face, t = truth(vertices, faces, rays)
+    hits = Scene(vertices, faces).closest(rays)
+    assert (hits.face == face).mean() > 0.999
+    same = (hits.face == face) & (face >= 0)
+    assert same.sum() > 500
+    assert np.abs(hits.t[same] - t[same]).max() < 1e-9
+    corners = vertices[faces[hits.face[same]]]
+    weights = np.column_stack([1 - hits.uv[same].sum(axis=1), hits.uv[same]])
+    places = rays[same, :3] + hits.t[same, None] * rays[same, 4:7]
+    assert np.abs((weights[:, :, None] * corners).sum(axis=1) - places).max() < 1e-9
+
+
+@pytest.mark.parametrize("refine", (True, False))
+def test_tnear_and_tfar_bound_the_hits_on_both_sides(refine: bool) -> None:
+    vertices, faces = mesh_of("torus")
+    scene = Scene(vertices, faces, refine=refine)
+    rays = outside_rays(vertices, 400, seed=2)
+    first = scene.closest(rays)
+    rays, t = rays[first.face >= 0], first.t[first.face >= 0]
+    face, step = first.face[first.face >= 0], 4 * scene.unit
+
+    def with_limits(near: Any, far: Any) -> Hits:
+        return scene.closest(rays_of(rays[:, :3], rays[:, 4:7], near, far))
+
+    assert (with_limits(t - step, np.inf).face == face).all()
+    assert (with_limits(0, t + step).face == face).all()
+    assert (with_limits(0, t - step).face == -1).all()
+    behind = with_limits(t + step, np.inf)
+    assert (behind.t[behind.face >= 0] > (t + step)[behind.face >= 0]).all()
+    assert (behind.face >= 0).mean() > 0.8
+    assert not scene.occluded(rays_of(rays[:, :3], rays[:, 4:7], 0, t - step)).any()
+    assert scene.occluded(rays_of(rays[:, :3], rays[:, 4:7], t - step, t + step)).all()
+
+
+def test_sides_masks_opacity_and_switched_off_meshes_are_no_hits() -> None:
+    scene = Scene(*SQUARE)
+    below = scene.add(SQUARE[0] - [0, 0, 1], SQUARE[1][:, ::-1])
+    rays = [DOWN, UP]
+    assert scene.closest(rays).mesh.tolist() == [0, below]
+    assert scene.closest(rays).is_back.tolist() == [False, False]
+    assert scene.closest(rays, CULL_FRONT).mesh.tolist() == [below, 0]
+    assert scene.closest(rays, CULL_FRONT).is_back.tolist() == [True, True]
+    assert scene.closest(rays, CULL_FRONT | CULL_BACK).mesh.tolist() == [-1, -1]
+    scene.set_opaque(0, [False, True])
+    assert scene.closest(rays).is_opaque.tolist() == [False, True]
+    assert scene.closest(rays, OPAQUE_ONLY).mesh.tolist() == [below, below]
+    scene.set_mask(below, 2)
+    assert scene.closest(rays, mask=4).mesh.tolist() == [0, 0]
+    assert scene.occluded(rays, OPAQUE_ONLY, mask=4).tolist() == [False, False]
+    assert scene.all(rays, mask=2).mesh.tolist() == [0, below, below, 0]
+    scene.enable(below, False)
+    assert scene.closest(rays).mesh.tolist() == [0, 0]
+    scene.remove(0)
+    assert scene.closest(rays).mesh.tolist() == [-1, -1]
+    assert not scene.occluded(rays).any()
+
+
+def test_equal_faces_of_either_side_are_all_hit() -> None:
+    scene = Scene(SQUARE[0], np.concatenate([SQUARE[1], SQUARE[1][:, ::-1]]))
+    assert sorted(scene.all([DOWN]).face) == [0, 2]
+    assert scene.closest([DOWN, UP], CULL_BACK).face.tolist() == [0, 2]
+
+
+def test_moved_vertices_move_the_hits() -> None:
+    scene = Scene(*SQUARE)
+    scene.update(0, SQUARE[0] + [0, 0, 0.5])
+    assert scene.closest([DOWN]).t.tolist() == [1.5]
+
+
+def test_all_hits_come_in_order() -> None:
+    vertices, faces = mesh_of("torus")
+    rays = outside_rays(vertices, 300, seed=3)
+    t, least = plane_hits(vertices, faces, rays)
+    wanted = [np.sort(row[(edge >= 0) & (row >= 0)].astype(float)) for row, edge in zip(t, least, strict=True)]
+    hits = Scene(vertices, faces).all(rays)
+    found = [hits.t[hits.ray == i] for i in range(len(rays))]
+    equal = [len(a) == len(b) and np.allclose(a, b, atol=1e-9) for a, b in zip(found, wanted, strict=True)]
+    assert np.mean(equal) > 0.995
+    assert max(map(len, found)) == 4
+    assert Scene(vertices, faces).all(rays, max_hits=1).t.tolist() == [row[0] for row in found if len(row)]
+
+
+def test_far_origins_hit_as_near_ones_do() -> None:
+    vertices, faces = mesh_of("torus")
+    place = np.array([3000.0, 0, -800])
+    scene = Scene(vertices + place, faces)
+    near = outside_rays(vertices, 500, seed=4)
+    near[:, :3] += place
+    far = near.copy()
+    far[:, :3] -= 50_000 * near[:, 4:7]
+    one, other = scene.closest(near), scene.closest(far)
+    assert (one.face == other.face).mean() > 0.995
+    hit = (one.face == other.face) & (one.face >= 0)
+    assert np.abs(other.t[hit] - one.t[hit] - 50_000).max() < 1e-6
+
+
+def test_hits_behind_the_origin_count_from_a_negative_tnear() -> None:
+    scene = Scene(*SQUARE)
+    ray = [0.7, 0.2, -2, -np.inf, 0, 0, -1, np.inf]
+    for near, face, t in ((-np.inf, 0, -2), (-2.5, 0, -2), (-1.5, -1, np.inf)):
+        ray[3] = near
+        hits = scene.closest([ray])
+        assert (hits.face[0], hits.t[0]) == (face, t)
+    assert scene.all([[*SQUARE[0][1], 0, 0, 0, -1, np.inf]]).t.tolist() == [0]
+
+
+def test_rays_of_no_number_miss() -> None:
+    scene = Scene(*SQUARE)
+    bad = np.array([DOWN] * 8)
+    bad[0, 0], bad[1, 5], bad[2, 4:7], bad[3, 3:8:4] = np.nan, np.inf, 0, (3, 1)
+    bad[4, 7], bad[5, 3], bad[6, 7], bad[7, 2] = -1, np.nan, np.nan, -np.inf
+    hits = scene.closest(bad)
+    assert (hits.face == -1).all()
+    assert (hits.uv == 0).all()
+    assert np.array_equal(hits.t, bad[:, 7], equal_nan=True)
+    assert not scene.occluded(bad).any()
+    assert scene.all(bad).face.size == 0
+    assert scene.counters()["raysRefused"] >= len(bad)
+
+
+@pytest.mark.parametrize("scale", (1e-30, 1e30))
+def test_directions_of_any_length(scale: float) -> None:
+    scene = Scene(*SQUARE)
+    ray = np.array([DOWN])
+    ray[0, 4:7] *= scale
+    assert scene.closest(ray).t[0] == pytest.approx(2 / scale)
+
+
+def test_batches_answer_alike_in_every_form() -> None:
+    """Whole records, fans, ranges and bits; several threads, as a batch has thousands of rays."""
+    vertices, faces = mesh_of("torus")
+    scene = Scene(vertices, faces, refine=False)
+    scene.closest([DOWN])
+    rays = outside_rays(vertices, 3001, seed=5)
+    rays[:, :3] = rays[0, :3]
+    records = rays.astype(np.float32)
+    submit = scene._rays.submit
+    hits = submit(records, MASKS).view(ANSWER)
+    assert (hits == np.concatenate([submit(part, MASKS).view(ANSWER) for part in np.array_split(records, 50)])).all()
+    fan = submit(np.ascontiguousarray(records[:, 4:]), MASKS | FAN, records[0, :3], 0.0).view(ANSWER)
+    assert (fan == hits).all()
+    assert (submit(records, MASKS | RANGES).view([("t", "f4"), ("id", "u4")]) == hits[["t", "id"]]).all()
+    bits = np.unpackbits(submit(records, MASKS | OCCLUDED), bitorder="little")
+    assert (bits[: len(rays)] == (hits["id"] != 0xFFFFFFFF)).all()
+    assert not bits[len(rays) :].any()
+    face = scene.closest(records).face
+    assert [scene._rays.face(int(i) & 0xFFFFFF)[1] for i in hits["id"][face >= 0]] == face[face >= 0].tolist()
+
+
+def test_batches_that_are_none_are_refused() -> None:
+    scene = Scene(*SQUARE)
+    scene.closest([DOWN])
+    for records, mode in (((1, 8), MASKS | 3), ((1, 8), MASKS | 1 << 5), ((0, 8), MASKS)):
+        with pytest.raises(ValueError, match="unknown mode"):
+            scene._rays.submit(np.zeros(records, np.float32), mode)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    (
+        ([[0, 0, 0], [1, 0, np.nan], [0, 1, 0]], [[0, 1, 2]], "vertex 1 is not finite"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3]], "face 0 names vertex 3 of 3"),
+        ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], "no face of the mesh has an area"),
+        ([[0, 0, 0], [1, 0, 0], [1, 1e-9, 0]], [[0, 1, 2]], "no face keeps an area at 16 bits"),
+        ([[1e9, 0, 0], [1e9 + 1e-6, 0, 0], [1e9, 1e-6, 0]], [[0, 1, 2]], "too far from the origin for its size"),
+        ([[0, 0], [1, 1]], [[0, 1, 2]], "give [n, 3]"),
+    ),
+)
+def test_wrong_meshes_are_refused(vertices: Any, faces: Any, message: str) -> None:
+    with pytest.raises(UserError) as error:
+        Scene(vertices, faces).closest([DOWN])
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_scenes_beyond_the_design_are_refused() -> None:
+    vertices, faces = mesh_of("torus")
+    with pytest.raises(UserError, match="records, the design has 64"):
+        Scene(vertices, faces, "tiny", ("columnBvhMemory.depth=64",)).closest([DOWN])
+
+
+def test_an_order_keeps_near_rays_together() -> None:
+    vertices, faces = mesh_of("torus")
+    scene, rays = Scene(vertices, faces), outside_rays(vertices, 4000, seed=6, distance=0.4)
+    order = scene.order(rays)
+    assert sorted(order) == list(range(len(rays)))
+    gaps = [np.linalg.norm(np.diff(rays[o, :3], axis=0), axis=1).mean() for o in (order, np.arange(len(rays)))]
+    assert gaps[0] < gaps[1] / 5
+
+
+def leaks(count: int, config: str, overrides: tuple[str, ...] = ()) -> int:
+    """Rays from inside a sphere to its vertices and to places on its edges that miss it."""
+    vertices, faces = mesh_of("sphere:4")
+    random = np.random.default_rng(7)
+    corners = vertices[faces[random.integers(len(faces), size=count)]]
+    share = random.choice([0, 0.25, 0.5, 1 / 3], size=(count, 1))
+    start = (random.random((count, 3)) - 0.5) * 0.4 * np.ptp(vertices, axis=0) + vertices.mean(axis=0)
+    rays = rays_of(start, corners[:, 0] + share * (corners[:, 1] - corners[:, 0]) - start)
+    scene = Scene(vertices, faces, config, overrides)
+    assert not (~scene.occluded(rays)).any()
+    return int((scene.closest(rays).face < 0).sum())
+
+
+@pytest.mark.parametrize("config", ("edge", "16b16s32d"))
+def test_a_closed_mesh_has_no_leaks(config: str) -> None:
+    assert leaks(20_000, config) == 0
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("overrides", ((), EXACT))
+def test_a_closed_mesh_has_no_leaks_in_a_million_rays(overrides: tuple[str, ...]) -> None:
+    assert leaks(1_000_000, "edge", overrides) == 0
