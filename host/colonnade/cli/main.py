@@ -41,6 +41,7 @@ LABORATORY = {
     "verify": "Compare the RTL with its model, and the model with Embree.",
     "fuzz": "Compare the RTL with its model on corrupt frames.",
     "bench": "Measure rays per cycle of the benchmark meshes.",
+    "rays": "Measure rays of applications a second.",
     "explore": "Measure quality, speed, area and power of many configurations.",
     "ppa": "Estimate area, timing and power of a configuration.",
 }

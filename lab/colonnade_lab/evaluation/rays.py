@@ -1,0 +1,102 @@
+"""Rays of applications: kinds of rays, and how many of them model and Embree answer a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from colonnade.common.types import Floats
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.rays import Scene
+
+#: Kinds of rays; "shuffled" ones have no order, the others that of `Scene.order`.
+KINDS = ("outside", "outside, shuffled", "off the surface", "off the surface, shuffled", "occlusion")
+
+
+@dataclass(frozen=True)
+class RayRates:
+    """Rays of a kind.
+
+    Attributes:
+        kind: One of `KINDS`.
+        hits: Share of the rays that hit.
+        model: Rays a second of the model.
+        embree: Rays a second of Embree; None without embreex.
+        node_reads: Nodes that a ray reads.
+        triangle_tests: Triangles that a ray tests.
+    """
+
+    kind: str
+    hits: float
+    model: float
+    embree: float | None
+    node_reads: float
+    triangle_tests: float
+
+
+def rays_of_kind(kind: str, mesh: Mesh, count: int) -> Floats:
+    """Rays [count, 8] of a kind, float32 values; those of a name are always the same."""
+    random = np.random.default_rng(len(kind.partition(",")[0]))
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    edge, way = (high - low).max(), random.normal(size=(count, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    if kind.startswith("outside"):
+        start = (low + high) / 2 + 2 * edge * way
+        way = low + random.random((count, 3)) * (high - low) - start
+    else:
+        corners = mesh.vertices[mesh.faces[random.integers(len(mesh.faces), size=count)]]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        start = (random.dirichlet([1, 1, 1], size=count)[:, :, None] * corners).sum(axis=1) + 1e-3 * edge * normals
+        way = way + normals
+    ends = np.zeros((count, 1))
+    return np.hstack([start, ends, way, ends + np.inf]).astype(np.float32).astype(np.float64)
+
+
+def measured(mesh: Mesh, config: str, overrides: tuple[str, ...], count: int) -> Iterator[RayRates]:
+    """Rates of each kind; the time of Embree has its conversion from arrays, as that of the model has."""
+    scene, embree = Scene(mesh.vertices, mesh.faces, config, overrides), _embree(mesh)
+    for kind in KINDS:
+        rays = rays_of_kind(kind, mesh, count)
+        if not kind.endswith("shuffled"):
+            rays = rays[scene.order(rays)]
+        before = scene.counters()
+        is_occlusion = kind == "occlusion"
+        answer, seconds = _timed(partial(scene.occluded if is_occlusion else scene.closest, rays))
+        hits = answer if is_occlusion else answer.face >= 0
+        reads = {name: scene.counters()[name] - before[name] for name in ("nodeReads", "triangleTests")}
+        other = None
+        if embree is not None:
+            parts = rays[:, :3].astype(np.float32), rays[:, 4:7].astype(np.float32)
+            run = partial(embree.run, query="OCCLUDED" if is_occlusion else "INTERSECT")
+            run(*(part[:1] for part in parts))  # its first call builds the tree
+            other = count / _timed(partial(run, *parts))[1]
+        yield RayRates(
+            kind, hits.mean(), count / seconds, other, reads["nodeReads"] / count, reads["triangleTests"] / count
+        )
+
+
+def report(rates: list[RayRates]) -> list[dict[str, Any]]:
+    """Rates as JSON."""
+    return [asdict(each) for each in rates]
+
+
+def _embree(mesh: Mesh) -> Any:
+    try:
+        from embreex import rtcore_scene
+        from embreex.mesh_construction import TriangleMesh
+    except ImportError:
+        return None
+    scene = rtcore_scene.EmbreeScene()
+    TriangleMesh(scene=scene, vertices=mesh.vertices.astype(np.float32), indices=mesh.faces.astype(np.int32))
+    return scene
+
+
+def _timed(call: Callable[[], Any]) -> tuple[Any, float]:
+    begin = time.perf_counter()
+    result = call()
+    return result, time.perf_counter() - begin
