@@ -1,0 +1,39 @@
+// Runs a test file of three-mesh-bvh, whose random numbers begin alike each time: node three_run.mjs FILE
+import { isDeepStrictEqual } from "node:util";
+import { counts } from "three-mesh-bvh";
+
+let seed = 12345n;
+Math.random = () => {
+  seed = (seed * 6364136223846793005n + 1442695040888963407n) & 0xffffffffffffffffn;
+  return Number(seed >> 11n) / 2 ** 53;
+};
+
+const results = { passed: 0, failed: [] }, names = [];
+let before = [], tests = [];
+
+globalThis.beforeAll = (call) => before.push(call);
+globalThis.it = (name, call) => tests.push([name, call]);
+globalThis.expect = (found) => ({
+  toEqual(wanted) {
+    if (!isDeepStrictEqual(found, wanted)) throw new Error("the values differ");
+  },
+});
+globalThis.describe = (name, call) => {
+  names.push(name);
+  call();
+  const [prepare, cases] = [before, tests];
+  [before, tests] = [[], []];
+  for (const each of prepare) each();
+  for (const [test, run] of cases) {
+    try {
+      run();
+      results.passed++;
+    } catch (error) {
+      results.failed.push(`${[...names, test].join(", ")}: ${error.message}`);
+    }
+  }
+  names.pop();
+};
+
+await import(process.argv[2]);
+console.log(JSON.stringify({ ...results, ...counts }));
