@@ -35,10 +35,17 @@ public:
             packer::quantise(faces_.vertices().data(), faces_.vertices().size(), faces_.faces().data(), faces_.faces().size(), design.format.vertexBits, options);
         if (quantised_.faces.empty())
             throw Failure(COLONNADE_RAYS_BAD_MESH, "no face keeps an area at " + std::to_string(design.format.vertexBits) + " bits a coordinate: use a design with more");
-        tree_ = packer::buildTree(quantised_, design.format);
-        packer_ = std::make_unique<packer::RecordPacker>(quantised_, tree_, design.format);
+        const std::size_t count = faces_.faces().size();
+        const std::vector<std::array<mesh::Vector, 3>> normals(count);
+        const std::vector<std::uint8_t> materials(count);
+        const std::vector<std::array<mesh::Row<std::int64_t>, 3>> colours(design.format.layouts.at("attributes").count("faces[0].colours[0].r") ? count : 0);
+        const packer::FaceAttributes attributes{normals.data(), materials.data(), isClear_.data(), colours.empty() ? nullptr : colours.data()};
+        tree_ = packer::buildTree(quantised_, attributes, design.format);
+        packer_ = std::make_unique<packer::RecordPacker>(quantised_, attributes, tree_, design.format);
         checkFit(design);
-        pack(design);
+        places_ = packer_->places();
+        records_ = packer_->records();
+        place(design);
     }
 
     bool isEmpty() const { return faces_.faces().empty(); }
@@ -54,14 +61,16 @@ public:
     bool isOpaque(std::size_t face) const { return isClear_[face] == 0; }
 
     /// The face of a packed id; all ones for an id of none.
-    std::size_t faceOfId(std::uint32_t id) const { return id < tree_.order.size() ? static_cast<std::size_t>(quantised_.meshFaces[tree_.order[id]]) : ~std::size_t{0}; }
+    std::size_t faceOfId(std::uint32_t id) const {
+        return id < places_.size() && places_[id] >= 0 ? static_cast<std::size_t>(quantised_.meshFaces[tree_.order[places_[id]]]) : ~std::size_t{0};
+    }
 
     /// u, v of an response by the corners of the face.
     std::array<double, 2> weightsOf(const colonnade_rays_response& response) const {
         const std::uint32_t id = response.id & ~(COLONNADE_RAYS_BACK_SIDE | COLONNADE_RAYS_NON_OPAQUE);
         const double packed[3] = {std::max(0.0, 1.0 - response.u - response.v), response.u, response.v};
         double weights[3];
-        for (int i = 0; i < 3; ++i) weights[packer_->cornerOf(id, i)] = packed[i];
+        for (int i = 0; i < 3; ++i) weights[packer_->cornerOf(places_[id], i)] = packed[i];
         return {weights[1], weights[2]};
     }
 
@@ -102,17 +111,12 @@ private:
         };
         refuse("records", sections.recordCount, static_cast<std::size_t>(design.number("depth")));
         if (design.format.bvh) refuse("stack entries", tree_.tree.stackBound, static_cast<std::size_t>(design.format.stackDepth));
-        refuse("numbers of triangles", tree_.order.size() + 1, std::size_t{1} << design.format.layouts.at("triangles").at("firstTriangle").width);
     }
 
-    void pack(const Design& design) {
-        const std::size_t count = faces_.faces().size();
-        const std::vector<std::array<mesh::Vector, 3>> normals(count);
-        const std::vector<std::uint8_t> materials(count);
-        const std::vector<std::array<mesh::Row<std::int64_t>, 3>> colours(design.format.layouts.at("attributes").count("faces[0].colours[0].r") ? count : 0);
-        records_ = packer_->records({normals.data(), materials.data(), isClear_.data(), colours.empty() ? nullptr : colours.data()});
-        idMasks_.resize(tree_.order.size());
-        for (std::size_t id = 0; id < idMasks_.size(); ++id) idMasks_[id] = masks_[faceOfId(static_cast<std::uint32_t>(id))];
+    void place(const Design& design) {
+        idMasks_.resize(places_.size());
+        for (std::size_t id = 0; id < places_.size(); ++id)
+            if (places_[id] >= 0) idMasks_[id] = masks_[faceOfId(static_cast<std::uint32_t>(id))];
         const packer::Sections& s = packer_->sections();
         image_ = {records_.data(), s.recordCount, design.format.recordBytes(), s.triangleBase, s.triangleRecords, s.attributeBase, {}, {}, idMasks_.data(), 0, 0, {}};
         const double mantissa = std::frexp(quantised_.scale, &image_.scale_exponent);
@@ -136,6 +140,7 @@ private:
     packer::QuantisedMesh quantised_;
     bvh::Bvh tree_;
     std::unique_ptr<packer::RecordPacker> packer_;
+    std::vector<std::int64_t> places_;
     std::vector<std::uint8_t> records_;
     colonnade_rays_image image_{};
     std::array<double, 3> corner_{};
