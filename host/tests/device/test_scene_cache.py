@@ -110,11 +110,11 @@ def test_the_port_moves_the_beats_of_the_lines_that_are_counted(tmp_path: Path, 
     """Whole beats: a line of 160 bytes moves 256 over a bus of 128."""
     design = design_with(*SHAPES[shape])
     bus = int(design.manifest.config["columnBvhMemory"]["cache"]["busBytes"])
-    image, registers = scene_of(design, 32, 24)
+    image, registers = scene_of(design, 10, 8)
     program = build_simulator(design)
     job, _ = write_job(tmp_path, design.manifest, image, [registers, registers])
     for banks in (0, 8):
-        options = Stalls(dram_banks=banks).options
+        options = Stalls(dram_latency=20, dram_banks=banks).options
         for frame in parse_output(run_program([str(program), *options, job.name], tmp_path, lambda share: None)):
             reads = frame.values["counters.dramReads"]
             assert frame.values["dram.beats"] * bus == reads * moved_bytes(design.manifest) > 0
