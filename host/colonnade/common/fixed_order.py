@@ -17,6 +17,9 @@ from colonnade.common.types import Floats
 
 Number = TypeVar("Number", np.float32, np.float64)
 
+#: Rows of fewer numbers are summed by `sum` from left to right, but slowly.
+_SHORT = 8
+
 
 def product(a: NDArray[Number], b: NDArray[Number]) -> NDArray[Number]:
     """The matrix product of ``a`` [..., n, k] and ``b`` [..., k, m], summed by ascending k.
@@ -44,7 +47,13 @@ def product(a: NDArray[Number], b: NDArray[Number]) -> NDArray[Number]:
 
 def dot(a: Floats, b: Floats) -> Floats:
     """Scalar products of vectors [..., n] along their last axis."""
-    return np.asarray((a * b).sum(axis=-1))
+    products = a * b
+    if not 0 < products.shape[-1] < _SHORT:
+        return np.asarray(products.sum(axis=-1))
+    total = products[..., 0]
+    for index in range(1, products.shape[-1]):
+        total = total + products[..., index]
+    return np.asarray(total)
 
 
 def solve(matrix: Floats, right_side: Floats) -> Floats:

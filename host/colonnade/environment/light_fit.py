@@ -84,18 +84,22 @@ def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS, walls: boo
     Raises:
         UserError: The room has no photo, or too few pixels are neither black nor saturated.
     """
-    found, cost = _fitted(environment, count, False)
-    if walls:
-        beside, beside_cost = _fitted(environment, count, True)
-        found = beside if beside_cost <= _GAIN * cost else found
-    return found
-
-
-def _fitted(environment: Environment, count: int, walls: bool) -> tuple[LightFit, float]:
-    """As `fit_lights`, with the walls whatever they explain; and the robust cost."""
     samples = samples_of(environment)
-    ambient = best = _refined(samples, RoomLights(np.full(3, 0.5)))
-    floor = _AMBIENT_SHARE * ambient.ambient
+    ambient = _refined(samples, RoomLights(np.full(3, 0.5)))
+    lights, surround, cost = _fitted(samples, ambient, count, False)
+    if walls:
+        beside, walls_beside, beside_cost = _fitted(samples, ambient, count, True)
+        if beside_cost <= _GAIN * cost:
+            lights, surround = beside, walls_beside
+    lights = _rounded(lights)
+    return LightFit(lights, relit_psnr(environment, lights), relit_psnr(environment, ambient), surround)
+
+
+def _fitted(
+    samples: Samples, ambient: RoomLights, count: int, walls: bool
+) -> tuple[RoomLights, Surround | None, float]:
+    """As `fit_lights` beside the best ambient light, with the walls whatever they explain; and the robust cost."""
+    best, floor = ambient, _AMBIENT_SHARE * ambient.ambient
     shining = Walls.around(samples) if walls else None
     if shining is not None:
         for _ in range(ALTERNATIONS):
@@ -114,8 +118,7 @@ def _fitted(environment: Environment, count: int, walls: bool) -> tuple[LightFit
     if shining is not None:
         surround = shining.surround(best.ambient)
         best = with_best_ambient(replace(samples, surround=np.ones_like(samples.surround)), best)
-    rounded = _rounded(best)
-    return LightFit(rounded, relit_psnr(environment, rounded), relit_psnr(environment, ambient), surround), cost
+    return best, surround, cost
 
 
 def relit(environment: Environment, lights: RoomLights) -> Floats:
