@@ -199,7 +199,7 @@ class Scene:
         overrides: Overrides = (),
         size: Size | None = None,
         relit: bool = False,
-        encoder: Encoder = "offline",
+        encoder: Encoder | None = None,
         progress: Progress = QUIET,
     ) -> DeviceScene:
         """Pack the scene for a design.
@@ -209,7 +209,7 @@ class Scene:
             overrides: Fields that replace some of it, ``key=value``.
             size: Width and height of frames, to refuse one that the room cannot have; None: no check.
             relit: Frames show the room under the scene's lights, not its photo.
-            encoder: Of the room's maps and of textures, ``offline`` or ``live``.
+            encoder: Of the room's maps and of textures, ``offline`` or ``live``; None: as `Encoder` says.
             progress: Shows the steps.
 
         Returns:

@@ -46,7 +46,7 @@ def inspect(
     overrides: tuple[str, ...],
     background: Path | None,
     encoding: str,
-    encoder: Encoder,
+    encoder: Encoder | None,
     output: Path | None,
     no_dists: bool,
     json_file: Path | None,
@@ -90,7 +90,7 @@ def _inspect_image(directory: Path, config: str | None, overrides: tuple[str, ..
 def _inspect_environment(
     background: Path,
     encoding: str,
-    encoder: Encoder,
+    encoder: Encoder | None,
     output: Path | None,
     with_dists: bool,
     json_file: Path | None,

@@ -11,7 +11,7 @@ import click
 
 from colonnade.common.errors import UserError
 from colonnade.common.terminal_text import plain
-from colonnade.maps.encoders import ENCODERS, Encoder
+from colonnade.maps.encoders import ENCODERS
 
 if TYPE_CHECKING:
     _NumberType = click.ParamType[float]
@@ -145,15 +145,13 @@ def background_option(command: Command) -> Command:
     )(command)
 
 
-def encoder_option(command: Command, default: Encoder | None = "offline", note: str = "") -> Command:
-    """Add ``--encoder``, with a note on its default."""
+def encoder_option(command: Command) -> Command:
+    """Add ``--encoder``."""
     return click.option(
         "--encoder",
         type=click.Choice(ENCODERS),
-        default=default,
-        show_default=True,
-        help="Encoder of a room's maps and of textures. offline: the best maps; live: the encoder of a moving camera,"
-        f" much faster.{note}",
+        help="Encoder of a room's maps and of textures. live: that of a moving camera; offline: maps that are a little"
+        " better, in 20 seconds.  [default: live, where it writes the layout of the maps]",
     )(command)
 
 

@@ -62,7 +62,7 @@ def pack(
     mesh: str | None,
     simplify: int | None,
     background: Path | None,
-    encoder: Encoder,
+    encoder: Encoder | None,
     output: Path,
     device_image: Path | None,
     maps_image: Path | None,

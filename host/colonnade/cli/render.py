@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -72,7 +71,7 @@ def _is_scene(word: str) -> bool:
 @mesh_option
 @simplify_option
 @background_option
-@partial(encoder_option, default=None, note="  [default: offline; with --sequence live]")
+@encoder_option
 @click.option("--relit", is_flag=True, help="Show the room shaded by the scene's lights instead of its photo.")
 @click.option(
     "--truth",
@@ -211,7 +210,7 @@ def render(
         background=background,
         sequence=sequence,
         keyframes=keyframes,
-        encoder=encoder or ("offline" if sequence is None else "live"),
+        encoder=encoder,
         hits=hits_file is not None,
         relit=relit,
         truth=truth,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import click
@@ -15,13 +14,19 @@ from colonnade.maps.encoders import Encoder
 @click.argument("scene", type=click.Path())
 @configuration_options
 @size_option("Frame size in pixels.  [default: 320x240]")
-@partial(encoder_option, default="live")
+@encoder_option
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port of the page.  [default: a free one]"
 )
 @click.option("--open/--no-open", "opens", default=True, show_default=True, help="Open the page in a browser.")
 def view(
-    scene: str, config: str, overrides: tuple[str, ...], size: str | None, encoder: Encoder, port: int, opens: bool
+    scene: str,
+    config: str,
+    overrides: tuple[str, ...],
+    size: str | None,
+    encoder: Encoder | None,
+    port: int,
+    opens: bool,
 ) -> None:
     """Show SCENE, a TOML file or the name of one, in a page at 127.0.0.1, rendered by the bit-exact model.
 

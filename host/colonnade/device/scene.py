@@ -75,7 +75,7 @@ class DeviceScene:
         *,
         size: Size | None = None,
         relit: bool = False,
-        encoder: Encoder = "offline",
+        encoder: Encoder | None = None,
         room: Environment | None = None,
         encode: Encode | None = None,
         progress: Progress = QUIET,

@@ -17,7 +17,7 @@ from colonnade.environment.model import Environment
 from colonnade.maps.encoders import Encoder
 from colonnade.maps.image import AttributeImage, Words, encode_environment
 from colonnade.maps.layout import AttributeLayout
-from colonnade.maps.live import encode_still
+from colonnade.maps.live import LiveEncoder, encode_still
 
 #: File name in a cache entry.
 FILE = "room.npz"
@@ -33,7 +33,7 @@ _INPUTS = {
 
 
 def encoded_environment(
-    environment: Environment, layout: AttributeLayout, folder: Path | None = None, encoder: Encoder = "offline"
+    environment: Environment, layout: AttributeLayout, folder: Path | None = None, encoder: Encoder | None = "offline"
 ) -> AttributeImage:
     """Encode an environment, or take it from the cache ``folder``, by default the project's.
 
@@ -42,7 +42,7 @@ def encoded_environment(
     Raises:
         UserError: The live encoder does not support the layout.
     """
-    if encoder == "live":
+    if encoder == "live" or (encoder is None and LiveEncoder.writes(layout)):
         return encode_still(environment, layout)
     rooms = folder or cache_directory(project_root()) / "rooms"
 

@@ -33,7 +33,7 @@ class EncodedEnvironment:
         return self.image.decoded_depth(PlaneProjection.of(self.environment, self.image.depth_unit))
 
     @staticmethod
-    def of(environment: Environment, manifest: Manifest, encoder: Encoder | Encode = "offline") -> EncodedEnvironment:
+    def of(environment: Environment, manifest: Manifest, encoder: Encoder | Encode | None = None) -> EncodedEnvironment:
         """Encode a room's maps for a design; a function is one that encodes a room.
 
         Raises:

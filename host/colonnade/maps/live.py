@@ -89,7 +89,7 @@ class LiveEncoder:
     """
 
     def __init__(self, layout: AttributeLayout, depth_noise: float = 0.0) -> None:
-        if (layout.encoding, layout.tile_size, layout.field_bits) != ("twoLevel", _TILE, _FIELD_BITS):
+        if not self.writes(layout):
             raise UserError(
                 f"the live encoder writes twoLevel maps with tiles of {_TILE} pixels, not {layout.encoding} maps with"
                 f" tiles of {layout.tile_size}: use the offline encoder"
@@ -98,6 +98,11 @@ class LiveEncoder:
         self._tolerance = max(EXACT_TOLERANCE, depth_noise * _NOISE_DISTANCE)
         names = ("width", "height", "palette_size", "heap_words", "planes", "plane_heap_words", "bounding_planes")
         self._encoder = _core.LiveRoom({name: getattr(layout, name) for name in names})
+
+    @staticmethod
+    def writes(layout: AttributeLayout) -> bool:
+        """Whether the encoder writes maps of a layout."""
+        return (layout.encoding, layout.tile_size, layout.field_bits) == ("twoLevel", _TILE, _FIELD_BITS)
 
     def encode(self, frame: LiveFrame) -> LiveMaps:
         """Encode the next frame.

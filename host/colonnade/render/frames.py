@@ -89,7 +89,7 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
         require_filter(scene, manifest, request.denoise)
     if request.truth is not None and request.backend != "reference":
         raise UserError(f"--truth is for --backend reference: the {request.backend} backend sees the room's maps only")
-    if request.encoder == "live" and request.backend == "reference":
+    if request.encoder is not None and request.backend == "reference":
         raise UserError("--encoder is for the rtl and the model backend: the reference sees the full maps")
     if request.hits and request.backend == "rtl":
         from colonnade.device.verilator import require_hits

@@ -169,7 +169,7 @@ def _light_cube(
     environment = room.environment
     image = None
     if room.scene.paths.gather and environment is not None:
-        image = encoded_environment(environment, _layout_for(environment, layout))
+        image = encoded_environment(environment, _layout_for(environment, layout), encoder=None)
     return scene_cube(room.scene, mesh.extent, environment, image, relit, room.unseen, room.second, is_noted)
 
 
@@ -195,7 +195,9 @@ def room_backdrop(
     bounding = None
     if room.scene.paths.gather == 0:
         with progress.step("finding the bounding planes"):
-            bounding = BoundingPlanes(environment, encoded_environment(environment, _layout_for(environment, layout)))
+            bounding = BoundingPlanes(
+                environment, encoded_environment(environment, _layout_for(environment, layout), encoder=None)
+            )
     if truth is not None:
         assert room.albedo is not None
         return true_room(truth, environment, room.albedo.albedo, 1.0 / room.scene.headroom, bounding)

@@ -40,7 +40,7 @@ class RenderRequest:
         relit: Whether the scene's lights shade the room even if it has a photo.
         truth: Mesh file of the room's real geometry, in its world space; for the reference.
         waveform: VCD file for the signals of one small RTL frame.
-        encoder: Of the room's maps and of textures.
+        encoder: Of the room's maps and of textures; None: as `Encoder` says.
         denoise: Filter the noise of gathered light, of the model and the RTL, as `FrameSize.denoise`.
 
     Raises:
@@ -63,7 +63,7 @@ class RenderRequest:
     relit: bool = False
     truth: Path | None = None
     waveform: Path | None = None
-    encoder: Encoder = "offline"
+    encoder: Encoder | None = None
     denoise: bool | Denoiser = False
 
     def __post_init__(self) -> None:

@@ -103,7 +103,7 @@ def sequence_scenes(
     *,
     every: int = 1,
     relit: bool = False,
-    encoder: Encoder = "live",
+    encoder: Encoder | None = None,
     progress: Progress = QUIET,
 ) -> Iterator[DeviceScene]:
     """A scene in each frame of a sequence: with its camera and photo, and the maps of the last keyframe.
@@ -142,7 +142,7 @@ def sequence_scenes(
 
 def _encoder_of(request: RenderRequest, sequence: Sequence, layout: AttributeLayout) -> Encode:
     """The encoder of a sequence's maps. The live encoder begins as with a still."""
-    if request.encoder == "offline":
+    if request.encoder == "offline" or (request.encoder is None and not LiveEncoder.writes(layout)):
         return lambda room: encoded_environment(room, layout)
     live = LiveEncoder(layout, sequence.content.depth_noise)
     rounds = iter([STILL_ROUNDS])

@@ -71,7 +71,7 @@ def pack(
     manifest: Manifest,
     materials: Sequence[MeshMaterial] | None = None,
     headroom: float = 1.0,
-    encoder: Encoder = "offline",
+    encoder: Encoder | None = None,
     children: int = 4,
 ) -> SceneImage:
     """Pack a mesh into a scene image for a design.

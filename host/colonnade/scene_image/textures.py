@@ -42,7 +42,7 @@ def layout_of_texture(formats: AttributeFormats) -> AttributeLayout:
 
 
 def with_textures(
-    image: SceneImage, atlas: Atlas | None, textures: int, manifest: Manifest, encoder: Encoder = "offline"
+    image: SceneImage, atlas: Atlas | None, textures: int, manifest: Manifest, encoder: Encoder | None = None
 ) -> SceneImage:
     """Add an atlas to a mesh's image, or zeros without one; the image itself for a design without textures.
 
@@ -57,7 +57,7 @@ def with_textures(
         return image
     layout = layout_of_texture(manifest.texture)
     sections = []
-    encode = encode_colours if encoder == "live" else _encoded
+    encode = _encoded if encoder == "offline" else encode_colours
     encoded = None if atlas is None else encode(atlas.colours, layout)
     for name, shape in manifest.memories.items():
         if not name.startswith("texture."):

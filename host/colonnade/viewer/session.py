@@ -112,7 +112,7 @@ class Session:
         config: str,
         overrides: Sequence[str] = (),
         size: tuple[int, int] = (320, 240),
-        encoder: Encoder = "live",
+        encoder: Encoder | None = None,
         progress: Progress = QUIET,
         is_own: bool = True,
     ) -> None:

@@ -15,11 +15,14 @@ from colonnade_lab.evaluation.studies.synthetic_attic import write_room
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from colonnade.api.scene import Scene
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment, EnvironmentCamera
+from colonnade.maps import cache
+from colonnade.maps.cache import encoded_environment
 from colonnade.maps.image import AttributeImage, memory_words
 from colonnade.maps.layout import POINTER_BITS, AttributeLayout
 from colonnade.maps.live import (
@@ -266,6 +269,14 @@ def test_other_layouts_and_sizes_are_refused() -> None:
             LiveEncoder(layout)
     with pytest.raises(UserError, match="the maps are 80x60 pixels, the encoder's layout is 160x120"):
         LiveEncoder(LAYOUT).encode(LiveFrame.of(box_room(width=80, height=60)))
+
+
+def test_it_encodes_unless_it_does_not_write_the_layout(monkeypatch: pytest.MonkeyPatch) -> None:
+    packed = [Scene.load("room").pack("small", **options).image for options in ({}, {"encoder": "live"})]
+    words = [[section.words for section in image.attributes] for image in packed]
+    assert all(np.array_equal(one, other) for one, other in zip(*words, strict=True))
+    monkeypatch.setattr(cache, "encode_environment", lambda *_: "offline")
+    assert encoded_environment(box_room(), replace(LAYOUT, tile_size=8), encoder=None) == "offline"
 
 
 def test_the_commands_take_the_encoder() -> None:
