@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -13,12 +13,12 @@ from colonnade.cli.options import (
     FILE,
     SCENE,
     background_option,
-    configuration_options,
     echo,
     encoder_option,
     finish,
     json_option,
     mesh_option,
+    render_options,
     require_outputs,
     require_suffix,
     simplify_option,
@@ -59,7 +59,7 @@ def _is_scene(word: str) -> bool:
 
 @click.command(cls=_Render, short_help="Render frames with the RTL, its model, or Embree.")
 @click.argument("scene", type=SCENE)
-@configuration_options
+@render_options
 @click.option(
     "--backend",
     type=click.Choice(["rtl", "model", "reference"]),
@@ -109,12 +109,12 @@ def _is_scene(word: str) -> bool:
 )
 @click.option(
     "--denoise",
-    type=click.Choice(["atrous", "oidn"]),
+    type=click.Choice(["atrous", "oidn", "none"]),
     is_flag=False,
     flag_value="atrous",
-    metavar="[atrous|oidn]",
+    metavar="[atrous|oidn|none]",
     help="Filter the noise of gathered light, as the key frame.denoise; not of the reference. Without a value by"
-    " atrous, a wavelet; oidn is Open Image Denoise.",
+    " atrous, a wavelet; oidn is Open Image Denoise; none shows the noise.",
 )
 @click.option(
     "--output", type=FILE, metavar="FILE", help="Write a PNG picture, or of several frames a .webp animation."
@@ -131,7 +131,7 @@ def _is_scene(word: str) -> bool:
 @json_option
 def render(
     scene: Path,
-    config: str,
+    config: str | None,
     overrides: tuple[str, ...],
     backend: Backend,
     size: str | None,
@@ -145,7 +145,7 @@ def render(
     sequence_file: Path | None,
     keyframes: int | None,
     samples: int | None,
-    denoise: Denoiser | None,
+    denoise: Denoiser | Literal["none"] | None,
     output: Path | None,
     video_file: Path | None,
     hits_file: Path | None,
@@ -215,7 +215,7 @@ def render(
         relit=relit,
         truth=truth,
         waveform=waveform,
-        denoise=denoise or False,
+        denoise=False if denoise == "none" else denoise,
     )
     results = render_frames(request, progress)
     is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"

@@ -64,6 +64,11 @@ class RoomFiles:
     albedo_encoding: str | None = None
 
 
+def has_photo(folder: Path) -> bool:
+    """Whether the room in a folder has a photo."""
+    return files.find(folder, PHOTOS) is not None
+
+
 def load_environment(path: Path, camera_height: float | None = None) -> Environment:
     """Load the room in the folder ``path``.
 

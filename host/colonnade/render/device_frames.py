@@ -46,7 +46,7 @@ def device_frames(
         prepared = DeviceScene.of(scene, manifest, mesh, size=size, relit=relit, encoder=encoder, progress=progress)
         if (line := coarse_line(prepared.image.header)) is not None:
             notes.tell(line)
-    prepared = within_budget(prepared, size, progress)
+    prepared, note = within_budget(prepared, size, note, progress)
     with progress.step("computing the registers"):
         poses = [prepared.scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
         frames = host_frames(request, prepared, size, poses, scene.motion.exposure(request.frames), progress)
@@ -75,12 +75,19 @@ def host_frames(
     first: int = 0,
 ) -> list[HostFrame]:
     """The frames of poses of a scene, numbered from ``first``; the first of all notes what the object gets."""
+    denoise = request.denoise or False
     look = None if request.relit else CameraLook.of(prepared.scene, prepared.photo, size)
     if look is not None and look.note is not None and first == 0:
         notes.tell(look.note)
     return [
         HostFrame(
-            prepared, size, tuple(prepared.passes(pose, exposure)), request.relit, request.denoise, look, first + number
+            prepared,
+            size,
+            tuple(prepared.passes(pose, exposure)),
+            request.relit,
+            denoise,
+            look,
+            first + number,
         )
         for number, pose in enumerate(poses)
     ]
@@ -91,6 +98,7 @@ def rendered(
 ) -> Iterator[RenderResult]:
     """Render frames that have one image, with the registers of each of their passes."""
     if request.backend == "rtl":
+        assert request.config is not None
         design = design_for(request.config, request.overrides, progress)
         found = rtl_passes(design, frames, registers, progress, request.waveform)
     else:

@@ -19,7 +19,8 @@ from colonnade.render.device_frames import device_frames
 from colonnade.render.host_frame import require_filter
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
-from colonnade.render.samples import with_requested_samples
+from colonnade.render.room_defaults import default_config, with_room_defaults
+from colonnade.render.samples import joined, with_requested_samples
 from colonnade.render.sequence_frames import check_sequence, sequence_frames
 from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
@@ -56,16 +57,24 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         scene.require_one_object("a mesh replaces that of a single object")
     if request.simplify is not None:
         scene = scene.with_simplified_mesh(request.simplify)
+    denoise = scene.frame.denoise if request.denoise is None else request.denoise
+    if request.backend == "reference" and not request.denoise:
+        if denoise:
+            notes.tell("frame.denoise is of the model and the RTL: frames of the reference are not filtered")
+        denoise = False
+    is_single = request.relit or request.hits or request.waveform is not None
+    scene = replace(scene, frame=replace(scene.frame, denoise=denoise), names_gather=scene.names_gather or is_single)
+    in_sequence = request.sequence is not None
+    config = request.config or default_config(scene, in_sequence)
+    manifest = manifest_for(config, request.overrides, progress).manifest
+    scene, defaults = with_room_defaults(scene, config, manifest, in_sequence)
     scene, note = with_requested_samples(scene, request)
     scene = exposed(scene)
-    if scene.frame.denoise and request.backend == "reference":
-        notes.tell("frame.denoise is of the model and the RTL: frames of the reference are not filtered")
-    elif not request.denoise:
-        request = replace(request, denoise=scene.frame.denoise)
+    request = replace(request, config=config, denoise=scene.frame.denoise or False)
     size = (scene.frame.width, scene.frame.height) if request.size is None else request.size
-    manifest = manifest_for(request.config, request.overrides, progress).manifest
     check_size(size, manifest)
     _check_frames(request, scene, size, manifest)
+    note = joined(defaults, note)
     if request.sequence is not None:
         return sequence_frames(request, request.sequence, scene, manifest, size, note, progress)
     frames = _reference_frames if request.backend == "reference" else device_frames

@@ -25,7 +25,7 @@ class RenderRequest:
 
     Attributes:
         scene: A scene, or its file, TOML.
-        config: Preset, path, or precision such as ``32b32s64d``.
+        config: Preset, path, or precision such as ``32b32s64d``; None: `default_config`.
         overrides: Changes to the configuration, ``key=value``.
         backend: ``rtl``: the generated Verilog in a simulator; ``model``: its bit-exact model; ``reference``: Embree.
         size: (width, height), pixels; None: that of the scene.
@@ -41,14 +41,14 @@ class RenderRequest:
         truth: Mesh file of the room's real geometry, in its world space; for the reference.
         waveform: VCD file for the signals of one small RTL frame.
         encoder: Of the room's maps and of textures; None: as `Encoder` says.
-        denoise: Filter the noise of gathered light, of the model and the RTL, as `FrameSize.denoise`.
+        denoise: Filter the noise of gathered light, of the model and the RTL, as `FrameSize.denoise`; None: as there.
 
     Raises:
         UserError: A value is none of these.
     """
 
     scene: Path | Scene
-    config: str
+    config: str | None
     overrides: Overrides = ()
     backend: Backend = "rtl"
     size: Size | None = None
@@ -64,7 +64,7 @@ class RenderRequest:
     truth: Path | None = None
     waveform: Path | None = None
     encoder: Encoder | None = None
-    denoise: bool | Denoiser = False
+    denoise: bool | Denoiser | None = None
 
     def __post_init__(self) -> None:
         check_types(vars(self), type(self))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import Progress
 from colonnade.device.scene import DeviceScene
@@ -34,6 +33,8 @@ def with_requested_samples(scene: Scene, request: RenderRequest) -> tuple[Scene,
     """
     named = request.samples or scene.frame.samples
     single = request.relit or request.hits or request.waveform is not None
+    if scene.frame.budget is not None and scene.paths.gather == 0:
+        raise UserError("frame.budget is of frames that gather light, this one does not: give frame.samples")
     if named is None and not single and scene.paths.gather:
         if request.backend == "reference":
             return scene.with_samples(MAX_BUDGET_SAMPLES), _REFERENCE
@@ -51,17 +52,20 @@ def with_requested_samples(scene: Scene, request: RenderRequest) -> tuple[Scene,
     return scene.with_samples(named or 1), None
 
 
-def within_budget(prepared: DeviceScene, size: tuple[int, int], progress: Progress) -> DeviceScene:
-    """The scene with as many samples as its budget allows; itself if it has a number.
+def within_budget(
+    prepared: DeviceScene, size: tuple[int, int], note: str | None, progress: Progress
+) -> tuple[DeviceScene, str | None]:
+    """The scene with as many samples as its budget allows, itself if it has a number; and the line that names defaults.
 
     Args:
         prepared: A scene from `with_requested_samples`, ready for the device.
         size: Width and height of frames, pixels.
+        note: The beginning of the line.
         progress: Shows the pass that is measured.
     """
     scene = prepared.scene
     if scene.frame.samples is not None:
-        return prepared
+        return prepared, note
     with progress.step("estimating the time of a pass"):
         registers = prepared.registers(size, composited=True)
 
@@ -72,5 +76,10 @@ def within_budget(prepared: DeviceScene, size: tuple[int, int], progress: Progre
         budget = Budget.of(prepared.manifest, prepared.image, registers, seconds, passes)
     hidden = f"; {scene.blurs[0]} shows its middle" if scene.blurs else ""
     hidden += "; coats and highlights do not show" if passes(2) > 2 else ""
-    notes.tell(budget.note + (hidden if budget.samples == 1 else ""))
-    return replace(prepared, scene=scene.with_samples(budget.samples))
+    note = joined(note, budget.note + (hidden if budget.samples == 1 else ""))
+    return replace(prepared, scene=scene.with_samples(budget.samples)), note
+
+
+def joined(*lines: str | None) -> str | None:
+    """The lines that are not None, as one."""
+    return "; ".join(line for line in lines if line is not None) or None

@@ -75,7 +75,7 @@ def sequence_frames(
                 prepared = next(scenes)
                 if samples is not None:
                     prepared = replace(prepared, scene=prepared.scene.with_samples(samples))
-            prepared = within_budget(prepared, size, progress)
+            prepared, note = within_budget(prepared, size, note, progress)
             samples = prepared.scene.frame.samples
             with progress.step(f"{title}: computing the registers"):
                 frames = host_frames(request, prepared, size, [prepared.scene], 0.0, progress, number)

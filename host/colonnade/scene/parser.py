@@ -121,7 +121,8 @@ def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
 
     Several objects do not turn unless the file says so.
     """
-    tables = dict(data) | {"names_light": "light" in data or "ambient" in data}
+    named = {"names_light": "light" in data or "ambient" in data, "names_gather": "gather" in _table(data, "paths")}
+    tables = dict(data) | named
     if isinstance(light := tables.get("light"), list) and light:
         tables |= {"light": light[0], "more_lights": light[1:]}
     if isinstance(tables.get("object"), list):
@@ -185,7 +186,7 @@ def _check_combinations(data: Mapping[str, Any], in_room: bool) -> None:
     frame = data.get("frame", {})
     if "budget" in frame and "samples" in frame:
         raise ValueError("frame.budget chooses the samples: leave out frame.samples or frame.budget")
-    if "budget" in frame and not _table(data, "paths").get("gather", 0):
+    if "budget" in frame and not _table(data, "paths").get("gather", in_room):
         raise ValueError("frame.budget is of frames that gather light: set paths.gather = 1, or give frame.samples")
     if "motion" in data and not data["motion"]:
         raise ValueError("[motion] moves nothing: give turn, stand_at, translate, light or camera")
@@ -257,9 +258,11 @@ def _node(table: str) -> dict[str, Any]:
 
 
 def _plain(node: dict[str, Any]) -> dict[str, Any]:
-    """Resolve a schema's reference, and its alternative to null."""
+    """Resolve a schema's reference, and an only alternative to null."""
     if "anyOf" in node:
-        (node,) = (option for option in node["anyOf"] if option.get("type") != "null")
+        node, *others = (option for option in node["anyOf"] if option.get("type") != "null")
+        if others:
+            return {"anyOf": [node, *others]}
     if "$ref" in node:
         found: dict[str, Any] = _JSON_SCHEMA["$defs"][node["$ref"].rpartition("/")[2]]
         return found
@@ -268,6 +271,8 @@ def _plain(node: dict[str, Any]) -> dict[str, Any]:
 
 def _expectation(node: Mapping[str, Any]) -> str:
     """Describe the valid values of a key."""
+    if "anyOf" in node:
+        return " or ".join(map(_expectation, node["anyOf"]))
     kind = node["type"]
     if kind == "array":
         numbers = node["prefixItems"]

@@ -24,6 +24,7 @@ from colonnade.device.scene import DeviceScene
 from colonnade.maps.encoders import Encoder
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.host_frame import HostFrame, require_filter
+from colonnade.render.room_defaults import default_config, with_room_defaults
 from colonnade.scene.model import Camera, Scene
 from colonnade.scene.model.values import WorldVector
 from colonnade.scene.parser import load_scene
@@ -95,7 +96,7 @@ class Session:
 
     Args:
         file: The scene file.
-        config: The design, as in `ModelDevice`.
+        config: The design, as in `ModelDevice`; None: `default_config` of the scene.
         overrides: Fields that replace some of it.
         size: Width and height, pixels.
         encoder: Of a room's maps and of textures.
@@ -109,7 +110,7 @@ class Session:
     def __init__(
         self,
         file: Path,
-        config: str,
+        config: str | None,
         overrides: Sequence[str] = (),
         size: tuple[int, int] = (320, 240),
         encoder: Encoder | None = None,
@@ -119,9 +120,10 @@ class Session:
         self.file, self.size = file, size
         self._is_own = is_own
         self._encoder = encoder
-        self._manifest = manifest_for(config, overrides, progress).manifest
+        self._config = config or default_config(load_scene(file))
+        self._manifest = manifest_for(self._config, overrides, progress).manifest
         check_size(size, self._manifest)
-        self._device = ModelDevice(config, overrides)
+        self._device = ModelDevice(self._config, overrides)
         self._rendering = threading.Lock()
         self._loading = threading.RLock()
         self._changed = threading.Condition()
@@ -182,7 +184,7 @@ class Session:
             scene = scene.with_camera(_moved(scene.scene.camera, camera))
         scene = replace(scene, scene=scene.scene.with_samples(samples))
         passes = scene.passes(exposure=scene.scene.motion.exposure(1))
-        denoise = scene.scene.frame.denoise if samples > 1 else False
+        denoise = (scene.scene.frame.denoise or False) if samples > 1 else False
         look = self._look if scene.photo is not None else None
         frame = HostFrame(scene, self.size, tuple(passes), denoise=denoise, look=look)
         return _Picture(camera, self._state["version"], frame, passes, frame.no_passes())
@@ -264,7 +266,10 @@ class Session:
         lines: list[str] = []
         with ledger.opened() as files, notes.opened(lines.append):
             self._lookups = files.lookups  # up to an error, if there is one
-            description = exposed(load_scene(self.file))
+            description, line = with_room_defaults(load_scene(self.file), self._config, self._manifest)
+            if line is not None:
+                notes.tell(line)
+            description = exposed(description)
             samples = description.frame.samples or 1
             description = description.with_samples(samples if samples > 1 else STILL_SAMPLES)
             scene = DeviceScene.of(description, self._manifest, size=self.size, encoder=self._encoder)

@@ -73,6 +73,7 @@ def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
         ('[mesh]\nname = "a"\n[light]\ncolour = [1, 1]', "light.colour must be three numbers"),
         ('[mesh]\nname = "a"\n[light]\ncolour = [1, 1, -1]', "light.colour must be three numbers from 0"),
         ('[mesh]\nname = "a"\n[light]\nshadows = 1', "light.shadows must be true or false"),
+        ('[mesh]\nname = "a"\n[frame]\ndenoise = 3', "frame.denoise must be true or false or one of atrous, oidn"),
         ('[mesh]\nname = "a"\n[light]\nposition = [0, 0, 1]\noffset = [0, 0, 1]', "not both"),
         ('[mesh]\nname = "a"\n[material]\nalbedo = [2, 0, 0]', "material.albedo must be three numbers from 0 to 1"),
         ('[mesh]\nname = "a"\n[camera]\nfov = 180', "camera.fov must be a number from 1 to 150"),

@@ -139,11 +139,11 @@ class FrameSize:
         samples: None: `colonnade.render.samples` chooses.
         budget: Seconds of the device at 200 MHz for a frame that gathers light and names no samples. None: a thirtieth.
         denoise: The noise of gathered light is filtered, in frames of the model and the RTL: by the host's own filter,
-            ``atrous`` or true, or by Open Image Denoise, ``oidn``.
+            ``atrous`` or true, or by Open Image Denoise, ``oidn``. None: `colonnade.render.room_defaults` chooses.
     """
 
     width: Annotated[int, Strict(), Ge(1)] = 640
     height: Annotated[int, Strict(), Ge(1)] = 480
     samples: Annotated[int, Strict(), Interval(ge=1, le=MAX_SAMPLES)] | None = None
     budget: Annotated[Float, Interval(ge=1e-6, le=1e3)] | None = None
-    denoise: StrictBool | Denoiser = False
+    denoise: StrictBool | Denoiser | None = None

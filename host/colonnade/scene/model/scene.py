@@ -29,9 +29,10 @@ class Scene:
     over the frame. ``standing_point`` is the world point on which the object stands, if that is known from another view
     of its room. ``frame_camera`` is that of a sequence's frame with the maps of another frame: a lens for their size,
     and a pose. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
-    fitted to its photo. ``fits_lights`` tells that these have an area, a guess that no mirror shows. ``headroom``
-    scales all lights up and diffuse albedos of the object down (`colonnade.environment.photo_colours`). ``exposure`` is
-    the device's number for the radiance 1.0, as a factor.
+    fitted to its photo. ``names_gather`` tells whether it says how many rays a path gathers. ``fits_lights`` tells that
+    these have an area, a guess that no mirror shows. ``headroom`` scales all lights up and diffuse albedos of the
+    object down (`colonnade.environment.photo_colours`). ``exposure`` is the device's number for the radiance 1.0, as a
+    factor.
     """
 
     mesh: MeshSource
@@ -52,6 +53,7 @@ class Scene:
     standing_point: Vector | None = None
     frame_camera: Annotated[InstanceOf[EnvironmentCamera], WithJsonSchema({})] | None = None
     names_light: bool = True
+    names_gather: bool = True
     fits_lights: bool = False
     headroom: float = 1.0
     exposure: float = 1.0

@@ -1,0 +1,46 @@
+"""What a frame in the photo of a room has where the scene leaves it open: gathered light, and the filter of noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from colonnade.design.manifest import Manifest
+from colonnade.environment.load import has_photo
+from colonnade.scene.model import Scene
+
+#: The preset of frames that gather light, and that of others.
+GATHERING_PRESET, PRESET = "textured", "small"
+
+
+def default_config(scene: Scene, in_sequence: bool = False) -> str:
+    """The preset of a frame for which none is named."""
+    return GATHERING_PRESET if scene.paths.gather or _is_open(scene, in_sequence) else PRESET
+
+
+def with_room_defaults(
+    scene: Scene, config: str, manifest: Manifest, in_sequence: bool = False
+) -> tuple[Scene, str | None]:
+    """The scene with gathered light and its filter, and a line that names them; itself where it does not leave it open.
+
+    Args:
+        scene: The scene.
+        config: The name of the design.
+        manifest: The design's manifest; a design that gathers no light changes nothing.
+        in_sequence: Its room is a view of a sequence, which has photos.
+    """
+    if not (manifest.gathers and _is_open(scene, in_sequence)):
+        return scene, None
+    denoise = scene.frame.denoise
+    if denoise is None and manifest.config["frame"]["hits"]:
+        denoise = True
+    gathering = replace(scene, paths=replace(scene.paths, gather=1), frame=replace(scene.frame, denoise=denoise))
+    filtered = " and filters its noise" if denoise else ""
+    return gathering, f"{config} gathers the room's light{filtered}, unless paths.gather = 0 or --denoise none"
+
+
+def _is_open(scene: Scene, in_sequence: bool) -> bool:
+    """Whether the scene is in the photo of a room, which it reflects, and does not say whether it gathers light."""
+    room = scene.background.room
+    if scene.names_gather or room is None or scene.background.colours == "albedo":
+        return False
+    return in_sequence or has_photo(room)
