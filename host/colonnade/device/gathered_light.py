@@ -67,7 +67,7 @@ def scene_cube(
     pose, distance = object_pose(scene, extent, room), np.inf
     point, lights = pose.to_world(extent.centre), lights_of(scene, extent, room)
     if room is not None and image is not None:
-        light = room_light(room, image, lights, point, not relit, unseen, second)
+        light = room_light(room, image, lights.brighter(scene.headroom), point, not relit, unseen, second)
         if is_noted and not isinstance(unseen, Panorama):
             others = "walls under the scene's lights" if unseen is None else "walls that were fitted"
             more = "background.panorama" + (" or background.second_view" if second is None else "")

@@ -25,7 +25,7 @@ from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next
 from colonnade.scene.model import Camera, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.passes import frame_passes
-from colonnade.scene.view import View, make_view, place, with_overrides
+from colonnade.scene.view import View, make_view, place, rendered_materials
 from colonnade.scene_image.device_image import device_image, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.environment import with_environment
@@ -105,10 +105,11 @@ class DeviceScene:
             if size is not None:
                 check_camera(scene, room, size)
         photo = view_photo(scene, room, size)
-        lit = lit_room(scene, room, mesh.extent, int(manifest.config["frame"]["lights"]), relit, progress)
+        lights, surfaces = int(manifest.config["frame"]["lights"]), rendered_materials(mesh.materials, scene)
+        lit = lit_room(scene, room, mesh.extent, lights, relit, progress, surfaces)
         maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest, encode or encoder)
         mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
-        materials = with_overrides(mesh.materials, lit.scene.material)
+        materials = rendered_materials(mesh.materials, lit.scene)
         image = pack(mesh, manifest, materials, lit.scene.headroom, encoder, scene.mesh.children)
         if maps is not None:
             image = with_environment(image, maps, manifest)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +41,11 @@ class RoomLights:
 
     ambient: Floats
     lights: tuple[RoomLight, ...] = ()
+
+    def brighter(self, factor: float) -> RoomLights:
+        """The lights with intensities times a factor."""
+        lights = tuple(replace(light, colour=light.colour * factor) for light in self.lights)
+        return RoomLights(self.ambient * factor, lights)
 
 
 def irradiance(points: Floats, normals: Floats, lights: RoomLights) -> Floats:

@@ -34,7 +34,7 @@ from colonnade.scene.lit_room import LitRoom, lit_room, scene_room, view_photo
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.passes import frame_passes
-from colonnade.scene.view import make_view, with_overrides
+from colonnade.scene.view import make_view, rendered_materials, with_overrides
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
@@ -136,7 +136,8 @@ def traced_frames(
     look = CameraLook.of(poses[0], photo, size)
     if look is not None and look.note is not None:
         notes.tell(look.note)
-    room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress)
+    surfaces = rendered_materials(mesh.materials, poses[0])
+    room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress, surfaces)
     backdrop = room_backdrop(room, layout, options.truth, progress)
     for number, pose in enumerate(poses):
         begun = time.perf_counter()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
 from colonnade.environment.shadow_strength import shadow_strength
 from colonnade.maps.encoded import layout_of
+from colonnade.mesh.materials.materials import MeshMaterial, is_lit
 from colonnade.scene.model import Colour
 from colonnade.scene.object_pose import object_pose, with_free_placement
 from colonnade.scene.panorama_light import panorama_light
@@ -109,6 +111,7 @@ def lit_room(
     max_lights: int,
     relit: bool,
     progress: Progress = QUIET,
+    materials: Sequence[MeshMaterial] = (),
 ) -> LitRoom:
     """Find the lights of a scene that names none, and choose the colours that rays see.
 
@@ -121,6 +124,7 @@ def lit_room(
         max_lights: Lights of the design.
         relit: The frame shows the room under the scene's lights, not its photo.
         progress: Shows the fit.
+        materials: Of the mesh, with the scene's overrides, as they are rendered.
 
     Raises:
         UserError: The object cannot stand in the room, or `background.colours` asks for a photo that it lacks;
@@ -149,8 +153,9 @@ def lit_room(
         )
     if scene.paths.gather and around is not None and room.photo is not None and not relit:
         scene = replace(scene, ambient=Colour(as_vector(_OPEN * np.array(scene.ambient.colour))))
-    # Gathered light has the photo's own scale
-    colours = _photo_colours(scene, room, extent, relit, 1.0 if scene.paths.gather else None)
+    # Gathered light has the photo's own scale, so a headroom is for what marched rays alone show
+    is_shown = scene.paths.gather == 0 or not any(map(is_lit, materials))
+    colours = _photo_colours(scene, room, extent, relit, None if is_shown else 1.0)
     strength = photo_strength(scene, room, extent, relit)
     if colours is None:
         return LitRoom(scene, room, room, unseen=unseen, strength=strength, second=second)

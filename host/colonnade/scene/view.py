@@ -13,7 +13,7 @@ import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
-from colonnade.mesh.materials.materials import MARKS, PLAIN, MeshMaterial, as_rendered, in_layer, in_pass
+from colonnade.mesh.materials.materials import MARKS, PLAIN, MeshMaterial, as_rendered, in_layer, in_pass, is_lit
 from colonnade.mesh.materials.mesh import Extent
 from colonnade.scene.cameras import (
     WorldCamera,
@@ -193,11 +193,8 @@ def make_view(
         ),
         materials=_dimmed(
             tuple(
-                in_layer(
-                    as_rendered(in_pass(one, scene.sample.coverage_of(entry)), scene.paths.gather > 0),
-                    scene.sample.layer,
-                )
-                for entry, one in enumerate(with_overrides(materials, scene.material))
+                in_layer(in_pass(one, scene.sample.coverage_of(entry)), scene.sample.layer)
+                for entry, one in enumerate(rendered_materials(materials, scene))
             ),
             scene.headroom,
             scene.exposure,
@@ -234,6 +231,11 @@ def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tu
     )
 
 
+def rendered_materials(materials: Sequence[MeshMaterial], scene: Scene) -> tuple[MeshMaterial, ...]:
+    """A mesh's materials with the values that the scene gives, as the device shows them (`as_rendered`)."""
+    return tuple(as_rendered(one, scene.paths.gather > 0) for one in with_overrides(materials, scene.material))
+
+
 def world_positions(scene: Scene, extent: Extent, environment: Environment | None) -> list[Floats]:
     """World positions of a scene's lights, float64 [3] each; of a light with a radius its middle."""
     start = object_pose(scene.at(0.0), extent, environment)
@@ -264,19 +266,19 @@ def _placed(scene: Scene, index: int, axes: Floats, centre: Floats, edge: float)
         away, on_disc = position - centre, scene.sample.light(index)
         if scene.sample.layer in MARKS and not scene.fits_lights:
             of_mark = MARKS[scene.sample.layer] * light.radius**2 / (light.falloff**2 if light.falloff else away @ away)
-            colour = (colour - of_mark).clip(min=0.0)
+            colour = (colour - scene.headroom * of_mark).clip(min=0.0)
         right, up, _ = camera_axes(away if away.any() else axes[2], _UP)
         position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)
     return PlacedLight(position, colour, light.falloff)
 
 
 def _dimmed(materials: tuple[MeshMaterial, ...], headroom: float, exposure: float) -> tuple[MeshMaterial, ...]:
-    """The materials under lights that are brighter by ``headroom``: diffuse surfaces keep their colour."""
+    """The materials under lights that are brighter by ``headroom``: surfaces that these light keep their colour."""
 
     def dimmed(material: MeshMaterial) -> MeshMaterial:
         red, green, blue = (value * exposure for value in material.emission)
         material = replace(material, emission=(red, green, blue))
-        if material.kind != "diffuse" or headroom == 1.0:
+        if not is_lit(material) or headroom == 1.0:
             return material
         red, green, blue = (value / headroom for value in material.albedo)
         return replace(material, albedo=(red, green, blue))

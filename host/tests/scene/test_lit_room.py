@@ -154,6 +154,19 @@ def test_the_headroom_of_the_lights_does_not_change_the_object(folder: Path) -> 
     assert np.abs(encode_srgb(photo.image).astype(int) - encode_srgb(albedo.image)).max() <= 3
 
 
+@pytest.mark.parametrize("kind", ["mirror", "glass"])
+def test_a_photo_that_is_brighter_than_its_lights_is_as_bright_in_what_gathers(folder: Path, kind: str) -> None:
+    """Under lights that explain the photo, and under a fifth of them."""
+    light = {}
+    for ambient in (1.0, 0.2):
+        text = f"light.colour = [0.0, 0.0, 0.0]\nambient.colour = {[ambient] * 3}\npaths.gather = 1\n"
+        (folder / "scene.toml").write_text(MIRROR.replace("mirror", kind) + text)
+        request = RenderRequest(folder / "scene.toml", "textured", SMALL_MAPS, "model", SIZE, samples=4)
+        result = render(replace(request, encoder="live"))
+        light[ambient] = result.image[result.object_mask].mean()
+    assert light[0.2] == pytest.approx(light[1.0], rel=0.04)
+
+
 def test_corners_of_faces_are_packed_darker_by_the_headroom(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "scene.toml").write_text(MIRROR.replace("mirror", "diffuse") + LAMP)
     packed: list[object] = []

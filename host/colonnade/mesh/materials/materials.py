@@ -157,6 +157,12 @@ def in_pass(material: MeshMaterial, threshold: float | None) -> MeshMaterial:
     return replace(CLEAR, albedo=(red, green, blue))
 
 
+def is_lit(material: MeshMaterial) -> bool:
+    """Whether lights and light cube light a material, as it is rendered; others show what their rays find in a room."""
+    is_rough = material.kind == "mirror" and material.roughness >= SHARP_ROUGHNESS
+    return is_rough or material.kind in ("diffuse", ROUGH_METAL)
+
+
 def microfacet_albedo(roughness: float) -> float:
     """The share of light that white GGX microfacets reflect at once, the mean over a sphere: a fit, within 0.01."""
     alpha = roughness**2
