@@ -42,10 +42,9 @@ def check_sequence(request: RenderRequest, sequence: Sequence, scene: Scene) -> 
         raise UserError("--sequence and --background both replace the scene's background: give one of them")
     if request.frames > len(sequence):
         raise UserError(f"{sequence.path} has {len(sequence)} frames, fewer than the {request.frames} of --frames")
-    if scene.places_camera and not scene.motion.camera:
-        raise UserError("each frame of a sequence has its own camera: leave out [camera]")
-    if not scene.motion.is_closed or scene.motion.shutter > 0:
-        raise UserError("the camera moves in a sequence, the object and lights stay in the world: leave out [motion]")
+    if scene.places_camera:
+        key = "[[motion.camera]]" if scene.motion.camera else "[camera]"
+        raise UserError(f"each frame of a sequence has its own camera: leave out {key}")
 
 
 def sequence_frames(
@@ -57,17 +56,21 @@ def sequence_frames(
     note: str | None,
     progress: Progress,
 ) -> Iterator[RenderResult]:
-    """The frames of a sequence: each with its camera and photo, and with its own maps or those of the last keyframe."""
+    """The frames of a sequence: each with its camera and photo, and with its own maps or those of the last keyframe.
+
+    Object and light move as in other frames of a motion, but the object does not turn unless the scene says so.
+    """
     every = request.keyframes or sequence.content.maps.every
     encode = _encoder_of(request, sequence, layout_of(manifest))
     relit, encoder = request.relit, request.encoder
     mesh = None if isinstance(request.mesh, str) else request.mesh
+    scene = replace(scene, motion=replace(scene.motion, turn=scene.motion.turn or 0.0))
     scenes = sequence_scenes(
         sequence, scene, manifest, size, encode, mesh, every=every, relit=relit, encoder=encoder,
         progress=progress,
     )  # fmt: skip
-    samples = scene.frame.samples
-    for number in range(request.frames):
+    samples, motion = scene.frame.samples, scene.motion
+    for number, share in enumerate(motion.frame_progress(request.frames)):
         title = f"frame {number + 1} of {request.frames}"
         begun = time.perf_counter()
         try:
@@ -78,7 +81,9 @@ def sequence_frames(
             prepared, note = within_budget(prepared, size, note, progress)
             samples = prepared.scene.frame.samples
             with progress.step(f"{title}: computing the registers"):
-                frames = host_frames(request, prepared, size, [prepared.scene], 0.0, progress, number)
+                pose = prepared.scene.at(share)
+                lit = prepared if motion.is_still else prepared.lit_at(pose, relit)
+                frames = host_frames(request, lit, size, [pose], motion.exposure(request.frames), progress, number)
                 registers = [frames[0].registers(one) for one in frames[0].passes]
             for line in (note, _BETWEEN if every > 1 else None):
                 if line is not None:
@@ -87,9 +92,9 @@ def sequence_frames(
             (result,) = rendered(request, frames, [registers], progress.of(title))
         except UserError as error:
             raise UserError(f"frame {number} of {sequence.path}: {error}") from None
-        report = replace(
-            result.report, time=sequence.content.frame[number].time, seconds=seconds | dict(result.report.seconds)
-        )
+        time_of = sequence.content.frame[number].time
+        seconds |= dict(result.report.seconds)
+        report = replace(result.report, time=time_of, share=None if motion.is_still else share, seconds=seconds)
         yield replace(result, report=report)
 
 
@@ -110,7 +115,7 @@ def sequence_scenes(
 
     Args:
         sequence: The frames.
-        scene: The scene; object and lights stay where the first frame has them.
+        scene: The scene; object and lights stay where the first frame has them, or move from there.
         manifest: The design's manifest.
         size: Width and height of frames, pixels.
         encode: Encodes the maps of each keyframe, in their order.

@@ -19,10 +19,9 @@ from colonnade.environment.shadow_strength import shadow_strength
 from colonnade.maps.encoded import layout_of
 from colonnade.mesh.materials.materials import MeshMaterial, is_lit
 from colonnade.scene.model import Colour
-from colonnade.scene.object_pose import object_pose, with_free_placement
+from colonnade.scene.object_pose import object_pose, standing_points, with_free_placement
 from colonnade.scene.panorama_light import panorama_light
 from colonnade.scene.room_lights import as_vector, lights_of, with_lights
-from colonnade.scene.standing import surface_point
 from colonnade.scene.view import world_positions
 
 if TYPE_CHECKING:
@@ -192,9 +191,8 @@ def fixed_in_world(scene: Scene, extent: Extent, room: Environment) -> Scene:
         room: The view from which they are placed.
     """
     first, *more = world_positions(scene, extent, room)
-    if scene.standing_point is None and scene.placement is not None and scene.placement.stand_at is not None:
-        point = surface_point(scene.placement.stand_at, room, "object.stand_at")
-        scene = replace(scene, standing_point=as_vector(point))
+    if scene.standing_points is None and scene.placement is not None and scene.placement.stand_at is not None:
+        scene = replace(scene, standing_points=standing_points(scene, room))
     lights = tuple(
         replace(light, position=as_vector(place)) for light, place in zip(scene.more_lights, more, strict=True)
     )

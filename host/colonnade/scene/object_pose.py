@@ -69,14 +69,22 @@ def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -
         return Pose(turned, scale, np.array(moved) + fixed_order.product(scale * (rotation - turned), extent.centre))
     if motion.translate is not None:
         raise UserError("motion.translate is for an object that does not stand in a room: give motion.stand_at")
-    if scene.standing_point is not None:
-        point = np.array(scene.standing_point)
-    else:
-        assert placement.stand_at is not None
-        point = surface_point(placement.stand_at, environment, "object.stand_at")
-    if motion.stand_at is not None:
-        point = (1.0 - progress) * point + progress * surface_point(motion.stand_at, environment, "motion.stand_at")
+    start, end = scene.standing_points or standing_points(scene, environment)
+    point = np.array(start if motion.stand_at is None else interpolate(start, end, progress))
     return standing_pose(placement, rotation, extent, point, motion.degrees * progress)
+
+
+def standing_points(scene: Scene, environment: Environment) -> tuple[Vector, Vector]:
+    """The world points on which an object with a place stands at the ends of the motion, as a room's view shows them.
+
+    Raises:
+        UserError: A pixel is outside the room's maps, or not on a surface that bears an object.
+    """
+    assert scene.placement is not None and scene.placement.stand_at is not None
+    start, end = scene.placement.stand_at, scene.motion.stand_at
+    first = surface_point(start, environment, "object.stand_at").tolist()
+    last = first if end is None else surface_point(end, environment, "motion.stand_at").tolist()
+    return interpolate(first, last, 0.0), interpolate(first, last, 1.0)
 
 
 def with_free_placement(scene: Scene, extent: Extent, environment: Environment | None) -> Scene:

@@ -147,6 +147,31 @@ def test_the_object_stays_where_it_is_while_the_camera_moves(folder: Path, frame
     assert [frame.report.time for frame in frames] == pytest.approx([0.0, 0.08, 0.16])
 
 
+@pytest.mark.parametrize("keyframes", [1, 2])
+def test_an_object_and_a_light_move_while_the_camera_does(
+    folder: Path, keyframes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between two pixels of the first frame, in the world."""
+    text = SCENE.format(colours="albedo").replace("offset = [1.0, 1.5, 0.5]", "position = [0.5, 2.2, 0.5]")
+    way = "object.stand_at = [36, 66]\nmotion = {stand_at = [64, 64], light = [-0.5, 2.2, 0.5], turn = 90.0}\n"
+    (folder / "moved.toml").write_text(text + way)
+    seen: list[HostFrame] = []
+    rendered = module.rendered
+    monkeypatch.setattr(module, "rendered", lambda *given: seen.extend(given[1]) or rendered(*given))
+    found = list(render_frames(replace(request_of(folder, "moved"), keyframes=keyframes)))
+    sequence, extent = load_sequence(folder / "sequence.toml"), load_mesh("teapot:3").extent
+    scene, room = load_scene(folder / "moved.toml", folder), sequence.room(0)
+    for share, camera, frame, result in zip((0.0, 0.5, 1.0), sequence.cameras, seen, found, strict=True):
+        pose = object_pose(scene.at(share), extent, room)
+        centre = (pose.to_world(extent.centre) - camera.to_world[:, 3]) @ camera.to_world[:, :3]
+        expected = centre[:2] / centre[2] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
+        rows, columns = np.nonzero(result.object_mask)
+        np.testing.assert_allclose((columns.mean() + 0.5, rows.mean() + 0.5), expected, atol=2.0)
+        (light,) = frame.prepared.view(SIZE, frame.passes[0]).lights
+        np.testing.assert_allclose(pose.to_world(light.position), (0.5 - share, 2.2, 0.5), atol=1e-9)
+        assert result.report.share == share
+
+
 def test_colours_of_the_photo_keep_the_light_of_the_first_frame(folder: Path) -> None:
     """The object's registers do not change: only the room does."""
     manifest = manifest_for("small", ROOM).manifest
@@ -297,12 +322,11 @@ def test_what_does_not_go_with_a_sequence_is_one_line(
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ("[motion]\nturn = 30.0\n", "leave out [motion]"),
         ("[camera]\nposition = [0.0, 1.0, 2.0]\n", "each frame of a sequence has its own camera: leave out [camera]"),
-        ("[[motion.camera]]\nposition = [0.0, 1.0, 2.0]\n", "leave out [motion]"),
+        ("[[motion.camera]]\nposition = [0.0, 1.0, 2.0]\n", "leave out [[motion.camera]]"),
     ],
 )
-def test_object_and_camera_of_a_scene_stay_in_a_sequence(folder: Path, table: str, message: str) -> None:
+def test_a_scene_has_no_camera_in_a_sequence(folder: Path, table: str, message: str) -> None:
     (folder / "moving.toml").write_text((folder / "albedo.toml").read_text() + table)
     moved = CliRunner().invoke(
         cli, ["render", str(folder / "moving.toml"), "--backend", "model", "--sequence", str(folder / "sequence.toml")]

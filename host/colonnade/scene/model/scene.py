@@ -26,13 +26,13 @@ class Scene:
     With a room, the camera is the room's unless the scene places it, and the world is the room's world, in metres.
 
     Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass
-    over the frame. ``standing_point`` is the world point on which the object stands, if that is known from another view
-    of its room. ``frame_camera`` is that of a sequence's frame with the maps of another frame: a lens for their size,
-    and a pose. ``names_light`` tells whether the scene names lights or ambient light; if not, those of a room are
-    fitted to its photo. ``names_gather`` tells whether it says how many rays a path gathers. ``fits_lights`` tells that
-    these have an area, a guess that no mirror shows. ``headroom`` scales all lights up and diffuse albedos of the
-    object down (`colonnade.environment.photo_colours`). ``exposure`` is the device's number for the radiance 1.0, as a
-    factor.
+    over the frame. ``standing_points`` are the world points on which the object stands at the ends of the motion, if
+    they are known from another view of its room. ``frame_camera`` is that of a sequence's frame with the maps of
+    another frame: a lens for their size, and a pose. ``names_light`` tells whether the scene names lights or ambient
+    light; if not, those of a room are fitted to its photo. ``names_gather`` tells whether it says how many rays a path
+    gathers. ``fits_lights`` tells that these have an area, a guess that no mirror shows. ``headroom`` scales all lights
+    up and diffuse albedos of the object down (`colonnade.environment.photo_colours`). ``exposure`` is the device's
+    number for the radiance 1.0, as a factor.
     """
 
     mesh: MeshSource
@@ -50,7 +50,7 @@ class Scene:
     motion: Motion = field(default_factory=Motion)
     motion_progress: float = 0.0
     sample: Sample = CENTRE
-    standing_point: Vector | None = None
+    standing_points: tuple[Vector, Vector] | None = None
     frame_camera: Annotated[InstanceOf[EnvironmentCamera], WithJsonSchema({})] | None = None
     names_light: bool = True
     names_gather: bool = True
