@@ -172,9 +172,9 @@ class DeviceScene:
         moved = replace(self, scene=replace(self.scene, camera=camera, frame_camera=None))
         return moved if self.environment is None else replace(moved, photo=None, strength=None)
 
-    def passes(self, scene: Scene | None = None, exposure: float = 0.0) -> list[Scene]:
+    def passes(self, scene: Scene | None = None, exposure: float = 0.0, number: int = 0) -> list[Scene]:
         """The passes of a frame (`frame_passes`) at another moment of `scene`; None: of `scene` itself."""
-        return frame_passes(scene or self.scene, self.image.header.materials, exposure)
+        return frame_passes(scene or self.scene, self.image.header.materials, exposure, number)
 
     @property
     def environment(self) -> Environment | None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from colonnade.common.accumulation import LUMINANCE
 from colonnade.common.types import Floats
@@ -20,13 +21,15 @@ from colonnade.common.vectors import unit_vectors
 _SPLINE = (3 / 8, 1 / 4, 1 / 16)
 #: Filters one after the other; each doubles the step.
 _LEVELS = 4
-#: How many standard deviations, and how much of the distance off the plane, two pixels may differ.
-_COLOUR, _PLANE = 3.0, 0.1
+#: How many standard deviations two pixels may differ.
+_COLOUR = 3.0
+#: How much of their distance two pixels may lie off a plane: of depth alone, and where shading normals are known.
+_PLANE, _SHADED_PLANE = 0.1, 0.4
 #: Power of the cosine between two normals.
-_NORMAL = 32
+_NORMAL = 8
 #: Side of the square over which a single sample's variance is estimated, pixels.
 _WINDOW = 7
-#: A single sample is a bright point if it is so many standard deviations above its neighbours; levels that spread it.
+#: A single sample is a point if it is so many standard deviations off its neighbours; levels that spread it.
 _POINT, _POINT_LEVELS = 1.5, 3
 
 
@@ -35,19 +38,27 @@ class Guide:
     """The surface that pixels show.
 
     Attributes:
-        position, normals: In one space, float64 [height, width, 3]; undefined outside `mask`.
+        position, planes, normals: In one space, float64 [height, width, 3]; 0 outside `mask`. ``planes`` are the
+            normals of the surface, ``normals`` those of its shading.
         mask: The pixel shows the object, bool [height, width].
+        plane: How much of their distance two pixels may lie off a plane.
     """
 
     position: Floats
+    planes: Floats
     normals: Floats
     mask: NDArray[np.bool_]
+    plane: float = _PLANE
 
     @staticmethod
-    def of(position: Floats, mask: NDArray[np.bool_]) -> Guide:
-        """Normals from positions: across the nearer neighbour on each axis."""
+    def of(position: Floats, mask: NDArray[np.bool_], normals: Floats | None = None) -> Guide:
+        """With planes from positions: across the nearer neighbour on each axis. Without ``normals`` they are these."""
+        position = np.where(mask[..., None], position, 0.0)
         along = [_difference(position, mask, axis) for axis in (0, 1)]
-        return Guide(position, unit_vectors(np.cross(along[0], along[1])), mask)
+        planes = unit_vectors(np.cross(along[0], along[1]))
+        if normals is None:
+            return Guide(position, planes, planes, mask)
+        return Guide(position, planes, np.where(mask[..., None], normals, 0.0), mask, _SHADED_PLANE)
 
 
 def _difference(position: Floats, mask: NDArray[np.bool_], axis: int) -> Floats:
@@ -62,53 +73,81 @@ def _difference(position: Floats, mask: NDArray[np.bool_], axis: int) -> Floats:
     return np.where(np.isfinite(np.minimum(ahead, behind))[..., None], found, 0.0)
 
 
-def denoised(colour: Floats, variance: Floats | None, guide: Guide) -> Floats:
+@dataclass(frozen=True)
+class Noisy:
+    """Colours with noise.
+
+    Attributes:
+        colour: Linear, float64 [height, width, 3].
+        variance: Of their luminance, float64 [height, width].
+    """
+
+    colour: Floats
+    variance: Floats
+
+    @staticmethod
+    def of(colour: Floats, variance: Floats | None, guide: Guide) -> Noisy:
+        """Means of samples; without a variance, single samples: points are spread, and neighbours have the variance."""
+        if variance is not None:
+            return Noisy(colour, variance)
+        usual = _without_points(colour, guide.mask)
+        box = _Box.of(guide.mask)
+        points, surface = box.cut(colour - usual), box.guide(guide)
+        for level in range(_POINT_LEVELS):
+            points, _ = _filtered(points, None, surface, 1 << level)
+        _, deviation = moments((usual @ LUMINANCE)[..., None], guide.mask)
+        return Noisy(usual + box.put(points, np.zeros_like(colour)), deviation[..., 0] ** 2)
+
+
+def denoised(noisy: Noisy, guide: Guide) -> Floats:
     """Filter the colours of the object's pixels.
 
     Args:
-        colour: Linear, float64 [height, width, 3].
-        variance: Of the luminance of each pixel's mean, float64 [height, width]; None: estimated from the neighbours.
+        noisy: The colours.
         guide: What the pixels show.
 
     Returns:
         float64 [height, width, 3]; pixels outside the mask are unchanged.
     """
-    rows, columns = np.flatnonzero(guide.mask.any(axis=1)), np.flatnonzero(guide.mask.any(axis=0))
-    if len(rows) == 0:
-        return colour
-    # The bounding box of the object, with a border that is outside the mask
-    border = 2 << (_LEVELS - 1)
-    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    pad = ((border, border), (border, border))
-
-    def boxed(values: Floats) -> Floats:
-        return np.pad(values[box], (*pad, *((0, 0),) * (values.ndim - 2)))
-
-    mask = np.pad(guide.mask[box], pad)
-    position, normals = boxed(np.where(guide.mask[..., None], guide.position, 0.0)), boxed(guide.normals)
-    now = boxed(np.where(guide.mask[..., None], colour, 0.0))
-    points = np.zeros_like(now)
-    if variance is None:
-        now, points = _without_points(now, mask)
-        for level in range(_POINT_LEVELS):
-            points, _ = _filtered(points, None, position, normals, mask, 1 << level)
-        spread = _local_variance(now @ LUMINANCE, mask)
-    else:
-        spread = boxed(variance) * mask
+    box = _Box.of(guide.mask)
+    colour, spread, surface = box.cut(noisy.colour), box.cut(noisy.variance), box.guide(guide)
     for level in range(_LEVELS):
-        now, spread = _filtered(now, spread, position, normals, mask, 1 << level)
-    now += points
-    result = colour.copy()
-    inner = np.s_[border:-border, border:-border]
-    result[box] = np.where(guide.mask[box][..., None], now[inner], colour[box])
-    return result
+        colour, spread = _filtered(colour, spread, surface, 1 << level)
+    return np.where(guide.mask[..., None], box.put(colour, noisy.colour), noisy.colour)
 
 
-def _filtered(
-    colour: Floats, variance: Floats | None, position: Floats, normals: Floats, mask: NDArray[np.bool_], step: int
-) -> tuple[Floats, Floats]:
+@dataclass(frozen=True)
+class _Box:
+    """The rectangle of an object, around which a filter sees a border outside the mask."""
+
+    rows: slice
+    columns: slice
+
+    _BORDER = 2 << (_LEVELS - 1)
+
+    @staticmethod
+    def of(mask: NDArray[np.bool_]) -> _Box:
+        rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+        if len(rows) == 0:
+            return _Box(slice(0, 0), slice(0, 0))
+        return _Box(slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
+
+    def cut(self, values: NDArray[Any]) -> NDArray[Any]:
+        return np.pad(values[self.rows, self.columns], ((self._BORDER,) * 2,) * 2 + ((0, 0),) * (values.ndim - 2))
+
+    def put(self, values: Floats, into: Floats) -> Floats:
+        found = into.copy()
+        found[self.rows, self.columns] = values[self._BORDER : -self._BORDER, self._BORDER : -self._BORDER]
+        return found
+
+    def guide(self, guide: Guide) -> Guide:
+        position, planes, normals = map(self.cut, (guide.position, guide.planes, guide.normals))
+        return Guide(position, planes, normals, self.cut(guide.mask), guide.plane)
+
+
+def _filtered(colour: Floats, variance: Floats | None, guide: Guide, step: int) -> tuple[Floats, Floats]:
     """One level of the wavelet: colours and the variance of their luminance. Without one, luminance does not count."""
-    light = colour @ LUMINANCE
+    light, mask = colour @ LUMINANCE, guide.mask
     deviation = np.inf if variance is None else _COLOUR * np.sqrt(_blurred(variance, mask)) + 1e-4
     sums, weights, squares = np.zeros_like(colour), np.zeros_like(light), np.zeros_like(light)
     for down in range(-2, 3):
@@ -118,10 +157,10 @@ def _filtered(
             def there(values: NDArray[Any], shift: tuple[int, int] = shift) -> NDArray[Any]:
                 return np.roll(values, shift, axis=(0, 1))
 
-            way = there(position) - position
-            off = np.abs(np.einsum("yxi,yxi->yx", way, normals))
-            far = _PLANE * np.linalg.norm(way, axis=2) + 1e-9
-            facing = np.einsum("yxi,yxi->yx", there(normals), normals).clip(min=0.0) ** _NORMAL
+            way = there(guide.position) - guide.position
+            off = np.abs(np.einsum("yxi,yxi->yx", way, guide.planes))
+            far = guide.plane * np.linalg.norm(way, axis=2) + 1e-9
+            facing = np.einsum("yxi,yxi->yx", there(guide.normals), guide.normals).clip(min=0.0) ** _NORMAL
             weight = _SPLINE[abs(down)] * _SPLINE[abs(across)] * there(mask) * mask
             if down or across:
                 weight = weight * facing * np.exp(-off / far - np.abs(there(light) - light) / deviation)
@@ -144,32 +183,31 @@ def _blurred(values: Floats, mask: NDArray[np.bool_]) -> Floats:
     return np.asarray(total / np.maximum(count, 1))
 
 
-def _without_points(colour: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Colours no brighter than their neighbours are, and what is brighter."""
+def _without_points(colour: Floats, mask: NDArray[np.bool_]) -> Floats:
+    """Colours no further from their neighbours than these are from each other."""
     light = colour @ LUMINANCE
-    count, first, second = _moments(light, mask)
-    others = np.maximum(count - mask, 1)
-    mean = (first - mask * light) / others
-    deviation = np.sqrt(((second - mask * light**2) / others - mean**2).clip(min=0.0))
-    usual = colour * np.minimum(1.0, (mean + _POINT * deviation) / np.maximum(light, 1e-9))[..., None]
-    return usual, colour - usual
+    count, first, second = _sums(light[..., None], mask)
+    others = np.maximum(count - 1, 1)
+    mean = (first[..., 0] - light) / others
+    deviation = np.sqrt(((second[..., 0] - light**2) / others - mean**2).clip(min=0.0))
+    usual = light.clip(mean - _POINT * deviation, mean + _POINT * deviation)
+    darker, lighter = colour * (usual / np.maximum(light, 1e-9))[..., None], colour + (usual - light)[..., None]
+    return np.where(mask[..., None], np.where((usual > light)[..., None], lighter, darker), colour)
 
 
-def _local_variance(light: Floats, mask: NDArray[np.bool_]) -> Floats:
-    """The variance of the luminance among the neighbours that show the object."""
-    count, first, second = _moments(light, mask)
-    safe = np.maximum(count, 1)
-    return np.asarray((second / safe - (first / safe) ** 2).clip(min=0.0) * mask)
+def moments(values: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Mean and standard deviation of values among the neighbours that show the object, float64 [height, width, k]."""
+    count, first, second = _sums(values, mask)
+    mean = first / np.maximum(count, 1)[..., None]
+    return mean, np.sqrt((second / np.maximum(count, 1)[..., None] - mean**2).clip(min=0.0))
 
 
-def _moments(light: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
-    """Number, sum and sum of squares of the luminance of the pixels around each that show the object."""
-    half = _WINDOW // 2
-    count, first, second = (np.zeros_like(light) for _ in range(3))
-    for down in range(-half, half + 1):
-        for across in range(-half, half + 1):
-            shows, value = np.roll(mask, (down, across), (0, 1)), np.roll(light, (down, across), (0, 1))
-            count += shows
-            first += shows * value
-            second += shows * value**2
-    return count, first, second
+def _sums(values: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
+    """Number, sums and sums of squares of values [height, width, k] around each pixel, where they show the object."""
+    shown = mask[..., None] * values
+
+    def around(of: Floats) -> Floats:
+        size = (_WINDOW, _WINDOW) + (1,) * (of.ndim - 2)
+        return np.asarray(ndimage.uniform_filter(of, size, mode="constant") * _WINDOW**2)
+
+    return around(mask.astype(np.float64)), around(shown), around(shown**2)

@@ -16,6 +16,7 @@ from colonnade.device.device import require_no_errors
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.camera_look import CameraLook
+from colonnade.render.history import History
 from colonnade.render.host_frame import HostFrame
 from colonnade.render.passes import Registers, model_passes, rtl_passes
 from colonnade.render.report import frame_report
@@ -49,7 +50,8 @@ def device_frames(
     prepared, note = within_budget(prepared, size, note, progress)
     with progress.step("computing the registers"):
         poses = [prepared.scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
-        frames = host_frames(request, prepared, size, poses, scene.motion.exposure(request.frames), progress)
+        exposure, history = scene.motion.exposure(request.frames), History.of(request.denoise, request.frames)
+        frames = host_frames(request, prepared, size, poses, exposure, progress, history=history)
         registers = [[frame.registers(one) for one in frame.passes] for frame in frames]
         if note is not None:
             notes.tell(note)
@@ -73,24 +75,18 @@ def host_frames(
     exposure: float,
     progress: Progress,
     first: int = 0,
+    history: History | None = None,
 ) -> list[HostFrame]:
     """The frames of poses of a scene, numbered from ``first``; the first of all notes what the object gets."""
     denoise = request.denoise or False
     look = None if request.relit else CameraLook.of(prepared.scene, prepared.photo, size)
     if look is not None and look.note is not None and first == 0:
         notes.tell(look.note)
-    return [
-        HostFrame(
-            prepared,
-            size,
-            tuple(prepared.passes(pose, exposure)),
-            request.relit,
-            denoise,
-            look,
-            first + number,
-        )
-        for number, pose in enumerate(poses)
-    ]
+    found = []
+    for number, pose in enumerate(poses, first):
+        passes = prepared.passes(pose, exposure, number if history is not None else 0)
+        found.append(HostFrame(prepared, size, tuple(passes), request.relit, denoise, look, number, history))
+    return found
 
 
 def rendered(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,14 @@ from colonnade.render.report import FrameReport
 from colonnade.render.result import RenderResult
 from colonnade.render.sky import sky_of
 from colonnade.scene.model import Denoiser, Scene
+from colonnade.scene.samples import CENTRE
+
+if TYPE_CHECKING:
+    from colonnade.render.denoise import Guide
+    from colonnade.render.history import Camera, History
+
+#: The least albedo by which the light of a single sample is known.
+_DARK = 0.02
 
 
 @dataclass(frozen=True)
@@ -36,6 +45,8 @@ class HostFrame:
         denoise: The noise of gathered light is filtered, as `FrameSize.denoise`.
         look: What the object gets of the photo's camera.
         number: From 0; each frame has its own grain.
+        history: The frames before, whose noise the filter averages; None: there are none. `pixels` or `result` are
+            called once, frame by frame.
     """
 
     prepared: DeviceScene
@@ -45,6 +56,7 @@ class HostFrame:
     denoise: bool | Denoiser = False
     look: CameraLook | None = None
     number: int = 0
+    history: History | None = None
 
     def registers(self, one: Scene) -> dict[str, int]:
         """The registers of a pass.
@@ -95,35 +107,55 @@ class HostFrame:
         if not self.denoise:
             return passes.whole
         from colonnade.render import oidn
-        from colonnade.render.denoise import Guide, denoised
+        from colonnade.render.denoise import Guide
+        from colonnade.render.history import Camera
+        from colonnade.render.hit_points import HitPoints
 
         depth, position = self._hits(passes.frame)
-        shows_object = ~np.isnan(depth)
+        shows_object, mesh = ~np.isnan(depth), self.prepared.mesh
+        points = None if mesh is None else HitPoints.of(mesh, self._faces(passes.frame), position)
+        normals = None if points is None or self.prepared.scene.material.flat else points.normals()
+        camera = Camera.of(self.prepared.view(self.size, self.passes[0]))
 
-        def filtered(layer: FramePasses) -> Accumulation:
+        def filtered(name: str, layer: FramePasses) -> Accumulation:
             sums, count = layer.sums, layer.sums.coverage[..., None]
             colours = sums.objects / np.maximum(count, 1) / sums.white
-            guide = Guide.of(position, shows_object & (count[..., 0] > 0))
+            guide = Guide.of(position, shows_object & (count[..., 0] > 0), normals)
+            # Other layers are not textured
+            albedo = np.ones_like(position) if points is None or layer is not passes else points.albedo()
             if self.denoise == "oidn":
-                # Other layers are not textured
-                mesh, white = self.prepared.mesh if layer is passes else None, np.ones_like(position)
-                albedo = white if mesh is None else oidn.albedo_of(mesh, self._faces(passes.frame), position)
                 # Beside a photo without noise it would leave the pattern of several samples
                 around = self.image(sums) if passes.sums.samples == 1 else np.zeros_like(position)
                 found = oidn.filtered(colours, around, guide, albedo)
             else:
-                found = denoised(colours, layer.object_variance(), guide)
+                # Of several samples the first one's albedo is not the mean
+                light = albedo.clip(min=_DARK) if sums.samples == 1 else np.ones_like(albedo)
+                variance = layer.object_variance()
+                found = light * self._without_noise(name, colours / light, variance, guide, camera)
             return replace(sums, objects=found * sums.white * count)
 
-        sums = self._with_smooth_shadow(filtered(passes), passes)
-        return sums.with_layers(filtered(layer) for layer in passes.layers.values())
+        sums = self._with_smooth_shadow(filtered("surface", passes), passes)
+        return sums.with_layers(filtered(*layer) for layer in passes.layers.items())
+
+    def _without_noise(
+        self, name: str, colours: Floats, variance: Floats | None, guide: Guide, camera: Camera, is_still: bool = True
+    ) -> Floats:
+        """Colours without noise: blended with those of the frames before, and filtered; of what is still or moves."""
+        from colonnade.render.denoise import Noisy, denoised
+        from colonnade.render.history import FRAMES, MOVING_FRAMES
+
+        noisy = Noisy.of(colours, variance, guide)
+        if self.history is not None:
+            noisy = self.history.blended(name, noisy, guide, camera, FRAMES if is_still else MOVING_FRAMES)
+        return denoised(noisy, guide)
 
     def _with_smooth_shadow(self, sums: Accumulation, passes: FramePasses) -> Accumulation:
         """Sums with filtered shadow ratios, where the maps tell what the pixels of the room show."""
         prepared = self.prepared
         if self.relit or prepared.scene.places_camera or prepared.environment is None or prepared.photo is None:
             return sums
-        from colonnade.render.denoise import Guide, denoised
+        from colonnade.render.denoise import Guide
+        from colonnade.render.history import Camera
 
         assert sums.ratio is not None
         count = (sums.samples - sums.coverage)[..., None]
@@ -135,11 +167,19 @@ class HostFrame:
         mask = np.zeros_like(shows_room)
         around = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         mask[around] = shows_room[around]
-        points = prepared.environment.points()
+        room = prepared.environment
+        points = room.points() @ room.camera_to_world[:, :3].T + room.camera_to_world[:, 3]
         y, x = (
             (2 * np.arange(size) + 1) * of // (2 * size) for size, of in zip(mask.shape, points.shape, strict=False)
         )
-        found = denoised(ratio, passes.ratio_variance(), Guide.of(points[y[:, None], x], mask))
+        view = prepared.view(self.size, replace(self.passes[0], sample=CENTRE))
+        assert view.view_to_mesh is not None
+        to_view = np.linalg.inv(np.vstack([view.view_to_mesh, (0.0, 0.0, 0.0, 1.0)]))
+        camera = Camera.of(view).moved(room.camera_to_world @ to_view)
+        guide = Guide.of(points[y[:, None], x], mask)
+        found = self._without_noise(
+            "room", ratio, passes.ratio_variance(), guide, camera, prepared.scene.motion.is_still
+        )
         return replace(sums, ratio=np.rint(found * count * sums.unshadowed).astype(sums.ratio.dtype))
 
     def _faces(self, frame: Frame) -> npt.NDArray[np.int64]:

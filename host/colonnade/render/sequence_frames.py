@@ -22,6 +22,7 @@ from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import STILL_ROUNDS, LiveEncoder, LiveFrame
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.device_frames import host_frames, rendered
+from colonnade.render.history import History
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.render.samples import within_budget
@@ -70,6 +71,7 @@ def sequence_frames(
         progress=progress,
     )  # fmt: skip
     samples, motion = scene.frame.samples, scene.motion
+    history = History.of(request.denoise, request.frames)
     for number, share in enumerate(motion.frame_progress(request.frames)):
         title = f"frame {number + 1} of {request.frames}"
         begun = time.perf_counter()
@@ -83,7 +85,9 @@ def sequence_frames(
             with progress.step(f"{title}: computing the registers"):
                 pose = prepared.scene.at(share)
                 lit = prepared if motion.is_still else prepared.lit_at(pose, relit)
-                frames = host_frames(request, lit, size, [pose], motion.exposure(request.frames), progress, number)
+                frames = host_frames(
+                    request, lit, size, [pose], motion.exposure(request.frames), progress, number, history
+                )
                 registers = [frames[0].registers(one) for one in frames[0].passes]
             for line in (note, _BETWEEN if every > 1 else None):
                 if line is not None:
@@ -93,8 +97,12 @@ def sequence_frames(
         except UserError as error:
             raise UserError(f"frame {number} of {sequence.path}: {error}") from None
         time_of = sequence.content.frame[number].time
-        seconds |= dict(result.report.seconds)
-        report = replace(result.report, time=time_of, share=None if motion.is_still else share, seconds=seconds)
+        report = replace(
+            result.report,
+            time=time_of,
+            share=None if motion.is_still else share,
+            seconds=seconds | dict(result.report.seconds),
+        )
         yield replace(result, report=report)
 
 

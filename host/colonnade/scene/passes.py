@@ -11,7 +11,7 @@ from dataclasses import replace
 from colonnade.common import notes
 from colonnade.mesh.materials.materials import BLACK, LAYERS, Layer, MeshMaterial, as_rendered, in_layer
 from colonnade.scene.model import Scene
-from colonnade.scene.samples import samples_of_frame
+from colonnade.scene.samples import PERIOD, samples_of_frame
 
 #: The device's number for the colour 1.0 where light is gathered, as a factor: a ray may bring more than the mean.
 _GATHER_EXPOSURE = 0.5
@@ -50,18 +50,21 @@ def layers_of(materials: Iterable[MeshMaterial]) -> list[Layer]:
     return [layer for layer in LAYERS[1:] if any(in_layer(one, layer) != BLACK for one in rendered)]
 
 
-def frame_passes(scene: Scene, materials: Iterable[MeshMaterial] = (), exposure: float = 0.0) -> list[Scene]:
+def frame_passes(
+    scene: Scene, materials: Iterable[MeshMaterial] = (), exposure: float = 0.0, number: int = 0
+) -> list[Scene]:
     """The scene at each pass of its frame: at its samples, and one of each other layer after every fourth.
 
     Args:
         scene: At the beginning of the frame.
         materials: Of the mesh, with the scene's overrides: they have the layers.
         exposure: Progress of the motion while the shutter is open (`Motion.exposure`).
+        number: Of the frame, if its colours are blended with those before (`samples_of_frame`).
     """
-    count, lights = scene.frame.samples or 1, len(scene.lights)
-    passes = list(samples_of_frame(count, lights))
+    count, lights, number = scene.frame.samples or 1, len(scene.lights), number % PERIOD
+    passes = list(samples_of_frame(count, lights, number))
     if count > 1 and may_have_layers(scene):
-        layers, few = layers_of(materials), samples_of_frame(max(1, count // _SAMPLES_OF_A_LAYER), lights)
+        layers, few = layers_of(materials), samples_of_frame(max(1, count // _SAMPLES_OF_A_LAYER), lights, number)
         for number, sample in reversed(list(enumerate(few, 1))):
             after = -(-number * count // len(few))
             passes[after:after] = [replace(sample, layer=layer) for layer in layers]

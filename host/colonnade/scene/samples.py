@@ -49,6 +49,8 @@ class Sample:
         return self.lights[index] if index < len(self.lights) else (0.0, 0.0)
 
 
+#: Frames until their sample points of gathered rays repeat.
+PERIOD = 16
 #: Samples of a pixel in the photo of a room, unless the scene or the command names others.
 PHOTO_SAMPLES = 4
 #: Steps between numbers that are spread evenly: the golden ratio.
@@ -57,17 +59,21 @@ _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 CENTRE = Sample()
 
 
-@lru_cache(maxsize=16)
-def samples_of_frame(count: int, lights: int) -> tuple[Sample, ...]:
-    """The samples of a frame; they are the same for every frame with as many passes.
+@lru_cache(maxsize=2 * PERIOD)
+def samples_of_frame(count: int, lights: int, number: int = 0) -> tuple[Sample, ...]:
+    """The samples of a frame; but for the gathered rays they are the same for every frame with as many passes.
 
     Args:
         count: Number of samples, from 1.
         lights: Number of lights.
+        number: Of the frame, below `PERIOD`: so many frames together have well-distributed points of gathered rays.
     """
     dimensions = 3 + lights + MAX_GATHERED
     pixel, time, lens, *others = (square_points(count, dimension) for dimension in range(dimensions))
-    on_lights, gather = others[:lights], [(points * 256).astype(np.int64) for points in others[lights:]]
+    on_lights, gather = (
+        others[:lights],
+        [(256 * _shifted(points, number, ray)).astype(np.int64) for ray, points in enumerate(others[lights:])],
+    )
     coverage = square_points(count, dimensions)[:, 0] if count > 1 else None
     return tuple(
         Sample(
@@ -99,6 +105,12 @@ def square_points(count: int, dimension: int) -> Floats:
     sequence = np.array([_sobol(index) for index in range(count)], dtype=np.int64)
     ranks = np.argsort(np.argsort(sequence, axis=0), axis=0)
     return np.asarray((ranks[order] + 0.5) / count, dtype=np.float64)
+
+
+def _shifted(points: Floats, number: int, dimension: int) -> Floats:
+    """Points of the unit square, each moved within its interval as a frame's number has it; those of 0 stay."""
+    places = square_points(PERIOD, dimension)
+    return np.asarray((points + (places[number] - places[0]) / len(points)) % 1.0)
 
 
 def _sobol(index: int) -> tuple[int, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import ModuleType
@@ -10,14 +11,17 @@ from types import ModuleType
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image
 from textured_files import gltf
 
 from colonnade.cli.main import cli
 from colonnade.common import extras
-from colonnade.common.image_io import read_picture
+from colonnade.common.image_io import encode_srgb, read_picture
 from colonnade.mesh.load import load_mesh
-from colonnade.render.denoise import Guide, denoised
-from colonnade.render.oidn import albedo_of
+from colonnade.render.denoise import Guide, Noisy, denoised
+from colonnade.render.frames import render
+from colonnade.render.hit_points import HitPoints
+from colonnade.render.request import RenderRequest
 
 HEIGHT, WIDTH = 40, 60
 
@@ -34,21 +38,25 @@ def noisy(mean: np.ndarray, deviation: float, seed: int = 1) -> np.ndarray:
     return np.asarray(mean + np.random.default_rng(seed).normal(size=mean.shape) * deviation)
 
 
+def filtered(colour: np.ndarray, variance: np.ndarray | None, guide: Guide) -> np.ndarray:
+    return denoised(Noisy.of(colour, variance, guide), guide)
+
+
 @pytest.mark.parametrize("is_known", [True, False])
 def test_noise_on_a_plane_is_averaged(is_known: bool) -> None:
     guide, flat = wall(), np.full((HEIGHT, WIDTH, 3), 0.5)
     variance = np.full((HEIGHT, WIDTH), 0.1**2 * (0.2126**2 + 0.7152**2 + 0.0722**2)) if is_known else None
-    found = denoised(noisy(flat, 0.1), variance, guide)
+    found = filtered(noisy(flat, 0.1), variance, guide)
     assert (found[guide.mask] - 0.5).std() < 0.1 / 4
     assert abs(found[guide.mask].mean() - 0.5) < 0.01
 
 
 def test_what_shows_no_object_stays() -> None:
     guide, picture = wall(), noisy(np.full((HEIGHT, WIDTH, 3), 0.5), 0.1)
-    found = denoised(picture, None, guide)
+    found = filtered(picture, None, guide)
     np.testing.assert_array_equal(found[~guide.mask], picture[~guide.mask])
-    nothing = Guide(guide.position, guide.normals, np.zeros_like(guide.mask))
-    np.testing.assert_array_equal(denoised(picture, None, nothing), picture)
+    nothing = replace(guide, mask=np.zeros_like(guide.mask))
+    np.testing.assert_array_equal(filtered(picture, None, nothing), picture)
 
 
 def test_surfaces_at_a_distance_and_at_an_angle_do_not_mix() -> None:
@@ -59,16 +67,33 @@ def test_surfaces_at_a_distance_and_at_an_angle_do_not_mix() -> None:
     edge = wall(np.where(left, 5.0, 5.0 + 0.2 * (x - WIDTH // 2)))
     for guide in (step, edge):
         # So large a variance that colours do not matter
-        found = denoised(noisy(colour, 0.05), np.full((HEIGHT, WIDTH), 1e6), guide)
+        found = filtered(noisy(colour, 0.05), np.full((HEIGHT, WIDTH), 1e6), guide)
         # The pixel of the ridge lies on both sides
         inner = guide.mask & (np.abs(x - WIDTH // 2) > 1)
         assert np.abs(found - colour)[inner].max() < 0.12
 
 
+def test_normals_of_shading_guide_a_detailed_surface() -> None:
+    """Its depth is as rough as a scan's, its normals are not."""
+    rough = wall(noisy(np.full((HEIGHT, WIDTH), 5.0), 0.03, seed=2))
+    smooth = Guide.of(rough.position, rough.mask, np.broadcast_to((0.0, 0.0, -1.0), rough.position.shape))
+    flat = np.full((HEIGHT, WIDTH, 3), 0.5)
+    left = [(filtered(noisy(flat, 0.1), None, guide)[guide.mask] - 0.5).std() for guide in (smooth, rough)]
+    assert left[0] < 0.1 / 4 and left[0] < 0.7 * left[1]
+
+
+@pytest.mark.parametrize("value", [0.0, 2.0])
+def test_no_point_stays_of_a_single_sample_that_is_far_off(value: float) -> None:
+    guide, picture = wall(), noisy(np.full((HEIGHT, WIDTH, 3), 1.0), 0.01)
+    picture[20, 30] = value
+    found = filtered(picture, None, guide)
+    assert np.abs(found - 1)[guide.mask].max() < 0.12, "the point is spread, whether light or dark"
+
+
 def test_a_pattern_without_noise_stays() -> None:
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     pattern = ((x // 3 + y // 3) % 2 * 0.6 + 0.2)[..., None] * np.ones(3)
-    found = denoised(pattern, np.full((HEIGHT, WIDTH), 1e-8), wall())
+    found = filtered(pattern, np.full((HEIGHT, WIDTH), 1e-8), wall())
     assert np.abs(found - pattern).max() < 1e-3
 
 
@@ -173,7 +198,18 @@ def test_the_albedo_of_a_point_is_that_of_its_texture(tmp_path: Path) -> None:
     expected = mesh.textures[0].colours((weights @ np.array([(0, 0), (1, 0), (0, 1)])).reshape(-1, 2)).reshape(2, 3, 3)
     hits = np.array([[0, 0, 0], [0, 0, -1]])
     expected[1, 2] = 0
-    np.testing.assert_allclose(albedo_of(mesh, hits, weights @ np.eye(3)), expected, atol=1e-6)
+    np.testing.assert_allclose(HitPoints.of(mesh, hits, weights @ np.eye(3)).albedo(), expected, atol=1e-6)
+
+
+def test_a_texture_stays_in_a_frame_of_one_sample(tmp_path: Path) -> None:
+    """By light alone, which is constant here."""
+    codes = np.random.default_rng(1).integers(30, 255, (6, 6, 3)).astype(np.uint8)
+    gltf(tmp_path, np.asarray(Image.fromarray(codes).resize((64, 64), Image.Resampling.BILINEAR)))
+    (tmp_path / "scene.toml").write_text('mesh.path = "a.gltf"\npaths.gather = 1\n')
+    request = RenderRequest(tmp_path / "scene.toml", "textured", backend="model", size=(64, 48), samples=1)
+    raw, found = (render(replace(request, denoise=denoise)) for denoise in (False, True))
+    difference = encode_srgb(raw.image).astype(int) - encode_srgb(found.image)
+    assert np.abs(difference[raw.object_mask]).mean() < 5
 
 
 def test_without_the_package_oidn_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,7 @@ from colonnade.scene.model import Camera, Light, MeshSource, Motion, Paths, Scen
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import frame_passes, of_a_device
-from colonnade.scene.samples import CENTRE, Sample, disc_point, samples_of_frame, square_points
+from colonnade.scene.samples import CENTRE, PERIOD, Sample, disc_point, samples_of_frame, square_points
 from colonnade.scene.view import View, make_view
 
 TEAPOT = Scene(MeshSource(name="teapot:2"))
@@ -58,6 +58,16 @@ def test_the_points_of_four_samples_are_fixed() -> None:
     """Pictures of the documentation and of users depend on them."""
     np.testing.assert_array_equal(square_points(4, 0) * 8, [[1, 1], [5, 5], [3, 7], [7, 3]])
     np.testing.assert_array_equal(square_points(4, 1) * 8, [[7, 3], [3, 7], [1, 1], [5, 5]])
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_frames_together_have_a_gathered_ray_in_each_interval(count: int) -> None:
+    frames = [samples_of_frame(count, 1, number) for number in range(PERIOD)]
+    for ray in range(2):
+        points = np.array([sample.gather[ray] for frame in frames for sample in frame])
+        for axis in points.T:
+            np.testing.assert_array_equal(np.sort(axis * count * PERIOD // 256), np.arange(count * PERIOD))
+    assert [replace(sample, gather=()) for sample in frames[3]] == [replace(sample, gather=()) for sample in frames[0]]
 
 
 def test_one_sample_is_the_centre() -> None:
