@@ -13,6 +13,9 @@ import numpy as np
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
 
+#: A pixel that is so near to the brightest one may be cut off; share of all directions from which on they are.
+_CUT, _CUT_OFF = 0.99, 0.001
+
 
 @dataclass(frozen=True)
 class Panorama:
@@ -52,6 +55,13 @@ class Panorama:
     def mean(self) -> Floats:
         """The mean over all directions, float64 [3]."""
         return np.asarray((self.radiance * self.solid_angles()[..., None]).sum(axis=(0, 1)) / (4 * np.pi))
+
+    @property
+    def is_cut_off(self) -> bool:
+        """Whether its brightest light is a limit that a part of all directions has reached, as in 8-bit pictures."""
+        brightest = self.radiance.max(axis=2)
+        angles = np.broadcast_to(self.solid_angles(), brightest.shape)
+        return bool(angles[brightest >= _CUT * brightest.max()].sum() > _CUT_OFF * 4 * np.pi)
 
     def cube(self, size: int) -> LightCube:
         """The cube of these directions, of at most 32 texels along an edge, each the mean of the pixels in it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from colonnade.mesh.materials.mesh import Extent
     from colonnade.scene.model import Scene
 
+#: Lights that are found for frames of several samples, at most: passes share them.
+MOST_LIGHTS = 8
 #: Distance of a light without a room, in edges of the object's cube.
 _FAR = 50.0
 #: Least share of all directions that tells the exposure.
@@ -36,7 +38,7 @@ class PanoramaLight:
     """A scene with the lights of its panorama.
 
     Attributes:
-        scene: With lights, unless the panorama has none and the room has a photo to fit them to.
+        scene: With lights, unless the panorama is cut off and shows none, and the room has a photo to fit them to.
         panorama: The light of all directions, at the scene's exposure, without the lights that were found in it.
         has_lights: The panorama has decided the scene's lights.
     """
@@ -81,12 +83,12 @@ def panorama_light(scene: Scene, extent: Extent, room: Environment | None, max_l
         )
     if scene.names_light:
         return PanoramaLight(scene, panorama, True)
-    found, rest = split_lights(panorama, max_lights)
-    if not found and seen is not None:
+    found, rest = split_lights(panorama, max_lights if scene.frame.samples == 1 else MOST_LIGHTS)
+    if not found and seen is not None and panorama.is_cut_off:
         return PanoramaLight(scene, rest, False)
     lights = _placed(found, room, point, extent.edge * pose.scale, seen)
     ambient = _mean(rest, seen).clip(max=MAX_INTENSITY)
-    scene = with_lights(scene, RoomLights(ambient.round(4), tuple(lights)))
+    scene = replace(with_lights(scene, RoomLights(ambient.round(4), tuple(lights))), pass_lights=max_lights)
     count = len(lights)
     notes.tell(
         f"the scene names no light: ambient light and {count} light{'' if count == 1 else 's'} are those of panorama"

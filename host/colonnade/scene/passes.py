@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from colonnade.common import notes
 from colonnade.mesh.materials.materials import BLACK, LAYERS, Layer, MeshMaterial, as_rendered, in_layer
 from colonnade.scene.model import Scene
-from colonnade.scene.samples import PERIOD, samples_of_frame
+from colonnade.scene.samples import PERIOD, Sample, samples_of_frame
 
 #: The device's number for the colour 1.0 where light is gathered, as a factor: a ray may bring more than the mean.
 _GATHER_EXPOSURE = 0.5
@@ -61,10 +63,10 @@ def frame_passes(
         exposure: Progress of the motion while the shutter is open (`Motion.exposure`).
         number: Of the frame, if its colours are blended with those before (`samples_of_frame`).
     """
-    count, lights, number = scene.frame.samples or 1, len(scene.lights), number % PERIOD
-    passes = list(samples_of_frame(count, lights, number))
+    count, of_frame = scene.frame.samples or 1, number % PERIOD
+    passes = _samples(scene, count, of_frame)
     if count > 1 and may_have_layers(scene):
-        layers, few = layers_of(materials), samples_of_frame(max(1, count // _SAMPLES_OF_A_LAYER), lights, number)
+        layers, few = layers_of(materials), _samples(scene, max(1, count // _SAMPLES_OF_A_LAYER), of_frame)
         for number, sample in reversed(list(enumerate(few, 1))):
             after = -(-number * count // len(few))
             passes[after:after] = [replace(sample, layer=layer) for layer in layers]
@@ -72,3 +74,33 @@ def frame_passes(
         replace(scene, sample=sample, motion_progress=min(1.0, scene.motion_progress + sample.time * exposure))
         for sample in passes
     ]
+
+
+def _samples(scene: Scene, count: int, number: int) -> list[Sample]:
+    """The samples of a frame, each with as many lights as a pass can have."""
+    samples = list(samples_of_frame(count, len(scene.lights), number))
+    if not 0 < scene.pass_lights < len(scene.lights):
+        return samples
+    shares = light_shares([max(light.colour) for light in scene.lights], count, scene.pass_lights)
+    return [replace(sample, shares=of_pass) for sample, of_pass in zip(samples, shares, strict=True)]
+
+
+def light_shares(strengths: Sequence[float], count: int, slots: int) -> list[tuple[float, ...]]:
+    """Factors of lights in each of ``count`` passes that have ``slots`` lights, so that the mean of each light is 1.
+
+    A stronger light is in more passes, so that these are about as bright. If all passes have too few lights, those
+    that come last in ``strengths`` are in none.
+    """
+    shown = [0 if index < count * slots else count for index in range(len(strengths))]
+    for _ in range(count * slots):
+        open_lights = [index for index, passes in enumerate(shown) if passes < count]
+        if open_lights:
+            # A light that is in no pass comes first
+            best = max(open_lights, key=lambda index: strengths[index] / shown[index] if shown[index] else np.inf)
+            shown[best] += 1
+    factors, place = np.zeros((count, len(strengths))), 0
+    for index, passes in enumerate(shown):
+        if index < count * slots:
+            factors[np.arange(place, place + passes) % count, index] = count / passes
+            place += passes
+    return [tuple(map(float, row)) for row in factors]

@@ -27,6 +27,7 @@ class Sample:
         time: Fraction of the shutter's opening, 0 to 1.
         lens: Point of the lens, a disc of radius 1.
         lights: Point of each light's disc of radius 1; missing ones are the centre.
+        shares: Factor of each light, 0 where the pass has not got it; empty: see `Scene.light_share`.
         gather: Sample point of each gathered ray of a path, two bytes (docs/gather.md).
         layer: What the pass shows.
         coverage: Below it materials are there; None: of the only pass (`in_pass`).
@@ -36,6 +37,7 @@ class Sample:
     time: float = 0.5
     lens: Point = (0.0, 0.0)
     lights: tuple[Point, ...] = ()
+    shares: tuple[float, ...] = ()
     gather: tuple[tuple[int, int], ...] = ((128, 128),) * MAX_GATHERED
     layer: Layer = "surface"
     coverage: float | None = None

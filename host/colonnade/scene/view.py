@@ -150,7 +150,9 @@ def place(scene: Scene, extent: Extent, width: int, height: int, environment: En
         camera = through_lens(camera, scene.camera, centre, scene.sample.lens)
     # In a room, light does not depend on where the scene's camera stands
     axes = first.axes if environment is None else environment.camera_to_world[:, :3].T * [[1.0], [-1.0], [-1.0]]
-    lights = tuple(_placed(scene, index, axes, centre, edge) for index in range(len(scene.lights)))
+    lights = tuple(
+        _placed(scene, index, axes, centre, edge) for index in range(len(scene.lights)) if scene.light_share(index) > 0
+    )
     shift_x, shift_y = scene.sample.pixel
     corner = camera.corner + shift_x * camera.step_x + shift_y * camera.step_y
     return PlacedScene(pose, replace(camera, corner=corner), lights)
@@ -261,11 +263,12 @@ def _placed(scene: Scene, index: int, axes: Floats, centre: Floats, edge: float)
     """
     light = scene.lights[index]
     position = _world_position(light, axes, centre, edge)
-    colour = np.array(light.colour) * scene.headroom * scene.exposure
+    colour = np.array(light.colour) * scene.headroom * scene.exposure * scene.light_share(index)
     if light.radius > 0:
         away, on_disc = position - centre, scene.sample.light(index)
         if scene.sample.layer in MARKS and not scene.fits_lights:
             of_mark = MARKS[scene.sample.layer] * light.radius**2 / (light.falloff**2 if light.falloff else away @ away)
+            of_mark *= scene.light_share(index)
             colour = (colour - scene.headroom * of_mark).clip(min=0.0)
         right, up, _ = camera_axes(away if away.any() else axes[2], _UP)
         position = position + light.radius * (on_disc[0] * right + on_disc[1] * up)

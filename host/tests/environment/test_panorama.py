@@ -99,14 +99,32 @@ def test_a_lamp_becomes_a_light_of_its_size(direction: tuple[float, float, float
     assert light.direction @ np.array(direction) / np.linalg.norm(direction) > 0.999
     assert abs(light.radius - radius) < 0.03 * radius + 0.01
     np.testing.assert_allclose(light.colour / 4 + rest.mean(), panorama.mean(), rtol=1e-9)
-    assert rest.radiance.max() <= 6 * 0.2 + 1e-9
+    assert rest.radiance.max() <= 1.0 + 1e-9
     weights = np.broadcast_to(face_directions(FACE)[1][..., None], (FACE, FACE, 3))
     whole = (rest.cube(FACE).texels * weights).sum(axis=(0, 1, 2)) / (6 * weights[..., 0].sum())
     np.testing.assert_allclose(whole, rest.mean(), rtol=0.01)
 
 
-def test_large_and_faint_regions_stay_light_by_direction() -> None:
-    for panorama in (disc((1, 0, 0), 0.6, 20.0), disc((1, 0, 0), 0.02, 10.0), disc((1, 0, 0), 0.2, 0.9)):
+def test_a_wide_region_becomes_several_lights() -> None:
+    panorama = disc((1.0, 0.2, 0.0), 0.6, 20.0)
+    lights, rest = split_lights(panorama, 8)
+    assert len(lights) > 1 and all(light.radius < np.radians(20) for light in lights)
+    assert rest.radiance.max() <= 1.0 + 1e-9, "nothing stays that a ray would cut off"
+    np.testing.assert_allclose(sum(light.colour for light in lights) / 4 + rest.mean(), panorama.mean(), rtol=1e-9)
+
+
+def test_the_panes_of_a_window_are_one_light_beside_a_lamp() -> None:
+    """Each pane has more light than the lamp, whose rays are brighter."""
+    panes = disc((1.0, 0.0, -0.18), 0.15, 12.0, 0.0), disc((1.0, 0.0, 0.18), 0.15, 12.0, 0.0)
+    panorama = Panorama(0.2 + sum(part.radiance for part in (*panes, disc((0.0, 1.0, 0.0), 0.05, 60.0, 0.0))))
+    (window, lamp), rest = split_lights(panorama, 2)
+    assert window.direction[0] > 0.999 and lamp.direction[1] > 0.999
+    assert 0.15 < window.radius < 0.4 and lamp.radius < 0.06
+    assert rest.radiance.max() <= 1.0 + 1e-9
+
+
+def test_faint_regions_stay_light_by_direction() -> None:
+    for panorama in (disc((1, 0, 0), 0.02, 10.0), disc((1, 0, 0), 0.2, 0.9)):
         lights, rest = split_lights(panorama, 2)
         assert lights == []
         np.testing.assert_array_equal(rest.radiance, panorama.radiance)
@@ -120,6 +138,12 @@ def test_the_brightest_lights_come_first() -> None:
     lights, rest = split_lights(panorama, 2)
     assert [int(np.abs(light.direction).argmax()) for light in lights] == [2, 1]
     assert rest.radiance.max() > 9, "the third one stays"
+
+
+def test_a_panorama_that_reaches_a_limit_is_cut_off() -> None:
+    sun = disc((0.0, 1.0, 0.0), 0.2, 30.0).radiance * np.linspace(0.5, 1.0, 2 * ROWS)[:, None]
+    assert not Panorama(sun).is_cut_off
+    assert Panorama(sun.clip(max=1.0)).is_cut_off
 
 
 def test_bad_panoramas_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

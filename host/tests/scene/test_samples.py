@@ -15,10 +15,10 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import MARKS, MeshMaterial
-from colonnade.scene.model import Camera, Light, MeshSource, Motion, Paths, Scene
+from colonnade.scene.model import Camera, Light, MeshSource, Motion, Paths, PointLight, Scene
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.parser import load_scene
-from colonnade.scene.passes import frame_passes, of_a_device
+from colonnade.scene.passes import frame_passes, light_shares, of_a_device
 from colonnade.scene.samples import CENTRE, PERIOD, Sample, disc_point, samples_of_frame, square_points
 from colonnade.scene.view import View, make_view
 
@@ -221,3 +221,36 @@ def test_what_a_device_does_not_show_by_itself_is_named(frame: dict[str, int], g
     with notes.opened(lines.append):
         assert of_a_device(scene).frame.samples == 1
     assert [line.partition(" of colonnade render")[0] for line in lines] == ([] if named is None else [named])
+
+
+@given(
+    strengths=st.lists(st.floats(0.01, 10.0), min_size=3, max_size=8),
+    count=st.integers(1, 20),
+    slots=st.integers(1, 2),
+)
+def test_passes_share_lights_without_a_change_of_their_mean(strengths: list[float], count: int, slots: int) -> None:
+    """A pass has as many lights as the hardware; a stronger light is in no fewer passes, and none is left out."""
+    strengths = sorted(strengths, reverse=True)
+    shares = np.array(light_shares(strengths, count, slots))
+    assert shares.shape == (count, len(strengths)) and ((shares > 0).sum(axis=1) <= slots).all()
+    shown = count * slots
+    np.testing.assert_allclose(shares[:, :shown].mean(axis=0), 1.0)
+    assert not shares[:, shown:].any()
+    assert (np.diff((shares > 0).sum(axis=0)) <= 0).all()
+
+
+def test_a_scene_has_the_lights_that_were_found_in_the_mean_of_its_passes() -> None:
+    colours = ((0.9, 0.8, 0.7), (0.3, 0.3, 0.4), (0.1, 0.2, 0.1))
+    first, *more = (PointLight((float(index), 3.0, 0.0), colour=own) for index, own in enumerate(colours))
+    scene = replace(TEAPOT, light=Light(first.position, colour=first.colour), more_lights=tuple(more))
+    every = make_view(scene, EXTENT, *SIZE).lights
+    assert len(every) == 3
+    shared = replace(scene, pass_lights=2).with_samples(8)
+    assert len(make_view(shared, EXTENT, *SIZE).lights) == 2, "a frame of one pass has the brightest"
+    sums = np.zeros((3, 3))
+    for one in frame_passes(shared):
+        view = make_view(one, EXTENT, *SIZE)
+        assert len(view.lights) == 2
+        for light in view.lights:
+            sums += [light.colour * np.allclose(light.position, other.position) for other in every]
+    np.testing.assert_allclose(sums / 8, colours)

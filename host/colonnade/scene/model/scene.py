@@ -30,7 +30,8 @@ class Scene:
     they are known from another view of its room. ``frame_camera`` is that of a sequence's frame with the maps of
     another frame: a lens for their size, and a pose. ``names_light`` tells whether the scene names lights or ambient
     light; if not, those of a room are fitted to its photo. ``names_gather`` tells whether it says how many rays a path
-    gathers. ``fits_lights`` tells that these have an area, a guess that no mirror shows. ``headroom`` scales all lights
+    gathers. ``fits_lights`` tells that these have an area, a guess that no mirror shows. ``pass_lights`` is the number
+    of lights of a pass, if those were found and may be more; 0: it has all. ``headroom`` scales all lights
     up and diffuse albedos of the object down (`colonnade.environment.photo_colours`). ``exposure`` is the device's
     number for the radiance 1.0, as a factor.
     """
@@ -55,6 +56,7 @@ class Scene:
     names_light: bool = True
     names_gather: bool = True
     fits_lights: bool = False
+    pass_lights: int = 0
     headroom: float = 1.0
     exposure: float = 1.0
 
@@ -110,6 +112,12 @@ class Scene:
         if first.position is not None and end is not None:
             first = replace(first, position=interpolate(first.position, end, self.motion_progress))
         return first, *self.more_lights
+
+    def light_share(self, index: int) -> float:
+        """Factor of a light in the pass of `sample`; 0: the pass has not got it."""
+        if self.sample.shares:
+            return self.sample.shares[index]
+        return float(self.pass_lights == 0 or index < self.pass_lights)
 
     @property
     def mesh_source(self) -> str | Path:
