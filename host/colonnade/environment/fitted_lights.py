@@ -19,7 +19,8 @@ from colonnade.environment.surround import Surround
 
 #: Sources that determine a fit, beside this file.
 _SOURCES = tuple(
-    "light_fit.py light_samples.py wall_fit.py lights.py surround.py ../common/fixed_order.py ../common/srgb.py".split()
+    "light_fit.py light_samples.py seen_sources.py wall_fit.py lights.py surround.py ../common/fixed_order.py"
+    " ../common/srgb.py".split()
 )
 
 
@@ -60,7 +61,7 @@ def _sources() -> str:
 
 def _from_json(stored: dict[str, Any]) -> LightFit:
     lights = tuple(
-        RoomLight(np.array(light["position"]), np.array(light["colour"]), light["falloff"])
+        RoomLight(np.array(light["position"]), np.array(light["colour"]), light["falloff"], light["radius"])
         for light in stored["lights"]["lights"]
     )
     walls = stored["surround"]

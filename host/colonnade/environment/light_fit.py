@@ -26,6 +26,7 @@ from colonnade.environment.light_samples import (
 )
 from colonnade.environment.lights import RoomLight, RoomLights, exposure, irradiance, world_surface
 from colonnade.environment.model import Environment
+from colonnade.environment.seen_sources import SEEN_RADIANCE, seen_sources
 from colonnade.environment.surround import Surround
 from colonnade.environment.wall_fit import ALTERNATIONS, Walls, with_best_ambient
 from colonnade.quality.image_metrics import psnr
@@ -104,7 +105,9 @@ def _fitted(
     if shining is not None:
         for _ in range(ALTERNATIONS):
             samples, best, shining = shining.fitted(samples, best)
-    for _ in range(count):
+    if seen := seen_sources(environment)[: max(1, count - 1)]:
+        best = _refined(samples, replace(best, lights=tuple(seen)), floor)
+    for _ in range(count - len(seen)):
         starts = _starts(samples, best, _candidates(samples))
         refined = [_refined(samples, start, floor) for start in starts]
         better = min(refined, key=lambda lights: cost_of(samples, lights))
@@ -163,7 +166,7 @@ def _starts(samples: Samples, lights: RoomLights, positions: Floats) -> list[Roo
             for other in chosen
         ):
             old = [
-                RoomLight(light.position, colour, light.falloff)
+                replace(light, colour=np.maximum(colour, SEEN_RADIANCE * light.radius**2))
                 for light, colour in zip(lights.lights, colours[1:-1], strict=True)
             ]
             chosen.append(RoomLights(colours[0], (*old, RoomLight(position, colours[-1], falloff))))
@@ -227,14 +230,16 @@ def _refined(samples: Samples, start: RoomLights, floor: Floats | None = None) -
 
     This is the Levenberg-Marquardt method within bounds; a library's would depend on the processor (`fixed_order`).
     """
-    layout = _Layout(tuple(light.falloff is not None for light in start.lights))
+    layout = _Layout(start.lights)
     low, high = [*(np.zeros(3) if floor is None else floor)], [_MAX_INTENSITY] * 3
     for light in start.lights:
-        low += [*samples.low, 0.0, 0.0, 0.0]
-        high += [*samples.high, *[_MAX_INTENSITY] * 3]
+        # The place of a source that is seen is known, and its least brightness
+        seen = light.radius > 0
+        low += [*(light.position if seen else samples.low), *[SEEN_RADIANCE * light.radius**2] * 3]
+        high += [*(light.position if seen else samples.high), *[_MAX_INTENSITY] * 3]
         if light.falloff is not None:
-            low.append(_FALLOFF_RANGE[0])
-            high.append(_FALLOFF_RANGE[1])
+            low.append(light.falloff if seen else _FALLOFF_RANGE[0])
+            high.append(light.falloff if seen else _FALLOFF_RANGE[1])
     lower, upper = np.array(low), np.array(high)
     values = np.clip(layout.pack(start), lower, upper)
     cost, damping = cost_of(samples, layout.unpack(values)), _FIRST_DAMPING
@@ -267,9 +272,9 @@ def _refined(samples: Samples, start: RoomLights, floor: Floats | None = None) -
 
 @dataclass(frozen=True)
 class _Layout:
-    """Lights as a vector: ambient, then position, colour and falloff (where `has_falloff`) of each light."""
+    """Lights as a vector: ambient, then position, colour and falloff, if it has one, of each light. Radii stay."""
 
-    has_falloff: tuple[bool, ...]
+    lights: tuple[RoomLight, ...]
 
     def pack(self, lights: RoomLights) -> Floats:
         parts = [lights.ambient]
@@ -279,10 +284,10 @@ class _Layout:
 
     def unpack(self, values: Floats) -> RoomLights:
         lights, at = [], 3
-        for has_falloff in self.has_falloff:
-            falloff = float(values[at + 6]) if has_falloff else None
-            lights.append(RoomLight(values[at : at + 3], values[at + 3 : at + 6], falloff))
-            at += 7 if has_falloff else 6
+        for light in self.lights:
+            falloff = None if light.falloff is None else float(values[at + 6])
+            lights.append(RoomLight(values[at : at + 3], values[at + 3 : at + 6], falloff, light.radius))
+            at += 6 if falloff is None else 7
         return RoomLights(values[:3], tuple(lights))
 
 
@@ -315,6 +320,7 @@ def _rounded(lights: RoomLights) -> RoomLights:
                 light.position.round(3),
                 light.colour.round(4),
                 None if light.falloff is None else round(light.falloff, 3),
+                round(light.radius, 3),
             )
             for light in lights.lights
         ),

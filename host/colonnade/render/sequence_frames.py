@@ -71,7 +71,7 @@ def sequence_frames(
         progress=progress,
     )  # fmt: skip
     samples, motion = scene.frame.samples, scene.motion
-    history = History.of(request.denoise, request.frames)
+    history = History.of(request.denoise or False, request.frames)
     for number, share in enumerate(motion.frame_progress(request.frames)):
         title = f"frame {number + 1} of {request.frames}"
         begun = time.perf_counter()

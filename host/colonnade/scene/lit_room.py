@@ -274,6 +274,8 @@ def _with_fitted_lights(
 
 
 def _with_area(light: RoomLight, point: Floats) -> RoomLight:
-    """A fitted light with an area, as a point sees it."""
+    """A fitted light with an area, as a point sees it; one that the photo shows has its own."""
+    if light.radius > 0:
+        return light
     away = light.position - point
     return replace(light, radius=round(_AREA * float(np.sqrt(fixed_order.dot(away, away))), 3))

@@ -8,15 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from colonnade_lab.evaluation.studies.synthetic_attic import AMBIENT, LAMP, LAMP_COLOUR, attic
+from numpy.typing import NDArray
+from scipy import ndimage
 
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.environment import light_fit
+from colonnade.environment.derived_albedo import derived_albedo, hue_lights
 from colonnade.environment.fitted_lights import fitted_lights
 from colonnade.environment.light_fit import fit_lights, relit, relit_psnr
 from colonnade.environment.lights import MAX_FALLOFF, RoomLight, RoomLights, exposure, irradiance, world_surface
 from colonnade.environment.model import Environment
 from colonnade.environment.photo_colours import MAX_CLAMPED, photo_colours
+from colonnade.environment.seen_sources import SEEN_RADIANCE, seen_sources
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +70,40 @@ def test_two_lamps_and_ambient_light_are_told_apart(environment: Environment) ->
     assert fit_lights(lit, 0).lights.lights == ()
     fit = fit_lights(lit, 2)
     assert len(fit.lights.lights) == 2 and fit.psnr > 38
+
+
+def test_light_and_albedo_share_the_hue_of_a_photo(environment: Environment) -> None:
+    """Grey light on coloured things, or coloured light on grey ones: half is wrong at most."""
+    grey = replace(environment, albedo=np.full_like(environment.albedo, 0.5))
+    lit = encode_srgb(relit(grey, RoomLights(np.array([0.3, 0.6, 0.9]))))
+    albedo = derived_albedo(replace(grey, photo=lit)).mean(axis=(0, 1))
+    assert 1.0 < albedo[2] / albedo[0] < np.sqrt(3.0)
+    lights = hue_lights(replace(grey, photo=lit)).ambient
+    assert np.sqrt(3.0) < lights[2] / lights[0] < 3.0
+
+
+def test_a_window_in_view_is_a_light(environment: Environment) -> None:
+    """It keeps its place; a saturated floor, on which the sun shines, is none, and neither is a small highlight."""
+    surface, normals = world_surface(environment)
+    upright, level = np.abs(normals[..., 1]) < 0.3, normals[..., 1] > 0.9
+    (window,) = (source for source in seen_sources(_saturated(environment, upright, 12)) if source.radius > 0)
+    assert 0.0 < window.radius < 1.0
+    assert np.sqrt(((surface - window.position) ** 2).sum(axis=2)).min() < 0.3
+    seen = _saturated(environment, upright, 12)
+    found = fit_lights(seen, 2).lights.lights[0]
+    np.testing.assert_allclose(found.position, window.position, atol=1e-3)
+    assert found.colour.min() >= SEEN_RADIANCE * window.radius**2 - 1e-3
+    assert seen_sources(_saturated(environment, level, 12)) == seen_sources(_saturated(environment, upright, 2)) == []
+
+
+def _saturated(environment: Environment, surface: NDArray[np.bool_], size: int) -> Environment:
+    """The room with a saturated square, in pixels, where it first fits on a surface."""
+    assert environment.photo is not None
+    fits = ndimage.binary_erosion(surface, np.ones((size, size)), origin=-(size // 2))
+    row, column = np.argwhere(fits)[0]
+    photo = np.minimum(environment.photo, 240)
+    photo[row : row + size, column : column + size] = 255
+    return replace(environment, photo=photo)
 
 
 def test_a_room_without_a_useful_photo_is_one_line(environment: Environment) -> None:
