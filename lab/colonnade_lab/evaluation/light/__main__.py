@@ -11,7 +11,8 @@ from colonnade.common.atomic_files import made_folder, write_json
 from colonnade.common.errors import UserError
 from colonnade.common.processes import tool
 
-from colonnade_lab.evaluation.light.rooms import ROOMS, KnownRoom
+from colonnade_lab.evaluation.light.rooms import ROOMS
+from colonnade_lab.evaluation.light.user_rooms import known_room
 
 
 def main() -> None:
@@ -25,16 +26,10 @@ def _job(arguments: list[str]) -> None:
     from colonnade_lab.evaluation.light.jobs import write_job
 
     (name, _, frame), file = arguments[0].partition("/"), arguments[1]
-    room = _room(name)
+    room = known_room(name)
     if frame and frame not in room.frames:
         raise UserError(f"there is no frame {frame} of {name}: choose from {', '.join(room.frames)}")
     write_job(Path(file), room, frame or None)
-
-
-def _room(name: str) -> KnownRoom:
-    if name not in ROOMS:
-        raise UserError(f"there is no room {name}: choose from {', '.join(ROOMS)}")
-    return ROOMS[name]
 
 
 def _store(arguments: list[str]) -> None:
@@ -52,7 +47,7 @@ def _frames(arguments: list[str]) -> None:
     options = arguments.index("--json") if "--json" in arguments else len(arguments)
     folder, names = Path(arguments[0]), tuple(arguments[1:options]) or tuple(ROOMS)
     for name in names:
-        _room(name)
+        known_room(name)
     with made_folder(folder):
         results: dict[str, columns.FrameResult] = {}
         strips: dict[str, list[report.Strip]] = {}

@@ -20,6 +20,7 @@ from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
 from colonnade.environment.panorama_file import read_radiance
+from colonnade.maps.encoders import Encoder
 from colonnade.render.device_frames import host_frames
 from colonnade.render.host_frame import HostFrame
 from colonnade.render.passes import model_passes
@@ -32,8 +33,9 @@ from numpy.typing import NDArray
 from colonnade_lab.evaluation.light import files
 from colonnade_lab.evaluation.light.mirror_rays import MirrorErrors, mirror_errors
 from colonnade_lab.evaluation.light.probe import ProbeFrame
-from colonnade_lab.evaluation.light.rooms import FRAME, ROOMS, PointLight
+from colonnade_lab.evaluation.light.rooms import ROOMS, KnownRoom, PointLight
 from colonnade_lab.evaluation.light.surfaces import RoomSurface
+from colonnade_lab.evaluation.light.user_rooms import known_room
 from colonnade_lab.evaluation.region_metrics import compare_regions
 
 #: The preset that renders.
@@ -65,8 +67,14 @@ class Column:
     light: str = "panorama"
 
 
-def columns() -> dict[str, Column]:
-    """Colonnade's columns by name."""
+def columns(is_users: bool = False) -> dict[str, Column]:
+    """Colonnade's columns by name, or those of a user's room."""
+    if is_users:
+        known, photo = (Column(1, denoise=True, light=light) for light in ("around", "photo"))
+        filtered = {
+            f"{count} pass{'es' if count > 1 else ''}, filtered": replace(known, passes=count) for count in PASSES
+        }
+        return filtered | {"photo alone": replace(photo, passes=PASSES[-1])}
     found = {"ambient light": Column(4, gather=0, light="lights")}
     for passes in PASSES:
         count = f"{passes} pass{'es' if passes > 1 else ''}"
@@ -130,26 +138,26 @@ def measure(
         Room and frame, what was measured, and the pictures by column, sRGB.
     """
     for name in names:
-        room = ROOMS[name]
+        room = known_room(name)
         surface = RoomSurface.of(room)
         environment = surface.maps(name, room.camera(), read_picture(files.stored(name) / "photo.webp"))
         lights = surface.lights(room)
-        scenes = {
-            light: files.write_scenes(folder / light, name, room, light, environment, lights) for light in files.LIGHTS
-        }
-        loaded = load_environment(folder / files.LIGHTS[0] / name)
+        wanted = files.USERS_LIGHTS if room.is_users else files.LIGHTS
+        scenes = {light: files.write_scenes(folder / light, name, room, light, environment, lights) for light in wanted}
+        loaded = load_environment(folder / wanted[0] / name)
         for frame, things in room.frames.items():
             of_frame = {light: own[frame] for light, own in scenes.items()}
             with progress.step(f"measuring {name}, {frame}"):
                 mirrors = None
                 if any(thing.kind == "mirror" for thing in things):
                     mirrors = mirror_errors(room, things, surface, loaded)
-                result, pictures = _frame(name, frame, environment, lights, of_frame, mirrors)
+                result, pictures = _frame(name, room, frame, environment, lights, of_frame, mirrors)
             yield f"{name}-{frame}", result, pictures
 
 
 def _frame(
     name: str,
+    room: KnownRoom,
     frame: str,
     environment: Environment,
     lights: Sequence[PointLight],
@@ -158,12 +166,12 @@ def _frame(
 ) -> tuple[FrameResult, dict[str, NDArray[np.uint8]]]:
     truth = files.truth(name, frame)
     assert environment.photo is not None
-    things = ROOMS[name].frames[frame]
-    pictures = {"truth": truth, "no object": resized_photo(environment.photo, *FRAME)}
+    things = room.frames[frame]
+    pictures = {"truth": truth, "no object": resized_photo(environment.photo, *room.frame)}
     panoramas = (read_radiance(files.stored(name) / f"{which}.hdr") for which in ("around", "panorama"))
-    image, owners = ProbeFrame(lights, things, environment, *panoramas).render()
+    image, owners = ProbeFrame(lights, things, environment, *panoramas, size=room.frame).render()
     pictures["probe, rasteriser"] = encode_srgb(image)
-    pictures |= _colonnade(scenes)
+    pictures |= _colonnade(scenes, room)
     is_object = owners >= 0
     difference = np.abs(truth.astype(int) - pictures["no object"]).max(axis=2)
     regions = {"frame": np.ones_like(is_object), "object": is_object, "room": ~is_object & (difference > CHANGED)}
@@ -178,17 +186,18 @@ def _frame(
     return FrameResult(pixels, qualities, mirrors), pictures
 
 
-def _colonnade(scenes: Mapping[str, Path]) -> dict[str, NDArray[np.uint8]]:
+def _colonnade(scenes: Mapping[str, Path], room: KnownRoom) -> dict[str, NDArray[np.uint8]]:
     """The pictures of all columns; those that differ in their filter alone have the same passes, rendered once."""
     manifest, pictures = manifest_for(CONFIG).manifest, {}
     passes: dict[Column, tuple[HostFrame, FramePasses]] = {}
-    for title, column in columns().items():
+    for title, column in columns(room.is_users).items():
         unfiltered = replace(column, denoise=False)
         if unfiltered not in passes:
             scene = load_scene(scenes[f"{column.light}-{column.gather}"]).with_samples(column.passes)
-            prepared = DeviceScene.of(exposed(scene), manifest, size=FRAME)
+            encoder: Encoder = "live" if room.is_users else "offline"
+            prepared = DeviceScene.of(exposed(scene), manifest, size=room.frame, encoder=encoder)
             request = RenderRequest(scene, CONFIG, backend="model", denoise=column.gather > 0)
-            (frame,) = host_frames(request, prepared, FRAME, [prepared.scene], 0.0, QUIET)
+            (frame,) = host_frames(request, prepared, room.frame, [prepared.scene], 0.0, QUIET)
             ((sums, _, _),) = model_passes([frame], [[frame.registers(one) for one in frame.passes]])
             require_no_errors(sums.errors)
             passes[unfiltered] = frame, sums

@@ -23,7 +23,7 @@ from colonnade.mesh.files.glb import Glb
 from colonnade.mesh.load import load_mesh
 from numpy.typing import NDArray
 
-from colonnade_lab.evaluation.light.rooms import FRAME, GLASSES, METALS, KnownRoom, PointLight, Thing
+from colonnade_lab.evaluation.light.rooms import GLASSES, METALS, KnownRoom, PointLight, Thing
 from colonnade_lab.evaluation.light.surfaces import pose_of
 from colonnade_lab.evaluation.studies.synthetic_attic import write_room
 
@@ -60,6 +60,8 @@ def write_panorama(path: Path, radiance: Floats) -> None:
 
 #: The scenes of a frame: what is known of the light (see `columns.Column`), and the gathered rays of a path.
 LIGHTS = ("lights-0", "panorama-1", "panorama-2", "around-1", "photo-0", "photo-1")
+#: Those of a user's room.
+USERS_LIGHTS = ("around-1", "photo-1")
 
 
 def write_scenes(
@@ -67,10 +69,14 @@ def write_scenes(
 ) -> dict[str, Path]:
     """Write a room's folder, its objects as glTF files, and a scene for each frame; returns the scenes.
 
-    ``light`` is one of `LIGHTS`; ``lights`` are the room's, as the objects see them.
+    ``light`` is one of `LIGHTS`; ``lights`` are the room's, as the objects see them. The folder of a user's room has
+    neither albedo nor normals.
     """
     known, gather = light.split("-")
     write_room(folder / name, environment)
+    if room.is_users:
+        for derived in ("albedo.png", "normal.png"):
+            (folder / name / derived).unlink()
     scenes = {}
     for frame, things in room.frames.items():
         lines = []
@@ -82,11 +88,13 @@ def write_scenes(
             lines += ["[[object]]", f'mesh = {{path = "{file}"}}', f"transform = {{{transform}}}", ""]
         if known in ("lights", "panorama"):
             lines += _lights(name, lights)
-        lines += ["[background]", f'room = "{name}"', 'shadows = "photo"']
+        lines += ["[background]", f'room = "{name}"', *([] if room.is_users else ['shadows = "photo"'])]
         if known in ("panorama", "around"):
             panorama = stored(name) / ("around.hdr" if known == "panorama" else "panorama.hdr")
-            lines += [f"panorama = {json.dumps(str(panorama))}", "panorama_exposure = 1.0"]
-        lines += ["", "[paths]", f"gather = {gather}", "", "[frame]", f"width = {FRAME[0]}", f"height = {FRAME[1]}"]
+            lines += [f"panorama = {json.dumps(str(panorama))}"]
+            lines += [] if room.is_users else ["panorama_exposure = 1.0"]
+        width, height = room.frame
+        lines += ["", "[paths]", f"gather = {gather}", "", "[frame]", f"width = {width}", f"height = {height}"]
         scenes[frame] = folder / f"{name}-{frame}.toml"
         scenes[frame].write_text("\n".join(lines) + "\n", encoding="utf-8")
     return scenes

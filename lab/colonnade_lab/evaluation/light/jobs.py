@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from colonnade.common.atomic_files import replacing
 
-from colonnade_lab.evaluation.light.rooms import FRAME, PHOTO, KnownRoom, Lamp
+from colonnade_lab.evaluation.light.rooms import PHOTO, KnownRoom, Lamp
 from colonnade_lab.evaluation.light.surfaces import RoomSurface, ThingSurface
 
 
@@ -37,7 +37,7 @@ def write_job(path: Path, room: KnownRoom, frame: str | None = None) -> None:
         "frames": frames,
         "has_room": frame is None,
         "photo": PHOTO,
-        "frame": FRAME,
+        "frame": room.frame,
         "place": room.place,
         "focal": room.focal,
         "pose": pose.tolist(),

@@ -121,6 +121,7 @@ class ProbeFrame:
         environment: Environment,
         around: Floats,
         panorama: Floats,
+        size: tuple[int, int] = FRAME,
     ) -> None:
         """Prepare a frame.
 
@@ -130,7 +131,9 @@ class ProbeFrame:
             environment: Its photo and maps.
             around: What the probe sees without the lights, equirectangular, float64 [height, width, 3].
             panorama: The same with them, for mirrors and glass.
+            size: Width and height of the frame, pixels.
         """
+        self._size = size
         self._things, self._environment = things, environment
         surfaces = [ThingSurface.of(thing) for thing in things]
         counts = [len(surface.faces) for surface in surfaces]
@@ -152,7 +155,7 @@ class ProbeFrame:
 
     def render(self) -> tuple[Floats, NDArray[np.int64]]:
         """The frame, linear, float64 [height, width, 3], and each pixel's object in its middle, or -1."""
-        width, height = FRAME
+        width, height = self._size
         total = np.zeros((height, width, 3))
         steps = (np.arange(_SAMPLES) + 0.5) / _SAMPLES - 0.5
         for down in steps:
@@ -161,7 +164,7 @@ class ProbeFrame:
         return total / _SAMPLES**2, self._sample(0.0, 0.0, owners_only=True)[1]
 
     def _sample(self, across: float, down: float, owners_only: bool = False) -> tuple[Floats, NDArray[np.int64]]:
-        width, height = FRAME
+        width, height = self._size
         environment, camera = self._environment, self._environment.camera
         rotation, eye = camera.to_world[:, :3], camera.to_world[:, 3]
         u = (np.arange(width) + 0.5 + across) * environment.width / width

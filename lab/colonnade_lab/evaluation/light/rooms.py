@@ -97,10 +97,10 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Window:
-    """An upright rectangle that emits to one side.
+    """A rectangle that emits to one side.
 
     Attributes:
-        normal: The way that it faces, level.
+        normal: The way that it faces: level, up or down.
     """
 
     centre: Vector
@@ -111,7 +111,7 @@ class Window:
 
     def corners(self) -> Floats:
         """Its corners, counter-clockwise for those whom it faces, float64 [4, 3]."""
-        up = np.array([0.0, 1.0, 0.0])
+        up = np.array([0.0, 1.0, 0.0]) if self.normal[1] == 0.0 else np.array([0.0, 0.0, 1.0])
         right = unit_vectors(np.cross(up, np.array(self.normal))[None])[0]
         across, high = right * self.width / 2, up * self.height / 2
         offsets = np.array([-across - high, across - high, across + high, high - across])
@@ -137,11 +137,13 @@ class KnownRoom:
 
     Attributes:
         parts: Makes its geometry.
-        emitters: What lights it; none is in view.
+        emitters: What lights it.
         eye, target: The camera's position, and a point in the middle of its picture.
         focal: Focal length in picture widths.
         place: Where the panorama is taken.
         frames: The objects of each frame.
+        frame: Size of the frames, pixels.
+        is_users: Of the room only photo, depth, pose and a panorama without exposure are known.
     """
 
     parts: Callable[[], list[Part]]
@@ -151,6 +153,8 @@ class KnownRoom:
     focal: float
     place: Vector
     frames: Mapping[str, tuple[Thing, ...]]
+    frame: tuple[int, int] = FRAME
+    is_users: bool = False
 
     def camera(self, size: tuple[int, int] = PHOTO) -> EnvironmentCamera:
         """The camera of the photo, for a picture of another size."""
