@@ -76,6 +76,8 @@ def within_budget(
         budget = Budget.of(prepared.manifest, prepared.image, registers, seconds, passes)
     hidden = f"; {scene.blurs[0]} shows its middle" if scene.blurs else ""
     hidden += "; coats and highlights do not show" if passes(2) > 2 else ""
+    missing = len(scene.lights) - scene.pass_lights if scene.pass_lights else 0
+    hidden += f"; {missing} of {len(scene.lights)} lights do not show" if missing > 0 else ""
     note = joined(note, budget.note + (hidden if budget.samples == 1 else ""))
     return replace(prepared, scene=scene.with_samples(budget.samples)), note
 

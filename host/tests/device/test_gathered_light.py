@@ -276,7 +276,7 @@ def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, told: list[str])
     to_light = np.array(light.position) - object_pose(scene, extent, None).to_world(extent.centre)
     assert to_light[1] > 0.999 * np.linalg.norm(to_light) and light.radius > 0
     solid = 2 * np.pi * (1 - np.cos(np.pi / 50))
-    assert light.colour == pytest.approx([solid * 0.25 * 94 / np.pi] * 3, rel=0.02)
+    assert light.colour == pytest.approx([solid * (25 - 1) / np.pi] * 3, rel=0.02)
     assert prepared.scene.ambient.colour == pytest.approx([0.25] * 3, rel=0.01)
     words = prepared.image.attributes[-1].words
     assert (light_of(words) / 4096).max() < 0.75 and 1 <= marks_of(words).sum() <= 8, "the lamp is a light instead"
