@@ -91,15 +91,15 @@ def light_shares(strengths: Sequence[float], count: int, slots: int) -> list[tup
     A stronger light is in more passes, so that these are about as bright. If all passes have too few lights, those
     that come last in ``strengths`` are in none.
     """
-    shown = [0 if index < count * slots else count for index in range(len(strengths))]
+    counts = [0 if index < count * slots else count for index in range(len(strengths))]
     for _ in range(count * slots):
-        open_lights = [index for index, passes in enumerate(shown) if passes < count]
+        open_lights = [index for index, passes in enumerate(counts) if passes < count]
         if open_lights:
             # A light that is in no pass comes first
-            best = max(open_lights, key=lambda index: strengths[index] / shown[index] if shown[index] else np.inf)
-            shown[best] += 1
+            best = max(open_lights, key=lambda index: strengths[index] / counts[index] if counts[index] else np.inf)
+            counts[best] += 1
     factors, place = np.zeros((count, len(strengths))), 0
-    for index, passes in enumerate(shown):
+    for index, passes in enumerate(counts):
         if index < count * slots:
             factors[np.arange(place, place + passes) % count, index] = count / passes
             place += passes

@@ -233,9 +233,9 @@ def test_passes_share_lights_without_a_change_of_their_mean(strengths: list[floa
     strengths = sorted(strengths, reverse=True)
     shares = np.array(light_shares(strengths, count, slots))
     assert shares.shape == (count, len(strengths)) and ((shares > 0).sum(axis=1) <= slots).all()
-    shown = count * slots
-    np.testing.assert_allclose(shares[:, :shown].mean(axis=0), 1.0)
-    assert not shares[:, shown:].any()
+    places = count * slots
+    np.testing.assert_allclose(shares[:, :places].mean(axis=0), 1.0)
+    assert not shares[:, places:].any()
     assert (np.diff((shares > 0).sum(axis=0)) <= 0).all()
 
 
