@@ -100,7 +100,7 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
         r"samples is 2.5: it must be a whole number": lambda: cube.render(samples=2.5),
         r"size is \(4.5, 3\): it must be": lambda: cube.render(size=(4.5, 3)),
         r"size is array\(\[4, 3\]\): it must be width and height": lambda: cube.render(size=np.array([4, 3])),
-        r"config is None: it must be text": lambda: cube.render(config=None),
+        r"config is None: it must be text": lambda: cube.pack(config=None),
         r"overrides is 'a=1': it must be a list of texts": lambda: cube.pack(overrides="a=1"),
         r"hits is 'no': it must be true or false": lambda: cube.render(hits="no"),
         r"denoise is 'yes': it must be true or false, or one of": lambda: cube.render(denoise="yes"),
@@ -125,7 +125,7 @@ def test_what_is_wrong_is_said_in_one_line() -> None:
 def test_what_a_scene_leaves_open_is_a_warning_once_for_it(tmp_path: Path) -> None:
     """Whatever is rendered of it: frames, a film, or a change."""
     write_attic(tmp_path / "attic", 96, 72)
-    options = {"overrides": SMALL_MAPS, "size": (96, 72), "encoder": "live"}
+    options = {"config": "small", "overrides": SMALL_MAPS, "size": (96, 72)}
     scene = colonnade.Scene("cube", background={"room": "attic"}, motion={"turn": 60.0}, folder=tmp_path)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
