@@ -60,7 +60,7 @@ HIGHLIGHT_ROUGHNESS = 0.125
 #: The kind of a surface that spreads light cube and lights in a lobe, as the layers of a frame have it (`in_layer`).
 ROUGH_METAL = "rough metal"
 #: The layers of a frame, which are added: surfaces, their coats, and what the marks of lamps do not show.
-Layer = Literal["surface", "coat", "clear coat", "highlight", "glass highlight"]
+Layer = Literal["surface", "coat", "highlight", "glass highlight", "clear coat"]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 #: The layers of lights alone, and the radiance of a lamp that surfaces already show in the device's numbers, by its
 #: mark: what a mirror brings is at most 1, and glass reflects so little of the mark that all of it counts.
