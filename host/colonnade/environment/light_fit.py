@@ -87,9 +87,10 @@ def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS, walls: boo
     """
     samples = samples_of(environment)
     ambient = _refined(samples, RoomLights(np.full(3, 0.5)))
-    lights, surround, cost = _fitted(samples, ambient, count, False)
+    seen = tuple(seen_sources(environment)[: max(1, count - 1)])
+    lights, surround, cost = _fitted(samples, ambient, seen, count, False)
     if walls:
-        beside, walls_beside, beside_cost = _fitted(samples, ambient, count, True)
+        beside, walls_beside, beside_cost = _fitted(samples, ambient, seen, count, True)
         if beside_cost <= _GAIN * cost:
             lights, surround = beside, walls_beside
     lights = _rounded(lights)
@@ -97,16 +98,16 @@ def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS, walls: boo
 
 
 def _fitted(
-    samples: Samples, ambient: RoomLights, count: int, walls: bool
+    samples: Samples, ambient: RoomLights, seen: tuple[RoomLight, ...], count: int, walls: bool
 ) -> tuple[RoomLights, Surround | None, float]:
-    """As `fit_lights` beside the best ambient light, with the walls whatever they explain; and the robust cost."""
+    """As `fit_lights` beside the best ambient light, from the sources in the photo; with the walls anyway; and the cost."""
     best, floor = ambient, _AMBIENT_SHARE * ambient.ambient
     shining = Walls.around(samples) if walls else None
     if shining is not None:
         for _ in range(ALTERNATIONS):
             samples, best, shining = shining.fitted(samples, best)
-    if seen := seen_sources(environment)[: max(1, count - 1)]:
-        best = _refined(samples, replace(best, lights=tuple(seen)), floor)
+    if seen:
+        best = _refined(samples, replace(best, lights=seen), floor)
     for _ in range(count - len(seen)):
         starts = _starts(samples, best, _candidates(samples))
         refined = [_refined(samples, start, floor) for start in starts]

@@ -31,8 +31,6 @@ struct Design {
         format.recordBits = number("recordBits");
         format.vertexBits = number("vertexBits");
         format.boxBits = number("boxBits");
-        format.arity = number("arity");
-        format.trianglesPerRecord = number("trianglesPerRecord");
         format.stackDepth = number("stackDepth");
         format.normalFraction = number("normalFraction");
         format.bvh = number("bvh") != 0;

@@ -14,8 +14,8 @@ SOURCES = HERE.parents[1] / "colonnade"
 DECIDING = (
     "common/srgb.py", "common/vectors.py", "maps", "environment/light_fit.py", "environment/lights.py",
     "environment/photo_colours.py", "environment/repair.py", "environment/depth_normals.py",
-    "environment/derived_albedo.py", "environment/seen_sources.py", "mesh", "scene/joined_mesh.py", "scene/object_pose.py",
-    "scene_image",
+    "environment/derived_albedo.py", "environment/seen_sources.py", "mesh", "scene/joined_mesh.py",
+    "scene/object_pose.py", "scene_image",
 )  # fmt: skip
 #: Reports, which decide nothing.
 REPORTS = {"quality.py", "visualise.py"}
