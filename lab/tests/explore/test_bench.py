@@ -118,7 +118,8 @@ def test_mirrors_are_other_frames(simulators: Simulators) -> None:
 def test_another_dram_is_another_measurement(simulators: Simulators) -> None:
     names = ("lines", "ways", "misses", "sharedLines", "sharedWays", "sharedMisses", "busBytes")
     cache = json.dumps(dict(zip(names, (16, 4, 8, 32, 4, 8, 16), strict=True)) | {"parity": False})
-    for dram in ({}, {"dram_latency": 50}, {"dram_banks": 8}, {"dram_latency": 50}):
+    memories: list[dict[str, int]] = [{}, {"dram_latency": 50}, {"dram_banks": 8}, {"dram_latency": 50}]
+    for dram in memories:
         bench("tiny", (f"columnBvhMemory.cache={cache}",), ("cube",), (16, 12), 1, reuse=True, dram=dram)
     assert [job.arguments["dram"] for job in simulators.ran] == [{}, {"dram_latency": 50}, {"dram_banks": 8}]
 
