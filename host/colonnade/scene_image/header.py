@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -165,10 +166,7 @@ class ImageHeader:
         values["parts"] = tuple(MeshPart(**part) for part in values["parts"])
         extent = {name: np.array(value, dtype=np.float64) for name, value in values["extent"].items()}
         values["extent"] = Extent(**extent)
-        values["materials"] = tuple(
-            MeshMaterial(**{key: tuple(one) if isinstance(one, list) else one for key, one in material.items()})
-            for material in values["materials"]
-        )
+        values["materials"] = tuple(MeshMaterial(**_with_tuples(material)) for material in values["materials"])
         values["tree"] = TreeStatistics(**values["tree"]) if values["tree"] else None
         if environment := values["room"]:
             memories = tuple(LoadedMemory(**memory) for memory in environment["memories"])
@@ -179,3 +177,8 @@ class ImageHeader:
         # Files that are older than gathered light lack the key
         values["light"] = tuple(LoadedMemory(**memory) for memory in values.get("light", ()))
         return ImageHeader(**values)
+
+
+def _with_tuples(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of JSON, with tuples for lists."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
