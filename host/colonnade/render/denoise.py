@@ -204,10 +204,10 @@ def moments(values: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
 
 def _sums(values: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
     """Number, sums and sums of squares of values [height, width, k] around each pixel, where they show the object."""
-    shown = mask[..., None] * values
+    inside = mask[..., None] * values
 
     def around(of: Floats) -> Floats:
         size = (_WINDOW, _WINDOW) + (1,) * (of.ndim - 2)
         return np.asarray(ndimage.uniform_filter(of, size, mode="constant") * _WINDOW**2)
 
-    return around(mask.astype(np.float64)), around(shown), around(shown**2)
+    return around(mask.astype(np.float64)), around(inside), around(inside**2)
