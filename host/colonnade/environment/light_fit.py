@@ -100,7 +100,7 @@ def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS, walls: boo
 def _fitted(
     samples: Samples, ambient: RoomLights, seen: tuple[RoomLight, ...], count: int, walls: bool
 ) -> tuple[RoomLights, Surround | None, float]:
-    """As `fit_lights` beside the best ambient light, from the sources in the photo; with the walls anyway; and the cost."""
+    """As `fit_lights` beside the best ambient light, from the sources seen; with the walls anyway; and the cost."""
     best, floor = ambient, _AMBIENT_SHARE * ambient.ambient
     shining = Walls.around(samples) if walls else None
     if shining is not None:

@@ -34,17 +34,17 @@ public:
     /// first one's corners 1 and 0, by which the triangle unit recognises the edge.
     int cornerOf(std::size_t packed, int corner) const { return (rotation_[packed] + corner) % 3; }
 
-    /// The place of each packed id in the order of the tree; −1 where there is none.
-    std::vector<std::int64_t> places() const {
-        std::vector<std::int64_t> places(leafTriangles * sections_.attributeBase, -1);
+    /// The index of each packed id in the order of the tree; −1 where there is none.
+    std::vector<std::int64_t> indices() const {
+        std::vector<std::int64_t> indices(leafTriangles * sections_.attributeBase, -1);
         for (std::size_t leaf = 0; leaf < leafFirst_.size(); ++leaf)
-            for (std::uint32_t k = 0; k < leafCount_[leaf]; ++k) places[leafTriangles * (sections_.triangleBase + leaf) + k] = leafFirst_[leaf] + k;
-        return places;
+            for (std::uint32_t k = 0; k < leafCount_[leaf]; ++k) indices[leafTriangles * (sections_.triangleBase + leaf) + k] = leafFirst_[leaf] + k;
+        return indices;
     }
 
     /// The quantised face of each packed id; −1 where there is none.
     std::vector<std::int64_t> faces() const {
-        std::vector<std::int64_t> faces = places();
+        std::vector<std::int64_t> faces = indices();
         for (std::int64_t& face : faces)
             if (face >= 0) face = tree_.order[face];
         return faces;

@@ -43,9 +43,9 @@ public:
         tree_ = packer::buildTree(quantised_, attributes, design.format);
         packer_ = std::make_unique<packer::RecordPacker>(quantised_, attributes, tree_, design.format);
         checkFit(design);
-        places_ = packer_->places();
+        indices_ = packer_->indices();
         records_ = packer_->records();
-        place(design);
+        describe(design);
     }
 
     bool isEmpty() const { return faces_.faces().empty(); }
@@ -62,7 +62,7 @@ public:
 
     /// The face of a packed id; all ones for an id of none.
     std::size_t faceOfId(std::uint32_t id) const {
-        return id < places_.size() && places_[id] >= 0 ? static_cast<std::size_t>(quantised_.meshFaces[tree_.order[places_[id]]]) : ~std::size_t{0};
+        return id < indices_.size() && indices_[id] >= 0 ? static_cast<std::size_t>(quantised_.meshFaces[tree_.order[indices_[id]]]) : ~std::size_t{0};
     }
 
     /// u, v of an response by the corners of the face.
@@ -70,7 +70,7 @@ public:
         const std::uint32_t id = response.id & ~(COLONNADE_RAYS_BACK_SIDE | COLONNADE_RAYS_NON_OPAQUE);
         const double packed[3] = {std::max(0.0, 1.0 - response.u - response.v), response.u, response.v};
         double weights[3];
-        for (int i = 0; i < 3; ++i) weights[packer_->cornerOf(places_[id], i)] = packed[i];
+        for (int i = 0; i < 3; ++i) weights[packer_->cornerOf(indices_[id], i)] = packed[i];
         return {weights[1], weights[2]};
     }
 
@@ -113,10 +113,10 @@ private:
         if (design.format.bvh) refuse("stack entries", tree_.tree.stackBound, static_cast<std::size_t>(design.format.stackDepth));
     }
 
-    void place(const Design& design) {
-        idMasks_.resize(places_.size());
-        for (std::size_t id = 0; id < places_.size(); ++id)
-            if (places_[id] >= 0) idMasks_[id] = masks_[faceOfId(static_cast<std::uint32_t>(id))];
+    void describe(const Design& design) {
+        idMasks_.resize(indices_.size());
+        for (std::size_t id = 0; id < indices_.size(); ++id)
+            if (indices_[id] >= 0) idMasks_[id] = masks_[faceOfId(static_cast<std::uint32_t>(id))];
         const packer::Sections& s = packer_->sections();
         image_ = {records_.data(), s.recordCount, design.format.recordBytes(), s.triangleBase, s.triangleRecords, s.attributeBase, {}, {}, idMasks_.data(), 0, 0, {}};
         const double mantissa = std::frexp(quantised_.scale, &image_.scale_exponent);
@@ -140,7 +140,7 @@ private:
     packer::QuantisedMesh quantised_;
     bvh::Bvh tree_;
     std::unique_ptr<packer::RecordPacker> packer_;
-    std::vector<std::int64_t> places_;
+    std::vector<std::int64_t> indices_;
     std::vector<std::uint8_t> records_;
     colonnade_rays_image image_{};
     std::array<double, 3> corner_{};

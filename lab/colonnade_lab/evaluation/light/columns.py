@@ -168,8 +168,8 @@ def _frame(
     assert environment.photo is not None
     things = room.frames[frame]
     pictures = {"truth": truth, "no object": resized_photo(environment.photo, *room.frame)}
-    panoramas = (read_radiance(files.stored(name) / f"{which}.hdr") for which in ("around", "panorama"))
-    image, owners = ProbeFrame(lights, things, environment, *panoramas, size=room.frame).render()
+    around, panorama = (read_radiance(files.stored(name) / f"{which}.hdr") for which in ("around", "panorama"))
+    image, owners = ProbeFrame(lights, things, environment, around, panorama, room.frame).render()
     pictures["probe, rasteriser"] = encode_srgb(image)
     pictures |= _colonnade(scenes, room)
     is_object = owners >= 0

@@ -202,9 +202,9 @@ def _courtyard(draw: _Draw) -> KnownRoom:
     for _ in range(90):
         at = np.array([draw.number(-2.4, 2.4), roof + draw.number(-0.1, 0.2), draw.number(-2.0, 2.4)])
         wide, long = np.array([draw.number(0.1, 0.25), 0.03, 0.0]), np.array([0.0, 0.02, draw.number(0.1, 0.25)])
-        parts.append(
-            quad(*((at + i * wide + j * long).tolist() for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))), leaves)
-        )  # type: ignore[arg-type]
+        corners = ((at + i * wide + j * long).tolist() for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+        first, second, third, fourth = corners
+        parts.append(quad(first, second, third, fourth, leaves))
     parts += _clutter(draw, 0.0, 0.6, 0.7)
     parts.append(cylinder((draw.side() * 1.1, 0.25, -1.0), 0.25, 0.25, rings(draw.colour(0.3, 0.6, 0.2), 0.1)))
     eye = (draw.number(-0.4, 0.4), draw.number(1.2, 1.45), 1.9)
