@@ -34,19 +34,6 @@ def rates(data: Data) -> str:
     return markdown([*titles, "cycles as a mirror", "rays per cycle"], rows)
 
 
-def large(data: Data) -> str:
-    """Rays per cycle of `edge` on meshes of a million triangles, by the memory."""
-    found = data.result("bench-large")
-    rows = [
-        [name, f"{mesh['triangles']:,}", memory, f"**{mesh['rays_per_cycle_in_box']:.2f}**"]
-        + [f"{mesh['per_ray'][each]:.1f}" for each in ("node_reads", "triangle_tests", "dram_bytes")]
-        for name in found["latency"]["meshes"]
-        for part, memory in (("latency", "one latency"), ("banks", "8 banks"))
-        for mesh in (found[part]["meshes"][name],)
-    ]
-    return markdown(["mesh", "triangles", "DRAM", "rays per cycle", "nodes a ray", "triangles", "DRAM bytes"], rows)
-
-
 def utilisation(data: Data) -> str:
     """Utilisation of units and ports of `edge`, and what each would allow alone."""
     meshes = data.result("bench-edge")["meshes"]
@@ -126,7 +113,6 @@ def view(data: Data) -> str:
 
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "rates": rates,
-    "large": large,
     "utilisation": utilisation,
     "scaling": scaling,
     "ablation": ablation,
