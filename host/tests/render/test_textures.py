@@ -116,7 +116,7 @@ def test_more_bytes_keep_more_of_a_texture() -> None:
     found = [psnr(reference(1024, "diffuse"), frame) for frame in frames]
     print("dB in 5,632, 16,384 and 21,632 bytes: " + ", ".join(f"{one:.1f}" for one in found))
     assert found == sorted(found) and found[-1] > found[0] + 1.0
-    assert found[1] > 38.5, "tiles share no words"
+    assert found[1] > 37.5, "tiles share no words"
 
 
 @pytest.mark.skipif(not os.environ.get("COLONNADE_MESHES"), reason="the duck is in the folders of COLONNADE_MESHES")

@@ -171,7 +171,7 @@ def test_corners_of_faces_are_packed_darker_by_the_headroom(folder: Path, monkey
     (folder / "scene.toml").write_text(MIRROR.replace("mirror", "diffuse") + LAMP)
     packed: list[object] = []
     whole = device_scene.pack
-    monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given[-2]) or whole(*given))
+    monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given[3]) or whole(*given))
     prepared = DeviceScene.of(load_scene(folder / "scene.toml"), manifest_for("small", SMALL_MAPS).manifest)
     assert packed == [prepared.scene.headroom] and prepared.scene.headroom > 1
 

@@ -23,7 +23,7 @@ from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.inspect import dense_line, describe, report_lines
-from colonnade.scene_image.packer import MAX_MEMORY_DEPTH, QuantisedMesh, memory_use, pack, quantise
+from colonnade.scene_image.packer import QuantisedMesh, memory_use, pack, quantise
 
 MakeManifest = Callable[..., Manifest]
 
@@ -217,9 +217,9 @@ def test_a_preset_with_its_scene_in_dram_takes_a_large_mesh(triangles: int) -> N
     assert memory.endswith(f"({-(-header.record_count // 4) * 256:,} bytes of DRAM)")
 
 
-def test_presets_with_their_scenes_in_dram_have_addresses_of_22_bits() -> None:
+def test_presets_with_their_scenes_in_dram_have_addresses_of_21_bits() -> None:
     memories = [json.loads(file.read_text())["columnBvhMemory"] for file in (project_root() / "configs").glob("*.json")]
-    assert {memory["depth"] for memory in memories if memory["cache"]} == {MAX_MEMORY_DEPTH}
+    assert {memory["depth"] for memory in memories if memory["cache"]} == {1 << 21}
 
 
 def test_too_deep_a_tree_is_refused(make_manifest: MakeManifest) -> None:

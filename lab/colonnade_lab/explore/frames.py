@@ -47,6 +47,8 @@ class Frame:
 
     def with_children(self, children: Literal[2, 4]) -> Frame:
         """The frame with so many children of a node at most."""
+        if children == self.scene.mesh.children:
+            return self
         scene = replace(self.scene, mesh=replace(self.scene.mesh, children=children))
         return replace(self, scene=scene, identity={**self.identity, "children": children})
 

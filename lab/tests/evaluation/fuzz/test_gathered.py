@@ -19,7 +19,7 @@ from colonnade_lab.evaluation.fuzz.gathered import with_any_light
 #: A design of `test_gather.py`.
 OPTIONS = (
     *("units.shadeInterval=3", "frame.gather=true", "physicalAttributeMemory=null", "array.columns=1"),
-    *("frame.emission=true"),
+    "frame.emission=true",
 )
 
 

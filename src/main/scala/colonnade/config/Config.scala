@@ -61,7 +61,7 @@ final case class GeometryConfig(
     cornerColours: Boolean = false,
     textureBytes:  Int = 0
 ) {
-  Require.within("geometry.vertexBits", vertexBits, 10, 19)
+  Require.within("geometry.vertexBits", vertexBits, 10, 24)
   Require.within("geometry.boxBits", boxBits, 4, 7)
   triangleBits.foreach(Require.within("geometry.triangleBits", _, 16, 64))
   Require("geometry.textureBytes", textureBytes == 0 || cornerColours, "needs geometry.cornerColours=true")

@@ -58,7 +58,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
       "precision.mac"               -> (16, 64),
       "precision.sqrt"              -> (16, 64),
       "precision.div"               -> (16, 64),
-      "geometry.vertexBits"         -> (10, 19),
+      "geometry.vertexBits"         -> (10, 24),
       "geometry.boxBits"            -> (4, 7),
       "geometry.triangleBits"       -> (16, 64),
       "columnBvhMemory.depth"       -> (16, 1 << 22),

@@ -26,7 +26,7 @@ class NumberFormatsSpec extends AnyFlatSpec with Matchers {
       mac        <- 16 to 64 by 3
       sqrt       <- Seq(16, 17, 64)
       div        <- 16 to 64 by 6
-      vertexBits <- Seq(10, 16, 19)
+      vertexBits <- Seq(10, 16, 24)
       triangles  <- Seq("null", "16", "64")
     } withClue(s"${mac}b${sqrt}s${div}d, $vertexBits vertex bits, triangle tests of $triangles: ") {
       val n = numbers(mac, sqrt, div, vertexBits, triangles)
