@@ -42,7 +42,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def both(folder: Path, text: str) -> tuple[RenderResult, RenderResult]:
     """The frames of the model and of the reference."""
     (folder / "scene.toml").write_text(text)
-    model = render(RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, "model", SIZE, relit=True, encoder="offline"))
+    model = render(
+        RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, "model", SIZE, relit=True, encoder="offline")
+    )
     return model, render(RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, "reference", SIZE, relit=True))
 
 
