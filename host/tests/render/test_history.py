@@ -61,7 +61,7 @@ def test_another_surface_has_no_history() -> None:
 
 
 def test_frames_of_one_sample_grow_calm(tmp_path: Path) -> None:
-    """The last of eight frames of an object that hardly turns is nearer the truth than by itself."""
+    """The last of eight frames of an object that turns slowly is nearer the truth than by itself."""
     scene = tmp_path / "scene.toml"
     scene.write_text('mesh.name = "teapot:4"\npaths.gather = 1\nmotion.turn = 0.01\n')
     request = RenderRequest(scene, "textured", backend="model", size=(64, 48), frames=8, samples=1, denoise=True)

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from colonnade_lab.evaluation.light import files
 from colonnade_lab.evaluation.light.probe import Probe
-from colonnade_lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS, Lamp, Thing, Window
+from colonnade_lab.evaluation.light.rooms import FRAME, PHOTO, ROOMS, KnownRoom, Lamp, Thing, Window
 from colonnade_lab.evaluation.light.surfaces import RoomSurface, ThingSurface
+from colonnade_lab.evaluation.light.user_rooms import REPORT, known_room, user_room
 
 #: What the stored pictures may take, bytes.
 BUDGET = 1_750_000
@@ -31,6 +32,19 @@ def test_every_room_is_stored() -> None:
         total += sum(file.stat().st_size for file in files.stored(name).iterdir())
     assert PHOTO[0] % FRAME[0] == 0
     assert total <= BUDGET
+
+
+@pytest.mark.parametrize("kind", REPORT)
+def test_a_users_room_follows_from_its_seed(kind: str) -> None:
+    """So rooms for tuning are none of those that are reported."""
+
+    def corners(room: KnownRoom) -> np.ndarray:
+        return np.concatenate([part.vertices for part in room.parts()])
+
+    reported, tuned = known_room(kind), user_room(kind, 1)
+    np.testing.assert_array_equal(corners(reported), corners(user_room(kind, REPORT[kind])))
+    assert not np.array_equal(corners(reported), corners(tuned)) and reported.emitters != tuned.emitters
+    assert set(reported.frames) == {"rough", "clear"} and REPORT[kind] > 100
 
 
 @given(scale=st.floats(1e-6, 1e6), seed=st.integers(0, 99))

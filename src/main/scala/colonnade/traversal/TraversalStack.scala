@@ -4,8 +4,8 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.{Context, TimingSlice}
 import colonnade.config.TraversalConfig
-import colonnade.numbers.Rounding
 import colonnade.formats.NodeRecord
+import colonnade.numbers.Rounding
 
 /** The next step of a ray: a record to visit, or the end of traversal. */
 final class TraversalStep(config: TraversalConfig) extends Bundle {
