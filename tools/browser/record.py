@@ -55,7 +55,9 @@ def record(name: str) -> dict[str, Any]:
                 for field in fields
             }
         )
-    rendered = render_rtl(design, pack(mesh, manifest), registers, progress=for_terminal()).frames
+    image = pack(mesh, manifest)
+    # From reset, as in the page: a frame leaves arbiters and caches in another state
+    rendered = [render_rtl(design, image, [each]).frames[0] for each in registers]
     values = [[int(each.counters[counter]) for counter in COUNTERS] for each in rendered]
     return {"formatHash": job["manifest"]["formatHash"], **frame, "counters": COUNTERS, "values": values}
 
