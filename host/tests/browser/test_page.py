@@ -423,7 +423,9 @@ def test_recorded_cycles_are_those_of_the_rtl(context: BrowserContext) -> None:
     expect(tab.page.locator("#times caption")).to_contain_text("the recording is of the RTL of tiny", timeout=60_000)
     rows = [row.split("\t") for row in tab.page.locator("#times tbody").inner_text().splitlines()]
     assert rows[0][1:] == ["tiny", "tiny, recorded"] and len(rows) == 8
-    assert [ours for _, ours, recorded in rows[1:]] == [recorded for _, ours, recorded in rows[1:]]
+    # Schedules that run without pause may be a cycle further at the start
+    ours, recorded = (np.array([int(row[of].replace(",", "")) for row in rows[1:]]) for of in (1, 2))
+    assert np.abs(ours - recorded).max() <= 1
     assert tab.is_quiet()
 
 
