@@ -17,7 +17,13 @@ const colour = (values, otherwise) => (Array.isArray(values) && values.length >=
 export class GltfMaterials {
   /** `notes`: a set that takes what pictures do not show. */
   constructor(document, notes) {
-    Object.assign(this, { document, notes, textures: [], places: new Map(), materials: [], numbers: new Map() });
+    this.document = document;
+    this.notes = notes;
+    this.materials = [];
+    this.textures = [];
+    /** By use: the number in `materials`, and in `textures`. */
+    this.numbers = new Map();
+    this.places = new Map();
   }
 
   /** The number in `materials` of that of a primitive, which may have none. */
@@ -64,6 +70,7 @@ export class GltfMaterials {
     };
   }
 
+  /** @returns {any} The metallic-roughness part of a material, or what stands for it. */
   surfaceOf({ pbrMetallicRoughness: surface = { metallicFactor: 0 } }, older) {
     if (!older) return surface;
     const { glossinessFactor, diffuseFactor, diffuseTexture } = older;

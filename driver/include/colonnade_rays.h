@@ -112,21 +112,25 @@ struct colonnade_rays_scene;
  * `backend` NULL: the model. The device is NULL if there is no memory, and otherwise has the error. */
 int colonnade_rays_open(const char *design, const struct colonnade_rays_backend *backend,
                         struct colonnade_rays_device **device);
-void colonnade_rays_close(struct colonnade_rays_device *device); /* after its scenes */
+/* Closes a device, after its scenes. */
+void colonnade_rays_close(struct colonnade_rays_device *device);
 /* Text of the last call that failed, until the next call. */
 const char *colonnade_rays_error(const struct colonnade_rays_device *device);
 /* A number of the design, such as "vertexBits"; -1 without it. */
 int64_t colonnade_rays_design(const struct colonnade_rays_device *device, const char *name);
+/* What the rays have read and tested since the device was opened. */
 void colonnade_rays_counters(const struct colonnade_rays_device *device, struct colonnade_rays_sums *counters);
 
 /* Scenes. Changes take effect at the next commit. */
 int colonnade_rays_scene_new(struct colonnade_rays_device *device, struct colonnade_rays_scene **scene);
+/* Frees a scene; NULL is none. */
 void colonnade_rays_scene_free(struct colonnade_rays_scene *scene);
 /* Adds a mesh, which is copied: `vertices` [vertex_count][3], `faces` [face_count][3]. `*mesh` is its number. */
 int colonnade_rays_mesh_add(struct colonnade_rays_scene *scene, const double *vertices, size_t vertex_count,
                             const uint32_t *faces, size_t face_count, uint32_t *mesh);
 /* Moves the vertices of a mesh, as many as it has. */
 int colonnade_rays_mesh_update(struct colonnade_rays_scene *scene, uint32_t mesh, const double *vertices);
+/* Removes a mesh; its number is not used again. */
 int colonnade_rays_mesh_remove(struct colonnade_rays_scene *scene, uint32_t mesh);
 /* Leaves a mesh out of the scene, or takes it in. */
 int colonnade_rays_mesh_enable(struct colonnade_rays_scene *scene, uint32_t mesh, int is_enabled);
@@ -157,9 +161,11 @@ void colonnade_rays_refine(struct colonnade_rays_scene *scene, int is_refined);
 /* An order of the rays in which near ones follow each other: origins in Morton order, then the octant of the direction. */
 int colonnade_rays_order(const struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
                          uint32_t *order);
-/* Hands over a batch as it is, and waits for all. Mesh and face of an response's id: `colonnade_rays_face`. */
+/* Hands over a batch as it is. */
 int colonnade_rays_submit(struct colonnade_rays_scene *scene, const struct colonnade_rays_batch *batch);
+/* Waits until all batches are done. */
 int colonnade_rays_wait(struct colonnade_rays_scene *scene);
+/* The mesh and the face of the id of a response. */
 int colonnade_rays_face(const struct colonnade_rays_scene *scene, uint32_t id, uint32_t *mesh, uint32_t *face);
 
 #ifdef __cplusplus

@@ -167,7 +167,13 @@ using Texture = std::tuple<nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 3>,
 
 mesh::Picture<std::uint8_t> pictureOf(const Texture& texture) {
     const auto& [pixels, wrapU, wrapV, isNearest] = texture;
-    return {pixels.data(), static_cast<std::int64_t>(pixels.shape(0)), static_cast<std::int64_t>(pixels.shape(1)), 3, static_cast<mesh::Wrap>(wrapU), static_cast<mesh::Wrap>(wrapV), isNearest};
+    return {pixels.data(),
+            static_cast<std::int64_t>(pixels.shape(0)),
+            static_cast<std::int64_t>(pixels.shape(1)),
+            3,
+            static_cast<mesh::Wrap>(wrapU),
+            static_cast<mesh::Wrap>(wrapV),
+            isNearest};
 }
 
 nb::tuple metalOf(const Texture& map, const Positions& uvs, double metallic, double roughness) {
@@ -183,7 +189,8 @@ nb::tuple metalOf(const Texture& map, const Positions& uvs, double metallic, dou
     return result;
 }
 
-nb::object atlas(const Positions& uvs, const Column<std::int32_t>& textures, const Rows<double>& factors, const std::vector<Texture>& pictures, const Column<double>& linear, std::int64_t edge) {
+nb::object atlas(const Positions& uvs, const Column<std::int32_t>& textures, const Rows<double>& factors, const std::vector<Texture>& pictures,
+                 const Column<double>& linear, std::int64_t edge) {
     std::vector<mesh::Picture<std::uint8_t>> own;
     for (const Texture& each : pictures) own.push_back(pictureOf(each));
     std::vector<mesh::Paint> paints;

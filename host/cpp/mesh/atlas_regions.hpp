@@ -49,7 +49,7 @@ private:
             for (std::size_t i = 0; i < pixels.size(); ++i)
                 if (isSmall[i]) enlarged[i] = {pixels[i][0] * gain, pixels[i][1] * gain};
             if (const double found = placed(enlarged); found >= least * scale) {
-                pixels = enlarged;
+                pixels = std::move(enlarged);
                 scale = found;
                 break;
             }

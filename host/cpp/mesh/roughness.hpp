@@ -30,14 +30,16 @@ inline FaceMetal metalOf(const Picture<std::uint8_t>& map, const double* uvs, co
 
 /// Values in groups of one kind become means until so many groups are left: the two go first whose difference, squared, times
 /// their weight is least (Ward's clustering). Returns the value of each.
-inline std::vector<double> mergedValues(const std::vector<double>& values, const std::vector<double>& weights, const std::vector<std::int64_t>& kinds, std::size_t count) {
+inline std::vector<double> mergedValues(const std::vector<double>& values, const std::vector<double>& weights, const std::vector<std::int64_t>& kinds,
+                                        std::size_t count) {
     struct Group {
         std::int64_t kind;
         double weight, value;
         std::vector<std::int64_t> members;
     };
     std::vector<Group> groups;
-    for (const std::int64_t i : sortedIndices(values.size(), [&](std::int64_t a, std::int64_t b) { return std::pair{kinds[a], values[a]} < std::pair{kinds[b], values[b]}; }))
+    for (const std::int64_t i :
+         sortedIndices(values.size(), [&](std::int64_t a, std::int64_t b) { return std::pair{kinds[a], values[a]} < std::pair{kinds[b], values[b]}; }))
         groups.push_back({kinds[i], weights[i], values[i], {i}});
     while (groups.size() > count) {
         std::size_t best = 0;
