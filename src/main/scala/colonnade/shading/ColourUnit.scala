@@ -21,7 +21,7 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
 }
 
 /** Colours of paths: docs/numbers.md, 5.9 and 6. A path has a radiance so far, and a throughput that weights what it still
-  * hits. They are in a table. A pipeline, a slot of a [[ColourSchedule]] a cycle: docs/shading.md. {{{
+  * hits. They are in a table. A pipeline, a slot of a `ColourSchedule` a cycle: docs/shading.md. {{{
   *
   * bounce, end ─▶ read ─▶ product ─▶ sum ─▶ reflected ─▶ seen ─▶ part ─▶ colour or radiance, throughput
   *
