@@ -3,7 +3,7 @@
 import { designLines, registerWrites } from "./design.js";
 
 const PACKED = [
-  "triangles", "recordCount", "triangleBase", "triangleRecords", "attributeBase", "lowX", "lowY", "lowZ", "highX", "highY",
+  "triangles", "recordCount", "nodes", "leaves", "hasColours", "lowX", "lowY", "lowZ", "highX", "highY",
   "highZ", "shadingOffset", "treeDepth", "stackBound", "dropped", "flipped", "replaced", "reversed",
 ];
 /** Those of the register map that do not depend on time. */

@@ -84,10 +84,10 @@ struct colonnade_rays_sums {
     uint64_t rays_in_box, node_reads, box_tests, triangle_tests, deepest_stack;
 };
 
-/* What a backend loads: the records of the column memory (bytes, in sections of records), and the placement of rays. */
+/* What a backend loads: the records of the column memory with the root first, and the placement of rays. */
 struct colonnade_rays_image {
     const uint8_t *records;
-    size_t record_count, record_bytes, triangle_base, triangle_records, attribute_base;
+    size_t record_count, record_bytes;
     int32_t bounds_low[3], bounds_high[3]; /* vertex units */
     const uint8_t *masks;                  /* by the device's number of a triangle */
     uint32_t scale_mantissa;               /* vertex units in the application's unit: mantissa * 2^(exponent - 24) */

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "binding.hpp"
 #include "packer/tree.hpp"
 
 namespace nb = nanobind;
@@ -42,13 +43,16 @@ packer::QuantisedMesh meshOf(const Integers& vertices, const Integers& faces) {
     return mesh;
 }
 
-nb::dict buildBvh(const Integers& vertices, const Integers& faces, int children, int boxBits, int stackDepth) {
+nb::dict buildBvh(const Integers& vertices, const Integers& faces, int children, int boxBits, int stackDepth, const colonnade::binding::FieldTuples& layouts,
+                  int normalFraction) {
     if (faces.shape(0) == 0) throw std::invalid_argument("no triangles");
     if (children < 2 || children > nodeChildren || boxBits < 1 || boxBits > 16) throw std::invalid_argument("unsupported tree parameters");
     const packer::QuantisedMesh mesh = meshOf(vertices, faces);
     const std::vector<std::array<colonnade::mesh::Vector, 3>> normals(mesh.faces.size());
     const std::vector<std::uint8_t> zeros(mesh.faces.size());
     packer::RecordFormat format;
+    format.layouts = colonnade::binding::layoutsOf(layouts);
+    format.normalFraction = normalFraction;
     format.children = children;
     format.boxBits = boxBits;
     format.stackDepth = stackDepth;
@@ -58,17 +62,19 @@ nb::dict buildBvh(const Integers& vertices, const Integers& faces, int children,
         built = packer::buildTree(mesh, {normals.data(), zeros.data(), zeros.data(), nullptr}, format);
     }
     bvh::WideTree& tree = built.tree;
-    const std::size_t nodes = tree.nodes(), leaves = tree.leafFirst.size(), triangles = built.order.size();
+    const std::size_t nodes = tree.nodes(), leaves = tree.leaves(), triangles = built.order.size();
     nb::dict out;
+    out["node_address"] = array(std::move(tree.nodeAddress), {nodes});
     out["origin"] = array(std::move(tree.origin), {nodes, 3});
     out["exponent"] = array(std::move(tree.exponent), {nodes, 3});
-    out["kinds"] = array(std::move(tree.kinds), {nodes, std::size_t{nodeChildren}});
     out["low"] = array(std::move(tree.low), {nodes, std::size_t{nodeChildren}, 3});
     out["high"] = array(std::move(tree.high), {nodes, std::size_t{nodeChildren}, 3});
-    out["first_child"] = array(std::move(tree.firstChild), {nodes});
-    out["first_triangles"] = array(std::move(tree.firstTriangles), {nodes});
+    out["first"] = array(std::move(tree.first), {nodes});
+    out["node_count"] = array(std::move(tree.nodeCount), {nodes});
+    out["leaf_children"] = array(std::move(tree.leafCount), {nodes});
+    out["leaf_address"] = array(std::move(tree.leafAddress), {leaves});
     out["leaf_first"] = array(std::move(tree.leafFirst), {leaves});
-    out["leaf_count"] = array(std::move(tree.leafCount), {leaves});
+    out["leaf_count"] = array(std::move(tree.leafTriangleCount), {leaves});
     out["order"] = array(std::move(built.order), {triangles});
     out["depth"] = tree.depth;
     out["stack_bound"] = tree.stackBound;
@@ -80,6 +86,6 @@ nb::dict buildBvh(const Integers& vertices, const Integers& faces, int children,
 }  // namespace
 
 void bind_bvh(nb::module_& module) {
-    module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "children"_a, "box_bits"_a, "stack_depth"_a,
+    module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "children"_a, "box_bits"_a, "stack_depth"_a, "layouts"_a, "normal_fraction"_a,
                "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the arrays of tests/trees.py.");
 }

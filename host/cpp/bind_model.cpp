@@ -103,7 +103,7 @@ public:
         for (std::size_t i = 0; i < count; ++i) {
             const Ray ray = prepareRay(requestOf(origins, directions, i), device_.frame().bounds, numbers_);
             Node node{};
-            node.kinds[0] = Child::leaf;
+            node.leaves = 1;
             for (std::size_t a = 0; a < 3; ++a) {
                 node.origin[a] = corners(i, a);
                 node.exponent[a] = static_cast<int>(exponents(i, a));

@@ -83,9 +83,8 @@ public:
         const packer::Sections& sections = packer_->sections();
         nb::dict result;
         result["record_count"] = sections.recordCount;
-        result["triangle_base"] = sections.triangleBase;
-        result["triangle_records"] = sections.triangleRecords;
-        result["attribute_base"] = sections.attributeBase;
+        result["nodes"] = sections.nodes;
+        result["leaves"] = sections.leaves;
         result["bounds_low"] = nb::make_tuple(sections.boundsLow[0], sections.boundsLow[1], sections.boundsLow[2]);
         result["bounds_high"] = nb::make_tuple(sections.boundsHigh[0], sections.boundsHigh[1], sections.boundsHigh[2]);
         result["largest_triangle"] = sections.largestTriangle;
@@ -95,7 +94,7 @@ public:
     nb::dict statistics() const {
         nb::dict result;
         result["nodes"] = tree_.tree.nodes();
-        result["leaves"] = tree_.tree.leafFirst.size();
+        result["leaves"] = tree_.tree.leaves();
         result["depth"] = tree_.tree.depth;
         result["stack_bound"] = tree_.tree.stackBound;
         result["cost"] = tree_.tree.cost;

@@ -7,6 +7,7 @@ void bind_environment(nb::module_& module);
 void bind_bvh(nb::module_& module);
 void bind_driver(nb::module_& module);
 void bind_fixed_order(nb::module_& module);
+void bind_leaf(nb::module_& module);
 void bind_live(nb::module_& module);
 void bind_model(nb::module_& module);
 void bind_packer(nb::module_& module);
@@ -20,6 +21,7 @@ NB_MODULE(_core, module) {
     bind_bvh(module);
     bind_driver(module);
     bind_fixed_order(module);
+    bind_leaf(module);
     bind_live(module);
     bind_model(module);
     bind_packer(module);

@@ -2,7 +2,7 @@
 //
 //   numbers key=value ...                                   (first line; no reply)
 //   setup  isShadow origin[3] direction[3] low[3] high[3] -> enters axis negative[3] origin[3] boxOrigin[3] shear[2] reciprocal[2] exponent[2] entry limit
-//   box    axis negative[3] boxOrigin[3] reciprocal[2] exponent[2] limit, origin[3] exponent[3] firstChild firstTriangles (kind low[3] high[3])*4
+//   box    axis negative[3] boxOrigin[3] reciprocal[2] exponent[2] limit, origin[3] exponent[3] nodes leaves (low[3] high[3])*4
 //                                                         -> tests count (slot near)*count
 //   triangle axis negative[3] origin[3] shear[2] vertices[9] -> isHit t weights[3] backSide
 //   limit  t                                              -> tMaxUnits
@@ -15,10 +15,17 @@
 //                                                         -> as shade, for a point of the environment
 //   bounce axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat kind etaFront etaBack reflectance
 //                                                         -> isRefraction origin[3] direction[3] reflection[3] fresnelWeight
+//   cornernormal u v                                      -> normal[3]
+//   geometricnormal vertices[9]                           -> normal[3]
+//   leaf   words[n], n = 8 up to 19 vertex bits, 32 bits each, low ones first         -> format isClear material vertices[4][3] normals[4][2]; those that it has not are 0
+//   leafface triangle words[n]                            -> material normals[9] geometricNormal[3]
+//   newleaf isPair isClear material vertices[4][3] normals[4][2]
+//                                                         -> words[n]; all 0 if the vertices are too far apart
+//          after `layout` lines of the formats of leaves
 //
 // Queries for whole pixels. The first three lines load the scene, in this order, and have no reply:
 //   layout record name=offset,width,signed ...              (for each kind of record)
-//   records triangleBase attributeBase hexadecimal ...
+//   records hexadecimal ...
 //   registers name=value ...
 //   pixel  x y                                            -> colour[3] isObject triangle distance ratio[3]
 //          with an environment if its lines precede the registers
@@ -28,6 +35,7 @@
 #include <sstream>
 
 #include "model/frame.hpp"
+#include "packer/leaf.hpp"
 #include "environment_queries.hpp"
 
 namespace {
@@ -73,10 +81,9 @@ void replyBox(Query& query, const Numbers& n) {
     Node node{};
     node.origin = query.vector();
     for (auto& exponent : node.exponent) exponent = static_cast<int>(query.number());
-    node.firstChild = static_cast<std::uint32_t>(query.number());
-    node.firstTriangles = static_cast<std::uint32_t>(query.number());
+    node.nodes = static_cast<int>(query.number());
+    node.leaves = static_cast<int>(query.number());
     for (int child = 0; child < nodeChildren; ++child) {
-        node.kinds[child] = static_cast<Child>(query.number());
         for (auto& low : node.low[child]) low = static_cast<std::int32_t>(query.number());
         for (auto& high : node.high[child]) high = static_cast<std::int32_t>(query.number());
     }
@@ -162,6 +169,72 @@ void replyEnvironmentLight(Query& query, const Numbers& n) {
     replyLights(query, origin, {normal[0], normal[1], normal[2]}, shadows, n);
 }
 
+void replyCornerNormal(Query& query, const Numbers& n) {
+    Octahedral code{query.number(), 0};
+    code.v = query.number();
+    Reply reply;
+    reply.all(directionOf(code, n.normalFraction)).print();
+}
+
+void replyGeometricNormal(Query& query, const Numbers& n) {
+    std::array<Vector, 3> vertices;
+    for (auto& vertex : vertices) vertex = query.vector();
+    Reply reply;
+    reply.all(geometricNormal(vertices, n.normalFraction)).print();
+}
+
+using LeafBytes = std::vector<std::uint8_t>;
+
+Leaf readLeaf(Query& query, const LeafFields& fields) {
+    LeafBytes record(4 * fields.words());
+    for (std::size_t word = 0; word < fields.words(); ++word)
+        for (std::int64_t byte = 0, bits = query.number(); byte < 4; ++byte) record[4 * word + byte] = static_cast<std::uint8_t>(bits >> 8 * byte);
+    return readLeaf(fields, record.data());
+}
+
+void replyLeaf(Query& query, const LeafFields& fields) {
+    const Leaf leaf = readLeaf(query, fields);
+    Reply reply;
+    reply << static_cast<int>(leaf.format) << leaf.isClear << leaf.material;
+    for (const auto& vertex : leaf.vertices) reply.all(vertex);
+    for (const auto& normal : leaf.normals) reply << normal.u << normal.v;
+    reply.print();
+}
+
+void replyLeafFace(Query& query, const LeafFields& fields, const Numbers& n) {
+    const int triangle = static_cast<int>(query.number());
+    const Face face = faceOf(readLeaf(query, fields), triangle, n.normalFraction);
+    Reply reply;
+    reply << face.material;
+    for (const auto& normal : face.normals) reply.all(normal);
+    reply.all(face.geometricNormal).print();
+}
+
+void replyNewLeaf(Query& query, const LeafFields& fields, const Numbers& n) {
+    Leaf leaf{};
+    const bool isPair = query.number() != 0;
+    leaf.isClear = query.number() != 0;
+    leaf.material = static_cast<int>(query.number());
+    for (auto& vertex : leaf.vertices) vertex = query.vector();
+    for (auto& normal : leaf.normals) {
+        normal.u = query.number();
+        normal.v = query.number();
+    }
+    const std::optional<LeafFormat> format = isPair ? packer::formatOf(fields, leaf, n.normalFraction) : LeafFormat::triangle;
+    LeafBytes record(4 * fields.words());
+    if (format) {
+        leaf.format = *format;
+        packer::writeLeaf(fields, leaf, record.data());
+    }
+    Reply reply;
+    for (std::size_t word = 0; word < fields.words(); ++word) {
+        std::int64_t bits = 0;
+        for (std::size_t byte = 0; byte < 4; ++byte) bits |= std::int64_t(record[4 * word + byte]) << 8 * byte;
+        reply << bits;
+    }
+    reply.print();
+}
+
 void replyBounce(Query& query, const Numbers& n) {
     const Surface surface = readSurface(query, n);
     const std::int64_t offset = query.number();
@@ -204,9 +277,13 @@ public:
 
     const std::map<std::string, Layout>& layouts() const { return layouts_; }
 
+    const LeafFields& leafFields() {
+        if (!leafFields_) leafFields_.emplace(layouts_);
+        return *leafFields_;
+    }
+
     void readRecords(std::istream& words) {
-        std::size_t triangleBase, attributeBase, count = 0;
-        words >> triangleBase >> attributeBase;
+        std::size_t count = 0;
         std::vector<std::uint8_t> bytes;
         for (std::string digits; words >> digits; ++count)
             for (std::size_t end = digits.size(); end > 0; end -= 2) bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
@@ -223,6 +300,7 @@ public:
 private:
     Numbers numbers_;
     std::map<std::string, Layout> layouts_;
+    std::optional<LeafFields> leafFields_;
     std::optional<Device> device_;
 };
 
@@ -256,6 +334,11 @@ int main() try {
         else if (kind == "cornercolour") replyCornerColour(query, numbers);
         else if (kind == "lightenvironment") replyEnvironmentLight(query, numbers);
         else if (kind == "bounce") replyBounce(query, numbers);
+        else if (kind == "cornernormal") replyCornerNormal(query, numbers);
+        else if (kind == "geometricnormal") replyGeometricNormal(query, numbers);
+        else if (kind == "leaf") replyLeaf(query, scene.leafFields());
+        else if (kind == "leafface") replyLeafFace(query, scene.leafFields(), numbers);
+        else if (kind == "newleaf") replyNewLeaf(query, scene.leafFields(), numbers);
         else if (kind == "layout") scene.readLayout(words);
         else if (kind == "records") scene.readRecords(words);
         else if (kind == "registers") {

@@ -8,21 +8,23 @@
 
 namespace colonnade::bvh {
 
-enum class Kind : std::uint8_t { empty = 0, node = 1, leaf = 2 };
-
-/// Flat arrays with one entry per node, times `nodeChildren` where stated. `firstTriangles` counts from the first leaf record.
+/// Flat arrays of the nodes and of the leaves, by rising address. The children of a node are at consecutive addresses: nodes, then
+/// leaves. Subtrees follow depth first.
 struct WideTree {
-    std::vector<std::uint32_t> origin;                       ///< nodes × 3, vertex units
-    std::vector<std::uint8_t> exponent;                      ///< nodes × 3
-    std::vector<std::uint8_t> kinds;                         ///< nodes × nodeChildren
-    std::vector<std::uint16_t> low, high;                    ///< nodes × nodeChildren × 3
-    std::vector<std::uint32_t> firstChild, firstTriangles;   ///< nodes; 0 without such a child
-    std::vector<std::uint32_t> leafFirst, leafCount;         ///< leaf records: packed id of the first triangle, number of triangles
+    std::vector<std::uint32_t> nodeAddress;        ///< the root's is 0
+    std::vector<std::uint32_t> origin;             ///< nodes × 3, vertex units
+    std::vector<std::uint8_t> exponent;            ///< nodes × 3
+    std::vector<std::uint16_t> low, high;          ///< nodes × nodeChildren × 3
+    std::vector<std::uint32_t> first;              ///< nodes; address of the first child
+    std::vector<std::uint8_t> nodeCount, leafCount; ///< nodes; children of each kind
+    std::vector<std::uint32_t> leafAddress;
+    std::vector<std::uint32_t> leafFirst, leafTriangleCount;  ///< leaves: position of the first triangle in the order, and their number
     unsigned depth = 0;                                      ///< nodes on the longest path from the root
     unsigned stackBound = 0;                                 ///< largest number of stack entries that a ray can need
     double cost = 0;                                         ///< expected record reads of a random ray through the root box
 
-    std::size_t nodes() const { return firstChild.size(); }
+    std::size_t nodes() const { return first.size(); }
+    std::size_t leaves() const { return leafFirst.size(); }
 };
 
 /// Replaces the binary nodes by wide nodes with the least sum of areas, which is the expected number of node reads (Ylitie,
@@ -30,9 +32,9 @@ struct WideTree {
 class Collapser {
 public:
     /// `most`: children of a node, 2 to `nodeChildren`. `stackDepth`: at least the height of the tree, which is the least stack bound
-    /// of all collapses.
-    Collapser(const BinaryTree& tree, unsigned most, unsigned boxBits, unsigned stackDepth)
-        : tree_(tree), most_(most), boxBits_(boxBits), stackDepth_(stackDepth), heights_(heights(tree)), free_(tree.nodes.size()) {
+    /// of all collapses. `leafRecords`: records of a leaf.
+    Collapser(const BinaryTree& tree, unsigned most, unsigned boxBits, unsigned stackDepth, unsigned leafRecords)
+        : tree_(tree), most_(most), boxBits_(boxBits), stackDepth_(stackDepth), leafRecords_(leafRecords), heights_(heights(tree)), free_(tree.nodes.size()) {
         for (std::size_t i = tree.nodes.size(); i-- > 0;)
             if (!tree.nodes[i].isLeaf())
                 for (unsigned slots = 1; slots < most_; ++slots) free_[i][slots - 1] = findForm(static_cast<std::int32_t>(i), slots, unlimited);
@@ -44,36 +46,37 @@ public:
 
         struct Task {
             std::int32_t binary;
-            std::uint32_t index;
+            std::size_t index;
             unsigned depth, stack;
         };
         std::vector<Task> tasks{{0, 0, 1, stackDepth_}};
-        append(wide);
+        std::uint32_t end = 0;  // of the addresses that are taken
+        append(wide, end++);
         while (!tasks.empty()) {
             const Task task = tasks.back();
             tasks.pop_back();
             wide.depth = std::max(wide.depth, task.depth);
             wide.cost += static_cast<double>(tree_.nodes[task.binary].box.halfArea()) / rootArea;
-            const std::vector<std::int32_t> children = childrenOf(task.binary, task.stack);
+            std::vector<std::int32_t> children = childrenOf(task.binary, task.stack);
+            const auto leaves = std::stable_partition(children.begin(), children.end(), [&](std::int32_t child) { return !tree_.nodes[child].isLeaf(); });
             const unsigned below = task.stack - static_cast<unsigned>(children.size() - 1);
             quantise(wide, task.index, tree_.nodes[task.binary].box, children);
+            wide.first[task.index] = end;
+            wide.nodeCount[task.index] = static_cast<std::uint8_t>(leaves - children.begin());
+            wide.leafCount[task.index] = static_cast<std::uint8_t>(children.end() - leaves);
 
-            // Siblings are adjacent and a subtree follows its root, which keeps spatial neighbours close in memory
             std::vector<Task> pending;
-            for (std::size_t slot = 0; slot < children.size(); ++slot) {
-                const BinaryNode& child = tree_.nodes[children[slot]];
-                if (child.isLeaf()) {
-                    if (!hasKind(wide, task.index, slot, Kind::leaf)) wide.firstTriangles[task.index] = static_cast<std::uint32_t>(wide.leafFirst.size());
-                    wide.kinds[task.index * nodeChildren + slot] = static_cast<std::uint8_t>(Kind::leaf);
-                    wide.leafFirst.push_back(child.begin);
-                    wide.leafCount.push_back(child.end - child.begin);
-                    wide.cost += static_cast<double>(child.box.halfArea()) / rootArea;
-                } else {
-                    if (!hasKind(wide, task.index, slot, Kind::node)) wide.firstChild[task.index] = static_cast<std::uint32_t>(wide.nodes());
-                    wide.kinds[task.index * nodeChildren + slot] = static_cast<std::uint8_t>(Kind::node);
-                    pending.push_back({children[slot], static_cast<std::uint32_t>(wide.nodes()), task.depth + 1, below});
-                    append(wide);
-                }
+            for (auto child = children.begin(); child != leaves; ++child) {
+                pending.push_back({*child, wide.nodes(), task.depth + 1, below});
+                append(wide, end++);
+            }
+            for (auto child = leaves; child != children.end(); ++child) {
+                const BinaryNode& leaf = tree_.nodes[*child];
+                wide.leafAddress.push_back(end);
+                end += leafRecords_;
+                wide.leafFirst.push_back(leaf.begin);
+                wide.leafTriangleCount.push_back(leaf.end - leaf.begin);
+                wide.cost += static_cast<double>(leaf.box.halfArea()) / rootArea;
             }
             tasks.insert(tasks.end(), pending.rbegin(), pending.rend());
         }
@@ -82,21 +85,15 @@ public:
     }
 
 private:
-    void append(WideTree& wide) const {
+    void append(WideTree& wide, std::uint32_t address) const {
+        wide.nodeAddress.push_back(address);
         wide.origin.insert(wide.origin.end(), 3, 0);
         wide.exponent.insert(wide.exponent.end(), 3, 0);
-        wide.kinds.insert(wide.kinds.end(), nodeChildren, 0);
         wide.low.insert(wide.low.end(), nodeChildren * 3, 0);
         wide.high.insert(wide.high.end(), nodeChildren * 3, 0);
-        wide.firstChild.push_back(0);
-        wide.firstTriangles.push_back(0);
-    }
-
-    /// Whether a slot before `slot` has a child of this kind.
-    bool hasKind(const WideTree& wide, std::uint32_t node, std::size_t slot, Kind kind) const {
-        for (std::size_t i = 0; i < slot; ++i)
-            if (wide.kinds[node * nodeChildren + i] == static_cast<std::uint8_t>(kind)) return true;
-        return false;
+        wide.first.push_back(0);
+        wide.nodeCount.push_back(0);
+        wide.leafCount.push_back(0);
     }
 
     static constexpr unsigned unlimited = UINT16_MAX;
@@ -189,7 +186,7 @@ private:
 
     /// Rounds child boxes outward to multiples of 2^exponent, and the node's low corner down to one. The lattice of a child lies
     /// in its parent's, so the rounded boxes of children give the same node as their exact boxes.
-    void quantise(WideTree& wide, std::uint32_t index, const Box& box, const std::vector<std::int32_t>& children) const {
+    void quantise(WideTree& wide, std::size_t index, const Box& box, const std::vector<std::int32_t>& children) const {
         const std::int64_t maximum = (std::int64_t{1} << boxBits_) - 1;
         for (int a = 0; a < 3; ++a) {
             int exponent = 0;
@@ -201,7 +198,7 @@ private:
             wide.exponent[index * 3 + a] = static_cast<std::uint8_t>(exponent);
             for (std::size_t slot = 0; slot < children.size(); ++slot) {
                 const Box& child = tree_.nodes[children[slot]].box;
-                const std::size_t at = (std::size_t{index} * nodeChildren + slot) * 3 + a;
+                const std::size_t at = (index * nodeChildren + slot) * 3 + a;
                 wide.low[at] = static_cast<std::uint16_t>(floored(child.low[a]) - origin);
                 wide.high[at] = static_cast<std::uint16_t>(raised(child.high[a]) - origin);
             }
@@ -212,20 +209,15 @@ private:
     unsigned stackBound(const WideTree& wide) const {
         std::vector<unsigned> bound(wide.nodes(), 0);
         for (std::size_t node = wide.nodes(); node-- > 0;) {
-            unsigned children = 0, deepest = 0, nodeChild = 0;
-            for (int slot = 0; slot < nodeChildren; ++slot) {
-                const auto kind = static_cast<Kind>(wide.kinds[node * nodeChildren + slot]);
-                if (kind == Kind::empty) continue;
-                ++children;
-                if (kind == Kind::node) deepest = std::max(deepest, bound[wide.firstChild[node] + nodeChild++]);
-            }
-            bound[node] = children - 1 + deepest;
+            const auto child = bound.begin() + (std::lower_bound(wide.nodeAddress.begin(), wide.nodeAddress.end(), wide.first[node]) - wide.nodeAddress.begin());
+            const unsigned deepest = wide.nodeCount[node] ? *std::max_element(child, child + wide.nodeCount[node]) : 0;
+            bound[node] = wide.nodeCount[node] + wide.leafCount[node] - 1u + deepest;
         }
         return bound[0];
     }
 
     const BinaryTree& tree_;
-    const unsigned most_, boxBits_, stackDepth_;
+    const unsigned most_, boxBits_, stackDepth_, leafRecords_;
     const std::vector<unsigned> heights_;
     std::vector<std::array<Form, 3>> free_;             ///< forms without a limit of the stack, by node and slots
     std::unordered_map<std::uint64_t, Form> limited_;  ///< forms within a stack, by node, slots and stack
@@ -240,13 +232,13 @@ struct Bvh {
 
 /// Builds the tree. If the binary tree is higher than the stack is deep, it is built again with that limit. The caller must check
 /// whether the returned tree fits the stack.
-inline Bvh build(const std::vector<Box>& boxes, const IsPair& isPair, unsigned most, unsigned boxBits, unsigned stackDepth) {
+inline Bvh build(const std::vector<Box>& boxes, const IsPair& isPair, unsigned most, unsigned boxBits, unsigned stackDepth, unsigned leafRecords) {
     const unsigned limit = std::max(stackDepth, balancedHeight(boxes.size()));
     BinaryTree tree = BinaryBuilder(boxes, isPair, 0).build();
     const bool isTooHigh = heights(tree)[0] > limit;
     if (isTooHigh) tree = BinaryBuilder(boxes, isPair, limit).build();
     tree = Reinsertion(std::move(tree), limit).optimise();
-    WideTree wide = Collapser(tree, most, boxBits, limit).collapse();
+    WideTree wide = Collapser(tree, most, boxBits, limit, leafRecords).collapse();
     return {std::move(wide), std::move(tree.order), isTooHigh ? limit : 0};
 }
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from colonnade.common import notes
-from colonnade.design.manifest import Manifest
+from colonnade.design.manifest import VERSION, Manifest
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -55,7 +55,7 @@ def manifest_data(
     layouts = _layouts(vertex_bits, box_bits, address)
     widest = max(sum(width for _, width, _ in fields) for fields in layouts.values())
     return {
-        "version": 2,
+        "version": VERSION,
         "config": {
             "array": {"rows": 1, "columns": 1, "contexts": 8},
             "units": {"pathContexts": 8, "marches": 1},
@@ -96,20 +96,27 @@ def _vector(name: str, width: int, signed: bool = False) -> FieldList:
 
 
 def _layouts(vertex: int, box: int, address: int) -> dict[str, FieldList]:
-    node = _vector("origin", vertex) + _vector("exponent", (vertex - box + 1).bit_length())
-    node += [("firstChild", address, False), ("firstTriangles", address, False)]
-    for child in range(4):
-        node += [(f"kinds[{child}]", 2, False), *_vector(f"low[{child}]", box), *_vector(f"high[{child}]", box)]
-    triangles: FieldList = [("count", 2, False)]
-    triangles += [(f"isClear[{k}]", 1, False) for k in range(2)]
-    for corner in range(6):
-        triangles += _vector(f"vertices[{corner}]", vertex)
-    attributes: FieldList = []
-    for face in range(2):
-        for corner in range(3):
-            attributes += _vector(f"faces[{face}].normals[{corner}]", 12, True)
-        attributes += [*_vector(f"faces[{face}].geometricNormal", 12, True), (f"faces[{face}].material", 8, False)]
-    return {"node": node, "triangles": triangles, "attributes": attributes}
+    node: FieldList = [("nodes", 3, False), ("leaves", 3, False), ("first", address, False)]
+    node += _vector("corner", vertex + 1)
+    for child in reversed(range(4)):
+        node += [*_vector(f"children[{child}].high", box), *_vector(f"children[{child}].low", box)]
+    delta, axes, code = (156 - 3 * vertex) // 9, "xyz", "uv"
+    head: FieldList = [("format", 2, False), ("isClear", 1, False), ("material", 8, False)]
+    vertices = _bodies("vertices", 4, axes, vertex)
+    far = _bodies("normals", 4, code, 10, True) + _bodies("deltas", 3, axes, delta) + vertices[-3:] + head
+    near = _bodies("normals", 4, code, 10, True) + _bodies("deltas", 3, axes, delta, True) + vertices[-3:] + head
+    return {
+        "node": node,
+        "nearPair": _bodies("lowBits", 4, code, 1) + near,
+        "triangle": _bodies("normals", 3, code, 11, True) + vertices[-9:] + head,
+        "flatPair": vertices + head,
+        "farPair": _bodies("signs", 3, axes, 1) + far,
+    }
+
+
+def _bodies(name: str, count: int, components: str, width: int, signed: bool = False) -> FieldList:
+    """The last one first, so that vertex 0 of all formats is in one place."""
+    return [(f"body.{name}[{i}].{c}", width, signed) for i in reversed(range(count)) for c in components]
 
 
 def _placed(fields: FieldList) -> list[dict[str, Any]]:
@@ -160,7 +167,7 @@ def _registers(vertex: int, mac: int, address: int, coordinate: int) -> list[dic
 
 
 _SHINY = (("kind", 2), ("etaFront", 16), ("etaBack", 16), ("reflectance", 13))
-_SCENE = ("recordCount", "triangleBase", "triangleRecords", "attributeBase")
+_SCENE = ("recordCount", "root")
 
 
 #: A file with tests of a minute.

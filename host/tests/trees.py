@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from colonnade import _core
+from colonnade.design.manifest import Manifest, field_places
 from colonnade.scene_image.header import TreeStatistics
 
 EMPTY, NODE, LEAF = 0, 1, 2
+TINY = Manifest.from_dict(json.loads((Path(__file__).parents[2] / "configs" / "golden" / "tiny.json").read_text()))
 
 
 @dataclass(frozen=True)
@@ -25,8 +29,8 @@ class Bvh:
         exponent: uint8 [n, 3].
         kinds: uint8 [n, 4]: EMPTY, NODE or LEAF.
         low, high: uint16 [n, 4, 3].
-        first_child: uint32 [n], node index of the first NODE child; the others follow in slot order.
-        first_triangles: uint32 [n], leaf index of the first LEAF child; the others follow in slot order.
+        first_child: int64 [n], node index of the first NODE child; the others follow in slot order.
+        first_triangles: int64 [n], leaf index of the first LEAF child; the others follow in slot order.
         leaf_first, leaf_count: uint32 [l], packed id of a leaf's first triangle, and number of its triangles.
         order: uint32 [m], face index of each packed id.
         statistics: Size and cost of the tree.
@@ -37,8 +41,8 @@ class Bvh:
     kinds: npt.NDArray[np.uint8]
     low: npt.NDArray[np.uint16]
     high: npt.NDArray[np.uint16]
-    first_child: npt.NDArray[np.uint32]
-    first_triangles: npt.NDArray[np.uint32]
+    first_child: npt.NDArray[np.int64]
+    first_triangles: npt.NDArray[np.int64]
     leaf_first: npt.NDArray[np.uint32]
     leaf_count: npt.NDArray[np.uint32]
     order: npt.NDArray[np.uint32]
@@ -71,7 +75,14 @@ def build_bvh(
         children,
         box_bits,
         stack_depth,
+        field_places(TINY.layouts),
+        TINY.numbers["normalFraction"],
     )
+    first, nodes, leaves = (arrays.pop(key) for key in ("first", "node_count", "leaf_children"))
+    slots = np.arange(4)
+    arrays["kinds"] = np.where(slots < nodes[:, None], NODE, np.where(slots < (nodes + leaves)[:, None], LEAF, EMPTY))
+    arrays["first_child"] = np.searchsorted(arrays.pop("node_address"), first)
+    arrays["first_triangles"] = np.searchsorted(arrays.pop("leaf_address"), first + nodes)
     statistics = TreeStatistics(
         nodes=len(arrays["kinds"]),
         leaves=len(arrays["leaf_first"]),

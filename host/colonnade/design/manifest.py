@@ -17,7 +17,7 @@ import numpy.typing as npt
 from colonnade.common.errors import UserError
 
 #: The newest version of manifests that is read; the older ones are, too.
-VERSION = 2
+VERSION = 3
 
 
 @dataclass(frozen=True)
@@ -206,9 +206,10 @@ class Manifest:
         """Build a manifest from its JSON object."""
         if data["version"] > VERSION:
             raise UserError(f"the manifest has version {data['version']}, this host reads {VERSION} at most: update it")
-        if ((data.get("attributes") or {}).get("sizes") or {}).get("sliding"):
+        if data["version"] < VERSION:
             raise UserError(
-                "the manifest has the slic maps of version 1, this host packs those of version 2: generate it again"
+                f"the manifest has the formats of version {data['version']}, this host packs those of version"
+                f" {VERSION}: generate it again"
             )
         bits = int(data["records"]["bits"])
         return Manifest(

@@ -74,7 +74,7 @@ def registers_of(
     check_surfaces(view, manifest)
     _check_reach(view, header, manifest)
     registers = dict.fromkeys((name for name, register in manifest.registers.items() if register.access == "rw"), 0)
-    registers |= _bounds(header)
+    registers |= _scene(header, manifest)
     registers |= surface_registers(view, header, manifest)
     if environment is not None:
         registers |= environment_registers(view, environment, header, manifest, relit)
@@ -103,12 +103,12 @@ def _check_reach(view: View, header: ImageHeader, manifest: Manifest) -> None:
             )
 
 
-def _bounds(header: ImageHeader) -> dict[str, int]:
+def _scene(header: ImageHeader, manifest: Manifest) -> dict[str, int]:
+    colours = {"scene.hasColours": int(header.has_colours)} if manifest.corner_colours else {}
     return {
         **{f"bounds.low.{axis}": header.bounds_low[a] for a, axis in enumerate(AXES)},
         **{f"bounds.high.{axis}": header.bounds_high[a] for a, axis in enumerate(AXES)},
         "scene.recordCount": header.record_count,
-        "scene.triangleBase": header.triangle_base,
-        "scene.triangleRecords": header.triangle_records,
-        "scene.attributeBase": header.attribute_base,
+        "scene.root": 0,
+        **colours,
     }

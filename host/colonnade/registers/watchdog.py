@@ -42,7 +42,7 @@ def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest:
     """
     rows, contexts = int(manifest.config["array"]["rows"]), int(manifest.config["units"]["pathContexts"])
     geometry = manifest.config["geometry"]
-    nodes, leaves = header.triangle_base, header.triangle_records
+    nodes, leaves = header.nodes, header.leaves
     if geometry["bvh"]:
         nodes, leaves = min(nodes, TREE_VISITS), min(leaves, TREE_VISITS)
     memory = manifest.config["columnBvhMemory"]

@@ -24,7 +24,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.scene_image.header import ImageHeader
 from colonnade.scene_image.header_checks import check_header
 
-MAGIC = b"CLNDIMG4"
+MAGIC = b"CLNDIMG5"
 FILE_NAME = "scene.image"
 _DIGEST_BYTES = 32
 _ADVICE = "pack the scene again"
@@ -50,7 +50,7 @@ class SceneImage:
     Attributes:
         header: Description of the content.
         records: uint8 [record_count, record_bits / 8], little-endian.
-        source_faces: int32 [2 · attribute_base], index in the mesh file of each packed id's face; −1 without one.
+        source_faces: int32 [2 · record_count], index in the mesh file of each packed id's face; −1 without one.
         attributes: A room's maps, textures and light cube in the order of `ImageHeader.memories`.
     """
 
@@ -100,7 +100,7 @@ class SceneImage:
             raise UserError(f"{file} is not a scene image")
         header, start = _header(data, file)
         records_end = start + header.record_count * header.record_bits // 8
-        faces_end = records_end + 8 * header.attribute_base
+        faces_end = records_end + 8 * header.record_count
         memories = header.memories
         end = faces_end + sum(memory.bytes for memory in memories)
         if len(data) < end + _DIGEST_BYTES:

@@ -107,7 +107,7 @@ class ImageHeader:
         source_triangles: Faces of the mesh file.
         triangles: Packed triangles.
         record_bits, record_count: Width and number of the column memory's records.
-        triangle_base, triangle_records, attribute_base: Bounds of the sections, in records.
+        nodes, leaves: Their numbers; the root is record 0. The rest are companions of leaves.
         bounds_low, bounds_high: The object's bounding box, vertex units, inclusive.
         largest_triangle: Greatest extent of a triangle along an axis, vertex units.
         frame: Transform from mesh space to vertex units.
@@ -127,9 +127,8 @@ class ImageHeader:
     triangles: int
     record_bits: int
     record_count: int
-    triangle_base: int
-    triangle_records: int
-    attribute_base: int
+    nodes: int
+    leaves: int
     bounds_low: tuple[int, int, int]
     bounds_high: tuple[int, int, int]
     largest_triangle: int
@@ -142,6 +141,11 @@ class ImageHeader:
     texture: TextureHeader | None = None
     light: tuple[LoadedMemory, ...] = ()
     parallax: int = 0
+
+    @property
+    def has_colours(self) -> bool:
+        """Whether each leaf is followed by its companion."""
+        return self.record_count > self.nodes + self.leaves
 
     @property
     def memories(self) -> tuple[LoadedMemory, ...]:

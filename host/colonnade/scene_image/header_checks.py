@@ -13,9 +13,8 @@ _COUNTS = (
     "source_triangles",
     "triangles",
     "record_count",
-    "triangle_base",
-    "triangle_records",
-    "attribute_base",
+    "nodes",
+    "leaves",
     "largest_triangle",
 )
 _MAX = 1 << 31
@@ -32,8 +31,7 @@ def check_header(header: Any) -> None:
     _require(isinstance(header, Mapping))
     for key in _COUNTS:
         _count(header[key])
-    _require(header["triangle_base"] <= header["attribute_base"] <= header["record_count"])
-    _require(header["triangle_records"] <= header["record_count"])
+    _require(header["record_count"] - header["nodes"] in (header["leaves"], 2 * header["leaves"]))
     bits = _count(header["record_bits"])
     _require(0 < bits <= _MAX_RECORD_BITS and bits % 32 == 0)
     for key in ("format_hash", "mesh"):

@@ -39,7 +39,7 @@ def describe(image: SceneImage) -> dict[str, Any]:
             "record_bits": header.record_bits,
             "records": header.record_count,
             "bytes": image.records.nbytes,
-            "sections": {name: {"first": first, "records": count} for name, first, count in sections(header)},
+            "sections": {name: count for name, count in sections(header)},
         },
         "objects": [asdict(part) | {"units": part.edge * header.frame.scale} for part in header.parts],
         "tree": asdict(header.tree) if header.tree is not None else None,
@@ -68,12 +68,12 @@ def illegal_lines(image: SceneImage) -> list[str]:
     return [f"warning     tiles point beyond their heap, {', '.join(counts)}: frames that show them report an error"]
 
 
-def sections(header: ImageHeader) -> list[tuple[str, int, int]]:
-    """The memory map as (name, first record, number of records)."""
+def sections(header: ImageHeader) -> list[tuple[str, int]]:
+    """Parts of the column memory as (name, number of records)."""
     return [
-        ("nodes", 0, header.triangle_base),
-        ("triangles", header.triangle_base, header.triangle_records),
-        ("attributes", header.attribute_base, header.record_count - header.attribute_base),
+        ("nodes", header.nodes),
+        ("leaves", header.leaves),
+        ("colours", header.leaves if header.has_colours else 0),
     ]
 
 
@@ -131,7 +131,7 @@ def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[
         if "line" in shape:
             size = f"{dram_lines(header.record_count, manifest) * shape['line']['pitch']:,} bytes of DRAM"
     lines.append(f"memory      {used} ({size})")
-    lines += [f"  {name:<10}{count:>9,} records from {first:,}" for name, first, count in sections(header) if count]
+    lines += [f"  {name:<10}{count:>9,} records" for name, count in sections(header) if count]
     return (
         lines
         + _tree_lines(header, manifest)

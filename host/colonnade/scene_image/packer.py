@@ -2,7 +2,8 @@
 
 The C++ packer (``cpp/packer``) quantises the vertices, drops degenerate triangles, and builds the tree. Its leaves are
 pairs of triangles with a common edge, or triangles. It fills the records by the manifest's layouts.
-The sections are nodes, triangles and attributes, in this order. Addresses in nodes are absolute.
+The tree begins at record 0, without one its leaves alone in the same order. If a material uses colours, each leaf's
+companion follows it. Addresses in nodes are absolute.
 """
 
 from __future__ import annotations
@@ -150,9 +151,9 @@ def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
             "depth": depth,
             "share": header.record_count / depth,
             "bytes": header.record_count * header.record_bits // 8,
-            "nodes": header.triangle_base,
-            "triangles": header.triangle_records,
-            "attributes": header.record_count - header.attribute_base,
+            "nodes": header.nodes,
+            "triangles": header.leaves,
+            "attributes": header.leaves if header.has_colours else 0,
         }
     }
     if header.tree is not None:
@@ -193,7 +194,7 @@ def _atlas(mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], he
 def _corner_colours(
     mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], headroom: float, atlas: Atlas | None
 ) -> npt.NDArray[np.int64] | None:
-    """The colours of the records, int64 [faces of the mesh, 3, 3]; None for a design without them.
+    """The colours of the records, int64 [faces of the mesh, 3, 3]; None if no material uses them.
 
     On textured faces red and green are positions in the atlas.
     """
@@ -202,6 +203,8 @@ def _corner_colours(
             raise UserError(
                 f"mesh {mesh.name} has colours at its corners, the hardware has none: set geometry.cornerColours=true"
             )
+        return None
+    if atlas is None and not any(material.has_corner_colours for material in materials):
         return None
     values = np.zeros((len(mesh.faces), 3, 3), dtype=np.int64)
     if mesh.corner_colours is not None:

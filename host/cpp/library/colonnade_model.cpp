@@ -166,9 +166,9 @@ void describe(colonnade_packed& packed, std::uint32_t faceCount) {
     const packer::Sections& sections = from.packer->sections();
     packed.triangles = static_cast<std::int32_t>(from.tree.order.size());
     packed.record_count = static_cast<std::int32_t>(sections.recordCount);
-    packed.triangle_base = static_cast<std::int32_t>(sections.triangleBase);
-    packed.triangle_records = static_cast<std::int32_t>(sections.triangleRecords);
-    packed.attribute_base = static_cast<std::int32_t>(sections.attributeBase);
+    packed.nodes = static_cast<std::int32_t>(sections.nodes);
+    packed.leaves = static_cast<std::int32_t>(sections.leaves);
+    packed.has_colours = sections.recordCount > sections.nodes + sections.leaves;
     std::copy(sections.boundsLow.begin(), sections.boundsLow.end(), packed.bounds_low);
     std::copy(sections.boundsHigh.begin(), sections.boundsHigh.end(), packed.bounds_high);
     const packer::OffsetFormat format{library->number("gridFraction"), library->number("weightBits"), library->number("mantissaBits"), library->number("distanceDigits")};
@@ -221,13 +221,14 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
     std::vector<std::uint8_t> materials, isClear;
     std::vector<mesh::Triangle> uvs(clean.faces.size());
     std::vector<mesh::Paint> paints;
-    bool isTextured = false;
+    bool isTextured = false, hasColours = false;
     for (std::size_t i = 0; i < clean.faces.size(); ++i) {
         const colonnade_surface& surface = given.surfaces[given.surface_of[clean.sources[i]]];
         materials.push_back(static_cast<std::uint8_t>(surface.entry));
         isClear.push_back(surface.is_glass != 0);
         paints.push_back({surface.texture, {surface.factor[0], surface.factor[1], surface.factor[2]}});
         isTextured |= surface.texture >= 0;
+        hasColours |= surface.has_colours != 0;
         if (given.uvs) {
             std::memcpy(&uvs[i], given.uvs + 6 * clean.sources[i], sizeof uvs[i]);
             uvs[i] = inFaceOrder(uvs[i], clean.winding.reversed[i]);
@@ -244,7 +245,7 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
     }
     if (!library->textureSizes.empty()) encodeAtlas(atlas);
     std::vector<Codes> codes;
-    if (library->format.layouts.at("attributes").count("faces[0].colours[0].r")) codes = cornerCodes(given, clean, atlas ? &atlas->uvs : nullptr);
+    if (library->format.layouts.count("colours") && (hasColours || atlas)) codes = cornerCodes(given, clean, atlas ? &atlas->uvs : nullptr);
     const packer::FaceAttributes attributes{clean.normals.normals.data(), materials.data(), isClear.data(), codes.empty() ? nullptr : codes.data()};
     next->tree = packer::buildTree(next->quantised, attributes, library->format);
     next->packer = std::make_unique<packer::RecordPacker>(next->quantised, attributes, next->tree, library->format);

@@ -38,9 +38,9 @@ struct colonnade_mesh {
     uint32_t texture_count;
 };
 
-/* A mesh as it is packed: sections in records, bounds in vertex units. */
+/* A mesh as it is packed: numbers of records, bounds in vertex units. */
 struct colonnade_packed {
-    int32_t triangles, record_count, triangle_base, triangle_records, attribute_base;
+    int32_t triangles, record_count, nodes, leaves, has_colours;
     int32_t bounds_low[3], bounds_high[3];
     int32_t shading_offset; /* register shading.offset, grid steps */
     int32_t tree_depth, stack_bound;

@@ -1,82 +1,93 @@
-// The column BVH memory: records decoded by the section that they are in (docs/errors.md).
+// The column BVH memory: records decoded as what a ray reads them for (docs/errors.md).
 #pragma once
 #include <algorithm>
+#include <optional>
 
-#include "formats.hpp"
+#include "leaf.hpp"
 
 namespace colonnade {
 
-/// Reads outside a record's section return null. Records that were never loaded are zero.
+/// Records are decoded as what the tree reads them for. Addresses outside the scene give null. Records that were never loaded are zero.
 class ColumnMemory {
 public:
-    ColumnMemory(const std::map<std::string, Layout>& layouts, const Numbers& numbers) : decoder_(layouts, numbers), unwritten_(emptyRecords()) {}
+    ColumnMemory(const std::map<std::string, Layout>& layouts, const Numbers& numbers)
+        : nodeDecoder_(layouts, numbers), leafFields_(layouts), normalFraction_(numbers.normalFraction) {}
 
     void load(const std::uint8_t* records, std::size_t count, std::size_t bytes) {
         bytes_.assign(records, records + count * bytes);
         recordBytes_ = bytes;
+        zero_.assign(bytes, 0);
         isDecoded_ = false;
     }
 
-    /// Sets the sections: nodes from 0, triangles from `triangleBase`, attributes from `attributeBase` up to `recordCount`. No base may be larger
-    /// than the next one.
-    void divide(std::size_t recordCount, std::size_t triangleBase, std::size_t attributeBase) {
-        if (isDecoded_ && recordCount == recordCount_ && triangleBase == triangleBase_ && attributeBase == attributeBase_) return;
+    /// Sets the number of records, and decodes what a ray can reach from the root; without a tree the leaves, from record 0.
+    void divide(std::size_t recordCount, std::size_t root, bool bvh, std::size_t leafRecords) {
+        const std::array<std::size_t, 4> given{recordCount, root, bvh, leafRecords};
+        if (isDecoded_ && given == given_) return;
+        given_ = given;
         recordCount_ = recordCount;
-        triangleBase_ = triangleBase;
-        attributeBase_ = attributeBase;
-        const std::size_t end = std::min(recordCount, recordBytes_ == 0 ? 0 : bytes_.size() / recordBytes_);
         nodes_.clear();
-        triangles_.clear();
-        faces_.clear();
-        for (std::size_t i = 0; i < std::min(triangleBase, end); ++i) nodes_.push_back(decoder_.node(at(i), i));
-        for (std::size_t i = triangleBase; i < std::min(attributeBase, end); ++i) triangles_.push_back(decoder_.triangles(at(i)));
-        for (std::size_t i = attributeBase; i < end; ++i)
-            for (int slot = 0; slot < decoder_.facesPerRecord(); ++slot) faces_.push_back(decoder_.face(at(i), slot));
+        leaves_.clear();
+        nodeAt_.assign(recordCount, none);
+        leafAt_.assign(recordCount, none);
+        if (bvh) reach(root, leafRecords);
+        else
+            for (std::size_t address = 0; address < recordCount; address += leafRecords) addLeaf(address);
         isDecoded_ = true;
     }
 
-    std::uint32_t addressMask() const { return decoder_.addressMask(); }
+    std::uint32_t addressMask() const { return nodeDecoder_.addressMask(); }
 
-    const Node* nodeAt(std::size_t address) const {
-        if (address >= triangleBase_) return nullptr;
-        return address < nodes_.size() ? &nodes_[address] : &unwritten_.node;
-    }
+    const Node* nodeAt(std::size_t address) const { return address < recordCount_ ? &nodes_[nodeAt_[address]] : nullptr; }
+    const Leaf* leafAt(std::size_t address) const { return address < recordCount_ ? &leaves_[leafAt_[address]] : nullptr; }
 
-    const Triangles* trianglesAt(std::size_t address) const {
-        if (address < triangleBase_ || address >= attributeBase_) return nullptr;
-        const std::size_t index = address - triangleBase_;
-        return index < triangles_.size() ? &triangles_[index] : &unwritten_.triangles;
-    }
+    /// The attributes of a hit triangle, without colours.
+    Face faceOf(std::uint64_t id) const { return colonnade::faceOf(*leafAt(id / leafTriangles), static_cast<int>(id % leafTriangles), normalFraction_); }
 
-    const Face* faceOf(std::uint64_t id) const {
-        const std::size_t index = id - leafTriangles * triangleBase_;
-        if (attributeBase_ + index / static_cast<std::size_t>(decoder_.facesPerRecord()) >= recordCount_) return nullptr;
-        return index < faces_.size() ? &faces_[index] : &unwritten_.face;
+    /// Reads the colours of a hit triangle; false if they are outside the scene.
+    bool readColours(std::uint64_t id, Face& face) const {
+        const std::size_t companion = id / leafTriangles + 1;
+        if (companion >= recordCount_) return false;
+        colonnade::readColours(leafFields_, at(companion), static_cast<int>(id % leafTriangles), face);
+        return true;
     }
 
 private:
-    struct Unwritten {
-        Node node;
-        Triangles triangles;
-        Face face;
-    };
+    static constexpr std::uint32_t none = UINT32_MAX;
 
-    static Unwritten emptyRecords() {
-        Unwritten empty{};
-        empty.node.isLegal = true; // a node without children
-        return empty;
+    const std::uint8_t* at(std::size_t address) const { return (address + 1) * recordBytes_ <= bytes_.size() ? bytes_.data() + address * recordBytes_ : zero_.data(); }
+
+    void addLeaf(std::size_t address) {
+        if (address >= recordCount_ || leafAt_[address] != none) return;
+        leafAt_[address] = static_cast<std::uint32_t>(leaves_.size());
+        leaves_.push_back(readLeaf(leafFields_, at(address)));
     }
 
-    const std::uint8_t* at(std::size_t address) const { return bytes_.data() + address * recordBytes_; }
+    void reach(std::size_t root, std::size_t leafRecords) {
+        std::vector<std::size_t> waiting{root};
+        while (!waiting.empty()) {
+            const std::size_t address = waiting.back();
+            waiting.pop_back();
+            if (address >= recordCount_ || nodeAt_[address] != none) continue;
+            nodeAt_[address] = static_cast<std::uint32_t>(nodes_.size());
+            const Node node = nodeDecoder_.node(at(address), address);
+            nodes_.push_back(node);
+            if (!node.isLegal) continue;
+            for (int i = 0; i < node.nodes; ++i) waiting.push_back(node.first + static_cast<std::size_t>(i));
+            for (int i = 0; i < node.leaves; ++i) addLeaf((node.first + static_cast<std::size_t>(node.nodes) + static_cast<std::size_t>(i) * leafRecords) & addressMask());
+        }
+    }
 
-    RecordDecoder decoder_;
-    Unwritten unwritten_;
-    std::vector<std::uint8_t> bytes_;
-    std::size_t recordBytes_ = 0, recordCount_ = 0, triangleBase_ = 0, attributeBase_ = 0;
+    NodeDecoder nodeDecoder_;
+    LeafFields leafFields_;
+    int normalFraction_;
+    std::vector<std::uint8_t> bytes_, zero_;
+    std::size_t recordBytes_ = 0, recordCount_ = 0;
+    std::array<std::size_t, 4> given_{};
     bool isDecoded_ = false;
+    std::vector<std::uint32_t> nodeAt_, leafAt_; ///< by address: index of what was decoded
     std::vector<Node> nodes_;
-    std::vector<Triangles> triangles_;
-    std::vector<Face> faces_;
+    std::vector<Leaf> leaves_;
 };
 
 } // namespace colonnade

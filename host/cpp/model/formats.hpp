@@ -113,23 +113,16 @@ struct Field {
 
 using Layout = std::map<std::string, Field>;
 
-enum class Child : std::uint8_t { empty = 0, node = 1, leaf = 2, illegal = 3 };
-
 /// A node record. Illegal records (docs/errors.md) count as empty.
 struct Node {
     bool isLegal;
     Vector origin;
     std::array<int, 3> exponent;
-    std::array<Child, nodeChildren> kinds;
+    int nodes, leaves; ///< children of each kind, in this order, at consecutive records from `first`
     std::array<std::array<std::int32_t, 3>, nodeChildren> low, high;
-    std::uint32_t firstChild, firstTriangles;
-};
+    std::uint32_t first;
 
-struct Triangles {
-    bool isLegal;
-    int count;
-    std::array<bool, leafTriangles> isTransmissive;
-    std::array<std::array<Vector, 3>, leafTriangles> vertices;
+    int children() const { return nodes + leaves; }
 };
 
 struct Face {
@@ -140,111 +133,62 @@ struct Face {
     int material;
 };
 
-/// Decodes records by the manifest's layouts. The fields are resolved once, for speed.
-class RecordDecoder {
+/// Decodes nodes by the manifest's layouts. The fields are resolved once, for speed.
+class NodeDecoder {
 public:
-    RecordDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers) : maxExponent_(numbers.maxExponent) {
+    NodeDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers) : maxExponent_(numbers.maxExponent) {
         const Layout& node = layouts.at("node");
-        origin_ = vectorOf(node, "origin");
-        exponent_ = vectorOf(node, "exponent");
-        firstChild_ = node.at("firstChild");
-        firstTriangles_ = node.at("firstTriangles");
+        corner_ = vectorOf(node, "corner");
+        first_ = node.at("first");
+        nodes_ = node.at("nodes");
+        leaves_ = node.at("leaves");
         for (int child = 0; child < nodeChildren; ++child) {
-            const std::string index = "[" + std::to_string(child) + "]";
-            kinds_.push_back(node.at("kinds" + index));
-            low_.push_back(vectorOf(node, "low" + index));
-            high_.push_back(vectorOf(node, "high" + index));
-        }
-        const Layout& triangles = layouts.at("triangles");
-        count_ = triangles.at("count");
-        for (int vertex = 0; vertex < 3 * leafTriangles; ++vertex) vertices_.push_back(vectorOf(triangles, "vertices[" + std::to_string(vertex) + "]"));
-        for (int triangle = 0; triangle < leafTriangles; ++triangle) isTransmissive_.push_back(triangles.at("isClear[" + std::to_string(triangle) + "]"));
-        const Layout& attributes = layouts.at("attributes");
-        for (int face = 0; attributes.count("faces[" + std::to_string(face) + "].material"); ++face) {
-            const std::string prefix = "faces[" + std::to_string(face) + "].";
-            FaceFields fields;
-            for (int corner = 0; corner < 3; ++corner) fields.normals[corner] = vectorOf(attributes, prefix + "normals[" + std::to_string(corner) + "]");
-            fields.geometricNormal = vectorOf(attributes, prefix + "geometricNormal");
-            fields.hasColours = attributes.count(prefix + "colours[0].r") != 0;
-            for (int corner = 0; corner < 3 && fields.hasColours; ++corner)
-                fields.colours[corner] = vectorOf(attributes, prefix + "colours[" + std::to_string(corner) + "]", "rgb");
-            fields.material = attributes.at(prefix + "material");
-            faces_.push_back(fields);
+            const std::string prefix = "children[" + std::to_string(child) + "].";
+            low_.push_back(vectorOf(node, prefix + "low"));
+            high_.push_back(vectorOf(node, prefix + "high"));
         }
     }
 
-    int facesPerRecord() const { return static_cast<int>(faces_.size()); }
-
     /// Bit mask of a record address.
-    std::uint32_t addressMask() const { return static_cast<std::uint32_t>((std::uint64_t(1) << firstChild_.width) - 1); }
+    std::uint32_t addressMask() const { return static_cast<std::uint32_t>((std::uint64_t(1) << first_.width) - 1); }
 
     /// Decodes the node at an address.
     Node node(const std::uint8_t* record, std::size_t at) const {
         Node result{};
-        result.origin = read(origin_, record);
-        const Vector exponent = read(exponent_, record);
-        for (int axis = 0; axis < 3; ++axis) result.exponent[axis] = static_cast<int>(exponent[axis]);
-        result.firstChild = static_cast<std::uint32_t>(firstChild_.read(record));
-        result.firstTriangles = static_cast<std::uint32_t>(firstTriangles_.read(record));
+        const Vector corner = read(corner_, record);
+        bool isMarked = true;
+        for (int axis = 0; axis < 3; ++axis) {
+            // 2 · origin + 2^exponent: the lowest set bit is the exponent's
+            result.exponent[axis] = corner[axis] == 0 ? 0 : bitLength(static_cast<UnsignedWide>(corner[axis] & -corner[axis])) - 1;
+            result.origin[axis] = (corner[axis] & (corner[axis] - 1)) >> 1;
+            isMarked = isMarked && corner[axis] != 0 && result.exponent[axis] <= maxExponent_;
+        }
+        result.first = static_cast<std::uint32_t>(first_.read(record));
+        result.nodes = static_cast<int>(nodes_.read(record));
+        result.leaves = static_cast<int>(leaves_.read(record));
         for (int child = 0; child < nodeChildren; ++child) {
-            result.kinds[child] = static_cast<Child>(kinds_[child].read(record));
             const Vector low = read(low_[child], record), high = read(high_[child], record);
             for (int axis = 0; axis < 3; ++axis) {
                 result.low[child][axis] = static_cast<std::int32_t>(low[axis]);
                 result.high[child][axis] = static_cast<std::int32_t>(high[axis]);
             }
         }
-        bool hasNodes = false, isKnown = true, isSmall = true;
-        for (int child = 0; child < nodeChildren; ++child) {
-            hasNodes = hasNodes || result.kinds[child] == Child::node;
-            isKnown = isKnown && result.kinds[child] != Child::illegal;
-        }
-        for (int axis = 0; axis < 3; ++axis) isSmall = isSmall && result.exponent[axis] <= maxExponent_;
-        const bool isBelow = result.firstChild > at && result.firstChild <= addressMask() - static_cast<std::uint32_t>(nodeChildren);
-        result.isLegal = isKnown && isSmall && (isBelow || !hasNodes);
-        return result;
-    }
-
-    Triangles triangles(const std::uint8_t* record) const {
-        Triangles result{};
-        result.count = static_cast<int>(count_.read(record));
-        result.isLegal = result.count > 0 && result.count <= leafTriangles;
-        for (int vertex = 0; vertex < 3 * leafTriangles; ++vertex) result.vertices[vertex / 3][vertex % 3] = read(vertices_[vertex], record);
-        for (int triangle = 0; triangle < leafTriangles; ++triangle) result.isTransmissive[triangle] = isTransmissive_[triangle].read(record) != 0;
-        return result;
-    }
-
-    Face face(const std::uint8_t* record, int slot) const {
-        const FaceFields& fields = faces_[slot];
-        Face result{};
-        for (int corner = 0; corner < 3; ++corner) result.normals[corner] = read(fields.normals[corner], record);
-        result.geometricNormal = read(fields.geometricNormal, record);
-        for (int corner = 0; corner < 3 && fields.hasColours; ++corner) result.colours[corner] = read(fields.colours[corner], record);
-        result.material = static_cast<int>(fields.material.read(record));
+        const bool isBelow = result.first > at && result.first + static_cast<std::uint64_t>(result.children()) <= addressMask() + std::uint64_t{1};
+        result.isLegal = result.children() == 0 || (result.children() <= nodeChildren && isMarked && isBelow);
         return result;
     }
 
 private:
     using VectorFields = std::array<Field, 3>;
-    struct FaceFields {
-        std::array<VectorFields, 3> normals;
-        VectorFields geometricNormal;
-        bool hasColours;
-        std::array<VectorFields, 3> colours;
-        Field material;
-    };
-
     static VectorFields vectorOf(const Layout& layout, const std::string& name, const char* components = "xyz") {
         return {layout.at(name + "." + components[0]), layout.at(name + "." + components[1]), layout.at(name + "." + components[2])};
     }
     static Vector read(const VectorFields& fields, const std::uint8_t* record) { return {fields[0].read(record), fields[1].read(record), fields[2].read(record)}; }
 
     int maxExponent_;
-    VectorFields origin_, exponent_;
-    Field firstChild_, firstTriangles_, count_;
-    std::vector<Field> kinds_, isTransmissive_;
-    std::vector<VectorFields> low_, high_, vertices_;
-    std::vector<FaceFields> faces_;
+    VectorFields corner_;
+    Field first_, nodes_, leaves_;
+    std::vector<VectorFields> low_, high_;
 };
 
 } // namespace colonnade

@@ -36,7 +36,7 @@ public:
         for (const auto& [name, limit] : limits_)
             if (const auto found = legal.find(name); found != legal.end()) found->second = std::min(found->second, limit);
         frame_ = Frame(legal, numbers_);
-        memory_->divide(frame_.recordCount, frame_.triangleBase, frame_.attributeBase);
+        memory_->divide(frame_.recordCount, frame_.root, numbers_.bvh, frame_.leafRecords());
         counters = {};
         errors = {};
     }

@@ -71,13 +71,15 @@ protected:
         }
     }
 
-    /// The object where a ray hits it; nothing if the record of its face is illegal.
+    /// The object where a ray hits it; nothing if the colours of its leaf are outside the scene.
     std::optional<ObjectPoint> pointOf(const Ray& ray, const Hit& hit) {
-        const Face* const face = memory_->faceOf(hit.id);
-        errors.illegalRecord = errors.illegalRecord || !face;
-        if (!face) return std::nullopt;
-        const Material& material = frame_.lighting.materialOf(*face);
-        return ObjectPoint{surfaceOf(ray, hit, *face, numbers_), material, albedoOf(material, hit, *face)};
+        Face face = memory_->faceOf(hit.id);
+        const Material& material = frame_.lighting.materialOf(face);
+        if ((material.hasCornerColours || material.hasTexture) && !memory_->readColours(hit.id, face)) {
+            errors.illegalRecord = true;
+            return std::nullopt;
+        }
+        return ObjectPoint{surfaceOf(ray, hit, face, numbers_), material, albedoOf(material, hit, face)};
     }
 
     /// Adds the light of a surface to a path. The path ends there, or goes on with a ray that gathers light.

@@ -47,7 +47,7 @@ public:
     }
 
     void addChild(const Node& node, int slot, std::uint32_t address, bool isHit) const {
-        RayStep step{RayStep::Kind::child, static_cast<std::int32_t>(address), isHit, node.kinds[slot] == Child::leaf, {}};
+        RayStep step{RayStep::Kind::child, static_cast<std::int32_t>(address), isHit, slot >= node.nodes, {}};
         for (int axis = 0; axis < 3; ++axis) {
             step.values[axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.low[slot][axis]) << node.exponent[axis]));
             step.values[3 + axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.high[slot][axis]) << node.exponent[axis]));

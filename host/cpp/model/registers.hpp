@@ -24,7 +24,8 @@ struct Frame {
     int stepShift;
     Bounds bounds;
     Lighting lighting;
-    std::size_t recordCount, triangleBase, triangleRecords, attributeBase;
+    std::size_t recordCount, root;
+    bool hasColours; ///< each leaf is followed by its companion
     std::uint64_t watchdogCycles;
     bool hasEnvironment;
     EnvironmentView environment;
@@ -86,10 +87,8 @@ struct Frame {
                                           {takeIfThere(name + "lobe.alpha"), takeIfThere(name + "lobe.slope"), takeIfThere(name + "lobe.peak")}});
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));
-        triangleRecords = static_cast<std::size_t>(take("scene.triangleRecords"));
-        // Clamp each section's start to the next section's
-        attributeBase = std::min(recordCount, static_cast<std::size_t>(take("scene.attributeBase")));
-        triangleBase = std::min(attributeBase, static_cast<std::size_t>(take("scene.triangleBase")));
+        root = static_cast<std::size_t>(take("scene.root"));
+        hasColours = takeIfThere("scene.hasColours") != 0;
         watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
         gather.bounces = static_cast<int>(takeIfThere("gather.bounces"));
         gather.parallax = static_cast<int>(takeIfThere("gather.parallax"));
@@ -113,6 +112,9 @@ struct Frame {
         environment.occlusionTolerance = take("environment.occlusionTolerance");
         environment.isMapCamera = take("environment.isMapCamera") != 0;
     }
+
+    /// Records of a leaf.
+    std::size_t leafRecords() const { return hasColours ? 2 : 1; }
 
     /// Name prefix of a table entry's registers.
     static std::string entry(const std::string& table, int index) { return table + "[" + std::to_string(index) + "]."; }

@@ -87,30 +87,25 @@ private:
     void run(TraceState& state) {
         if (numbers_.bvh) traverse(state);
         else
-            for (std::size_t i = 0; (i == 0 || i < frame_.triangleRecords) && !state.isOver(); ++i) testRecord(state, frame_.triangleBase + i);
+            for (std::size_t i = 0; (i == 0 || i < frame_.recordCount) && !state.isOver(); i += frame_.leafRecords()) testRecord(state, i);
     }
 
     void testRecord(TraceState& state, std::size_t address) {
         address &= memory_->addressMask();
-        const Triangles* const found = memory_->trianglesAt(address);
+        const Leaf* const found = memory_->leafAt(address);
         if (!found) {
             errors.illegalRecord = true;
             return;
         }
-        const Triangles& record = *found;
+        const Leaf& leaf = *found;
         log.addRead(RayStep::Kind::record, address);
-        if (!record.isLegal) {
-            errors.illegalRecord = true;
-            ++counters.triangleTests; // an empty record takes as many cycles as one triangle
-            return;
-        }
-        for (int i = 0; i < record.count; ++i) {
+        for (int i = 0; i < leaf.triangles(); ++i) {
             ++counters.triangleTests;
             Hit hit = state.best;
             const std::uint64_t id = leafTriangles * address + static_cast<std::uint64_t>(i);
-            const bool isHit = testTriangle(state.ray, record.vertices[i], id, numbers_, hit);
-            log.addTriangle(record.vertices[i], id, isHit);
-            hit.isClear = record.isTransmissive[i];
+            const bool isHit = testTriangle(state.ray, leaf.verticesOf(i), id, numbers_, hit);
+            log.addTriangle(leaf.verticesOf(i), id, isHit);
+            hit.isClear = leaf.isClear;
             if (!isHit || (state.filter && !state.filter->accepts(hit))) continue;
             if (state.isShadow)
                 state.occlusion = std::max(state.occlusion, hit.isClear && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
@@ -123,7 +118,7 @@ private:
         std::array<StackEntry, 256> stack;
         std::size_t depth = 0;
         std::uint64_t nodeVisits = 0;
-        StackEntry next{false, 0, 0};
+        StackEntry next{false, static_cast<std::uint32_t>(frame_.root), 0};
         for (bool busy = !errors.watchdog; busy;) {
             busy = false;
             if (next.isLeaf) {
@@ -163,19 +158,17 @@ private:
 
     void logNode(std::uint32_t address, const Node& node, const std::array<Entered, nodeChildren>& entered, int count) const {
         log.addRead(RayStep::Kind::node, address);
-        for (int slot = 0; slot < nodeChildren; ++slot) {
-            if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
+        for (int slot = 0; node.isLegal && slot < node.children(); ++slot) {
             const bool isHit = std::any_of(entered.begin(), entered.begin() + count, [slot](const Entered& child) { return child.slot == slot; });
             log.addChild(node, slot, entryOf(node, {slot, 0}).address, isHit);
         }
     }
 
-    /// Address of a child: the nodes and the leaves of a node are each consecutive, in slot order.
     StackEntry entryOf(const Node& node, const Entered& child) const {
-        std::uint32_t before = 0;
-        for (int slot = 0; slot < child.slot; ++slot) before += node.kinds[slot] == node.kinds[child.slot];
-        const bool isLeaf = node.kinds[child.slot] == Child::leaf;
-        return {isLeaf, ((isLeaf ? node.firstTriangles : node.firstChild) + before) & memory_->addressMask(), child.tNear};
+        const auto slot = static_cast<std::uint32_t>(child.slot), nodes = static_cast<std::uint32_t>(node.nodes);
+        const bool isLeaf = slot >= nodes;
+        const std::uint32_t offset = isLeaf ? nodes + (slot - nodes) * static_cast<std::uint32_t>(frame_.leafRecords()) : slot;
+        return {isLeaf, (node.first + offset) & memory_->addressMask(), child.tNear};
     }
 };
 

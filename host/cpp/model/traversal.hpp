@@ -93,8 +93,7 @@ inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const 
     const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1, high = (std::int64_t(1) << (n.nearBits - 1)) - 1;
     const std::array<int, 3> axes = {ray.objectAxis(0), ray.objectAxis(1), ray.objectAxis(2)};
     int count = 0;
-    for (int slot = 0; slot < nodeChildren; ++slot) {
-        if (node.kinds[slot] != Child::node && node.kinds[slot] != Child::leaf) continue;
+    for (int slot = 0; slot < node.children(); ++slot) {
         ++tests;
         std::int64_t tNear = relative.origin, tFar = relative.tMax;
         for (int a = 0; a < 3; ++a) {

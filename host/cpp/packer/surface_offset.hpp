@@ -18,8 +18,8 @@ inline double distanceError(const OffsetFormat& n, int largestTriangle) {
 
 /// The least `shading.offset` with which no ray hits the plane that it leaves, grid steps.
 inline long surfaceOffset(const OffsetFormat& n, int largestTriangle) {
-    // The stored normal, 2047 long with components rounded to whole numbers, is at least this long along the exact one
-    const double normalLength = 1 - std::ldexp(1, -10), root = std::sqrt(3.0);
+    // The geometric normal is at least this long along the exact one, see unitLength
+    const double normalLength = 0.99, root = std::sqrt(3.0);
     const double vertices = root / 2 * (std::ldexp(1, n.gridFraction) + (n.gridFraction < 0 ? 1 : 0));
     const double hit = root * distanceError(n, largestTriangle) + std::sqrt(2.0), offset = root / 2;
     return static_cast<long>(std::ceil((2 * vertices + 2 * hit + offset) / normalLength));

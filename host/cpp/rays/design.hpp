@@ -26,7 +26,7 @@ struct Design {
             } else throw std::invalid_argument("the design has a line of the unknown kind '" + kind + "'");
             if (!lines) throw std::invalid_argument("the design has a line that is not complete: " + kind + " " + name);
         }
-        for (const char* each : {"node", "triangles", "attributes"})
+        for (const char* each : {"node", "nearPair", "triangle", "flatPair", "farPair"})
             if (!format.layouts.count(each)) throw std::invalid_argument("the design has no layout of '" + std::string(each) + "'");
         format.recordBits = number("recordBits");
         format.vertexBits = number("vertexBits");

@@ -38,12 +38,12 @@ public:
         const std::size_t count = faces_.faces().size();
         const std::vector<std::array<mesh::Vector, 3>> normals(count);
         const std::vector<std::uint8_t> materials(count);
-        const std::vector<std::array<mesh::Row<std::int64_t>, 3>> colours(design.format.layouts.at("attributes").count("faces[0].colours[0].r") ? count : 0);
-        const packer::FaceAttributes attributes{normals.data(), materials.data(), isClear_.data(), colours.empty() ? nullptr : colours.data()};
+        const packer::FaceAttributes attributes{normals.data(), materials.data(), isClear_.data(), nullptr};
         tree_ = packer::buildTree(quantised_, attributes, design.format);
         packer_ = std::make_unique<packer::RecordPacker>(quantised_, attributes, tree_, design.format);
         checkFit(design);
         indices_ = packer_->indices();
+        rotations_ = packer_->rotations();
         records_ = packer_->records();
         describe(design);
     }
@@ -70,7 +70,7 @@ public:
         const std::uint32_t id = response.id & ~(COLONNADE_RAYS_BACK_SIDE | COLONNADE_RAYS_NON_OPAQUE);
         const double packed[3] = {std::max(0.0, 1.0 - response.u - response.v), response.u, response.v};
         double weights[3];
-        for (int i = 0; i < 3; ++i) weights[packer_->cornerOf(indices_[id], i)] = packed[i];
+        for (int i = 0; i < 3; ++i) weights[(rotations_[static_cast<std::size_t>(indices_[id])] + i) % 3] = packed[i];
         return {weights[1], weights[2]};
     }
 
@@ -118,7 +118,7 @@ private:
         for (std::size_t id = 0; id < indices_.size(); ++id)
             if (indices_[id] >= 0) idMasks_[id] = masks_[faceOfId(static_cast<std::uint32_t>(id))];
         const packer::Sections& s = packer_->sections();
-        image_ = {records_.data(), s.recordCount, design.format.recordBytes(), s.triangleBase, s.triangleRecords, s.attributeBase, {}, {}, idMasks_.data(), 0, 0, {}};
+        image_ = {records_.data(), s.recordCount, design.format.recordBytes(), {}, {}, idMasks_.data(), 0, 0, {}};
         const double mantissa = std::frexp(quantised_.scale, &image_.scale_exponent);
         image_.scale_mantissa = static_cast<std::uint32_t>(std::ldexp(mantissa, Placement::scaleBits));
         const int fraction = gridFraction_ + image_.scale_exponent + Placement::fractionBits;
@@ -141,6 +141,7 @@ private:
     bvh::Bvh tree_;
     std::unique_ptr<packer::RecordPacker> packer_;
     std::vector<std::int64_t> indices_;
+    std::vector<std::uint8_t> rotations_;
     std::vector<std::uint8_t> records_;
     colonnade_rays_image image_{};
     std::array<double, 3> corner_{};

@@ -20,11 +20,8 @@ public:
 
     void load(const colonnade_rays_image& image) {
         memory_->load(image.records, image.record_count, image.record_bytes);
-        memory_->divide(image.record_count, image.triangle_base, image.attribute_base);
         frame_.recordCount = image.record_count;
-        frame_.triangleBase = image.triangle_base;
-        frame_.triangleRecords = image.triangle_records;
-        frame_.attributeBase = image.attribute_base;
+        memory_->divide(frame_.recordCount, frame_.root, numbers_.bvh, frame_.leafRecords());
         placement_ = {image.scale_mantissa, image.scale_exponent, {}};
         for (int a = 0; a < 3; ++a) {
             frame_.bounds.low[a] = image.bounds_low[a];

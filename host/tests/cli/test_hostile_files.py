@@ -190,7 +190,7 @@ CASES |= {
         ("strange-material", "materials", [{"kind": "gold", "albedo": [1, 1, 1], "ior": 1.5}]),
         ("no-material", "materials", []),
         ("number-mesh", "mesh", 7),
-        ("sections", "triangle_base", 10**9),
+        ("sections", "nodes", 10**9),
         ("room", "room", {"name": "r", "depth_unit": 1.0, "memories": [{"memory": "x", "words": 0, "word_bytes": 4}]}),
         (
             "negative-room",
@@ -203,9 +203,9 @@ CASES |= {
 }
 CASES |= {
     "image-deep-header": Case(
-        "inspect x.image", "corrupt", {"x.image": b"CLNDIMG4" + struct.pack("<I", 200_000) + b"[" * 200_100}
+        "inspect x.image", "corrupt", {"x.image": b"CLNDIMG5" + struct.pack("<I", 200_000) + b"[" * 200_100}
     ),
-    "image-long-header": Case("inspect x.image", "truncated", {"x.image": b"CLNDIMG4\xff\xff\xff\xff" + b" " * 99}),
+    "image-long-header": Case("inspect x.image", "truncated", {"x.image": b"CLNDIMG5\xff\xff\xff\xff" + b" " * 99}),
     "image-other-version": Case("inspect x.image", "another version", {"x.image": b"CLNDIMG1" + b" " * 99}),
     "image-none": Case("inspect none", "run colonnade pack"),
     "image-named-300": Case(f"inspect {'i' * 300}", "File name too long"),

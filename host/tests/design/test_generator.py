@@ -14,13 +14,13 @@ import pytest
 
 from colonnade.common import cache, notes
 from colonnade.common.errors import UserError
-from colonnade.design import generator, toolchain
+from colonnade.design import generator, manifest, toolchain
 from colonnade.design.config_name import find_configuration
 from colonnade.design.idle_parts import idle_notes
 from colonnade.device import compiler
 
 MANIFEST = {
-    "version": 1,
+    "version": manifest.VERSION,
     "config": {
         "array": {"rows": 1, "contexts": 8},
         "units": {"pathContexts": 8, "marches": 1},

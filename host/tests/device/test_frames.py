@@ -11,6 +11,7 @@ import pytest
 from colonnade_lab.evaluation.fuzz.cases import coloured, textured
 from colonnade_lab.evaluation.throughput import figures, records_taken
 from equal_frames import PIPELINED, equal_frames
+from leaves import packed_triangles
 
 from colonnade.common.errors import UserError
 from colonnade.design.generator import design_for, manifest_for
@@ -30,7 +31,6 @@ pytestmark = pytest.mark.verilator
 TEAPOT = Scene(MeshSource(name="teapot:4"))
 SKY = Background(colour=(0.2, 0.3, 0.5))
 
-SECTIONS = ("scene.recordCount", "scene.triangleBase", "scene.attributeBase")
 
 #: Configuration and overrides of the narrowest arithmetic.
 NARROW = ("16b16s32d", ("array.rows=1", "array.columns=1"))
@@ -208,10 +208,7 @@ def test_single_rays_through_the_hardware_slip_through_no_edge() -> None:
     numbers = design.manifest.numbers
     image = pack(load_mesh("sphere:2"), design.manifest)
     base = frame_registers(replace(TEAPOT, mesh=MeshSource(name="sphere:2")), image.header, design.manifest, 1, 1)
-    fields = design.manifest.layouts["triangles"].unpack(
-        image.records[image.header.triangle_base : image.header.attribute_base]
-    )
-    vertices = np.stack([fields[f"vertices[0].{axis}"] for axis in "xyz"], axis=1)[:200] << numbers["gridFraction"]
+    vertices = packed_triangles(image, design.manifest)[1][:200, 0] << numbers["gridFraction"]
     random = np.random.default_rng(5)
     middle = 1 << (numbers["vertexBits"] - 1 + numbers["gridFraction"])
     registers: list[Mapping[str, int]] = []
@@ -240,16 +237,16 @@ def test_a_distant_camera_sees_the_object() -> None:
 
 
 def nodes_of(manifest: Manifest, pointers: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
-    """Nodes with the cube as box, from their firstChild and their number of child nodes."""
+    """Nodes with the cube as box, from their first child and their number of child nodes."""
     layout = manifest.layouts["node"]
     fields = {name: np.zeros(len(pointers), dtype=np.int64) for name in layout.fields}
-    fields["firstChild"][:] = [first for first, _ in pointers]
-    for slot in range(layout.count_of("kinds[{}]")):
-        fields[f"kinds[{slot}]"][:] = [int(slot < count) for _, count in pointers]
+    fields["first"][:], fields["nodes"][:] = zip(*pointers, strict=True)
+    for slot in range(4):
         for axis in "xyz":
-            fields[f"high[{slot}].{axis}"][:] = layout.fields[f"high[{slot}].{axis}"].range[1]
+            high = f"children[{slot}].high.{axis}"
+            fields[high][:] = layout.fields[high].range[1]
     for axis in "xyz":
-        fields[f"exponent.{axis}"][:] = manifest.numbers["maxExponent"]
+        fields[f"corner.{axis}"][:] = 1 << manifest.numbers["maxExponent"]
     return layout.pack(fields)
 
 
@@ -268,10 +265,8 @@ def test_an_endless_traversal_is_an_error(pointers: list[tuple[int, int]], error
     image = pack(load_mesh("cube"), design.manifest)
     registers = frame_registers(replace(TEAPOT, mesh=MeshSource(name="cube")), image.header, design.manifest, 16, 16)
     nodes = nodes_of(design.manifest, pointers)
-    others = image.records[image.header.triangle_base :]
-    walk = replace(image, records=np.concatenate([nodes, others]))
-    moved = {name: registers[name] + len(nodes) - image.header.triangle_base for name in SECTIONS}
-    registers |= moved | {"frame.watchdogCycles": 20_000}
+    walk = replace(image, records=nodes)
+    registers |= {"scene.recordCount": len(nodes), "frame.watchdogCycles": 20_000}
     frame = render_rtl(design, walk, [registers]).frames[0]
     model = render_model(design.manifest, walk, registers)
     assert frame.errors == model.errors == errors

@@ -239,7 +239,7 @@ def test_highlights_are_those_of_the_reference() -> None:
     balls = (shiny_ball(backend, "mirror", (6 / 256) ** 0.5, 0.5) for backend in ("model", "reference"))
     (found, ball), (expected, _) = balls
     assert expected.max() > 0.9
-    assert np.abs(found - expected)[ball].mean() < 0.03 * expected[ball].mean()
+    assert np.abs(found - expected)[ball].mean() < 0.04 * expected[ball].mean()
 
 
 def side_lit(path: Path, bright: float = 0.4, dim: float = 0.02) -> Path:

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable
 
 import pytest
+from leaves import leaf_addresses
 
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
@@ -93,8 +94,8 @@ def test_too_many_materials_are_refused(make_manifest: Callable[..., Manifest]) 
 def test_only_glass_is_transmissive(make_manifest: Callable[..., Manifest]) -> None:
     manifest = make_manifest()
     mesh = load_mesh("cube")
-    layout = manifest.layouts["triangles"]
+    layout = manifest.layouts["nearPair"]
     for kind, expected in (("glass", 1), ("mirror", 0), ("diffuse", 0)):
         image = pack(mesh, manifest, (MeshMaterial(kind),))
-        triangles = image.records[image.header.triangle_base :][: image.header.triangle_records]
-        assert set(layout.unpack(triangles)["isClear[0]"].tolist()) == {expected}
+        leaves = image.records[leaf_addresses(image)]
+        assert set(layout.unpack(leaves)["isClear"].tolist()) == {expected}

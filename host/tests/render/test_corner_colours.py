@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from leaves import leaves_of
 
 from colonnade.common import notes
 from colonnade.common.errors import UserError
@@ -157,24 +158,24 @@ def test_an_albedo_of_the_scene_replaces_the_colours_and_a_kind_does_not(tmp_pat
 
 @pytest.mark.parametrize("headroom", [1.0, 2.5])
 def test_records_hold_the_colours_of_their_face(tmp_path: Path, headroom: float) -> None:
-    """Linear with 12 bits, darker by the headroom of the lights, one face a record; each with its corner's normal."""
-    mesh = load_mesh(ply(tmp_path / "a.ply", "sphere:1"), corner_colours=True)
+    """Linear with 12 bits, darker by the headroom of the lights, a companion a leaf; each with its corner's normal."""
+    mesh = load_mesh(ply(tmp_path / "a.ply", "sphere:4"), corner_colours=True)
     assert mesh.corner_colours is not None
     manifest = coloured()
     image = pack(mesh, manifest, None, headroom)
-    values = manifest.layouts["attributes"].unpack(image.records[image.header.attribute_base :])
-    found = np.array([[values[f"faces[0].colours[{k}].{c}"] for c in "rgb"] for k in range(3)]).transpose(2, 0, 1)
-    order = image.source_faces[2 * image.header.triangle_base :]
-    found, order = found[order >= 0], order[order >= 0]
+    values = manifest.layouts["colours"].unpack(image.records)
+    colours = np.array([[values[f"colours[{k}].{c}"] for c in "rgb"] for k in range(4)]).transpose(2, 0, 1)
+    ids, leaves = leaves_of(image, manifest)
+    order = image.source_faces[ids]
+    leaf, triangle = np.divmod(ids, 2)
+    found = colours[leaf[:, None] + 1, np.array([[0, 1, 2], [1, 0, 3]])[triangle]]
     expected = np.rint(mesh.corner_colours[order] * 4095 / headroom)
     turned = [(found == np.roll(expected, -k, axis=1)).all(axis=(1, 2)) for k in range(3)]
     assert np.logical_or.reduce(turned).all() and any(each.any() for each in turned[1:])
-    normals = np.array([[values[f"faces[0].normals[{k}].{c}"] for c in "xyz"] for k in range(3)]).transpose(2, 0, 1)
-    normals = normals[image.source_faces[2 * image.header.triangle_base :] >= 0]
-    one = np.abs(normals).max() / np.abs(mesh.corner_normals).max()
+    normals = leaves["normals"] / 2047
     for k, is_turned in enumerate(turned):
         np.testing.assert_allclose(
-            normals[is_turned], np.roll(mesh.corner_normals[order], -k, axis=1)[is_turned] * one, atol=1
+            normals[is_turned], np.roll(mesh.corner_normals[order], -k, axis=1)[is_turned], atol=0.011
         )
 
 

@@ -21,7 +21,7 @@ from colonnade.scene.view import make_view
 SIZE = (320, 240)
 #: Least PSNR, dB. Of the glass bush 41 pixels differ, where a path leaves an edge: it starts 1.7 units off the surface
 #: in the device, and 2^-22 of the cube in the reference. With vertices of 20 bits, in finer units, it has 49.4 dB.
-LEAST = {("bush", "glass"): 44.0}
+LEAST = {("bush", "glass"): 42.0}
 #: Profile of a bush with a chamfered flange about y, and its normals at both ends of each segment.
 BUSH = [
     ((0.4, -0.9), (1.0, -0.9), (0, -1), (0, -1)),

@@ -12,22 +12,20 @@ from typing import Any
 
 import numpy as np
 from colonnade.design.generator import manifest_for
-from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 from colonnade.device.scene import DeviceScene
 from colonnade.render.device_frames import render_model
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
-from colonnade.scene_image.file import SceneImage
 
 from colonnade_lab.common.markdown import markdown
 from colonnade_lab.evaluation.bench import MESHES, geometric_mean
 
-TITLES = ["mesh", "node records", "triangle records", "nodes per ray", "triangle tests per ray", "pairs with an edge"]
+TITLES = ["mesh", "node records", "triangle records", "nodes per ray", "triangle tests per ray", "pairs"]
 
 
 def tree_reads(config: str, meshes: Sequence[str], size: tuple[int, int]) -> dict[str, dict[str, float]]:
-    """Records of each mesh, its reads per in-box ray, and the share of the leaves of two triangles with a common edge.
+    """Records of each mesh, its reads per in-box ray, and the share of the leaves that are pairs.
 
     Args:
         config: A configuration with a tree.
@@ -43,25 +41,13 @@ def tree_reads(config: str, meshes: Sequence[str], size: tuple[int, int]) -> dic
         image = DeviceScene.of(own, manifest, mesh).image
         counters = render_model(own, mesh, manifest, size).report.counters
         found[name] = {
-            "node_records": image.header.triangle_base,
-            "triangle_records": image.header.triangle_records,
+            "node_records": image.header.nodes,
+            "triangle_records": image.header.leaves,
             "nodes": counters["nodeReads"] / counters["raysInBox"],
             "tests": counters["triangleTests"] / counters["raysInBox"],
-            "pairs": edge_sharing_pairs(image, manifest),
+            "pairs": float(np.mean(image.source_faces[1::2][image.source_faces[::2] >= 0] >= 0)),
         }
     return found
-
-
-def edge_sharing_pairs(image: SceneImage, manifest: Manifest) -> float:
-    """The share of the leaves of two triangles whose triangles have two corners in common; 0 without such leaves."""
-    header, layout = image.header, manifest.layouts["triangles"]
-    values = layout.unpack(image.records[header.triangle_base : header.attribute_base])
-    pairs = values["count"] == 2
-    if not pairs.any():
-        return 0.0
-    corners = [np.stack([values[f"vertices[{k}].{axis}"][pairs] for axis in "xyz"], axis=1) for k in range(6)]
-    common = sum(np.any([(a == b).all(axis=1) for b in corners[3:]], axis=0).astype(int) for a in corners[:3])
-    return float(np.mean(common == 2))
 
 
 def table(results: dict[str, dict[str, float]]) -> str:

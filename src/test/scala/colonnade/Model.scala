@@ -6,7 +6,7 @@ import java.security.MessageDigest
 
 import chisel3.Data
 import colonnade.config.{AttributeLayout, ColonnadeConfig}
-import colonnade.formats.{AttributeMemories, Layout, RecordFormats}
+import colonnade.formats.{AttributeMemories, Layout, LeafRecord, RecordFormats}
 
 import scala.jdk.CollectionConverters._
 import scala.sys.process._
@@ -31,12 +31,11 @@ object Model {
       environment: Option[Map[String, Seq[BigInt]]] = None
   ): Seq[Seq[BigInt]] = {
     val formats = new RecordFormats(config)
-    val kinds   = Seq("node" -> formats.node, "triangles" -> formats.triangles, "attributes" -> formats.attributes)
-    val layouts = kinds.map { case (name, kind) => layout(name, kind) }
+    val layouts = formats.kinds.map { case (name, kind) => layout(name, kind) }
     val digits  = formats.recordBits / 4
     val hex     = records.map(record => "0" * (digits - record.toString(16).length) + record.toString(16))
     val scene   =
-      s"records ${registers("scene.triangleBase")} ${registers("scene.attributeBase")} ${hex.mkString(" ")}"
+      s"records ${hex.mkString(" ")}"
     val written = registers.map { case (name, value) => s"$name=$value" }.mkString("registers ", " ", "")
     val maps    = environment.toSeq.flatMap(environmentOf(config, _))
     answers(
@@ -46,6 +45,10 @@ object Model {
       "pixel"
     )
   }
+
+  /** Runs the model on questions about leaves. */
+  def leaves(config: ColonnadeConfig, questions: Seq[Seq[BigInt]], kind: String): Seq[Seq[BigInt]] =
+    answers(config, LeafRecord.kinds(config.geometry).map { case (name, kind) => layout(name, kind) }, questions, kind)
 
   /** Runs the model on questions about the environment's maps; environment_queries.hpp documents their format.
     *

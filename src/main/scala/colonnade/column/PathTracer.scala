@@ -97,6 +97,8 @@ final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config)
   for ((port, requests) <- io.requests.zip(traversals.map(_.requests) :+ hits.requests)) port :<>= requests
   traversals.foreach(_.broadcasts := io.broadcasts)
   hits.broadcasts := io.broadcasts
+  for ((wants, material) <- hits.wantsColours.toSeq.flatten.zip(io.registers.materials))
+    wants := material.hasCornerColours.getOrElse(false.B) || material.hasTexture.getOrElse(false.B)
 
   io.isIdle := paths.isIdle && !io.requests.map(_.valid).reduce(_ || _)
   for ((events, unit) <- io.events.traversal.zip(traversals)) events := unit.events

@@ -133,9 +133,10 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
 object NumberFormats {
   val reachBits: Int = 8 // the scene reaches this many doublings beyond the object's cube
 
-  /** A stored normal component: signed, [[normalFraction]] fraction bits. */
+  /** A stored normal component: signed, [[normalFraction]] fraction bits; the length of a unit normal. */
   val normalBits:     Int = 12
   val normalFraction: Int = 11
+  val unitNormal:     Int = (1 << normalFraction) - 1
 
   val colourBits:    Int = 12 // a linear colour channel, unsigned; all ones is 1.0
   val lightBits:     Int = 16 // a light's intensity per channel, unsigned

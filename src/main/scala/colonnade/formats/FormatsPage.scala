@@ -7,28 +7,40 @@ object FormatsPage {
 
   def apply(config: ColonnadeConfig): String = {
     val formats = new RecordFormats(config)
-    val page    = Seq(
+    val kinds   = formats.kinds.toMap
+
+    def body(format: String) = table(numbersOf(kinds(format)).filter(_._1.startsWith("body.")))
+    val page                 = Seq(
       "# Memory formats",
       s"""*Written by the generator (`tools/regenerate`) from the Chisel bundles of `colonnade.formats`, for preset `small`, precision
          |${config.precision}. Widths follow the configuration.*""".stripMargin,
       """`u16` is an unsigned number of 16 bits; `s12.11` is signed, 12 bits, 11 of them fraction bits. Bit 0 is the least significant.
         |One row holds fields of one kind: of `normals[i<3].xyz` at `68+36i`, `56+36i`, `44+36i`, `normals[2].z` is at 44 + 36 · 2.""".stripMargin,
       "## Column BVH memory",
-      s"""One memory holds three sections: nodes from record 0, triangles from `scene.triangleBase`, attributes from
-         |`scene.attributeBase`. All records have ${formats.recordBits} bits, whole words of 32; unused high bits are zero. There are
-         |${config.columnBvhMemory.depth} records: an address has ${formats.addressBits} bits, a packed triangle id ${formats.idBits}.""".stripMargin,
+      s"""One memory holds nodes and leaves. All records have ${formats.recordBits} bits, whole words of 32; unused high bits are zero. There
+         |are ${config.columnBvhMemory.depth} records: an address has ${formats.addressBits} bits, a packed triangle id ${formats.idBits}.""".stripMargin,
       "### Node",
-      """Up to four children. Their boxes have planes `origin + (low << exponent)` and `origin + (high << exponent)`, in vertex units.
-        |A kind is 0 (empty), 1 (node) or 2 (leaf). In slot order, nodes are consecutive records from `firstChild`, and leaves
-        |triangles records from `firstTriangles`. The root is record 0.""".stripMargin,
+      """Up to four children, at consecutive records from `first`: as many `nodes`, then as many `leaves`. Their boxes have planes
+        |`origin + (low << exponent)` and `origin + (high << exponent)`, in vertex units. `corner` is 2 · origin + 2^exponent: its
+        |lowest set bit gives the exponent, of which the origin is a multiple. The root is at `scene.root`.""".stripMargin,
       table(formats.node),
-      "### Triangles",
-      """A pair with a common edge, or one triangle. Triangle k of the leaf at address a has the packed id 2a + k, and the vertices
-        |3k, 3k + 1 and 3k + 2.""".stripMargin,
-      table(formats.triangles),
-      "### Attributes",
-      attributes(config),
-      table(formats.attributes),
+      "### Leaf",
+      """A pair of triangles with a common edge, or one triangle. The triangles of the leaf at address a have packed ids 2a and
+        |2a + 1, and vertices (0, 1, 2) and (1, 0, 3). Any bits are legal. All formats have these fields:""".stripMargin,
+      table(numbersOf(kinds("nearPair")).filterNot(_._1.matches("body.*|unused"))),
+      """The format is 0 for a near pair, 1 for a triangle, 2 for a flat pair, 3 for a far pair. A corner normal is a
+        |[code](numbers.md#normals) (u, v).""".stripMargin,
+      "Near pair: vertices 1 to 3 are vertex 0 plus a delta, and wrap. Each code lies in two parts, with its lowest bits apart:",
+      body("nearPair"),
+      "Far pair: the deltas of a near pair, with a sign in place of the lowest bits of codes, which are 0:",
+      body("farPair"),
+      "Flat pair, whose corner normals are those of its triangles; and one triangle:",
+      body("flatPair"),
+      body("triangle"),
+      "### Colours",
+      """With `geometry.cornerColours` and `scene.hasColours` the record after each leaf is its companion: `colours[i<4].rgb` of its
+        |vertices, 12 bits each, all ones 1.0. With `geometry.textureBytes` red and green of a textured face are u and v in the atlas,
+        |texels with 3 fraction bits.""".stripMargin,
       "## Physical-attribute memory",
       attributeMemories(config),
       "`mapDescriptor`, a tile of the albedo or normal map ([modes and masks](background.md#twolevel)):",
@@ -58,22 +70,6 @@ object FormatsPage {
     page.mkString("\n\n") + "\n"
   }
 
-  private def attributes(config: ColonnadeConfig): String = {
-    val slots = RecordFormats.facesPerRecord(config)
-    val face  =
-      s"""Unit normals of a face's corners and plane, and its material. The face with packed id t has number
-         |f = t − 2 · `scene.triangleBase`, and is in record `scene.attributeBase + f / $slots`, slot `f % $slots`.""".stripMargin
-    val colours =
-      if (config.geometry.cornerColours)
-        "A face also has a linear colour for each vertex, all ones 1.0."
-      else
-        """With `geometry.cornerColours` a record holds one face, with linear colours `colours[0]` to `colours[2]` of its corners:
-          |channels of 12 bits, all ones 1.0.""".stripMargin
-    val textures =
-      """With `geometry.textureBytes` red and green of a textured face are u and v in the atlas, texels with 3 fraction bits.""".stripMargin
-    s"$face $colours $textures"
-  }
-
   private def attributeMemories(config: ColonnadeConfig): String = config.physicalAttributeMemory match {
     case None =>
       """The maps of an environment; this configuration has none of them (`physicalAttributeMemory` is null). Each of their parts is a
@@ -86,10 +82,13 @@ object FormatsPage {
         |record. Tiles lie row by row.""".stripMargin + (head ++ rows).mkString("\n\n", "\n", "")
   }
 
-  private def table(kind: chisel3.Data): String = {
-    val numbers = Layout.of(kind).map(f => (f.name, f.offset, number(f.width, f.signed, f.fraction)))
+  private def table(kind: chisel3.Data): String = table(numbersOf(kind))
+
+  private def table(numbers: Seq[(String, Int, String)]): String =
     table("field | low bit | number", FieldFamily.of(numbers))
-  }
+
+  private def numbersOf(kind: chisel3.Data): Seq[(String, Int, String)] =
+    Layout.of(kind).map(f => (f.name, f.offset, number(f.width, f.signed, f.fraction)))
 
   private val titles =
     Map[Access, String](

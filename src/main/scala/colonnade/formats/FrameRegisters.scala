@@ -88,16 +88,20 @@ final class Bounds(numbers: NumberFormats) extends Bundle {
   val high = Vec3(UInt(numbers.vertexBits.W))
 }
 
-/** The sections of the column BVH memory: nodes, then triangles, then attributes. A base above the next one, or above
-  * `recordCount`, is clamped to it.
-  */
-final class SceneMap(countBits: Int) extends Bundle {
+/** The column BVH memory. */
+final class SceneMap(config: ColonnadeConfig) extends Bundle {
 
   /** Total number of records. */
-  val recordCount     = UInt(countBits.W)
-  val triangleBase    = UInt(countBits.W)
-  val triangleRecords = UInt(countBits.W)
-  val attributeBase   = UInt(countBits.W)
+  val recordCount = UInt(RecordFormats.idBits(config).W)
+
+  /** The record of the root node. */
+  val root = UInt(RecordFormats.addressBits(config).W)
+
+  /** Leaves have companions. */
+  val hasColours = Option.when(config.geometry.cornerColours)(Bool())
+
+  /** The distance of leaves, by a multiplication: that of the companion is 1. */
+  def leafRecords(count: UInt): UInt = hasColours.fold(count)(Mux(_, count << 1, count))
 }
 
 /** Where the records lie in DRAM. */
@@ -134,7 +138,7 @@ final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
   val background  = Rgb(FrameRegisters.colour)
   val materials   = Vec(config.frame.materials, new Material(config))
   val bounds      = new Bounds(numbers)
-  val scene       = new SceneMap(RecordFormats.idBits(config))
+  val scene       = new SceneMap(config)
   val environment = config.physicalAttributeMemory.map(_ => new EnvironmentView(numbers))
   val dram        = config.columnBvhMemory.cache.map(_ => new SceneInDram)
   val gather      = Gather(config)

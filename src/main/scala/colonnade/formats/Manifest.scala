@@ -8,18 +8,14 @@ import colonnade.formats.Access.ReadWrite
   * records, registers and streams. The generator writes it beside the Verilog; packer, model and harness read it.
   */
 object Manifest {
-  val version: Int = 2 // incremented when a key changes its meaning or leaves
+  val version: Int = 3 // incremented when a key changes its meaning or leaves
 
   def apply(config: ColonnadeConfig): ujson.Obj = {
     val formats = new RecordFormats(config)
     val numbers = ujson.Obj.from(config.numbers.entries.map { case (name, value) => name -> ujson.Num(value) })
     val records = ujson.Obj(
       "bits"    -> formats.recordBits,
-      "layouts" -> ujson.Obj(
-        "node"       -> fields(Layout.of(formats.node)),
-        "triangles"  -> fields(Layout.of(formats.triangles)),
-        "attributes" -> fields(Layout.of(formats.attributes))
-      )
+      "layouts" -> ujson.Obj.from(formats.kinds.map { case (name, kind) => name -> fields(Layout.of(kind)) })
     )
     val registers = ujson.Obj(
       "dataBits" -> RegisterMap.dataBits,

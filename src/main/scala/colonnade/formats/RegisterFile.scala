@@ -42,12 +42,6 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   private val legal    = settings.map { case (r, value) => r.name -> RegisterLimits.clamp(value, r.limit) }.toMap
   io.frame := Cat(Layout.of(io.frame).sortBy(-_.offset).map(field => legal(field.name))).asTypeOf(io.frame)
 
-  // A section ends at the base of the next one at the latest
-  private val scene         = io.frame.scene
-  private val attributeBase = least(legal("scene.attributeBase"), legal("scene.recordCount"))
-  scene.attributeBase := attributeBase
-  scene.triangleBase  := least(legal("scene.triangleBase"), attributeBase)
-
   // Control: a pulse in the cycle of the write.
   private def pulse(name: String): Bool =
     writes && io.register.address === registers.find(_.name == name).get.address.U && io.register.writeData(0)
@@ -90,8 +84,6 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   }
   when(isCopy) { readData := copy }
   io.register.readData := Mux(isCopy, copy, readData)
-
-  private def least(a: UInt, b: UInt): UInt = Mux(a < b, a, b)
 
   private def wordOf(value: UInt, word: Int): UInt = {
     val low = word * RegisterMap.dataBits

@@ -15,17 +15,15 @@ object RegisterLimits {
     val materials = (0 until config.frame.materials).flatMap { index =>
       Seq(s"materials[$index].kind" -> MaterialKind.last(config), s"materials[$index].reflectance" -> one)
     }
-    val records = Seq("recordCount", "triangleBase", "triangleRecords", "attributeBase").map(name =>
-      s"scene.$name" -> BigInt(config.columnBvhMemory.depth)
-    )
     val limits = Seq(
       "frame.unitShift"             -> BigInt(numbers.maxUnitShift),
       "camera.stepShift"            -> BigInt(numbers.coordinateBits),
       "shading.lights"              -> BigInt(config.frame.lights),
       "shading.bounces"             -> BigInt(config.frame.maxBounces),
       "shading.shadowTransmittance" -> one,
-      "gather.bounces"              -> BigInt(Gather.maxBounces)
-    ) ++ materials ++ records
+      "gather.bounces"              -> BigInt(Gather.maxBounces),
+      "scene.recordCount"           -> BigInt(config.columnBvhMemory.depth)
+    ) ++ materials
     val max = Layout.of(new FrameRegisters(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
     limits.filter { case (name, limit) => max.get(name).exists(limit < _) }.toMap
   }

@@ -38,7 +38,7 @@ final class EventSums(config: ColonnadeConfig, columns: Int) extends Bundle {
   val raysRefraction   = perColumn
   val raysInBox        = perUnit
   val nodeReads        = perUnit
-  val boxTests         = sum(units * NodeRecord.children)
+  val boxTests         = sum(units * NodeRecord.most)
   val triangleTests    = perUnit
   val hits             = perColumn
   val recordReads      = sum(columns * config.columnBvhMemory.banks)

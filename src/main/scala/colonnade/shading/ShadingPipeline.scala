@@ -5,7 +5,7 @@ import chisel3.util.{log2Ceil, RegEnable}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.common.ModuloSchedule
 import colonnade.config.PathConfig
-import colonnade.formats.{Lobe, Material, MaterialKind}
+import colonnade.formats.{Lobe, MaterialKind}
 import colonnade.numbers.Rounding
 
 /** Shades hits as [[SequentialShader]] does, bit for bit: a hit with one light every three cycles, and three cycles more for
@@ -313,7 +313,7 @@ object ShadingPipeline {
     1 << log2Ceil(new BrightnessCycles(config).direct / ModuloSchedule.interval + 4)
 
   /** The entry of a material's number, truncated to the bits that the table needs; beyond the table it means entry 0. */
-  private[shading] def material(config: PathConfig, table: Vec[Material], number: UInt): Material = {
+  private[colonnade] def material[T <: Data](config: PathConfig, table: Vec[T], number: UInt): T = {
     val indexBits = log2Ceil(config.frame.materials)
     val entries   = table.padTo(1 << indexBits, table.head)
     if (indexBits == 0) entries.head else VecInit(entries)(number(indexBits - 1, 0))

@@ -3,7 +3,7 @@ package colonnade.traversal
 import chisel3._
 import chisel3.util.Cat
 import colonnade.config.TraversalConfig
-import colonnade.formats.{ChildKind, NodeRecord, RecordFormats, Vec3}
+import colonnade.formats.{ChildBox, NodeRecord, RecordFormats}
 import colonnade.ray.{PermutedFrame, RayFormats}
 
 /** Operands that the box tests of all children of a node share, in the ray's own frame. */
@@ -40,11 +40,8 @@ final class ChildPlanes(config: TraversalConfig) extends Bundle {
 
 /** A child as its record stores it, in the object's frame. */
 final class StoredChild(config: TraversalConfig) extends Bundle {
-  private val plane = UInt(config.geometry.boxBits.W)
-
-  val kind = UInt(ChildKind.bits.W)
-  val low  = Vec3(plane)
-  val high = Vec3(plane)
+  val isOccupied = Bool()
+  val box        = new ChildBox(config.geometry.boxBits)
 }
 
 /** Converts a record and a ray to operands: selections, and one subtraction per axis. */
@@ -75,25 +72,21 @@ object BoxOperands {
 
   def child(config: TraversalConfig, node: NodeRecord, slot: Int): StoredChild = {
     val stored = Wire(new StoredChild(config))
-    stored.kind := node.kinds(slot)
-    stored.low  := node.low(slot)
-    stored.high := node.high(slot)
+    stored.isOccupied := slot.U < node.count
+    stored.box        := node.children(slot)
     stored
   }
 
   /** The planes in the frame of a ray with this dominant axis and these signs. */
   def planes(config: TraversalConfig, child: StoredChild, axis: UInt, negative: Seq[Bool]): ChildPlanes = {
     val result = Wire(new ChildPlanes(config))
-    val low    = PermutedFrame(child.low, axis)
-    val high   = PermutedFrame(child.high, axis)
-    result.isOccupied := BoxOperands.isOccupied(child.kind)
+    val low    = PermutedFrame(child.box.low, axis)
+    val high   = PermutedFrame(child.box.high, axis)
+    result.isOccupied := child.isOccupied
     for (a <- 0 until 3) {
       result.nearPlanes(a) := Mux(negative(a), ~high(a), low(a))
       result.farPlanes(a)  := Mux(negative(a), ~low(a), high(a))
     }
     result
   }
-
-  /** Whether the slot holds a child to test: a node or a leaf. */
-  def isOccupied(kind: UInt): Bool = kind === ChildKind.node || kind === ChildKind.leaf
 }

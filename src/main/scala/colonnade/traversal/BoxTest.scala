@@ -31,9 +31,9 @@ final class BoxCandidate(config: TraversalConfig) extends Bundle {
 /** The children that the ray enters: the first `count` of `children`, sorted by entry distance. */
 final class BoxResult(config: TraversalConfig) extends Bundle {
   val context  = Context(config)
-  val count    = UInt(log2Ceil(NodeRecord.children + 1).W)
-  val children = Vec(NodeRecord.children, new EnteredChild(config))
+  val count    = UInt(log2Ceil(NodeRecord.most + 1).W)
+  val children = Vec(NodeRecord.most, new EnteredChild(config))
 
   /** Children tested: those that are not empty. */
-  val tests = UInt(log2Ceil(NodeRecord.children + 1).W)
+  val tests = UInt(log2Ceil(NodeRecord.most + 1).W)
 }

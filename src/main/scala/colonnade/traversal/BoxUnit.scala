@@ -1,10 +1,10 @@
 package colonnade.traversal
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Mux1H, PopCount, Queue, RegEnable, ShiftRegister}
+import chisel3.util.{log2Ceil, Decoupled, Mux1H, Queue, RegEnable, ShiftRegister}
 import colonnade.common.{Context, ReservedQueue}
 import colonnade.config.TraversalConfig
-import colonnade.formats.{ChildKind, NodeRecord, RecordFormats}
+import colonnade.formats.{NodeRecord, RecordFormats, SceneMap}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
@@ -12,11 +12,12 @@ final class BoxUnitIO(config: TraversalConfig) extends Bundle {
   val in        = Flipped(Decoupled(new BoxCandidate(config)))
   val readyNext = Output(Bool()) // `in` will be ready in the next cycle
   val out       = Decoupled(new BoxResult(config))
+  val scene     = Input(new SceneMap(config))
   val busy      = Output(Bool()) // the datapath accepts children in this cycle
 }
 
 /** Tests one ray against the children of one node (docs/numbers.md, section 3). The result lists the children that the
-  * ray enters, sorted by entry distance. Children of an illegal kind count as empty.
+  * ray enters, sorted by entry distance.
   *
   * Throughput: `units.boxLanes` children per cycle, in order; a node takes arity / `boxLanes` beats. Latency: 5 cycles
   * plus the beats of the node. The pipeline never stalls: a node enters only if the result queue has space for it, and
@@ -27,7 +28,7 @@ final class BoxUnitIO(config: TraversalConfig) extends Bundle {
   * computes.
   */
 class BoxUnit(config: TraversalConfig) extends Module {
-  private val arity = NodeRecord.children
+  private val arity = NodeRecord.most
   private val lanes = config.units.boxLanes
   private val beats = arity / lanes
 
@@ -89,31 +90,27 @@ class BoxUnit(config: TraversalConfig) extends Module {
   sorted.io.deq.ready := io.out.ready
   tags.out.ready      := io.out.fire
   tags.mayTakeNext    := ends || sorted.io.count =/= io.out.fire.asUInt
-  io.out.bits         := tags.out.bits.result(sorted.io.deq.bits)
+  io.out.bits         := tags.out.bits.result(sorted.io.deq.bits, io.scene)
   io.busy             := starts
   assert(!io.out.valid || tags.out.valid, "sorted children without their node")
 }
 
 /** What the result needs of a node besides the sorted children. */
 private[traversal] final class NodeTag(config: TraversalConfig) extends Bundle {
-  private val arity   = NodeRecord.children
-  private val address = UInt(RecordFormats.addressBits(config).W)
+  val context = Context(config)
+  val nodes   = UInt(NodeRecord.countBits.W)
+  val count   = UInt(NodeRecord.countBits.W)
+  val first   = UInt(RecordFormats.addressBits(config).W)
 
-  val context        = Context(config)
-  val kinds          = Vec(arity, UInt(ChildKind.bits.W))
-  val firstChild     = address.cloneType
-  val firstTriangles = address.cloneType
-
-  def result(order: ChildOrder): BoxResult = {
-    val before = VecInit(kinds.indices.map(slot => PopCount(kinds.take(slot).map(_ === kinds(slot)) :+ false.B).pad(2)))
+  def result(order: ChildOrder, scene: SceneMap): BoxResult = {
     val result = Wire(new BoxResult(config))
     result.context := context
     result.count   := order.count
-    result.tests   := PopCount(kinds.map(BoxOperands.isOccupied))
+    result.tests   := count
     for ((child, entered) <- result.children.zip(order.children)) {
-      val isLeaf = kinds(entered.slot) === ChildKind.leaf
+      val isLeaf = entered.slot >= nodes
       child.target.isLeaf  := isLeaf
-      child.target.address := Mux(isLeaf, firstTriangles, firstChild) + before(entered.slot)
+      child.target.address := first + Mux(isLeaf, nodes +& scene.leafRecords(entered.slot - nodes), entered.slot)
       child.tNear          := Fixed(new RayFormats(config.numbers).units, order.distance.units(entered.tNear).zext)
     }
     result
@@ -123,10 +120,10 @@ private[traversal] final class NodeTag(config: TraversalConfig) extends Bundle {
 private[traversal] object NodeTag {
   def apply(config: TraversalConfig, candidate: BoxCandidate): NodeTag = {
     val tag = Wire(new NodeTag(config))
-    tag.context        := candidate.context
-    tag.kinds          := candidate.node.kinds
-    tag.firstChild     := candidate.node.firstChild
-    tag.firstTriangles := candidate.node.firstTriangles
+    tag.context := candidate.context
+    tag.nodes   := candidate.node.nodes
+    tag.count   := candidate.node.count
+    tag.first   := candidate.node.first
     tag
   }
 }

@@ -7,7 +7,7 @@ import colonnade.formats.NodeRecord
 
 /** A child by its slot, and its entry distance. */
 final class OrderedChild(config: TraversalConfig) extends Bundle {
-  val slot = UInt(log2Ceil(NodeRecord.children).W)
+  val slot = UInt(log2Ceil(NodeRecord.most).W)
 
   /** Relative to the node, see [[NodeDistance]]. */
   val tNear = SInt(config.numbers.nearBits.W)
@@ -15,8 +15,8 @@ final class OrderedChild(config: TraversalConfig) extends Bundle {
 
 /** The children that the ray enters: the first `count` of `children`, sorted by entry distance, then by slot. */
 final class ChildOrder(config: TraversalConfig) extends Bundle {
-  val count    = UInt(log2Ceil(NodeRecord.children + 1).W)
-  val children = Vec(NodeRecord.children, new OrderedChild(config))
+  val count    = UInt(log2Ceil(NodeRecord.most + 1).W)
+  val children = Vec(NodeRecord.most, new OrderedChild(config))
   val distance = new NodeDistance(config)
 }
 

@@ -49,7 +49,7 @@ final class TraversalStackIO(config: TraversalConfig) extends Bundle {
   * round-robin arbiter selects between results and resumptions.
   */
 class TraversalStack(config: TraversalConfig) extends Module {
-  private val arity      = NodeRecord.children
+  private val arity      = NodeRecord.most
   private val contexts   = config.contexts
   private val stackDepth = config.columnBvhMemory.stackDepth
 

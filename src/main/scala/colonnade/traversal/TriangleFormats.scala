@@ -77,16 +77,10 @@ final class TriangleTag(config: PartConfig) extends Bundle {
   val context = Context(config)
   val id      = UInt(RecordFormats.idBits(config).W) // of the first triangle
 
-  /** The round is the last of its record; it tests a pair, whose second triangle has the next id. */
-  val isLast = Bool()
-  val isPair = Bool()
-
-  /** The material transmits light; of the first triangle, and of the second one of a pair. */
-  val isTransmissive = Vec(2, Bool())
-
-  /** Stands for a record without triangles and always misses; the ray's direction is negative on its dominant axis. */
-  val isAbsent   = Bool()
-  val isNegative = Bool()
+  /** The round tests a pair, whose second triangle has the next id; the material transmits light. */
+  val isPair         = Bool()
+  val isTransmissive = Bool()
+  val isNegative     = Bool() // the ray's direction, on its dominant axis
 }
 
 /** Depths of the vertices along the ray's dominant axis. */

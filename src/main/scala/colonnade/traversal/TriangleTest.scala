@@ -3,7 +3,7 @@ package colonnade.traversal
 import chisel3._
 import colonnade.common.Context
 import colonnade.config.PartConfig
-import colonnade.formats.RecordFormats
+import colonnade.formats.{LeafRecord, RecordFormats}
 import colonnade.numbers.Fixed
 import colonnade.ray.{RayFormats, TriangleRay}
 
@@ -11,7 +11,7 @@ import colonnade.ray.{RayFormats, TriangleRay}
 final class TriangleCandidate(config: PartConfig) extends Bundle {
   val context = Context(config)
   val address = UInt(RecordFormats.addressBits(config).W)
-  val record  = new RecordFormats(config).triangles
+  val record  = UInt(LeafRecord.recordBits(config.geometry).W)
   val ray     = new TriangleRay(config.numbers)
 }
 

@@ -23,13 +23,12 @@ final private class PendingTriangle(config: PartConfig) extends Bundle {
 /** Watertight test of a ray against the triangles of a record (after Woop, Benthin and Wald 2013, in integers);
   * docs/traversal.md. The hit table compares the result with the closest hit so far.
   *
-  * Throughput: a record whose two triangles share an edge every 5 cycles, any other triangle every 4 cycles; one result
-  * for each triangle, in order. Latency of a miss: 10 cycles. A triangle that the ray's line crosses takes about 30 cycles
+  * Throughput: a pair every 5 cycles, a triangle every 4 cycles; one result for each triangle, in order. Latency of a miss: 10 cycles. A triangle that the ray's line crosses takes about 30 cycles
   * plus a quarter of the quotient's digits, one every 7 cycles or one per rotation of the dividers, whichever is longer.
   * Sequencer, shear and edges stall together, when a triangle's edges are known and the next stage is full. The stages
   * ahead share nothing with them, so these always make progress.
   *
-  * A record with an illegal `count` gives one miss, its last. A triangle in a plane through the ray misses.
+  * A triangle in a plane through the ray misses.
   *
   * @param distanceLanes number of dividers
   * @param queueDepth    triangles that may wait for their result or for that of an earlier one
@@ -64,15 +63,15 @@ final class TriangleUnit(config: PartConfig, distanceLanes: Int = 1, queueDepth:
 
   // The edge functions decide
   private val isSecond        = edges.io.isSecond
-  private val crossesTriangle = edges.io.crossesTriangle && !tested.isAbsent
+  private val crossesTriangle = edges.io.crossesTriangle
   private val isTaken         = pending.io.enq.ready && (!crossesTriangle || weights.io.crossed.ready)
   private val decides         = edges.io.decides && isTaken
   advances := !edges.io.decides || isTaken
 
   pending.io.enq.valid                := decides
   pending.io.enq.bits.context         := tested.context
-  pending.io.enq.bits.isLast          := Mux(tested.isPair, isSecond, tested.isLast)
-  pending.io.enq.bits.isTransmissive  := tested.isTransmissive(isSecond)
+  pending.io.enq.bits.isLast          := isSecond || !tested.isPair
+  pending.io.enq.bits.isTransmissive  := tested.isTransmissive
   pending.io.enq.bits.crossesTriangle := crossesTriangle
 
   // The path of crossed triangles

@@ -9,7 +9,7 @@ import colonnade.ray.BoxRay
 
 /** The kind of a record; each kind has one unit that takes it: box unit, triangle unit, shader. */
 object RecordKind extends ChiselEnum {
-  val node, triangles, attributes = Value
+  val node, leaf, colours = Value
 }
 
 /** A context that needs a record. */
@@ -57,7 +57,7 @@ final class RecordFetchIO(config: PartConfig) extends Bundle {
   /** Invalidates all buffers: the memory may have changed. */
   val start = Input(Bool())
   val row   = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
-  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
+  val scene = Input(new SceneMap(config))
 
   /** A context has at most one request outstanding. */
   val fetches    = Flipped(Vec(RecordFetch.ports, Valid(new FetchRequest(config))))

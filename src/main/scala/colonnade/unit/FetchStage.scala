@@ -14,7 +14,7 @@ final class FetchStageIO(config: TraversalConfig) extends Bundle {
   /** Invalidates all record buffers. */
   val start      = Input(Bool())
   val row        = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
-  val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
+  val scene      = Input(new SceneMap(config))
   val requests   = Decoupled(new RecordRequest(config))
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
 
@@ -68,10 +68,10 @@ final class FetchStage(config: TraversalConfig) extends Module {
   io.nodes.bits.node    := formats.asNode(response.record)
   io.nodes.bits.ray     := boxRay
 
-  io.triangles.valid        := isFor(RecordKind.triangles)
+  io.triangles.valid        := isFor(RecordKind.leaf)
   io.triangles.bits.context := response.context
   io.triangles.bits.address := response.address
-  io.triangles.bits.record  := formats.asTriangles(response.record)
+  io.triangles.bits.record  := response.record
   io.triangles.bits.ray     := triangleRay
 
   assert(!io.nodes.valid || io.nodes.ready, "the box unit does not accept its node")

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Arbiter, Decoupled, DecoupledIO, Pipe, Valid}
 import colonnade.common.{Context, TimingSlice}
 import colonnade.config.TraversalConfig
-import colonnade.formats.{NodeRecord, RecordFormats, SceneMap}
+import colonnade.formats.{NodeRecord, SceneMap}
 import colonnade.ray.PreparedRay
 import colonnade.traversal.{NodeRef, TriangleCandidate, TriangleLanesIO, TriangleResult}
 
@@ -14,7 +14,7 @@ final class IntersectorEvents(config: TraversalConfig) extends Bundle {
 
   val raysInBox         = Bool()
   val nodeReads         = Bool()
-  val boxTests          = UInt(log2Ceil(NodeRecord.children + 1).W)
+  val boxTests          = UInt(log2Ceil(NodeRecord.most + 1).W)
   val triangleTests     = Bool()
   val busyBoxUnit       = Bool()
   val busyTriangleUnit  = UInt(log2Ceil(config.units.triangleLanes + 1).W)
@@ -27,7 +27,7 @@ final class IntersectorEvents(config: TraversalConfig) extends Bundle {
 
 final class IntersectorIO(config: TraversalConfig) extends Bundle {
   val start = Input(Bool()) // a frame starts
-  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
+  val scene = Input(new SceneMap(config))
 
   /** A ray that enters the object's box, for an idle context; by context: its ray is a shadow ray. */
   val rays     = Flipped(Valid(new PreparedRay(config)))
@@ -117,9 +117,7 @@ final class Intersector(config: TraversalConfig) extends Module {
   io.events.contextsTriangles := Occupancy(config, Seq(io.triangles.fire), Seq(result.fire && result.bits.isLast))
   io.events.deepestStack      := traversal.io.deepest
   io.events.stackOverflow     := traversal.io.overflow
-  // Behind a register, since a group's triangle units take a record by a combinational path through the column
-  private val isIllegal = RegNext(io.triangles.fire && !io.triangles.bits.record.isLegal, false.B)
-  io.events.illegalRecord := traversal.io.illegal || isIllegal
+  io.events.illegalRecord     := traversal.io.illegal
 
   /** A result stays a cycle while the hit table compares it. */
   private def compared(offered: DecoupledIO[TriangleResult]): DecoupledIO[TriangleResult] = {
@@ -140,7 +138,7 @@ final class Intersector(config: TraversalConfig) extends Module {
   private def fetch(port: Valid[FetchRequest], valid: Bool, context: UInt, target: NodeRef): Unit = {
     port.valid        := valid
     port.bits.context := context
-    port.bits.kind    := Mux(target.isLeaf, RecordKind.triangles, RecordKind.node)
+    port.bits.kind    := Mux(target.isLeaf, RecordKind.leaf, RecordKind.node)
     port.bits.address := target.address
   }
 }

@@ -5,10 +5,10 @@ import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Choice, Context, ContextTable}
 import colonnade.config.PathConfig
 import colonnade.environment.HitDistance
-import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.formats.{Leaf, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PreparedRay, RayFormats, TriangleRay}
-import colonnade.shading.Occlusion
+import colonnade.shading.{Occlusion, ShadingPipeline}
 import colonnade.traversal.HitPoint
 
 /** The closest hit of a ray that is to be shaded. */
@@ -27,20 +27,11 @@ object SurfaceHit {
   /** The distance of a hit at `t` of a ray that enters the object's box at `tEntry`, in whole units. */
   def distance(config: PathConfig, tEntry: UInt, t: Fixed): UInt =
     Rounding.floor(tEntry, -config.numbers.gridFraction) +& t.integer.asUInt
-
-  /** The record with the attributes of a triangle. */
-  def attributeAddress(config: PathConfig, scene: SceneMap, id: UInt): UInt = {
-    val slotBits = RecordFormats.faceSlotBits(config)
-    val face     = id -% (scene.triangleBase ## 0.U(1.W))
-    // With one face per record the sum may be too large: all ones is no legal address
-    if (slotBits == 0) Rounding.saturate(scene.attributeBase +& face, id.getWidth)
-    else scene.attributeBase + (face >> slotBits)
-  }
 }
 
 final class PathHitsIO(config: PathConfig) extends Bundle {
   val start = Input(Bool())
-  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
+  val scene = Input(new SceneMap(config))
   val trace = Flipped(new TracePort(config)) // to the path unit
 
   /** Rays that enter the object's box, to the traversal units; what they have met. */
@@ -51,6 +42,9 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
   val requests   = Decoupled(new RecordRequest(config))
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
   val events     = Output(new FetchEvents(AttributeFetch.slotConfig(config)))
+
+  /** By material: its colour depends on the companion of a leaf. */
+  val wantsColours = scene.hasColours.map(_ => Input(Vec(config.frame.materials, Bool())))
 }
 
 /** Stands between a path unit and the traversal units that trace its rays: forwards rays, keeps the hit of each context,
@@ -61,9 +55,8 @@ final class PathHits(config: PathConfig) extends Module {
 
   val io = IO(new PathHitsIO(config))
 
-  private val trace      = io.trace
-  private val control    = trace.control
-  private val attributes = Module(new AttributeFetch(config)).io
+  private val trace   = io.trace
+  private val control = trace.control
 
   // Forward a ray, or end its trace at once if it misses the object's box
   private val ray = trace.rays.bits
@@ -91,7 +84,7 @@ final class PathHits(config: PathConfig) extends Module {
 
   // Tables: what the resolution of a hit reads, and what its shading reads
   private val closest = ContextTable(paths, new ClosestHit(config))
-  private val hits    = ContextTable(paths, new ShadedHit(config))
+  private val hits    = ContextTable(paths, new HitPoint(config))
   private val rays    = ContextTable(paths, new TriangleRay(config.numbers))
   private val writes  = io.rays.fire && !ray.isShadow // nobody shades what a shadow ray hits
   when(writes) { rays.write(ray.context, ray.ray.forTriangles) }
@@ -100,10 +93,7 @@ final class PathHits(config: PathConfig) extends Module {
     entry.id := result.hit.id
     entry.t  := result.hit.t
     closest.write(result.context, entry)
-    val shaded = Wire(new ShadedHit(config))
-    shaded.point := result.hit.point
-    shaded.slot  := result.hit.id // its low bits
-    hits.write(result.context, shaded)
+    hits.write(result.context, result.hit.point)
   }
 
   // A hit with a surface to shade, or whose distance is measured
@@ -126,33 +116,44 @@ final class PathHits(config: PathConfig) extends Module {
   assert(!(shades && distance.valid), "one hit is read in a cycle")
 
   // Its attributes
-  attributes.start      := io.start
-  attributes.scene      := io.scene
-  attributes.broadcasts := io.broadcasts
-  io.requests :<>= attributes.requests
+  private val attributes = Module(new AttributeFetch(config)).io
+  private val decoder    = Module(new LeafDecoder(config)).io
+  private val record     = attributes.response.bits
+  attributes.start             := io.start
+  attributes.scene             := io.scene
+  attributes.broadcasts        := io.broadcasts
   attributes.hits.valid        := trace.surfaceHit.valid
   attributes.hits.bits.context := context
-  attributes.hits.bits.address := SurfaceHit.attributeAddress(config, io.scene, hit.id)
-  attributes.readyNext         := trace.hitsReadyNext
-  trace.attributeError         := attributes.error
-  private val granted  = attributes.grantNext
-  private val shaded   = hits.read(granted.bits, granted.valid)
-  private val response = attributes.response
-  private val faces    = new RecordFormats(config).asAttributes(response.bits.record).faces
-  trace.hits.valid        := response.valid
-  trace.hits.bits.context := response.bits.context
-  trace.hits.bits.ray     := rays.read(granted.bits, granted.valid)
-  trace.hits.bits.hit     := shaded.point
-  trace.hits.bits.face    := (if (faces.size == 1) faces.head else faces(shaded.slot))
+  attributes.hits.bits.id      := hit.id
+  attributes.readyNext         := decoder.readyNext
+  attributes.wantsColours      := io.wantsColours.fold(false.B)(
+    ShadingPipeline.material(config, _, new Leaf(config.geometry, record.record).material)
+  )
+  trace.attributeError := attributes.error
+  io.events            := attributes.events
+  io.requests :<>= attributes.requests
+  decoder.leaf.valid         := attributes.response.valid && !record.isColours
+  decoder.leaf.bits.context  := record.hit.context
+  decoder.leaf.bits.isSecond := record.hit.id(0)
+  decoder.leaf.bits.record   := record.record
+  decoder.mayTakeNext        := trace.hitsReadyNext
+  private val granted = decoder.grantNext
+  private val face    = decoder.face.bits
+  trace.hits.valid                     := decoder.face.valid
+  trace.hits.bits.context              := face.context
+  trace.hits.bits.ray                  := rays.read(granted.bits, granted.valid)
+  trace.hits.bits.hit                  := hits.read(granted.bits, granted.valid)
+  trace.hits.bits.face.normals         := face.normals
+  trace.hits.bits.face.geometricNormal := face.geometricNormal
+  trace.hits.bits.face.material        := face.material
+  for (colours <- trace.hits.bits.face.colours) {
+    val table   = ContextTable(paths, chiselTypeOf(colours))
+    val ofLeaf  = new RecordFormats(config).asColours(record.record).colours
+    val corners = Leaf.corners.map { case (second, first) => Mux(record.hit.id(0), ofLeaf(second), ofLeaf(first)) }
+    when(attributes.response.valid && record.isColours)(table.write(record.hit.context, VecInit(corners)))
+    colours := table.read(granted.bits, granted.valid)
+  }
   assert(!trace.hits.valid || trace.hits.ready, "the shader does not accept its hit")
-
-  io.events := attributes.events
-}
-
-/** What the shading of a hit needs, besides its record: the point, and which of the record's faces it is on. */
-private final class ShadedHit(config: PathConfig) extends Bundle {
-  val point = new HitPoint(config)
-  val slot  = UInt(RecordFormats.faceSlotBits(config).W)
 }
 
 /** What the resolution of a hit needs. */

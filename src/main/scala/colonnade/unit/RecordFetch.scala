@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Mux1H, MuxLookup, OHToUInt, PopCount, PriorityEncoderOH}
+import chisel3.util.{Mux1H, OHToUInt, PopCount, PriorityEncoderOH}
 import colonnade.common.TimingSlice
 import colonnade.config.PartConfig
 
@@ -74,7 +74,7 @@ final class RecordFetch(config: PartConfig) extends Module {
   // New fetches
   for {
     port <- io.fetches
-    isLegal = isInSection(port.bits)
+    isLegal = port.bits.address < io.scene.recordCount
     (fetch, context) <- fetches.zipWithIndex
   } when(port.valid && port.bits.context === context.U) {
     fetch.isPending  := isLegal
@@ -91,17 +91,9 @@ final class RecordFetch(config: PartConfig) extends Module {
   // Events
   private val snoopHits = VecInit(fetches.zip(fill.isFound).map { case (fetch, isFound) => isFound && !fetch.isIssued })
   io.snoopHits         := PopCount(TimingSlice(snoopHits))
-  io.waitsForTriangles := fetches.map(fetch => fetch.hasRecord && fetch.kind === RecordKind.triangles).reduce(_ || _)
+  io.waitsForTriangles := fetches.map(fetch => fetch.hasRecord && fetch.kind === RecordKind.leaf).reduce(_ || _)
   io.stalledContexts   := PopCount(fetches.map(_.isPending))
   io.readyContexts     := PopCount(fetches.map(_.hasRecord) :+ io.response.valid)
-
-  /** Sections are consecutive, and the address of a face is never below the attribute section. */
-  private def isInSection(request: FetchRequest): Bool = {
-    val isNode = request.address < io.scene.triangleBase
-    MuxLookup(request.kind, request.address < io.scene.recordCount)(
-      Seq(RecordKind.node -> isNode, RecordKind.triangles -> (!isNode && request.address < io.scene.attributeBase))
-    )
-  }
 }
 
 object RecordFetch {

@@ -68,5 +68,5 @@ final class RecordGrant(config: PartConfig) extends Module {
 private object RecordGrant {
 
   /** Record kinds by falling priority. */
-  val priority: Seq[Int] = Seq(RecordKind.triangles, RecordKind.attributes, RecordKind.node).map(_.litValue.toInt)
+  val priority: Seq[Int] = Seq(RecordKind.leaf, RecordKind.colours, RecordKind.node).map(_.litValue.toInt)
 }

@@ -4,12 +4,12 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.Context
 import colonnade.config.TraversalConfig
-import colonnade.formats.{ChildKind, NodeRecord, RecordFormats, SceneMap}
+import colonnade.formats.{NodeRecord, SceneMap}
 import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalStack, TraversalStep}
 
 final class TraversalIO(config: TraversalConfig) extends Bundle {
   val clear = Input(Bool()) // resets `deepest`
-  val scene = Input(new SceneMap(RecordFormats.idBits(config)))
+  val scene = Input(new SceneMap(config))
 
   /** A ray enters the object's box; its first record is [[Traversal.root]]. */
   val start = Flipped(Valid(Context(config)))
@@ -24,7 +24,7 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
   val steps = Decoupled(new TraversalStep(config))
 
   /** For the counters. */
-  val boxTests = Output(UInt(log2Ceil(NodeRecord.children + 1).W))
+  val boxTests = Output(UInt(log2Ceil(NodeRecord.most + 1).W))
   val busy     = Output(Bool())
   val deepest  = Output(UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W))
   val overflow = Output(Bool())
@@ -42,10 +42,14 @@ final class Traversal(config: TraversalConfig) extends Module {
     val stack   = Module(new TraversalStack(config))
     val isLegal = io.nodes.bits.node.isLegal(io.nodes.bits.address)
 
+    boxUnit.io.scene           := io.scene
     boxUnit.io.in.valid        := io.nodes.valid
     boxUnit.io.in.bits.context := io.nodes.bits.context
     boxUnit.io.in.bits.node    := io.nodes.bits.node
-    when(!isLegal)(boxUnit.io.in.bits.node.kinds.foreach(_ := ChildKind.empty))
+    when(!isLegal) {
+      boxUnit.io.in.bits.node.nodes  := 0.U
+      boxUnit.io.in.bits.node.leaves := 0.U
+    }
     boxUnit.io.in.bits.ray  := io.nodes.bits.ray
     boxUnit.io.in.bits.tMax := io.tMax(0).units
     io.tMax(0).context      := io.nodes.bits.context
@@ -84,11 +88,11 @@ final class Traversal(config: TraversalConfig) extends Module {
 
 object Traversal {
 
-  /** The first record of every ray: the root node, or without a BVH the first triangle record. */
+  /** The first record of every ray: the root node, or without a BVH the first leaf. */
   def root(config: TraversalConfig, scene: SceneMap): NodeRef = {
     val root = Wire(new NodeRef(config))
     root.isLeaf  := (!config.geometry.bvh).B
-    root.address := (if (config.geometry.bvh) 0.U else scene.triangleBase)
+    root.address := (if (config.geometry.bvh) scene.root else 0.U)
     root
   }
 }

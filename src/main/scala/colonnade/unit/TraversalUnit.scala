@@ -5,7 +5,7 @@ import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{log2Ceil, Decoupled, Queue, RegEnable, Valid}
 import colonnade.common.{Context, First}
 import colonnade.config.{PathConfig, TraversalConfig}
-import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.formats.{RecordBroadcast, RecordRequest, SceneMap}
 import colonnade.ray.PreparedRay
 import colonnade.traversal.TriangleLanesIO
 
@@ -18,7 +18,7 @@ final class TraversalEvents(config: TraversalConfig) extends Bundle {
 /** `scene` is constant while a frame runs; `start` precedes the first ray. */
 final class TraversalUnitIO(config: TraversalConfig) extends Bundle {
   val row        = Input(UInt(log2Ceil(config.recordRequesters).W))
-  val scene      = Input(new SceneMap(RecordFormats.idBits(config)))
+  val scene      = Input(new SceneMap(config))
   val start      = Input(Bool())
   val requests   = Decoupled(new RecordRequest(config))
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))

@@ -14,13 +14,9 @@ import scala.util.Random
 private class CastHarness(config: ColonnadeConfig) extends Module {
   private val formats = new RecordFormats(config)
 
-  val record     = IO(Input(formats.record))
-  val node       = IO(Output(formats.node))
-  val triangles  = IO(Output(formats.triangles))
-  val attributes = IO(Output(formats.attributes))
-  node       := formats.asNode(record)
-  triangles  := formats.asTriangles(record)
-  attributes := formats.asAttributes(record)
+  val record = IO(Input(formats.record))
+  val kinds  = formats.kinds.map { case (name, kind) => IO(Output(kind)).suggestName(name) }
+  kinds.foreach(kind => kind := record(kind.getWidth - 1, 0).asTypeOf(kind))
 }
 
 class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Properties {
@@ -43,7 +39,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
 
   private def kinds(config: ColonnadeConfig): Seq[Data] = {
     val formats = new RecordFormats(config)
-    Seq(formats.node, formats.triangles, formats.attributes, new Pixel(config), new Load(config)) ++
+    formats.kinds.map(_._2) ++ Seq(new Pixel(config), new Load(config)) ++
       Seq(new FrameRegisters(config), new DeviceStatus(config)) ++ AttributeMemories.layouts.map { case (_, kind) =>
         kind()
       }
@@ -75,7 +71,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
     val records = for {
       config <- ArbitraryConfig.legal
       formats = new RecordFormats(config)
-      kind   <- Gen.oneOf(Seq[Data](formats.node, formats.triangles, formats.attributes))
+      kind   <- Gen.oneOf(formats.kinds.map(_._2))
       values <- Gen.sequence[Seq[BigInt], BigInt](Layout.of(kind).map(number))
     } yield (kind, Layout.of(kind).map(_.name).zip(values).toMap)
     Prop.forAllNoShrink(records) { case (kind, values) =>
@@ -98,12 +94,12 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
   }
 
   it should "fit every kind of record into whole words" in {
-    new RecordFormats(variants.head).recordBits shouldBe 320
+    new RecordFormats(variants.head).recordBits shouldBe 256
     holds(cases = 60) {
       Prop.forAll(ArbitraryConfig.legal) { config =>
         val formats = new RecordFormats(config)
         formats.recordBits % 32 == 0 &&
-        Seq(formats.node, formats.triangles, formats.attributes).forall(_.getWidth <= formats.recordBits)
+        formats.kinds.forall(_._2.getWidth <= formats.recordBits)
       }
     }
   }
@@ -122,7 +118,7 @@ class LayoutSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers wi
       for (_ <- 0 until 5) {
         val bits = BigInt(unit.record.getWidth, random)
         unit.record.poke(bits)
-        for (kind <- Seq(unit.node, unit.triangles, unit.attributes); field <- Layout.of(kind)) {
+        for (kind <- unit.kinds; field <- Layout.of(kind)) {
           val raw   = (bits >> field.offset) & ((BigInt(1) << field.width) - 1)
           val value = if (field.signed && raw.testBit(field.width - 1)) raw - (BigInt(1) << field.width) else raw
           withClue(s"${field.name}: ")(LayoutSpec.number(kind, field.name).peek().litValue shouldBe value)

@@ -35,8 +35,8 @@ class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
         "formatHash",
         "configHash"
       )
-    whole("records")("layouts").obj.keys.toSeq shouldBe Seq("node", "triangles", "attributes")
-    whole("memories")("columnBvh") shouldBe ujson.Obj("depth" -> 131072, "bits" -> 320, "banks" -> 2)
+    whole("records")("layouts").obj.keys.toSeq shouldBe Seq("node", "nearPair", "triangle", "flatPair", "farPair")
+    whole("memories")("columnBvh") shouldBe ujson.Obj("depth" -> 131072, "bits" -> 256, "banks" -> 2)
     val names = whole("registers")("fields").arr.map(_("name").str)
     names should contain.allOf(
       "control.start",
@@ -54,7 +54,7 @@ class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
       "background.b",
       "materials[7].albedo.r",
       "bounds.high.y",
-      "scene.attributeBase"
+      "scene.recordCount"
     )
     names should not contain "materials[8].albedo.r"
   }
@@ -131,16 +131,16 @@ class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
 
   it should "give faces and materials corner colours only where the configuration has them" in {
     def names(whole: ujson.Value): Seq[String] =
-      (whole("records")("layouts")("attributes").arr ++ whole("registers")("fields").arr).map(_("name").str).toSeq
+      (whole("records")("layouts").obj.get("colours").toSeq.flatMap(_.arr) ++ whole("registers")("fields").arr)
+        .map(_("name").str)
     val (without, coloured) = (manifest(), manifest("geometry.cornerColours=true"))
     names(without).filter(name => name.contains("olours")) shouldBe empty
     names(coloured) should contain.allOf(
-      "faces[0].colours[0].r",
-      "faces[0].colours[2].b",
+      "colours[0].r",
+      "colours[3].b",
       "materials[7].hasCornerColours"
     )
-    names(coloured).filter(_.startsWith("faces[1]")) shouldBe empty
-    coloured("records")("bits").num shouldBe 320
+    coloured("records")("bits").num shouldBe 256
     coloured("formatHash") should not be without("formatHash")
   }
 

@@ -8,20 +8,20 @@ import scala.util.Random
 
 /** A ray and a node as integers; the ray's numbers are in its own frame. */
 final case class BoxCase(
-    axis:           Int,
-    negative:       Seq[Boolean],
-    boxOrigin:      Seq[BigInt],
-    reciprocal:     Seq[BigInt],
-    exponent:       Seq[Int],
-    tMax:           BigInt,
-    origin:         Seq[BigInt],
-    shift:          Seq[Int],
-    kinds:          Seq[Int],
-    low:            Seq[Seq[BigInt]],
-    high:           Seq[Seq[BigInt]],
-    firstChild:     BigInt,
-    firstTriangles: BigInt,
-    context:        Int
+    axis:       Int,
+    negative:   Seq[Boolean],
+    boxOrigin:  Seq[BigInt],
+    reciprocal: Seq[BigInt],
+    exponent:   Seq[Int],
+    tMax:       BigInt,
+    origin:     Seq[BigInt],
+    shift:      Seq[Int],
+    nodes:      Int,
+    leaves:     Int,
+    low:        Seq[Seq[BigInt]],
+    high:       Seq[Seq[BigInt]],
+    first:      BigInt,
+    context:    Int
 ) {
 
   /** The input of the model, in the format of vectors.cpp. */
@@ -29,8 +29,8 @@ final case class BoxCase(
     (BigInt(axis) +: negative.map(sign => BigInt(if (sign) 1 else 0))) ++ boxOrigin ++ reciprocal ++ exponent.map(
       BigInt(_)
     ) ++
-      Seq(tMax) ++ origin ++ shift.map(BigInt(_)) ++ Seq(firstChild, firstTriangles) ++
-      kinds.indices.flatMap(slot => BigInt(kinds(slot)) +: (low(slot) ++ high(slot)))
+      Seq(tMax) ++ origin ++ shift.map(BigInt(_)) ++ Seq(nodes, leaves).map(BigInt(_)) ++
+      low.indices.flatMap(slot => low(slot) ++ high(slot))
 
   /** The fields of [[BoxCandidate]] by name. Half of the origins are the unit below, and round up. */
   def fields(tMaxUnits: BigInt): Map[String, BigInt] = {
@@ -47,12 +47,11 @@ final case class BoxCase(
         boxOrigin.zip(roundsUp).map { case (value, up) => value - up }
       ) ++ indexed("ray.roundsUp", roundsUp) ++
       indexed("ray.reciprocal", reciprocal) ++ indexed("ray.exponent", exponent.map(BigInt(_))) ++
-      vector("node.origin", origin) ++ vector("node.exponent", shift.map(BigInt(_))) ++
-      Map("node.firstChild" -> firstChild, "node.firstTriangles" -> firstTriangles) ++ indexed(
-        "node.kinds",
-        kinds.map(BigInt(_))
-      ) ++
-      kinds.indices.flatMap(slot => vector(s"node.low[$slot]", low(slot)) ++ vector(s"node.high[$slot]", high(slot)))
+      vector("node.corner", origin.zip(shift).map { case (at, exponent) => 2 * at + (BigInt(1) << exponent) }) ++
+      Map[String, BigInt]("node.first" -> first, "node.nodes" -> nodes, "node.leaves" -> leaves) ++
+      low.indices.flatMap { slot =>
+        vector(s"node.children[$slot].low", low(slot)) ++ vector(s"node.children[$slot].high", high(slot))
+      }
   }
 }
 
@@ -102,7 +101,7 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
     val any   = one()
     val shift = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits))
     val most  = (BigInt(1) << numbers.boxBits) - 1
-    val arity = NodeRecord.children
+    val arity = NodeRecord.most
     val cuts  = Seq.fill(2 * arity)(below(most + 1)).sorted.grouped(2).map(pair => (pair.head, pair.last)).toSeq
     val along = if (any.negative.last) cuts else cuts.reverse // from the farthest to the nearest
     val boxes =
@@ -110,7 +109,8 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
         any.axis,
         _
       ))
-    val origin = shift.map(_ => below(cube / 2))
+    val origin = shift.map(exponent => below(cube / 2) >> exponent << exponent)
+    val nodes  = random.nextInt(arity + 1)
     val sides  = Seq(1, 2).map(next => (any.axis + next) % 3).map(a => origin(a) + below((most << shift(a)) + 1))
     val before = (BigInt(1) << numbers.boxPadLog) + below(cube / 8)
     val start  = origin(any.axis)
@@ -121,7 +121,8 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
       tMax = farthest,
       origin = origin,
       shift = shift,
-      kinds = Seq.fill(arity)(1 + random.nextInt(2)),
+      nodes = nodes,
+      leaves = arity - nodes,
       low = boxes.map(_.map(_._1)),
       high = boxes.map(_.map(_._2))
     )
@@ -131,10 +132,10 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
 
   private def one(): BoxCase = {
     val shift  = Seq.fill(3)(random.nextInt(numbers.vertexBits - numbers.boxBits + 2))
-    val origin = shift.map(s => below(cube).min(cube - 1) >> (if (random.nextInt(3) == 0) 0 else s.min(3)))
-    val kinds  =
-      Seq.fill(NodeRecord.children)(if (random.nextInt(8) == 0) random.nextInt(4) else 1 + random.nextInt(2))
-    val boxes = kinds.map(_ => Seq.tabulate(3)(a => interval(shift(a))))
+    val origin = shift.map(s => below(cube).min(cube - 1) >> (if (random.nextInt(3) == 0) 0 else s.min(3)) >> s << s)
+    val count  = if (random.nextInt(3) == 0) random.nextInt(NodeRecord.most) else NodeRecord.most
+    val nodes  = random.nextInt(count + 1)
+    val boxes  = Seq.fill(NodeRecord.most)(Seq.tabulate(3)(a => interval(shift(a))))
     BoxCase(
       axis = random.nextInt(3),
       negative = Seq.fill(3)(random.nextBoolean()),
@@ -144,11 +145,11 @@ final class BoxStimulus(config: ColonnadeConfig, seed: Int) {
       tMax = if (random.nextInt(4) == 0) farthest else below(farthest) >> random.nextInt(6),
       origin = origin,
       shift = shift,
-      kinds = kinds,
+      nodes = nodes,
+      leaves = count - nodes,
       low = boxes.map(_.map(_._1)),
       high = boxes.map(_.map(_._2)),
-      firstChild = below(address - 4),
-      firstTriangles = below(address - 4),
+      first = below(address - 4),
       context = random.nextInt(config.array.contexts)
     )
   }
@@ -218,14 +219,11 @@ object BoxStimulus {
     }
   }
 
-  /** Children of a kind are consecutive, in slot order. */
+  /** Children are consecutive, nodes first. */
   private def child(testCase: BoxCase, slot: Int, tNear: BigInt): Seq[(String, BigInt)] = {
-    val kind    = testCase.kinds(slot)
-    val isLeaf  = kind == 2
-    val earlier = testCase.kinds.take(slot).count(_ == kind)
     Seq(
-      "target.isLeaf"  -> BigInt(if (isLeaf) 1 else 0),
-      "target.address" -> ((if (isLeaf) testCase.firstTriangles else testCase.firstChild) + earlier),
+      "target.isLeaf"  -> BigInt(if (slot < testCase.nodes) 0 else 1),
+      "target.address" -> (testCase.first + slot),
       "tNear"          -> tNear
     )
   }

@@ -19,17 +19,16 @@ class LinearScanSpec extends AnyFlatSpec with ChiselScalatestTester {
     geometry = TestConfigs.tiny.geometry.copy(bvh = false)
   )
 
-  for (contexts <- Seq(1, 5); (base, records) <- Seq((0, 1), (3, 7)))
-    it should s"lead rays of $contexts contexts through $records records from $base" in
+  for (contexts <- Seq(1, 5); records <- Seq(1, 7))
+    it should s"lead rays of $contexts contexts through $records records" in
       test(new LinearScan(config(contexts))) { dut =>
         for ((accepted, seed) <- Seq((1.0, 1), (0.3, 2)))
-          new Walkers(dut, contexts, base, records, seed).run(rays = 40, accepted)
+          new Walkers(dut, contexts, records, seed).run(rays = 40, accepted)
       }
 
   it should "give a step one cycle after a resumption, one per cycle" in
     test(new LinearScan(config(contexts = 1))) { dut =>
-      dut.io.scene.triangleBase.poke(10)
-      dut.io.scene.triangleRecords.poke(6)
+      dut.io.scene.recordCount.poke(6)
       dut.io.start.valid.poke(true)
       dut.clock.step()
       dut.io.start.valid.poke(false)
@@ -40,7 +39,7 @@ class LinearScanSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.clock.step()
         dut.io.steps.valid.expect(true)
         dut.io.steps.bits.isDone.expect(false)
-        dut.io.steps.bits.target.address.expect(10 + visited)
+        dut.io.steps.bits.target.address.expect(visited)
       }
       dut.clock.step()
       dut.io.steps.bits.isDone.expect(true)
@@ -48,7 +47,7 @@ class LinearScanSpec extends AnyFlatSpec with ChiselScalatestTester {
 }
 
 /** Rays that test records with random latency: each context has at most one. */
-private class Walkers(dut: LinearScan, contexts: Int, base: Int, records: Int, seed: Int) {
+private class Walkers(dut: LinearScan, contexts: Int, records: Int, seed: Int) {
   private val random = new Random(seed)
 
   /** By context: addresses that its ray has visited; `busy` until it requests the next one. */
@@ -58,8 +57,7 @@ private class Walkers(dut: LinearScan, contexts: Int, base: Int, records: Int, s
   private var begun    = 0
   private var ended    = 0
 
-  dut.io.scene.triangleBase.poke(base)
-  dut.io.scene.triangleRecords.poke(records)
+  dut.io.scene.recordCount.poke(records)
 
   def run(rays: Int, accepted: Double): Unit = {
     var idle = 0
@@ -82,7 +80,7 @@ private class Walkers(dut: LinearScan, contexts: Int, base: Int, records: Int, s
       dut.clock.step()
 
       for (context <- starts) {
-        visited(context) = Vector(base) // the unit that starts a ray visits its first record
+        visited(context) = Vector(0) // the unit that starts a ray visits its first record
         busy += context
         begun += 1
       }
@@ -102,7 +100,7 @@ private class Walkers(dut: LinearScan, contexts: Int, base: Int, records: Int, s
       s"context $context has not requested a step"
     )
     if (step.isDone.peekBoolean()) {
-      assert(visited(context) == (base until base + records))
+      assert(visited(context) == (0 until records))
       visited -= context
       ended += 1
     } else {

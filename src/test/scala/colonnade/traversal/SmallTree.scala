@@ -12,32 +12,34 @@ final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
   import SmallTree._
 
   private val random = new Random(seed)
-  private val arity  = NodeRecord.children
+  private val arity  = NodeRecord.most
 
-  /** Nodes by address, as cases without a ray. Children of a kind are consecutive, in slot order. */
-  val nodes: Vector[BoxCase] = {
+  /** Nodes by address, as cases without a ray; none at the address of a leaf. */
+  private val records: Vector[Option[BoxCase]] = {
     val cases  = new BoxStimulus(config, seed)
-    var depths = Vector(0) // of all nodes known so far, by address
-    var leaves = 0
-    var grown  = Vector.empty[BoxCase]
+    var depths = Vector(Option(0)) // by address; none for a leaf
+    var grown  = Vector.empty[Option[BoxCase]]
     while (grown.size < depths.size) {
-      val depth = depths(grown.size)
-      val kinds = Seq.tabulate(arity)(slot => if (depth == 0 && slot < 2) node else kind(depth))
-      grown :+= boxes(cases(1).head, isRoot = depth == 0).copy(
-        kinds = kinds,
-        firstChild = depths.size,
-        firstTriangles = firstLeaf + leaves
-      )
-      depths ++= kinds.filter(_ == node).map(_ => depth + 1)
-      leaves += kinds.count(_ == leaf)
+      grown :+= depths(grown.size).map { depth =>
+        val kinds  = Seq.tabulate(arity)(slot => if (depth == 0 && slot < 2) node else kind(depth))
+        val nodes  = kinds.count(_ == node)
+        val leaves = kinds.count(_ == leaf)
+        val first  = depths.size
+        depths ++= Seq.fill(nodes)(Some(depth + 1)) ++ Seq.fill(leaves)(None)
+        boxes(cases(1).head, isRoot = depth == 0).copy(nodes = nodes, leaves = leaves, first = first)
+      }
     }
     grown
   }
 
+  /** Nodes by address. */
+  val nodes: Map[Int, BoxCase] =
+    records.zipWithIndex.collect { case (Some(node), address) => address -> node }.toMap
+
   /** Rays, as cases without a node: those of many random ones that enter most of the root's children. */
   val rays: Vector[BoxCase] = {
     val many    = new BoxStimulus(config, seed + 1)(4 * rayCount)
-    val entered = Model.answers(config, many.map(against(_, nodes.head).words), "box").map(_(1))
+    val entered = Model.answers(config, many.map(against(_, nodes(0)).words), "box").map(_(1))
     many.zip(entered).sortBy(-_._2).take(rayCount).map(_._1).toVector
   }
 
@@ -47,7 +49,7 @@ final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
 
   /** By ray and node: the children that an unlimited ray enters, sorted by entry distance. */
   private val entered: Map[(Int, Int), Seq[Child]] = {
-    val pairs = for (ray <- rays.indices; address <- nodes.indices) yield (ray, address)
+    val pairs = for (ray <- rays.indices; address <- nodes.keys.toSeq.sorted) yield (ray, address)
     val asked = pairs.map { case (ray, address) => against(rays(ray), nodes(address)) }
     pairs.zip(BoxStimulus.solved(config, asked).map { case (_, result) =>
       (0 until result("count").toInt).map { i =>
@@ -73,11 +75,11 @@ final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
     tMax = (BigInt(1) << (config.numbers.gridBits - 1)) - 1,
     origin = node.origin,
     shift = node.shift,
-    kinds = node.kinds,
+    nodes = node.nodes,
+    leaves = node.leaves,
     low = node.low,
     high = node.high,
-    firstChild = node.firstChild,
-    firstTriangles = node.firstTriangles
+    first = node.first
   )
 
   private def kind(depth: Int): Int =
@@ -106,9 +108,6 @@ final class SmallTree(config: ColonnadeConfig, rayCount: Int, seed: Int) {
 }
 
 object SmallTree {
-
-  /** Address of the first leaf's record. */
-  val firstLeaf: Int = 512
 
   private val deepest = 3
   private val node    = 1

@@ -14,7 +14,7 @@ import colonnade.numbers.Fixed
   * but for its sign. These bits identify an entry, because any two entries may differ in them.
   */
 private[traversal] final class TraversalStackProof(config: ColonnadeConfig) extends Module {
-  private val arity      = NodeRecord.children
+  private val arity      = NodeRecord.most
   private val contexts   = config.array.contexts
   private val stackDepth = config.columnBvhMemory.stackDepth
   require(contexts == 2)

@@ -101,7 +101,7 @@ private final case class Resumed(context: Int) extends StackOperation
 /** Drives the stack like the traversal unit: each context has at most one operation in flight. */
 private class StackDriver(dut: TraversalStack, config: ColonnadeConfig, seed: Int) {
   private val contexts  = config.array.contexts
-  private val arity     = NodeRecord.children
+  private val arity     = NodeRecord.most
   private val random    = new Random(seed)
   private val reference = new StackReference(contexts, config.columnBvhMemory.stackDepth)
   private val tMaxUnits = Array.fill(contexts)(BigInt(1000))

@@ -3,11 +3,12 @@ package colonnade.traversal
 import chisel3._
 import chiseltest._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.TrianglesRecord
+import colonnade.Packed
+import colonnade.formats.{Leaf, LeafRecord}
 import colonnade.numbers.Fixed
 import org.scalatest.matchers.should.Matchers
 
-/** A record's triangles with their ray; none stands for a record with an illegal count. */
+/** A leaf's triangles with their ray: one, or a pair. */
 final case class TestCandidate(context: Int, address: Int, ray: TestRay, triangles: Seq[TestTriangle])
 
 /** One result: of which candidate, whether it is its last, and the hit. */
@@ -15,22 +16,17 @@ final case class ExpectedResult(candidate: TestCandidate, index: Int, isLast: Bo
 
 /** Drives a [[TriangleUnit]] and holds it against the model. */
 final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus) extends Matchers {
-  private val perRecord = TrianglesRecord.most
-
-  private val miss = ExpectedHit(isHit = false, 0, Seq.fill(3)(BigInt(0)), backSide = false)
+  private val flatPair = new Packed(LeafRecord.flatPair(config.geometry))
 
   /** Results in order, by the model. */
   def expected(candidates: Seq[TestCandidate]): Seq[ExpectedResult] = {
     val hits = stimulus.expected(candidates.flatMap(c => c.triangles.map((c.ray, _)))).iterator
-    candidates.flatMap { c =>
-      if (c.triangles.isEmpty) Seq(ExpectedResult(c, 0, isLast = true, miss))
-      else c.triangles.indices.map(k => ExpectedResult(c, k, k == c.triangles.size - 1, hits.next()))
-    }
+    candidates.flatMap(c => c.triangles.indices.map(k => ExpectedResult(c, k, k == c.triangles.size - 1, hits.next())))
   }
 
-  /** Random candidates, a few of them empty. */
+  /** Random candidates. */
   def random(count: Int): Seq[TestCandidate] = Seq.fill(count) {
-    val (ray, triangles) = stimulus.meeting(if (stimulus.chance(20)) 0 else 1 + stimulus.nextInt(perRecord))
+    val (ray, triangles) = stimulus.meeting(1 + stimulus.nextInt(Leaf.maxTriangles))
     candidate(ray, triangles)
   }
 
@@ -95,7 +91,7 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
       val hit = result.hit
       (peek(hit.t), hit.weights.map(peek), hit.backSide.peekBoolean()) shouldBe
         ((expected.hit.t, expected.hit.weights, expected.hit.backSide))
-      hit.id.peekInt() shouldBe TrianglesRecord.most * expected.candidate.address + expected.index
+      hit.id.peekInt() shouldBe Leaf.maxTriangles * expected.candidate.address + expected.index
     }
   }
 
@@ -103,11 +99,11 @@ final class TriangleHarness(config: ColonnadeConfig, stimulus: TriangleStimulus)
     val ray = bits.ray
     bits.context.poke(candidate.context.U)
     bits.address.poke(candidate.address.U)
-    val largest = (1 << bits.record.count.getWidth) - 1
-    val illegal = if (candidate.context % 2 == 0 && 3 * largest > bits.record.vertices.size) largest else 0
-    bits.record.count.poke((if (candidate.triangles.isEmpty) illegal else candidate.triangles.size).U)
-    for ((triangle, k) <- candidate.triangles.zipWithIndex; (vertex, j) <- triangle.vertices.zipWithIndex)
-      bits.record.vertices(3 * k + j).axes.zip(vertex).foreach { case (port, value) => port.poke(value.U) }
+    // A triangle has its vertices where a flat pair has its first three
+    val vertices = candidate.triangles.head.vertices ++ candidate.triangles.tail.map(_.vertices.last)
+    val values   = for ((vertex, i) <- vertices.zipWithIndex; (value, axis) <- vertex.zip("xyz"))
+      yield s"body.vertices[$i].$axis" -> value
+    bits.record.poke(flatPair.pack(values.toMap + ("format" -> BigInt(if (candidate.triangles.size == 1) 1 else 2))))
     ray.orientation.axis.poke(candidate.ray.axis.U)
     ray.orientation.negative.zip(candidate.ray.negative).foreach { case (port, value) => port.poke(value.B) }
     ray.origin.zip(candidate.ray.origin).foreach { case (port, value) => poke(port, value) }

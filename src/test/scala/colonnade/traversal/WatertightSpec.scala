@@ -25,7 +25,9 @@ class WatertightSpec extends AnyFlatSpec with ChiselScalatestTester with Matcher
       val stimulus = new TriangleStimulus(config, seed = 30)
       val harness  = new TriangleHarness(config, stimulus)
       val fans     = Seq.fill(60)(stimulus.fan)
-      val records  = fans.flatMap { case (ray, triangles) => triangles.grouped(2).map(harness.candidate(ray, _)) }
+      val records  = fans.flatMap { case (ray, triangles) =>
+        triangles.map(triangle => harness.candidate(ray, Seq(triangle)))
+      }
       harness.run(unit, records, bubbles = 0, stalls = 0)._2 should be >= fans.size
     }
   }

@@ -17,32 +17,35 @@ class AttributeFetchProof(config: ColonnadeConfig, slots: Int) extends Module {
 
   val hit          = IO(Input(Bool()))
   val context      = IO(Input(chiselTypeOf(dut.hits.bits.context)))
-  val address      = IO(Input(chiselTypeOf(dut.hits.bits.address)))
+  val id           = IO(Input(chiselTypeOf(dut.hits.bits.id)))
   val accepts      = IO(Input(Bool()))
   val responds     = IO(Input(Bool()))
   val otherComes   = IO(Input(Bool()))
   val otherAddress = IO(Input(chiselTypeOf(dut.broadcasts.head.bits.address)))
   val readyNext    = IO(Input(Bool()))
+  val wants        = IO(Input(Bool()))
 
-  dut.start                 := false.B
-  dut.scene.triangleBase    := 1.U
-  dut.scene.triangleRecords := (attributeBase - 1).U
-  dut.scene.attributeBase   := attributeBase.U
-  dut.scene.recordCount     := recordCount.U
-  dut.readyNext             := readyNext
+  dut.start             := false.B
+  dut.scene.root        := 0.U
+  dut.scene.recordCount := recordCount.U
+  dut.scene.hasColours.foreach(_ := true.B)
+  dut.readyNext    := readyNext
+  dut.wantsColours := wants
+  if (!config.geometry.cornerColours) assume(!wants)
 
   // Hits
-  private val pending   = RegInit(VecInit.fill(contexts)(false.B))
-  private val addresses = Reg(Vec(contexts, chiselTypeOf(address)))
+  private val pending  = RegInit(VecInit.fill(contexts)(false.B))
+  private val ids      = Reg(Vec(contexts, chiselTypeOf(id)))
+  private val coloured = Reg(Vec(contexts, Bool()))
   assume(!hit || context < contexts.U)
   assume(!hit || !pending(context), "one hit of a context at a time")
-  assume(address >= attributeBase.U, "the address of a face")
   dut.hits.valid        := hit
   dut.hits.bits.context := context
-  dut.hits.bits.address := address
+  dut.hits.bits.id      := id
   when(hit) {
-    pending(context)   := true.B
-    addresses(context) := address
+    pending(context)  := true.B
+    ids(context)      := id
+    coloured(context) := false.B
   }
 
   // The bank, and records of others. A record tells its address
@@ -59,23 +62,30 @@ class AttributeFetchProof(config: ColonnadeConfig, slots: Int) extends Module {
   broadcast.bits.record  := broadcast.bits.address
   assert(!dut.requests.valid || dut.requests.bits.address < recordCount.U, "only legal addresses are read")
 
-  // Answers
-  private val answer                     = dut.response
-  private def asked(context: UInt): UInt = addresses(context)
-  assert(answer.valid === RegNext(dut.grantNext.valid, false.B), "an answer follows its grant")
-  assert(!answer.valid || RegNext(readyNext, false.B), "an answer comes to a shader that is ready")
+  // Answers: a leaf, or its companion and then the leaf
+  private val answer                    = dut.response
+  private val answered                  = answer.bits.hit
+  private val isColours                 = answer.bits.isColours
+  private def leaf(context: UInt): UInt = ids(context) >> 1
   when(answer.valid) {
-    assert(answer.bits.context === RegNext(dut.grantNext.bits), "the context of the grant")
-    assert(pending(answer.bits.context), "an answer to a hit, once")
-    assert(answer.bits.record === asked(answer.bits.context), "the record of the hit")
-    pending(answer.bits.context) := false.B
+    assert(pending(answered.context), "an answer to a hit, once")
+    assert(answered.id === ids(answered.context), "the triangle of the hit")
+    assert(answer.bits.record === leaf(answered.context) +& isColours, "the record of the hit")
+    assert(isColours || RegNext(readyNext, false.B), "a leaf comes to a shader that is ready")
+    assert(!isColours || !coloured(answered.context), "colours come once")
+    assert(isColours || coloured(answered.context) || !wants, "a leaf that wants colours has them")
+    pending(answered.context)  := isColours
+    coloured(answered.context) := isColours
   }
   when(dut.error.valid) {
     assert(pending(dut.error.bits), "an error of a hit, once")
-    assert(asked(dut.error.bits) >= recordCount.U, "an error only where the address is illegal")
+    assert(
+      leaf(dut.error.bits) +& config.geometry.cornerColours.B >= recordCount.U,
+      "an error only where an address is illegal"
+    )
     pending(dut.error.bits) := false.B
   }
-  assert(!answer.valid || !dut.error.valid || answer.bits.context =/= dut.error.bits, "an answer or an error")
+  assert(!answer.valid || !dut.error.valid || answered.context =/= dut.error.bits, "an answer or an error")
 
   // No hang: if the bank has answered and the shader is ready, something happens soon
   private val progress = answer.valid || dut.error.valid || dut.requests.valid || held =/= 0.U || !readyNext
@@ -89,15 +99,15 @@ class AttributeFetchProof(config: ColonnadeConfig, slots: Int) extends Module {
   cover(answer.valid && reads === 0.U, "a record that others have read")
   if (slots > 1) cover(answer.valid && RegNext(answer.valid, false.B), "two answers in two cycles")
   cover(dut.error.valid, "an illegal address")
+  if (config.geometry.cornerColours) cover(answer.valid && coloured(answered.context), "a leaf after its companion")
 }
 
 object AttributeFetchProof {
-  private val attributeBase = 2
-  private val recordCount   = 6
+  private val recordCount = 6
 
   /** Reads that the bank has accepted. */
   private val capacity = 2
 
-  /** Cycles without progress of a pending hit: the queue, its slot, its record and the grant. */
-  private val maxQuiet = 4
+  /** Cycles without progress of a pending hit: the queue, its slot, its record and the grant, twice. */
+  private val maxQuiet = 8
 }

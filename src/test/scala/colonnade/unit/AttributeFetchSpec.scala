@@ -7,12 +7,15 @@ import org.scalatest.flatspec.AnyFlatSpec
 class AttributeFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
   behavior of "AttributeFetch"
 
-  for ((contexts, slots, cycles) <- Seq((2, 1, 11), (3, 2, 9)))
-    it should s"answer each of the hits of $contexts contexts once, by $slots slots" in {
-      val memory = TestConfigs.tiny.columnBvhMemory.copy(depth = 16, banks = 1)
-      val units  = TestConfigs.tiny.units.copy(pathContexts = contexts)
-      prove(cycles)(
-        new AttributeFetchProof(TestConfigs.tiny.copy(columnBvhMemory = memory, units = units), slots)
+  private val tiny = TestConfigs.tiny
+
+  for ((contexts, slots, cycles, colours) <- Seq((2, 1, 11, false), (3, 2, 9, false), (2, 1, 15, true)))
+    it should s"answer each of the hits of $contexts contexts once, by $slots slots, colours $colours" in {
+      val config = tiny.copy(
+        columnBvhMemory = tiny.columnBvhMemory.copy(depth = 16, banks = 1),
+        units = tiny.units.copy(pathContexts = contexts),
+        geometry = tiny.geometry.copy(cornerColours = colours)
       )
+      prove(cycles)(new AttributeFetchProof(config, slots))
     }
 }

@@ -4,11 +4,11 @@ import chisel3._
 import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.RecordFormats
+import colonnade.formats.{ColoursRecord, Face, Leaf, LeafRecord, RecordFormats}
 import colonnade.ray.TracedRay
 import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleHit
-import colonnade.{Simulation, TestConfigs}
+import colonnade.{Model, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -21,15 +21,18 @@ import scala.util.Random
 class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "PathHits"
 
-  for (contexts <- Seq(5, 40))
-    it should s"join hits with rays and attributes, $contexts contexts" in {
+  for ((contexts, colours) <- Seq((5, true), (40, false)))
+    it should s"join hits with rays and attributes, $contexts contexts${if (colours) ", colours" else ""}" in {
       val tiny   = TestConfigs.tiny
-      val config = tiny.copy(units = tiny.units.copy(pathContexts = contexts))
+      val config = tiny.copy(
+        units = tiny.units.copy(pathContexts = contexts),
+        geometry = tiny.geometry.copy(cornerColours = colours)
+      )
       test(new PathHitsHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         val driver = new PathHitsDriver(dut, config, new Random(contexts))
         driver.run(traces = 600)
         driver.shaded should be > 160
-        driver.refused should be > 16
+        if (colours) driver.refused should be > 4
         driver.measured should be > 60
       }
     }
@@ -69,7 +72,7 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
   private val trace    = dut.io.trace
   private val contexts = config.units.pathContexts
   private val formats  = new RecordFormats(config)
-  private val faceBits = formats.attributes.faces.head.getWidth
+  private val coloured = config.geometry.cornerColours
 
   private object State extends Enumeration { val idle, offered, traced, ended, shading = Value }
   import State._
@@ -94,10 +97,11 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
   private var measuredBefore       = Option.empty[Int]
   private var (cycle, done, quiet) = (0, 0, 0)
 
-  /** Hits that were shaded, hits whose attributes have an illegal address, and hits whose distance was asked for alone. */
+  /** Hits that were shaded, hits whose colours have an illegal address, and hits whose distance was asked for alone. */
   var (shaded, refused, measured) = (0, 0, 0)
 
-  private val (triangleBase, attributeBase, recordCount) = (8, 16, 24)
+  private val recordCount = 24
+  private val wants       = Seq.fill(config.frame.materials)(random.nextBoolean())
 
   private def chance(times: Int): Boolean = random.nextInt(times) == 0
 
@@ -108,8 +112,7 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
   def run(traces: Int): Unit = {
     dut.clock.setTimeout(0)
     dut.io.scene.recordCount.poke(recordCount)
-    dut.io.scene.attributeBase.poke(attributeBase)
-    dut.io.scene.triangleBase.poke(triangleBase)
+    dut.io.wantsColours.foreach(_.zip(wants).foreach { case (port, wants) => port.poke(wants) })
     dut.io.start.poke(true)
     dut.clock.step()
     dut.io.start.poke(false)
@@ -179,7 +182,7 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     for (context <- context; now = all(context)) {
       now.hasHit = !chance(3)
       now.occlusion = Occlusion.all(random.nextInt(3))
-      now.id = 2 * triangleBase + random.nextInt(2 * (recordCount - attributeBase) + 3)
+      now.id = random.nextInt(2 * recordCount)
       result.bits.context.poke(context)
       result.bits.hasHit.poke(now.hasHit)
       result.bits.occlusion.poke(now.occlusion)
@@ -264,21 +267,41 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     if (trace.attributeError.valid.peekBoolean()) {
       val now = all(trace.attributeError.bits.peekInt().toInt)
       now.state shouldBe shading
-      attributeBase - triangleBase + now.id / 2 should be >= recordCount
+      (coloured && wantsColours(records(now.id / 2))) shouldBe true
+      now.id / 2 + 1 should be >= recordCount
       refused += 1
       retire(now)
     }
     if (trace.hits.valid.peekBoolean()) {
       val now = all(trace.hits.bits.context.peekInt().toInt)
       now.state shouldBe shading
-      val faces = records(attributeBase - triangleBase + now.id / 2)
+      val leaf = records(now.id / 2)
       dut.foundRay.expect(now.ray)
       dut.foundHit.expect(now.details)
-      dut.foundFace.expect((faces >> (faceBits * (now.id % 2))) & ((BigInt(1) << faceBits) - 1))
+      if (now.id % 2 == 0 || (leaf >> 254) % 4 != 1) checkFace(leaf, now.id) // a triangle has no second one
       shaded += 1
       retire(now)
     }
   }
+
+  /** The face of a leaf by the model; the low bits of the face are those of its material, above them are its colours. */
+  private def checkFace(leaf: BigInt, id: Int): Unit = {
+    val words    = Seq.tabulate(LeafRecord.recordBits(config.geometry) / 32)(i => (leaf >> (32 * i)) & 0xffffffffL)
+    val question = Seq(BigInt(id % 2) +: words)
+    val face     = new Packed(new Face(config)).unpack(dut.foundFace.peekInt())
+    val model    = Model.leaves(config, question, "leafface").head
+    val names    = (0 until 3).map(i => s"normals[$i]") :+ "geometricNormal"
+    ("material" +: names.flatMap(name => "xyz".map(axis => s"$name.$axis"))).map(face) shouldBe model
+    if (coloured && wantsColours(leaf)) {
+      val colours = new Packed(new ColoursRecord).unpack(records(id / 2 + 1))
+      for (((second, first), i) <- Leaf.corners.zipWithIndex; channel <- "rgb")
+        face(s"colours[$i].$channel") shouldBe colours(s"colours[${if (id % 2 == 1) second else first}].$channel")
+    }
+  }
+
+  /** The material's index is truncated to the bits of the table. */
+  private def wantsColours(leaf: BigInt): Boolean =
+    wants(new Packed(LeafRecord.triangle(config.geometry)).unpack(leaf)("material").toInt % wants.size)
 
   private def retire(now: Trace): Unit = {
     now.state = idle

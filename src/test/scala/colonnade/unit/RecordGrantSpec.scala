@@ -21,7 +21,7 @@ class RecordGrantSpec extends AnyFlatSpec with ChiselScalatestTester {
   it should "serve triangles before attributes before nodes, and only kinds whose unit accepts a record" in
     test(new RecordGrant(config)) { dut =>
       val random   = new Random(7)
-      val priority = Seq(RecordKind.triangles, RecordKind.attributes, RecordKind.node)
+      val priority = Seq(RecordKind.leaf, RecordKind.colours, RecordKind.node)
       var granted  = Option.empty[(Int, RecordKind.Type, Int)]
       for (_ <- 0 until 1000) {
         val ready   = Seq.fill(contexts)(random.nextInt(3) == 0)

@@ -2,8 +2,9 @@ package colonnade.unit
 
 import colonnade.Packed
 import colonnade.config.{ColonnadeConfig, NumberFormats}
-import colonnade.formats.{NodeRecord, RecordFormats, TrianglesRecord}
+import colonnade.formats.{Leaf => LeafFormats, LeafRecord, NodeRecord, Octahedral, RecordFormats}
 
+import scala.collection.mutable
 import scala.util.Random
 
 /** A few large triangles in the object's cube with a camera in front of it: records in the packer's layout, and registers.
@@ -18,38 +19,44 @@ final class SmallScene(
     shadows:       Boolean
 ) {
   private type Point = Seq[Int]
-  private type Leaf  = Seq[Seq[Point]]
+  private type Leaf  = Seq[Point] // the vertices of a triangle or of a pair
 
   private val random   = new Random(seed)
   private val numbers  = config.numbers
   private val formats  = new RecordFormats(config)
   private val vertices = 1 << numbers.vertexBits
+  private val firsts   = mutable.Map.empty[Int, Int] // position of the first child by the node's position
 
   private val leaves: Vector[Leaf] =
-    Seq.fill(triangleCount)(triangle()).sortBy(_.map(_.head).sum).grouped(TrianglesRecord.most).toVector
+    Seq.fill(triangleCount / LeafFormats.maxTriangles + 1)(leaf()).sortBy(_.map(_.head).take(3).sum).toVector
 
-  /** Nodes as groups of leaves, breadth first, none without a tree; leaves in the order of their records. */
-  private val (nodes, ordered) = {
-    var known = if (config.geometry.bvh) Vector(leaves) else Vector.empty[Vector[Leaf]]
-    var found = if (config.geometry.bvh) Vector.empty[Leaf] else leaves
-    var built = Vector.empty[BigInt => BigInt] // of the first triangles record's address
-    while (built.size < known.size) {
-      val groups     = cut(known(built.size))
-      val firstChild = known.size
-      val firstLeaf  = found.size
-      built :+= (triangleBase => node(groups, firstChild, triangleBase + firstLeaf))
-      known ++= groups.filter(_.size > 1)
-      found ++= groups.filter(_.size == 1).flatten
-    }
-    (built, found)
-  }
+  /** A node as groups of leaves, breadth first; or a leaf. Without a tree there are leaves alone. */
+  private val ordered: Vector[Either[Seq[Vector[Leaf]], Leaf]] =
+    if (config.geometry.bvh) {
+      var known = Vector[Either[Seq[Vector[Leaf]], Leaf]](Left(cut(leaves)))
+      var built = 0
+      while (built < known.size) {
+        for (groups <- known(built).left) {
+          firsts(built) = known.size
+          known ++= groups.filter(_.size > 1).map(group => Left(cut(group))) ++
+            groups.filter(_.size == 1).map(group => Right(group.head))
+        }
+        built += 1
+      }
+      known
+    } else leaves.map(Right(_))
+
+  /** Of a leaf: itself and its companion. */
+  private val leafRecords = if (config.geometry.cornerColours) 2 else 1
+  private val addresses: Vector[Int] = ordered.scanLeft(0)((at, each) => at + each.fold(_ => 1, _ => leafRecords))
+
+  val leafAddresses: Vector[Int] = ordered.zip(addresses).collect { case (Right(_), address) => address }
 
   val records: Seq[BigInt] =
-    nodes.map(_(nodes.size)) ++
-      ordered.map(triangles) ++
-      ordered.flatMap(leaf => leaf.padTo(TrianglesRecord.most, leaf.head)).grouped(
-        RecordFormats.facesPerRecord(config)
-      ).map(attributes)
+    ordered.zipWithIndex.flatMap {
+      case (Left(groups), at) => Seq(node(groups.sortBy(_.size == 1), addresses(firsts(at))))
+      case (Right(leaf), _)   => record(leaf) +: Seq.fill(leafRecords - 1)(colours())
+    }
 
   /** The host's registers, by name. */
   val registers: Map[String, BigInt] = {
@@ -59,13 +66,9 @@ final class SmallScene(
     val step      = forwards / wide
     def at(x: BigInt, y: BigInt, z: BigInt): Seq[BigInt] = Seq(x, y, z).map(_ >> unitShift)
 
-    val points = leaves.flatten.flatten
-    val scene  = Map(
-      "recordCount"     -> records.size,
-      "triangleBase"    -> nodes.size,
-      "triangleRecords" -> ordered.size,
-      "attributeBase"   -> (nodes.size + ordered.size)
-    )
+    val points = leaves.flatten
+    val scene  = Map("recordCount" -> records.size, "root" -> 0) ++
+      Option.when(config.geometry.cornerColours)("hasColours" -> 1)
     val materials = Seq.tabulate(config.frame.materials) { i =>
       vector(s"materials[$i].albedo", "rgb", Seq.fill(3)(BigInt(1000 + random.nextInt(3000)))) ++
         (if (config.frame.hasBounces) glossy(i) else Map.empty[String, BigInt]) ++
@@ -133,70 +136,111 @@ final class SmallScene(
   private def vector(name: String, parts: String, values: Seq[BigInt]): Map[String, BigInt] =
     parts.zip(values).map { case (part, value) => s"$name.$part" -> value }.toMap
 
-  private def triangle(): Seq[Point] = {
-    val reach  = vertices * 2 / 5
+  /** A triangle or a pair, of any format. */
+  private def leaf(): Leaf = {
+    val reach  = vertices * 2 / 5 >> (if (random.nextInt(3) == 0) 3 + random.nextInt(3) else 0)
     val middle = Seq.fill(3)(reach + random.nextInt(vertices - 2 * reach))
-    Seq.fill(3)(middle.map(_ + random.nextInt(2 * reach) - reach))
+    Seq.fill(3 + random.nextInt(2))(middle.map(_ + random.nextInt(2 * reach) - reach))
   }
 
   private def cut(these: Vector[Leaf]): Seq[Vector[Leaf]] =
-    these.grouped((these.size + NodeRecord.children - 1) / NodeRecord.children).toSeq
+    these.grouped((these.size + NodeRecord.most - 1) / NodeRecord.most).toSeq
 
-  private def node(groups: Seq[Vector[Leaf]], firstChild: BigInt, firstTriangles: BigInt): BigInt = {
+  private def node(groups: Seq[Vector[Leaf]], first: BigInt): BigInt = {
     val limit                                = (1 << numbers.boxBits) - 1
     val axes                                 = "xyz".zipWithIndex
     def ends(group: Vector[Leaf], axis: Int) = {
-      val values = group.flatten.flatten.map(_(axis))
+      val values = group.flatten.map(_(axis))
       (values.min, values.max)
     }
     val whole    = axes.map { case (_, axis) => ends(groups.toVector.flatten, axis) }
-    val exponent = whole.map { case (low, high) => LazyList.from(0).find(e => ((high - low) >> e) < limit).get }
-    val fields   = Map("firstChild" -> firstChild, "firstTriangles" -> firstTriangles) ++
-      axes.map { case (name, axis) => s"origin.$name" -> BigInt(whole(axis)._1) } ++
-      axes.map { case (name, axis) => s"exponent.$name" -> BigInt(exponent(axis)) } ++
+    val exponent = whole.map { case (low, high) =>
+      LazyList.from(0).find(e => (high >> e) + 1 - (low >> e) <= limit).get
+    }
+    val nodes  = groups.count(_.size > 1)
+    val fields = Map[String, BigInt]("first" -> first, "nodes" -> nodes, "leaves" -> (groups.size - nodes)) ++
+      axes.map { case (name, axis) =>
+        s"corner.$name" -> BigInt((2 * (whole(axis)._1 >> exponent(axis)) + 1) << exponent(axis))
+      } ++
       groups.zipWithIndex.flatMap { case (group, slot) =>
-        (s"kinds[$slot]" -> BigInt(if (group.size > 1) 1 else 2)) +: axes.flatMap { case (name, axis) =>
+        axes.flatMap { case (name, axis) =>
           val (low, high) = ends(group, axis)
+          val origin      = whole(axis)._1 >> exponent(axis)
           Seq(
-            s"low[$slot].$name"  -> BigInt((low - whole(axis)._1) >> exponent(axis)),
-            s"high[$slot].$name" -> BigInt(((high - whole(axis)._1) >> exponent(axis)) + 1)
+            s"children[$slot].low.$name"  -> BigInt((low >> exponent(axis)) - origin),
+            s"children[$slot].high.$name" -> BigInt((high >> exponent(axis)) + 1 - origin)
           )
         }
       }
     new Packed(formats.node).pack(fields)
   }
 
-  private def triangles(leaf: Leaf): BigInt = {
-    val points = leaf.flatten.zipWithIndex.flatMap { case (point, i) =>
-      vector(s"vertices[$i]", "xyz", point.map(BigInt(_)))
-    }
-    new Packed(formats.triangles).pack(
-      points.toMap ++ Map("count" -> BigInt(leaf.size)) ++
-        leaf.indices.map(k => s"isClear[$k]" -> BigInt(random.nextInt(2)))
-    )
+  /** In the format that holds it; normals are near those of the first triangle, with any lowest bits. */
+  private def record(leaf: Leaf): BigInt = {
+    val deltas = leaf.tail.map(_.zip(leaf.head).map { case (to, from) => BigInt(to - from) })
+    val bits   = LeafRecord.deltaBits(config.geometry)
+    val length = deltas.flatten.map(delta => if (delta < 0) ~delta else delta).max.bitLength
+    val codes  = leaf.map(_ => code(normal(leaf)))
+
+    def points(name: String, values: Seq[Seq[BigInt]]): Map[String, BigInt] =
+      values.zipWithIndex.flatMap { case (value, i) => vector(s"body.$name[$i]", "xyz", value) }.toMap
+    def normals(drop: Int): Map[String, BigInt] =
+      codes.zipWithIndex.flatMap { case (code, i) => vector(s"body.normals[$i]", "uv", code.map(_ >> drop)) }.toMap
+    val absolute       = points("vertices", leaf.map(_.map(BigInt(_))))
+    val relative       = vector("body.vertex", "xyz", leaf.head.map(BigInt(_))) ++ normals(1)
+    val (kind, fields) =
+      if (leaf.size == 3) (1, absolute ++ normals(0))
+      else if (length < bits)
+        (0, relative ++ points("deltas", deltas) ++ codes.indices.map(i => s"body.lowBits[$i].u" -> BigInt(i % 2)))
+      else if (length > bits) (2, absolute)
+      else {
+        val low = deltas.map(_.map(_ & ((BigInt(1) << bits) - 1)))
+        (
+          3,
+          relative ++ points("deltas", low) ++ points(
+            "signs",
+            deltas.map(_.map(delta => BigInt(if (delta < 0) 1 else 0)))
+          )
+        )
+      }
+    new Packed(SmallScene.kinds(config)(kind)).pack(fields ++ Map(
+      "format"   -> BigInt(kind),
+      "isClear"  -> BigInt(random.nextInt(2)),
+      "material" -> BigInt(random.nextInt(config.frame.materials))
+    ))
   }
 
-  private def attributes(faces: Seq[Seq[Point]]): BigInt =
-    new Packed(formats.attributes).pack(faces.zipWithIndex.flatMap { case (face, slot) =>
-      val Seq(edge1, edge2) = face.tail.map(_.zip(face.head).map { case (a, b) => (a - b).toDouble })
-      val normal            = (0 until 3).map { axis =>
-        val (u, v) = ((axis + 1) % 3, (axis + 2) % 3)
-        edge1(u) * edge2(v) - edge1(v) * edge2(u)
-      }
-      val length  = math.sqrt(normal.map(n => n * n).sum)
-      val corners = (0 until 3).flatMap { corner =>
-        vector(s"faces[$slot].normals[$corner]", "xyz", unit(normal.map(_ / length + random.nextDouble() - 0.5)))
-      }
-      val colours = if (config.geometry.cornerColours) 0 until 3 else Nil
-      (corners ++ vector(s"faces[$slot].geometricNormal", "xyz", unit(normal))) ++
-        colours.flatMap(corner => vector(s"faces[$slot].colours[$corner]", "rgb", Seq.fill(3)(anyColour))) :+
-        (s"faces[$slot].material" -> BigInt(random.nextInt(config.frame.materials)))
-    }.toMap)
+  private def normal(face: Seq[Point]): Seq[Double] = {
+    val Seq(edge1, edge2) = face.slice(1, 3).map(_.zip(face.head).map { case (a, b) => (a - b).toDouble })
+    val normal            = (0 until 3).map { axis =>
+      val (u, v) = ((axis + 1) % 3, (axis + 2) % 3)
+      edge1(u) * edge2(v) - edge1(v) * edge2(u)
+    }
+    val length = math.sqrt(normal.map(n => n * n).sum)
+    normal.map(_ / length + random.nextDouble() - 0.5)
+  }
+
+  private def code(normal: Seq[Double]): Seq[BigInt] = {
+    val one          = (1 << (Octahedral.bits - 1)) - 1
+    val Seq(u, v, z) = normal.map(x => (x / normal.map(_.abs).sum * one).round)
+    val folded       =
+      if (z >= 0) Seq(u, v) else Seq((one - v.abs) * (if (u < 0) -1 else 1), (one - u.abs) * (if (v < 0) -1 else 1))
+    folded.map(BigInt(_))
+  }
+
+  private def colours(): BigInt =
+    new Packed(formats.kinds.toMap.apply("colours")).pack(
+      (0 until LeafFormats.maxVertices).flatMap(i => vector(s"colours[$i]", "rgb", Seq.fill(3)(anyColour))).toMap
+    )
 
   private def anyColour: BigInt = BigInt(NumberFormats.colourBits, random.self)
+}
 
-  private def unit(direction: Seq[Double]): Seq[BigInt] = {
-    val length = math.sqrt(direction.map(d => d * d).sum)
-    direction.map(d => BigInt(math.round(d / length * ((1 << NumberFormats.normalFraction) - 1))))
+object SmallScene {
+
+  /** The formats of leaves, by their number. */
+  def kinds(config: ColonnadeConfig): Seq[chisel3.Data] = {
+    val kinds = LeafRecord.kinds(config.geometry).toMap
+    Seq("nearPair", "triangle", "flatPair", "farPair").map(kinds)
   }
 }

@@ -1,9 +1,8 @@
 package colonnade.unit
 
 import colonnade.Model
-import colonnade.Packed
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{RecordFormats, TrianglesRecord}
+import colonnade.formats.{Leaf, LeafRecord}
 import colonnade.shading.Occlusion
 
 /** Finds what rays meet in a small scene by the model's test of each triangle, without a tree. */
@@ -12,16 +11,16 @@ final class TriangleSearch(config: ColonnadeConfig, scene: SmallScene) {
 
   /** With the address of its record. */
   val triangles: Vector[(Int, Triangle)] = {
-    val layout        = new Packed(new RecordFormats(config).triangles)
-    val Seq(from, to) = Seq("triangleBase", "attributeBase").map(name => scene.registers(s"scene.$name").toInt)
+    val words = scene.leafAddresses.map(at =>
+      Seq.tabulate(LeafRecord.recordBits(config.geometry) / 32)(i => (scene.records(at) >> (32 * i)) & 0xffffffffL)
+    )
+    val leaves = Model.leaves(config, words, "leaf")
     for {
-      address <- (from until to).toVector
-      fields = layout.unpack(scene.records(address))
-      k <- 0 until fields("count").toInt
-    } yield {
-      val vertices = (3 * k until 3 * k + 3).map(i => Seq("x", "y", "z").map(axis => fields(s"vertices[$i].$axis")))
-      address -> Triangle(TrianglesRecord.most * address + k, fields(s"isClear[$k]") == 1, vertices)
-    }
+      (leaf, address) <- leaves.toVector.zip(scene.leafAddresses)
+      vertices = leaf.slice(3, 15).grouped(3).toSeq
+      k <- 0 until (if (leaf.head == 1) 1 else Leaf.maxTriangles)
+      corners = Leaf.corners.map { case (second, first) => vertices(if (k == 1) second else first) }
+    } yield address -> Triangle(Leaf.maxTriangles * address + k, leaf(1) == 1, corners)
   }
 
   /** By ray, given by the fields of a [[colonnade.ray.PreparedRay]]: occlusion of a shadow ray, or the fields of its closest
