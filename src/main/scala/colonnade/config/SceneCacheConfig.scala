@@ -1,7 +1,7 @@
 package colonnade.config
 
-/** Caches between traversal units and a scene in DRAM: one in every column, and one that all columns share. A line is four
-  * records. Lines are interleaved over `columnBvhMemory.banks` banks in both.
+/** Caches between traversal units and a scene in DRAM: one in every column, and one that all columns share. A line is two
+  * records. Pairs of lines are interleaved over `columnBvhMemory.banks` banks in both.
   *
   * @param lines        lines of a column's cache
   * @param ways         its associativity
@@ -73,8 +73,8 @@ final case class SceneCacheConfig(
 }
 
 object SceneCacheConfig {
-  val lineRecords: Int = 4 // records of a line
+  val lineRecords: Int = 2 // records of a line
 
-  /** Records of the smallest scene memory: a line in each of four banks, twice. */
+  /** Records of the smallest scene memory: a pair of lines in each of four banks, twice. */
   val leastDepth: Int = 32
 }

@@ -5,7 +5,7 @@ import chisel3.util.log2Ceil
 import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 
-/** Banks are interleaved by record, those of a cache by line. */
+/** Banks are interleaved by record, those of a cache by pair of lines. */
 object Banks {
 
   /** Number of records in one bank of a scratchpad. */
@@ -35,5 +35,5 @@ object Banks {
 
   /** Address bits within a stripe of a bank. */
   private def wordBits(config: ColonnadeConfig): Int =
-    if (config.columnBvhMemory.cache.nonEmpty) log2Ceil(SceneLines.records) else 0
+    if (config.columnBvhMemory.cache.nonEmpty) log2Ceil(2 * SceneLines.records) else 0
 }

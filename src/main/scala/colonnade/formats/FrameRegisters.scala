@@ -107,11 +107,11 @@ final class SceneMap(config: ColonnadeConfig) extends Bundle {
 /** Where the records lie in DRAM. */
 final class SceneInDram extends Bundle {
 
-  /** The page of 4 KB in which the first line of four records begins; docs/scene-cache.md. */
+  /** The page of 4 KB in which the first line begins; docs/scene-cache.md. */
   val page = UInt(SceneInDram.pageBits.W)
 }
 
-/** The layout of records in DRAM: lines of four, at a pitch of a power of two, so that no line crosses a page of 4 KB. */
+/** The layout of records in DRAM: lines of two, at a pitch of a power of two, so that no line crosses a page of 4 KB. */
 object SceneLines {
   val records: Int = SceneCacheConfig.lineRecords
 

@@ -23,6 +23,7 @@ private[memory] final class AwaitedLinesIO(config: ColonnadeConfig) extends Bund
 
   /** The line that is looked up is awaited from now on. */
   val enter  = Flipped(Decoupled())
+  val isBusy = Output(Bool()) // half of the lines that can be awaited are, or more
   val reads  = Decoupled(UInt(Lines.lineBits(config).W))
   val oldest = Decoupled(new AwaitedLine(config))
 }
@@ -34,11 +35,14 @@ private[memory] final class AwaitedLines(config: ColonnadeConfig, count: Int) ex
   private val lines  = Reg(Vec(count, new AwaitedLine(config)))
   private val isUsed = RegInit(VecInit(Seq.fill(count)(false.B)))
   private val isSent = Reg(Vec(count, Bool()))
+  private val used   = RegInit(0.U(log2Ceil(count + 1).W))
   private val tail   = new RingPointer(count)
   private val sender = new RingPointer(count)
   private val head   = new RingPointer(count)
 
   private val matches = lines.zip(isUsed).map { case (entry, used) => used && entry.line === io.lookup.line }
+  used            := used + io.enter.fire - io.oldest.fire
+  io.isBusy       := used >= ((count + 1) / 2).U
   io.isAwaited    := matches.reduce(_ || _)
   io.enter.ready  := !isUsed(tail.value)
   io.reads.valid  := isUsed(sender.value) && !isSent(sender.value)

@@ -101,7 +101,7 @@ final class ColumnCache(config: ColonnadeConfig) extends Module {
   }
   tags.access(Mux(replaces, line, lineOf(request.bits)), victim, request.fire, replaces)
 
-  // Cycles a + 3 to a + 6: its records
+  // Cycles a + 3 and a + 4: its records
   private val place      = RegEnable(tags.place(line, victim), replaces)
   private val placeNow   = ShiftRegister(place, 1 - slice.cycles) // valid from a + 3
   private val lineNow    = RegNext(RegEnable(line, taken))

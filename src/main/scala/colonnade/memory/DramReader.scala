@@ -78,14 +78,13 @@ private object DramReader {
     val arbiter  = Module(new RoundRobin(reads.size))
     val address  = Wire(Decoupled(new AxiAddress(DramPort.idBits(config))))
     val bank     = OHToUInt(arbiter.io.grant)
-    val bankBits = log2Ceil(reads.size)
     val line     = Mux1H(arbiter.io.grant, reads.map(_.bits))
     arbiter.io.requests := VecInit(reads.map(_.valid)).asUInt
     arbiter.io.isTaken  := address.fire
     reads.zip(arbiter.io.grant.asBools).foreach { case (read, isGranted) => read.ready := isGranted && address.ready }
     address.valid      := arbiter.io.requests.orR
     address.bits.id    := bank
-    address.bits.addr  := base + ((line ## bank.pad(bankBits)(bankBits - 1, 0)) << log2Ceil(SceneLines.pitch(config)))
+    address.bits.addr  := base + (Lines.numberOf(config, line, bank) << log2Ceil(SceneLines.pitch(config)))
     address.bits.len   := (beats(config) - 1).U
     address.bits.size  := Axi.size(config.columnBvhMemory.cache.get.busBytes)
     address.bits.burst := Axi.incr

@@ -66,7 +66,7 @@ final class LineForwarder(config: ColonnadeConfig) extends Module {
     }
   }
 
-  // A whole line is announced in step 1; its records are read in steps 3 to 6
+  // A whole line is announced in step 1; its records are read in steps 3 and 4
   private val step     = RegInit(0.U(3.W))
   private val readHalf = RegInit(false.B)
   private val last     = (LineBroadcast.latency + Lines.records - 1).U
@@ -75,7 +75,7 @@ final class LineForwarder(config: ColonnadeConfig) extends Module {
     isWhole(readHalf) := false.B
     readHalf          := !readHalf
   }
-  private val word   = (step + (Lines.records - LineBroadcast.latency).U)(Lines.wordBits - 1, 0)
+  private val word   = (step + (2 * Lines.records - LineBroadcast.latency).U)(Lines.wordBits - 1, 0)
   private val record = Lines.withParity(config, gathered.read(readHalf ## word).asUInt)
   io.lines.announced.valid := step === 1.U
   io.lines.announced.bits  := awaited.io.deq.bits

@@ -5,7 +5,9 @@ import chisel3.util.{log2Ceil, Valid}
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{RecordFormats, SceneLines}
 
-/** A line is four consecutive records. Line n lies in bank n mod `banks`, as number n / `banks` of that bank. */
+/** A line is two consecutive records. Lines 2n and 2n + 1, *buddies*, lie in bank n mod `banks`, as numbers 2 · (n / `banks`)
+  * and the next one of that bank.
+  */
 object Lines {
   val records:  Int = SceneLines.records
   val wordBits: Int = log2Ceil(records)
@@ -13,6 +15,13 @@ object Lines {
   /** Width of the number of a line in its bank. */
   def lineBits(config: ColonnadeConfig): Int =
     RecordFormats.addressBits(config) - wordBits - log2Ceil(config.columnBvhMemory.banks)
+
+  /** The other line of a pair. */
+  def buddy(line: UInt): UInt = line ^ 1.U
+
+  /** The number of a bank's line in the scene. */
+  def numberOf(config: ColonnadeConfig, line: UInt, bank: UInt): UInt =
+    (line >> 1).asUInt ## bank(log2Ceil(config.columnBvhMemory.banks) - 1, 0) ## line(0)
 
   /** Whether records have a parity bit from the DRAM port to their requesters. */
   def hasParity(config: ColonnadeConfig): Boolean = config.columnBvhMemory.cache.exists(_.parity)
@@ -27,8 +36,8 @@ object Lines {
 
 /** From a bank of the shared cache to the same bank of every column: a line that was read.
   *
-  * The records of the line follow its announcement after three to six cycles, one per cycle. The next announcement comes
-  * four cycles later, or later than that. A column that awaits the line takes it; no column can delay it.
+  * The records of the line follow its announcement after three and four cycles. The next announcement comes two cycles
+  * later, or later than that. A column that awaits the line takes it; no column can delay it.
   */
 final class LineBroadcast(config: ColonnadeConfig) extends Bundle {
   val announced = Valid(UInt(Lines.lineBits(config).W)) // the line's number in its bank

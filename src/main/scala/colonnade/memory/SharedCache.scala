@@ -30,11 +30,12 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** One bank of the cache that all columns share, behind the same bank of every [[ColumnCache]]: docs/scene-cache.md. {{{
-  * cycle    d−1     d                     d+1        d+2             d+3              d+4 … d+7
+  * cycle    d−1     d                     d+1        d+2             d+3              d+4, d+5
   * request  accept  tags, awaited lines   announced  line read                        records on the bus
   * line             victim                announced  line written    taken from DRAM  records on the bus
   * }}}
-  * Reads from DRAM are announced in their order. They precede requests that hit, which keep their place and are looked up
+  * While less than half of the lines that can be awaited are, the buddy of a line that misses is read, too, unless it is
+  * held. Reads from DRAM are announced in their order. They precede requests that hit, which keep their place and are looked up
   * again.
   */
 final class SharedCache(config: ColonnadeConfig) extends Module {
@@ -58,7 +59,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
       .reduce(_ || _)
   }
 
-  // Each bus is free every four cycles
+  // Each bus is free every two cycles
   private val starts = Wire(UInt(buses.W)) // announcements
   private val busy   = starts.asBools.map { isStarting =>
     val cycles = RegInit(0.U(log2Ceil(Lines.records).W))
@@ -88,17 +89,21 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   }
   // With extra slices a request enters in the cycle after the last one has left
   private val isVacant = if (slice.isEnabled) !isWaiting else !isWaiting || leaves
-  private val accepts  = isVacant && arbiter.io.requests.orR
-  private val next     = Mux1H(arbiter.io.grant, io.requests.map(_.bits))
+  private val buddy    = RegInit(0.U.asTypeOf(Valid(UInt(lineBits.W)))) // to be looked up when no request is
+  private val isBuddy  = RegInit(false.B)                               // it is what is looked up
+  private val isAsked  = arbiter.io.requests.orR
+  private val accepts  = isVacant && (isAsked || buddy.valid)
+  private val next     = Mux(isAsked, Mux1H(arbiter.io.grant, io.requests.map(_.bits)), buddy.bits)
   arbiter.io.requests := VecInit(eligible).asUInt
-  arbiter.io.isTaken  := accepts
+  arbiter.io.isTaken  := isVacant && isAsked
   io.requests.zip(arbiter.io.grant.asBools).foreach { case (request, isGranted) =>
     request.ready := isGranted && isVacant
   }
   isWaiting := accepts || (isWaiting && !leaves)
   when(accepts) {
     asked.line  := next
-    asked.buses := VecInit(byBus(arbiter.io.grant.asBools)).asUInt
+    asked.buses := Mux(isAsked, VecInit(byBus(arbiter.io.grant.asBools)).asUInt, 0.U)
+    isBuddy     := !isAsked
   }
 
   // Cycle d: compare
@@ -112,14 +117,20 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   awaited.io.lookup      := asked
   awaited.io.joins       := joins
   awaited.io.enter.valid := isMiss
-  leaves                 := delivers || joins || awaited.io.enter.fire
+  leaves                 := delivers || joins || awaited.io.enter.fire || (isLookedUp && isBuddy)
+  when(accepts && !isAsked)(buddy.valid := false.B)
+  when(awaited.io.enter.fire && !isBuddy) {
+    buddy.valid := !awaited.io.isBusy
+    buddy.bits  := Lines.buddy(line)
+  }
   isFilling              := fills || (isFilling && !io.data.fire)
 
   // Announce on the buses that must, and on those that have nothing else to do
   private val announced = Mux(fills, filled.line, line)
   private val isOther   = VecInit(byBus(io.requests.map(request => request.valid && request.bits =/= announced))).asUInt
   private val joining   = usable & ~isOther
-  starts := Mux(fills || delivers, Mux(fills, filled.buses, asked.buses) | joining, 0.U)
+  private val wanted = Mux(fills, filled.buses, asked.buses)
+  starts := Mux((fills || delivers) && wanted.orR, wanted | joining, 0.U)
 
   // A line from DRAM replaces another one
   // With an extra slice it is found in the cycle before: then the line is the oldest one already
@@ -149,7 +160,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   private val isTaken = RegNext(isFill, false.B)
   io.data.ready := isTaken
 
-  // Cycles d + 4 to d + 7: the records on the bus; those of a failed read become zeros there, and nobody reads them later
+  // Cycles d + 4 and d + 5: the records on the bus; those of a failed read become zeros there, and nobody reads them later
   private val ready = VecInit(held.zip(io.data.bits.records).map { case (record, other) =>
     Mux(isTaken, other, record)
   })
@@ -162,7 +173,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
 
   io.reads :<>= awaited.io.reads
   when(io.invalidate) { tags.clear() }
-  io.isIdle := !(isWaiting || awaited.io.oldest.valid || !free.andR || isFilling)
+  io.isIdle := !(isWaiting || buddy.valid || awaited.io.oldest.valid || !free.andR || isFilling)
   assert(!(io.invalidate && !io.isIdle), "lines are forgotten while some are read")
 }
 

@@ -55,14 +55,15 @@ class FakeDram(axi: AxiReadPort, config: ColonnadeConfig, random: Random, isShar
       val address = ar.bits.addr.peekInt() - (page << SceneInDram.pageLog)
       val bank    = ar.bits.id.peekInt().toInt
       address % SceneLines.pitch(config) shouldBe 0
-      val line = (address / SceneLines.pitch(config)).toInt
-      line % banks shouldBe bank
+      val number = (address / SceneLines.pitch(config)).toInt
+      val line   = number / 2 / banks * 2 + number % 2
+      number / 2 % banks shouldBe bank
       ar.bits.len.expect(beats - 1)
       (1 << ar.bits.size.peekInt().toInt) shouldBe bus
       ar.bits.burst.expect(1)
-      if (isShared) inFlight(bank).map(_.line) should not contain (line / banks)
-      val failingBeat = if (failing(line / banks)) random.nextInt(beats) else -1
-      inFlight(bank).enqueue(Read(line / banks, now + 1 + random.nextInt(60), failingBeat))
+      if (isShared) inFlight(bank).map(_.line) should not contain line
+      val failingBeat = if (failing(line)) random.nextInt(beats) else -1
+      inFlight(bank).enqueue(Read(line, now + 1 + random.nextInt(60), failingBeat))
       reads += 1
     }
   }
