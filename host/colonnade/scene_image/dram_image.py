@@ -35,8 +35,8 @@ def moved_bytes(manifest: Manifest) -> int:
 
 
 def dram_lines(records: int, manifest: Manifest) -> int:
-    """Lines of so many records; see `line_layout`."""
-    return -(-records // line_layout(manifest)["records"])
+    """Lines of so many records, in whole pairs, as the device reads them; see `line_layout`."""
+    return 2 * -(-records // (2 * line_layout(manifest)["records"]))
 
 
 def dram_image(image: SceneImage, manifest: Manifest) -> bytes:

@@ -204,7 +204,7 @@ def test_a_preset_with_its_scene_in_dram_takes_a_large_mesh(triangles: int) -> N
     header = pack(load_mesh(f"sphere:{triangles}"), manifest).header
     assert header.record_count > 1 << 17
     (memory,) = (line for line in report_lines(header, manifest) if line.startswith("memory"))
-    assert memory.endswith(f"({-(-header.record_count // 2) * 64:,} bytes of DRAM)")
+    assert memory.endswith(f"({-(-header.record_count // 4) * 128:,} bytes of DRAM)")
 
 
 def test_presets_with_their_scenes_in_dram_have_addresses_of_21_bits() -> None:

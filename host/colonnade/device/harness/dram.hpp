@@ -31,7 +31,7 @@ public:
     /// Writes a record, as the host would.
     void store(std::uint64_t address, const void* record, std::size_t bytes) {
         const std::uint64_t at = address / DRAM_LINE_RECORDS * DRAM_LINE_PITCH + address % DRAM_LINE_RECORDS * bytes;
-        if (memory_.size() < at + DRAM_LINE_PITCH) memory_.resize((at / DRAM_LINE_PITCH + 2) * DRAM_LINE_PITCH);
+        if (memory_.size() < at + DRAM_LINE_PITCH) memory_.resize((at / (2 * DRAM_LINE_PITCH) + 2) * 2 * DRAM_LINE_PITCH); // whole pairs of lines
         std::memcpy(&memory_[at], record, bytes);
     }
 

@@ -19,7 +19,7 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
   val requests = Vec(config.array.columns, Flipped(Decoupled(UInt(Lines.lineBits(config).W))))
   val lines    = Output(Vec(SharedCache.buses(config), new LineBroadcast(config)))
 
-  /** Lines to read from DRAM, and the lines that were read, in the same order. A line's records are stable until taken. */
+  /** Lines to read from DRAM, and the lines that were read, in the same order. */
   val reads = Decoupled(UInt(Lines.lineBits(config).W))
   val data  = Flipped(Decoupled(new ReadLine(config)))
 
@@ -30,9 +30,9 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** One bank of the cache that all columns share, behind the same bank of every [[ColumnCache]]: docs/scene-cache.md. {{{
-  * cycle    d−1     d                     d+1        d+2             d+3              d+4, d+5
-  * request  accept  tags, awaited lines   announced  line read                        records on the bus
-  * line             victim                announced  line written    taken from DRAM  records on the bus
+  * cycle    d−1     d                     d+1                d+2             d+4, d+5
+  * request  accept  tags, awaited lines   announced          line read       records on the bus
+  * line             victim                announced, taken   line written    records on the bus
   * }}}
   * While less than half of the lines that can be awaited are, the buddy of a line that misses is read, too, unless it is
   * held. Reads from DRAM are announced in their order. They precede requests that hit, which keep their place and are looked up
@@ -69,7 +69,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   private val free = VecInit(busy.map(_ === 0.U)).asUInt
 
   // A line from DRAM has priority on its buses
-  private val isFilling = RegInit(false.B) // it is being written
+  private val isFilling = RegInit(false.B) // it is being taken
   private val filled    = awaited.io.oldest.bits
   private val comes     = io.data.valid && !isFilling
   private val fills     = comes && (filled.buses & ~free) === 0.U
@@ -123,7 +123,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
     buddy.valid := !awaited.io.isBusy
     buddy.bits  := Lines.buddy(line)
   }
-  isFilling              := fills || (isFilling && !io.data.fire)
+  isFilling              := fills
 
   // Announce on the buses that must, and on those that have nothing else to do
   private val announced = Mux(fills, filled.line, line)
@@ -151,24 +151,25 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
     port.announced.bits  := lineNow
   }
 
-  // Cycle d + 2: read the line, or write that from DRAM, which is stable until it is taken a cycle later
+  // Cycle d + 2: read the line, or write that from DRAM, which is held until the next one is taken
+  io.data.ready := isFilling
+  private val incoming = RegEnable(io.data.bits, isFilling)
   private val place   = ShiftRegister(Mux(fills, tags.place(filled.line, victim), tags.place(line, hitWay)), 2)
   private val isFill  = RegNext(RegNext(fills, false.B), false.B)
   private val isKept  = RegNext(RegNext(keeps, false.B), false.B)
   private val isRead  = RegNext(RegNext(delivers, false.B), false.B)
-  private val held    = lines.readWrite(place, io.data.bits.records, isRead || isKept, isKept)
+  private val held    = lines.readWrite(place, incoming.records, isRead || isKept, isKept)
   private val isTaken = RegNext(isFill, false.B)
-  io.data.ready := isTaken
 
   // Cycles d + 4 and d + 5: the records on the bus; those of a failed read become zeros there, and nobody reads them later
-  private val ready = VecInit(held.zip(io.data.bits.records).map { case (record, other) =>
+  private val ready = VecInit(held.zip(incoming.records).map { case (record, other) =>
     Mux(isTaken, other, record)
   })
   for ((port, isOn) <- io.lines.zip(isAnnounced)) {
     val begins = ShiftRegister(isOn, 2, false.B, true.B)
     val rest   = Reg(Vec(Lines.records, Lines.stored(config)))
     rest        := Mux(begins, ready, VecInit(rest.tail :+ rest.last))
-    port.record := Mux(RegEnable(isTaken && io.data.bits.isError, begins), 0.U.asTypeOf(rest.head), rest.head)
+    port.record := Mux(RegEnable(isTaken && incoming.isError, begins), 0.U.asTypeOf(rest.head), rest.head)
   }
 
   io.reads :<>= awaited.io.reads
