@@ -1,126 +1,16 @@
-// The calls of Embree 4 for triangles, on colonnade_rays.h: a shared library in place of libembree4. COLONNADE_RAYS_DESIGN names
-// the design's file. Structures are those of Embree's documented binary interface; other geometries are refused.
+// The calls of Embree 4 for triangles: a shared library in place of libembree4. COLONNADE_RAYS_DESIGN names the design's file. Other
+// geometries, instances and motion are refused.
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <iterator>
-#include <limits>
-#include <map>
 #include <string>
-#include <vector>
 
-#include "colonnade_rays.h"
+#include "embree.hpp"
+
+using namespace colonnade::rays::embree;
 
 namespace {
-
-enum Error { none = 0, invalidArgument = 2, invalidOperation = 3 };
-enum BufferType { indexBuffer = 0, vertexBuffer = 1 };
-
-struct Device {
-    int references = 1;
-    int error = none;
-    void (*report)(void*, int, const char*) = nullptr;
-    void* user = nullptr;
-    colonnade_rays_device* rays = nullptr;
-
-    void fail(int code, const char* text) {
-        if (error == none) error = code;
-        if (report) report(user, code, text);
-    }
-    void check(int status) {
-        if (status != COLONNADE_RAYS_OK) fail(invalidArgument, colonnade_rays_error(rays));
-    }
-};
-
-struct Buffer {
-    std::vector<char> owned;
-    const char* data = nullptr;
-    std::size_t stride = 0, count = 0;
-};
-
-struct Geometry {
-    explicit Geometry(Device* of) : device(of) {}
-    Device* device;
-    int references = 1;
-    Buffer buffers[2];
-    bool isEnabled = true;
-    unsigned mask = 0xffffffff;
-    void* user = nullptr;
-
-    template <class T> std::vector<T> rows(BufferType type) const {
-        const Buffer& buffer = buffers[type];
-        std::vector<T> values(3 * buffer.count);
-        for (std::size_t i = 0; i < buffer.count; ++i) std::memcpy(&values[3 * i], buffer.data + i * buffer.stride, 3 * sizeof(T));
-        return values;
-    }
-};
-
-struct Scene {
-    explicit Scene(Device* of) : device(of) {}
-    Device* device;
-    int references = 1;
-    std::map<unsigned, Geometry*> geometries;
-    std::vector<unsigned> ids; ///< of each mesh
-    std::vector<std::vector<double>> vertices;
-    std::vector<std::vector<std::uint32_t>> faces;
-    colonnade_rays_scene* rays = nullptr;
-};
-
-struct RTCRay {
-    float org[3], tnear, dir[3], time, tfar;
-    unsigned mask, id, flags;
-};
-struct RTCHit {
-    float normal[3], u, v;
-    unsigned primitive, geometry, instance;
-};
-struct RTCRayHit {
-    alignas(16) RTCRay ray;
-    alignas(16) RTCHit hit;
-};
-
-Device& device(void* handle) { return *static_cast<Device*>(handle); }
-Scene& scene(void* handle) { return *static_cast<Scene*>(handle); }
-Geometry& geometry(void* handle) { return *static_cast<Geometry*>(handle); }
-
-void release(Geometry* geometry) {
-    if (--geometry->references == 0) delete geometry;
-}
-
-colonnade_rays_ray rayOf(const RTCRay& r) { return {{r.org[0], r.org[1], r.org[2]}, r.tnear, {r.dir[0], r.dir[1], r.dir[2]}, r.tfar}; }
-unsigned modeOf(const RTCRay& ray) { return ray.mask << COLONNADE_RAYS_MASK_SHIFT; }
-
-/// A ray without an interval is not active, and keeps its bytes.
-bool isActive(const RTCRay& ray) { return ray.tnear <= ray.tfar && ray.tfar >= 0; }
-
-void intersect(Scene& scene, RTCRayHit& query) {
-    if (!isActive(query.ray)) return;
-    const colonnade_rays_ray ray = rayOf(query.ray);
-    colonnade_rays_hit hit;
-    scene.device->check(colonnade_rays_closest(scene.rays, &ray, 1, modeOf(query.ray), &hit));
-    if (hit.face == UINT32_MAX) return;
-    const std::vector<double>& at = scene.vertices[hit.mesh];
-    const std::uint32_t* const face = &scene.faces[hit.mesh][3 * hit.face];
-    double edges[2][3];
-    for (int i = 0; i < 2; ++i)
-        for (int a = 0; a < 3; ++a) edges[i][a] = at[3 * face[i + 1] + a] - at[3 * face[0] + a];
-    for (int a = 0; a < 3; ++a) query.hit.normal[a] = static_cast<float>(edges[0][(a + 1) % 3] * edges[1][(a + 2) % 3] - edges[0][(a + 2) % 3] * edges[1][(a + 1) % 3]);
-    query.ray.tfar = static_cast<float>(hit.t);
-    query.hit.u = static_cast<float>(hit.u);
-    query.hit.v = static_cast<float>(hit.v);
-    query.hit.primitive = hit.face;
-    query.hit.geometry = scene.ids[hit.mesh];
-    query.hit.instance = ~0u;
-}
-
-void occlude(Scene& scene, RTCRay& query) {
-    if (!isActive(query)) return;
-    const colonnade_rays_ray ray = rayOf(query);
-    std::uint8_t isOccluded = 0;
-    scene.device->check(colonnade_rays_occluded(scene.rays, &ray, 1, modeOf(query), &isOccluded));
-    if (isOccluded) query.tfar = -std::numeric_limits<float>::infinity();
-}
 
 /// Runs a call on the active rays of a packet, whose fields are arrays of `width`: those of a ray, and with `hasHit` of a hit.
 template <class Call> void eachOf(const int* valid, char* packet, int width, bool hasHit, const Call& call) {
@@ -167,7 +57,10 @@ int rtcGetDeviceError(void* handle) {
     device(handle).error = none;
     return error;
 }
-ssize_t rtcGetDeviceProperty(void*, int) { return 0; }
+ssize_t rtcGetDeviceProperty(void*, int property) {
+    // Ray masks, filters, rays that are not finite, triangles
+    return property == 64 || property == 66 || property == 67 || property == 96;
+}
 void rtcSetDeviceProperty(void*, int, ssize_t) {}
 
 void* rtcNewScene(void* handle) {
@@ -206,17 +99,29 @@ void rtcSetGeometryMask(void* handle, unsigned mask) {
     if (mask != 0xffffffff && mask > 0xff) geometry(handle).device->fail(invalidArgument, "a mask has more than 8 bits");
     else geometry(handle).mask = mask;
 }
-void rtcSetSharedGeometryBuffer(void* handle, int type, unsigned, int, const void* data, std::size_t offset, std::size_t stride, std::size_t count) {
-    if (type != indexBuffer && type != vertexBuffer) return geometry(handle).device->fail(invalidArgument, "only indices and vertices");
-    geometry(handle).buffers[type] = {{}, static_cast<const char*>(data) + offset, stride, count};
+void rtcSetSharedGeometryBuffer(void* handle, int type, unsigned slot, int format, void* data, std::size_t offset, std::size_t stride, std::size_t count) {
+    Device& device = *geometry(handle).device;
+    if ((type != indexBuffer && type != vertexBuffer) || format != formats[type]) return device.fail(invalidArgument, "only indices, uint3, and vertices, float3");
+    if (slot != 0 || offset % 4 != 0 || stride % 4 != 0) return device.fail(invalidOperation, "only slot 0, and offset and stride in whole words");
+    geometry(handle).buffers[type] = {{}, static_cast<char*>(data) + offset, stride, count};
 }
 void* rtcSetNewGeometryBuffer(void* handle, int type, unsigned slot, int format, std::size_t stride, std::size_t count) {
     std::vector<char> owned(stride * count + 16);
-    rtcSetSharedGeometryBuffer(handle, type, slot, format, owned.data(), 0, stride, count);
-    if (type != indexBuffer && type != vertexBuffer) return nullptr;
+    char* const data = owned.data();
+    rtcSetSharedGeometryBuffer(handle, type, slot, format, data, 0, stride, count);
+    if ((type != indexBuffer && type != vertexBuffer) || geometry(handle).buffers[type].data != data) return nullptr;
     geometry(handle).buffers[type].owned = std::move(owned);
-    return geometry(handle).buffers[type].owned.data();
+    return data;
 }
+void* rtcGetGeometryBufferData(void* handle, int type, unsigned slot) {
+    return slot == 0 && (type == indexBuffer || type == vertexBuffer) ? geometry(handle).buffers[type].data : nullptr;
+}
+void rtcSetGeometryTimeStepCount(void* handle, unsigned count) {
+    if (count != 1) geometry(handle).device->fail(invalidOperation, "only geometries without motion");
+}
+void rtcSetGeometryIntersectFilterFunction(void* handle, Filter filter) { geometry(handle).filters[0] = filter; }
+void rtcSetGeometryOccludedFilterFunction(void* handle, Filter filter) { geometry(handle).filters[1] = filter; }
+void rtcSetGeometryEnableFilterFunctionFromArguments(void* handle, bool isEnabled) { geometry(handle).takesArgumentFilter = isEnabled; }
 
 unsigned rtcAttachGeometry(void* handle, void* attached) {
     unsigned id = 0;
@@ -231,7 +136,10 @@ void rtcDetachGeometry(void* handle, unsigned id) {
     release(found->second);
     scene(handle).geometries.erase(found);
 }
-void* rtcGetGeometry(void* handle, unsigned id) { return scene(handle).geometries.at(id); }
+void* rtcGetGeometry(void* handle, unsigned id) {
+    const auto found = scene(handle).geometries.find(id);
+    return found == scene(handle).geometries.end() ? nullptr : found->second;
+}
 
 void rtcCommitScene(void* handle) {
     Scene& to = scene(handle);
@@ -269,14 +177,19 @@ void rtcGetSceneBounds(void* handle, float* bounds) {
     }
 }
 
-void rtcIntersect1(void* handle, RTCRayHit* query, void*) { intersect(scene(handle), *query); }
-void rtcOccluded1(void* handle, RTCRay* query, void*) { occlude(scene(handle), *query); }
+void rtcGetSceneLinearBounds(void* handle, float* bounds) {
+    rtcGetSceneBounds(handle, bounds);
+    std::memcpy(bounds + 8, bounds, 8 * sizeof(float));
+}
+
+void rtcIntersect1(void* handle, RTCRayHit* query, const QueryArguments* arguments) { intersect(scene(handle), *query, arguments); }
+void rtcOccluded1(void* handle, RTCRay* query, const QueryArguments* arguments) { occlude(scene(handle), *query, arguments); }
 #define PACKET(WIDTH) \
-    void rtcIntersect##WIDTH(const int* valid, void* handle, char* packet, void*) { \
-        eachOf(valid, packet, WIDTH, true, [&](RTCRayHit& one) { intersect(scene(handle), one); }); \
+    void rtcIntersect##WIDTH(const int* valid, void* handle, char* packet, const QueryArguments* arguments) { \
+        eachOf(valid, packet, WIDTH, true, [&](RTCRayHit& one) { intersect(scene(handle), one, arguments); }); \
     } \
-    void rtcOccluded##WIDTH(const int* valid, void* handle, char* packet, void*) { \
-        eachOf(valid, packet, WIDTH, false, [&](RTCRayHit& one) { occlude(scene(handle), one.ray); }); \
+    void rtcOccluded##WIDTH(const int* valid, void* handle, char* packet, const QueryArguments* arguments) { \
+        eachOf(valid, packet, WIDTH, false, [&](RTCRayHit& one) { occlude(scene(handle), one.ray, arguments); }); \
     }
 PACKET(4)
 PACKET(8)
