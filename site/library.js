@@ -66,7 +66,7 @@ export class Library {
   }
 
   static async from(code) {
-    return new Library(await instantiate(code));
+    return new this(await instantiate(code));
   }
 
   get bytes() {

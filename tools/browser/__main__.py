@@ -1,4 +1,5 @@
-"""Builds Colonnade in a browser tab: out/browser/index.html, one file that works from a folder (docs/browser.md).
+"""Builds Colonnade in a browser tab: out/browser/index.html, one file that works from a folder (docs/browser.md), and
+out/browser/rays.js, an ES module for rays of other pages (docs/rays.md).
 
 Usage: tools/browser; run it with the Python of .venv, after tools/zig-environment.
 """
@@ -21,6 +22,7 @@ from colonnade.common.atomic_files import replacing
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
+from colonnade.rays.scene import design_text
 
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT = ROOT / "out" / "browser"
@@ -43,8 +45,8 @@ def ply(mesh: Mesh) -> bytes:
 def main() -> None:
     """Compile, collect, write."""
     OUTPUT.mkdir(parents=True, exist_ok=True)
-    code = module.OBJECTS / "colonnade.wasm"
-    module.compile_module(code)
+    code, ray_code = module.OBJECTS / "colonnade.wasm", module.OBJECTS / "rays.wasm"
+    module.compile_modules(code, ray_code)
     rtl_code = module.OBJECTS / f"{RTL}.wasm"
     rtl.compile_rtl(RTL, rtl_code)
     texts = {
@@ -72,11 +74,15 @@ def main() -> None:
         "rtl": rtl_code.read_bytes(),
         "teapot": ply(load_mesh("teapot")),
     }
-    html = bundle.page(contents).encode()
-    with replacing(OUTPUT / "index.html") as stream:
-        stream.write(html)
-    size = len(gzip.compress(html, 9))
-    print(f"colonnade: out/browser/index.html, {len(html):,} bytes, {size:,} compressed")
+    design = design_text(manifests["edge"])
+    for name, text in (
+        ("index.html", bundle.page(contents)),
+        ("rays.js", bundle.ray_module(ray_code.read_bytes(), design)),
+    ):
+        with replacing(OUTPUT / name) as stream:
+            stream.write(text.encode())
+        size = len(gzip.compress(text.encode(), 9))
+        print(f"colonnade: out/browser/{name}, {len(text.encode()):,} bytes, {size:,} compressed")
 
 
 if __name__ == "__main__":

@@ -64,6 +64,15 @@ def page(contents: Mapping[str, bytes]) -> str:
     return html
 
 
+def ray_module(code: bytes, design: str) -> str:
+    """An ES module that exports `MeshBVH`, with its WebAssembly and design."""
+    inflated = "new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'))).arrayBuffer()"
+    return f"""{joined(("design", "library", "raycast"))}
+const bytes = Uint8Array.from(atob("{base64_text(gzip.compress(code, 9, mtime=0))}"), (each) => each.charCodeAt(0));
+export const MeshBVH = await meshTrees(await {inflated}, {json.dumps(design)});
+"""
+
+
 def base64_text(content: bytes) -> str:
     """Bytes as base64."""
     return base64.b64encode(content).decode()

@@ -1,10 +1,11 @@
-"""Compiles the packer, the model, the live encoder and colonnade_view to WebAssembly."""
+"""Compiles packer, model, live encoder and colonnade_view to WebAssembly; the library of rays is a module of its own."""
 
 from __future__ import annotations
 
 import os
 import re
 import subprocess
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -17,15 +18,10 @@ DRIVER = ROOT / "driver"
 
 TARGET = ("-target", "wasm32-wasi", "-O2", "-DNDEBUG", "-ffp-contract=off")
 #: A throw ends the module: it has no exceptions.
-CPP = (
-    "-std=gnu++17",
-    "-fno-exceptions",
-    "-fno-rtti",
-    "-Dthrow=__builtin_trap(),",
-    "-Wno-keyword-macro",
-    "-Wno-unused-value",
-)
-SOURCES = (
+PLAIN = ("-std=gnu++17", "-fno-exceptions", "-fno-rtti", "-Wno-keyword-macro", "-Wno-unused-value")
+CPP = (*PLAIN, "-Dthrow=__builtin_trap(),")
+Source = tuple[str, Path, tuple[str, ...]]
+SOURCES: tuple[Source, ...] = (
     ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{DRIVER / 'include'}")),
     ("c++", LIBRARY / "colonnade_environment.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")),
     *(("c++", LIVE / f"{name}.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")) for name in ("live", "kernels")),
@@ -38,19 +34,30 @@ HEADERS = (
     LIVE / "live.h",
     DRIVER / "include" / "colonnade_view.h",
 )
+#: The library of rays: the text of a refusal stays, and a batch is one thread's.
+HERE = Path(__file__).parent
+INCLUDED = tuple(f"-include{HERE / name}.hpp" for name in ("threads", "refusals"))
+RAYS = ROOT / "host" / "cpp" / "rays" / "rays.cpp"
+RAY_OPTIONS = (f"-I{ROOT / 'host' / 'cpp'}", f"-I{DRIVER / 'include'}", *INCLUDED, "-Dthrow=colonnade::Refused{} =")
 
 
-def compile_module(output: Path) -> None:
-    """Write the module; it exports the functions of `HEADERS`, and malloc and free.
+def compile_modules(model: Path, rays: Path) -> None:
+    """Write the modules of the model and of rays; they export the functions of their headers, and malloc and free.
 
     Raises:
         subprocess.CalledProcessError: The compiler found an error; it has printed it.
     """
     OBJECTS.mkdir(parents=True, exist_ok=True)
+    _compile_module(model, SOURCES, HEADERS, {"colonnade_view_size"})
+    header = DRIVER / "include" / "colonnade_rays.h"
+    _compile_module(rays, [("c++", RAYS, (*PLAIN, *RAY_OPTIONS))], [header], {"colonnade_refusal"})
+
+
+def _compile_module(output: Path, sources: Iterable[Source], headers: Iterable[Path], others: set[str]) -> None:
     with ThreadPoolExecutor() as pool:
-        objects = list(pool.map(lambda source: _compile(*source), SOURCES))
-    names = {name for header in HEADERS for name in re.findall(r"\b(colonnade_\w+)\(", header.read_text("utf-8"))}
-    exports = [f"-Wl,--export={name}" for name in sorted(names | {"colonnade_view_size", "malloc", "free"})]
+        objects = list(pool.map(lambda source: _compile(*source), sources))
+    names = {name for header in headers for name in re.findall(r"\b(colonnade_\w+)\(", header.read_text("utf-8"))}
+    exports = [f"-Wl,--export={name}" for name in sorted(names | others | {"malloc", "free"})]
     zig("c++", *TARGET, "-mexec-model=reactor", "-s", *map(str, objects), *exports, "-o", str(output))
 
 

@@ -24,10 +24,14 @@ struct colonnade_rays_scene {
 
 namespace {
 
-/// The status of a call, whose failures become the device's error.
+/// The status of a call, whose failures become the device's error. Without exceptions a failure ends the module.
 template <class Call> int guarded(colonnade_rays_device& device, const Call& call) {
+    device.error.clear();
+#ifndef __cpp_exceptions
+    call();
+    return COLONNADE_RAYS_OK;
+#else
     try {
-        device.error.clear();
         call();
         return COLONNADE_RAYS_OK;
     } catch (const Failure& failure) {
@@ -40,6 +44,7 @@ template <class Call> int guarded(colonnade_rays_device& device, const Call& cal
         device.error = "there is not enough memory";
         return COLONNADE_RAYS_NO_MEMORY;
     }
+#endif
 }
 
 MeshPart& meshOf(colonnade_rays_scene& scene, std::uint32_t mesh) {
