@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "binding.hpp"
-#include "rays/conversion.hpp"
+#include "rays/design.hpp"
+#include "rays/traffic.hpp"
 
 using namespace nanobind::literals;
 using namespace colonnade;
@@ -24,7 +25,10 @@ const colonnade_rays_ray* raysOf(const Eights<double>& rays) { return reinterpre
 class Rays {
 public:
     explicit Rays(const std::string& design) {
-        check(colonnade_rays_open(design.c_str(), nullptr, &device_));
+        const rays::Design parts(design);
+        model_ = std::make_unique<rays::ReadingModel>(Numbers(parts.numbers), parts.number("directionBits"), parts.format.layouts);
+        const colonnade_rays_backend backend = model_->backend();
+        check(colonnade_rays_open(design.c_str(), &backend, &device_));
         check(colonnade_rays_scene_new(device_, &scene_));
     }
     ~Rays() {
@@ -88,6 +92,24 @@ public:
         auto result = makeArray<std::uint32_t>({rays.shape(0)}, order);
         check(colonnade_rays_order(scene_, raysOf(rays), rays.shape(0), order));
         return result;
+    }
+
+    /// What the caches of an array read for rays: records, and lines from DRAM.
+    Values traffic(const Eights<double>& rays, std::uint32_t mode, bool isOcclusion, const std::array<std::size_t, 7>& shape) {
+        std::vector<std::vector<std::uint32_t>> reads;
+        rays::Traffic found;
+        model_->writeTo(&reads);
+        const int status = released([&] {
+            std::vector<colonnade_rays_hit> hits(isOcclusion ? 0 : rays.shape(0));
+            std::vector<std::uint8_t> occluded(isOcclusion ? rays.shape(0) : 0);
+            const int done = isOcclusion ? colonnade_rays_occluded(scene_, raysOf(rays), occluded.size(), mode, occluded.data())
+                                         : colonnade_rays_closest(scene_, raysOf(rays), hits.size(), mode, hits.data());
+            found = rays::trafficOf(reads, {shape[0], shape[1], shape[2], shape[3], shape[4], shape[5], shape[6]});
+            return done;
+        });
+        model_->writeTo(nullptr);
+        check(status);
+        return {{"reads", static_cast<std::int64_t>(found.reads)}, {"lines", static_cast<std::int64_t>(found.lines)}};
     }
 
     /// A batch from memory: its records in, 32 or 16 bytes each, and the bytes of its responses out.
@@ -170,6 +192,7 @@ private:
         return result;
     }
 
+    std::unique_ptr<rays::ReadingModel> model_;
     colonnade_rays_device* device_ = nullptr;
     colonnade_rays_scene* scene_ = nullptr;
 };
@@ -213,6 +236,7 @@ void bind_rays(nb::module_& module) {
         .def("all", &Rays::all, "rays"_a, "mode"_a, "most"_a)
         .def("occluded", &Rays::occluded, "rays"_a, "mode"_a)
         .def("order", &Rays::order, "rays"_a)
+        .def("traffic", &Rays::traffic, "rays"_a, "mode"_a, "is_occlusion"_a, "shape"_a)
         .def("submit", &Rays::submit, "rays"_a, "mode"_a, "origin"_a = std::array<float, 3>{}, "tnear"_a = 0.0f)
         .def("face", &Rays::face, "id"_a)
         .def("counters", &Rays::counters);

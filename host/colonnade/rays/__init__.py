@@ -2,5 +2,6 @@
 
 from colonnade.rays.intersector import RayMeshIntersector
 from colonnade.rays.scene import Hits, Scene
+from colonnade.rays.traffic import Traffic
 
-__all__ = ["Hits", "RayMeshIntersector", "Scene"]
+__all__ = ["Hits", "RayMeshIntersector", "Scene", "Traffic"]

@@ -15,6 +15,7 @@ from colonnade.common.types import Floats
 from colonnade.design.config_name import Overrides
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
+from colonnade.rays.traffic import Traffic, cache_shape
 from colonnade.scene_image.packer import record_format
 
 #: Bits of a batch's mode, as `driver/include/colonnade_rays.h` has them.
@@ -74,7 +75,8 @@ class Scene:
         from colonnade import _core
 
         self._lock = threading.Lock()
-        self._rays: Any = _core.Rays(design_text(manifest_for(config, overrides).manifest))
+        self._manifest = manifest_for(config, overrides).manifest
+        self._rays: Any = _core.Rays(design_text(self._manifest))
         self._rays.refine(refine)
         self._is_committed = False
         if vertices is not None:
@@ -134,6 +136,16 @@ class Scene:
         """An order of rays in which near ones follow each other: the device then reads fewer records from DRAM."""
         result: NDArray[np.uint32] = self._query("order", _rays(rays))
         return result
+
+    def traffic(self, rays: ArrayLike, is_occlusion: bool = False) -> Traffic:
+        """What the design's caches read for the rays in this order, of closest hits or of occlusion.
+
+        Raises:
+            UserError: The design has no caches.
+        """
+        shape, line_bytes = cache_shape(self._manifest)
+        found = self._query("traffic", _rays(rays), ALL_MASKS << 24, is_occlusion, shape)
+        return Traffic(found["reads"], found["lines"] * line_bytes)
 
     def counters(self) -> dict[str, int]:
         """Sums over all rays, by the names of the device's counters."""
