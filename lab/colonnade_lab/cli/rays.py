@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from pathlib import Path
 
 import click
@@ -14,7 +15,7 @@ from colonnade.cli.options import MESH, configuration_options, echo, finish, jso
 @click.option("--rays", "count", type=click.IntRange(1), default=100_000, show_default=True, help="Rays of each kind.")
 @json_option
 def rays(config: str, overrides: tuple[str, ...], mesh: str, count: int, json_file: Path | None) -> None:
-    """Count the rays that the model and Embree answer a second, and what the model reads for one.
+    """Count the rays that the model and Embree answer a second, and what the model and its caches read for one.
 
     "shuffled" rays have no order; the others have that of `colonnade.rays.Scene.order`.
     """
@@ -28,16 +29,18 @@ def rays(config: str, overrides: tuple[str, ...], mesh: str, count: int, json_fi
     table = Table(
         (
             Column("rays", 26, is_text=True),
-            Column("hits", 4, ".0%"),
+            Column("model", 9, ",.0f", group="hits"),
+            Column("Embree", 9, ",.0f", group="hits"),
             Column("model", 11, ",.0f", group="rays a second"),
             Column("Embree", 11, ",.0f", group="rays a second"),
             Column("nodes", 6, ".1f", group="a ray"),
             Column("triangles", 9, ".1f", group="a ray"),
+            Column("DRAM, B", 8, ".0f", group="a ray"),
         ),
         echo,
     )
     rates = []
     for each in measured(load_mesh(mesh), config, overrides, count):
         rates.append(each)
-        table.print(each.kind, each.hits, each.model, each.embree, each.node_reads, each.triangle_tests)
+        table.print(*astuple(each))
     finish({"mesh": mesh, "rays": count, "kinds": report(rates)}, json_file)

@@ -10,9 +10,12 @@ from typing import Any
 
 import numpy as np
 from colonnade.common.types import Floats
+from colonnade.design.generator import manifest_for
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.rays import Scene
 
+#: Counters of what rays read.
+READS = ("nodeReads", "triangleTests")
 #: Kinds of rays; "shuffled" ones have no order, the others that of `Scene.order`.
 KINDS = ("outside", "outside, shuffled", "off the surface", "off the surface, shuffled", "occlusion")
 
@@ -23,19 +26,23 @@ class RayRates:
 
     Attributes:
         kind: One of `KINDS`.
-        hits: Share of the rays that hit.
+        hits: Rays that hit, of the model.
+        embree_hits: Rays that hit, of Embree; None without embreex.
         model: Rays a second of the model.
         embree: Rays a second of Embree; None without embreex.
         node_reads: Nodes that a ray reads.
         triangle_tests: Triangles that a ray tests.
+        dram_bytes: Bytes that the design's caches read for a ray; None without caches.
     """
 
     kind: str
-    hits: float
+    hits: int
+    embree_hits: int | None
     model: float
     embree: float | None
     node_reads: float
     triangle_tests: float
+    dram_bytes: float | None
 
 
 def rays_of_kind(kind: str, mesh: Mesh, count: int) -> Floats:
@@ -60,6 +67,7 @@ def rays_of_kind(kind: str, mesh: Mesh, count: int) -> Floats:
 def measured(mesh: Mesh, config: str, overrides: tuple[str, ...], count: int) -> Iterator[RayRates]:
     """Rates of each kind; the time of Embree has its conversion from arrays, as that of the model has."""
     scene, embree = Scene(mesh.vertices, mesh.faces, config, overrides), _embree(mesh)
+    has_caches = manifest_for(config, overrides).manifest.config["columnBvhMemory"]["cache"] is not None
     for kind in KINDS:
         rays = rays_of_kind(kind, mesh, count)
         if not kind.endswith("shuffled"):
@@ -68,15 +76,23 @@ def measured(mesh: Mesh, config: str, overrides: tuple[str, ...], count: int) ->
         is_occlusion = kind == "occlusion"
         answer, seconds = _timed(partial(scene.occluded if is_occlusion else scene.closest, rays))
         hits = answer if is_occlusion else answer.face >= 0
-        reads = {name: scene.counters()[name] - before[name] for name in ("nodeReads", "triangleTests")}
-        other = None
+        reads = {name: scene.counters()[name] - before[name] for name in READS}
+        other = embree_hits = None
         if embree is not None:
             parts = rays[:, :3].astype(np.float32), rays[:, 4:7].astype(np.float32)
             run = partial(embree.run, query="OCCLUDED" if is_occlusion else "INTERSECT")
             run(*(part[:1] for part in parts))  # its first call builds the tree
-            other = count / _timed(partial(run, *parts))[1]
+            found, other_seconds = _timed(partial(run, *parts))
+            other, embree_hits = count / other_seconds, int((found >= 0).sum())
+        dram_bytes = scene.traffic(rays, is_occlusion).bytes / count if has_caches else None
         yield RayRates(
-            kind, hits.mean(), count / seconds, other, reads["nodeReads"] / count, reads["triangleTests"] / count
+            kind,
+            int(hits.sum()),
+            embree_hits,
+            count / seconds,
+            other,
+            *(reads[name] / count for name in READS),
+            dram_bytes,
         )
 
 

@@ -274,6 +274,10 @@ def catalog() -> dict[str, Entry]:
         _verify("equality", "small", "--no-reference", "--size", "320x240"),
         Entry("fpga", "fpga", {"": ("tools/soc-fpga",)}, report="out/fpga/report.json"),
         Entry("simulators", "small", {"": ("tools/simulators", f"--json={REPORT}")}),
+        Entry("ray-suites", "edge", {"": ("tools/ray-suites", "--json", REPORT)}, **_alone("rays")),
+        Entry(
+            "ray-rates", "edge", _colonnade("rays", "--config", "edge", "--mesh", "armadillo"), sources=("rays", "tree")
+        ),
         Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}),
         _paper_unit(),
         _paper_maps(),

@@ -28,7 +28,14 @@ _DEFAULTS: tuple[tuple[str, ...], ...] = ((), ("physicalAttributeMemory={}", "co
 #: What the figures depend on, as arguments of git.
 SOURCES = (
     *("build.sbt", "configs", "driver", "host", "lab", "project", "scenes", "soc", "src", "tools/light"),
-    *("tools/room-frames", "tools/simulators", "tools/soc-fpga", "tools/view-frames"),
+    *(
+        "tools/ray-suites",
+        "tools/ray_suites",
+        "tools/room-frames",
+        "tools/simulators",
+        "tools/soc-fpga",
+        "tools/view-frames",
+    ),
     *(":!lab/colonnade_lab/figures", ":!lab/colonnade_lab/report", ":!lab/tests"),
     *(":!host/tests", ":!host/locks", ":!src/test"),
 )

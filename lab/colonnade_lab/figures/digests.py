@@ -23,6 +23,7 @@ from colonnade_lab.figures.catalog import Design, Entry
 SOURCES: Mapping[str, tuple[str, ...]] = {
     "live": ("host/cpp/live/*.[ch]*",),
     "maps": tuple(f"host/colonnade/maps/{each}.py" for each in ("*_encoder", "*_fit", "slic", "palette", "heap")),
+    "rays": ("host/colonnade/rays/*.py", "host/cpp/rays/*.[ch]pp", "tools/ray_suites/*"),
     "roomLight": ("host/colonnade/environment/*_fit.py", "host/colonnade/maps/room_light.py"),
     "tree": ("host/cpp/*bvh.hpp", "host/cpp/reinsertion.hpp", "host/cpp/packer/tree.hpp"),
 }

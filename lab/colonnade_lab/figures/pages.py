@@ -21,6 +21,7 @@ from colonnade_lab.figures import (
     paper_tables,
     performance_tables,
     precision_tables,
+    ray_tables,
     result_tables,
     study_tables,
     tree_tables,
@@ -39,6 +40,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     **paper_tables.TABLES,
     **tree_tables.TABLES,
     **precision_tables.TABLES,
+    **ray_tables.TABLES,
 }
 
 _TABLE = re.compile(r"^<!-- ([\w-]+) -->\n.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)

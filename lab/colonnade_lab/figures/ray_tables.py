@@ -1,0 +1,45 @@
+"""The tables of ``docs/rays.md``: tests of other projects that pass, and rays a second of the model beside Embree's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from colonnade_lab.common.markdown import markdown
+from colonnade_lab.figures.data import Data
+
+_TITLES = {
+    "trimesh": "trimesh `test_ray.py`, `test_ray_upstream.py`, by ",
+    "three-mesh-bvh": "three-mesh-bvh `RandomRaycasts`: every hit of every ray equal as floats",
+    "embree": "Embree `embree_verify`: ",
+}
+
+
+def suites(data: Data) -> str:
+    """Tests of other projects: how many pass, by bits of a coordinate."""
+    rows: dict[str, list[str]] = {}
+    for each in data.result("ray-suites")["suites"]:
+        title = _TITLES[each["suite"]] + (each["test"] and f"`{each['test']}`")
+        row = rows.setdefault(title, [title, f"`{each['commit'][:10]}`", f"{each['tests']:,}"])
+        row.append(f"{each['passed']:,}")
+    return markdown(["suite", "commit", "tests", "pass at 16 bits", "at 24 bits"], list(rows.values()))
+
+
+def rates(data: Data) -> str:
+    """Rays a second, and what one reads, by kind of rays."""
+    result = data.result("ray-rates")
+    rows = [
+        [
+            each["kind"],
+            f"{each['hits']:,}, {each['embree_hits']:,}",
+            f"{each['model'] / 1000:,.0f}",
+            f"{each['embree'] / 1000:,.0f}",
+            *(f"{each[name]:.1f}" for name in ("node_reads", "triangle_tests")),
+            f"{each['dram_bytes']:,.0f}",
+        ]
+        for each in result["kinds"]
+    ]
+    titles = [f"rays, {result['rays']:,} of each kind", "hits: model, Embree", "model, 1,000 rays a second", "Embree"]
+    return markdown([*titles, "nodes a ray", "triangles", "bytes of DRAM"], rows)
+
+
+TABLES: Mapping[str, Callable[[Data], str]] = {"ray-suites": suites, "ray-rates": rates}

@@ -1,0 +1,71 @@
+"""Embree's own tests of triangles, `embree_verify`, linked with the library of rays in place of Embree."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from colonnade.common.errors import UserError
+
+#: The names of the tests, as regular expressions without brackets, and how often each repeats its rays.
+TESTS = {
+    r"buffer_stride\.triangles": 1,
+    r"empty_scene\..*": 1,
+    r"get_bounds\.triangles": 1,
+    r"get_linear_bounds\.triangles": 1,
+    r"inactive_rays\..*": 0.1,
+    r"intersection_filter\.triangles.*": 1,
+    r"multiple_devices": 1,
+    r"ray_alignment_test\..*sphere\.triangles": 0.1,
+    r"triangle_hit\..*": 1,
+    r"triangle_split_epsilon\..*": 1,
+    r"watertight_triangles\..*": 1,
+}
+#: Parts of Embree that the tests use beside its calls.
+PARTS = ("sys", "math", "simd", "lexers", "tasking", "image", "alloc_tutorial", "scenegraph", "embree_verify")
+OPTIONS = {
+    "CMAKE_BUILD_TYPE": "Release",
+    "CMAKE_EXE_LINKER_FLAGS": "-Wl,--unresolved-symbols=ignore-all",
+    "EMBREE_ISPC_SUPPORT": "OFF",
+    "EMBREE_MAX_ISA": "SSE2",
+    "EMBREE_TASKING_SYSTEM": "INTERNAL",
+    "EMBREE_TUTORIALS": "ON",
+    "EMBREE_TUTORIALS_GLFW": "OFF",
+}
+
+
+def build(run: Callable[..., str], checkout: Path, folder: Path, library: Callable[..., None]) -> Path:
+    """The program `embree_verify`; `library` compiles the library of rays to a path.
+
+    Calls that the library lacks, of other tests, stay without an address.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    run("cmake", "-S", checkout, "-B", folder, *(f"-D{name}={value}" for name, value in OPTIONS.items()), cwd=checkout)
+    library(folder / "libembree4.so.4", "-Wl,-soname,libembree4.so.4")
+    for part in PARTS:
+        run("make", "-j2", f"{part}/fast", cwd=folder)
+    return folder / "embree_verify"
+
+
+def verify(program: Path, design: Path) -> dict[str, tuple[int, int]]:
+    """Tests that pass, and all, by name."""
+    found = {}
+    for pattern, intensity in TESTS.items():
+        name = pattern.replace(r"\..*", ".").replace(".*", "").replace("\\", "").rstrip(".")
+        options = ["--no-colors", "--sequential", "--flatten", "--intensity", str(intensity)]
+        options += ["--run", rf"SSE2\.{pattern}"]
+        done = subprocess.run(
+            [program, *options],
+            env={"COLONNADE_RAYS_DESIGN": str(design)},
+            cwd=program.parent,
+            text=True,
+            capture_output=True,
+        )
+        counts = [int(count) for count in re.findall(r"Tests (?:passed|failed): *(\d+)", done.stdout)]
+        if len(counts) != 2 or not sum(counts):
+            raise UserError(f"embree_verify did not finish {name}: {(done.stderr or done.stdout).strip()[-500:]}")
+        found[name] = counts[0], sum(counts)
+        print(f"embree_verify {name}: {counts[0]} of {sum(counts)} pass", flush=True)
+    return found
