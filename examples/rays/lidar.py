@@ -76,8 +76,8 @@ def picture(points: Floats) -> NDArray[np.uint8]:
     colours = np.stack([np.interp(height, (0, 1.5, 4, 9), stop) for stop in stops.T], axis=1)
     pixels = np.full((SIZE[1], SIZE[0], 3), GROUND, dtype=np.uint8)
     for x, y in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        shown = (at[:, 2] > 0) & (column + x >= 0) & (column + x < SIZE[0]) & (row + y >= 0) & (row + y < SIZE[1])
-        pixels[(row + y)[shown], (column + x)[shown]] = colours[shown]
+        visible = (at[:, 2] > 0) & (column + x >= 0) & (column + x < SIZE[0]) & (row + y >= 0) & (row + y < SIZE[1])
+        pixels[(row + y)[visible], (column + x)[visible]] = colours[visible]
     return pixels
 
 

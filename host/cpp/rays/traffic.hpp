@@ -69,11 +69,11 @@ public:
     bool holds(std::size_t line) {
         std::vector<std::size_t>& set = sets_[line % sets_.size()];
         const auto found = std::find(set.begin(), set.end(), line);
-        const bool isThere = found != set.end();
-        if (isThere) set.erase(found);
+        const bool isHit = found != set.end();
+        if (isHit) set.erase(found);
         else if (set.size() == ways_) set.erase(set.begin());
         set.push_back(line);
-        return isThere;
+        return isHit;
     }
 
 private:
@@ -84,12 +84,12 @@ private:
 /// What columns read that take the rays in runs of a tile, and of whose rays in flight each reads its next record in turn.
 inline Traffic trafficOf(const std::vector<std::vector<std::uint32_t>>& reads, const CacheShape& shape) {
     constexpr std::size_t run = 64;
-    struct Place {
+    struct Cursor {
         std::size_t ray, read;
     };
     struct ColumnState {
         LineCache cache;
-        std::vector<Place> flight;
+        std::vector<Cursor> flight;
         std::size_t next;
     };
     std::vector<ColumnState> columns;
@@ -101,16 +101,16 @@ inline Traffic trafficOf(const std::vector<std::vector<std::uint32_t>>& reads, c
         for (ColumnState& column : columns) {
             for (; column.flight.size() < shape.flight && column.next < reads.size(); column.next += (column.next + 1) % run != 0 ? 1 : run * (shape.columns - 1) + 1)
                 if (!reads[column.next].empty()) column.flight.push_back({column.next, 0});
-            std::vector<std::uint32_t> wanted;
-            for (Place& place : column.flight) wanted.push_back(reads[place.ray][place.read++]);
-            std::sort(wanted.begin(), wanted.end());
-            wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
-            traffic.reads += wanted.size();
-            for (const std::uint32_t address : wanted) {
+            std::vector<std::uint32_t> addresses;
+            for (Cursor& cursor : column.flight) addresses.push_back(reads[cursor.ray][cursor.read++]);
+            std::sort(addresses.begin(), addresses.end());
+            addresses.erase(std::unique(addresses.begin(), addresses.end()), addresses.end());
+            traffic.reads += addresses.size();
+            for (const std::uint32_t address : addresses) {
                 const std::size_t line = address / shape.recordsOfALine;
                 if (!column.cache.holds(line) && (shape.sharedLines == 0 || !shared.holds(line))) ++traffic.lines;
             }
-            const auto isDone = [&](const Place& place) { return place.read == reads[place.ray].size(); };
+            const auto isDone = [&](const Cursor& cursor) { return cursor.read == reads[cursor.ray].size(); };
             column.flight.erase(std::remove_if(column.flight.begin(), column.flight.end(), isDone), column.flight.end());
             isBusy = isBusy || !column.flight.empty() || column.next < reads.size();
         }
