@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from colonnade.common.atomic_files import replacing
+from colonnade.common.processes import tool
 from colonnade.mesh.geometry import primitives
 from colonnade.rays import Scene
 from numpy.typing import NDArray
@@ -100,4 +101,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tool(main)

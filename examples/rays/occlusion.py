@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from colonnade.common.atomic_files import replacing
+from colonnade.common.processes import tool
 from colonnade.mesh.load import load_mesh
 from colonnade.rays import Scene
 from numpy.typing import NDArray
@@ -125,4 +126,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    tool(main)
