@@ -30,9 +30,9 @@ def rates(data: Data) -> str:
     rows = [
         [
             each["kind"],
-            f"{each['hits']:,}, {each['embree_hits']:,}",
-            f"{each['model'] / 1000:,.0f}",
-            f"{each['embree'] / 1000:,.0f}",
+            f"{each['hits']:,}, {_number(each['embree_hits'])}",
+            _number(each["model"], 1000),
+            _number(each["embree"], 1000),
             *(f"{each[name]:.1f}" for name in ("node_reads", "triangle_tests")),
             f"{each['dram_bytes']:,.0f}",
         ]
@@ -40,6 +40,10 @@ def rates(data: Data) -> str:
     ]
     titles = [f"rays, {result['rays']:,} of each kind", "hits: model, Embree", "model, 1,000 rays a second", "Embree"]
     return markdown([*titles, "nodes a ray", "triangles", "bytes of DRAM"], rows)
+
+
+def _number(value: float | None, unit: int = 1) -> str:
+    return "–" if value is None else f"{value / unit:,.0f}"
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {"ray-suites": suites, "ray-rates": rates}

@@ -238,6 +238,21 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "samples": 16,
             "scenes": [{"scene": "a", "rate": 9.0, "processor": 0.05, "reload": 0.1, "start": 1.0, "rest": 2.0}],
         },
+        "ray-suites": {
+            "suites": [
+                {"suite": suite, "test": "a", "commit": "0123456789ab", "passed": passed, "tests": 1000}
+                for suite in ("trimesh", "embree")
+                for passed in (999, 1000)
+            ]
+        },
+        "ray-rates": {
+            "rays": 1000,
+            "kinds": [
+                {"kind": "near", "hits": 900, "embree_hits": hits, "model": 2e6, "embree": hits}
+                | {"node_reads": 2.0, "triangle_tests": 1.0, "dram_bytes": 50.4}
+                for hits in (901, None)
+            ],
+        },
     }
     (tmp_path / "docs" / "data").mkdir(parents=True)
     for name, result in results.items():
@@ -341,7 +356,10 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| **array**, MGE | 4.00 | 3.00 | 2.00 | +100.0 | +50.0 | +5.7 |" in table(docs, "bvh-costs")
     row = "| SLIC | 16,384 | 56.2 | 30.0 dB, 1.5° | 40.00, 0.0100 | 40.00, 0.0100 | 12.50 | 2.0 |"
     assert row in table(docs, "paper-maps")
-    assert re.search(r"\| all \d+ \| 49.5 \|", table(docs, "measuring"))
+    assert re.search(r"\| all \d+ \| 52.5 \|", table(docs, "measuring"))
+    assert "| Embree `embree_verify`: `a` | `0123456789` | 1,000 | 999 | 1,000 |" in table(docs, "ray-suites")
+    assert "| near | 900, 901 | 2,000 | 1 | 2.0 | 1.0 | 50 |" in table(docs, "ray-rates")
+    assert "| near | 900, – | 2,000 | – |" in table(docs, "ray-rates")
     assert "| Room | 97.0, 97.0, 97.0 |" in table(docs, "rebuilds")
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
