@@ -1,4 +1,4 @@
-"""Compiles packer, model, live encoder and colonnade_view to WebAssembly; the library of rays is a module of its own."""
+"""Compiles packer, model, live encoder and colonnade_view to WebAssembly, and the library of rays to its own module."""
 
 from __future__ import annotations
 
