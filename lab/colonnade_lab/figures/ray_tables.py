@@ -19,7 +19,7 @@ def suites(data: Data) -> str:
     rows: dict[str, list[str]] = {}
     for each in data.result("ray-suites")["suites"]:
         title = _TITLES[each["suite"]] + (each["test"] and f"`{each['test']}`")
-        row = rows.setdefault(title, [title, f"`{each['commit'][:10]}`", f"{each['tests']:,}"])
+        row = rows.setdefault(title, [title, f"`{each['revision'][:10]}`", f"{each['tests']:,}"])
         row.append(f"{each['passed']:,}")
     return markdown(["suite", "commit", "tests", "pass at 16 bits", "at 24 bits"], list(rows.values()))
 

@@ -240,7 +240,7 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         },
         "ray-suites": {
             "suites": [
-                {"suite": suite, "test": "a", "commit": "0123456789ab", "passed": passed, "tests": 1000}
+                {"suite": suite, "test": "a", "revision": "0123456789ab", "passed": passed, "tests": 1000}
                 for suite in ("trimesh", "embree")
                 for passed in (999, 1000)
             ]
