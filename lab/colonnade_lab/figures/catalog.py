@@ -9,6 +9,7 @@ from typing import Any
 
 from colonnade.design.toolchain import project_root
 
+from colonnade_lab.evaluation.light.user_rooms import REPORT as USERS_ROOMS
 from colonnade_lab.explore.points import points_of
 from colonnade_lab.explore.study_file import load_study
 
@@ -262,6 +263,7 @@ def catalog() -> dict[str, Entry]:
         _samples(),
         _gather(),
         _light(),
+        Entry("light-users", "textured", {"frames": ("tools/light", "frames", *USERS_ROOMS, "--json", REPORT)}),
         Entry("assets", "textured", {"": ("tools/light", "samples", "--json", REPORT)}),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),

@@ -14,11 +14,13 @@ Frame = Mapping[str, Any]
 _COSTS = ((1, 1, 1), (4, 1, 5), (16, 1, 20), (16, 2, 20))
 #: Columns that are compared by material and at mirrors.
 _MATERIALS = ("probe, rasteriser", "ambient light", "1 pass, filtered", "16 passes, filtered", "photo alone")
+#: The data of users' rooms, and columns of them that are compared by material.
+USERS, _USERS_MATERIALS = "light-users", ("probe, rasteriser", "16 passes, filtered", "photo alone")
 
 
-def _of(data: Data, suffix: str) -> dict[str, Frame]:
+def _of(data: Data, suffix: str, part: str = "light") -> dict[str, Frame]:
     """The frames of a kind by room."""
-    frames = data.result("light")["frames"]["frames"]
+    frames = data.result(part)["frames"]["frames"]
     return {name.removesuffix(suffix): own for name, own in frames.items() if name.endswith(suffix)}
 
 
@@ -36,9 +38,9 @@ def _means(frames: Mapping[str, Frame], column: str, part: str, *keys: str) -> s
     return ", ".join(f"{value:.3f}" if index else f"{value:.1f}" for index, value in enumerate(values))
 
 
-def quality(data: Data) -> str:
+def quality(data: Data, part: str = "light") -> str:
     """PSNR of the rough objects by room, and means of PSNR, FLIP and DISTS of objects, changed room and frame."""
-    frames = _of(data, "-rough")
+    frames = _of(data, "-rough", part)
     rows = []
     for column in _columns(frames):
         objects = ["–"] * (len(frames) + 1)
@@ -51,6 +53,19 @@ def quality(data: Data) -> str:
             others = [_means(frames, column, "room", "flip"), _means(frames, column, "frame", "flip", "dists")]
         rows.append([column, *objects, *others])
     return markdown(["dB, FLIP, DISTS", *frames, "objects", "room", "frame"], rows)
+
+
+def users_materials(data: Data) -> str:
+    """PSNR of each object of users' rooms, and the light of matt ones and mirrors against the truth."""
+    rows, rooms = [], list(_of(data, "-rough", USERS))
+    for frames in (_of(data, f"-{frame}", USERS) for frame in ("rough", "clear")):
+        for kind in next(iter(frames.values()))["qualities"][_USERS_MATERIALS[0]]["things"]:
+            for column in _USERS_MATERIALS:
+                own = [frame["qualities"][column] for frame in frames.values()]
+                light = [f", {one['brightness']:.2f}" if kind in ("matt", "mirror") else "" for one in own]
+                cells = [f"{one['things'][kind]:.1f}{part}" for one, part in zip(own, light, strict=True)]
+                rows.append([f"{kind}: {column}", *cells])
+    return markdown(["dB, light", *rooms], rows)
 
 
 def materials(data: Data) -> str:
@@ -127,6 +142,8 @@ def _mean(values: list[float]) -> float:
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {
+    "light-users": lambda data: quality(data, USERS),
+    "light-users-materials": users_materials,
     "light-quality": quality,
     "light-materials": materials,
     "light-mirrors": mirrors,

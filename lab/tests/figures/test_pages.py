@@ -174,6 +174,9 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "pass": {"cycles": 50_000, "rays": {"in_box": 1_000_000}},
             "two": {"cycles": 60_000, "rays": {"in_box": 1_100_000}},
         },
+        "light-users": {
+            "frames": {"frames": {"r-rough": compared("matt", "metal"), "r-clear": compared("mirror", "glass")}}
+        },
         "room-lights": {
             "fits": {"r": {"ambient": 15.0, "lights": 20.0, "walls": None, "lamps": 20.0}},
             "choices": {"r: default lights": {"relit": 20.0, "mirror_device": 25.0, "mirror_right": 26.0}},
@@ -303,6 +306,8 @@ def compared(*kinds: str) -> dict[str, Any]:
         "1 pass, filtered",
         "1 pass, OIDN",
         "photo alone, no gathered light",
+        "16 passes, filtered",
+        "photo alone",
     )
     qualities = {column: {**own, "things": dict.fromkeys(kinds, 20.0 + index)} for index, column in enumerate(columns)}
     errors = {kind: {"rays": 9, "median": 1.25, "high": 3.0} for kind in ("probe", "colonnade")}
@@ -356,7 +361,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| **array**, MGE | 4.00 | 3.00 | 2.00 | +100.0 | +50.0 | +5.7 |" in table(docs, "bvh-costs")
     row = "| SLIC | 16,384 | 56.2 | 30.0 dB, 1.5° | 40.00, 0.0100 | 40.00, 0.0100 | 12.50 | 2.0 |"
     assert row in table(docs, "paper-maps")
-    assert re.search(r"\| all \d+ \| 52.5 \|", table(docs, "measuring"))
+    assert re.search(r"\| all \d+ \| 54.0 \|", table(docs, "measuring"))
     assert "| Embree `embree_verify`: `a` | `0123456789` | 1,000 | 999 | 1,000 |" in table(docs, "ray-suites")
     assert "| near | 900, 901 | 2,000 | 1 | 2.0 | 1.0 | 50 |" in table(docs, "ray-rates")
     assert "| near | 900, – | 2,000 | – |" in table(docs, "ray-rates")
@@ -378,6 +383,8 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "OIDN" not in table(docs, "light-mirrors") + table(docs, "light-materials")
     assert "| light: 1 pass, filtered | 0.75 |" in table(docs, "light-mirrors")
     assert "| rays of Colonnade | 1.2°, 3.0° |" in table(docs, "light-mirrors")
+    users = table(docs, "light-users-materials")
+    assert "| matt: photo alone | 27.0, 0.75 |" in users and "| glass: photo alone | 27.0 |" in users
     # A million rays of 2 nJ a pass
     assert "| 1, 1 | 50,000 | 1,000,000 | 4,000 | 2.00 |" in table(docs, "light-cost")
     assert "| 16, 2 | 60,000 | 1,100,000 | 167 | 44.00 |" in table(docs, "light-cost")

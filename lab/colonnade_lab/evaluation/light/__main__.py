@@ -53,7 +53,8 @@ def _frames(arguments: list[str]) -> None:
         strips: dict[str, list[report.Strip]] = {}
         for name, result, pictures in columns.measure(folder, names, progress.for_terminal()):
             results[name] = result
-            kind = name.rpartition("-")[2]
+            room, _, frame = name.rpartition("-")
+            kind = f"users-{frame}" if known_room(room).is_users else frame
             strips.setdefault(kind, []).append(report.write_pictures(folder, name, pictures))
         for kind, rows in strips.items():
             report.write_strips(folder / f"light-{kind}.jpg", rows)

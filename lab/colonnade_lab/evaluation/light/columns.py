@@ -99,7 +99,7 @@ class Quality:
         frame_dists, object_dists: DISTS of the frame, and of the objects with the truth around them; None without its
             weights.
         things: PSNR of each object, by its kind.
-        brightness: Light of the mirror's pixels over that of the truth; None without a mirror.
+        brightness: Light of the pixels of the mirror, or of the matt object, over that of the truth; None without them.
     """
 
     frame: float
@@ -176,9 +176,9 @@ def _frame(
     difference = np.abs(truth.astype(int) - pictures["no object"]).max(axis=2)
     regions = {"frame": np.ones_like(is_object), "object": is_object, "room": ~is_object & (difference > CHANGED)}
     of_things: dict[str, NDArray[np.bool_]] = {thing.kind: owners == index for index, thing in enumerate(things)}
-    mirror = of_things.get("mirror")
+    bright = of_things.get("mirror", of_things.get("matt"))
     qualities = {
-        title: _quality(truth, picture, regions, of_things, mirror)
+        title: _quality(truth, picture, regions, of_things, bright)
         for title, picture in pictures.items()
         if title != "truth"
     }
@@ -211,7 +211,7 @@ def _quality(
     picture: NDArray[np.uint8],
     regions: Mapping[str, NDArray[np.bool_]],
     of_things: Mapping[str, NDArray[np.bool_]],
-    mirror: NDArray[np.bool_] | None,
+    bright: NDArray[np.bool_] | None,
 ) -> Quality:
     own = compare_regions(truth, picture, {**regions, **of_things}, with_dists=("frame", "object"))
     values = {part: own[part].psnr or 0.0 for part in own}
@@ -227,7 +227,7 @@ def _quality(
         own["object"].dists,
         {kind: values[kind] for kind in of_things},
     )
-    if mirror is None:
+    if bright is None:
         return quality
-    light = [float((decode_srgb(image[mirror]) @ LUMINANCE).mean()) for image in (picture, truth)]
+    light = [float((decode_srgb(image[bright]) @ LUMINANCE).mean()) for image in (picture, truth)]
     return replace(quality, brightness=light[0] / light[1])

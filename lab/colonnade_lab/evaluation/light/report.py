@@ -14,8 +14,9 @@ from colonnade_lab.evaluation.light.columns import FrameResult
 #: Pictures side by side, sRGB, uint8 [height, width, 3].
 Strip = NDArray[np.uint8]
 
-#: The columns that are seen side by side, as far as they were rendered.
+#: The columns that are seen side by side, and those of a user's room, which has no frame of ambient light.
 SIDE_BY_SIDE = ("truth", "probe, rasteriser", "ambient light", "1 pass, filtered", "16 passes, filtered")
+USERS_SIDE_BY_SIDE = ("truth", "probe, rasteriser", "1 pass, filtered", "16 passes, filtered", "photo alone")
 #: Pixels around the objects, width of the pictures side by side, pixels, and their quality in JPEG.
 _MARGIN, _WIDTH, _QUALITY = 10, 1200, 80
 
@@ -29,7 +30,7 @@ def table(results: Mapping[str, FrameResult]) -> str:
             parts = ((own.frame, own.frame_flip), (own.object, own.object_flip), (own.room, own.room_flip))
             text = "  ".join(f"{psnr:5.1f} dB {flip:.3f}" for psnr, flip in parts)
             things = ", ".join(f"{kind} {value:.1f}" for kind, value in own.things.items())
-            brightness = "" if own.brightness is None else f", mirror's light {own.brightness:.2f}"
+            brightness = "" if own.brightness is None else f", light {own.brightness:.2f}"
             lines.append(f"  {column:24} {text}  {things}{brightness}")
         for kind, errors in (result.mirrors or {}).items():
             lines.append(f"  mirror rays of {kind}: {errors.rays:,}, {errors.median:.1f}°, 90 %: {errors.high:.1f}°")
@@ -37,7 +38,7 @@ def table(results: Mapping[str, FrameResult]) -> str:
 
 
 def write_pictures(folder: Path, name: str, pictures: Mapping[str, NDArray[np.uint8]]) -> Strip:
-    """Write the pictures of a frame, sRGB, as PNG files; returns those of `SIDE_BY_SIDE` around the objects."""
+    """Write the pictures of a frame, sRGB, as PNG files; returns those side by side, around the objects."""
     from PIL import Image
 
     (folder / name).mkdir(exist_ok=True)
@@ -47,7 +48,8 @@ def write_pictures(folder: Path, name: str, pictures: Mapping[str, NDArray[np.ui
     changed = np.abs(pictures["truth"].astype(int) - pictures["no object"]).max(axis=2) > 40
     rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
     box = tuple(slice(max(0, int(span[0]) - _MARGIN), int(span[-1]) + _MARGIN) for span in (rows, columns))
-    return np.concatenate([pictures[title][box] for title in SIDE_BY_SIDE], axis=1)
+    titles = SIDE_BY_SIDE if set(SIDE_BY_SIDE) <= set(pictures) else USERS_SIDE_BY_SIDE
+    return np.concatenate([pictures[title][box] for title in titles], axis=1)
 
 
 def write_strips(file: Path, strips: Sequence[Strip]) -> None:
