@@ -56,6 +56,11 @@ class Panorama:
         """The mean over all directions, float64 [3]."""
         return np.asarray((self.radiance * self.solid_angles()[..., None]).sum(axis=(0, 1)) / (4 * np.pi))
 
+    def on_ground(self) -> Floats:
+        """What level ground of albedo 1 shows under it, float64 [3]."""
+        weights = (self.solid_angles() * self.directions()[..., 1].clip(min=0.0))[..., None]
+        return np.asarray((self.radiance * weights).sum(axis=(0, 1)) / weights.sum())
+
     @property
     def is_cut_off(self) -> bool:
         """Whether its brightest light is a limit that a part of all directions has reached, as in 8-bit pictures."""

@@ -35,11 +35,13 @@ class DistantLight:
         direction: Unit, towards the light, world space, float64 [3].
         colour: What a surface of albedo 1 that faces it shows: its radiance times its solid angle / π, float64 [3].
         radius: Radius as seen from the panorama's point, radians.
+        is_far: It is outside of any room.
     """
 
     direction: Floats
     colour: Floats
     radius: float
+    is_far: bool = False
 
 
 def split_lights(panorama: Panorama, count: int) -> tuple[list[DistantLight], Panorama]:

@@ -22,6 +22,7 @@ from colonnade.scene.model import Colour
 from colonnade.scene.object_pose import object_pose, standing_points, with_free_placement
 from colonnade.scene.panorama_light import panorama_light
 from colonnade.scene.room_lights import as_vector, lights_of, with_lights
+from colonnade.scene.sun import sun_alone
 from colonnade.scene.view import world_positions
 
 if TYPE_CHECKING:
@@ -259,6 +260,12 @@ def _with_fitted_lights(
             " and ambient light 0.1 are used; [[light]] and [ambient] name others"
         )
         return scene, None
+    if (sunny := sun_alone(scene, extent, room)) is not None:
+        notes.tell(
+            f"the scene names no light: the photo of room {room.name} shows sun and shade, so the sun is overhead;"
+            " [[light]] and [ambient] name others"
+        )
+        return replace(with_lights(scene, sunny), fits_lights=scene.paths.gather > 0), None
     with progress.step("fitting lights to the photo"):
         fit = fitted_lights(room, min(DEFAULT_LIGHTS, max_lights), walls=scene.paths.gather > 0)
     count = len(fit.lights.lights)

@@ -19,6 +19,7 @@ from colonnade.environment.photo_colours import MAX_INTENSITY
 from colonnade.environment.seen_light import FINE, SeenLight, texel_weights
 from colonnade.scene.object_pose import object_pose
 from colonnade.scene.room_lights import with_lights
+from colonnade.scene.sun import with_sun
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
@@ -86,6 +87,8 @@ def panorama_light(scene: Scene, extent: Extent, room: Environment | None, max_l
     found, rest = split_lights(panorama, max_lights if scene.frame.samples == 1 else MOST_LIGHTS)
     if not found and seen is not None and panorama.is_cut_off:
         return PanoramaLight(scene, rest, False)
+    if room is not None:
+        found = with_sun(found, rest, scene, extent, room)
     lights = _placed(found, room, point, extent.edge * pose.scale, seen)
     ambient = _mean(rest, seen).clip(max=MAX_INTENSITY)
     scene = replace(with_lights(scene, RoomLights(ambient.round(4), tuple(lights))), pass_lights=max_lights)
@@ -132,13 +135,13 @@ def _placed(
 ) -> list[RoomLight]:
     """Point lights for the lights of a panorama.
 
-    In a room they are on the surface that the photo shows, or else where they leave the box of the room; without a
-    room they are far away.
+    In a room they are on the surface that the photo shows, or else where they leave the box of the room; the sun, and
+    lights without a room, are far away.
     """
     lights = []
     for light in found:
         distance, falloff = _FAR * edge, None
-        if room is not None:
+        if room is not None and not light.is_far:
             distance = _distance(room, point, light.direction, seen)
             falloff = round(distance, 3)
         colour = light.colour * min(1.0, MAX_INTENSITY / light.colour.max())
