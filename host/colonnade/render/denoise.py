@@ -53,9 +53,9 @@ class Guide:
     @staticmethod
     def of(position: Floats, mask: NDArray[np.bool_], normals: Floats | None = None) -> Guide:
         """With planes from positions: across the nearer neighbour on each axis. Without ``normals`` they are these."""
-        position = np.where(mask[..., None], position, 0.0)
-        along = [_difference(position, mask, axis) for axis in (0, 1)]
-        planes = unit_vectors(np.cross(along[0], along[1]))
+        position, box = np.where(mask[..., None], position, 0.0), _Box.of(mask)
+        along = [_difference(box.cut(position), box.cut(mask), axis) for axis in (0, 1)]
+        planes = box.put(unit_vectors(np.cross(along[0], along[1])), np.zeros_like(position))
         if normals is None:
             return Guide(position, planes, planes, mask)
         return Guide(position, planes, np.where(mask[..., None], normals, 0.0), mask, _SHADED_PLANE)
@@ -204,10 +204,10 @@ def moments(values: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
 
 def _sums(values: Floats, mask: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
     """Number, sums and sums of squares of values [height, width, k] around each pixel, where they show the object."""
-    inside = mask[..., None] * values
+    box, inside = _Box.of(mask), mask[..., None] * values
 
     def around(of: Floats) -> Floats:
         size = (_WINDOW, _WINDOW) + (1,) * (of.ndim - 2)
-        return np.asarray(ndimage.uniform_filter(of, size, mode="constant") * _WINDOW**2)
+        return box.put(ndimage.uniform_filter(box.cut(of), size, mode="constant") * _WINDOW**2, np.zeros_like(of))
 
     return around(mask.astype(np.float64)), around(inside), around(inside**2)

@@ -111,22 +111,24 @@ def _likely(noisy: Noisy, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
 
 def _reprojected(before: _Seen, guide: Guide) -> tuple[Floats, Floats, Floats]:
     """Colours, variances and numbers of frames of a frame's points, 0 for those that the frame before did not show."""
-    height, width = guide.mask.shape
-    place, is_before = before.camera.pixels(np.where(guide.mask[..., None], guide.position, 0.0))
+    (height, width), own = guide.mask.shape, guide.mask
+    position, planes, normals = guide.position[own], guide.planes[own], guide.normals[own]
+    place, is_before = before.camera.pixels(position)
     corner = np.floor(place.clip(-2, max(height, width) + 2)).astype(np.int64)
-    distance = np.linalg.norm(guide.position - before.camera.origin, axis=2)
+    distance = np.linalg.norm(position - before.camera.origin, axis=1)
     values = np.dstack([before.noisy.colour, before.noisy.variance, before.frames])
-    total, weights = np.zeros((height, width, 5)), np.zeros((height, width))
+    total, weights = np.zeros((len(position), 5)), np.zeros(len(position))
     for down in (0, 1):
         for across in (0, 1):
             x, y = corner[..., 0] + across, corner[..., 1] + down
-            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height) & is_before & guide.mask
+            inside = (x >= 0) & (y >= 0) & (x < width) & (y < height) & is_before
             at = (np.where(inside, y, 0), np.where(inside, x, 0))
-            off = np.abs(np.einsum("yxi,yxi->yx", before.guide.position[at] - guide.position, guide.planes))
-            facing = np.einsum("yxi,yxi->yx", before.guide.normals[at], guide.normals)
+            off = np.abs(np.einsum("pi,pi->p", before.guide.position[at] - position, planes))
+            facing = np.einsum("pi,pi->p", before.guide.normals[at], normals)
             same = inside & before.guide.mask[at] & (off < _OFF * distance) & (facing > _COSINE)
             weight = same * np.abs((x + 1 - 2 * across - place[..., 0]) * (y + 1 - 2 * down - place[..., 1]))
             total += weight[..., None] * np.where(same[..., None], values[at], 0.0)
             weights += weight
-    found = total / np.maximum(weights, 1e-9)[..., None]
+    found = np.zeros((height, width, 5))
+    found[own] = total / np.maximum(weights, 1e-9)[:, None]
     return found[..., :3], found[..., 3], found[..., 4]

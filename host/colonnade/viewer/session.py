@@ -23,6 +23,7 @@ from colonnade.device.device import ModelDevice
 from colonnade.device.scene import DeviceScene
 from colonnade.maps.encoders import Encoder
 from colonnade.render.camera_look import CameraLook
+from colonnade.render.history import History
 from colonnade.render.host_frame import HostFrame, require_filter
 from colonnade.render.room_defaults import default_config, with_room_defaults
 from colonnade.scene.model import Camera, Scene
@@ -131,6 +132,8 @@ class Session:
         self._error = ""
         self.has_ended = False
         self._rest: _Picture | None = None
+        self._history: History | None = None
+        self._number = 0
         self._load()
 
     def state(self, version: int | None = None, timeout: float = 0.0) -> dict[str, Any]:
@@ -148,6 +151,8 @@ class Session:
     def frame(self, camera: ViewCamera | None = None) -> ViewFrame:
         """Render a frame of one sample of the scene that was last right, as `colonnade render --samples 1`.
 
+        If noise is filtered, it also has the light of the frames before, as those of a motion have.
+
         Args:
             camera: In place of the scene's own.
 
@@ -155,7 +160,8 @@ class Session:
             UserError: The camera is out of the hardware's range.
         """
         with self._rendering:
-            return self._next(self._picture(camera, 1))
+            self._number += 1
+            return self._next(self._picture(camera, 1, self._history))
 
     def still(self, camera: ViewCamera | None = None) -> ViewFrame:
         """Render the next sample of a camera that rests: the picture has one more than that of the last call.
@@ -177,16 +183,17 @@ class Session:
                 rest.last = self._next(rest)
             return rest.last
 
-    def _picture(self, camera: ViewCamera | None, samples: int) -> _Picture:
+    def _picture(self, camera: ViewCamera | None, samples: int, history: History | None = None) -> _Picture:
         """A picture of so many samples, of which none is rendered."""
         scene = self._scene
         if camera is not None:
             scene = scene.with_camera(_moved(scene.scene.camera, camera))
         scene = replace(scene, scene=scene.scene.with_samples(samples))
-        passes = scene.passes(exposure=scene.scene.motion.exposure(1))
-        denoise = (scene.scene.frame.denoise or False) if samples > 1 else False
+        number = self._number if history is not None else 0
+        passes = scene.passes(exposure=scene.scene.motion.exposure(1), number=number)
+        denoise = (scene.scene.frame.denoise or False) if samples > 1 or history is not None else False
         look = self._look if scene.photo is not None else None
-        frame = HostFrame(scene, self.size, tuple(passes), denoise=denoise, look=look)
+        frame = HostFrame(scene, self.size, tuple(passes), denoise=denoise, look=look, history=history)
         return _Picture(camera, self._state["version"], frame, passes, frame.no_passes())
 
     def _next(self, picture: _Picture) -> ViewFrame:
@@ -285,6 +292,7 @@ class Session:
         with self._rendering, self._changed:
             self._device.load(scene.image)
             self._scene, self._look, self._samples = scene, look, description.frame.samples or 1
+            self._history = History.of(description.frame.denoise or False, STILL_SAMPLES)
             self._state = self._described(scene) | {
                 "version": self._state["version"] + 1,
                 "notes": lines,

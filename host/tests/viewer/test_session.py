@@ -165,3 +165,19 @@ def test_a_scene_of_the_project_is_not_edited(file: Path) -> None:
         session.save(ViewCamera((2.0, 2.0, 4.0), (0.0, 0.0, 0.0)))
     assert file.read_bytes() == text
     session.close()
+
+
+def test_a_moving_camera_keeps_the_light_of_the_frames_before(tmp_path: Path) -> None:
+    """So it has less noise than the frame that comes first."""
+    Image.fromarray(np.repeat(np.uint8([[250], [20]]), 16, 0).repeat(64, 1)).save(tmp_path / "p.png")
+    dark = "light = {position = [0, 9, 0], colour = [0, 0, 0]}\nframe.denoise = true\npaths.gather = 1\n"
+    (tmp_path / "scene.toml").write_text(f'mesh.name = "teapot:6"\nbackground.panorama = "p.png"\n{dark}')
+    session = Session(tmp_path / "scene.toml", None, size=(96, 72))
+    own = session.state()["camera"]
+    x, y, z = own["position"]
+    first, *_, last = (
+        session.frame(ViewCamera((x + 0.01 * number, y, z), own["target"])).pixels.astype(float) for number in range(8)
+    )
+    after, before = (np.median(np.abs(np.diff(pixels[30:50, 20:60], axis=1))) for pixels in (last, first))
+    assert after < 0.4 * before
+    session.close()
