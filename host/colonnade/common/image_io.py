@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import warnings
 from collections.abc import Iterable, Iterator
@@ -48,9 +49,15 @@ def encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 def decode_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float64]:
     """8-bit sRGB (any shape) as linear colours, 0.0 to 1.0."""
+    return _linear_codes()[encoded]
+
+
+@functools.cache
+def _linear_codes() -> NDArray[np.float64]:
+    """The linear colour of each code, float64 [256]."""
     import numpy as np
 
-    return linear_from_srgb(encoded.astype(np.float64) / 255.0)
+    return linear_from_srgb(np.arange(256) / 255.0)
 
 
 def resized_photo(photo: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:

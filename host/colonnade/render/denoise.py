@@ -25,8 +25,10 @@ _LEVELS = 4
 _COLOUR = 3.0
 #: How much of their distance two pixels may lie off a plane: of depth alone, and where shading normals are known.
 _PLANE, _SHADED_PLANE = 0.1, 0.4
-#: Power of the cosine between two normals.
-_NORMAL = 8
+#: The cosine between two normals is squared so many times.
+_NORMAL_SQUARES = 3
+#: Rows that are filtered at once: their arrays stay in the cache.
+_ROWS = 16
 #: Side of the square over which a single sample's variance is estimated, pixels.
 _WINDOW = 7
 #: A single sample is a point if it is so many standard deviations off its neighbours; levels that spread it.
@@ -123,7 +125,7 @@ class _Box:
     rows: slice
     columns: slice
 
-    _BORDER = 2 << (_LEVELS - 1)
+    BORDER = 2 << (_LEVELS - 1)
 
     @staticmethod
     def of(mask: NDArray[np.bool_]) -> _Box:
@@ -133,11 +135,11 @@ class _Box:
         return _Box(slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
 
     def cut(self, values: NDArray[Any]) -> NDArray[Any]:
-        return np.pad(values[self.rows, self.columns], ((self._BORDER,) * 2,) * 2 + ((0, 0),) * (values.ndim - 2))
+        return np.pad(values[self.rows, self.columns], ((self.BORDER,) * 2,) * 2 + ((0, 0),) * (values.ndim - 2))
 
     def put(self, values: Floats, into: Floats) -> Floats:
         found = into.copy()
-        found[self.rows, self.columns] = values[self._BORDER : -self._BORDER, self._BORDER : -self._BORDER]
+        found[self.rows, self.columns] = values[self.BORDER : -self.BORDER, self.BORDER : -self.BORDER]
         return found
 
     def guide(self, guide: Guide) -> Guide:
@@ -147,29 +149,40 @@ class _Box:
 
 def _filtered(colour: Floats, variance: Floats | None, guide: Guide, step: int) -> tuple[Floats, Floats]:
     """One level of the wavelet: colours and the variance of their luminance. Without one, luminance does not count."""
-    light, mask = colour @ LUMINANCE, guide.mask
-    deviation = np.inf if variance is None else _COLOUR * np.sqrt(_blurred(variance, mask)) + 1e-4
-    sums, weights, squares = np.zeros_like(colour), np.zeros_like(light), np.zeros_like(light)
-    for down in range(-2, 3):
-        for across in range(-2, 3):
-            shift = (-down * step, -across * step)
+    light, mask = colour @ LUMINANCE, guide.mask.astype(np.float64)
+    deviation = np.full_like(light, np.inf)
+    if variance is not None:
+        deviation = _COLOUR * np.sqrt(_blurred(variance, guide.mask)) + 1e-4
+    border, (height, width) = _Box.BORDER, mask.shape
+    found, spread = np.zeros_like(colour), np.zeros_like(light)
+    for top in range(border, height - border, _ROWS):
+        rows = slice(top, min(top + _ROWS, height - border))
 
-            def there(values: NDArray[Any], shift: tuple[int, int] = shift) -> NDArray[Any]:
-                return np.roll(values, shift, axis=(0, 1))
+        def there(values: Floats, down: int = 0, across: int = 0, rows: slice = rows) -> Floats:
+            x = border + across * step
+            return values[rows.start + down * step : rows.stop + down * step, x : x + width - 2 * border]
 
-            way = there(guide.position) - guide.position
-            off = np.abs(np.einsum("yxi,yxi->yx", way, guide.planes))
-            far = guide.plane * np.linalg.norm(way, axis=2) + 1e-9
-            facing = np.einsum("yxi,yxi->yx", there(guide.normals), guide.normals).clip(min=0.0) ** _NORMAL
-            weight = _SPLINE[abs(down)] * _SPLINE[abs(across)] * there(mask) * mask
-            if down or across:
-                weight = weight * facing * np.exp(-off / far - np.abs(there(light) - light) / deviation)
-            sums += weight[..., None] * there(colour)
-            weights += weight
-            if variance is not None:
-                squares += weight**2 * there(variance)
-    safe = np.where(weights > 0, weights, 1.0)
-    return sums / safe[..., None], squares / safe**2
+        position, planes, normals, own = map(there, (guide.position, guide.planes, guide.normals, mask))
+        sums, weights, squares = np.zeros_like(position), np.zeros_like(own), np.zeros_like(own)
+        for down in range(-2, 3):
+            for across in range(-2, 3):
+                weight = _SPLINE[abs(down)] * _SPLINE[abs(across)] * there(mask, down, across) * own
+                if down or across:
+                    way = there(guide.position, down, across) - position
+                    off = np.abs(np.einsum("yxi,yxi->yx", way, planes))
+                    far = guide.plane * np.sqrt(np.einsum("yxi,yxi->yx", way, way)) + 1e-9
+                    facing = np.einsum("yxi,yxi->yx", there(guide.normals, down, across), normals).clip(min=0.0)
+                    for _ in range(_NORMAL_SQUARES):
+                        facing *= facing
+                    difference = np.abs(there(light, down, across) - there(light)) / there(deviation)
+                    weight *= facing * np.exp(-off / far - difference)
+                sums += weight[..., None] * there(colour, down, across)
+                weights += weight
+                if variance is not None:
+                    squares += weight**2 * there(variance, down, across)
+        safe = np.where(weights > 0, weights, 1.0)
+        there(found)[:], there(spread)[:] = sums / safe[..., None], squares / safe**2
+    return found, spread
 
 
 def _blurred(values: Floats, mask: NDArray[np.bool_]) -> Floats:
