@@ -44,7 +44,9 @@ def derived_albedo(room: Environment, lights: RoomLights | None = None) -> Float
     assert room.photo is not None
     light = irradiance(*world_surface(room), lights or hue_lights(room))
     colours = decode_srgb(room.photo) / light.clip(min=_DARK)
-    return np.asarray(np.where(light > _DARK, colours, _hues(room)).clip(max=1.0))
+    if (light <= _DARK).any():
+        colours = np.where(light > _DARK, colours, _hues(room))
+    return np.asarray(colours.clip(max=1.0))
 
 
 def hue_lights(room: Environment) -> RoomLights:
