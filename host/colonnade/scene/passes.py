@@ -89,8 +89,10 @@ def light_shares(strengths: Sequence[float], count: int, slots: int) -> list[tup
     """Factors of lights in each of ``count`` passes that have ``slots`` lights, so that the mean of each light is 1.
 
     A stronger light is in more passes, so that these are about as bright. If all passes have too few lights, those
-    that come last in ``strengths`` are in none.
+    that come last in ``strengths`` are in none, and the others are as bright as all.
     """
+    kept = sum(strengths[: count * slots])
+    scale = sum(strengths) / kept if kept > 0 else 1.0
     counts = [0 if index < count * slots else count for index in range(len(strengths))]
     for _ in range(count * slots):
         open_lights = [index for index, passes in enumerate(counts) if passes < count]
@@ -101,6 +103,6 @@ def light_shares(strengths: Sequence[float], count: int, slots: int) -> list[tup
     factors, place = np.zeros((count, len(strengths))), 0
     for index, passes in enumerate(counts):
         if index < count * slots:
-            factors[np.arange(place, place + passes) % count, index] = count / passes
+            factors[np.arange(place, place + passes) % count, index] = scale * count / passes
             place += passes
     return [tuple(map(float, row)) for row in factors]

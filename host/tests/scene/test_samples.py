@@ -234,7 +234,9 @@ def test_passes_share_lights_without_a_change_of_their_mean(strengths: list[floa
     shares = np.array(light_shares(strengths, count, slots))
     assert shares.shape == (count, len(strengths)) and ((shares > 0).sum(axis=1) <= slots).all()
     places = count * slots
-    np.testing.assert_allclose(shares[:, :places].mean(axis=0), 1.0)
+    means = shares.mean(axis=0)
+    np.testing.assert_allclose(means[:places], means[0])
+    np.testing.assert_allclose(means @ strengths, sum(strengths))
     assert not shares[:, places:].any()
     assert (np.diff((shares > 0).sum(axis=0)) <= 0).all()
 
