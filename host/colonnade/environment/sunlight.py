@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from colonnade.common import fixed_order
-from colonnade.common.accumulation import LUMINANCE
+from colonnade.common.accumulation import LUMINANCE, WHOLE
 from colonnade.common.image_io import decode_srgb
 from colonnade.common.types import Floats
 from colonnade.environment.lights import world_surface
@@ -32,6 +33,8 @@ _PHOTO_RANGE = (2, 250)
 _BINS = 128
 #: A point whose shadow is so much farther from the camera than what the photo shows there is hidden, as a factor.
 _HIDDEN = 1.05
+#: Strength of a shadow in the shade: it is the sky's alone. Edge of the median's window, pixels.
+_IN_SHADE, _MEDIAN = 0.4, 5
 
 Mask = NDArray[np.bool_]
 
@@ -58,15 +61,19 @@ class Sunlight:
         _, normals = world_surface(room)
         light = decode_srgb(room.photo)
         usable = (room.photo.max(axis=2) <= _PHOTO_RANGE[1]) & (room.photo.min(axis=2) >= _PHOTO_RANGE[0])
-        ways = np.concatenate([np.eye(3)[[1, 0, 2]], -np.eye(3)[[0, 2]]])
-        ground, *others = (
-            _kinds(light[usable & (fixed_order.product(normals, way) > _FACING)], usable.size, *limits)
-            for way, limits in zip(ways, (_GROUND, *[_OTHER] * 4), strict=True)
-        )
-        if ground is None or not any(others):
+        x, y, z = np.moveaxis(np.where(usable[..., None], normals, 0.0), -1, 0)
+        ground = _kinds(light[y > _FACING], usable.size, *_GROUND)
+        if ground is None or not any(
+            _kinds(light[facing > _FACING], usable.size, *_OTHER) for facing in (z, x, -x, -z)
+        ):
             return None
         sun, shade, level = ground
         return cls(sun / shade, shade, light @ LUMINANCE > level)
+
+    def strength(self) -> NDArray[np.uint8]:
+        """The strength of the object's shadow on the photo, as `shadow_strength`: in the shade it takes no sun away."""
+        share = ndimage.median_filter(self.is_lit.astype(np.float64), size=_MEDIAN, mode="nearest")
+        return np.asarray(np.rint(WHOLE * (_IN_SHADE + (1 - _IN_SHADE) * share)), dtype=np.uint8)
 
     def colour(self, shade: Floats) -> Floats:
         """The sun's light on level ground, float64 [3], beside the light of the shade there."""

@@ -16,6 +16,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.environment.load import load_environment
 from colonnade.environment.photo_colours import PhotoColours, photo_colours
 from colonnade.environment.shadow_strength import shadow_strength
+from colonnade.environment.sunlight import Sunlight
 from colonnade.maps.encoded import layout_of
 from colonnade.mesh.materials.materials import MeshMaterial, is_lit
 from colonnade.scene.model import Colour
@@ -213,7 +214,7 @@ def photo_strength(scene: Scene, room: Environment, extent: Extent, relit: bool)
     """The strength of the object's shadow on the photo of a room, uint8 [height, width].
 
     None, and whole, for a camera that is not that of the maps; and unless the scene wants something else, for lights
-    that it names, which the photo may not show, and in a room without an albedo map.
+    that it names, which the photo may not show, and in a room without an albedo map whose photo shows no sun and shade.
 
     Raises:
         UserError: `background.shadows` asks for a photo or an albedo map that the room lacks.
@@ -224,11 +225,14 @@ def photo_strength(scene: Scene, room: Environment, extent: Extent, relit: bool)
             f"background.shadows is photo, but room {room.name} has no "
             + ("photo.png or render.png" if room.photo is None else "albedo.png: its albedo has the photo's shadows")
         )
-    if relit or scene.places_camera or room.photo is None or not room.has_albedo:
+    if relit or scene.places_camera or room.photo is None:
         return None
     if wanted == "whole" or (wanted is None and scene.names_light):
         return None
-    return shadow_strength(room, lights_of(scene, extent, room))
+    if room.has_albedo:
+        return shadow_strength(room, lights_of(scene, extent, room))
+    sun = Sunlight.of(room)
+    return None if sun is None else sun.strength()
 
 
 def _photo_colours(

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from sunny_yard import SHADE, SUN, yard
+from sunny_yard import SHADE, SUN, WALL, yard
 
+from colonnade.common.accumulation import WHOLE
+from colonnade.environment.lights import world_surface
 from colonnade.environment.panorama import Panorama
 from colonnade.environment.panorama_lights import DistantLight
 from colonnade.mesh.load import load_mesh
+from colonnade.scene.lit_room import photo_strength
 from colonnade.scene.model import Background, MeshSource, Scene, Transform
 from colonnade.scene.sun import sun_alone, with_sun
 
@@ -54,3 +58,14 @@ def test_a_photo_alone_has_sun_and_shade() -> None:
         np.testing.assert_allclose(sun.colour, share * SUN / SHADE * found.ambient, atol=0.15)
         assert sun.falloff is None and sun.position[1] > 10
     assert sun_alone(scene(0.0), EXTENT, yard(has_shadows=False)) is None
+
+
+def test_an_object_takes_no_sun_away_in_the_shade() -> None:
+    found = replace(scene(0.0), names_light=False)
+    room = replace(ROOM, has_albedo=False)
+    strength = photo_strength(found, room, EXTENT, relit=False)
+    assert strength is not None
+    x, is_ground = world_surface(room)[0][..., 0], room.depth < WALL
+    assert strength[is_ground & (np.abs(x) > 1.3)].min() == WHOLE
+    assert strength[is_ground & (np.abs(x) < 0.7)].max() < WHOLE / 2
+    assert photo_strength(found, replace(yard(has_shadows=False), has_albedo=False), EXTENT, relit=False) is None
