@@ -1,10 +1,11 @@
-/// Normals of depth maps and light cubes (cpp/environment) for Python.
+/// Normals of depth maps, light cubes and the filter of noise (cpp/environment) for Python.
 #include <nanobind/stl/array.h>
 
 #include <cstring>
 
 #include "binding.hpp"
 #include "environment/light_cube.hpp"
+#include "environment/wavelet.hpp"
 
 using namespace nanobind::literals;
 using namespace colonnade;
@@ -67,6 +68,28 @@ nb::tuple seenLight(const Rows& points, const Rows& normals, const Rows& colours
                           arrayOf<double>(light.distance, {texels}));
 }
 
+using Pixels3 = nb::ndarray<const double, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+
+nb::tuple wavelet(const std::array<Pixels3, 3>& surface, const Map<bool>& mask, double plane, const Pixels3& colour, const std::array<Map<double>, 3>& light, int step) {
+    const std::size_t height = mask.shape(0), width = mask.shape(1);
+    const auto vectors = [&](const Pixels3& pixels) {
+        if (pixels.shape(0) != height || pixels.shape(1) != width) throw std::invalid_argument("the sizes of pictures differ");
+        return reinterpret_cast<const environment::Vector*>(pixels.data());
+    };
+    for (const auto& one : light)
+        if (one.shape(0) != height || one.shape(1) != width) throw std::invalid_argument("the sizes of pictures differ");
+    const environment::Guide guide{vectors(surface[0]),
+                                   vectors(surface[1]),
+                                   vectors(surface[2]),
+                                   reinterpret_cast<const std::uint8_t*>(mask.data()),
+                                   static_cast<int>(width),
+                                   static_cast<int>(height),
+                                   plane};
+    const environment::NoisyPixels noisy{vectors(colour), light[0].data(), light[1].data(), light[2].data()};
+    const environment::FilteredPixels found = released([&] { return environment::wavelet(guide, noisy, step); });
+    return nb::make_tuple(arrayOf<double>(found.colour, {height, width, 3}), arrayOf<double>(found.variance, {height, width}));
+}
+
 } // namespace
 
 void bind_surroundings(nb::module_& module) {
@@ -76,5 +99,6 @@ void bind_surroundings(nb::module_& module) {
     module.def("rotated_cube", &rotatedCube, "radiance"_a, "size"_a, "rotation"_a);
     module.def("cube_words", &cubeWords, "radiance"_a, "lights"_a);
     module.def("seen_light", &seenLight, "points"_a, "normals"_a, "colours"_a, "point"_a);
+    module.def("wavelet", &wavelet, "surface"_a, "mask"_a, "plane"_a, "colour"_a, "light"_a, "step"_a);
     module.def("box_distance", &environment::boxDistance, "low"_a, "high"_a, "point"_a);
 }

@@ -17,18 +17,12 @@ from colonnade.common.accumulation import LUMINANCE
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 
-#: Weights of a cubic B-spline at distances of 0, 1 and 2 steps.
-_SPLINE = (3 / 8, 1 / 4, 1 / 16)
 #: Filters one after the other; each doubles the step.
 _LEVELS = 4
 #: How many standard deviations two pixels may differ.
 _COLOUR = 3.0
 #: How much of their distance two pixels may lie off a plane: of depth alone, and where shading normals are known.
 _PLANE, _SHADED_PLANE = 0.1, 0.4
-#: The cosine between two normals is squared so many times.
-_NORMAL_SQUARES = 3
-#: Rows that are filtered at once: their arrays stay in the cache.
-_ROWS = 16
 #: Side of the square over which a single sample's variance is estimated, pixels.
 _WINDOW = 7
 #: A single sample is a point if it is so many standard deviations off its neighbours; levels that spread it.
@@ -93,12 +87,11 @@ class Noisy:
         if variance is not None:
             return Noisy(colour, variance)
         usual = _without_points(colour, guide.mask)
-        box = _Box.of(guide.mask)
-        points, surface = box.cut(colour - usual), box.guide(guide)
+        points = colour - usual
         for level in range(_POINT_LEVELS):
-            points, _ = _filtered(points, None, surface, 1 << level)
+            points, _ = _filtered(points, None, guide, 1 << level)
         _, deviation = moments((usual @ LUMINANCE)[..., None], guide.mask)
-        return Noisy(usual + box.put(points, np.zeros_like(colour)), deviation[..., 0] ** 2)
+        return Noisy(usual + points, deviation[..., 0] ** 2)
 
 
 def denoised(noisy: Noisy, guide: Guide) -> Floats:
@@ -111,21 +104,20 @@ def denoised(noisy: Noisy, guide: Guide) -> Floats:
     Returns:
         float64 [height, width, 3]; pixels outside the mask are unchanged.
     """
-    box = _Box.of(guide.mask)
-    colour, spread, surface = box.cut(noisy.colour), box.cut(noisy.variance), box.guide(guide)
+    colour, spread = noisy.colour, noisy.variance
     for level in range(_LEVELS):
-        colour, spread = _filtered(colour, spread, surface, 1 << level)
-    return np.where(guide.mask[..., None], box.put(colour, noisy.colour), noisy.colour)
+        colour, spread = _filtered(colour, spread, guide, 1 << level)
+    return np.where(guide.mask[..., None], colour, noisy.colour)
 
 
 @dataclass(frozen=True)
 class _Box:
-    """The rectangle of an object, around which a filter sees a border outside the mask."""
+    """The rectangle of an object, with a border outside the mask."""
 
     rows: slice
     columns: slice
 
-    BORDER = 2 << (_LEVELS - 1)
+    _BORDER = 1
 
     @staticmethod
     def of(mask: NDArray[np.bool_]) -> _Box:
@@ -135,54 +127,28 @@ class _Box:
         return _Box(slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1))
 
     def cut(self, values: NDArray[Any]) -> NDArray[Any]:
-        return np.pad(values[self.rows, self.columns], ((self.BORDER,) * 2,) * 2 + ((0, 0),) * (values.ndim - 2))
+        return np.pad(values[self.rows, self.columns], ((self._BORDER,) * 2,) * 2 + ((0, 0),) * (values.ndim - 2))
 
     def put(self, values: Floats, into: Floats) -> Floats:
         found = into.copy()
-        found[self.rows, self.columns] = values[self.BORDER : -self.BORDER, self.BORDER : -self.BORDER]
+        found[self.rows, self.columns] = values[self._BORDER : -self._BORDER, self._BORDER : -self._BORDER]
         return found
-
-    def guide(self, guide: Guide) -> Guide:
-        position, planes, normals = map(self.cut, (guide.position, guide.planes, guide.normals))
-        return Guide(position, planes, normals, self.cut(guide.mask), guide.plane)
 
 
 def _filtered(colour: Floats, variance: Floats | None, guide: Guide, step: int) -> tuple[Floats, Floats]:
     """One level of the wavelet: colours and the variance of their luminance. Without one, luminance does not count."""
-    light, mask = colour @ LUMINANCE, guide.mask.astype(np.float64)
+    from colonnade import _core
+
+    light, spread = colour @ LUMINANCE, np.zeros_like(guide.position[..., 0])
     deviation = np.full_like(light, np.inf)
     if variance is not None:
-        deviation = _COLOUR * np.sqrt(_blurred(variance, guide.mask)) + 1e-4
-    border, (height, width) = _Box.BORDER, mask.shape
-    found, spread = np.zeros_like(colour), np.zeros_like(light)
-    for top in range(border, height - border, _ROWS):
-        rows = slice(top, min(top + _ROWS, height - border))
-
-        def there(values: Floats, down: int = 0, across: int = 0, rows: slice = rows) -> Floats:
-            x = border + across * step
-            return values[rows.start + down * step : rows.stop + down * step, x : x + width - 2 * border]
-
-        position, planes, normals, own = map(there, (guide.position, guide.planes, guide.normals, mask))
-        sums, weights, squares = np.zeros_like(position), np.zeros_like(own), np.zeros_like(own)
-        for down in range(-2, 3):
-            for across in range(-2, 3):
-                weight = _SPLINE[abs(down)] * _SPLINE[abs(across)] * there(mask, down, across) * own
-                if down or across:
-                    way = there(guide.position, down, across) - position
-                    off = np.abs(np.einsum("yxi,yxi->yx", way, planes))
-                    far = guide.plane * np.sqrt(np.einsum("yxi,yxi->yx", way, way)) + 1e-9
-                    facing = np.einsum("yxi,yxi->yx", there(guide.normals, down, across), normals).clip(min=0.0)
-                    for _ in range(_NORMAL_SQUARES):
-                        facing *= facing
-                    difference = np.abs(there(light, down, across) - there(light)) / there(deviation)
-                    weight *= facing * np.exp(-off / far - difference)
-                sums += weight[..., None] * there(colour, down, across)
-                weights += weight
-                if variance is not None:
-                    squares += weight**2 * there(variance, down, across)
-        safe = np.where(weights > 0, weights, 1.0)
-        there(found)[:], there(spread)[:] = sums / safe[..., None], squares / safe**2
-    return found, spread
+        spread, deviation = variance, _COLOUR * np.sqrt(_blurred(variance, guide.mask)) + 1e-4
+    arrays = (colour, light, spread, deviation, guide.position, guide.planes, guide.normals)
+    colour, light, spread, deviation, *surface = map(np.ascontiguousarray, arrays)
+    found: tuple[Floats, Floats] = _core.wavelet(
+        surface, guide.mask, guide.plane, colour, [light, spread, deviation], step
+    )
+    return found
 
 
 def _blurred(values: Floats, mask: NDArray[np.bool_]) -> Floats:
