@@ -20,6 +20,7 @@ from colonnade.common.input_files import is_file, require_regular
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
+from colonnade.mesh.clips.clip import Clip
 from colonnade.mesh.files import catalog
 from colonnade.mesh.files.formats import SUFFIXES, read_surface
 from colonnade.mesh.geometry import primitives, teapot
@@ -42,7 +43,11 @@ SUBDIVISION_LIMIT = 5
 
 
 def load_mesh(
-    name_or_path: str | Path, crease: float | None = None, corner_colours: bool = False, simplify: int | None = None
+    name_or_path: str | Path,
+    crease: float | None = None,
+    corner_colours: bool = False,
+    simplify: int | None = None,
+    animation: str | None = None,
 ) -> Mesh:
     """Load the mesh of a name or a file, and report its notes (`colonnade.common.notes`).
 
@@ -56,11 +61,12 @@ def load_mesh(
             without them the default angle.
         corner_colours: Keep the colours of the corners. Otherwise a face has one colour, the mean of its corners.
         simplify: Simplify a mesh of more triangles to about so many; a line tells both numbers. None: all of them.
+        animation: Name or number of an animation of a glTF file, whose clip the mesh gets. It cannot be simplified.
 
     Raises:
         UserError: The mesh does not exist or cannot be rendered.
     """
-    mesh = _loaded(name_or_path, crease, corner_colours)
+    mesh = _loaded(name_or_path, crease, corner_colours, animation)
     notes.report(mesh.notes)
     return mesh if simplify is None or len(mesh.faces) <= simplify else _simplified(mesh, simplify)
 
@@ -88,18 +94,20 @@ def _simplified(mesh: Mesh, triangles: int) -> Mesh:
     return replace(result, notes=mesh.notes)
 
 
-def _loaded(name_or_path: str | Path, crease: float | None, corner_colours: bool) -> Mesh:
+def _loaded(name_or_path: str | Path, crease: float | None, corner_colours: bool, animation: str | None) -> Mesh:
     text = str(name_or_path)
     if isinstance(name_or_path, str) and (built := _built_in(text)) is not None:
+        if animation is not None:
+            raise UserError(f"mesh {text} has no animations: leave out mesh.animation, or give a glTF file")
         return clean_mesh(*built, name=text, crease=crease)
     looks_like_path = os.sep in text or Path(text).suffix.lower() in SUFFIXES
     if isinstance(name_or_path, str) and not looks_like_path and not is_file(Path(text)):
         base, colon, number = text.partition(":")
         found = catalog.find(base)
         cuts = _size(text, number, 0, 0, SUBDIVISION_LIMIT, bool(colon))
-        mesh = _read(found.path, found.subdivisions + cuts, crease, corner_colours)
+        mesh = _read(found.path, found.subdivisions + cuts, crease, corner_colours, animation)
         return replace(mesh, name=text)
-    return _read(Path(text), 0, crease, corner_colours)
+    return _read(Path(text), 0, crease, corner_colours, animation)
 
 
 def _built_in(name: str) -> tuple[Floats, Faces] | None:
@@ -123,7 +131,7 @@ def _size(name: str, argument: str, default: int, minimum: int, maximum: int, gi
     return int(argument)
 
 
-def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: bool) -> Mesh:
+def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: bool, animation: str | None) -> Mesh:
     """Read a mesh file and split each triangle into four ``subdivisions`` times."""
     require_regular(path, "mesh file")
     if path.suffix.lower() not in SUFFIXES:
@@ -132,7 +140,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         raise UserError(f"mesh file {path} is empty")
     try:
         with np.errstate(all="ignore"):  # of numbers that are refused or noted
-            file = read_surface(path)
+            file = read_surface(path, animation)
     except (ImportError, MemoryError):
         raise
     except UserError as error:
@@ -182,6 +190,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         single_sided=None if surface.single_sided is None else np.repeat(surface.single_sided, 4**subdivisions),
         sources=None if surface.source_faces is None or subdivisions else (surface.source_faces, surface.source_count),
         relief=relief,
+        clip=surface.clip,
     )
 
 
@@ -201,6 +210,7 @@ def clean_mesh(
     single_sided: npt.NDArray[np.bool_] | None = None,
     sources: tuple[Indices, int] | None = None,
     relief: Relief | None = None,
+    clip: Clip | None = None,
 ) -> Mesh:
     """Clean raw vertices and faces.
 
@@ -220,6 +230,7 @@ def clean_mesh(
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
         sources: The face of the file that each is a part of, int64 [m], and their number; None: themselves.
         relief: Normal maps, which are baked into the corner normals; None: none.
+        clip: What moves the vertices; None: nothing.
 
     Raises:
         UserError: A vertex is not finite, the size is out of range, or no face has an area.
@@ -230,10 +241,11 @@ def clean_mesh(
     cleaned = clean(vertices, faces, normals, crease, source_count)
     if isinstance(cleaned, str):
         raise UserError(label + cleaned.removeprefix("the mesh"))
-    vertices, faces, keep = cleaned.vertices, cleaned.faces, cleaned.sources
+    keep, clip_corners = cleaned.sources, None if clip is None else faces[cleaned.sources].astype(np.int64)
+    vertices, faces = cleaned.vertices, cleaned.faces
     colours, uvs = (None if values is None else values[keep] for values in (colours, uvs))
     has_backs = single_sided is not None and bool((single_sided[keep] & cleaned.is_open).any())
-    for values in (colours, uvs):
+    for values in (colours, uvs, clip_corners):
         if values is not None:
             values[cleaned.reversed] = values[cleaned.reversed][:, ::-1]
     relief = None if relief is None else relief.kept(keep).reversed(cleaned.reversed)
@@ -262,4 +274,6 @@ def clean_mesh(
         corner_colours=colours,
         textures=textures,
         corner_uvs=uvs,
+        clip=clip,
+        clip_corners=clip_corners,
     )

@@ -63,6 +63,24 @@ CAMERAS = Loss.of("camera", "not used", "the scene file has the camera")
 ANIMATIONS = Loss.of("animation", "not played", "nodes stand as the file places them")
 SKINS = Loss.of("skin", "not applied", "its mesh has the pose in which it was bound")
 MORPHS = Loss.of("morph target", "not applied", "its mesh has its base shape")
+CHANNELS = Loss.of(
+    "channel of an animation", "not played", "only those of nodes and morph targets are", "channels of an animation"
+)
+INFLUENCES = Loss.of(
+    "vertex with more than four joints",
+    "moved by the largest four",
+    "others count for little",
+    "vertices with more than four joints",
+)
+BENT_RELIEF = Loss.of(
+    "normal map of an animated mesh", "not shown", "its smooth normals are", "normal maps of an animated mesh"
+)
+BENT_ALPHA = Loss.of(
+    "partly transparent material of an animated mesh",
+    "opaque",
+    "alpha cuts only what does not bend",
+    "partly transparent materials of an animated mesh",
+)
 HOLES = Loss.of("polygon with holes", "not shown", "export triangles", "polygons with holes")
 BEAMS = Loss.of("beam lattice", "not shown", "only faces are rendered")
 MATERIAL_GROUPS = Loss.of(

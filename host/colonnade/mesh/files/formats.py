@@ -25,18 +25,24 @@ class MeshFile:
     losses: Losses
 
 
-def read_surface(path: Path) -> MeshFile:
+def read_surface(path: Path, animation: str | None = None) -> MeshFile:
     """Read a mesh file and join its parts.
 
+    Args:
+        path: The file.
+        animation: Name or number of an animation of a glTF file, which the surface plays. None: it does not move.
+
     Raises:
-        UserError: The file is invalid.
+        UserError: The file is invalid, or has no such animation.
     """
     content = read_input(path, "the mesh", MAX_MESH_BYTES)
     kind, losses, references = path.suffix.lower(), Losses(), References(path)
+    if animation is not None and kind not in (".glb", ".gltf"):
+        raise UserError(f"mesh {path} has no animations: leave out mesh.animation, or give a glTF file")
     if kind in (".glb", ".gltf"):
         from colonnade.mesh.files.gltf import read_gltf
 
-        surface = read_gltf(content, path, references, losses)
+        surface = read_gltf(content, path, references, losses, animation)
     elif kind == ".obj":
         from colonnade.mesh.files.obj import read_obj
 

@@ -6,8 +6,7 @@ leaves out.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,13 @@ from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
+from colonnade.mesh.clips.clip import cofactors
 from colonnade.mesh.files.gltf_checks import DRACO, READ_EXTENSIONS
+from colonnade.mesh.files.gltf_clip import ClipReader
 from colonnade.mesh.files.gltf_document import COMPRESSION, GltfDocument
 from colonnade.mesh.files.gltf_draco import DracoPrimitives, PrimitiveArrays
 from colonnade.mesh.files.gltf_metal import metal_of, of_map
+from colonnade.mesh.files.gltf_nodes import mesh_nodes
 from colonnade.mesh.files.gltf_relief import relief_of
 from colonnade.mesh.files.gltf_textures import GltfTextures
 from colonnade.mesh.files.resolver import References
@@ -41,17 +43,24 @@ from colonnade.mesh.materials.roughness import merged_roughness, surface_areas
 from colonnade.mesh.materials.surface import RawSurface, joined
 from colonnade.mesh.materials.texture import MAX_UV
 
-#: Largest magnitude of a transform's element, in the scene.
-_MAX_TRANSFORM = 1e100
-
 #: Materials of a file up to which those with a map have all of its roughnesses.
 _MAPPED_MATERIALS = 64
 
 _POINTS, _LINE_MODES, _TRIANGLES, _STRIP, _FAN = 0, (1, 2, 3), 4, 5, 6
 
 
-def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -> RawSurface:
+def read_gltf(
+    data: bytes, path: Path, references: References, losses: Losses, animation: str | None = None
+) -> RawSurface:
     """Read a glTF file, text or binary, with the transforms of its nodes.
+
+    Args:
+        data: Its bytes.
+        path: Its path, for messages.
+        references: The files beside it.
+        losses: Counts what is not read.
+        animation: Name or number of an animation, whose clip the surface gets. None: skins and morph targets are not
+            applied.
 
     Raises:
         UserError: The file is invalid, or requires an extension that is not supported.
@@ -59,7 +68,8 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
     document = GltfDocument(data, path, references)
     _check_extensions(document)
     textures = GltfTextures(document, references, losses)
-    parts = _parts(document, textures, losses)
+    clip = None if animation is None else ClipReader(document, animation, losses)
+    parts = _parts(document, textures, losses, clip)
     materials = (*(from_gltf(material) for material in document.json.get("materials", [])), PLAIN)
     found = list(materials)
     for index in sorted({part.material for part in parts} - {len(materials) - 1}):
@@ -67,11 +77,12 @@ def read_gltf(data: bytes, path: Path, references: References, losses: Losses) -
         losses.update(gltf_losses(material))
         losses.update((extension_loss(name), 1) for name in unused_extensions(material))
         found[index] = replace(found[index], emission=textures.emission(index, found[index].emission))
-    _count_other(document, losses)
+    _count_other(document, losses, clip is not None)
     textures.reader.count_losses()
     if not parts:
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     surface = joined([part.surface for part in parts])
+    surface = surface if clip is None else clip.surface(surface)
     materials, face_materials = _materials_of(tuple(found), parts, textures)
     areas = surface_areas(surface.vertices, surface.faces, face_materials, len(materials))
     materials, _ = merged_roughness(materials, areas, max(_MAPPED_MATERIALS, len(found)))
@@ -110,17 +121,25 @@ class _Part:
         return self.surface.uvs is None and self.surface.colours is None and len(self.surface.faces) > 0
 
 
-def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses) -> list[_Part]:
-    """The primitives of the default scene; refused as soon as they have too many materials."""
+def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip: ClipReader | None) -> list[_Part]:
+    """The primitives of the default scene, whose vertices a clip takes; refused if they have too many materials."""
     compressed, default = DracoPrimitives(document), len(document.json.get("materials", []))
     parts: list[_Part] = []
     # Of surfaces that no texture or corner colours; metal by a map keeps these, too
     plain: set[tuple[Vector, float]] = set()
-    for node, matrix in _nodes(document, losses):
+    for index, node, matrix in mesh_nodes(document, losses):
+        losses.add(lost.SKINS, clip is None and "skin" in node)
         for primitive in document.entry("meshes", node["mesh"]).get("primitives", []):
-            part = _primitive(document, primitive, matrix, default, losses, textures, compressed)
+            to_scene = matrix if clip is None else np.eye(4)
+            part = _primitive(document, primitive, to_scene, default, losses, textures, compressed)
             if part is None:
                 continue
+            if clip is not None:
+                clip.add(index, primitive, compressed.arrays(primitive), part.surface.vertices)
+                losses.add(lost.BENT_RELIEF, part.surface.relief is not None)
+                part = replace(part, surface=replace(part.surface, relief=None))
+            else:
+                losses.add(lost.MORPHS, len(primitive.get("targets", [])))
             parts.append(part)
             if part.material != default and part.has_one_colour:
                 material = from_gltf(document.entry("materials", part.material))
@@ -168,11 +187,11 @@ def _check_extensions(document: GltfDocument) -> None:
             raise document.error(f"it requires the glTF extension {name}, which is not supported: export it without")
 
 
-def _count_other(document: GltfDocument, losses: Losses) -> None:
+def _count_other(document: GltfDocument, losses: Losses, is_animated: bool) -> None:
     """Count what the file holds beside meshes and materials."""
     json = document.json
-    for key, loss in (("cameras", lost.CAMERAS), ("animations", lost.ANIMATIONS)):
-        losses.add(loss, len(json.get(key, [])))
+    losses.add(lost.CAMERAS, len(json.get("cameras", [])))
+    losses.add(lost.ANIMATIONS, 0 if is_animated else len(json.get("animations", [])))
     extensions = json.get("extensions", {})
     extensions = extensions if isinstance(extensions, Mapping) else {}
     for name, content in extensions.items():
@@ -184,54 +203,6 @@ def _count_other(document: GltfDocument, losses: Losses) -> None:
     for node in json.get("nodes", []):
         names = node.get("extensions", {})
         losses.update((extension_loss(name), 1) for name in names if name != "KHR_lights_punctual")
-
-
-def _nodes(document: GltfDocument, losses: Losses) -> Iterator[tuple[Mapping[str, Any], Floats]]:
-    """The nodes with a mesh of the default scene, and their transforms to the scene, float64 [4, 4]."""
-    json = document.json
-    scenes, nodes = json.get("scenes", []), json.get("nodes", [])
-    if scenes:
-        default = json.get("scene", 0)
-        losses.add(lost.SCENES, len(scenes) - 1)
-        roots = document.entry("scenes", default).get("nodes", [])
-    else:
-        children = {child for node in nodes for child in node.get("children", [])}
-        roots = [index for index in range(len(nodes)) if index not in children]
-    pending = [(root, np.eye(4)) for root in reversed(roots)]
-    while pending:
-        index, parent = pending.pop()
-        node = document.entry("nodes", index)
-        matrix = fixed_order.product(parent, _local(document, index, node))
-        if not (np.abs(matrix) < _MAX_TRANSFORM).all():
-            raise document.error(f"the transform of node {index} is not finite, or too large: export it again")
-        pending += [(child, matrix) for child in reversed(node.get("children", []))]
-        if "mesh" in node:
-            losses.add(lost.SKINS, "skin" in node)
-            yield node, matrix
-
-
-def _local(document: GltfDocument, index: int, node: Mapping[str, Any]) -> Floats:
-    """A node's transform to its parent, float64 [4, 4]."""
-    try:
-        if "matrix" in node:
-            matrix = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-        else:
-            x, y, z, w = np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64)
-            length = math.hypot(x, y, z, w) or 1.0
-            x, y, z, w = x / length, y / length, z / length, w / length
-            rotation = np.array(
-                [
-                    [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-                ]
-            )
-            matrix = np.eye(4)
-            matrix[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64).reshape(3)
-            matrix[:3, 3] = np.array(node.get("translation", (0.0, 0.0, 0.0)), dtype=np.float64).reshape(3)
-    except (ValueError, TypeError):
-        raise document.error(f"the transform of node {index} is not valid: export it again") from None
-    return matrix
 
 
 def _primitive(
@@ -256,7 +227,6 @@ def _primitive(
         losses.add(extension_loss(name), name not in (DRACO, *COMPRESSION))
     if "POSITION" not in attributes:
         raise document.error("a primitive has no positions")
-    losses.add(lost.MORPHS, len(primitive.get("targets", [])))
     arrays = compressed.arrays(primitive)
     positions = arrays.attribute("POSITION").astype(np.float64)
     if positions.shape[1] != 3:
@@ -282,12 +252,10 @@ def _primitive(
         colours, alphas = colours[:, :3], np.clip(colours[:, 3], 0.0, 1.0) if width == 4 else None
     normals = attribute("NORMAL", 3)
     linear = matrix[:3, :3]
-    # The cofactors are the inverse transpose but for a factor, and exist for flat transforms too
-    x, y, z = linear.T
-    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
-    is_mirrored = float(fixed_order.dot(x, cofactors[0])) < 0
+    turning = cofactors(linear)
+    is_mirrored = float(fixed_order.dot(linear[:, 0], turning[:, 0])) < 0
     if normals is not None:
-        normals = unit_vectors(fixed_order.product(unit_vectors(normals), cofactors) * (-1.0 if is_mirrored else 1.0))
+        normals = unit_vectors(fixed_order.product(unit_vectors(normals), turning.T) * (-1.0 if is_mirrored else 1.0))
     if is_mirrored:
         faces = faces[:, ::-1]
     material = primitive.get("material", default)

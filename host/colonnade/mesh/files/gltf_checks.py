@@ -38,14 +38,17 @@ _LISTS = (
     "textures",
     "images",
     "samplers",
+    "animations",
+    "skins",
 )
 #: Keys at any depth whose values are whole numbers from 0 on, texts, objects, and lists of these.
 _WHOLE = {"mesh", "material", "bufferView", "buffer", "source", "sampler", "index", "texCoord", "byteOffset"}
 _WHOLE |= {"byteLength", "byteStride", "componentType", "mode", "skin", "wrapS", "wrapT", "magFilter", "minFilter"}
+_WHOLE |= {"node", "input", "output", "inverseBindMatrices"}
 _TEXT = {"uri", "mimeType", "alphaMode"}
 _OBJECT = {"attributes", "extensions", "pbrMetallicRoughness", "sparse", "values"}
 _OBJECT |= {"baseColorTexture", "metallicRoughnessTexture", "normalTexture", "occlusionTexture", "emissiveTexture"}
-_OBJECTS, _WHOLES = {"primitives", "targets"}, {"nodes", "children"}
+_OBJECTS, _WHOLES = {"primitives", "targets", "channels", "samplers"}, {"nodes", "children", "joints"}
 
 
 def _is_whole(value: Any) -> bool:

@@ -22,7 +22,7 @@ from colonnade.mesh.files.resolver import References
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 #: Extensions that compress the mesh, and are not supported.
 COMPRESSION = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 class GltfDocument:

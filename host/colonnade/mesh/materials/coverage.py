@@ -68,6 +68,9 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
     """
     if all(material.alpha is None for material in surface.materials):
         return surface
+    if surface.clip is not None:
+        losses.add(lost.BENT_ALPHA, sum(material.alpha is not None for material in surface.materials))
+        return replace(surface, materials=tuple(replace(material, alpha=None) for material in surface.materials))
     index = surface.material_index
     whole = [np.flatnonzero(np.array([material.alpha is None for material in surface.materials])[index])]
     textures, materials = list(surface.textures), [replace(material, alpha=None) for material in surface.materials]

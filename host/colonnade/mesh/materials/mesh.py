@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common import fixed_order
-from colonnade.common.types import Floats
+from colonnade.common.types import Floats, Indices
+from colonnade.mesh.clips.clip import Clip
 from colonnade.mesh.geometry import primitives
 from colonnade.mesh.geometry.topology import Faces
 from colonnade.mesh.materials.materials import MeshMaterial
@@ -76,6 +77,8 @@ class Mesh:
         textures: Base-colour textures of the materials.
         corner_uvs: Texture coordinates (u, v) of the corners of the faces, 0 on faces
             without one, float64 [m, 3, 2]; None: no material has a texture.
+        clip: What moves the mesh, which is in its rest pose; None: nothing.
+        clip_corners: The vertex of the clip at each corner of the faces, int64 [m, 3]; None: as the clip.
     """
 
     vertices: Floats
@@ -91,6 +94,8 @@ class Mesh:
     corner_colours: Floats | None = None
     textures: tuple[Texture, ...] = ()
     corner_uvs: Floats | None = None
+    clip: Clip | None = None
+    clip_corners: Indices | None = None
 
     @cached_property
     def extent(self) -> Extent:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
+from colonnade.mesh.clips.clip import Clip
 from colonnade.mesh.geometry.polygons import triangulate
 from colonnade.mesh.losses import CLIPPED_COLOURS, CROSSED, DARK_COLOURS, SHORT_FACES, TEXTURED_COLOURS, Losses
 from colonnade.mesh.materials.materials import PLAIN, MeshMaterial
@@ -36,6 +37,7 @@ class RawSurface:
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
         alphas: Alpha of the corners, which counts for materials with one, 0 to 1, float64 [m, 3]; None: all are opaque.
         relief: Normal maps of the faces; None: none.
+        clip: What moves the vertices, which are in its rest pose; None: nothing.
     """
 
     vertices: Floats
@@ -51,6 +53,18 @@ class RawSurface:
     single_sided: npt.NDArray[np.bool_] | None = None
     alphas: Floats | None = None
     relief: Relief | None = None
+    clip: Clip | None = None
+
+    def reversed(self, faces: npt.NDArray[np.bool_]) -> RawSurface:
+        """The surface with the corners of some faces backwards, bool [m]. It has no relief."""
+        names = ("faces", "normals", "colours", "uvs", "alphas")
+        values = ((name, getattr(self, name)) for name in names)
+        flipped = {
+            name: np.where(faces.reshape(-1, *[1] * (value.ndim - 1)), value[:, ::-1], value)
+            for name, value in values
+            if value is not None
+        }
+        return replace(self, **flipped)
 
     @property
     def material_index(self) -> Indices:

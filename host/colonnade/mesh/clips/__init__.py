@@ -1,0 +1,1 @@
+"""Clips: meshes that bend over time."""

@@ -1,0 +1,102 @@
+"""The nodes of a glTF file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from colonnade.common import fixed_order
+from colonnade.common.types import Floats
+from colonnade.mesh import losses as lost
+from colonnade.mesh.clips.clip import Nodes, rotations
+from colonnade.mesh.files.gltf_document import GltfDocument
+from colonnade.mesh.losses import Losses
+
+#: Largest magnitude of a transform's element, in the scene.
+_MAX_TRANSFORM = 1e100
+
+
+def mesh_nodes(document: GltfDocument, losses: Losses) -> Iterator[tuple[int, Mapping[str, Any], Floats]]:
+    """The nodes with a mesh of the default scene, with their numbers, and transforms to the scene, float64 [4, 4]."""
+    json = document.json
+    scenes, nodes = json.get("scenes", []), json.get("nodes", [])
+    if scenes:
+        default = json.get("scene", 0)
+        losses.add(lost.SCENES, len(scenes) - 1)
+        roots = document.entry("scenes", default).get("nodes", [])
+    else:
+        children = {child for node in nodes for child in node.get("children", [])}
+        roots = [index for index in range(len(nodes)) if index not in children]
+    pending = [(root, np.eye(4)) for root in reversed(roots)]
+    while pending:
+        index, parent = pending.pop()
+        node = document.entry("nodes", index)
+        matrix = fixed_order.product(parent, _local(document, index, node))
+        if not (np.abs(matrix) < _MAX_TRANSFORM).all():
+            raise document.error(f"the transform of node {index} is not finite, or too large: export it again")
+        pending += [(child, matrix) for child in reversed(node.get("children", []))]
+        if "mesh" in node:
+            yield index, node, matrix
+
+
+def all_nodes(document: GltfDocument) -> Nodes:
+    """The nodes of the file, those outside of the default scene, too."""
+    nodes = document.json.get("nodes", [])
+    parents = [-1] * len(nodes)
+    for index, node in enumerate(nodes):
+        for child in node.get("children", []):
+            parents[child] = index
+    order = [index for index, parent in enumerate(parents) if parent < 0]
+    for index in order:  # which grows
+        order += nodes[index].get("children", [])
+    parts = [_Parts.of(document, index, node) for index, node in enumerate(nodes)]
+    return Nodes(
+        tuple(parents),
+        tuple(order),
+        np.array([_local(document, index, node) for index, node in enumerate(nodes)]),
+        np.array([part.translation for part in parts]),
+        np.array([part.rotation for part in parts]),
+        np.array([part.scale for part in parts]),
+    )
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Translation, unit rotation and scale of a node; a matrix replaces them."""
+
+    translation: Floats
+    rotation: Floats
+    scale: Floats
+
+    @classmethod
+    def of(cls, document: GltfDocument, index: int, node: Mapping[str, Any]) -> _Parts:
+        rotation = _numbers(document, index, node, "rotation", (0.0, 0.0, 0.0, 1.0))
+        return cls(
+            _numbers(document, index, node, "translation", (0.0, 0.0, 0.0)),
+            rotation / (math.hypot(*rotation) or 1.0),
+            _numbers(document, index, node, "scale", (1.0, 1.0, 1.0)),
+        )
+
+
+def _numbers(
+    document: GltfDocument, index: int, node: Mapping[str, Any], name: str, default: tuple[float, ...]
+) -> Floats:
+    try:
+        return np.array(node.get(name, default), dtype=np.float64).reshape(len(default))
+    except (ValueError, TypeError):
+        raise document.error(f"the transform of node {index} is not valid: export it again") from None
+
+
+def _local(document: GltfDocument, index: int, node: Mapping[str, Any]) -> Floats:
+    """A node's transform to its parent, float64 [4, 4]."""
+    if "matrix" in node:
+        return _numbers(document, index, node, "matrix", (0.0,) * 16).reshape(4, 4).T
+    parts = _Parts.of(document, index, node)
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotations(parts.rotation[np.newaxis])[0] * parts.scale
+    matrix[:3, 3] = parts.translation
+    return matrix

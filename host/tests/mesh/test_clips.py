@@ -1,0 +1,132 @@
+"""Tests of clips that glTF files hold: skins, morph targets and moving nodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from animated_documents import Document, Evaluator, arm
+
+from colonnade.common.errors import UserError
+from colonnade.mesh.files.gltf_document import GltfDocument
+from colonnade.mesh.files.resolver import References
+from colonnade.mesh.load import load_mesh
+from colonnade.mesh.materials.mesh import Mesh
+
+TIMES = (0.0, 0.1, 0.4, 0.62, 0.99, 1.5)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return arm().write(tmp_path_factory.mktemp("clips") / "arm.gltf")
+
+
+@pytest.fixture(scope="module")
+def mesh(path: Path) -> Mesh:
+    return load_mesh(path, animation="bend")
+
+
+def expected(path: Path, time: float) -> list[list[float]]:
+    """All vertices of the default scene in their order."""
+    document = GltfDocument(path.read_bytes(), path, References(path))
+    evaluator, found = Evaluator(document.json, document.array), []
+    for node in document.json["scenes"][0]["nodes"]:
+        mesh = document.json["nodes"][node].get("mesh")
+        for primitive in [] if mesh is None else document.json["meshes"][mesh]["primitives"]:
+            count = len(document.array(primitive["attributes"]["POSITION"]))
+            found += [evaluator.vertex(node, primitive, vertex, time) for vertex in range(count)]
+    return found
+
+
+@pytest.mark.parametrize("time", TIMES)
+def test_vertices_are_where_gltf_has_them(path: Path, mesh: Mesh, time: float) -> None:
+    assert mesh.clip is not None
+    pose = mesh.clip.pose(time)
+    np.testing.assert_allclose(mesh.clip.vertices(pose.matrices, pose.weights), expected(path, time), atol=2e-6)
+
+
+def test_the_mesh_is_in_the_rest_pose_of_its_clip(mesh: Mesh) -> None:
+    assert mesh.clip is not None and mesh.clip_corners is not None
+    rest = mesh.clip.rest()
+    vertices = mesh.clip.vertices(rest.matrices, rest.weights)
+    np.testing.assert_array_equal(vertices[mesh.clip_corners], mesh.vertices[mesh.faces])
+
+
+def test_rest_of_nodes_that_do_not_bend_is_the_mesh_without_its_clip(tmp_path: Path) -> None:
+    document = arm()
+    document.json["scenes"] = [{"nodes": [5]}]
+    path = document.write(tmp_path / "box.gltf")
+    still, moving = load_mesh(path), load_mesh(path, animation="bend")
+    np.testing.assert_array_equal(still.vertices[still.faces], moving.vertices[moving.faces])
+    np.testing.assert_allclose(still.corner_normals, moving.corner_normals, atol=1e-12)
+
+
+def test_a_value_jumps_at_a_step(mesh: Mesh) -> None:
+    assert mesh.clip is not None
+    before, after = mesh.clip.pose(0.625, before=True), mesh.clip.pose(0.625)
+    assert not before.is_equal(after)
+    assert np.abs(before.matrices - mesh.clip.pose(0.625 - 1e-9).matrices).max() < 1e-6
+    assert np.abs(after.matrices - mesh.clip.pose(0.625 + 1e-9).matrices).max() < 1e-6
+
+
+def test_an_animation_has_a_name_or_a_number(path: Path, mesh: Mesh) -> None:
+    assert mesh.clip is not None
+    other = load_mesh(path, animation="0").clip
+    assert other is not None and other.pose(0.3).is_equal(mesh.clip.pose(0.3))
+    with pytest.raises(UserError, match="it has no animation jump: it has bend"):
+        load_mesh(path, animation="jump")
+
+
+def test_meshes_without_animations_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    for source in ("teapot", tmp_path / "a.obj"):
+        with pytest.raises(UserError, match=r"has no animations: leave out mesh\.animation"):
+            load_mesh(source, animation="bend")
+
+
+def _change(document: Document, *places: Any, to: Any) -> None:
+    value: Any = document.json
+    for place in places[:-1]:
+        value = value[place]
+    value[places[-1]] = to
+
+
+@pytest.mark.parametrize(
+    ("places", "value", "message"),
+    [
+        (("animations", 0, "channels", 0, "sampler"), 9, "uses sampler 9, which does not exist"),
+        (("animations", 0, "channels", 0, "target", "node"), 99, r"nodes\[99\] is used, but does not exist"),
+        (
+            ("animations", 0, "channels", 1),
+            {"sampler": 0, "target": {"node": 2, "path": "rotation"}},
+            "moves the same property of a node twice",
+        ),
+        (("animations", 0, "channels"), [], "moves no node and no morph target"),
+        (("animations", 0, "channels"), 3, r"animations\[0\].channels is not a list of objects"),
+        (("animations", 0, "samplers", 0, "interpolation"), "EASE", "has an unknown interpolation"),
+        (("animations", 0, "samplers", 0, "input"), 0, "ascend|numbers for"),
+        (("animations", 0, "samplers", 0, "output"), 0, "numbers for 3 keys of a rotation"),
+        (
+            ("nodes", 2),
+            {"matrix": [1.0] * 16},
+            "moves node 2, which has a matrix",
+        ),
+        (("nodes", 4, "skin"), 7, r"skins\[7\] is used, but does not exist"),
+        (("skins", 0, "joints"), [1, 2], "a vertex has joint 2, its skin has 2"),
+        (("skins", 0, "joints"), [1, 2, "a"], "joints is not a list of whole numbers"),
+        (("skins", 0, "inverseBindMatrices"), 0, "inverse bind matrices that are not valid"),
+        (("nodes", 6, "weights"), ["a", 0], "a weight of node 6 is not a finite number"),
+        (("nodes", 1, "scale"), [1e300, 1e300, 1e300], "the transform of node 1 is not finite, or too large"),
+        (("meshes", 2, "primitives", 0, "targets", 0, "POSITION"), 0, "a morph target has POSITION that are not valid"),
+        (("meshes", 0, "primitives", 0, "attributes", "JOINTS_0"), 0, "joints or weights that are not valid"),
+    ],
+)
+def test_hostile_animations_are_refused(tmp_path: Path, places: tuple[Any, ...], value: Any, message: str) -> None:
+    document = arm()
+    _change(document, *places, to=value)
+    path = document.write(tmp_path / "hostile.gltf")
+    with pytest.raises(UserError, match=message) as caught:
+        load_mesh(path, animation="0")
+    assert "\n" not in str(caught.value)
