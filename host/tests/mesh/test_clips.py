@@ -10,11 +10,13 @@ import pytest
 from animated_documents import Document, Evaluator, arm
 
 from colonnade.common.errors import UserError
+from colonnade.mesh.clips.keys import Keys, keys_of
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.files.resolver import References
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 
+TOLERANCE = 2.0**-10
 TIMES = (0.0, 0.1, 0.4, 0.62, 0.99, 1.5)
 
 
@@ -130,3 +132,31 @@ def test_hostile_animations_are_refused(tmp_path: Path, places: tuple[Any, ...],
     with pytest.raises(UserError, match=message) as caught:
         load_mesh(path, animation="0")
     assert "\n" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def keys(mesh: Mesh) -> Keys:
+    assert mesh.clip is not None
+    return keys_of(mesh.clip, mesh.extent.edge * TOLERANCE)
+
+
+def test_keys_follow_the_clip_within_their_tolerance(mesh: Mesh, keys: Keys) -> None:
+    assert mesh.clip is not None
+    for time in np.random.default_rng(5).uniform(0.0, mesh.clip.duration, 100):
+        found, exact = (mesh.clip.vertices(*vars(pose).values()) for pose in (keys.at(time), mesh.clip.pose(time)))
+        assert np.abs(found - exact).max() <= mesh.extent.edge * TOLERANCE
+
+
+def test_keys_jump_where_the_clip_jumps(mesh: Mesh, keys: Keys) -> None:
+    assert mesh.clip is not None
+    assert (keys.times == 0.625).sum() == 2
+    assert keys.at(0.625).is_equal(mesh.clip.pose(0.625))
+
+
+def test_the_box_of_keys_holds_all_poses_between_them(mesh: Mesh, keys: Keys) -> None:
+    assert mesh.clip is not None
+    low, high = keys.box(mesh.clip)
+    assert (low <= mesh.vertices.min(axis=0)).all() and (mesh.vertices.max(axis=0) <= high).all()
+    for time in np.linspace(0.0, mesh.clip.duration, 200):
+        vertices = mesh.clip.vertices(*vars(keys.at(time)).values())
+        assert (low - 1e-12 <= vertices).all() and (vertices <= high + 1e-12).all()
