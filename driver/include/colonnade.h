@@ -44,7 +44,11 @@ enum colonnade_error {
     COLONNADE_BAD_LENS,   /* a focal length, a principal point or a size out of bounds */
     COLONNADE_TOO_FAR,    /* camera or light is out of the hardware's range, or the object is too small for the room */
     COLONNADE_NO_LIGHT,   /* the scene has no such light */
-    COLONNADE_NO_SAMPLE   /* no such number of passes, or no such pass */
+    COLONNADE_NO_SAMPLE,  /* no such number of passes, or no such pass */
+    /* Of colonnade_mesh.h */
+    COLONNADE_NOT_A_CLIP,   /* no clip file, or one of another version, or numbers that no design has */
+    COLONNADE_OUTSIDE,      /* a vertex leaves the object's grid */
+    COLONNADE_OTHER_RECORDS /* the records are not those of the clip */
 };
 
 /* Bits of `interrupt.status` and `interrupt.enable`. */

@@ -9,6 +9,7 @@ void bind_driver(nb::module_& module);
 void bind_fixed_order(nb::module_& module);
 void bind_leaf(nb::module_& module);
 void bind_live(nb::module_& module);
+void bind_mesh(nb::module_& module);
 void bind_model(nb::module_& module);
 void bind_packer(nb::module_& module);
 void bind_rays(nb::module_& module);
@@ -16,13 +17,14 @@ void bind_surroundings(nb::module_& module);
 void bind_view(nb::module_& module);
 
 NB_MODULE(_core, module) {
-    module.doc() = "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, rays, registers as a target computes them.";
+    module.doc() = "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, rays, registers and meshes as a target computes them.";
     bind_environment(module);
     bind_bvh(module);
     bind_driver(module);
     bind_fixed_order(module);
     bind_leaf(module);
     bind_live(module);
+    bind_mesh(module);
     bind_model(module);
     bind_packer(module);
     bind_rays(module);

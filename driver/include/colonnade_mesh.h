@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Meshes that bend: docs/driver.md.
+ *
+ * Integers only: no allocation, no floating point, no library. The same clip gives the same records on every processor. */
+#ifndef COLONNADE_MESH_H
+#define COLONNADE_MESH_H
+
+#include "colonnade.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+    COLONNADE_MESH_FIELDS = 85, /* of node and leaf records, whose places a clip file has */
+    COLONNADE_MESH_CHILDREN = 4,
+    COLONNADE_MESH_NO_VERTEX = 0xFFFF /* upper half of a leaf's fourth vertex, if it is a triangle */
+};
+
+/* A clip: vertices, what moves them, and the leaves that have them. Only the functions below read and write it. It points
+ * into the clip file. */
+struct colonnade_mesh {
+    int32_t vertex_bits, delta_bits, box_bits, address_bits;
+    uint32_t leaf_records; /* a leaf's: 2 with corner colours, else 1 */
+    uint32_t records;      /* of the mesh, nodes and leaves */
+    uint32_t depth;        /* nodes on the longest path from the root */
+    uint32_t vertices, leaves, bones, targets, changes, keys;
+    uint32_t duration;    /* 2^-16 s */
+    int32_t linear_shift; /* fraction bits of matrices beyond those of translations */
+    int32_t shift;        /* fraction bits of translations */
+    uint8_t fields[COLONNADE_MESH_FIELDS];
+    const uint8_t *vertex_words, *leaf_words, *change_words, *key_words;
+};
+
+/* A vertex of a pose, on the object's grid. */
+struct colonnade_vertex {
+    int32_t position[3];
+    int16_t normal[2]; /* octahedral code */
+};
+
+/* The caller's memory for a node on the path from the root. */
+struct colonnade_mesh_node {
+    int32_t low[COLONNADE_MESH_CHILDREN][3], high[COLONNADE_MESH_CHILDREN][3];
+    uint32_t address, first;
+    uint32_t nodes, children, next;
+};
+
+/* What a refit has found. */
+struct colonnade_refit {
+    int32_t low[3], high[3]; /* bounds of the mesh, vertex units */
+    uint32_t flat_pairs;     /* pairs that are too stretched for normals at their corners */
+};
+
+/* Reads a clip file, which `colonnade pack --clip-file` writes. */
+enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const struct colonnade_design *design, const void *data,
+                                         size_t bytes);
+
+/* The bones' matrices and the weights of morph targets at a time, 2^-16 s; the clip repeats. `pose` has space for
+ * colonnade_mesh_pose_words. */
+void colonnade_mesh_pose(const struct colonnade_mesh *mesh, uint32_t time, int32_t *pose);
+uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh);
+
+/* The mesh's vertices in a pose. Refused is a pose in which one leaves the object's grid. */
+enum colonnade_error colonnade_mesh_skin(const struct colonnade_mesh *mesh, const int32_t *pose,
+                                         struct colonnade_vertex *vertices);
+
+/* Writes vertices into a copy of the mesh's records, whose root has the address `root`. Each record is written once; of the
+ * tree none changes its place or its kind. `copy` points at the root; `path` has space for mesh->depth nodes. No frame may
+ * read the copy meanwhile, and the next one that does needs `control.invalidate`. A copy that is refused as
+ * COLONNADE_OTHER_RECORDS may be written in part. */
+enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
+                                          uint8_t *copy, uint32_t root, struct colonnade_mesh_node *path,
+                                          struct colonnade_refit *result);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

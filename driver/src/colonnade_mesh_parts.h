@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Parts of colonnade_mesh: fields of records, and words of a clip file. */
+#ifndef COLONNADE_MESH_PARTS_H
+#define COLONNADE_MESH_PARTS_H
+
+#include "colonnade_mesh.h"
+#include "colonnade_words.h"
+
+enum {
+    RECORD_WORDS = 8,
+    RECORD_BITS = 32 * RECORD_WORDS,
+    OCTAHEDRAL_BITS = 11,
+    COUNT_BITS = 3,
+    VERTEX_WORDS = 8,
+    LEAF_WORDS = 4,
+    CHANGE_WORDS = 6,
+    MATRIX_WORDS = 12,
+    WEIGHT_BITS = 15,        /* of bones; the weights of a vertex have the sum 2^15 */
+    TARGET_WEIGHT_BITS = 16, /* fraction of the weights of morph targets */
+    BOUND_BITS = 25,         /* of a bound position and of what a morph target adds, without the sign */
+    TARGET_BITS = 24,        /* of the weight of a morph target, without the sign */
+    MATRIX_BITS = 30         /* of an element of a bone's matrix, without the sign */
+};
+
+/* The order of fields in a clip file. */
+enum field {
+    FIELD_PLANES = 0, /* by child: low x, y, z, high x, y, z */
+    FIELD_CORNER = FIELD_PLANES + 6 * COLONNADE_MESH_CHILDREN,
+    FIELD_FIRST = FIELD_CORNER + 3,
+    FIELD_LEAVES,
+    FIELD_NODES,
+    FIELD_VERTICES,                         /* absolute ones, by vertex */
+    FIELD_DELTAS = FIELD_VERTICES + 12,     /* of vertices 1 to 3 from vertex 0 */
+    FIELD_SIGNS = FIELD_DELTAS + 9,         /* of the deltas of a far pair */
+    FIELD_NORMALS = FIELD_SIGNS + 9,        /* of a triangle: u, v by corner */
+    FIELD_HIGH_NORMALS = FIELD_NORMALS + 6, /* of a pair: all bits but the lowest */
+    FIELD_LOW_NORMALS = FIELD_HIGH_NORMALS + 8,
+    FIELD_FORMAT = FIELD_LOW_NORMALS + 8,
+    FIELD_MATERIAL,
+    FIELD_IS_CLEAR
+};
+
+_Static_assert(FIELD_IS_CLEAR + 1 == COLONNADE_MESH_FIELDS, "each field has its place");
+
+static inline int32_t colonnade_signed_word(const uint8_t *bytes, size_t index) {
+    return (int32_t)colonnade_word(bytes, index);
+}
+
+/* Half `index` of a word: 0 the lower one. */
+static inline uint32_t colonnade_half(const uint8_t *bytes, size_t index) {
+    return (uint32_t)bytes[2 * index] | (uint32_t)bytes[2 * index + 1] << 8;
+}
+
+static inline int32_t colonnade_signed_half(const uint8_t *bytes, size_t index) {
+    return (int16_t)colonnade_half(bytes, index);
+}
+
+#endif
