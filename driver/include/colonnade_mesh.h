@@ -65,11 +65,12 @@ enum colonnade_error colonnade_mesh_skin(const struct colonnade_mesh *mesh, cons
                                          struct colonnade_vertex *vertices);
 
 /* Writes vertices into a copy of the mesh's records, whose root has the address `root`. Each record is written once; of the
- * tree none changes its place or its kind. `copy` points at the root; `path` has space for mesh->depth nodes. No frame may
+ * tree none changes its place or its kind. `copy` points at the root, in the device's order of bytes, low byte first; `path`
+ * has space for mesh->depth nodes. No frame may
  * read the copy meanwhile, and the next one that does needs `control.invalidate`. A copy that is refused as
  * COLONNADE_OTHER_RECORDS may be written in part. */
 enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
-                                          uint8_t *copy, uint32_t root, struct colonnade_mesh_node *path,
+                                          uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path,
                                           struct colonnade_refit *result);
 
 #ifdef __cplusplus

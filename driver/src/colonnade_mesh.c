@@ -19,16 +19,18 @@ static void put(struct record *record, uint32_t low, int32_t width, uint32_t val
     if (at + (uint32_t)width > 32) word[1] |= bits >> (32 - at);
 }
 
-static uint32_t get(uint32_t last, uint32_t low, int32_t width) { return last >> (low % 32) & (((uint32_t)1 << width) - 1); }
-
-static uint8_t *record_at(uint8_t *copy, uint32_t root, uint32_t address) {
-    return copy + 4 * (size_t)RECORD_WORDS * (address - root);
+static uint32_t get(const uint32_t *record, uint32_t low, int32_t width) {
+    const uint32_t *word = &record[low / 32], at = low % 32;
+    const uint32_t more = at + (uint32_t)width > 32 ? word[1] << (32 - at) : 0;
+    return (word[0] >> at | more) & (((uint32_t)1 << width) - 1);
 }
 
-static uint32_t last_word(const uint8_t *record) { return colonnade_word(record, RECORD_WORDS - 1); }
+static uint32_t *record_at(uint32_t *copy, uint32_t root, uint32_t address) {
+    return copy + (size_t)RECORD_WORDS * (address - root);
+}
 
-static void store(uint8_t *to, const struct record *record) {
-    for (size_t i = 0; i < 4 * RECORD_WORDS; ++i) to[i] = (uint8_t)(record->words[i / 4] >> 8 * (i % 4));
+static void store(uint32_t *to, const struct record *record) {
+    for (int i = 0; i < RECORD_WORDS; ++i) to[i] = record->words[i];
 }
 
 /* The format of a pair: near or far, by its largest delta, else flat. */
@@ -63,7 +65,7 @@ static void widen(int32_t low[3], int32_t high[3], const int32_t other_low[3], c
 
 /* Writes a leaf; its material and whether it is clear stay. Answers whether it has become a flat pair. */
 static bool write_leaf(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices, const uint8_t *words,
-                       uint8_t *to, int32_t low[3], int32_t high[3]) {
+                       uint32_t *to, int32_t low[3], int32_t high[3]) {
     const struct colonnade_vertex *corners[4];
     const bool is_pair = colonnade_word(words, 3) >> 16 != COLONNADE_MESH_NO_VERTEX;
     const int count = is_pair ? 4 : 3;
@@ -71,10 +73,9 @@ static bool write_leaf(const struct colonnade_mesh *mesh, const struct colonnade
     const uint8_t *fields = mesh->fields;
     for (int i = 0; i < count; ++i) corners[i] = &vertices[colonnade_word(words, (size_t)i)];
     const enum format format = is_pair ? format_of(mesh, corners) : TRIANGLE;
-    const uint32_t last = last_word(to);
     put(&record, fields[FIELD_FORMAT], 2, format);
-    put(&record, fields[FIELD_MATERIAL], 8, get(last, fields[FIELD_MATERIAL], 8));
-    put(&record, fields[FIELD_IS_CLEAR], 1, get(last, fields[FIELD_IS_CLEAR], 1));
+    put(&record, fields[FIELD_MATERIAL], 8, get(to, fields[FIELD_MATERIAL], 8));
+    put(&record, fields[FIELD_IS_CLEAR], 1, get(to, fields[FIELD_IS_CLEAR], 1));
     for (int axis = 0; axis < 3; ++axis) low[axis] = high[axis] = corners[0]->position[axis];
     for (int i = 0; i < count; ++i) {
         const int32_t *at = corners[i]->position, *from = corners[0]->position;
@@ -94,12 +95,11 @@ static bool write_leaf(const struct colonnade_mesh *mesh, const struct colonnade
 }
 
 /* Writes a node from its children's boxes; where they lie stays. Answers its own box. */
-static void write_node(const struct colonnade_mesh *mesh, const struct colonnade_mesh_node *node, uint8_t *to, int32_t low[3],
+static void write_node(const struct colonnade_mesh *mesh, const struct colonnade_mesh_node *node, uint32_t *to, int32_t low[3],
                        int32_t high[3]) {
     struct record record = {{0}};
     const uint8_t *fields = mesh->fields;
     const int32_t most = ((int32_t)1 << mesh->box_bits) - 1;
-    const uint32_t last = last_word(to);
     for (int axis = 0; axis < 3; ++axis) low[axis] = node->low[0][axis], high[axis] = node->high[0][axis];
     for (uint32_t child = 1; child < node->children; ++child) widen(low, high, node->low[child], node->high[child]);
     for (int axis = 0; axis < 3; ++axis) {
@@ -115,9 +115,9 @@ static void write_node(const struct colonnade_mesh *mesh, const struct colonnade
             put(&record, planes[3], mesh->box_bits, (uint32_t)(raised - origin));
         }
     }
-    put(&record, fields[FIELD_FIRST], mesh->address_bits, get(last, fields[FIELD_FIRST], mesh->address_bits));
-    put(&record, fields[FIELD_LEAVES], COUNT_BITS, get(last, fields[FIELD_LEAVES], COUNT_BITS));
-    put(&record, fields[FIELD_NODES], COUNT_BITS, get(last, fields[FIELD_NODES], COUNT_BITS));
+    put(&record, fields[FIELD_FIRST], mesh->address_bits, get(to, fields[FIELD_FIRST], mesh->address_bits));
+    put(&record, fields[FIELD_LEAVES], COUNT_BITS, get(to, fields[FIELD_LEAVES], COUNT_BITS));
+    put(&record, fields[FIELD_NODES], COUNT_BITS, get(to, fields[FIELD_NODES], COUNT_BITS));
     store(to, &record);
 }
 
@@ -126,7 +126,7 @@ static void write_node(const struct colonnade_mesh *mesh, const struct colonnade
 struct walk {
     const struct colonnade_mesh *mesh;
     const struct colonnade_vertex *vertices;
-    uint8_t *copy;
+    uint32_t *copy;
     uint32_t root, next, leaf; /* the next record and the next leaf */
     uint32_t flat_pairs;
 };
@@ -134,11 +134,11 @@ struct walk {
 /* Enters a node and writes its leaves; answers whether it is one of the clip's tree. */
 static bool enter(struct walk *walk, struct colonnade_mesh_node *node, uint32_t address) {
     const struct colonnade_mesh *mesh = walk->mesh;
-    const uint32_t last = last_word(record_at(walk->copy, walk->root, address)), step = mesh->leaf_records;
-    const uint32_t nodes = get(last, mesh->fields[FIELD_NODES], COUNT_BITS);
-    const uint32_t leaves = get(last, mesh->fields[FIELD_LEAVES], COUNT_BITS);
+    const uint32_t *record = record_at(walk->copy, walk->root, address);
+    const uint32_t nodes = get(record, mesh->fields[FIELD_NODES], COUNT_BITS), step = mesh->leaf_records;
+    const uint32_t leaves = get(record, mesh->fields[FIELD_LEAVES], COUNT_BITS);
     node->address = address;
-    node->first = get(last, mesh->fields[FIELD_FIRST], mesh->address_bits);
+    node->first = get(record, mesh->fields[FIELD_FIRST], mesh->address_bits);
     node->nodes = nodes;
     node->children = nodes + leaves;
     node->next = 0;
@@ -147,7 +147,7 @@ static bool enter(struct walk *walk, struct colonnade_mesh_node *node, uint32_t 
         return false;
     walk->next += nodes + leaves * step;
     for (uint32_t i = 0; i < leaves; ++i) {
-        uint8_t *to = record_at(walk->copy, walk->root, node->first + nodes + i * step);
+        uint32_t *to = record_at(walk->copy, walk->root, node->first + nodes + i * step);
         const uint8_t *words = mesh->leaf_words + 4 * (size_t)LEAF_WORDS * walk->leaf++;
         walk->flat_pairs += write_leaf(mesh, walk->vertices, words, to, node->low[nodes + i], node->high[nodes + i]);
     }
@@ -155,7 +155,7 @@ static bool enter(struct walk *walk, struct colonnade_mesh_node *node, uint32_t 
 }
 
 enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
-                                          uint8_t *copy, uint32_t root, struct colonnade_mesh_node *path,
+                                          uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path,
                                           struct colonnade_refit *result) {
     struct walk walk = {mesh, vertices, copy, root, root + 1, 0, 0};
     struct colonnade_refit found;

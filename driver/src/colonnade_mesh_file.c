@@ -21,13 +21,12 @@ static uint32_t width_of(const struct colonnade_mesh *mesh, int field) {
     return field == FIELD_FORMAT ? 2 : field == FIELD_MATERIAL ? 8 : 1;
 }
 
-/* Fields lie in a record; those that stay when a mesh bends, in its last word. */
+/* Fields lie in a record. */
 static bool read_fields(struct colonnade_mesh *mesh, const uint8_t *bytes) {
     bool is_good = true;
     for (int field = 0; field < COLONNADE_MESH_FIELDS; ++field) {
         const uint32_t low = mesh->fields[field] = bytes[4 * FIELD_WORD + field];
-        const bool stays = (field >= FIELD_FIRST && field <= FIELD_NODES) || field >= FIELD_MATERIAL;
-        is_good &= low + width_of(mesh, field) <= RECORD_BITS && (!stays || low >= RECORD_BITS - 32);
+        is_good &= low + width_of(mesh, field) <= RECORD_BITS;
     }
     return is_good;
 }
@@ -59,8 +58,8 @@ static bool read_numbers(struct colonnade_mesh *mesh, const uint8_t *bytes) {
            colonnade_is_within(numbers[6], 1, 257) && colonnade_is_within(numbers[7], 1, MOST) &&
            colonnade_is_within(numbers[8], 1, MOST) && colonnade_is_within(numbers[9], 1, 1 << 16) &&
            colonnade_is_within(numbers[10], 0, 1 << 16) && colonnade_is_within(numbers[11], 0, MOST) &&
-           colonnade_is_within(numbers[12], 1, MOST) && colonnade_is_within(mesh->linear_shift, 0, 60) &&
-           colonnade_is_within(mesh->shift, 1, 20);
+           colonnade_is_within(numbers[12], 1, MOST) && colonnade_is_within(mesh->linear_shift, 0, 32) &&
+           colonnade_is_within(mesh->shift, 2, 20);
 }
 
 static bool are_vertices(const struct colonnade_mesh *mesh) {

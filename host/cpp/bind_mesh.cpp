@@ -19,7 +19,7 @@ namespace {
 template <class T, class Shape> using Given = nb::ndarray<const T, Shape, nb::c_contig, nb::device::cpu>;
 using Corner = std::array<std::int32_t, 3>;
 
-constexpr std::size_t recordBytes = 32;
+constexpr std::size_t recordWords = 8;
 
 void check(colonnade_error error) {
     if (error != COLONNADE_OK) throw std::invalid_argument(colonnade_error_name(error));
@@ -63,7 +63,7 @@ public:
     }
 
     auto refit(const Given<std::int32_t, nb::shape<-1, 3>>& positions, const Given<std::int16_t, nb::shape<-1, 2>>& normals,
-               const nb::ndarray<std::uint8_t, nb::shape<-1, recordBytes>, nb::c_contig, nb::device::cpu>& copy, std::uint32_t root) const {
+               const nb::ndarray<std::uint32_t, nb::shape<-1, recordWords>, nb::c_contig, nb::device::cpu>& copy, std::uint32_t root) const {
         if (positions.shape(0) != mesh_.vertices || normals.shape(0) != mesh_.vertices || copy.shape(0) < mesh_.records)
             throw std::invalid_argument("vertices or records of another clip");
         std::vector<colonnade_vertex> vertices(mesh_.vertices);

@@ -26,7 +26,8 @@ TOLERANCE = 2.0**-10
 TIME_FRACTION, WEIGHT_FRACTION, TARGET_FRACTION, NORMAL_FRACTION = 16, 15, 16, 14
 #: Bits of bound positions, of elements of matrices, of weights of morph targets, without the sign.
 _BOUND_BITS, _MATRIX_BITS, _TARGET_BITS = 25, 30, 24
-_MOST_SHIFT = 20
+#: Of `GridClip.shift` and `GridClip.linear_shift`.
+_LEAST_SHIFT, _MOST_SHIFT, _MOST_LINEAR_SHIFT = 2, 20, 32
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,8 @@ class _Numbers:
         linear, offset = self._parts(matrices)
         self.linear_bits, self.bits = (_fraction(part) for part in (linear, offset))
         self.bits = min(self.bits, self.linear_bits, _MOST_SHIFT)
-        if self.bits < 1 or self.linear_bits - self.bits > 60:
+        self.linear_bits = min(self.linear_bits, self.bits + _MOST_LINEAR_SHIFT)
+        if self.bits < _LEAST_SHIFT:
             raise UserError(f"mesh {mesh.name}: its animation {clip.name} moves a bone too far: export it again")
 
     def _parts(self, matrices: Floats) -> tuple[Floats, Floats]:

@@ -42,7 +42,7 @@ class Bent:
     def refit(self, positions: Any, normals: Any) -> tuple[Any, Any]:
         """The records, and what the refit has found."""
         records = self.tree.records.copy()
-        return records, self.target.refit(positions, normals, records, ROOT)
+        return records, self.target.refit(positions, normals, records.view(np.uint32), ROOT)
 
     def at(self, time: float) -> tuple[Any, Any]:
         """Positions and normals at a time, seconds."""
@@ -139,7 +139,7 @@ def test_a_refit_writes_all_vertices_and_boxes(clip: GridClip, leaf_records: int
             _check(bent, positions, normals, records, found)
             np.testing.assert_array_equal(records, swept(records, ROOT, bent.tree, bent.vertex_bits))
             again = records.copy()
-            bent.target.refit(positions, normals, again, ROOT)
+            bent.target.refit(positions, normals, again.view(np.uint32), ROOT)
             np.testing.assert_array_equal(records, again)
 
 
@@ -194,7 +194,7 @@ def test_other_records_are_refused(bent: Bent) -> None:
             records[change] = 0xFF
         if change is None or change == 0:
             with pytest.raises(ValueError, match="otherRecords"):
-                bent.target.refit(positions, normals, records, root)
+                bent.target.refit(positions, normals, records.view(np.uint32), root)
 
 
 def test_a_clip_repeats(clip: GridClip, bent: Bent) -> None:

@@ -1,0 +1,183 @@
+/* Fuzzer of meshes that bend (tools/driver-fuzz): an input chooses the numbers of a clip file, each legal, from usual ones to
+ * all of them extreme at once, and a tree over its leaves; in some files it then changes words or the length, and in some
+ * trees records. File and records end where their memory ends. A legal file opens; a vertex is on the grid; a refit of the
+ * tree succeeds, twice with the same records, and changes nothing behind them. */
+#include "colonnade_mesh.h"
+#include "fuzz.h"
+
+enum { MOST_WORDS = 8000, MOST_VERTICES = 24, MOST_LEAVES = 40, MOST_RECORDS = 4 * MOST_LEAVES, POSE_WORDS = 12 * 4 + 4 };
+enum { FIELDS = COLONNADE_MESH_FIELDS, RECORD_WORDS = 8, SPARE = 0x5A5A5A5A };
+
+static const struct colonnade_design design = {.format_hash = {1, 2, 3, 4, 5, 6, 7, 0xFFFFFFFF}};
+
+static uint32_t extremes; /* of 256 numbers */
+
+static uint32_t below(uint32_t count) { return take32() % count; }
+
+/* Up to 2^bits in magnitude; an extreme one reaches it. */
+static int32_t number(int usual, int most) {
+    const bool is_extreme = take() < extremes;
+    const int64_t limit = (int64_t)1 << (is_extreme ? most : usual);
+    const int64_t value = is_extreme && take() < 128 ? limit - 1 : (int64_t)(take32() % (uint32_t)limit);
+    return (int32_t)(take() % 2 != 0 ? value : -value);
+}
+
+static struct file {
+    uint32_t words[MOST_WORDS];
+    size_t count;
+} file;
+
+static uint32_t records[MOST_RECORDS][RECORD_WORDS];
+static uint32_t record_count, leaf_count, depth, root, step;
+
+static void add(int64_t word) { file.words[file.count++] = (uint32_t)word; }
+
+static void put(uint32_t *record, uint32_t low, uint32_t width, uint32_t value) {
+    for (uint32_t i = 0; i < width; ++i) record[(low + i) / 32] |= (value >> i & 1) << ((low + i) % 32);
+}
+
+/* A node with one to four children, at random nodes or leaves, and all that are below it. */
+static void build(uint32_t address, uint32_t level) {
+    const uint32_t count = 1 + below(4), room = MOST_RECORDS / 2 > record_count ? 1 : 0;
+    uint32_t nodes = room != 0 && level < 12 ? below(count + 1) : 0;
+    if (leaf_count + 8 > MOST_LEAVES) nodes = 0;
+    const uint32_t leaves = nodes == 0 && leaf_count + count > MOST_LEAVES ? 0 : count - nodes, first = record_count;
+    if (level > depth) depth = level;
+    put(records[address], 228, 22, root + first);
+    put(records[address], 250, 3, leaves);
+    put(records[address], 253, 3, nodes);
+    record_count += nodes + leaves * step;
+    leaf_count += leaves;
+    for (uint32_t i = 0; i < nodes; ++i) build(first + i, level + 1);
+}
+
+/* The layout of records of vertices of 16 bits. */
+static void add_fields(void) {
+    uint8_t lows[FIELDS + 3] = {0};
+    size_t count = 0;
+    for (int child = 0; child < 4; ++child)
+        for (int i = 0; i < 6; ++i) lows[count++] = (uint8_t)(42 * child + 7 * i);
+    for (int i = 0; i < 3; ++i) lows[count++] = (uint8_t)(168 + 17 * i);
+    lows[count++] = 228, lows[count++] = 250, lows[count++] = 253;
+    for (int i = 0; i < 12; ++i) lows[count++] = (uint8_t)(16 * i);
+    for (int i = 0; i < 9; ++i) lows[count++] = (uint8_t)(48 + 12 * i);
+    for (int i = 0; i < 9; ++i) lows[count++] = (uint8_t)(236 + i);
+    for (int i = 0; i < 6; ++i) lows[count++] = (uint8_t)(144 + 11 * i);
+    for (int i = 0; i < 8; ++i) lows[count++] = (uint8_t)(156 + 10 * i);
+    for (int i = 0; i < 8; ++i) lows[count++] = (uint8_t)(236 + i);
+    lows[count++] = 254, lows[count++] = 245, lows[count++] = 253;
+    CHECK(count == FIELDS);
+    for (size_t i = 0; i < sizeof lows; i += 4)
+        add(lows[i] | lows[i + 1] << 8 | lows[i + 2] << 16 | (int64_t)lows[i + 3] << 24);
+}
+
+static void add_clip(void) {
+    const uint32_t head[] = {0x444E4C43, 0x50494C43, 1, 0, 1, 2, 3, 4, 5, 6, 7, 0xFFFFFFFF};
+    const uint32_t vertices = 1 + below(MOST_VERTICES), bones = 1 + below(4), targets = below(5), keys = 1 + below(4);
+    const uint32_t changes = targets == 0 ? 0 : below(3 * vertices);
+    uint32_t time = 0, last = 0;
+    file.count = 0;
+    for (int i = 0; i < 12; ++i) add(head[i]);
+    const uint32_t numbers[] = {16,    12,      7,       22,   step, record_count, depth, vertices, leaf_count,
+                                bones, targets, changes, keys, 0,    15,           10};
+    for (int i = 0; i < 16; ++i) add(numbers[i]);
+    const size_t duration = file.count - 3;
+    add_fields();
+    for (uint32_t i = 0; i < vertices; ++i) {
+        uint32_t weights[3], sum = 0;
+        for (int axis = 0; axis < 3; ++axis) add(number(20, 25));
+        for (int k = 0; k < 3; ++k) weights[k] = take() < 128 ? 0 : below(0x8001 - sum), sum += weights[k];
+        add((number(14, 15) & 0xFFFF) | (int64_t)(number(14, 15) & 0xFFFF) << 16);
+        add((number(14, 15) & 0xFFFF) | (int64_t)below(bones) << 16);
+        add(below(bones) | (int64_t)below(bones) << 16);
+        add(below(bones) | (int64_t)weights[0] << 16);
+        add(weights[1] | (int64_t)weights[2] << 16);
+    }
+    for (uint32_t i = 0; i < leaf_count; ++i) {
+        for (int k = 0; k < 3; ++k) add(below(vertices));
+        add(take() % 4 == 0 ? 0xFFFFFFFF : below(vertices));
+    }
+    for (uint32_t i = 0; i < changes; ++i) {
+        last += take() < 128 && last + 1 < vertices;
+        add(last);
+        for (int axis = 0; axis < 3; ++axis) add(number(18, 25));
+        add((number(14, 15) & 0xFFFF) | (int64_t)(number(14, 15) & 0xFFFF) << 16);
+        add((number(14, 15) & 0xFFFF) | (int64_t)below(targets) << 16);
+    }
+    for (uint32_t key = 0; key < keys; ++key) {
+        add(time);
+        file.words[duration] = time;
+        time += take() < 64 ? 0 : take() < extremes ? take32() >> 2 : take32() % 100000;
+        for (uint32_t i = 0; i < 12 * bones; ++i) /* about a middle of 2^15 */
+            add(number(i % 4 == 3 ? 18 : 19, 30) + (i % 4 == 3 && take() >= extremes ? 1 << 25 : 0));
+        for (uint32_t i = 0; i < targets; ++i) add(number(16, 24));
+    }
+    file.words[3] = 4 * (uint32_t)file.count;
+}
+
+static bool damage(void) {
+    if (take() >= 96) return false;
+    for (uint32_t i = 1 + take() % 3; i > 0; --i) file.words[below((uint32_t)file.count)] = take() < 128 ? take32() : take();
+    return true;
+}
+
+static void check_refit(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices, bool is_known) {
+    const size_t words = (size_t)RECORD_WORDS * record_count;
+    uint32_t *copy = malloc(4 * words), *again = malloc(4 * words);
+    struct colonnade_mesh_node *path = malloc(sizeof *path * mesh->depth);
+    struct colonnade_refit refit, same;
+    CHECK(copy != NULL && again != NULL && path != NULL);
+    memcpy(copy, records, 4 * words);
+    if (take() < 32) copy[below((uint32_t)words)] ^= 1u << take() % 32, is_known = false;
+    const enum colonnade_error error = colonnade_mesh_refit(mesh, vertices, copy, root, path, &refit);
+    CHECK(error == COLONNADE_OK || (error == COLONNADE_OTHER_RECORDS && !is_known));
+    memcpy(again, copy, 4 * words);
+    if (error == COLONNADE_OK) {
+        CHECK(colonnade_mesh_refit(mesh, vertices, again, root, path, &same) == COLONNADE_OK);
+        CHECK(memcmp(copy, again, 4 * words) == 0 && memcmp(&refit, &same, sizeof refit) == 0);
+    }
+    free(path);
+    free(again);
+    free(copy);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    static const uint32_t shares[] = {0, 2, 16, 256};
+    open_input(data, size);
+    extremes = shares[take() % 4];
+    step = 1 + take() % 2;
+    root = take() < 128 ? 0 : below(1 << 21);
+    memset(records, 0, sizeof records);
+    record_count = 1, leaf_count = 0, depth = 0;
+    build(0, 1);
+    if (leaf_count == 0) return 0;
+    add_clip();
+    const bool is_damaged = damage();
+    const size_t bytes = take() < 240 ? 4 * file.count : below(4 * (uint32_t)file.count + 1);
+    uint8_t *exact = malloc(bytes == 0 ? 1 : bytes);
+    CHECK(exact != NULL);
+    for (size_t i = 0; i < bytes; ++i) exact[i] = (uint8_t)(file.words[i / 4] >> (8 * (i % 4)));
+    struct colonnade_mesh mesh, before;
+    memset(&mesh, 0x5A, sizeof mesh);
+    memcpy(&before, &mesh, sizeof mesh);
+    const enum colonnade_error opened = colonnade_mesh_open(&mesh, &design, exact, bytes);
+    CHECK(opened == COLONNADE_OK || is_damaged || bytes != 4 * file.count);
+    if (opened != COLONNADE_OK) CHECK(memcmp(&mesh, &before, sizeof mesh) == 0);
+    for (int call = 0; call < 4 && opened == COLONNADE_OK; ++call) {
+        int32_t *pose = malloc(4 * (size_t)colonnade_mesh_pose_words(&mesh));
+        struct colonnade_vertex *vertices = malloc(sizeof *vertices * mesh.vertices);
+        CHECK(pose != NULL && vertices != NULL);
+        colonnade_mesh_pose(&mesh, take() < 16 ? take32() : below(200000), pose);
+        const enum colonnade_error error = colonnade_mesh_skin(&mesh, pose, vertices);
+        CHECK(error == COLONNADE_OK || error == COLONNADE_OUTSIDE);
+        for (uint32_t i = 0; error == COLONNADE_OK && i < mesh.vertices; ++i)
+            for (int axis = 0; axis < 3; ++axis)
+                CHECK(vertices[i].position[axis] >= 0 && vertices[i].position[axis] >> mesh.vertex_bits == 0);
+        if (error == COLONNADE_OK && mesh.records == record_count && mesh.leaf_records == step)
+            check_refit(&mesh, vertices, !is_damaged);
+        free(vertices);
+        free(pose);
+    }
+    free(exact);
+    return 0;
+}
