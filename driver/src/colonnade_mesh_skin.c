@@ -62,7 +62,7 @@ static bool morph(const struct colonnade_mesh *mesh, const int32_t *weights, uin
 }
 
 /* a * b / 2^32, towards minus infinity. */
-static int32_t high(int32_t a, int32_t b) { return (int32_t)((int64_t)a * b >> 32); }
+static int32_t high(uint32_t a, int32_t b) { return (int32_t)((int64_t)a * b >> 32); }
 
 /* Half the matrix of a vertex, from those of its bones. */
 static void blend(const int32_t *pose, const uint8_t *halves, int32_t matrix[MATRIX_WORDS]) {
@@ -78,7 +78,7 @@ static void blend(const int32_t *pose, const uint8_t *halves, int32_t matrix[MAT
     }
     for (int i = 0; i < MATRIX_WORDS; ++i) matrix[i] = 0;
     for (size_t k = 0; k < 4; ++k) {
-        const int32_t weight = weights[k] * (1 << (31 - WEIGHT_BITS));
+        const uint32_t weight = (uint32_t)weights[k] << (32 - 1 - WEIGHT_BITS);
         if (weight == 0) continue;
         bone = pose + MATRIX_WORDS * colonnade_half(halves, 3 + k);
         for (int i = 0; i < MATRIX_WORDS; ++i) matrix[i] += high(weight, bone[i]);

@@ -93,7 +93,11 @@ def test_a_wait_by_interrupts_enables_its_events_and_leaves_the_others_as_they_w
     run_silently(compile_test("waits", "shell"))
 
 
-@pytest.mark.parametrize("names", [("fuzz", "shell"), ("fuzz_view",)], ids=["driver", "registers from poses"])
+@pytest.mark.parametrize(
+    "names",
+    [("fuzz", "shell"), ("fuzz_view",), ("fuzz_mesh",)],
+    ids=["driver", "registers from poses", "meshes that bend"],
+)
 def test_random_inputs_of_the_fuzzers_break_nothing(names: tuple[str, ...]) -> None:
     """Also without libFuzzer: calls in any order, view files of legal and extreme numbers, tiles of any size."""
     run_silently(compile_test(*names, options=("-DRUNS=5000", "-lm")))
