@@ -83,7 +83,7 @@ def clip_file(clip: GridClip, tree: ClipTree, places: Places, format_words: Sequ
     body = [
         lows + b"\0" * (-len(lows) % 4),
         np.column_stack([clip.vertices[:, :3].astype("<u4"), halves.view("<u4")]).astype("<u4").tobytes(),
-        (tree.leaves & NO_VERTEX).astype("<u4").tobytes(),
+        (tree.leaves.astype(np.int64) & NO_VERTEX).astype("<u4").tobytes(),
         np.column_stack([clip.changes[:, :4].astype("<u4"), changed.view("<u4")]).astype("<u4").tobytes(),
         np.column_stack([clip.times, clip.poses & 0xFFFFFFFF]).astype("<u4").tobytes(),
     ]

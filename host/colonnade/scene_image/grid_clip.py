@@ -14,14 +14,12 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh.clips.clip import Clip, Pose, cofactors
-from colonnade.mesh.clips.keys import Keys, keys_of
+from colonnade.mesh.clips.keys import Keys, baked
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene_image.header import ObjectFrame
 
 Integers = npt.NDArray[np.int64]
 
-#: Share of the longest edge of the object's box by which interpolated keys may miss the clip.
-TOLERANCE = 2.0**-10
 #: Fraction bits of times, of weights of bones and of morph targets, of normals.
 TIME_FRACTION, WEIGHT_FRACTION, TARGET_FRACTION, NORMAL_FRACTION = 16, 15, 16, 14
 #: Bits of bound positions, of elements of matrices, of weights of morph targets, without the sign.
@@ -70,8 +68,8 @@ def grid_clip(mesh: Mesh, vertex_bits: int) -> GridClip:
     """
     clip = mesh.clip
     assert clip is not None
-    keys = keys_of(clip, mesh.extent.edge * TOLERANCE)
-    low, high = keys.box(clip)
+    clip_keys = baked(clip)
+    keys, low, high = clip_keys.keys, clip_keys.low, clip_keys.high
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         raise UserError(f"mesh {mesh.name}: its animation {clip.name} has a pose that is not finite: export it again")
     # Vertices are within this of where floats have them, in vertex units, by the rounding of positions and weights

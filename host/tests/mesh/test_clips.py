@@ -10,13 +10,12 @@ import pytest
 from animated_documents import Document, Evaluator, arm
 
 from colonnade.common.errors import UserError
-from colonnade.mesh.clips.keys import Keys, keys_of
+from colonnade.mesh.clips.keys import TOLERANCE, Keys, keys_of
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.files.resolver import References
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 
-TOLERANCE = 2.0**-10
 TIMES = (0.0, 0.1, 0.4, 0.62, 0.99, 1.5)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,11 @@ from animated_documents import arm
 from bent_trees import delta_bits, get, pairs, random_tree, read_leaf, swept, walk
 
 from colonnade import _core
+from colonnade.mesh.clips.keys import TOLERANCE
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene_image.clip_file import clip_file
-from colonnade.scene_image.grid_clip import TIME_FRACTION, TOLERANCE, GridClip, grid_clip
+from colonnade.scene_image.grid_clip import TIME_FRACTION, GridClip, grid_clip
 
 HASH = tuple(range(1, 9))
 ROOT = 77
@@ -184,6 +186,17 @@ def test_a_vertex_outside_is_an_error(clip: GridClip, bent: Bent) -> None:
     pose[3] += 1 << (bits_of(clip) + clip.shift)
     with pytest.raises(ValueError, match="outside"):
         bent.target.skin(pose)
+
+
+def test_a_vertex_may_have_its_whole_weight_on_any_bone(clip: GridClip, bent: Bent) -> None:
+    pose = np.zeros(len(clip.rest), dtype=np.int32)
+    pose[3 : 12 * clip.bones : 4] = (np.arange(3 * clip.bones) + 1000) << clip.shift
+    for bones, weights in (((2, 0, 0, 0), (0, 0, 0)), ((0, 2, 0, 0), (1 << 15, 0, 0)), ((1, 0, 0, 2), (0, 0, 1 << 15))):
+        vertices = clip.vertices.copy()
+        vertices[:, 6:] = (*bones, *weights)
+        tree = bent.tree.clip_tree(bent.vertex_bits, bent.leaves)
+        target: Any = _core.TargetMesh(HASH, clip_file(replace(clip, vertices=vertices), tree, bent.tree.places, HASH))
+        assert (target.skin(pose)[0] == [1006, 1007, 1008]).all()
 
 
 def test_other_records_are_refused(bent: Bent) -> None:

@@ -100,7 +100,7 @@ class Morphs:
     normals: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Clip:
     """Vertices, and what moves them.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise, product
 
 import numpy as np
@@ -12,6 +13,8 @@ from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh.clips.clip import INFLUENCES, Clip, Pose
 
+#: Share of the longest edge of the object at rest by which interpolated keys may miss the clip.
+TOLERANCE = 2.0**-10
 #: Bisections of the time between two keys of the file.
 _BISECTIONS = 8
 
@@ -62,6 +65,24 @@ class Keys:
                 found.append(crossed / 2)
         lows, highs = (np.array([one.min(axis=0) for one in found]), np.array([one.max(axis=0) for one in found]))
         return lows.min(axis=0), highs.max(axis=0)
+
+
+@dataclass(frozen=True)
+class Baked:
+    """The keys of a clip, and the box of all of its poses, float64 [3] twice."""
+
+    keys: Keys
+    low: Floats
+    high: Floats
+
+
+@lru_cache(maxsize=2)
+def baked(clip: Clip) -> Baked:
+    """The keys of a clip within `TOLERANCE`."""
+    rest = clip.rest()
+    vertices = clip.vertices(rest.matrices, rest.weights)
+    keys = keys_of(clip, TOLERANCE * float(np.ptp(vertices, axis=0).max()))
+    return Baked(keys, *keys.box(clip))
 
 
 class _Reach:

@@ -130,6 +130,7 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
     for index, node, matrix in mesh_nodes(document, losses):
         losses.add(lost.SKINS, clip is None and "skin" in node)
         for primitive in document.entry("meshes", node["mesh"]).get("primitives", []):
+            losses.add(lost.MORPHS, 0 if clip is not None else len(primitive.get("targets", [])))
             to_scene = matrix if clip is None else np.eye(4)
             part = _primitive(document, primitive, to_scene, default, losses, textures, compressed)
             if part is None:
@@ -138,8 +139,6 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
                 clip.add(index, primitive, compressed.arrays(primitive), part.surface.vertices)
                 losses.add(lost.BENT_RELIEF, part.surface.relief is not None)
                 part = replace(part, surface=replace(part.surface, relief=None))
-            else:
-                losses.add(lost.MORPHS, len(primitive.get("targets", [])))
             parts.append(part)
             if part.material != default and part.has_one_colour:
                 material = from_gltf(document.entry("materials", part.material))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh.clips.clip import Clip
+from colonnade.mesh.clips.keys import baked
 from colonnade.mesh.geometry import primitives
 from colonnade.mesh.geometry.topology import Faces
 from colonnade.mesh.materials.materials import MeshMaterial
@@ -99,7 +101,11 @@ class Mesh:
 
     @cached_property
     def extent(self) -> Extent:
-        """The bounding box and the outline."""
+        """The bounding box and the outline; of a mesh with a clip the box of all of its poses, and its corners."""
+        if self.clip is not None:
+            clip = baked(self.clip)
+            corners = np.array(list(product(*zip(clip.low, clip.high, strict=True))))
+            return Extent(clip.low, clip.high, corners)
         points, _ = primitives.sphere(720)
         directions = np.unique(points, axis=0)
         outermost: set[int] = set()
