@@ -61,7 +61,7 @@ public:
             const FieldTuples& layouts)
         : format_{layoutsOf(layouts),          valueOf(format, "recordBits"), valueOf(format, "vertexBits"),
                   valueOf(format, "boxBits"),  valueOf(format, "stackDepth"), valueOf(format, "normalFraction"),
-                  valueOf(format, "children"), valueOf(format, "bvh") != 0},
+                  valueOf(format, "children"), valueOf(format, "bvh") != 0, valueOf(format, "bends") != 0},
           normals_(normals), materials_(materials), isClear_(isClear), colours_(colours) {
         checkFaces(faces, vertices.shape(0));
         if (faces.shape(0) == 0 || meshFaces.shape(0) != faces.shape(0)) throw std::invalid_argument("the numbers of faces differ, or are 0");
@@ -105,6 +105,11 @@ public:
     nb::object faces() const {
         const std::vector<std::int64_t> faces = packer_->faces();
         return arrayOf<std::int64_t>(faces, {faces.size()});
+    }
+
+    nb::object leafCorners() const {
+        const std::vector<std::int64_t> corners = packer_->leafCorners();
+        return arrayOf<std::int64_t>(corners, {corners.size() / 4, 4});
     }
 
     nb::object records() const {
@@ -211,6 +216,7 @@ void bind_packer(nb::module_& module) {
         .def("sections", &Packing::sections)
         .def("statistics", &Packing::statistics)
         .def("faces", &Packing::faces)
+        .def("leaf_corners", &Packing::leafCorners)
         .def("records", &Packing::records);
     module.def(
         "surface_offset",

@@ -24,10 +24,11 @@ inline Octahedral flatCode(const Leaf& leaf, int triangle, int normalFraction) {
     return octahedralOf({static_cast<double>(normal[0]), static_cast<double>(normal[1]), static_cast<double>(normal[2])});
 }
 
-/// The format of a pair: flat where all normals are those of its triangles, else near or far; none if its vertices are too far apart.
-inline std::optional<LeafFormat> formatOf(const LeafFields& fields, const Leaf& pair, int normalFraction) {
-    bool isFlat = true;
-    for (int triangle = 0; triangle < 2; ++triangle)
+/// The format of a pair: flat where all normals are those of its triangles, else near or far; none if its vertices are too far apart. A pair
+/// that bends is near, so that it may become twice as long before it loses its normals.
+inline std::optional<LeafFormat> formatOf(const LeafFields& fields, const Leaf& pair, int normalFraction, bool bends = false) {
+    bool isFlat = !bends;
+    for (int triangle = 0; isFlat && triangle < 2; ++triangle)
         for (const int corner : Leaf::cornersOf(triangle)) isFlat = isFlat && pair.normals[corner] == flatCode(pair, triangle, normalFraction);
     if (isFlat) return LeafFormat::flatPair;
     std::int64_t reach = 0; // the most bits of a delta, without its sign
@@ -37,7 +38,7 @@ inline std::optional<LeafFormat> formatOf(const LeafFields& fields, const Leaf& 
             reach = std::max<std::int64_t>(reach, bitLength(static_cast<UnsignedWide>(delta < 0 ? ~delta : delta)));
         }
     if (reach < fields.deltaBits()) return LeafFormat::nearPair;
-    if (reach == fields.deltaBits()) return LeafFormat::farPair;
+    if (reach == fields.deltaBits() && !bends) return LeafFormat::farPair;
     return std::nullopt;
 }
 

@@ -48,6 +48,21 @@ public:
         return rotations;
     }
 
+    /// The corner of a quantised face that is each of the four vertices of a leaf, in the order of leaves: 3 · face + corner; −1 for the
+    /// fourth of a triangle.
+    std::vector<std::int64_t> leafCorners() const {
+        std::vector<std::int64_t> corners;
+        for (std::size_t leaf = 0; leaf < sections_.leaves; ++leaf) {
+            std::array<int, 2> begins{};
+            const std::uint32_t* const faces = &tree_.order[leafFirst_[leaf]];
+            const bool isPair = leafCount_[leaf] == leafTriangles;
+            if (isPair) pairing_.pair(faces[0], faces[1], begins);
+            for (int i = 0; i < 3; ++i) corners.push_back(std::int64_t{3} * faces[0] + (begins[0] + i) % 3);
+            corners.push_back(isPair ? std::int64_t{3} * faces[1] + (begins[1] + 2) % 3 : -1);
+        }
+        return corners;
+    }
+
     /// The quantised face of each packed id; −1 where there is none.
     std::vector<std::int64_t> faces() const {
         std::vector<std::int64_t> faces = indices();

@@ -15,6 +15,7 @@ struct RecordFormat {
     int recordBits = 0, vertexBits = 0, boxBits = 0, stackDepth = 0, normalFraction = 0;
     int children = nodeChildren;  ///< most children of a node, 2 to nodeChildren
     bool bvh = true;
+    bool bends = false;  ///< the mesh has a clip: vertices that are at one place may part
 
     std::size_t recordBytes() const { return static_cast<std::size_t>(recordBits / 8); }
 };
@@ -35,7 +36,7 @@ struct FaceAttributes {
 class Pairing {
 public:
     Pairing(const QuantisedMesh& quantised, const FaceAttributes& attributes, const RecordFormat& format)
-        : quantised_(quantised), attributes_(attributes), fields_(format.layouts), normalFraction_(format.normalFraction), codes_(quantised.faces.size()) {
+        : quantised_(quantised), attributes_(attributes), fields_(format.layouts), normalFraction_(format.normalFraction), bends_(format.bends), codes_(quantised.faces.size()) {
         for (std::size_t face = 0; face < codes_.size(); ++face)
             for (int i = 0; i < 3; ++i) {
                 const mesh::Vector& normal = attributes_.cornerNormals[meshFace(face)][i];
@@ -64,7 +65,7 @@ public:
                 for (int k = 0; k < 3; ++k) take(leaf, k, one, (i + k) % 3);
                 take(leaf, 3, other, (j + 2) % 3);
                 begins = {i, j};
-                const std::optional<LeafFormat> format = formatOf(fields_, leaf, normalFraction_);
+                const std::optional<LeafFormat> format = formatOf(fields_, leaf, normalFraction_, bends_);
                 if (!format) return {};
                 leaf.format = *format;
                 return leaf;
@@ -93,6 +94,7 @@ private:
 
     bool isSame(std::uint32_t one, int i, std::uint32_t other, int j) const {
         return quantised_.corner(one, i) == quantised_.corner(other, j) && codes_[one][i] == codes_[other][j] &&
+               (!bends_ || quantised_.faces[one][i] == quantised_.faces[other][j]) &&
                (!attributes_.colours || attributes_.colours[meshFace(one)][i] == attributes_.colours[meshFace(other)][j]);
     }
 
@@ -100,6 +102,7 @@ private:
     const FaceAttributes attributes_;
     const LeafFields fields_;
     const int normalFraction_;
+    const bool bends_;
     std::vector<std::array<Octahedral, 3>> codes_;
 };
 
