@@ -52,6 +52,7 @@ from colonnade.maps.encoders import Encoder
     "--photo-file", type=FILE, metavar="FILE", help="Also write the photo behind the object, for the AXI4 shell."
 )
 @click.option("--view-file", type=FILE, metavar="FILE", help="Also write what a processor needs to move the object.")
+@click.option("--clip-file", type=FILE, metavar="FILE", help="Also write what a processor needs to bend the mesh.")
 @size_option("Frame size of --frame-file, --photo-file and --view-file, e.g. 640x480.  [default: that of the scene]")
 @strict_option
 @json_option
@@ -70,6 +71,7 @@ def pack(
     frame_file: Path | None,
     photo_file: Path | None,
     view_file: Path | None,
+    clip_file: Path | None,
     size: str | None,
     json_file: Path | None,
 ) -> None:
@@ -95,7 +97,15 @@ def pack(
     file = image_file(output)
     check_image_file(file)
     require_outputs(
-        json_file, device_image, maps_image, dram_image, frame_file, photo_file, view_file, folders=[file.parent]
+        json_file,
+        device_image,
+        maps_image,
+        dram_image,
+        frame_file,
+        photo_file,
+        view_file,
+        clip_file,
+        folders=[file.parent],
     )
     declare_output(file)
     terminal = progress.for_terminal()
@@ -134,6 +144,8 @@ def pack(
             others.append(("a photo", photo_file, photo))
         if view_file is not None:
             others.append(("a view", view_file, prepared.view_file((width, height), composited=True)))
+        if clip_file is not None:
+            others.append(("a clip", clip_file, prepared.clip_file()))
     image.save(output)
     echo(f"packed      {file}")
     for title, path, content in others:

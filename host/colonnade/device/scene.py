@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.arguments import checked
+from colonnade.common.errors import UserError
 from colonnade.common.frame_size import Size
 from colonnade.common.framebuffer_formats import photo_lines
 from colonnade.common.image_io import resized_photo
@@ -111,6 +112,7 @@ class DeviceScene:
         mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
         materials = rendered_materials(mesh.materials, lit.scene)
         image = pack(mesh, manifest, materials, lit.scene.headroom, encoder, scene.mesh.children)
+        image = image.posed(scene.motion_progress)
         if maps is not None:
             image = with_environment(image, maps, manifest)
         if manifest.gathers:
@@ -141,7 +143,7 @@ class DeviceScene:
         return replace(self, scene=scene, image=image, maps=maps, photo=room.photo, strength=strength)
 
     def lit_at(self, pose: Scene, relit: bool = False) -> DeviceScene:
-        """The scene with the light cube of a pose of its motion; itself if it gathers no light.
+        """The scene with the light cube of a pose of its motion, and the records of its clip; itself without both.
 
         Args:
             pose: As `Scene.at` gives it.
@@ -149,7 +151,8 @@ class DeviceScene:
         """
         held = None if self.maps is None else self.maps.image
         cube = scene_cube(pose, self.image.header.extent, self.environment, held, relit, self.unseen, self.second)
-        return self if cube is None else replace(self, image=with_cube(self.image, cube))
+        image = self.image.posed(pose.motion_progress)
+        return replace(self, image=image if cube is None else with_cube(image, cube))
 
     def seen_by(self, camera: EnvironmentCamera, photo: NDArray[np.uint8] | None) -> DeviceScene:
         """The scene from another camera: object, lights and maps stay in the world, primary rays march.
@@ -217,6 +220,17 @@ class DeviceScene:
     def maps_image(self) -> bytes | None:
         """As `device_image`, with the maps of the room alone; None without a room."""
         return None if self.maps is None else maps_image(self.maps.image, self.manifest)
+
+    @checked
+    def clip_file(self) -> bytes:
+        """What bends the mesh on a target (docs/driver.md, "Meshes that bend").
+
+        Raises:
+            UserError: The scene has no animation.
+        """
+        if self.image.bending is None:
+            raise UserError("a clip file has an animation, and the scene has none: give mesh.animation")
+        return self.image.bending.file
 
     def dram_image(self) -> bytes:
         """The records as a design with a cache reads them from DRAM.

@@ -57,7 +57,8 @@ def device_frames(
             notes.tell(note)
     seconds = {"pack": time.perf_counter() - begun, "build": None}
     results = rendered(request, frames, registers, progress)
-    if scene.paths.gather and len(poses) > 1:  # Each has a light cube of its own
+    # Each has a light cube, or records, of its own
+    if (scene.paths.gather or prepared.image.bending is not None) and len(poses) > 1:
         results = itertools.chain.from_iterable(
             rendered(request, [replace(frame, prepared=prepared.lit_at(pose, relit))], [values], progress)
             for frame, pose, values in zip(frames, poses, registers, strict=True)

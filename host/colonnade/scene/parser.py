@@ -119,7 +119,7 @@ def _beside(mesh: MeshSource, folder: Path) -> MeshSource:
 def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
     """Rename the file's tables to the fields of `Scene`; several ``[[light]]`` become `light` and `more_lights`.
 
-    Several objects do not turn unless the file says so.
+    Several objects, and one with an animation, do not turn unless the file says so.
     """
     named = {"names_light": "light" in data or "ambient" in data, "names_gather": "gather" in _table(data, "paths")}
     tables = dict(data) | named
@@ -132,6 +132,8 @@ def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:
             tables["motion"] = {"turn": 0.0} | motion
     elif "object" in tables:
         tables["placement"] = tables.pop("object")
+    if "animation" in _table(data, "mesh") and isinstance(motion := tables.get("motion", {}), dict):
+        tables["motion"] = {"turn": 0.0} | motion
     return {"mesh": {}} | tables
 
 
@@ -213,6 +215,8 @@ def _check_objects(data: Mapping[str, Any], in_room: bool) -> None:
             raise ValueError("object must be tables: [[object]]")
         if "mesh" not in one:
             raise ValueError(f"object {number} has no mesh: give object.mesh")
+        if "animation" in _table(one, "mesh"):
+            raise ValueError("mesh.animation is for a scene of one object: give [mesh] instead of [[object]]")
         placing = [key for key in ("stand_at", "size", "turn") if key in one]
         moving = [key for key in ("scale", "translate") if key in _table(one, "transform")]
         if placing and not in_room:

@@ -9,7 +9,7 @@ companion follows it. Addresses in nodes are absolute.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,9 @@ from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.mesh.materials.palette import TEXTURE_HARDWARE, table_entries
 from colonnade.scene_image.atlas import Atlas, make_atlas, uv_codes
+from colonnade.scene_image.bending import Bending, at_rest
 from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.grid_clip import grid_clip
 from colonnade.scene_image.header import ImageHeader, ObjectFrame, TreeStatistics
 from colonnade.scene_image.textures import with_textures
 
@@ -91,20 +93,28 @@ def pack(
     """
     from colonnade import _core
 
-    quantised = quantise(mesh, int(manifest.config["geometry"]["vertexBits"]))
+    bits = int(manifest.config["geometry"]["vertexBits"])
+    clip = None if mesh.clip is None else grid_clip(mesh, bits)
+    if clip is None:
+        quantised, corner_normals = quantise(mesh, bits), mesh.corner_normals
+    else:
+        vertices, normals = at_rest(clip, manifest)
+        quantised = QuantisedMesh(vertices, clip.corners, np.arange(len(clip.corners)), clip.frame)
+        corner_normals = normals[clip.corners]
     materials = mesh.materials if materials is None else tuple(materials)
     entries, index = table_entries(materials)
     is_glass = np.array([material.kind == "glass" or material.coverage < 0.5 for material in materials])
     atlas = _atlas(mesh, manifest, materials, headroom)
+    colours = _corner_colours(mesh, manifest, materials, headroom, atlas)
     packing: Any = _core.Packing(
         quantised.vertices,
         quantised.faces,
         quantised.mesh_faces,
-        mesh.corner_normals,
+        corner_normals,
         index.astype(np.uint8)[mesh.face_materials],
         is_glass[mesh.face_materials],
-        _corner_colours(mesh, manifest, materials, headroom, atlas),
-        record_format(manifest) | {"children": children},
+        colours,
+        record_format(manifest) | {"children": children, "bends": int(clip is not None)},
         field_places(manifest.layouts),
     )
     sections, faces = packing.sections(), packing.faces()
@@ -123,8 +133,15 @@ def pack(
         parts=mesh.parts,
         **sections,
     )
+    bending = None
+    if clip is not None:
+        edge = max(high - low for low, high in zip(clip.low, clip.high, strict=True))
+        header = replace(header, bounds_low=clip.low, bounds_high=clip.high, largest_triangle=edge)
+        corners = packing.leaf_corners()
+        leaves = np.where(corners < 0, -1, clip.corners.reshape(-1)[corners])
+        bending = Bending.of(clip, manifest, sections["record_count"], tree.depth, leaves, colours is not None)
     sources = np.where(faces < 0, -1, mesh.source_faces[quantised.mesh_faces[faces]])
-    image = SceneImage(header, packing.records(), sources.astype(np.int32))
+    image = SceneImage(header, packing.records(), sources.astype(np.int32), bending=bending)
     return with_textures(image, atlas, len({material.texture for material in materials} - {None}), manifest, encoder)
 
 

@@ -24,6 +24,7 @@ class MeshSource:
         crease: Angle up to which edges are smooth, degrees, in place of the file's normals. None: the file's normals,
             without them 60 degrees.
         simplify: Number of triangles to which a mesh of more is simplified. None: all are kept.
+        animation: Name or number of an animation of a glTF file, which the frames of a motion play once.
         children: Most children of a node of the packer's tree: 2 is a binary tree, as in the source paper.
     """
 
@@ -31,12 +32,15 @@ class MeshSource:
     path: File | None = None
     crease: Annotated[Float, Interval(ge=0.0, le=180.0)] | None = None
     simplify: Triangles | None = None
+    animation: Text | None = None
     children: Literal[2, 4] = 4
 
     @model_validator(mode="after")
     def _exactly_one(self) -> Self:
         if (self.name is None) == (self.path is None):
             raise ValueError("[mesh] needs either a name or a path")
+        if self.animation is not None and self.simplify is not None:
+            raise ValueError("mesh.animation moves all triangles: leave out mesh.simplify")
         return self
 
     @property

@@ -91,8 +91,10 @@ class Scene:
         """The scene with its mesh simplified to so many triangles.
 
         Raises:
-            UserError: The scene has several objects.
+            UserError: The scene has several objects, or an animation.
         """
+        if self.mesh.animation is not None:
+            raise UserError("mesh.animation moves all triangles: leave out --simplify")
         self.require_one_object("--simplify is of a single object, simplify in the mesh of each [[object]] of its own")
         return replace(self, mesh=replace(self.mesh, simplify=triangles))
 
