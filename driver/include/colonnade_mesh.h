@@ -55,9 +55,9 @@ struct colonnade_refit {
 enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const struct colonnade_design *design, const void *data,
                                          size_t bytes);
 
-/* The bones' matrices and the weights of morph targets at a time, 2^-16 s; the clip repeats. `pose` has space for
- * colonnade_mesh_pose_words. */
+/* The bones' matrices and the weights of morph targets at a time, 2^-16 s; the clip repeats. */
 void colonnade_mesh_pose(const struct colonnade_mesh *mesh, uint32_t time, int32_t *pose);
+/* The words of a pose. */
 uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh);
 
 /* The mesh's vertices in a pose. Refused is a pose in which one leaves the object's grid. */

@@ -164,7 +164,8 @@ enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, con
     for (;;) {
         struct colonnade_mesh_node *node = &path[depth];
         if (node->next < node->nodes) {
-            if (++depth == mesh->depth || !enter(&walk, &path[depth], node->first + node->next)) return COLONNADE_OTHER_RECORDS;
+            ++depth;
+            if (depth == mesh->depth || !enter(&walk, &path[depth], node->first + node->next)) return COLONNADE_OTHER_RECORDS;
             continue;
         }
         write_node(mesh, node, record_at(copy, root, node->address), found.low, found.high);
