@@ -136,6 +136,8 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
     require_regular(path, "mesh file")
     if path.suffix.lower() not in SUFFIXES:
         raise UserError(f"{path}: the suffix of a mesh file must be one of {', '.join(SUFFIXES)}")
+    if animation is not None and subdivisions:
+        raise UserError(f"mesh {path} is subdivided, a clip is not: leave out mesh.animation, or the subdivisions")
     if path.stat().st_size == 0:
         raise UserError(f"mesh file {path} is empty")
     try:

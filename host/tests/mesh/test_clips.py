@@ -87,6 +87,13 @@ def test_meshes_without_animations_are_refused(tmp_path: Path) -> None:
             load_mesh(source, animation="bend")
 
 
+def test_an_animated_mesh_is_not_subdivided(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLONNADE_MESHES", str(path.parent))
+    assert load_mesh("arm", animation="bend").clip is not None
+    with pytest.raises(UserError, match="or the subdivisions"):
+        load_mesh("arm:1", animation="bend")
+
+
 def _change(document: Document, *places: Any, to: Any) -> None:
     value: Any = document.json
     for place in places[:-1]:
