@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{log2Ceil, Decoupled}
 import colonnade.config.ColonnadeConfig
 
-/** A line that is awaited from DRAM, and the buses that announce it when it comes. */
+/** A line to come from DRAM, and the buses that announce it when it comes. */
 private[memory] final class AwaitedLine(config: ColonnadeConfig) extends Bundle {
   val line = UInt(Lines.lineBits(config).W)
 
@@ -23,7 +23,7 @@ private[memory] final class AwaitedLinesIO(config: ColonnadeConfig) extends Bund
 
   /** The line that is looked up is awaited from now on. */
   val enter  = Flipped(Decoupled())
-  val isBusy = Output(Bool()) // half of the lines that can be awaited are, or more
+  val isBusy = Output(Bool()) // half of the entries are used, or more
   val reads  = Decoupled(UInt(Lines.lineBits(config).W))
   val oldest = Decoupled(new AwaitedLine(config))
 }

@@ -75,10 +75,10 @@ private object DramReader {
 
   /** Bursts for the lines that are read, which their banks request in turn. */
   def addresses(config: ColonnadeConfig, base: UInt, reads: Seq[DecoupledIO[UInt]]): DecoupledIO[AxiAddress] = {
-    val arbiter  = Module(new RoundRobin(reads.size))
-    val address  = Wire(Decoupled(new AxiAddress(DramPort.idBits(config))))
-    val bank     = OHToUInt(arbiter.io.grant)
-    val line     = Mux1H(arbiter.io.grant, reads.map(_.bits))
+    val arbiter = Module(new RoundRobin(reads.size))
+    val address = Wire(Decoupled(new AxiAddress(DramPort.idBits(config))))
+    val bank    = OHToUInt(arbiter.io.grant)
+    val line    = Mux1H(arbiter.io.grant, reads.map(_.bits))
     arbiter.io.requests := VecInit(reads.map(_.valid)).asUInt
     arbiter.io.isTaken  := address.fire
     reads.zip(arbiter.io.grant.asBools).foreach { case (read, isGranted) => read.ready := isGranted && address.ready }

@@ -34,7 +34,7 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
   * request  accept  tags, awaited lines   announced          line read       records on the bus
   * line             victim                announced, taken   line written    records on the bus
   * }}}
-  * While less than half of the lines that can be awaited are, the buddy of a line that misses is read, too, unless it is
+  * While less than half of the entries of lines to read are used, the buddy of a line that misses is read, too, unless it is
   * held. Reads from DRAM are announced in their order. They precede requests that hit, which keep their place and are looked up
   * again.
   */
@@ -88,22 +88,22 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
     request.valid && willBeFree(SharedCache.busOf(config, column))
   }
   // With extra slices a request enters in the cycle after the last one has left
-  private val isVacant = if (slice.isEnabled) !isWaiting else !isWaiting || leaves
-  private val buddy    = RegInit(0.U.asTypeOf(Valid(UInt(lineBits.W)))) // to be looked up when no request is
-  private val isBuddy  = RegInit(false.B)                               // it is what is looked up
-  private val isAsked  = arbiter.io.requests.orR
-  private val accepts  = isVacant && (isAsked || buddy.valid)
-  private val next     = Mux(isAsked, Mux1H(arbiter.io.grant, io.requests.map(_.bits)), buddy.bits)
+  private val isVacant   = if (slice.isEnabled) !isWaiting else !isWaiting || leaves
+  private val buddy      = RegInit(0.U.asTypeOf(Valid(UInt(lineBits.W)))) // to be looked up when no request is
+  private val isBuddy    = RegInit(false.B)                               // it is what is looked up
+  private val hasRequest = arbiter.io.requests.orR
+  private val accepts    = isVacant && (hasRequest || buddy.valid)
+  private val next       = Mux(hasRequest, Mux1H(arbiter.io.grant, io.requests.map(_.bits)), buddy.bits)
   arbiter.io.requests := VecInit(eligible).asUInt
-  arbiter.io.isTaken  := isVacant && isAsked
+  arbiter.io.isTaken  := isVacant && hasRequest
   io.requests.zip(arbiter.io.grant.asBools).foreach { case (request, isGranted) =>
     request.ready := isGranted && isVacant
   }
   isWaiting := accepts || (isWaiting && !leaves)
   when(accepts) {
     asked.line  := next
-    asked.buses := Mux(isAsked, VecInit(byBus(arbiter.io.grant.asBools)).asUInt, 0.U)
-    isBuddy     := !isAsked
+    asked.buses := Mux(hasRequest, VecInit(byBus(arbiter.io.grant.asBools)).asUInt, 0.U)
+    isBuddy     := !hasRequest
   }
 
   // Cycle d: compare
@@ -117,20 +117,21 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   awaited.io.lookup      := asked
   awaited.io.joins       := joins
   awaited.io.enter.valid := isMiss
-  leaves                 := delivers || joins || awaited.io.enter.fire || (isLookedUp && isBuddy)
-  when(accepts && !isAsked)(buddy.valid := false.B)
-  when(awaited.io.enter.fire && !isBuddy) {
+  private val enters = awaited.io.enter.fire
+  leaves := delivers || joins || enters || (isLookedUp && isBuddy)
+  when(accepts && !hasRequest)(buddy.valid := false.B)
+  when(enters && !isBuddy) {
     buddy.valid := !awaited.io.isBusy
     buddy.bits  := Lines.buddy(line)
   }
-  isFilling              := fills
+  isFilling := fills
 
   // Announce on the buses that must, and on those that have nothing else to do
   private val announced = Mux(fills, filled.line, line)
   private val isOther   = VecInit(byBus(io.requests.map(request => request.valid && request.bits =/= announced))).asUInt
   private val joining   = usable & ~isOther
-  private val wanted = Mux(fills, filled.buses, asked.buses)
-  starts := Mux((fills || delivers) && wanted.orR, wanted | joining, 0.U)
+  private val targets   = Mux(fills, filled.buses, asked.buses)
+  starts := Mux((fills || delivers) && targets.orR, targets | joining, 0.U)
 
   // A line from DRAM replaces another one
   // With an extra slice it is found in the cycle before: then the line is the oldest one already
@@ -154,12 +155,12 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   // Cycle d + 2: read the line, or write that from DRAM, which is held until the next one is taken
   io.data.ready := isFilling
   private val incoming = RegEnable(io.data.bits, isFilling)
-  private val place   = ShiftRegister(Mux(fills, tags.place(filled.line, victim), tags.place(line, hitWay)), 2)
-  private val isFill  = RegNext(RegNext(fills, false.B), false.B)
-  private val isKept  = RegNext(RegNext(keeps, false.B), false.B)
-  private val isRead  = RegNext(RegNext(delivers, false.B), false.B)
-  private val held    = lines.readWrite(place, incoming.records, isRead || isKept, isKept)
-  private val isTaken = RegNext(isFill, false.B)
+  private val place    = ShiftRegister(Mux(fills, tags.place(filled.line, victim), tags.place(line, hitWay)), 2)
+  private val isFill   = RegNext(RegNext(fills, false.B), false.B)
+  private val isKept   = RegNext(RegNext(keeps, false.B), false.B)
+  private val isRead   = RegNext(RegNext(delivers, false.B), false.B)
+  private val held     = lines.readWrite(place, incoming.records, isRead || isKept, isKept)
+  private val isTaken  = RegNext(isFill, false.B)
 
   // Cycles d + 4 and d + 5: the records on the bus; those of a failed read become zeros there, and nobody reads them later
   private val ready = VecInit(held.zip(incoming.records).map { case (record, other) =>
