@@ -30,13 +30,14 @@
 //   pixel  x y                                            -> colour[3] isObject triangle distance ratio[3]
 //          with an environment if its lines precede the registers
 //
-// Environment maps: see environment_queries.hpp.
+// Environment maps: see environment_queries.hpp; rays of applications: see ray_queries.hpp.
 #include <optional>
 #include <sstream>
 
 #include "model/frame.hpp"
 #include "packer/leaf.hpp"
 #include "environment_queries.hpp"
+#include "ray_queries.hpp"
 
 namespace {
 
@@ -319,7 +320,9 @@ int main() try {
     std::getline(std::cin, line);
     std::istringstream first(line);
     first >> kind;
-    const Numbers numbers(readNumbers(first));
+    const std::map<std::string, std::int64_t> values = readNumbers(first);
+    const Numbers numbers(values);
+    const auto directionBits = static_cast<int>(lookUp(values, "directionBits"));
     Scene scene(numbers);
     EnvironmentQueries environment;
     while (std::getline(std::cin, line)) {
@@ -333,6 +336,8 @@ int main() try {
         else if (kind == "shade") replyShade(query, numbers);
         else if (kind == "cornercolour") replyCornerColour(query, numbers);
         else if (kind == "lightenvironment") replyEnvironmentLight(query, numbers);
+        else if (kind == "ray") replyRay(query, numbers, directionBits);
+        else if (kind == "hit") replyHit(query, numbers, directionBits);
         else if (kind == "bounce") replyBounce(query, numbers);
         else if (kind == "cornernormal") replyCornerNormal(query, numbers);
         else if (kind == "geometricnormal") replyGeometricNormal(query, numbers);

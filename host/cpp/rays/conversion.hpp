@@ -88,14 +88,19 @@ public:
             if (component != 0 && exponents[a] == largest) dominant = std::max(dominant, static_cast<int>(magnitude(component)));
             component = nearestEven(component, std::min(largest - exponents[a] - (directionBits_ - 2 - 24), 100));
         }
-        result.product = static_cast<std::uint64_t>(dominant) * placement_.mantissa;
-        result.exponent = 48 - largest - placement_.exponent - n_.gridFraction;
-        result.request.tMin = near.mantissa > 0 ? steps(near, result, true) : 0;
+        setStep(result, dominant, largest);
+        result.request.tMin = near.mantissa > 0 ? std::min<Wide>(steps(near, result, true), n_.unlimited()) : 0;
         result.request.tMax = std::min<Wide>(steps(far, result, false) + 1, n_.unlimited());
         result.kind = ConvertedRay::Kind::legal;
         for (int a = 0; a < 3; ++a)
             if (!toGrid(ray.origin[a], isLocal ? 0 : placement_.base[a], result.request.origin[a])) result.kind = ConvertedRay::Kind::outOfRange;
         return result;
+    }
+
+    /// Sets a step of t, from the direction's largest component.
+    void setStep(ConvertedRay& ray, int mantissa, int exponent) const {
+        ray.product = static_cast<std::uint64_t>(mantissa) * placement_.mantissa;
+        ray.exponent = 48 - exponent - placement_.exponent - n_.gridFraction;
     }
 
     /// A hit in the application's numbers.
@@ -111,6 +116,7 @@ private:
     /// A parameter of the ray in grid steps, rounded down or up, saturated to those of a ray without a limit.
     Wide steps(const Float& t, const ConvertedRay& ray, bool isUp) const {
         if (!t.isFinite) return n_.unlimited();
+        if (t.mantissa == 0) return 0;
         const Wide product = Wide(t.mantissa) * ray.product;
         const int left = t.exponent - 24 - ray.exponent;
         if (bitLength(magnitude(product)) + left > n_.sceneBits + 1) return n_.unlimited();

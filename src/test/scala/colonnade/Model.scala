@@ -102,9 +102,10 @@ object Model {
 
   private lazy val program: Path = synchronized {
     val sources = Paths.get("host", "cpp")
-    val files   = Files.walk(sources).iterator.asScala.filter(p =>
-      p.toString.endsWith(".hpp") || p.endsWith("vectors.cpp")
-    ).toSeq.sorted
+    val driver  = Paths.get("driver", "include")
+    val files   = Seq(sources, driver).flatMap(Files.walk(_).iterator.asScala).filter(p =>
+      p.toString.endsWith(".hpp") || p.toString.endsWith(".h") || p.endsWith("vectors.cpp")
+    ).sorted
     val digest = MessageDigest.getInstance("SHA-256")
     files.foreach(file => digest.update(Files.readAllBytes(file)))
     val name  = digest.digest().take(8).map(byte => f"$byte%02x").mkString
@@ -118,6 +119,8 @@ object Model {
         "-O2",
         "-I",
         sources.toString,
+        "-I",
+        driver.toString,
         sources.resolve("vectors.cpp").toString,
         "-o",
         fresh.toString

@@ -157,6 +157,7 @@ final case class ColumnBvhMemoryConfig(
   * @param hits       the pixel stream also carries the hit triangle and its distance
   * @param emission   materials have a colour that diffuse surfaces emit
   * @param gather     diffuse surfaces gather light: docs/gather.md
+  * @param rays       rays of applications and their hits in place of pixels: docs/rays.md
   */
 final case class FrameConfig(
     maxWidth:   Int = 1920,
@@ -167,7 +168,8 @@ final case class FrameConfig(
     maxBounces: Int = 0,
     hits:       Boolean = true,
     emission:   Boolean = false,
-    gather:     Boolean = false
+    gather:     Boolean = false,
+    rays:       Boolean = false
 ) {
   Require.within("frame.maxWidth", maxWidth, 8, 4096)
   Require.within("frame.maxHeight", maxHeight, 8, 4096)
@@ -202,6 +204,14 @@ final case class ColonnadeConfig(
   )
 
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
+
+  if (frame.rays) {
+    Require("frame.rays", frame.maxBounces == 0, "needs frame.maxBounces=0")
+    Require("frame.rays", physicalAttributeMemory.isEmpty, "needs physicalAttributeMemory=null")
+    Require("frame.rays", units.rayInterval == 1, "needs units.rayInterval=1")
+    Require("frame.rays", numbers.gridBits <= 38, "needs geometry.triangleBits of at most 38")
+    Require("frame.rays", numbers.directionBits <= 64, "needs precision.mac and frame.maxWidth for 64-bit directions")
+  }
 
   /** Rows share triangle units. */
   val sharesTriangleUnits: Boolean = units.triangleRows > 1

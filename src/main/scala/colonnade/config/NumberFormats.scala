@@ -33,7 +33,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
 
   val weightBits:      Int = mantissaBits.min(gridBits - 1)
   val distanceDigits:  Int = gridBits.min(mantissaBits)
-  val barycentricBits: Int = weightBits.min(colourBits)
+  val barycentricBits: Int = if (frame.rays) weightBits else weightBits.min(colourBits)
 
   /** Magnitude bits of a vector component in the shader's dot products: 18 suffice for a cosine of `colourBits`. */
   val shadeBits:      Int = macBits.min(colourBits + 6)

@@ -18,6 +18,16 @@ object Rounding {
 
   def floor(x: UInt, bits: UInt): UInt = x >> bits
 
+  /** `floor`, as wide as the number, and whether it is inexact. */
+  def floorInexact(x: UInt, bits: UInt): (UInt, Bool) = {
+    val width = x.getWidth
+    (0 until bits.getWidth).foldLeft((x, false.B)) { case ((value, inexact), step) =>
+      val dropped = (BigInt(1) << step).min(width).toInt
+      val shifted = if (dropped == width) 0.U(width.W) else (value >> dropped).pad(width)
+      (Mux(bits(step), shifted, value), inexact || (bits(step) && value(dropped - 1, 0).orR))
+    }
+  }
+
   /** Drops `bits` low bits to nearest, ties to even; one bit wider than `floor`, for the carry. */
   def nearestEven(x: SInt, bits: Int): SInt =
     if (bits <= 0) shiftedLeft(x, -bits)

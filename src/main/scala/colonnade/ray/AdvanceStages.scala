@@ -16,6 +16,7 @@ final class AdvancingRay(config: PathConfig) extends Bundle {
   val exponent    = Vec(2, UInt(formats.exponentBits.W))
   val origin      = Vec(3, new Fixed(formats.scene))
   val tMax        = UInt((config.numbers.sceneBits + 1).W)
+  val limits      = Option.when(config.frame.rays)(new RayLimits(config.numbers))
 }
 
 final class AdvanceStagesIO(config: PathConfig) extends Bundle {
@@ -95,7 +96,11 @@ final class AdvanceStages(config: PathConfig) extends Module {
   }
   prepared.tEntry := Fixed(formats.entry, entrySteps << (-fraction).max(0))
   prepared.tMax   := Fixed(formats.grid, Rounding.saturate(io.ray.tMax.zext -& along.zext, 0, formats.grid.highest))
-  io.output       := load(prepared, stages.preparedRay)
+  for (limits <- prepared.limits; requested <- io.ray.limits) {
+    limits.filter := requested.filter
+    limits.tMin   := Mux(requested.tMin > along, requested.tMin - along, 0.U)
+  }
+  io.output := load(prepared, stages.preparedRay)
 
   /** A product in grid steps, towards 0, and whether the nearest one is the next. */
   private def roundedDown(product: UInt): (UInt, Bool) = {

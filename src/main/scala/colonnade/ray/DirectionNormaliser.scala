@@ -39,6 +39,8 @@ final class PermutedRay(config: PathConfig) extends Bundle {
 
   /** Largest t in grid steps; it saturates above the sum of an entry distance and the largest t of the grid. */
   val tMax = UInt((numbers.sceneBits + 1).W)
+
+  val limits = Option.when(config.frame.rays)(new RayLimits(numbers))
 }
 
 final class DirectionNormaliserIO(config: PathConfig) extends Bundle {

@@ -53,6 +53,10 @@ final class DirectionStages(config: PathConfig) extends Module {
   private val length    = Rounding.saturate(permuted(magnitudes).last, numbers.sceneBits + 1)
   private val unlimited = ((BigInt(1) << (numbers.sceneBits + 1)) - 1).U
   io.ray.tMax := Mux(isShadow, length, unlimited)
+  for (limits <- io.ray.limits; requested <- request.limits) {
+    limits      := RegEnable(requested, io.loads(0))
+    io.ray.tMax := limits.tMax
+  }
 
   io.mantissas.minor.zip(Seq(minor0, minor1)).foreach { case (to, from) =>
     to := RegEnable(from.mantissa, io.loads(1))

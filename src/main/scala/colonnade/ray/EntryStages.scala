@@ -91,9 +91,13 @@ final class EntryStages(config: PathConfig) extends Module {
 
   // The latest entry, before the earliest exit
   private val Seq(x, y) = tNears
-  private val z         = hold(tNearAlong, stages.planes, stages.limits)
-  private val tNear     = load(Mux(x > y, Mux(x > z, x, z), Mux(y > z, y, z)), stages.entry)
-  private val exits     = tFars.map(_.hold(stages.limits, stages.entry)) :+ tFarAlong.hold(stages.planes, stages.entry)
+  private val z         = io.ray.limits.fold(hold(tNearAlong, stages.planes, stages.limits)) { limits =>
+    val units = Rounding.saturate(Rounding.floor(limits.tMin, numbers.gridFraction), entryBits)
+    val least = hold(load(units, stages.unitOrigins), stages.unitOrigins, stages.planes)
+    hold(load(Mux(least > tNearAlong, least, tNearAlong), stages.distances), stages.distances, stages.limits)
+  }
+  private val tNear = load(Mux(x > y, Mux(x > z, x, z), Mux(y > z, y, z)), stages.entry)
+  private val exits = tFars.map(_.hold(stages.limits, stages.entry)) :+ tFarAlong.hold(stages.planes, stages.entry)
   io.tNear  := tNear
   io.enters := load(exits.map(exit => !exit.isBelow0 && tNear <= exit.t).reduce(_ && _), stages.enters)
 

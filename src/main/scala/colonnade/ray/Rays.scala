@@ -40,6 +40,27 @@ final class RayRequest(config: PathConfig) extends Bundle {
   val isShadow = Bool()
   val origin   = Vec3(new Fixed(new RayFormats(numbers).scene))
   val dir      = Vec3(SInt(numbers.directionBits.W))
+  val limits   = Option.when(config.frame.rays)(new RayLimits(numbers))
+}
+
+/** What an application's ray does not hit: triangles seen from the front or the back, and those that are not opaque. */
+final class HitFilter extends Bundle {
+  val cullsFront   = Bool()
+  val cullsBack    = Bool()
+  val refusesClear = Bool()
+}
+
+/** The limits of an application's ray in grid steps: hits at tMin ≤ t < tMax count. */
+final class RayLimits(numbers: NumberFormats) extends Bundle {
+  val tMin   = UInt((numbers.sceneBits + 1).W)
+  val tMax   = UInt((numbers.sceneBits + 1).W)
+  val filter = new HitFilter
+}
+
+/** What is left of [[RayLimits]] at a ray's entry: a tMin of less than a unit. */
+final class EntryLimits(numbers: NumberFormats) extends Bundle {
+  val tMin   = UInt(numbers.gridFraction.max(0).W)
+  val filter = new HitFilter
 }
 
 /** A ray's dominant axis (0, 1, 2) and the signs of its direction in the ray's own frame. There, z' is the dominant axis,
@@ -117,6 +138,7 @@ final class PreparedRay(config: PartConfig) extends Bundle {
   val ray      = new TracedRay(numbers)
   val tEntry   = new Fixed(formats.entry)
   val tMax     = new Fixed(formats.grid) // hits with t < `tMax` count; never negative
+  val limits   = Option.when(config.frame.rays)(new EntryLimits(numbers))
 }
 
 object PermutedFrame {

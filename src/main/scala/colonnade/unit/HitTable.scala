@@ -65,6 +65,7 @@ final class HitTable(config: TraversalConfig) extends Module {
     val detail = Wire(new HitDetails(config))
     detail.weights  := hit.weights
     detail.backSide := hit.backSide
+    detail.isClear.foreach(_ := io.result.bits.isTransmissive)
     details.write(context, detail)
     ids(context)      := hit.id
     closestT(context) := hit.t
@@ -89,12 +90,14 @@ final class HitTable(config: TraversalConfig) extends Module {
   io.outcome.hit.id       := ids(reader)
   io.outcome.hit.weights  := detail.weights
   io.outcome.hit.backSide := detail.backSide
+  io.outcome.isClear.zip(detail.isClear).foreach { case (to, from) => to := from }
 }
 
 /** The parts of a hit that no comparison needs. */
 private final class HitDetails(config: TraversalConfig) extends Bundle {
   val weights  = Vec(3, new Fixed(new RayFormats(config.numbers).weight))
   val backSide = Bool()
+  val isClear  = Option.when(config.frame.rays)(Bool())
 }
 
 /** A read port of the [[HitTable]], seen from the reader. */
@@ -105,4 +108,5 @@ final class HitReader(config: TraversalConfig) extends Bundle {
   val hasHit    = Input(Bool())
   val occlusion = Input(Occlusion())
   val hit       = Input(new TriangleHit(config))
+  val isClear   = Option.when(config.frame.rays)(Input(Bool()))
 }

@@ -91,9 +91,15 @@ final class Intersector(config: TraversalConfig) extends Module {
   triangles.candidate :<>= io.triangles
   hitTable.io.result.valid := result.fire
   hitTable.io.result.bits  := result.bits
-  hitTable.io.isShadow     := isShadow
-  result.ready             := isOccluded || !result.bits.isLast || resumes.io.in(1).ready
-  io.ended(1)              := Pipe(result.fire && result.bits.isLast && isOccluded, result.bits.context)
+  if (config.frame.rays) {
+    val limits = Module(new HitLimits(config)).io
+    limits.rays                   := io.rays
+    limits.result                 := result.bits
+    hitTable.io.result.bits.isHit := limits.isHit
+  }
+  hitTable.io.isShadow := isShadow
+  result.ready         := isOccluded || !result.bits.isLast || resumes.io.in(1).ready
+  io.ended(1)          := Pipe(result.fire && result.bits.isLast && isOccluded, result.bits.context)
   hitTable.io.outcome :<>= io.outcome
 
   // A record with an illegal address is skipped

@@ -34,4 +34,7 @@ final class TraceResult(config: PathConfig) extends Bundle {
   /** What a shadow ray has met; the hit of another ray, if `hasHit`. */
   val occlusion = Occlusion()
   val hit       = new TriangleHit(config)
+
+  /** The hit triangle is not opaque. */
+  val isClear = Option.when(config.frame.rays)(Bool())
 }

@@ -104,6 +104,7 @@ final class TraversalUnit(config: TraversalConfig) extends Module {
   result.bits.hasHit                := intersector.outcome.hasHit
   result.bits.occlusion             := intersector.outcome.occlusion
   result.bits.hit                   := intersector.outcome.hit
+  result.bits.isClear.zip(intersector.outcome.isClear).foreach { case (to, from) => to := from }
   queue.io.enq :<>= result
   io.results :<>= queue.io.deq
 

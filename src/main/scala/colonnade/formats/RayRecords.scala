@@ -1,0 +1,91 @@
+package colonnade.formats
+
+import chisel3._
+import colonnade.axi.Axi
+import colonnade.numbers.Float32
+
+/** A ray of an application in memory: hits are those at tNear ≤ t ≤ tFar of origin + t · dir. Byte 0 is the lowest; a ray
+  * of a fan has the upper half alone. `driver/include/colonnade_rays.h` has the same formats in C.
+  */
+final class RayRecord extends Bundle {
+  val tFar   = new Float32
+  val dir    = Vec(3, new Float32)
+  val tNear  = new Float32
+  val origin = Vec(3, new Float32)
+}
+
+/** A hit in memory; a range is its lower half. */
+final class HitRecord extends Bundle {
+  val v  = new Float32
+  val u  = new Float32
+  val id = UInt(32.W) // with `HitRecord.backSide` and `HitRecord.clear`, or one of the values below
+  val t  = new Float32
+}
+
+object HitRecord {
+  val backSide:   BigInt = BigInt(1) << 31
+  val clear:      BigInt = BigInt(1) << 30
+  val miss:       BigInt = (BigInt(1) << 32) - 1
+  val outOfRange: BigInt = miss - 1
+}
+
+/** Where the scene lies among an application's rays. The application's unit has mantissa · 2^(exponent − 24) vertex units,
+  * and `base` is its position of (0, 0, 0), in steps of 2^(−gridFraction − exponent − 3): docs/numbers.md, section 9.
+  */
+final class RayPlacement extends Bundle {
+  val mantissa = UInt(Float32.mantissaBits.W)
+  val exponent = SInt(RayPlacement.exponentBits.W)
+  val base     = Vec3(SInt(RayPlacement.baseBits.W))
+}
+
+object RayPlacement {
+  val exponentBits: Int = 9
+  val baseBits:     Int = 64
+
+  /** Bits of `base` behind those of a grid step. */
+  val fractionBits: Int = 3
+}
+
+/** A batch of rays in memory, 64 bytes; byte 0 is the lowest. */
+final class RayBatch extends Bundle {
+  val reserved = UInt(64.W)
+  val done     = UInt(64.W) // address of 4 bytes, to which `tag` goes when all hits are in memory; 0: none
+  val tag      = UInt(32.W)
+  val tFar     = UInt(32.W) // reserved
+  val tNear    = new Float32
+  val origin   = Vec(3, new Float32)
+  val mode     = UInt(32.W)
+  val count    = UInt(32.W)
+  val hits     = UInt(64.W)
+  val rays     = UInt(64.W)
+
+  def response: UInt     = mode(1, 0)
+  def isFan: Bool        = mode(4)
+  def cullsFront: Bool   = mode(8)
+  def cullsBack: Bool    = mode(9)
+  def refusesClear: Bool = mode(10)
+  def isLocal: Bool      = mode(11)
+
+  /** A device holds no masks: a batch with another mask than all ones is refused. Addresses fit those of the port. */
+  def isLegal: Bool = {
+    val isAligned = rays(5, 0) === 0.U && hits(5, 0) === 0.U && done(1, 0) === 0.U
+    val isInReach = (rays | hits | done)(63, Axi.addressBits) === 0.U
+    val isKnown   = response =/= 3.U && (mode & ~RayBatch.modes.U(32.W)) === 0.U && mode(31, 24).andR
+    isAligned && isInReach && isKnown && count =/= 0.U && count <= RayBatch.maxCount.U
+  }
+}
+
+object RayBatch {
+  val bytes:    Int    = 64
+  val maxCount: BigInt = BigInt(1) << 24
+
+  /** Values of `response`. */
+  def hits: UInt     = 0.U(2.W)
+  def ranges: UInt   = 1.U(2.W)
+  def occluded: UInt = 2.U(2.W)
+
+  /** Of a tag: the batch was refused, or has failed. */
+  val errorBit: BigInt = BigInt(1) << 31
+
+  private val modes = BigInt("ff000f13", 16)
+}
