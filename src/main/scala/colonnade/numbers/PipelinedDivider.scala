@@ -3,7 +3,7 @@ package colonnade.numbers
 import chisel3._
 import chisel3.util.{Cat, RegEnable}
 
-final class PipelinedDividerIO(mantissaBits: Int, digits: Int, lanes: Int) extends Bundle {
+final class PipelinedDividerIO(mantissaBits: Int, digits: Int, lanes: Int, hasRest: Boolean) extends Bundle {
   val loads = Input(Vec(PipelinedDivider.stages(digits), Bool())) // stage i loads from the stage before
 
   /** The numerator's top bit is set, or it is zero; the denominator's top bit is set. */
@@ -11,6 +11,9 @@ final class PipelinedDividerIO(mantissaBits: Int, digits: Int, lanes: Int) exten
   val denominator = Input(UInt(mantissaBits.W))
 
   val quotients = Output(Vec(lanes, UInt((digits + 1).W))) // ⌊numerator · 2^digits / denominator⌋
+
+  /** A quotient is inexact. */
+  val rests = Option.when(hasRest)(Output(Vec(lanes, Bool())))
 }
 
 /** Divides mantissas as [[Divider]] does, a division a cycle in each lane. The lanes share the denominator.
@@ -21,13 +24,14 @@ final class PipelinedDividerIO(mantissaBits: Int, digits: Int, lanes: Int) exten
   *
   * @param digits fraction bits of the quotient
   * @param lanes  numerators that are divided by the same denominator
+  * @param hasRest it tells inexact quotients
   */
-final class PipelinedDivider(mantissaBits: Int, digits: Int, lanes: Int) extends Module {
+final class PipelinedDivider(mantissaBits: Int, digits: Int, lanes: Int, hasRest: Boolean = false) extends Module {
   import PipelinedDivider._
   require(mantissaBits >= 2, s"a divider of $mantissaBits-bit mantissas; they must have at least 2 bits")
   require(digits >= 0, s"a divider for $digits digits; it must be for at least 0")
 
-  val io = IO(new PipelinedDividerIO(mantissaBits, digits, lanes))
+  val io = IO(new PipelinedDividerIO(mantissaBits, digits, lanes, hasRest))
 
   /** A partial division: the remainder is less than twice the denominator. */
   private case class Partial(remainder: UInt, quotient: Option[UInt])
@@ -47,6 +51,7 @@ final class PipelinedDivider(mantissaBits: Int, digits: Int, lanes: Int) extends
     (next, RegEnable(denominator, io.loads(stage)))
   }
   io.quotients.zip(end).foreach { case (to, partial) => to := partial.quotient.get }
+  for (rests <- io.rests; (to, partial) <- rests.zip(end)) to := partial.remainder.orR
 }
 
 object PipelinedDivider {
