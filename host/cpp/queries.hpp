@@ -4,6 +4,7 @@
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "model/traversal.hpp"
 
@@ -35,6 +36,16 @@ public:
 private:
     std::istream& words_;
 };
+
+/// The bytes of records, which are hexadecimal words, the last digits first; and their number.
+inline std::pair<std::vector<std::uint8_t>, std::size_t> readRecordBytes(std::istream& words) {
+    std::vector<std::uint8_t> bytes;
+    std::size_t count = 0;
+    for (std::string digits; words >> digits; ++count)
+        for (std::size_t end = digits.size(); end > 0; end -= 2) bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
+    if (count == 0) throw std::invalid_argument("the scene has no records");
+    return {bytes, count};
+}
 
 class Reply {
 public:

@@ -2,9 +2,11 @@
 //
 //   ray    mantissa exponent base[3] isLocal, record[8]  -> kind tMin tMax origin[3] direction[3], kind: legal, refused, out of range
 //   hit    mantissa exponent dominant entry t weights[3] -> t u v
+//   image  low[3] high[3] mantissa exponent base[3], hexadecimal records: loads a scene; no reply
+//   batch  mode count origin[3] tnear, words of its rays -> words of its hits
 #pragma once
 #include "queries.hpp"
-#include "rays/conversion.hpp"
+#include "rays/tracer.hpp"
 
 namespace colonnade {
 
@@ -57,5 +59,53 @@ inline void replyHit(Query& query, const Numbers& n, int directionBits) {
     const colonnade_rays_response response = converter.hitOf(converted, ray, hit);
     (Reply() << bitsOf(response.t) << bitsOf(response.u) << bitsOf(response.v)).print();
 }
+
+/// Batches of rays in a scene.
+class RayBatches {
+public:
+    void load(Query& query, std::istream& words, const rays::Model& model) {
+        model_ = std::make_unique<rays::Model>(model);
+        image_ = {};
+        for (auto* bounds : {image_.bounds_low, image_.bounds_high})
+            for (int a = 0; a < 3; ++a) bounds[a] = static_cast<std::int32_t>(query.number());
+        image_.scale_mantissa = static_cast<std::uint32_t>(query.number());
+        image_.scale_exponent = static_cast<std::int32_t>(query.number());
+        for (std::int64_t& base : image_.base) base = query.number();
+        std::tie(records_, image_.record_count) = readRecordBytes(words);
+        image_.records = records_.data();
+        image_.record_bytes = records_.size() / image_.record_count;
+        const colonnade_rays_backend backend = model_->backend();
+        backend.load(backend.context, &image_);
+    }
+
+    void reply(Query& query) {
+        colonnade_rays_batch batch{};
+        batch.mode = static_cast<std::uint32_t>(query.number());
+        batch.count = static_cast<std::uint32_t>(query.number());
+        for (float& each : batch.origin) each = floatOf(query.number());
+        batch.tnear = floatOf(query.number());
+        const std::uint32_t form = batch.mode & COLONNADE_RAYS_RESPONSE;
+        const std::size_t rayWords = batch.mode & COLONNADE_RAYS_FAN ? 4 : 8;
+        const std::size_t hitWords = form == COLONNADE_RAYS_OCCLUDED ? (batch.count + 63) / 64 * 2 : batch.count * (form == COLONNADE_RAYS_HITS ? 4 : 2);
+        std::vector<Line> rays(batch.count * rayWords / 16 + 1), hits(hitWords / 16 + 1);
+        for (std::size_t i = 0; i < batch.count * rayWords; ++i) rays[i / 16].words[i % 16] = static_cast<std::uint32_t>(query.number());
+        batch.rays = reinterpret_cast<std::uintptr_t>(rays.data());
+        batch.hits = reinterpret_cast<std::uintptr_t>(hits.data());
+        const colonnade_rays_backend backend = model_->backend();
+        if (backend.submit(backend.context, &batch) != COLONNADE_RAYS_OK) throw std::invalid_argument("the model refuses the batch");
+        Reply reply;
+        for (std::size_t i = 0; i < hitWords; ++i) reply << hits[i / 16].words[i % 16];
+        reply.print();
+    }
+
+private:
+    struct alignas(64) Line {
+        std::uint32_t words[16];
+    };
+
+    std::unique_ptr<rays::Model> model_;
+    colonnade_rays_image image_{};
+    std::vector<std::uint8_t> records_;
+};
 
 } // namespace colonnade

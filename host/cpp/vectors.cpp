@@ -284,11 +284,7 @@ public:
     }
 
     void readRecords(std::istream& words) {
-        std::size_t count = 0;
-        std::vector<std::uint8_t> bytes;
-        for (std::string digits; words >> digits; ++count)
-            for (std::size_t end = digits.size(); end > 0; end -= 2) bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
-        if (count == 0) throw std::invalid_argument("the scene has no records");
+        const auto [bytes, count] = readRecordBytes(words);
         device_.emplace(numbers_, layouts_);
         device_->load(bytes.data(), count, bytes.size() / count);
     }
@@ -325,6 +321,7 @@ int main() try {
     const auto directionBits = static_cast<int>(lookUp(values, "directionBits"));
     Scene scene(numbers);
     EnvironmentQueries environment;
+    RayBatches batches;
     while (std::getline(std::cin, line)) {
         std::istringstream words(line);
         words >> kind;
@@ -338,6 +335,8 @@ int main() try {
         else if (kind == "lightenvironment") replyEnvironmentLight(query, numbers);
         else if (kind == "ray") replyRay(query, numbers, directionBits);
         else if (kind == "hit") replyHit(query, numbers, directionBits);
+        else if (kind == "image") batches.load(query, words, rays::Model(numbers, directionBits, scene.layouts()));
+        else if (kind == "batch") batches.reply(query);
         else if (kind == "bounce") replyBounce(query, numbers);
         else if (kind == "cornernormal") replyCornerNormal(query, numbers);
         else if (kind == "geometricnormal") replyGeometricNormal(query, numbers);

@@ -30,17 +30,12 @@ object Model {
       positions:   Seq[(Int, Int)],
       environment: Option[Map[String, Seq[BigInt]]] = None
   ): Seq[Seq[BigInt]] = {
-    val formats = new RecordFormats(config)
-    val layouts = formats.kinds.map { case (name, kind) => layout(name, kind) }
-    val digits  = formats.recordBits / 4
-    val hex     = records.map(record => "0" * (digits - record.toString(16).length) + record.toString(16))
-    val scene   =
-      s"records ${hex.mkString(" ")}"
+    val scene = s"records ${hexadecimal(config, records)}"
     val written = registers.map { case (name, value) => s"$name=$value" }.mkString("registers ", " ", "")
     val maps    = environment.toSeq.flatMap(environmentOf(config, _))
     answers(
       config,
-      layouts ++ maps ++ Seq(scene, written),
+      recordLayouts(config) ++ maps ++ Seq(scene, written),
       positions.map { case (x, y) => Seq(BigInt(x), BigInt(y)) },
       "pixel"
     )
@@ -49,6 +44,23 @@ object Model {
   /** Runs the model on questions about leaves. */
   def leaves(config: ColonnadeConfig, questions: Seq[Seq[BigInt]], kind: String): Seq[Seq[BigInt]] =
     answers(config, LeafRecord.kinds(config.geometry).map { case (name, kind) => layout(name, kind) }, questions, kind)
+
+  /** Words of the hits of batches of rays; ray_queries.hpp documents the questions.
+    *
+    * @param image  what comes before the records there
+    */
+  def batches(
+      config:    ColonnadeConfig,
+      image:     Seq[BigInt],
+      records:   Seq[BigInt],
+      questions: Seq[Seq[BigInt]]
+  ): Seq[Seq[BigInt]] =
+    answers(
+      config,
+      recordLayouts(config) :+ s"image ${image.mkString(" ")} ${hexadecimal(config, records)}",
+      questions,
+      "batch"
+    )
 
   /** Runs the model on questions about the environment's maps; environment_queries.hpp documents their format.
     *
@@ -68,6 +80,15 @@ object Model {
       s"words ${memory.name} ${(memory.bits + 7) / 8} ${words(memory.name).map(_.toString(16)).mkString(" ")}"
     }
     layouts ++ Seq(sizes.mkString("sizes ", " ", "")) ++ contents
+  }
+
+  private def recordLayouts(config: ColonnadeConfig): Seq[String] = {
+    new RecordFormats(config).kinds.map { case (name, kind) => layout(name, kind) }
+  }
+
+  private def hexadecimal(config: ColonnadeConfig, records: Seq[BigInt]): String = {
+    val digits = new RecordFormats(config).recordBits / 4
+    records.map(record => "0" * (digits - record.toString(16).length) + record.toString(16)).mkString(" ")
   }
 
   private def layout(name: String, kind: Data): String = {
@@ -117,6 +138,7 @@ object Model {
         "g++",
         "-std=c++17",
         "-O2",
+        "-pthread",
         "-I",
         sources.toString,
         "-I",

@@ -1,14 +1,12 @@
 package colonnade.column
 
 import chisel3._
-import chisel3.experimental.hierarchy.{Definition, Instance}
-import chisel3.experimental.noPrefix
 import chisel3.util.{Decoupled, Valid}
 import colonnade.config.{ColonnadeConfig, PathConfig, TraversalConfig}
 import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitPosition}
 import colonnade.shading.{CubePort, TexturePort}
-import colonnade.unit.{AttributeFetch, FetchEvents, PathEvents, PathHits, PathUnit, TraversalEvents, TraversalUnit}
+import colonnade.unit.{AttributeFetch, FetchEvents, PathEvents, PathHits, PathUnit, TraversalEvents}
 
 /** Events of a [[PathTracer]] in one cycle. */
 final class PathTracerEvents(config: ColonnadeConfig) extends Bundle {
@@ -53,14 +51,10 @@ abstract class PathTracerModule(config: ColonnadeConfig) extends Module {
 final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config) {
   private val pathConfig = PathConfig(config)
 
-  // A definition: the unit is elaborated once, not once per row. Without prefix the instances are TraversalUnit, TraversalUnit_1…
-  private val definition = Definition(new TraversalUnit(TraversalConfig(config)))
-  private val traversals = Seq.fill(config.array.rows)(noPrefix(Instance(definition)).io)
-  private val paths      = Module(new PathUnit(pathConfig)).io
-  private val hits       = Module(new PathHits(pathConfig)).io
-  private val rays       = Module(new RayBus(config)).io
-  private val results    = Module(new ResultBus(config)).io
-  private val scene      = io.registers.scene
+  private val rows  = new TraversalRows(config)
+  private val paths = Module(new PathUnit(pathConfig)).io
+  private val hits  = Module(new PathHits(pathConfig)).io
+  private val scene = io.registers.scene
 
   // Pixels
   paths.registers := io.registers
@@ -73,35 +67,18 @@ final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config)
 
   // Rays and their results
   hits.trace :<>= paths.trace
-  rays.rays :<>= hits.rays
-  hits.results := results.results
-  for ((unit, row) <- traversals.zipWithIndex) {
-    unit.row         := row.U
-    unit.scene       := scene
-    unit.start       := io.start
-    unit.rays        := rays.units(row)
-    rays.isFree(row) := unit.isFree
-    results.units(row) :<>= unit.results
-  }
-  for (rows <- traversals.grouped(config.units.triangleRows)) {
-    val group = Module(new TriangleGroup(config, rows.size)).io
-    for ((unit, row) <- rows.zipWithIndex) {
-      unit.triangleLanes :<>= group.rows(row)
-      group.waits(row) := unit.waitsForTriangles
-    }
-  }
+  hits.results := rows.connect(hits.rays, scene, io.start, io.broadcasts)
 
   // Records
   hits.start := io.start
   hits.scene := scene
-  for ((port, requests) <- io.requests.zip(traversals.map(_.requests) :+ hits.requests)) port :<>= requests
-  traversals.foreach(_.broadcasts := io.broadcasts)
+  for ((port, requests) <- io.requests.zip(rows.units.map(_.requests) :+ hits.requests)) port :<>= requests
   hits.broadcasts := io.broadcasts
   for ((wants, material) <- hits.wantsColours.toSeq.flatten.zip(io.registers.materials))
     wants := material.hasCornerColours.getOrElse(false.B) || material.hasTexture.getOrElse(false.B)
 
   io.isIdle := paths.isIdle && !io.requests.map(_.valid).reduce(_ || _)
-  for ((events, unit) <- io.events.traversal.zip(traversals)) events := unit.events
+  for ((events, unit) <- io.events.traversal.zip(rows.units)) events := unit.events
   io.events.paths                                                    := paths.events
   io.events.attributes                                               := hits.events
 }

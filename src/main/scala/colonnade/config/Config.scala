@@ -209,6 +209,7 @@ final case class ColonnadeConfig(
     Require("frame.rays", frame.maxBounces == 0, "needs frame.maxBounces=0")
     Require("frame.rays", physicalAttributeMemory.isEmpty, "needs physicalAttributeMemory=null")
     Require("frame.rays", units.rayInterval == 1, "needs units.rayInterval=1")
+    Require("frame.rays", units.pathContexts == UnitsConfig.maxPathContexts, "needs units.pathContexts=256")
     Require("frame.rays", numbers.gridBits <= 38, "needs geometry.triangleBits of at most 38")
     Require("frame.rays", numbers.directionBits <= 64, "needs precision.mac and frame.maxWidth for 64-bit directions")
   }

@@ -89,3 +89,15 @@ object RayBatch {
 
   private val modes = BigInt("ff000f13", 16)
 }
+
+/** The ring of batches in memory: 2^sizeLog of them from `base` on, a multiple of 64. */
+final class RayRing extends Bundle {
+  val base    = UInt(Axi.addressBits.W)
+  val sizeLog = UInt(4.W)
+}
+
+object RayRing {
+
+  /** Of head and tail, which count batches; the ring has fewer. */
+  val indexBits: Int = 16
+}

@@ -1,0 +1,126 @@
+package colonnade.query
+
+import chisel3._
+import chisel3.util.{log2Ceil, Cat, Decoupled, Fill}
+import colonnade.axi.{Axi, AxiReadPort, AxiWritePort}
+import colonnade.formats.{RayBatch, RayRing}
+
+/** `ring` is constant while batches run. */
+final class BatchReaderIO(columns: Int) extends Bundle {
+  val ring  = Input(new RayRing)
+  val tail  = Input(UInt(RayRing.indexBits.W))
+  val head  = Output(UInt(RayRing.indexBits.W))
+  val read  = new AxiReadPort(1, RayBatch.bytes)
+  val write = new AxiWritePort(1, RayBatch.bytes)
+
+  /** A batch starts; it is constant while its runs run, of which some end, or fail. */
+  val start  = Output(Bool())
+  val batch  = Output(new RayBatch)
+  val runs   = Decoupled(new Run)
+  val ended  = Input(UInt(log2Ceil(2 * columns + 1).W))
+  val failed = Input(Bool())
+
+  /** Pulses: a batch is refused, or has failed; rays of a batch are done. */
+  val isError  = Output(Bool())
+  val answered = Output(UInt(32.W))
+  val isBusy   = Output(Bool())
+}
+
+/** Reads batches from a ring in memory, hands out their runs, and writes their tags: one batch after the other.
+  *
+  * An illegal batch has no runs. Its tag, and that of a batch of which a run has failed, have the error bit. A batch that
+  * cannot be read has no tag.
+  */
+final class BatchReader(columns: Int) extends Module {
+  val io = IO(new BatchReaderIO(columns))
+
+  private object State extends ChiselEnum {
+    val idle, asking, reading, checking, running, writing, sending, ending = Value
+  }
+  import State._
+
+  private val state  = RegInit(idle)
+  private val head   = RegInit(0.U(RayRing.indexBits.W))
+  private val batch  = Reg(new RayBatch)
+  private val left   = RegInit(0.U(32.W)) // rays that are in no run yet
+  private val rays   = Reg(UInt(Axi.addressBits.W))
+  private val hits   = Reg(UInt(Axi.addressBits.W))
+  private val inRuns = RegInit(0.U(32.W)) // runs that have not ended
+  private val failed = Reg(Bool())
+  io.head   := head
+  io.batch  := batch
+  io.isBusy := state =/= idle || io.tail =/= head
+
+  // Read a batch
+  private val slot = (head & ((1.U << io.ring.sizeLog) - 1.U)(RayRing.indexBits - 1, 0))
+  private val ar   = io.read.ar
+  ar.valid        := state === asking
+  ar.bits.id      := 0.U
+  ar.bits.addr    := Cat(io.ring.base >> 6, 0.U(6.W)) + Cat(slot, 0.U(6.W))
+  ar.bits.len     := 0.U
+  ar.bits.size    := Axi.size(RayBatch.bytes)
+  ar.bits.burst   := Axi.incr
+  io.read.r.ready := state === reading
+  private val isUnread = io.read.r.bits.resp =/= Axi.okay
+  private val isLegal  = batch.isLegal
+  io.start := state === checking && isLegal
+
+  // Hand out its runs
+  private val count  = Mux(left > Run.rays.U, Run.rays.U, left)
+  private val hitLog = Mux(batch.response === RayBatch.hits, 10.U, Mux(batch.response === RayBatch.ranges, 9.U, 3.U))
+  private val begins = io.runs.fire
+  io.runs.valid      := state === running && left =/= 0.U
+  io.runs.bits.rays  := rays
+  io.runs.bits.hits  := hits
+  io.runs.bits.count := count
+  when(begins) {
+    left := left - count
+    rays := rays + Mux(batch.isFan, (16 * Run.rays).U, (32 * Run.rays).U)
+    hits := hits + (1.U << hitLog)
+  }
+  inRuns := inRuns + begins - io.ended
+  when(io.failed) { failed := true.B }
+
+  // Write its tag
+  private val aw = io.write.aw
+  private val w  = io.write.w
+  aw.valid         := state === writing
+  aw.bits.id       := 0.U
+  aw.bits.addr     := Cat(batch.done(Axi.addressBits - 1, 6), 0.U(6.W))
+  aw.bits.len      := 0.U
+  aw.bits.size     := Axi.size(RayBatch.bytes)
+  aw.bits.burst    := Axi.incr
+  w.valid          := state === sending
+  w.bits.data      := Fill(16, batch.tag | Mux(failed, RayBatch.errorBit.U, 0.U))
+  w.bits.strb      := 15.U << Cat(batch.done(5, 2), 0.U(2.W))
+  w.bits.last      := true.B
+  io.write.b.ready := state === ending
+
+  private val isDone    = state === running && left === 0.U && inRuns === 0.U
+  private val leaves    = isDone && batch.done === 0.U || io.write.b.fire || (io.read.r.fire && isUnread)
+  private val isTagless = state === checking && !isLegal &&
+    (batch.done === 0.U || batch.done(1, 0) =/= 0.U || (batch.done >> Axi.addressBits) =/= 0.U)
+  when(state === idle && io.tail =/= head) { state := asking }
+  when(ar.fire) { state := reading }
+  when(io.read.r.fire) {
+    batch := io.read.r.bits.data.asTypeOf(batch)
+    state := checking
+  }
+  when(state === checking) {
+    state  := Mux(isLegal, running, writing)
+    left   := batch.count
+    rays   := batch.rays
+    hits   := batch.hits
+    failed := !isLegal
+  }
+  when(isDone) { state := writing }
+  when(aw.fire) { state := sending }
+  when(w.fire) { state := ending }
+  when(leaves || isTagless) {
+    state := idle
+    head  := head + 1.U
+  }
+  io.isError := (leaves && (failed || isUnread && state === reading)) || isTagless ||
+    (io.write.b.fire && io.write.b.bits.resp =/= Axi.okay)
+  io.answered := Mux(isDone, batch.count, 0.U)
+}

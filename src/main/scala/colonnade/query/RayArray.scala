@@ -1,0 +1,102 @@
+package colonnade.query
+
+import chisel3._
+import chisel3.experimental.hierarchy.{Definition, Instance}
+import chisel3.util.{Decoupled, Pipe}
+import colonnade.axi.{AxiReadPort, AxiWritePort}
+import colonnade.common.{Dispatcher, TimingSlice}
+import colonnade.config.ColonnadeConfig
+import colonnade.formats.{Load, RayBatch, RayRing, SceneInDram}
+import colonnade.memory.{DramPort, SceneMemory, SharedCache}
+
+final class RayArrayIO(config: ColonnadeConfig) extends Bundle {
+  private val ids = RayPort.idBits(config.array.columns + 1)
+
+  val ring  = Input(new RayRing)                   // constant while batches run, and so is the scene
+  val scene = Input(new RayScene(config))
+  val page  = config.columnBvhMemory.cache.map(_ => Input(UInt(SceneInDram.pageBits.W)))
+  val tail  = Input(UInt(RayRing.indexBits.W))
+  val head  = Output(UInt(RayRing.indexBits.W))
+  val load  = Flipped(Decoupled(new Load(config))) // ready while no batch runs
+
+  /** Batches, rays and hits; with a cache, the scene. */
+  val read   = new AxiReadPort(ids, RayBatch.bytes)
+  val write  = new AxiWritePort(ids, RayBatch.bytes)
+  val memory = config.columnBvhMemory.cache.map(_ => DramPort(config))
+
+  /** For verification, as of [[colonnade.ColonnadeIO]]. */
+  val memoryHolds = Option.when(config.columnBvhMemory.holdable)(
+    Input(UInt((config.array.columns * config.columnBvhMemory.banks).W))
+  )
+
+  /** The caches forget the scene before the next batch. */
+  val invalidate = Input(Bool())
+  val isBusy     = Output(Bool())
+  val events     = Output(Vec(config.array.columns, new RayEvents(config)))
+
+  /** Pulses; rays whose hits are in memory. */
+  val batchError  = Output(Bool())
+  val memoryError = Output(Bool())
+  val answered    = Output(UInt(32.W))
+}
+
+/** The columns of a device for rays, and the reader of batches that gives them runs. */
+final class RayArray(config: ColonnadeConfig) extends Module {
+  val io = IO(new RayArrayIO(config))
+
+  private val reader     = Module(new BatchReader(config.array.columns)).io
+  private val definition = Definition(new RayColumn(config)) // elaborated once, not once per column
+  private val columns    = Seq.fill(config.array.columns)(Instance(definition).io)
+  private val port       = Module(new RayPort(columns.size + 1)).io
+  private val dispatch   = Module(new Dispatcher(new Run, columns.size)).io
+  private val load       = Pipe(io.load.fire, io.load.bits)
+  io.load.ready := !reader.isBusy
+
+  reader.ring := io.ring
+  reader.tail := io.tail
+  io.head     := reader.head
+  io.isBusy   := reader.isBusy
+  dispatch.items :<>= reader.runs
+  for ((column, index) <- columns.zipWithIndex) {
+    column.scene := io.scene
+    column.batch := reader.batch
+    column.start := reader.start
+    column.load  := load
+    column.runs :<>= dispatch.takers(index)
+    port.reads(index) :<>= column.read
+    port.writes(index) :<>= column.write
+    io.events(index)                                    := column.events
+    for (to <- column.holds; from <- io.memoryHolds) to := from >> (index * config.columnBvhMemory.banks)
+  }
+  port.reads.last :<>= reader.read
+  port.writes.last :<>= reader.write
+  io.read :<>= port.read
+  io.write :<>= port.write
+
+  // The scene in DRAM
+  private val sceneMemory = config.columnBvhMemory.cache.map(_ => Module(new SceneMemory(config)).io)
+  private val isWrong     = columns.flatMap(_.memoryError).fold(false.B)(_ || _) // by parity
+  private val hasFailed   = sceneMemory.fold(false.B)(_.events.error) || isWrong
+  for (memory <- sceneMemory) {
+    val isStale    = RegInit(false.B)
+    val invalidate = isStale && reader.start
+    isStale     := (isStale && !invalidate) || io.invalidate || hasFailed
+    memory.page := io.page.get
+    io.memory.get :<>= memory.axi
+    val forgets = TimingSlice.flag(invalidate)
+    memory.invalidate := forgets
+    for (((column, requests), index) <- columns.zip(memory.requests).zipWithIndex) {
+      requests :<>= column.lineRequests.get
+      column.lines.get      := memory.lines(SharedCache.busOf(config, index))
+      column.invalidate.get := forgets
+    }
+  }
+
+  // A batch fails with its runs, and with what its rays read
+  private val isIllegal = io.events.map(events => events.stackOverflow || events.illegalRecord).reduce(_ || _)
+  reader.ended   := columns.map(_.ended).reduce(_ +& _)
+  reader.failed  := columns.map(_.failed).reduce(_ || _) || isIllegal || hasFailed
+  io.batchError  := reader.isError
+  io.memoryError := hasFailed
+  io.answered    := reader.answered
+}

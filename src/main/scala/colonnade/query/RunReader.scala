@@ -1,0 +1,127 @@
+package colonnade.query
+
+import chisel3._
+import chisel3.util.{log2Ceil, Cat, Decoupled, Queue, Valid}
+import colonnade.axi.{Axi, AxiReadPort}
+import colonnade.config.PathConfig
+import colonnade.formats.{RayBatch, RayRecord}
+
+/** Consecutive rays of a batch, as many as a block of hits holds. */
+final class Run extends Bundle {
+  val rays  = UInt(Axi.addressBits.W)
+  val hits  = UInt(Axi.addressBits.W)
+  val count = UInt(log2Ceil(Run.rays + 1).W)
+}
+
+object Run {
+  val rays:   Int = 64
+  val blocks: Int = 4
+
+  /** Beats of a burst, which begins at any and ends at a multiple of this length: it crosses no 4 KB. */
+  val burstBeats: Int = 16
+  val beatBits:   Int = 8 * RayBatch.bytes
+
+  /** Beats up to the end of a burst at an address. */
+  def beatsAt(address: UInt, left: UInt): UInt = {
+    val low  = log2Ceil(RayBatch.bytes)
+    val most = burstBeats.U -& address(low + log2Ceil(burstBeats) - 1, low)
+    Mux(left < most, left, most)
+  }
+
+  def block(context: UInt): UInt = context(log2Ceil(rays * blocks) - 1, log2Ceil(rays))
+}
+
+final class RunReaderIO(config: PathConfig) extends Bundle {
+  val batch = Input(new RayBatch)                 // constant while its runs are read
+  val runs  = Flipped(Decoupled(new Run))
+  val block = Input(UInt(log2Ceil(Run.blocks).W)) // of the run
+  val axi   = new AxiReadPort(1, RayBatch.bytes)
+  val rays  = Decoupled(new BatchRay(config))
+
+  /** A read of the block's rays has failed. */
+  val failed = Valid(UInt(log2Ceil(Run.blocks).W))
+}
+
+/** Reads the rays of runs by bursts. A burst is read when all its beats have a place, so that the port never waits for the
+  * rays before it.
+  */
+final class RunReader(config: PathConfig) extends Module {
+  import RunReader._
+
+  val io = IO(new RunReaderIO(config))
+
+  private val isFan = io.batch.isFan
+
+  // Addresses
+  private val address  = Reg(UInt(Axi.addressBits.W))
+  private val left     = RegInit(0.U(log2Ceil(Run.rays + 1).W))
+  private val reserved = RegInit(0.U(log2Ceil(places + 1).W))
+  private val begun    = Module(new Queue(new BegunRun, Run.blocks)).io
+  private val beats    = Module(new Queue(new ReadBeat, places, useSyncReadMem = true)).io
+  private val burst    = Run.beatsAt(address, left)
+  private val ar       = io.axi.ar
+  io.runs.ready        := left === 0.U && begun.enq.ready
+  begun.enq.valid      := io.runs.valid && left === 0.U
+  begun.enq.bits.block := io.block
+  begun.enq.bits.count := io.runs.bits.count
+  ar.valid             := left =/= 0.U && reserved +& burst <= places.U
+  ar.bits.id           := 0.U
+  ar.bits.addr         := address
+  ar.bits.len          := burst - 1.U
+  ar.bits.size         := Axi.size(RayBatch.bytes)
+  ar.bits.burst        := Axi.incr
+  when(ar.fire) {
+    address := address + (burst << log2Ceil(RayBatch.bytes))
+    left    := left - burst
+  }
+  when(io.runs.fire) {
+    address := io.runs.bits.rays
+    left    := Mux(isFan, (io.runs.bits.count +& 3.U) >> 2, (io.runs.bits.count +& 1.U) >> 1)
+  }
+  reserved := reserved + Mux(ar.fire, burst, 0.U) - beats.deq.fire
+
+  // Beats, each of which has a place
+  beats.enq.valid        := io.axi.r.valid
+  beats.enq.bits.data    := io.axi.r.bits.data
+  beats.enq.bits.isError := io.axi.r.bits.resp =/= Axi.okay
+  io.axi.r.ready         := true.B
+  assert(!io.axi.r.valid || beats.enq.ready, "a beat of rays has no place")
+
+  // Rays
+  private val index    = RegInit(0.U(log2Ceil(Run.rays).W))
+  private val run      = begun.deq.bits
+  private val isLast   = index +& 1.U === run.count
+  private val slot     = Mux(isFan, index(1, 0), index(0) ## 0.U(1.W))
+  private val quarters = VecInit(Seq.tabulate(4)(i => beats.deq.bits.data(128 * i + 127, 128 * i)))
+  private val ofBatch  = Cat(io.batch.tNear.asUInt, io.batch.origin.asUInt)
+  private val record   = Mux(isFan, Cat(quarters(slot), ofBatch), Cat(quarters(slot | 1.U), quarters(slot)))
+  io.rays.valid                    := beats.deq.valid && begun.deq.valid
+  io.rays.bits.context             := Cat(run.block, index)
+  io.rays.bits.isOccluded          := io.batch.response === RayBatch.occluded
+  io.rays.bits.isLocal             := io.batch.isLocal
+  io.rays.bits.filter.cullsFront   := io.batch.cullsFront
+  io.rays.bits.filter.cullsBack    := io.batch.cullsBack
+  io.rays.bits.filter.refusesClear := io.batch.refusesClear
+  io.rays.bits.record              := record.asTypeOf(new RayRecord)
+  beats.deq.ready                  := io.rays.fire && (isLast || slot(1) && (slot(0) || !isFan))
+  begun.deq.ready                  := io.rays.fire && isLast
+  when(io.rays.fire) { index := Mux(isLast, 0.U, index + 1.U) }
+  io.failed.valid := beats.deq.fire && beats.deq.bits.isError
+  io.failed.bits  := run.block
+}
+
+object RunReader {
+
+  /** Beats that are read or awaited: a run's. */
+  private val places = 2 * Run.burstBeats
+}
+
+final private class BegunRun extends Bundle {
+  val block = UInt(log2Ceil(Run.blocks).W)
+  val count = UInt(log2Ceil(Run.rays + 1).W)
+}
+
+final private class ReadBeat extends Bundle {
+  val data    = UInt(Run.beatBits.W)
+  val isError = Bool()
+}
