@@ -32,7 +32,7 @@ struct colonnade_rays_batch {
     uint32_t count, mode;    /* 1 to 2^24 rays; the bits below */
     float origin[3];         /* of the form `fan` */
     float tnear, tfar;       /* tnear of the form `fan`; tfar is reserved */
-    uint32_t tag;            /* written to `done` when all hits are in memory */
+    uint32_t tag;            /* written to `done` when all hits are in memory; bit 31: refused, or failed */
     uint64_t done, reserved; /* 4 bytes at `done`; 0 */
 };
 

@@ -87,6 +87,16 @@ def test_rays_are_those_of_exact_arithmetic(config: str) -> None:
     assert min(kinds) > 30
 
 
+def test_limits_at_the_ends_of_their_range() -> None:
+    """A tfar of 0 along a direction of any length; a tnear that rounds up to 2^33 steps."""
+    numbers = numbers_of("edge")
+    ray = np.float32([[0, 0, 0, 0, 0, 0, 3e38, 0], [0, 0, 0, 8345589, 0, 0, 11242465 / 2**23, inf]])
+    _, last = (values[6:] for _, values, *_ in _core.convert_rays(numbers, ray, True, 0xC00000, 5, (0, 0, 0)))
+    first, _ = (values[6:] for _, values, *_ in _core.convert_rays(numbers, ray, True, 0xC00000, 110, (0, 0, 0)))
+    assert tuple(first) == (0, 1)
+    assert tuple(last) == ((1 << 33) - 1, (1 << 33) - 1)
+
+
 def test_local_origins_have_no_base() -> None:
     numbers = numbers_of("edge")
     ray = np.float32([[0.5, -1, 2, 0, 0, 0, -3, 9]])

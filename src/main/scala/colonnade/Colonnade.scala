@@ -41,7 +41,7 @@ final class Colonnade(config: ColonnadeConfig, pathTracer: ColonnadeConfig => Pa
     extends Module {
   val io = IO(new ColonnadeIO(config))
 
-  private val registers  = Module(new RegisterFile(config))
+  private val registers  = Module(RegisterFile.ofFrames(config))
   private val controller = Module(new FrameController(config))
   private val counters   = Module(new CounterFile(config))
   private val clears     = reset.asBool || controller.io.aborts

@@ -55,7 +55,8 @@ object Generate {
     }
 
   private def top(config: ColonnadeConfig, axi: Option[ShellConfig]): RawModule =
-    axi.fold[RawModule](new Colonnade(config))(new ColonnadeAxi(config, _))
+    if (config.frame.rays) new ColonnadeRays(config)
+    else axi.fold[RawModule](new Colonnade(config))(new ColonnadeAxi(config, _))
 
   private def generate(options: Options): Unit = {
     if (options.pixelStream && options.axi.isEmpty)
@@ -63,6 +64,8 @@ object Generate {
     val axi    = options.axi.map(_.copy(pixelStream = options.pixelStream))
     val name   = options.config.getOrElse(throw new ConfigError("--config is missing; see --help"))
     val config = ConfigIO.load(name, options.overrides)
+    if (config.frame.rays && axi.nonEmpty)
+      throw new ConfigError("a device with frame.rays has no AXI4 shell: leave --axi out")
     if (options.output.isEmpty && options.formatsPage.isEmpty)
       throw new ConfigError("--output is missing; see --help")
 
@@ -71,7 +74,8 @@ object Generate {
       OutputFiles.replaceDirectory(path(directory)) { fresh =>
         if (!options.manifestOnly) {
           Emit(top(config, axi), fresh, options.blackBoxMemories)
-          CoreFile.write(if (options.axi.isEmpty) "Colonnade" else "ColonnadeAxi", fresh)
+          val name = if (config.frame.rays) "ColonnadeRays" else if (axi.isEmpty) "Colonnade" else "ColonnadeAxi"
+          CoreFile.write(name, fresh)
         }
         OutputFiles.writeFile(fresh.resolve("manifest.json"), formats.Json.pretty(Manifest(config)))
         for (shell <- axi) OutputFiles.writeFile(fresh.resolve("shell.json"), ShellMap.json(config, shell))

@@ -45,20 +45,20 @@ object Model {
   def leaves(config: ColonnadeConfig, questions: Seq[Seq[BigInt]], kind: String): Seq[Seq[BigInt]] =
     answers(config, LeafRecord.kinds(config.geometry).map { case (name, kind) => layout(name, kind) }, questions, kind)
 
-  /** Words of the hits of batches of rays; ray_queries.hpp documents the questions.
+  /** Words of the hits of batches of rays; ray_queries.hpp documents the queries.
     *
     * @param image  what comes before the records there
     */
   def batches(
-      config:    ColonnadeConfig,
-      image:     Seq[BigInt],
-      records:   Seq[BigInt],
-      questions: Seq[Seq[BigInt]]
+      config:  ColonnadeConfig,
+      image:   Seq[BigInt],
+      records: Seq[BigInt],
+      queries: Seq[Seq[BigInt]]
   ): Seq[Seq[BigInt]] =
     answers(
       config,
       recordLayouts(config) :+ s"image ${image.mkString(" ")} ${hexadecimal(config, records)}",
-      questions,
+      queries,
       "batch"
     )
 

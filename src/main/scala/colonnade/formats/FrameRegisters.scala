@@ -126,8 +126,14 @@ object SceneInDram {
   val pageBits:    Int = addressBits - pageLog
 }
 
+/** Registers with the sections of a scene. */
+trait SceneRegisters { def scene: SceneMap }
+
+/** Registers that tell whether the device is busy. */
+trait BusyRegisters { def status: Status }
+
 /** The registers that the host writes before a frame. Constant while a frame runs. */
-final class FrameRegisters(config: ColonnadeConfig) extends Bundle {
+final class FrameRegisters(config: ColonnadeConfig) extends Bundle with SceneRegisters {
   private val numbers = config.numbers
 
   val frame       = new FrameSettings(numbers)
@@ -259,7 +265,7 @@ object Counters {
 }
 
 /** The registers that the host reads. */
-final class DeviceStatus(config: ColonnadeConfig) extends Bundle {
+final class DeviceStatus(config: ColonnadeConfig) extends Bundle with BusyRegisters {
   val status   = new Status
   val errors   = new Errors(config)
   val counters = new Counters(config)

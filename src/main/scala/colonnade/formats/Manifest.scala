@@ -21,9 +21,11 @@ object Manifest {
       "dataBits" -> RegisterMap.dataBits,
       "fields"   -> ujson.Arr.from(RegisterMap(config).map(register))
     )
-    val streams = ujson.Obj(
-      "pixel" -> fields(Layout.of(new Pixel(config))),
-      "load"  -> fields(Layout.of(new Load(config)))
+    val outputs =
+      if (config.frame.rays) Seq("batch" -> new RayBatch, "ray" -> new RayRecord, "hit" -> new HitRecord)
+      else Seq("pixel"                   -> new Pixel(config))
+    val streams = ujson.Obj.from(
+      (outputs :+ "load" -> new Load(config)).map { case (name, kind) => name -> fields(Layout.of(kind)) }
     )
     val memories = ujson.Obj(
       "columnBvh" -> ujson.Obj(

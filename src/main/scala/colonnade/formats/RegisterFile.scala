@@ -1,7 +1,7 @@
 package colonnade.formats
 
 import chisel3._
-import chisel3.util.{log2Ceil, Cat, UIntToOH}
+import chisel3.util.{log2Ceil, Cat, RegEnable, UIntToOH}
 import colonnade.config.ColonnadeConfig
 
 /** The host's port to the registers: one word per cycle. */
@@ -15,31 +15,45 @@ final class RegisterPort(addressBits: Int) extends Bundle {
   val readData = Output(UInt(RegisterMap.dataBits.W))
 }
 
-final class RegisterFileIO(config: ColonnadeConfig) extends Bundle {
+final class RegisterFileIO[S <: Bundle with SceneRegisters, D <: Bundle with BusyRegisters](
+    config:   ColonnadeConfig,
+    settings: => S,
+    status:   => D
+) extends Bundle {
   val register = new RegisterPort(RegisterFile.addressBits(config))
-  val frame    = Output(new FrameRegisters(config))
-  val device   = Input(new DeviceStatus(config))
+  val frame    = Output(settings)
+  val device   = Input(status)
 
   /** Pulses: a frame starts; caches forget the scene. */
   val start      = Output(Bool())
   val invalidate = if (config.columnBvhMemory.cache.nonEmpty) Some(Output(Bool())) else None
+
+  /** Of a device for rays. */
+  val commands = Option.when(config.frame.rays)(Output(new RayCommands))
 }
 
 /** The registers of the host, at the addresses of [[RegisterMap]]. Settings above their limit are clamped for the device.
   *
   * Writes are ignored while the device is busy, so the settings of a frame are constant. A read takes one cycle. The words
   * of a wide number are read one by one, so it is consistent only while the device is idle.
+  *
+  * @param settings registers that the host writes
+  * @param status   registers that the host reads
   */
-final class RegisterFile(config: ColonnadeConfig) extends Module {
-  val io = IO(new RegisterFileIO(config))
+final class RegisterFile[S <: Bundle with SceneRegisters, D <: Bundle with BusyRegisters](
+    config:   ColonnadeConfig,
+    settings: => S,
+    status:   => D
+) extends Module {
+  val io = IO(new RegisterFileIO(config, settings, status))
 
   private val registers = RegisterMap(config)
 
   private val writes = io.register.write && !io.device.status.busy
 
   // Settings: one hardware register per number, combined to the bundle by its layout.
-  private val settings = registers.filter(_.access == Access.ReadWrite).map(r => r -> storage(r))
-  private val legal    = settings.map { case (r, value) => r.name -> RegisterLimits.clamp(value, r.limit) }.toMap
+  private val written = registers.filter(_.access == Access.ReadWrite).map(r => r -> storage(r))
+  private val legal   = written.map { case (r, value) => r.name -> RegisterLimits.clamp(value, r.limit) }.toMap
   io.frame := Cat(Layout.of(io.frame).sortBy(-_.offset).map(field => legal(field.name))).asTypeOf(io.frame)
 
   // Control: a pulse in the cycle of the write.
@@ -48,10 +62,23 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   io.start := pulse("control.start")
   io.invalidate.foreach(_ := pulse("control.invalidate"))
 
+  // Commands have one word each, and may be written while the device is busy
+  for (commands <- io.commands) {
+    val values = Layout.of(commands).map { field =>
+      val register = registers.find(_.name == s"rays.${field.name}").get
+      RegEnable(
+        io.register.writeData(field.width - 1, 0),
+        0.U(field.width.W),
+        io.register.write && io.register.address === register.address.U
+      )
+    }
+    commands := Cat(values).asTypeOf(commands)
+  }
+
   // Reads of status
-  private val status   = Layout.of(io.device).map(field => field.name -> field).toMap
+  private val fields   = Layout.of(io.device).map(field => field.name -> field).toMap
   private val observed = registers.filter(_.access == Access.ReadOnly).map { r =>
-    val field = status(r.name)
+    val field = fields(r.name)
     r -> io.device.asUInt(field.end - 1, field.offset)
   }
   private val words = (for {
@@ -66,7 +93,7 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
   when(io.register.read)(readData := shown(io.register.address))
 
   // Settings are read from a memory of copies: registers all over the device need no way back
-  private val masks = settings.flatMap { case (r, _) =>
+  private val masks = written.flatMap { case (r, _) =>
     (0 until r.words).map(word => r.address + word -> ((BigInt(1) << wordBits(r, word)) - 1))
   }.toMap
   private val first     = masks.keys.min
@@ -104,5 +131,14 @@ final class RegisterFile(config: ColonnadeConfig) extends Module {
 }
 
 object RegisterFile {
+  type OfFrames = RegisterFile[FrameRegisters, DeviceStatus]
+  type OfRays   = RegisterFile[RayRegisters, RayStatus]
+
+  def ofFrames(config: ColonnadeConfig): OfFrames =
+    new RegisterFile(config, new FrameRegisters(config), new DeviceStatus(config))
+
+  def ofRays(config: ColonnadeConfig): OfRays =
+    new RegisterFile(config, new RayRegisters(config), new RayStatus(config))
+
   def addressBits(config: ColonnadeConfig): Int = log2Ceil(RegisterMap.size(RegisterMap(config)))
 }

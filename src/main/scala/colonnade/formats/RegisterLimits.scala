@@ -24,7 +24,7 @@ object RegisterLimits {
       "gather.bounces"              -> BigInt(Gather.maxBounces),
       "scene.recordCount"           -> BigInt(config.columnBvhMemory.depth)
     ) ++ materials
-    val max = Layout.of(new FrameRegisters(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
+    val max = Layout.of(RegisterMap.settings(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
     limits.filter { case (name, limit) => max.get(name).exists(limit < _) }.toMap
   }
 

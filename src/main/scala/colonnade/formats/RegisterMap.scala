@@ -50,11 +50,35 @@ object RegisterMap {
 
   private val blocks = Seq(
     Block(0, Access.WriteOnly, config => named("control", new Control(config))),
+    Block(6, Access.WriteOnly, ofRays(_ => named("rays", new RayCommands)), isCommon = false),
     Block(8, Access.ReadOnly, _ => named("status", new Status)),
-    Block(16, Access.ReadOnly, config => named("errors", new Errors(config))),
-    Block(32, Access.ReadOnly, config => named("counters", new Counters(config))),
-    Block(256, Access.ReadWrite, config => Layout.of(new FrameRegisters(config)), isCommon = false)
+    Block(12, Access.ReadOnly, ofRays(_ => named("rays", new RayProgress)), isCommon = false),
+    Block(
+      16,
+      Access.ReadOnly,
+      config => named("errors", if (config.frame.rays) new RayErrors(config) else new Errors(config))
+    ),
+    Block(28, Access.ReadOnly, ofRays(config => named("errors", new RayErrors(config)).takeRight(1)), isCommon = false),
+    Block(
+      32,
+      Access.ReadOnly,
+      config => named("counters", if (config.frame.rays) new RayCounters(config) else new Counters(config))
+    ),
+    Block(
+      192,
+      Access.ReadOnly,
+      ofRays(config => named("counters", new RayCounters(config)).takeRight(2)),
+      isCommon = false
+    ),
+    Block(256, Access.ReadWrite, config => Layout.of(settings(config)), isCommon = false)
   )
+
+  /** Those that the host writes before a frame, or a batch. */
+  def settings(config: ColonnadeConfig): Data =
+    if (config.frame.rays) new RayRegisters(config) else new FrameRegisters(config)
+
+  private def ofRays(numbers: ColonnadeConfig => Seq[Field])(config: ColonnadeConfig): Seq[Field] =
+    if (config.frame.rays) numbers(config) else Nil
 
   def apply(config: ColonnadeConfig): Seq[Register] = {
     val limits = RegisterLimits(config)

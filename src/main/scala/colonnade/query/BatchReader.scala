@@ -14,15 +14,15 @@ final class BatchReaderIO(columns: Int) extends Bundle {
   val write = new AxiWritePort(1, RayBatch.bytes)
 
   /** A batch starts; it is constant while its runs run, of which some end, or fail. */
-  val start  = Output(Bool())
-  val batch  = Output(new RayBatch)
-  val runs   = Decoupled(new Run)
-  val ended  = Input(UInt(log2Ceil(2 * columns + 1).W))
-  val failed = Input(Bool())
+  val start    = Output(Bool())
+  val batch    = Output(new RayBatch)
+  val runs     = Decoupled(new Run)
+  val resolved = Input(UInt(log2Ceil(2 * columns + 1).W))
+  val failed   = Input(Bool())
 
   /** Pulses: a batch is refused, or has failed; rays of a batch are done. */
   val isError  = Output(Bool())
-  val answered = Output(UInt(32.W))
+  val raysDone = Output(UInt(32.W))
   val isBusy   = Output(Bool())
 }
 
@@ -78,7 +78,7 @@ final class BatchReader(columns: Int) extends Module {
     rays := rays + Mux(batch.isFan, (16 * Run.rays).U, (32 * Run.rays).U)
     hits := hits + (1.U << hitLog)
   }
-  inRuns := inRuns + begins - io.ended
+  inRuns := inRuns + begins - io.resolved
   when(io.failed) { failed := true.B }
 
   // Write its tag
@@ -122,5 +122,5 @@ final class BatchReader(columns: Int) extends Module {
   }
   io.isError := (leaves && (failed || isUnread && state === reading)) || isTagless ||
     (io.write.b.fire && io.write.b.bits.resp =/= Axi.okay)
-  io.answered := Mux(isDone, batch.count, 0.U)
+  io.raysDone := Mux(isDone, batch.count, 0.U)
 }

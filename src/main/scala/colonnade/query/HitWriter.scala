@@ -34,8 +34,8 @@ final class HitWriter extends Module {
   private val isFilled = RegInit(0.U(8.W))
   private val position = RegInit(0.U(3.W))                            // in the run
   private val at       = position + io.address(5, 3)
-  private val chosen   = Mux(io.isWide, UIntToOH(at) | UIntToOH(at | 1.U), UIntToOH(at))(7, 0)
-  private val isFull   = chosen(7)
+  private val lanes    = Mux(io.isWide, UIntToOH(at) | UIntToOH(at | 1.U), UIntToOH(at))(7, 0)
+  private val isFull   = lanes(7)
   private val beats    = Module(new Queue(new PackedBeat, 2 * Run.burstBeats, useSyncReadMem = true)).io
   private val isPushed = RegInit(false.B)                             // the beat is complete
   private val isLast   = Reg(Bool())
@@ -50,10 +50,10 @@ final class HitWriter extends Module {
     count    := Mux(isLast, 0.U, count + 1.U)
   }
   when(io.hits.fire) {
-    for (word <- 0 until 8) when(chosen(word)) {
+    for (word <- 0 until 8) when(lanes(word)) {
       beat(word) := Mux(io.isWide && (word % 2 == 1).B, io.hits.bits.words(127, 64), io.hits.bits.words(63, 0))
     }
-    isFilled := Mux(leaves, 0.U, isFilled) | chosen
+    isFilled := Mux(leaves, 0.U, isFilled) | lanes
     position := Mux(io.hits.bits.isLast, 0.U, position + Mux(io.isWide, 2.U, 1.U))
     isPushed := isFull || io.hits.bits.isLast
     isLast   := io.hits.bits.isLast
@@ -99,15 +99,15 @@ final class HitWriter extends Module {
   beats.deq.ready := sending =/= 0.U && w.ready
   when(w.fire) { sending := sending - 1.U }
 
-  // Answers, in order
-  private val hasFailed = RegInit(false.B)
-  private val isError   = io.axi.b.bits.resp =/= Axi.okay
-  private val isAnswer  = io.axi.b.fire && bursts.deq.bits
+  // Responses, in order
+  private val hasFailed  = RegInit(false.B)
+  private val isError    = io.axi.b.bits.resp =/= Axi.okay
+  private val isResponse = io.axi.b.fire && bursts.deq.bits
   io.axi.b.ready   := true.B
   bursts.deq.ready := io.axi.b.valid
   when(io.axi.b.fire) { hasFailed := !bursts.deq.bits && (hasFailed || isError) }
-  io.written := isAnswer && !hasFailed && !isError
-  io.failed  := isAnswer && (hasFailed || isError)
+  io.written := isResponse && !hasFailed && !isError
+  io.failed  := isResponse && (hasFailed || isError)
   io.isIdle  := !isPushed && position === 0.U && !ends.deq.valid && left === 0.U && !bursts.deq.valid
 }
 

@@ -6,18 +6,16 @@ import chisel3.util.{Decoupled, Pipe}
 import colonnade.axi.{AxiReadPort, AxiWritePort}
 import colonnade.common.{Dispatcher, TimingSlice}
 import colonnade.config.ColonnadeConfig
-import colonnade.formats.{Load, RayBatch, RayRing, SceneInDram}
+import colonnade.formats.{Load, RayBatch, RayRegisters, RayRing}
 import colonnade.memory.{DramPort, SceneMemory, SharedCache}
 
 final class RayArrayIO(config: ColonnadeConfig) extends Bundle {
   private val ids = RayPort.idBits(config.array.columns + 1)
 
-  val ring  = Input(new RayRing)                   // constant while batches run, and so is the scene
-  val scene = Input(new RayScene(config))
-  val page  = config.columnBvhMemory.cache.map(_ => Input(UInt(SceneInDram.pageBits.W)))
-  val tail  = Input(UInt(RayRing.indexBits.W))
-  val head  = Output(UInt(RayRing.indexBits.W))
-  val load  = Flipped(Decoupled(new Load(config))) // ready while no batch runs
+  val registers = Input(new RayRegisters(config))      // constant while batches run
+  val tail      = Input(UInt(RayRing.indexBits.W))
+  val head      = Output(UInt(RayRing.indexBits.W))
+  val load      = Flipped(Decoupled(new Load(config))) // ready while no batch runs
 
   /** Batches, rays and hits; with a cache, the scene. */
   val read   = new AxiReadPort(ids, RayBatch.bytes)
@@ -37,7 +35,7 @@ final class RayArrayIO(config: ColonnadeConfig) extends Bundle {
   /** Pulses; rays whose hits are in memory. */
   val batchError  = Output(Bool())
   val memoryError = Output(Bool())
-  val answered    = Output(UInt(32.W))
+  val raysDone    = Output(UInt(32.W))
 }
 
 /** The columns of a device for rays, and the reader of batches that gives them runs. */
@@ -52,16 +50,16 @@ final class RayArray(config: ColonnadeConfig) extends Module {
   private val load       = Pipe(io.load.fire, io.load.bits)
   io.load.ready := !reader.isBusy
 
-  reader.ring := io.ring
+  reader.ring := io.registers.ring
   reader.tail := io.tail
   io.head     := reader.head
   io.isBusy   := reader.isBusy
   dispatch.items :<>= reader.runs
   for ((column, index) <- columns.zipWithIndex) {
-    column.scene := io.scene
-    column.batch := reader.batch
-    column.start := reader.start
-    column.load  := load
+    column.registers := io.registers
+    column.batch     := reader.batch
+    column.start     := reader.start
+    column.load      := load
     column.runs :<>= dispatch.takers(index)
     port.reads(index) :<>= column.read
     port.writes(index) :<>= column.write
@@ -81,7 +79,7 @@ final class RayArray(config: ColonnadeConfig) extends Module {
     val isStale    = RegInit(false.B)
     val invalidate = isStale && reader.start
     isStale     := (isStale && !invalidate) || io.invalidate || hasFailed
-    memory.page := io.page.get
+    memory.page := io.registers.dram.get.page
     io.memory.get :<>= memory.axi
     val forgets = TimingSlice.flag(invalidate)
     memory.invalidate := forgets
@@ -94,9 +92,9 @@ final class RayArray(config: ColonnadeConfig) extends Module {
 
   // A batch fails with its runs, and with what its rays read
   private val isIllegal = io.events.map(events => events.stackOverflow || events.illegalRecord).reduce(_ || _)
-  reader.ended   := columns.map(_.ended).reduce(_ +& _)
-  reader.failed  := columns.map(_.failed).reduce(_ || _) || isIllegal || hasFailed
-  io.batchError  := reader.isError
-  io.memoryError := hasFailed
-  io.answered    := reader.answered
+  reader.resolved := columns.map(_.resolved).reduce(_ +& _)
+  reader.failed   := columns.map(_.failed).reduce(_ || _) || isIllegal || hasFailed
+  io.batchError   := reader.isError
+  io.memoryError  := hasFailed
+  io.raysDone     := reader.raysDone
 }

@@ -6,15 +6,8 @@ import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.axi.{AxiReadPort, AxiWritePort}
 import colonnade.column.{ColumnBvhController, TraversalRows}
 import colonnade.config.{ColonnadeConfig, PathConfig}
-import colonnade.formats.{Bounds, Load, NodeRecord, RayBatch, RayPlacement, SceneMap}
+import colonnade.formats.{Load, NodeRecord, RayBatch, RayRegisters}
 import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
-
-/** What rays are traced with. */
-final class RayScene(config: ColonnadeConfig) extends Bundle {
-  val scene     = new SceneMap(colonnade.formats.RecordFormats.idBits(config))
-  val bounds    = new Bounds(config.numbers)
-  val placement = new RayPlacement
-}
 
 /** Events of a column in one cycle; names as in the registers. */
 final class RayEvents(config: ColonnadeConfig) extends Bundle {
@@ -33,15 +26,15 @@ final class RayEvents(config: ColonnadeConfig) extends Bundle {
 final class RayColumnIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
 
-  val scene  = Input(new RayScene(config)) // constant while runs run, and so is the batch
-  val batch  = Input(new RayBatch)
-  val start  = Input(Bool())               // before the first run of a batch
-  val load   = Flipped(Valid(new Load(config)))
-  val runs   = Flipped(Decoupled(new Run))
-  val ended  = Output(UInt(2.W))
-  val failed = Output(Bool())
-  val read   = new AxiReadPort(1, RayBatch.bytes)
-  val write  = new AxiWritePort(1, RayBatch.bytes)
+  val registers = Input(new RayRegisters(config)) // constant while runs run, and so is the batch
+  val batch     = Input(new RayBatch)
+  val start     = Input(Bool())                   // before the first run of a batch
+  val load      = Flipped(Valid(new Load(config)))
+  val runs      = Flipped(Decoupled(new Run))
+  val resolved  = Output(UInt(2.W))
+  val failed    = Output(Bool())
+  val read      = new AxiReadPort(1, RayBatch.bytes)
+  val write     = new AxiWritePort(1, RayBatch.bytes)
 
   /** As of [[colonnade.column.Column]]. */
   val holds        = Option.when(config.columnBvhMemory.holdable)(Input(UInt(banks.W)))
@@ -61,14 +54,14 @@ final class RayColumn(config: ColonnadeConfig) extends Module {
   private val controller = Module(new ColumnBvhController(config)).io
   private val rows       = new TraversalRows(config)
   queries.batch     := io.batch
-  queries.placement := io.scene.placement
-  queries.bounds    := io.scene.bounds
+  queries.placement := io.registers.placement
+  queries.bounds    := io.registers.bounds
   queries.runs :<>= io.runs
-  io.ended  := queries.ended
-  io.failed := queries.failed
+  io.resolved := queries.resolved
+  io.failed   := queries.failed
   io.read :<>= queries.read
   io.write :<>= queries.write
-  queries.results := rows.connect(queries.rays, io.scene.scene, io.start, controller.broadcasts)
+  queries.results := rows.connect(queries.rays, io.registers.scene, io.start, controller.broadcasts)
 
   // Records; the last requester is that of attributes, which nobody reads
   for ((port, unit) <- controller.requests.zip(rows.units)) port :<>= unit.requests

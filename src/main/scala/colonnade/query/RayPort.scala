@@ -2,7 +2,7 @@ package colonnade.query
 
 import chisel3._
 import chisel3.util.{log2Ceil, Mux1H, OHToUInt, RRArbiter}
-import colonnade.axi.{AxiReadPort, AxiWritePort}
+import colonnade.axi.{AxiAddress, AxiReadPort, AxiWritePort}
 import colonnade.common.RoundRobin
 import colonnade.formats.RayBatch
 
@@ -13,7 +13,7 @@ final class RayPortIO(count: Int) extends Bundle {
   val write  = new AxiWritePort(RayPort.idBits(count), RayBatch.bytes)
 }
 
-/** One port for some masters, by round-robin; a master's number is its id, so answers of different ones may overtake each
+/** One port for some masters, by round-robin; a master's number is its id, so responses of different ones may overtake each
   * other. The beats of a write follow its address before the next address is taken.
   */
 final class RayPort(count: Int) extends Module {
@@ -22,12 +22,12 @@ final class RayPort(count: Int) extends Module {
   private val ids = RayPort.idBits(count)
 
   // Reads
-  private val addresses = Module(new RRArbiter(chiselTypeOf(io.reads.head.ar.bits), count)).io
-  addresses.in.zip(io.reads).foreach { case (to, from) => to :<>= from.ar }
-  io.read.ar.valid    := addresses.out.valid
-  io.read.ar.bits     := addresses.out.bits
-  io.read.ar.bits.id  := addresses.chosen
-  addresses.out.ready := io.read.ar.ready
+  private val addresses = Module(new RRArbiter(new AxiAddress(ids), count)).io
+  for (((to, from), index) <- addresses.in.zip(io.reads).zipWithIndex) {
+    to :<>= from.ar
+    to.bits.id := index.U
+  }
+  io.read.ar :<>= addresses.out
   for ((port, index) <- io.reads.zipWithIndex) {
     port.r.valid := io.read.r.valid && io.read.r.bits.id === index.U
     port.r.bits  := io.read.r.bits
@@ -38,17 +38,17 @@ final class RayPort(count: Int) extends Module {
   private val arbiter = Module(new RoundRobin(count)).io
   private val sends   = RegInit(false.B)
   private val sender  = Reg(UInt(ids.W))
-  private val chosen  = arbiter.grant
+  private val grant   = arbiter.grant
   arbiter.requests    := Mux(sends, 0.U, VecInit(io.writes.map(_.aw.valid)).asUInt)
   arbiter.isTaken     := io.write.aw.fire
   io.write.aw.valid   := arbiter.requests.orR
-  io.write.aw.bits    := Mux1H(chosen, io.writes.map(_.aw.bits))
-  io.write.aw.bits.id := OHToUInt(chosen)
+  io.write.aw.bits    := Mux1H(grant, io.writes.map(_.aw.bits))
+  io.write.aw.bits.id := OHToUInt(grant)
   io.write.w.valid    := sends && io.writes(sender).w.valid
   io.write.w.bits     := io.writes(sender).w.bits
   io.write.b.ready    := io.writes(io.write.b.bits.id).b.ready
   for ((port, index) <- io.writes.zipWithIndex) {
-    port.aw.ready := chosen(index) && io.write.aw.ready
+    port.aw.ready := grant(index) && io.write.aw.ready
     port.w.ready  := sends && sender === index.U && io.write.w.ready
     port.b.valid  := io.write.b.valid && io.write.b.bits.id === index.U
     port.b.bits   := io.write.b.bits
@@ -56,7 +56,7 @@ final class RayPort(count: Int) extends Module {
   when(io.write.w.fire && io.write.w.bits.last) { sends := false.B }
   when(io.write.aw.fire) {
     sends  := true.B
-    sender := OHToUInt(chosen)
+    sender := OHToUInt(grant)
   }
 }
 

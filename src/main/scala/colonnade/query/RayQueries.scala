@@ -18,8 +18,8 @@ final class RayQueriesIO(config: PathConfig) extends Bundle {
   val runs      = Flipped(Decoupled(new Run))
 
   /** Runs that end: their hits are in memory, or have failed. */
-  val ended  = Output(UInt(2.W))
-  val failed = Output(Bool())
+  val resolved = Output(UInt(2.W))
+  val failed   = Output(Bool())
 
   val read  = new AxiReadPort(1, RayBatch.bytes)
   val write = new AxiWritePort(1, RayBatch.bytes)
@@ -32,7 +32,7 @@ final class RayQueriesIO(config: PathConfig) extends Bundle {
   val refuses = Output(Bool())
 }
 
-/** Answers runs of rays: docs/rays.md, hardware. A run has a block of contexts, one for each of its rays, whose tables hold
+/** Traces runs of rays: docs/rays.md, hardware. A run has a block of contexts, one for each of its rays, whose tables hold
   * what is known of it. Blocks are filled, and written when all their rays have ended, in the order of runs.
   *
   * A result is always accepted; a ray waits for a traversal unit, which waits for nothing here. So each block ends.
@@ -122,21 +122,21 @@ final class RayQueries(config: PathConfig) extends Module {
   private val index      = RegInit(0.U(rayBits.W))
   private val entry      = Reg(new TracedHit(config))
   private val hasEntry   = RegInit(false.B)
-  private val takes      = Wire(Bool())
+  private val entryReady = Wire(Bool())
   private val writing    = Module(new Queue(new Run, 4)).io
   private val reads      = Wire(Bool())
   private val isRead     = RegNext(reads, false.B)
   private val isFirst    = index === 0.U
   private val isLast     = index +& 1.U === runs(tail).count
   private val context    = Cat(tail, index)
-  reads             := isComplete && !drops && !isRead && (!hasEntry || takes) && (!isFirst || writing.enq.ready)
+  reads             := isComplete && !drops && !isRead && (!hasEntry || entryReady) && (!isFirst || writing.enq.ready)
   writing.enq.valid := reads && isFirst
   writing.enq.bits  := runs(tail)
   private val frees = drops || (reads && isLast)
   used := used + begins - frees
   when(reads) { index := Mux(isLast, 0.U, index + 1.U) }
   when(frees) { tail := tail + 1.U }
-  when(takes) { hasEntry := false.B }
+  when(entryReady) { hasEntry := false.B }
   private val (scale, from, result) =
     (scales.read(context, reads), entries.read(context, reads), results.read(context, reads))
   when(isRead) {
@@ -150,8 +150,8 @@ final class RayQueries(config: PathConfig) extends Module {
   }
 
   // Occluded rays: a bit each
-  private val place     = RegInit(0.U(rayBits.W)) // in the run
-  private val isEnd     = place +& 1.U === writing.deq.bits.count
+  private val position  = RegInit(0.U(rayBits.W)) // in the run
+  private val isEnd     = position +& 1.U === writing.deq.bits.count
   private val bits      = RegInit(0.U(Run.rays.W))
   private val hasWord   = RegInit(false.B)
   private val converter = Module(new HitConverter(config)).io
@@ -159,11 +159,11 @@ final class RayQueries(config: PathConfig) extends Module {
   converter.placement  := io.placement
   converter.hits.valid := hasEntry && !isOccluded
   converter.hits.bits  := entry
-  takes                := hasEntry && Mux(isOccluded, !hasWord, converter.hits.ready)
-  private val passes = Mux(isOccluded, takes, writer.hits.fire)
-  when(passes) { place := Mux(isEnd, 0.U, place + 1.U) }
-  when(takes && isOccluded) {
-    bits    := bits | (entry.hasHit << place)
+  entryReady           := hasEntry && Mux(isOccluded, !hasWord, converter.hits.ready)
+  private val passes = Mux(isOccluded, entryReady, writer.hits.fire)
+  when(passes) { position := Mux(isEnd, 0.U, position + 1.U) }
+  when(entryReady && isOccluded) {
+    bits    := bits | (entry.hasHit << position)
     hasWord := isEnd
   }
   when(writer.hits.fire && isOccluded) {
@@ -180,8 +180,8 @@ final class RayQueries(config: PathConfig) extends Module {
   converter.records.ready := writer.hits.ready && !isOccluded
   writing.deq.ready       := writer.hits.fire && writer.hits.bits.isLast
   io.write :<>= writer.axi
-  io.ended  := writer.written +& writer.failed +& drops
-  io.failed := writer.failed || drops
+  io.resolved := writer.written +& writer.failed +& drops
+  io.failed   := writer.failed || drops
 }
 
 object RayQueries {

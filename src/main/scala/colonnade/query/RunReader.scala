@@ -55,16 +55,16 @@ final class RunReader(config: PathConfig) extends Module {
   // Addresses
   private val address  = Reg(UInt(Axi.addressBits.W))
   private val left     = RegInit(0.U(log2Ceil(Run.rays + 1).W))
-  private val reserved = RegInit(0.U(log2Ceil(places + 1).W))
+  private val reserved = RegInit(0.U(log2Ceil(queueDepth + 1).W))
   private val begun    = Module(new Queue(new BegunRun, Run.blocks)).io
-  private val beats    = Module(new Queue(new ReadBeat, places, useSyncReadMem = true)).io
+  private val beats    = Module(new Queue(new ReadBeat, queueDepth, useSyncReadMem = true)).io
   private val burst    = Run.beatsAt(address, left)
   private val ar       = io.axi.ar
   io.runs.ready        := left === 0.U && begun.enq.ready
   begun.enq.valid      := io.runs.valid && left === 0.U
   begun.enq.bits.block := io.block
   begun.enq.bits.count := io.runs.bits.count
-  ar.valid             := left =/= 0.U && reserved +& burst <= places.U
+  ar.valid             := left =/= 0.U && reserved +& burst <= queueDepth.U
   ar.bits.id           := 0.U
   ar.bits.addr         := address
   ar.bits.len          := burst - 1.U
@@ -113,7 +113,7 @@ final class RunReader(config: PathConfig) extends Module {
 object RunReader {
 
   /** Beats that are read or awaited: a run's. */
-  private val places = 2 * Run.burstBeats
+  private val queueDepth = 2 * Run.burstBeats
 }
 
 final private class BegunRun extends Bundle {

@@ -16,7 +16,7 @@ class RegisterFileSpec extends AnyFlatSpec with OneSimulation with Matchers {
   private val registers = RegisterMap(config)
   private val settings  = registers.filter(_.access == Access.ReadWrite)
 
-  private def write(unit: RegisterFile, address: Int, data: BigInt): Unit = {
+  private def write(unit: RegisterFile.OfFrames, address: Int, data: BigInt): Unit = {
     unit.io.register.write.poke(true)
     unit.io.register.address.poke(address)
     unit.io.register.writeData.poke(data)
@@ -24,7 +24,7 @@ class RegisterFileSpec extends AnyFlatSpec with OneSimulation with Matchers {
     unit.io.register.write.poke(false)
   }
 
-  private def read(unit: RegisterFile, address: Int): BigInt = {
+  private def read(unit: RegisterFile.OfFrames, address: Int): BigInt = {
     unit.io.register.read.poke(true)
     unit.io.register.address.poke(address)
     unit.clock.step()
@@ -36,18 +36,18 @@ class RegisterFileSpec extends AnyFlatSpec with OneSimulation with Matchers {
     data
   }
 
-  private def writeWhole(unit: RegisterFile, register: Register, bits: BigInt): Unit =
+  private def writeWhole(unit: RegisterFile.OfFrames, register: Register, bits: BigInt): Unit =
     for (word <- 0 until register.words) write(unit, register.address + word, (bits >> 32 * word) & 0xffffffffL)
 
-  private def readWhole(unit: RegisterFile, register: Register): BigInt =
+  private def readWhole(unit: RegisterFile.OfFrames, register: Register): BigInt =
     (0 until register.words).map(word => read(unit, register.address + word) << 32 * word).sum
 
   private def ones(register: Register): BigInt = (BigInt(1) << register.width) - 1
 
-  private def shown(unit: RegisterFile, register: Register): BigInt =
+  private def shown(unit: RegisterFile.OfFrames, register: Register): BigInt =
     LayoutSpec.number(unit.io.frame, register.name).peek().litValue & ones(register)
 
-  inOneSimulation(new RegisterFile(config))(
+  inOneSimulation(RegisterFile.ofFrames(config))(
     "store every setting, clamp it for the hardware, and read it back" -> { unit =>
       val random = new Random(8)
       val values = settings.map(r => r -> BigInt(r.width, random))

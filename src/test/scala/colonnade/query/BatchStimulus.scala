@@ -15,7 +15,7 @@ final case class TestBatch(mode: BigInt, count: Int, ofFan: Seq[BigInt], rays: S
     case 1 => 8 * count
     case _ => (count + 63) / 64 * 8
   }
-  def question: Seq[BigInt] = Seq(mode, BigInt(count)) ++ ofFan ++ rays
+  def query: Seq[BigInt] = Seq(mode, BigInt(count)) ++ ofFan ++ rays
 
   /** The descriptor's words. */
   def words(rays: BigInt, hits: BigInt, tag: BigInt, done: BigInt): Seq[BigInt] = {
@@ -45,9 +45,8 @@ final class BatchStimulus(config: ColonnadeConfig, random: Random) {
   /** What the model's query `image` has before the records. */
   def image: Seq[BigInt] = {
     val registers = scene.registers
-    val sections  = Seq("triangleBase", "triangleRecords", "attributeBase").map(name => registers(s"scene.$name"))
     val bounds    = Seq("low", "high").flatMap(side => "xyz".map(axis => registers(s"bounds.$side.$axis")))
-    sections ++ bounds ++ placed.scale ++ placed.base
+    bounds ++ placed.scale ++ placed.base
   }
 
   def batch(count: Int, response: Int, isFan: Boolean): TestBatch = {

@@ -32,16 +32,16 @@ class HitConverterSpec extends AnyFlatSpec with ChiselScalatestTester with Match
         val traced   = new Packed(new TracedHit(config))
         val record   = new Packed(new HitRecord)
         val results  = for (_ <- 0 until 24) yield {
-          val placed    = stimulus.placement()
-          val hits      = Seq.fill(30)(new RandomHit(config, stimulus, random))
-          val questions = hits.map(hit => placed.scale ++ Seq(hit.dominant, hit.entry, hit.t) ++ hit.weights)
+          val placed  = stimulus.placement()
+          val hits    = Seq.fill(30)(new RandomHit(config, stimulus, random))
+          val queries = hits.map(hit => placed.scale ++ Seq(hit.dominant, hit.entry, hit.t) ++ hit.weights)
           dut.placement.poke(placed.packed)
           val (records, _) = PackedStreams.run(dut, hits.map(hit => traced.pack(hit.fields)), 0.7, 0.6, random)
-          for (((bits, hit), answer) <- records.zip(hits).zip(Model.answers(config, questions, "hit")))
+          for (((bits, hit), reply) <- records.zip(hits).zip(Model.answers(config, queries, "hit")))
             yield withClue(s"$placed, ${hit.fields}: ") {
               val found = record.unpack(bits)
-              Seq("t", "id", "u", "v").map(wordOf(found, _)) shouldBe hit.expected(answer)
-              answer.head.toInt
+              Seq("t", "id", "u", "v").map(wordOf(found, _)) shouldBe hit.expected(reply)
+              reply.head.toInt
             }
         }
         val times = results.flatten
@@ -99,11 +99,11 @@ private class RandomHit(config: ColonnadeConfig, stimulus: RayStimulus, random: 
       )
 
   /** t, id, u, v as words, from the model's t, u, v. */
-  def expected(answer: Seq[BigInt]): Seq[BigInt] =
+  def expected(reply: Seq[BigInt]): Seq[BigInt] =
     if (!hasHit) Seq(tFar, if (isTooFar) HitRecord.outOfRange else HitRecord.miss, 0, 0)
     else {
       val flagged = id + flags.head * HitRecord.backSide + flags.last * HitRecord.clear
-      Seq(answer.head, flagged) ++ (if (hasWeights) answer.tail else Seq(BigInt(0), BigInt(0)))
+      Seq(reply.head, flagged) ++ (if (hasWeights) reply.tail else Seq(BigInt(0), BigInt(0)))
     }
 
   /** Of up to so many bits, with a few ones, zeros, or any digits at the end. */

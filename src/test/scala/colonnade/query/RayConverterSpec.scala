@@ -36,23 +36,23 @@ class RayConverterSpec extends AnyFlatSpec with ChiselScalatestTester with Match
           val isLocal = round % 3 == 0
           val records =
             Seq.fill(20)(stimulus.ray(placed, isLocal)) ++ Seq.fill(10)(stimulus.anyLimits()) :+ stimulus.anyRay()
-          val questions = records.map(placed.scale ++ placed.base ++ Seq(BigInt(if (isLocal) 1 else 0)) ++ _)
-          val answers   = Model.answers(config, questions, "ray")
+          val queries  = records.map(placed.scale ++ placed.base ++ Seq(BigInt(if (isLocal) 1 else 0)) ++ _)
+          val expected = Model.answers(config, queries, "ray")
           dut.placement.poke(placed.packed)
           val payloads = records.zipWithIndex.map { case (record, i) =>
             ray.pack(Map("context" -> BigInt(i % 4), "isLocal" -> BigInt(if (isLocal) 1 else 0))) + recordOf(record)
           }
           val (results, _) = PackedStreams.run(dut, payloads, 0.7, 0.6, random)
-          for (((result, answer), record) <- results.map(converted.unpack).zip(answers).zip(records))
+          for (((result, reply), record) <- results.map(converted.unpack).zip(expected).zip(records))
             withClue(s"$placed, ${record.map(_.toString(16))}: ") {
-              kindOf(result) shouldBe answer.head
+              kindOf(result) shouldBe reply.head
               val request = Seq("limits.tMin", "limits.tMax") ++ Seq("origin", "dir").flatMap(name =>
                 "xyz".map(axis => s"$name.$axis")
               )
-              if (answer.head == 0) request.map(name => result(s"request.$name")) shouldBe answer.tail
+              if (reply.head == 0) request.map(name => result(s"request.$name")) shouldBe reply.tail
               else "xyz".map(axis => result(s"request.dir.$axis")).toSet shouldBe Set(BigInt(0))
             }
-          answers.map(_.head.toInt)
+          expected.map(_.head.toInt)
         }
         val counts = kinds.flatten.groupBy(identity).map { case (kind, all) => kind -> all.size }
         info(s"legal, refused, out of range: ${counts.toSeq.sorted.map(_._2).mkString(", ")}")

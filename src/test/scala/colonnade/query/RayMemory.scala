@@ -11,7 +11,7 @@ import scala.util.Random
   * bursts cross no 4 KB and are complete.
   *
   * @param stall    percentage of cycles in which a channel does not move
-  * @param maxDelay cycles from an address to its answer
+  * @param maxDelay cycles from an address to its response
   */
 class RayMemory(read: AxiReadPort, write: AxiWritePort, random: Random, stall: Int, maxDelay: Int) {
   val bytes   = mutable.Map.empty[BigInt, Int]
@@ -22,12 +22,12 @@ class RayMemory(read: AxiReadPort, write: AxiWritePort, random: Random, stall: I
   var maxId  = 0
 
   private case class Pending(id: Int, address: BigInt, beats: Int, due: Int)
-  private val reads   = mutable.ArrayBuffer.empty[Pending]
-  private val answers = mutable.ArrayBuffer.empty[Pending]
-  private var writes  = Option.empty[Pending] // the beats that are left
-  private var reading = Option.empty[Pending]
-  private var answer  = Option.empty[Pending]
-  private var now     = 0
+  private val reads     = mutable.ArrayBuffer.empty[Pending]
+  private val responses = mutable.ArrayBuffer.empty[Pending]
+  private var writes    = Option.empty[Pending] // the beats that are left
+  private var reading   = Option.empty[Pending]
+  private var response  = Option.empty[Pending]
+  private var now       = 0
 
   def store(address: BigInt, words: Seq[BigInt]): Unit =
     for ((word, i) <- words.zipWithIndex; byte <- 0 until 4)
@@ -53,9 +53,9 @@ class RayMemory(read: AxiReadPort, write: AxiWritePort, random: Random, stall: I
       read.r.bits.resp.poke(if (broken(burst.address)) 2 else 0)
       read.r.bits.last.poke(burst.beats == 1)
     }
-    if (answer.isEmpty && random.nextInt(100) >= stall) answer = next(answers)
-    write.b.valid.poke(answer.nonEmpty)
-    for (burst <- answer) {
+    if (response.isEmpty && random.nextInt(100) >= stall) response = next(responses)
+    write.b.valid.poke(response.nonEmpty)
+    for (burst <- response) {
       write.b.bits.id.poke(burst.id)
       write.b.bits.resp.poke(0)
     }
@@ -67,7 +67,7 @@ class RayMemory(read: AxiReadPort, write: AxiWritePort, random: Random, stall: I
       reading = None
       if (rest.beats > 0) reads.insert(reads.indexWhere(_.id == rest.id).max(0).min(reads.size), rest)
     }
-    if (answer.nonEmpty && write.b.ready.peekBoolean()) answer = None
+    if (response.nonEmpty && write.b.ready.peekBoolean()) response = None
     if (ar && read.ar.valid.peekBoolean()) reads += burstOf(read.ar.bits)
     if (write.w.valid.peekBoolean() && w) {
       val burst  = writes.getOrElse(fail("data before their address"))
@@ -79,18 +79,18 @@ class RayMemory(read: AxiReadPort, write: AxiWritePort, random: Random, stall: I
       }
       assert(write.w.bits.last.peekBoolean() == (burst.beats == 1), "last")
       writes = Some(burst.copy(address = burst.address + 64, beats = burst.beats - 1)).filter(_.beats > 0)
-      if (writes.isEmpty) answers += burst.copy(due = now + 1 + random.nextInt(maxDelay + 1))
+      if (writes.isEmpty) responses += burst.copy(due = now + 1 + random.nextInt(maxDelay + 1))
     } else if (aw && writes.isEmpty && write.aw.valid.peekBoolean()) writes = Some(burstOf(write.aw.bits))
     now += 1
   }
 
-  /** The first answer of any id that is due. */
+  /** The first response of any id that is due. */
   private def next(pending: mutable.ArrayBuffer[Pending]): Option[Pending] = {
     val firsts = pending.groupBy(_.id).values.map(_.head).filter(_.due <= now).toSeq.sortBy(_.id)
     Option.when(firsts.nonEmpty) {
-      val chosen = firsts(random.nextInt(firsts.size))
-      pending.remove(pending.indexWhere(_.id == chosen.id))
-      chosen
+      val oldest = firsts(random.nextInt(firsts.size))
+      pending.remove(pending.indexWhere(_.id == oldest.id))
+      oldest
     }
   }
 
