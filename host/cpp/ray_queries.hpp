@@ -23,9 +23,7 @@ inline std::uint32_t bitsOf(float value) {
     return bits;
 }
 
-inline rays::Placement readPlacement(Query& query) {
-    return {static_cast<std::uint32_t>(query.number()), static_cast<int>(query.number()), {}};
-}
+inline rays::Placement readPlacement(Query& query) { return {static_cast<std::uint32_t>(query.number()), static_cast<int>(query.number()), {}}; }
 
 inline colonnade_rays_record readRecord(Query& query) {
     colonnade_rays_record record;

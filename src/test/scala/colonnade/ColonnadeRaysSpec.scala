@@ -91,7 +91,7 @@ private class RayBatches(dut: ColonnadeRays, config: ColonnadeConfig, stall: Int
     memory.cycle()
     dut.clock.step()
     cycles += 1
-    if (cycles > 400000) fail(s"no end after ${read("rays.head")} batches")
+    if (cycles > 60000) fail(s"no end after ${read("rays.head")} batches")
   }
 
   /** @param counts rays of each batch

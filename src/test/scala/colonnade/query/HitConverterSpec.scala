@@ -31,8 +31,9 @@ class HitConverterSpec extends AnyFlatSpec with ChiselScalatestTester with Match
         val stimulus = new RayStimulus(config, random)
         val traced   = new Packed(new TracedHit(config))
         val record   = new Packed(new HitRecord)
-        val results  = for (_ <- 0 until 24) yield {
-          val placed  = stimulus.placement()
+        val results  = for (round <- 0 until 24) yield {
+          val any     = stimulus.placement()
+          val placed  = if (round % 3 == 0) any.copy(mantissa = BigInt(1) << 23) else any
           val hits    = Seq.fill(30)(new RandomHit(config, stimulus, random))
           val queries = hits.map(hit => placed.scale ++ Seq(hit.dominant, hit.entry, hit.t) ++ hit.weights)
           dut.placement.poke(placed.packed)
@@ -66,11 +67,15 @@ private class RandomHit(config: ColonnadeConfig, stimulus: RayStimulus, random: 
     val float = LazyList.continually(stimulus.any() & 0x7fffffff).find(x => x >= 0x800000 && x < 0x7f800000).get
     if (isEven) float & 0x7f800000 else float
   }
-  val entry: BigInt = {
-    val finest = (-numbers.gridFraction).max(0)
-    (number(numbers.vertexBits + 5) >> finest) << finest
+
+  /** With a scale that is a power of two 25 digits lie between two floats. */
+  val (entry: BigInt, t: BigInt) = {
+    val fraction = numbers.gridFraction
+    val finest   = (-fraction).max(0)
+    if (isEven && fraction > 0)
+      ((BigInt(1) << (24 - fraction)) + BigInt(24 - fraction, random), BigInt(fraction, random).setBit(0))
+    else ((number(numbers.vertexBits + 5) >> finest) << finest, number(numbers.gridBits - 1))
   }
-  val t: BigInt = number(numbers.gridBits - 1)
 
   val weights: Seq[BigInt] = {
     val all = BigInt(1) << (numbers.weightBits - 2)
