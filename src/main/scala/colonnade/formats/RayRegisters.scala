@@ -6,7 +6,7 @@ import colonnade.config.ColonnadeConfig
 /** The registers of a device for rays that the host writes while no batch runs. */
 final class RayRegisters(config: ColonnadeConfig) extends Bundle with SceneRegisters {
   val bounds    = new Bounds(config.numbers)
-  val scene     = new SceneMap(RecordFormats.idBits(config))
+  val scene     = new SceneMap(config)
   val dram      = config.columnBvhMemory.cache.map(_ => new SceneInDram)
   val placement = new RayPlacement
   val ring      = new RayRing

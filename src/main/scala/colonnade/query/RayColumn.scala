@@ -16,7 +16,7 @@ final class RayEvents(config: ColonnadeConfig) extends Bundle {
   val raysRefused   = Bool()
   val raysInBox     = perUnit()
   val nodeReads     = perUnit()
-  val boxTests      = perUnit(NodeRecord.children)
+  val boxTests      = perUnit(NodeRecord.most)
   val triangleTests = perUnit()
   val stackOverflow = Bool()
   val illegalRecord = Bool()
