@@ -25,7 +25,7 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
 
   val invalidate = Input(Bool()) // forgets all lines; only while idle
 
-  /** No request is looked up, and no line is awaited or announced. */
+  /** No request is looked up, and no line is read or announced. */
   val isIdle = Output(Bool())
 }
 
