@@ -111,8 +111,9 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   private val hitOH      = tags.hitOH(line)
   private val isLookedUp = isWaiting && isFresh && !fills
   private val isHit      = isLookedUp && hitOH.orR
-  private val isMiss     = isLookedUp && !hitOH.orR && !awaited.io.isAwaited
-  private val joins      = isLookedUp && !hitOH.orR && awaited.io.isAwaited
+  private val isPending  = awaited.io.isAwaited
+  private val isMiss     = isLookedUp && !hitOH.orR && !isPending
+  private val joins      = isLookedUp && !hitOH.orR && isPending
   private val delivers   = isHit && (asked.buses & usable).orR
   awaited.io.lookup      := asked
   awaited.io.joins       := joins
