@@ -141,7 +141,7 @@ class RecordFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
     }
 
     /** Banks are interleaved as in [[colonnade.formats.Banks]]. */
-    private def bankOf(address: Int): Int = (if (hasCache) address / SceneLines.records else address) % banks
+    private def bankOf(address: Int): Int = (if (hasCache) address / (2 * SceneLines.records) else address) % banks
 
     private def recordIn(bank: Int): Int = {
       val records = (0 until recordCount).filter(bankOf(_) == bank)

@@ -41,7 +41,7 @@ final class SmallFrame(
 
   /** Rays of all kinds that the frame may have are traced. */
   def checkRays(counts: String => Int, shadows: Boolean): Unit = {
-    assert(hits > positions.size / 10, "there is something to see")
+    assert(hits > positions.size / 16, "there is something to see")
     assert(if (shadows) counts("raysShadow") > hits / 8 else counts("raysShadow") == 0)
     assert((counts("raysReflection") + counts("raysRefraction") > 0) == config.frame.hasBounces)
   }

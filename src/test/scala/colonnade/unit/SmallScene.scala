@@ -28,7 +28,7 @@ final class SmallScene(
   private val firsts   = mutable.Map.empty[Int, Int] // position of the first child by the node's position
 
   private val leaves: Vector[Leaf] =
-    Seq.fill(triangleCount / LeafFormats.maxTriangles + 1)(leaf()).sortBy(_.map(_.head).take(3).sum).toVector
+    Seq.fill(triangleCount / LeafFormats.maxTriangles + 3)(leaf()).sortBy(_.map(_.head).take(3).sum).toVector
 
   /** A node as groups of leaves, breadth first; or a leaf. Without a tree there are leaves alone. */
   private val ordered: Vector[Either[Seq[Vector[Leaf]], Leaf]] =
@@ -138,9 +138,10 @@ final class SmallScene(
 
   /** A triangle or a pair, of any format. */
   private def leaf(): Leaf = {
-    val reach  = vertices * 2 / 5 >> (if (random.nextInt(3) == 0) 3 + random.nextInt(3) else 0)
+    val size   = 3 + random.nextInt(2)
+    val reach  = vertices * 2 / 5 >> (if (size == 4 && random.nextInt(3) == 0) 3 + random.nextInt(3) else 0)
     val middle = Seq.fill(3)(reach + random.nextInt(vertices - 2 * reach))
-    Seq.fill(3 + random.nextInt(2))(middle.map(_ + random.nextInt(2 * reach) - reach))
+    Seq.fill(size)(middle.map(_ + random.nextInt(2 * reach) - reach))
   }
 
   private def cut(these: Vector[Leaf]): Seq[Vector[Leaf]] =

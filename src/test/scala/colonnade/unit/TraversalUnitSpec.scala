@@ -26,8 +26,10 @@ class TraversalUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   private def traces(config: ColonnadeConfig, name: String): Unit =
     it should s"find the hit of every ray: $name" in
       test(new TraversalUnitHarness(config)).withAnnotations(Simulation.verilator) { dut =>
-        for ((willing, seed, isIllegal) <- Seq((1.0, 1, false), (0.3, 2, false), (0.7, 3, true)))
-          new RayTracing(dut, config, seed, isIllegal).run(willing)
+        val met = for ((willing, seed, isIllegal) <- Seq((1.0, 1, false), (0.3, 2, false), (0.7, 3, true)))
+          yield new RayTracing(dut, config, seed, isIllegal).run(willing)
+        assert(met.flatten.count(_ == Occlusion.opaque) > 9)
+        assert(!config.frame.hasBounces || met.flatten.contains(Occlusion.transmissive))
       }
 
   traces(
@@ -166,8 +168,10 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
   dut.clock.step()
   dut.start.poke(false)
 
-  /** @param willing probability that a port is ready or valid in a cycle */
-  def run(willing: Double): Unit = {
+  /** @param willing probability that a port is ready or valid in a cycle
+    * @return what occludes each ray
+    */
+  def run(willing: Double): Seq[Occlusion.Type] = {
     def isWilling              = random.nextDouble() < willing
     var (sent, answered, idle) = (0, 0, 0)
     while (answered < rays.size) {
@@ -209,9 +213,8 @@ private class RayTracing(dut: TraversalUnitHarness, config: ColonnadeConfig, see
     // Results wait in a queue and in the test
     assert(maxTraced >= contexts, "all contexts are used")
     assert(enteredCount == rays.size && hasIllegal == (isIllegal && config.geometry.bvh))
-    val kinds = expected.groupBy(_._1).map { case (kind, all) => kind -> all.size }
-    assert(expected.count(_._2.nonEmpty) > rays.size / 5 && kinds(Occlusion.opaque) > 2)
-    assert(!config.frame.hasBounces || kinds(Occlusion.transmissive) > 0)
+    assert(expected.count(_._2.nonEmpty) > rays.size / 5)
+    expected.map(_._1)
   }
 
   private def step(): Unit = {
