@@ -241,7 +241,7 @@ async def a_flipped_bit_ends_the_frame_and_the_next_is_right(dut: Any) -> None:
     shared = dut.device.SceneMemory
     for memories, records in (
         ((column.caches_cache.records_ext, column.caches_cache_1.records_ext), 1),
-        ((shared.caches_0.lines_ext, shared.caches_1.lines_ext), 4),
+        ((shared.caches_0.lines_ext, shared.caches_1.lines_ext), 2),
     ):
         for memory in memories:
             for line in memory.Memory:

@@ -19,7 +19,7 @@ from colonnade.device.verilator import Stalls, render_rtl, run_program, write_jo
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
-from colonnade.scene_image.dram_image import moved_bytes
+from colonnade.scene_image.dram_image import dram_lines, moved_bytes
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
@@ -107,7 +107,7 @@ def test_frames_of_the_preset_for_fpgas() -> None:
     ["one of everything", "four banks and two buses", pytest.param("no shared cache", marks=pytest.mark.matrix)],
 )
 def test_the_port_moves_the_beats_of_the_lines_that_are_counted(tmp_path: Path, shape: str) -> None:
-    """Whole beats: a line of 160 bytes moves 256 over a bus of 128."""
+    """Whole beats: a line of 64 bytes moves 128 over a bus of 128."""
     design = design_with(*SHAPES[shape])
     bus = int(design.manifest.config["columnBvhMemory"]["cache"]["busBytes"])
     image, registers = scene_of(design, 10, 8)
@@ -124,7 +124,7 @@ def test_a_scene_that_fits_is_read_once() -> None:
     """A line that the shared cache holds is never read again, whatever else happens while it is looked up."""
     design = design_with(1, 5, 1, 2, (4, 1, 4, 1024, 16, 8, 32, False))
     image, registers = scene_of(design, 32, 24)
-    lines = -(-len(image.records) // 4)
+    lines = dram_lines(len(image.records), design.manifest)
     assert lines <= 1024
     expected = render_model(design.manifest, image, registers)
     first, second = render_rtl(design, image, [registers, registers], Stalls(dram_latency=20)).frames

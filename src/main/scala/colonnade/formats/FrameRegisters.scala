@@ -117,7 +117,8 @@ object SceneLines {
 
   /** Bytes of a line; distance of consecutive lines in bytes. */
   def bytes(config: ColonnadeConfig): Int = records * new RecordFormats(config).recordBits / 8
-  def pitch(config: ColonnadeConfig): Int = 1 << log2Ceil(bytes(config))
+  def pitch(config: ColonnadeConfig): Int =
+    (1 << log2Ceil(bytes(config))).max(config.columnBvhMemory.cache.fold(0)(_.busBytes))
 }
 
 object SceneInDram {
