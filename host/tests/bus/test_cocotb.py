@@ -35,7 +35,7 @@ pytestmark = pytest.mark.skipif(shutil.which("iverilog") is None, reason="no ive
 
 WIDTH, HEIGHT, FORMAT = 20, 6, 0
 UNWRITTEN = 0xA5
-CACHE = {"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2, "sharedMisses": 8, "busBytes": 16}
+CACHE = {"lines": 16, "ways": 2, "misses": 4, "sharedLines": 32, "sharedWays": 2, "sharedMisses": 8, "busBytes": 16}
 
 #: The bus in bytes, the configuration, and which tests of `shell_bench` run, with how many errors.
 CASES: dict[str, tuple[int, tuple[str, ...], dict[str, Any]]] = {
