@@ -30,7 +30,7 @@ object Model {
       positions:   Seq[(Int, Int)],
       environment: Option[Map[String, Seq[BigInt]]] = None
   ): Seq[Seq[BigInt]] = {
-    val scene = s"records ${hexadecimal(config, records)}"
+    val scene   = s"records ${hexadecimal(config, records)}"
     val written = registers.map { case (name, value) => s"$name=$value" }.mkString("registers ", " ", "")
     val maps    = environment.toSeq.flatMap(environmentOf(config, _))
     answers(
