@@ -75,7 +75,7 @@ STILL_ROOMS = (
     [
         ("diffuse", ()),
         pytest.param("mirror", ("array.rows=3", "array.columns=5"), marks=pytest.mark.matrix),
-        ("glass", SHARED),
+        pytest.param("glass", SHARED, marks=pytest.mark.matrix),
         pytest.param("mirror", SLIC, marks=pytest.mark.matrix),
     ],
     ids=["diffuse", "mirror, 3×5", "glass, maps shared by two columns", "mirror, SLIC maps"],

@@ -16,7 +16,7 @@ class LeafDecoderSpec extends AnyFlatSpec with ChiselScalatestTester with Matche
   for ((name, few, fewTaken) <- Seq(("at full rate", 1, 1), ("as leaves come", 5, 1), ("as the shader is ready", 1, 9)))
     it should s"find the attributes of hits $name" in test(new LeafDecoder(TestConfigs.tiny)) { dut =>
       val random = new Random(few + fewTaken)
-      val leaves = Seq.fill(150) {
+      val leaves = Seq.fill(if (few + fewTaken == 2) 150 else 50) {
         val record = Seq.fill(8)(BigInt(32, random))
         val isPair = (record.last >> 30) != 1
         BigInt(if (isPair) random.nextInt(2) else 0) +: record
