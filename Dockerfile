@@ -22,6 +22,6 @@ COPY --chown=colonnade:colonnade tools/programs.sh tools/python-environment tool
 RUN tools/fetch-sbt && tools/python-environment --packages
 COPY --chown=colonnade:colonnade . .
 # The generator is compiled at its first use.
-RUN tools/setup && .venv/bin/colonnade generate --config textured --output /tmp/textured && rm -rf /tmp/textured
+RUN tools/setup && .venv/bin/colonnade generate --config small --output /tmp/small && rm -rf /tmp/small
 ENV PATH=/colonnade/.venv/bin:$PATH
 CMD ["bash"]

@@ -6,7 +6,7 @@ SHELL := /bin/bash
 
 venv := .venv/bin
 SCENE ?= scenes/metal.toml
-CONFIG ?= textured
+CONFIG ?= small
 SIZE ?= 640x480
 SAMPLES ?= 4
 BENCH_CONFIG ?= edge

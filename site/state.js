@@ -4,7 +4,7 @@ import { ROOM_START, START } from "./camera.js";
 
 export const DEFAULTS = {
   mesh: "teapot.ply",
-  design: "textured",
+  design: "small",
   room: "",
   photo: 1,
   gather: 1,

@@ -17,7 +17,7 @@ export const kindFor = (room, design) => room?.kinds.find(({ views }) => design 
 
 /** The room of the page whose view files are templates, and a design that has maps: the wanted one, if it has. */
 export function templateFor(rooms, wanted) {
-  const design = kindFor(rooms.living, wanted) ? wanted : "textured";
+  const design = kindFor(rooms.living, wanted) ? wanted : "small";
   return { template: { ...rooms.living, ...kindFor(rooms.living, design) }, design };
 }
 

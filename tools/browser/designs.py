@@ -13,7 +13,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.scene.parser import load_scene
 
 ROOT = Path(__file__).resolve().parents[2]
-DESIGNS = ("textured", "edge", "lean", "small", "diffuse", "tiny")
+DESIGNS = ("small", "edge", "lean", "tiny")
 #: What record.py writes.
 RECORDINGS = ROOT / "site" / "cycles.json"
 #: Its view file is every mesh's, but for the registers that the page sets: its edge is the cube's.

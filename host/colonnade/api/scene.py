@@ -139,15 +139,14 @@ class Scene:
 
     @checked
     def render(
-        self, backend: Backend = "model", config: str | None = None, size: Size | None = None, **options: Any
+        self, backend: Backend = "model", config: str = "small", size: Size | None = None, **options: Any
     ) -> RenderResult:
         """Render one frame.
 
         Args:
             backend: ``model``, the bit-exact model; ``rtl``, the generated Verilog in a simulator; or ``reference``,
                 Embree in floating point.
-            config: The design: a preset, a JSON file, or a precision such as ``32b32s64d``; None: ``textured`` with
-                gathered light, as in the photo of a room, else ``small``.
+            config: The design: a preset, a JSON file, or a precision such as ``32b32s64d``.
             size: Width and height, pixels; None: those of the scene, 640×480 unless given.
             options: Others of `RenderRequest`: ``overrides``, ``samples``, ``relit``, ``truth``, ``encoder``,
                 ``denoise``, ``hits``, ``waveform``; and ``progress`` (`colonnade.common.progress.for_terminal`).
@@ -166,7 +165,7 @@ class Scene:
         self,
         count: int,
         backend: Backend = "model",
-        config: str | None = None,
+        config: str = "small",
         size: Size | None = None,
         **options: Any,
     ) -> Iterator[RenderResult]:

@@ -58,8 +58,8 @@ class SceneName(_PathType):
 SCENE = SceneName()
 
 
-def configuration_options(command: Command, default: str | None = "small", note: str = "") -> Command:
-    """Add ``--config`` and ``--set``, which choose the hardware configuration, with a note on its default."""
+def configuration_options(command: Command) -> Command:
+    """Add ``--config`` and ``--set``, which choose the hardware configuration."""
     command = click.option(
         "--set",
         "overrides",
@@ -69,18 +69,12 @@ def configuration_options(command: Command, default: str | None = "small", note:
     )(command)
     return click.option(
         "--config",
-        default=default,
+        default="small",
         show_default=True,
         metavar="CONFIG",
-        help="Hardware configuration: a preset (tiny, small, textured, fpga, diffuse, lean, edge), a JSON file, "
-        f"or a precision like 32b32s64d.{note}",
+        help="Hardware configuration: a preset (tiny, small, fpga, lean, edge), a JSON file, "
+        "or a precision like 32b32s64d.",
     )(command)
-
-
-def render_options(command: Command) -> Command:
-    """Add the options of `configuration_options`, for frames; None leaves the choice to the scene."""
-    note = "  [default: textured with gathered light, as in the photo of a room, else small]"
-    return configuration_options(command, None, note)
 
 
 def size_option(text: str) -> Callable[[Command], Command]:

@@ -18,7 +18,7 @@ from colonnade.cli.options import (
     finish,
     json_option,
     mesh_option,
-    render_options,
+    configuration_options,
     require_outputs,
     require_suffix,
     simplify_option,
@@ -59,7 +59,7 @@ def _is_scene(word: str) -> bool:
 
 @click.command(cls=_Render, short_help="Render frames with the RTL, its model, or Embree.")
 @click.argument("scene", type=SCENE)
-@render_options
+@configuration_options
 @click.option(
     "--backend",
     type=click.Choice(["rtl", "model", "reference"]),
@@ -131,7 +131,7 @@ def _is_scene(word: str) -> bool:
 @json_option
 def render(
     scene: Path,
-    config: str | None,
+    config: str,
     overrides: tuple[str, ...],
     backend: Backend,
     size: str | None,

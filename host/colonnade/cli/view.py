@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import echo, encoder_option, render_options, size_option
+from colonnade.cli.options import echo, encoder_option, configuration_options, size_option
 from colonnade.maps.encoders import Encoder
 
 
 @click.command(short_help="Show a scene in the browser, while it is edited.")
 @click.argument("scene", type=click.Path())
-@render_options
+@configuration_options
 @size_option("Frame size in pixels.  [default: 320x240]")
 @encoder_option
 @click.option(
@@ -21,7 +21,7 @@ from colonnade.maps.encoders import Encoder
 @click.option("--open/--no-open", "opens", default=True, show_default=True, help="Open the page in a browser.")
 def view(
     scene: str,
-    config: str | None,
+    config: str,
     overrides: tuple[str, ...],
     size: str | None,
     encoder: Encoder | None,

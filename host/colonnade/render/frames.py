@@ -19,7 +19,7 @@ from colonnade.render.device_frames import device_frames
 from colonnade.render.host_frame import require_filter
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
-from colonnade.render.room_defaults import default_config, with_room_defaults
+from colonnade.render.room_defaults import with_room_defaults
 from colonnade.render.samples import joined, with_requested_samples
 from colonnade.render.sequence_frames import check_sequence, sequence_frames
 from colonnade.scene.model import Scene
@@ -65,12 +65,11 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
     is_single = request.relit or request.hits or request.waveform is not None
     scene = replace(scene, frame=replace(scene.frame, denoise=denoise), names_gather=scene.names_gather or is_single)
     in_sequence = request.sequence is not None
-    config = request.config or default_config(scene, in_sequence)
-    manifest = manifest_for(config, request.overrides, progress).manifest
-    scene, defaults = with_room_defaults(scene, config, manifest, in_sequence)
+    manifest = manifest_for(request.config, request.overrides, progress).manifest
+    scene, defaults = with_room_defaults(scene, request.config, manifest, in_sequence)
     scene, note = with_requested_samples(scene, request)
     scene = exposed(scene)
-    request = replace(request, config=config, denoise=scene.frame.denoise or False)
+    request = replace(request, denoise=scene.frame.denoise or False)
     size = (scene.frame.width, scene.frame.height) if request.size is None else request.size
     check_size(size, manifest)
     _check_frames(request, scene, size, manifest)

@@ -25,7 +25,7 @@ class RenderRequest:
 
     Attributes:
         scene: A scene, or its file, TOML.
-        config: Preset, path, or precision such as ``32b32s64d``; None: `default_config`.
+        config: Preset, path, or precision such as ``32b32s64d``.
         overrides: Changes to the configuration, ``key=value``.
         backend: ``rtl``: the generated Verilog in a simulator; ``model``: its bit-exact model; ``reference``: Embree.
         size: (width, height), pixels; None: that of the scene.
@@ -48,7 +48,7 @@ class RenderRequest:
     """
 
     scene: Path | Scene
-    config: str | None
+    config: str
     overrides: Overrides = ()
     backend: Backend = "rtl"
     size: Size | None = None

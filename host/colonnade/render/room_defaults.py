@@ -8,15 +8,6 @@ from colonnade.design.manifest import Manifest
 from colonnade.environment.load import has_photo
 from colonnade.scene.model import Scene
 
-#: The preset of frames that gather light, and that of others.
-GATHERING_PRESET, PRESET = "textured", "small"
-
-
-def default_config(scene: Scene, in_sequence: bool = False) -> str:
-    """The preset of a frame for which none is named."""
-    return GATHERING_PRESET if scene.paths.gather or _is_open(scene, in_sequence) else PRESET
-
-
 def with_room_defaults(
     scene: Scene, config: str, manifest: Manifest, in_sequence: bool = False
 ) -> tuple[Scene, str | None]:

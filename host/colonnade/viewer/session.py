@@ -25,7 +25,7 @@ from colonnade.maps.encoders import Encoder
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.history import History
 from colonnade.render.host_frame import HostFrame, require_filter
-from colonnade.render.room_defaults import default_config, with_room_defaults
+from colonnade.render.room_defaults import with_room_defaults
 from colonnade.scene.model import Camera, Scene
 from colonnade.scene.model.values import WorldVector
 from colonnade.scene.parser import load_scene
@@ -97,7 +97,7 @@ class Session:
 
     Args:
         file: The scene file.
-        config: The design, as in `ModelDevice`; None: `default_config` of the scene.
+        config: The design, as in `ModelDevice`.
         overrides: Fields that replace some of it.
         size: Width and height, pixels.
         encoder: Of a room's maps and of textures.
@@ -111,7 +111,7 @@ class Session:
     def __init__(
         self,
         file: Path,
-        config: str | None,
+        config: str,
         overrides: Sequence[str] = (),
         size: tuple[int, int] = (320, 240),
         encoder: Encoder | None = None,
@@ -121,7 +121,7 @@ class Session:
         self.file, self.size = file, size
         self._is_own = is_own
         self._encoder = encoder
-        self._config = config or default_config(load_scene(file))
+        self._config = config
         self._manifest = manifest_for(self._config, overrides, progress).manifest
         check_size(size, self._manifest)
         self._device = ModelDevice(self._config, overrides)

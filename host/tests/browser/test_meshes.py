@@ -27,7 +27,7 @@ def by_the_tab(folder: Path, files: dict[str, bytes]) -> dict[str, Any]:
     """What site/meshes.js reads, by name: an error, or the arrays of corners."""
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    manifest = json.loads((ROOT / "configs" / "golden" / "textured.json").read_text())
+    manifest = json.loads((ROOT / "configs" / "golden" / "small.json").read_text())
     run_node("meshes.mjs", folder, {"module": str(MODULE), "manifest": manifest})
     return dict(json.loads((folder / "result.json").read_text()))
 

@@ -77,7 +77,7 @@ def test_the_page_is_small_and_fast_and_equals_the_host(context: BrowserContext)
     tab = Tab(context, "#pixel=4")
     assert time.monotonic() - begin < 10  # some 3 s on a busy machine
     picture = tab.picture()
-    frame = host_frame(picture, load_mesh("teapot"), "textured")
+    frame = host_frame(picture, load_mesh("teapot"), "small")
     assert frame.is_object.sum() > 100
     np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
     np.testing.assert_array_equal(np.reshape(picture["triangles"], frame.triangle.shape), frame.triangle)
@@ -96,7 +96,7 @@ def test_the_first_picture_is_that_of_the_readme(context: BrowserContext) -> Non
           return [writes, Array.from(triangles, (triangle) => Number(triangle >= 0)).join("")];
         }"""
     )
-    manifest = Manifest.load(ROOT / "configs" / "golden" / "textured.json")
+    manifest = Manifest.load(ROOT / "configs" / "golden" / "small.json")
     registers = registers_of({"writes": writes}, manifest)
     scene = DeviceScene.of(load_scene(ROOT / "scenes" / "metal.toml"), manifest, load_mesh("teapot"), encoder="live")
     own = scene.registers((640, 480))
@@ -160,7 +160,7 @@ def test_a_room_lights_the_object_and_passes_are_added(context: BrowserContext) 
         picture = tab.picture()
         angle = np.radians(float(page.evaluate("/azimuth=([\\d.]+)/.exec(location.hash)[1]")) - 24)
         rotation = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
-        frame = host_frame(picture, load_mesh("teapot"), "textured", is_in_room=True, light=cube.turned(rotation))
+        frame = host_frame(picture, load_mesh("teapot"), "small", is_in_room=True, light=cube.turned(rotation))
         assert frame.is_object.sum() > 100 and frame.ratio.min() < 3500
         np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
         np.testing.assert_array_equal(np.reshape(picture["ratios"], frame.ratio.shape), frame.ratio)
@@ -170,7 +170,7 @@ def test_a_room_lights_the_object_and_passes_are_added(context: BrowserContext) 
     view, middle = page.evaluate("[colonnade.pass, colonnade.middle]")
     writes = page.evaluate("colonnade.renderer.writes(colonnade.pass)")
     sample = samples_of_frame(64, len(light["lamps"]))[63]
-    registers = registers_of(writes, Manifest.load(ROOT / "configs" / "golden" / "textured.json"))
+    registers = registers_of(writes, Manifest.load(ROOT / "configs" / "golden" / "small.json"))
     assert [registers[f"gather.points[0].{axis}"] for axis in "uv"] == list(sample.gather[0])
     for lamp, placed, point in zip(light["lamps"], view["lights"], sample.lights, strict=True):
         right, up, _ = camera_axes(np.subtract(lamp["position"], middle), (0, 1, 0))
@@ -232,7 +232,7 @@ def test_a_photo_and_its_depth_are_a_room(context: BrowserContext) -> None:
     expect(page.locator("#error")).to_contain_text("render.png is a photo without depth")
     # Its light, in hardware that gathers it
     with tab.another_frame():
-        page.select_option("select[name=design]", "textured")
+        page.select_option("select[name=design]", "small")
         expect(page.locator("#notes")).to_contain_text("of the directions around the object")
     share, parallax = page.evaluate("[colonnade.light.share, colonnade.light.parallax]")
     assert 0.1 < share < 0.6 and parallax in (2, 3)
@@ -347,7 +347,7 @@ def test_changes_that_come_faster_than_pictures(context: BrowserContext) -> None
           new MutationObserver(note).observe(error, { childList: true });
         }"""
     )
-    designs, rooms, materials = ("edge", "textured", "diffuse", "lean"), ("office", "living", ""), ("glass", "metal")
+    designs, rooms, materials = ("edge", "small", "tiny", "lean"), ("office", "living", ""), ("glass", "metal")
     for index in range(24):
         name, values = (("design", designs), ("room", rooms), ("material", materials))[index % 3]
         before = page.evaluate(

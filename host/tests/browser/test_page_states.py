@@ -70,9 +70,9 @@ def test_the_page_of_any_link_has_a_picture_and_works(context: BrowserContext, l
     assert page.evaluate("location.hash") == "#pixel=4"
     controls = ("design", "room", "bounces", "light", "pixel")
     values = page.evaluate(f"{list(controls)}.map(name => document.getElementById('controls').elements[name].value)")
-    assert values == ["textured", "", "4", "1", "4"]
+    assert values == ["small", "", "4", "1", "4"]
     if "design" in link:
-        expect(page.locator("#notes")).to_contain_text("which the page does not have: this is textured")
+        expect(page.locator("#notes")).to_contain_text("which the page does not have: this is small")
     assert page.locator("#error").is_hidden() and page.locator("#busy").is_hidden()
     assert page.locator("#path").is_hidden()
     with tab.another_frame():
@@ -167,7 +167,7 @@ def test_hardware_that_cannot_hold_the_mesh_is_not_taken(context: BrowserContext
     with tab.another_frame():
         page.select_option("select[name=design]", "tiny")
         expect(page.locator("#error")).to_contain_text("mesh grid.obj needs ")
-    expect(page.locator("select[name=design]")).to_have_value("textured")
+    expect(page.locator("select[name=design]")).to_have_value("small")
     assert tab.picture()["colours"] == colours and page.locator("#error").is_visible()
     with tab.another_frame():
         page.select_option("select[name=material]", "mirror")

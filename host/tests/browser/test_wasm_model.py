@@ -81,7 +81,7 @@ def check(
 
 @pytest.mark.parametrize(
     ("config", "scene"),
-    [("textured", "object.toml"), ("edge", "mirror.toml"), ("lean", "glass.toml"), ("tiny", "object.toml")],
+    [("small", "object.toml"), ("edge", "mirror.toml"), ("lean", "glass.toml"), ("tiny", "object.toml")],
 )
 def test_webassembly_equals_the_host(tmp_path: Path, config: str, scene: str) -> None:
     check(tmp_path, load_mesh("teapot:4"), config, scene, (64, 48))

@@ -96,7 +96,7 @@ def runs(root: Path) -> list[str]:
     return [line.split()[0] for line in log.read_text().splitlines()] if log.exists() else []
 
 
-@pytest.mark.parametrize("preset", ["tiny", "small", "textured", "fpga", "diffuse", "lean", "edge"])
+@pytest.mark.parametrize("preset", ["tiny", "small", "fpga", "lean", "edge"])
 def test_no_part_of_a_preset_is_idle(preset: str) -> None:
     assert idle_notes(json.loads((toolchain.project_root() / "configs" / f"{preset}.json").read_text())) == []
 

@@ -51,7 +51,7 @@ def marks_of(words: NDArray[np.uint8]) -> NDArray[np.int64]:
 
 
 def test_without_a_room_every_texel_is_the_ambient_light() -> None:
-    prepared = DeviceScene.of(SCENE, manifest_for("textured").manifest)
+    prepared = DeviceScene.of(SCENE, manifest_for("small").manifest)
     (cube,) = (section for section in prepared.image.attributes if section.memory == "light.cube")
     assert cube.words.shape == (1536, 4)
     np.testing.assert_allclose(light_of(cube.words) / 4096, np.broadcast_to((0.4, 0.2, 0.1), (1536, 3)), atol=0.4 / 128)
@@ -63,7 +63,7 @@ def test_without_a_room_every_texel_is_the_ambient_light() -> None:
 
 @pytest.mark.parametrize("scene", [SCENE, IN_ROOM], ids=["alone", "in a room"])
 def test_an_image_keeps_its_light_in_a_file(scene: Scene, tmp_path: Path) -> None:
-    manifest = manifest_for("textured").manifest
+    manifest = manifest_for("small").manifest
     image = DeviceScene.of(scene, manifest, encoder="live").image
     again = SceneImage.load(image.save(tmp_path / "scene.image"), manifest)
     assert again.header.to_json() == image.header.to_json()
@@ -77,7 +77,7 @@ def test_an_image_keeps_its_light_in_a_file(scene: Scene, tmp_path: Path) -> Non
 
 def test_a_room_lights_the_object_from_its_picture() -> None:
     """Another place has another light; a scene that gathers nothing has no cube."""
-    manifest = manifest_for("textured").manifest
+    manifest = manifest_for("small").manifest
     moved = replace(IN_ROOM, placement=Placement((150.0, 380.0), 0.5))
     words = [DeviceScene.of(scene, manifest, encoder="live").image.attributes[-1].words for scene in (IN_ROOM, moved)]
     assert (words[0] != words[1]).any()
@@ -89,7 +89,7 @@ def test_a_room_lights_the_object_from_its_picture() -> None:
 
 
 def test_a_new_view_of_the_room_brings_its_light() -> None:
-    prepared = DeviceScene.of(IN_ROOM, manifest_for("textured").manifest, encoder="live")
+    prepared = DeviceScene.of(IN_ROOM, manifest_for("small").manifest, encoder="live")
     assert prepared.maps is not None
     room, image = load_environment(ROOM), prepared.maps.image
     assert room.photo is not None
@@ -99,7 +99,7 @@ def test_a_new_view_of_the_room_brings_its_light() -> None:
 
 
 def test_each_pass_has_points_of_its_own() -> None:
-    manifest = manifest_for("textured").manifest
+    manifest = manifest_for("small").manifest
     prepared = DeviceScene.of(SCENE, manifest)
     passes = prepared.passes(prepared.scene.with_samples(16))
     registers = [prepared.registers((32, 24), one) for one in passes]
@@ -114,14 +114,14 @@ def test_what_cannot_gather_is_refused() -> None:
     with pytest.raises(UserError, match=r"set frame\.gather=true"):
         DeviceScene.of(SCENE, manifest_for("small").manifest).registers((32, 24))
     with pytest.raises(UserError, match=r"frame\.gather"):
-        manifest_for("textured", ("units.shadeInterval=128",))
+        manifest_for("small", ("units.shadeInterval=128",))
     with pytest.raises(UserError, match=r"frame\.gather"):
-        manifest_for("textured", ("frame.maxBounces=0",))
+        manifest_for("small", ("frame.maxBounces=0",))
 
 
 def test_room_pixels_near_the_object_gather_its_light() -> None:
     """The ratios of the model are those of the reference, in the window and beside it."""
-    design, size = manifest_for("textured").manifest, (80, 60)
+    design, size = manifest_for("small").manifest, (80, 60)
     scene = replace(IN_ROOM, material=Material(albedo=(0.8, 0.1, 0.1))).with_samples(4)
     prepared = DeviceScene.of(scene, design, encoder="live")
     passes = FramePasses()
@@ -139,7 +139,7 @@ def test_room_pixels_near_the_object_gather_its_light() -> None:
 
 def test_a_surface_in_a_dome_of_light_is_as_bright_as_under_ambient_light() -> None:
     """A convex object sees the whole dome: its albedo times the light."""
-    manifest = manifest_for("textured").manifest
+    manifest = manifest_for("small").manifest
     frames = []
     for gather in (0, 1):
         dark = replace(SCENE, mesh=MeshSource(name="sphere"), light=Light(colour=(0.0, 0.0, 0.0)))
@@ -153,7 +153,7 @@ def test_a_surface_in_a_dome_of_light_is_as_bright_as_under_ambient_light() -> N
 
 def test_a_mirror_shows_the_light_and_the_lamps_that_leave_it_nothing_else() -> None:
     """A matt object does not see them: they are lights already."""
-    manifest, lamp = manifest_for("textured").manifest, Light((0.0, 6.0, 0.0), radius=2.0)
+    manifest, lamp = manifest_for("small").manifest, Light((0.0, 6.0, 0.0), radius=2.0)
     for kind, brightest in (("mirror", 4095), ("diffuse", 0)):
         dark = Light((0.0, 6.0, 0.0), colour=(0.0, 0.0, 0.0), radius=2.0) if kind == "diffuse" else lamp
         scene = replace(SCENE, mesh=MeshSource(name="sphere"), light=dark, material=Material(kind=kind))
@@ -166,7 +166,7 @@ def test_a_mirror_shows_the_light_and_the_lamps_that_leave_it_nothing_else() -> 
 
 
 def test_mirrors_and_glass_in_a_room_are_those_of_the_reference() -> None:
-    design, size, room = manifest_for("textured").manifest, (80, 60), load_environment(ROOM)
+    design, size, room = manifest_for("small").manifest, (80, 60), load_environment(ROOM)
     for kind, limit in (("mirror", 0.004), ("glass", 0.02)):
         scene = replace(IN_ROOM, mesh=MeshSource(name="sphere"), material=Material(kind=kind), paths=Paths(gather=1))
         prepared = DeviceScene.of(scene, design, encoder="live")
@@ -186,7 +186,7 @@ def test_rays_that_bring_more_than_white_count_whole(backend: str, tmp_path: Pat
     scene = replace(SCENE, mesh=MeshSource(name="sphere"), material=plain, background=sky, paths=Paths(gather=1))
     facing = replace(scene, light=Light(colour=(0.0, 0.0, 0.0)), camera=Camera(direction=(0.0, 0.0, 1.0)))
     dark = facing.with_samples(16)
-    (result,) = render_frames(RenderRequest(dark, "textured", backend=backend, size=(32, 24)))
+    (result,) = render_frames(RenderRequest(dark, "small", backend=backend, size=(32, 24)))
     middle = result.image[10:14, 15:17].mean()
     assert abs(middle - 0.8) < 0.03
 
@@ -202,7 +202,7 @@ def test_a_coat_reflects_the_light_around_without_its_colour(backend: str) -> No
             for samples in (1, 4):
                 material = Material(kind="diffuse", albedo=(albedo, 0.0, 0.0), roughness=roughness)
                 one = replace(scene, material=material).with_samples(samples)
-                (result,) = render_frames(RenderRequest(one, "textured", backend=backend, size=(32, 24)))
+                (result,) = render_frames(RenderRequest(one, "small", backend=backend, size=(32, 24)))
                 middles[albedo, roughness, samples] = result.image[10:14, 14:18].mean(axis=(0, 1))
                 assert result.report.samples == samples
     for albedo in (0.0, 0.5):
@@ -221,7 +221,7 @@ def shiny_ball(
     scene = replace(SCENE, mesh=MeshSource(name="sphere"), light=lamp, ambient=dark, paths=Paths(gather=1))
     material = Material(kind=kind, albedo=(1.0, 1.0, 1.0), roughness=roughness)
     scene = replace(scene, camera=Camera(direction=(0.0, 0.5, 1.0), fov=3.0), material=material).with_samples(16)
-    (result,) = render_frames(RenderRequest(scene, "textured", backend=backend, size=(96, 72)))
+    (result,) = render_frames(RenderRequest(scene, "small", backend=backend, size=(96, 72)))
     return result.image[..., 0], result.object_mask
 
 
@@ -266,7 +266,7 @@ def panorama_scene(path: Path, level: float, scene: Scene) -> Scene:
 
 def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, told: list[str]) -> None:
     """Lights that the scene names add to it; otherwise they are taken out of it, and the rest is ambient light."""
-    manifest, scene = manifest_for("textured").manifest, panorama_scene(tmp_path / "sky.exr", 0.5, SCENE)
+    manifest, scene = manifest_for("small").manifest, panorama_scene(tmp_path / "sky.exr", 0.5, SCENE)
     scene = replace(scene, background=replace(scene.background, panorama_exposure=0.5))
     words = light_of(DeviceScene.of(scene, manifest).image.attributes[-1].words) / 4096
     assert (np.sort(words, axis=None)[: 1528 * 3] == 0.25).all() and words.max() > 1
@@ -294,7 +294,7 @@ def test_the_light_stays_while_the_object_turns(tmp_path: Path) -> None:
         sky = Background(panorama=side_lit(tmp_path / "side.exr"), panorama_exposure=1.0)
         east = replace(scene, light=Light(colour=(0.0, 0.0, 0.0)), background=sky)
         for backend in ("model", "reference"):
-            request = RenderRequest(east.with_samples(16), "textured", backend=backend, size=(32, 24), frames=3)
+            request = RenderRequest(east.with_samples(16), "small", backend=backend, size=(32, 24), frames=3)
             frames = [result.image.mean(axis=2) for result in render_frames(request)]
             sides = np.array([(frame[8:16, 10:14].mean(), frame[8:16, 18:22].mean()) for frame in frames])
             assert (sides[:, 1] > 1.3 * sides[:, 0]).all(), "the light comes from the right"

@@ -72,7 +72,7 @@ def test_a_swatch_map_is_as_near_to_the_reference_as_plain_colours(tmp_path: Pat
         MeshSource(name="sphere:2"), camera=Camera(position=(1.5, 1.2, 3.4), target=(0.0, 0.0, 0.0), fov=38.0),
         light=Light(), background=Background((0.25, 0.45, 0.7)),
     )  # fmt: skip
-    manifest = manifest_for("textured").manifest
+    manifest = manifest_for("small").manifest
     size = (160, 120)
     reference = render_reference(mesh, make_view(scene, mesh.extent, *size, mesh.materials))
     found = psnr(encode_srgb(reference.image), encode_srgb(render_model(scene, mesh, manifest, size).image))

@@ -78,7 +78,7 @@ def test_hardware_without_textures_shows_their_mean(tmp_path: Path) -> None:
     with notes.opened(told.append):
         plain = with_materials(Scene(MeshSource(name="square")), mesh, SurfaceFeatures(8))
     assert plain.materials == (MeshMaterial(albedo=(0.25, 0.5, 0.5)),) and plain.textures == ()
-    assert "take --config textured, or set geometry.cornerColours=true and geometry.textureBytes" in " ".join(told)
+    assert "take --config small, or set geometry.cornerColours=true and geometry.textureBytes" in " ".join(told)
     (replaced,) = with_overrides(mesh.materials, Material(albedo=(0.1, 0.2, 0.3)))
     assert replaced.texture is None
 

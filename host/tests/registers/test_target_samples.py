@@ -26,7 +26,7 @@ SCENE = Scene(
 
 @pytest.fixture(scope="module")
 def prepared() -> DeviceScene:
-    return DeviceScene.of(SCENE, Manifest.load(GOLDEN / "textured.json"), size=(WIDTH, HEIGHT))
+    return DeviceScene.of(SCENE, Manifest.load(GOLDEN / "small.json"), size=(WIDTH, HEIGHT))
 
 
 def test_the_registers_of_all_passes_are_those_of_the_host(prepared: DeviceScene) -> None:

@@ -52,7 +52,7 @@ def test_rtl_and_model_have_the_samples_of_one_budget(told: list[str]) -> None:
 def test_longer_budgets_give_more_samples() -> None:
     def samples(budget: float | None) -> int:
         scene = replace(GATHERS, frame=FrameSize(*SIZE, budget=budget))
-        return render(RenderRequest(scene, "textured", backend="model")).report.samples
+        return render(RenderRequest(scene, "small", backend="model")).report.samples
 
     found = [samples(budget) for budget in (1e-6, 1e-4, 1.0, None)]
     assert found == sorted(found) and found[0] == 1 and found[2:] == [16, 16]
@@ -64,19 +64,19 @@ def test_passes_of_coats_count() -> None:
 
     The passes of the plain mesh with a coat of its own are cheaper.
     """
-    prepared = DeviceScene.of(GATHERS, manifest_for("textured").manifest)
+    prepared = DeviceScene.of(GATHERS, manifest_for("small").manifest)
     cycles = Budget.of(prepared.manifest, prepared.image, prepared.registers(SIZE, composited=True), 1.0).cycles
     frame = FrameSize(*SIZE, budget=17 * cycles / CLOCK)
     coated = replace(load_mesh("teapot:2"), materials=(MeshMaterial(roughness=0.3),))
     for roughness, mesh, samples, passes in ((1.0, None, 16, 16), (0.3, None, 8, 10), (None, coated, 16, 20)):
         scene = replace(GATHERS, material=Material(roughness=roughness), frame=frame)
-        report = render(RenderRequest(scene, "textured", backend="model", mesh=mesh)).report
+        report = render(RenderRequest(scene, "small", backend="model", mesh=mesh)).report
         assert report.samples == samples and report.rays["primary"] == passes * SIZE[0] * SIZE[1]
 
 
 def test_what_is_named_wins(told: list[str]) -> None:
     """And all frames of a motion have the number of the first one."""
-    still = RenderRequest(GATHERS, "textured", backend="model")
+    still = RenderRequest(GATHERS, "small", backend="model")
     for request in (replace(still, samples=3), replace(still, scene=GATHERS.with_samples(3))):
         assert render(request).report.samples == 3
     assert render(replace(still, hits=True)).report.samples == 1
@@ -106,6 +106,6 @@ def test_estimates_are_rounded_to_two_digits() -> None:
 )
 def test_budgets_that_mean_nothing_are_one_line(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "scene.toml").write_text(f'mesh.name = "teapot:2"\n{text}\n')
-    result = CliRunner().invoke(cli, ["render", str(tmp_path / "scene.toml"), "--config", "textured"])
+    result = CliRunner().invoke(cli, ["render", str(tmp_path / "scene.toml"), "--config", "small"])
     assert result.exit_code == 2
     assert message in result.stderr and len(result.stderr.splitlines()) == 1

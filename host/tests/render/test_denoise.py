@@ -107,7 +107,7 @@ gather = {}
 
 def run(folder: Path, gather: int, *options: str) -> tuple[int, str]:
     (folder / "scene.toml").write_text(SCENE.format(gather))
-    arguments = ["render", str(folder / "scene.toml"), "--config", "textured", "--size", "64x48", *options]
+    arguments = ["render", str(folder / "scene.toml"), "--config", "small", "--size", "64x48", *options]
     done = CliRunner().invoke(cli, arguments)
     return done.exit_code, done.output
 
@@ -128,7 +128,7 @@ def test_the_shadow_on_a_photo_is_filtered_and_the_photo_is_not(tmp_path: Path) 
     scene = Path(__file__).parents[3] / "scenes" / "gathered.toml"
     pictures = {}
     for name, options in (("raw", ("1",)), ("filtered", ("1", "--denoise")), ("truth", ("64",))):
-        arguments = ["render", str(scene), "--config", "textured", "--size", "80x60", "--encoder", "live"]
+        arguments = ["render", str(scene), "--config", "small", "--size", "80x60", "--encoder", "live"]
         output = tmp_path / f"{name}.png"
         options = ("--backend", "model", "--output", str(output), "--samples", *options)
         done = CliRunner().invoke(cli, [*arguments, *options])
@@ -145,7 +145,7 @@ def test_a_scene_asks_for_the_filter(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text(SCENE.format(1) + frame)
     run(tmp_path, 1, "--backend", "model", "--samples", "1", "--denoise", "--output", str(tmp_path / "filtered.png"))
     for backend in ("model", "reference"):
-        own = ["render", str(tmp_path / "own.toml"), "--config", "textured", "--backend", backend]
+        own = ["render", str(tmp_path / "own.toml"), "--config", "small", "--backend", backend]
         done = CliRunner().invoke(cli, [*own, "--output", str(tmp_path / f"{backend}.png")])
         assert done.exit_code == 0, done.output
     assert (tmp_path / "model.png").read_bytes() == (tmp_path / "filtered.png").read_bytes()
@@ -182,7 +182,7 @@ def test_oidn_sees_the_object_and_its_albedo(tmp_path: Path, monkeypatch: pytest
     output_file = tmp_path / "filtered.png"
     material = "[material]\nalbedo = [0.2, 0.4, 0.8]\n[background]\ncolour = [1.0, 1.0, 1.0]\n"
     (tmp_path / "own.toml").write_text(SCENE.format(1) + material + '[frame]\ndenoise = "oidn"\nsamples = 1\n')
-    options = ["--config", "textured", "--size", "64x48", "--backend", "model", "--output", str(output_file)]
+    options = ["--config", "small", "--size", "64x48", "--backend", "model", "--output", str(output_file)]
     done = CliRunner().invoke(cli, ["render", str(tmp_path / "own.toml"), *options])
     assert done.exit_code == 0, done.output
     is_object = seen["albedo"].any(axis=2)
@@ -206,7 +206,7 @@ def test_a_texture_stays_in_a_frame_of_one_sample(tmp_path: Path) -> None:
     codes = np.random.default_rng(1).integers(30, 255, (6, 6, 3)).astype(np.uint8)
     gltf(tmp_path, np.asarray(Image.fromarray(codes).resize((64, 64), Image.Resampling.BILINEAR)))
     (tmp_path / "scene.toml").write_text('mesh.path = "a.gltf"\npaths.gather = 1\n')
-    request = RenderRequest(tmp_path / "scene.toml", "textured", backend="model", size=(64, 48), samples=1)
+    request = RenderRequest(tmp_path / "scene.toml", "small", backend="model", size=(64, 48), samples=1)
     raw, found = (render(replace(request, denoise=denoise)) for denoise in (False, True))
     difference = encode_srgb(raw.image).astype(int) - encode_srgb(found.image)
     assert np.abs(difference[raw.object_mask]).mean() < 5

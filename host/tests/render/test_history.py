@@ -64,7 +64,7 @@ def test_frames_of_one_sample_grow_calm(tmp_path: Path) -> None:
     """The last of eight frames of an object that turns slowly is nearer the truth than by itself."""
     scene = tmp_path / "scene.toml"
     scene.write_text('mesh.name = "teapot:4"\npaths.gather = 1\nmotion.turn = 0.01\n')
-    request = RenderRequest(scene, "textured", backend="model", size=(64, 48), frames=8, samples=1, denoise=True)
+    request = RenderRequest(scene, "small", backend="model", size=(64, 48), frames=8, samples=1, denoise=True)
     *_, last = render_frames(request)
     truth, alone = (render(replace(request, samples=samples)).image for samples in (64, 1))
     inner = np.s_[20:32, 24:40]

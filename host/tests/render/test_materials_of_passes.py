@@ -57,8 +57,8 @@ def test_a_clear_coat_reflects_the_light_around(told: list[str]) -> None:
     """Six hundredths of it, on a black surface, as a layer of its own; a scene of one sample says that it lacks it."""
     coated = MeshMaterial(albedo=(0.0, 0.0, 0.0), clear_coat=(0.5, 0.0))
     scene = replace(SCENE, paths=Paths(gather=1))
-    found = middle(scene.with_samples(4), coated, "textured")
+    found = middle(scene.with_samples(4), coated, "small")
     np.testing.assert_allclose(found, 0.5 * 0.06 * np.array(AMBIENT), rtol=0.1)
     assert not any("clear coat" in line for line in told)
-    assert middle(scene.with_samples(1), coated, "textured").max() == 0.0
+    assert middle(scene.with_samples(1), coated, "small").max() == 0.0
     assert any("1 clear coat is not shown" in line for line in told)

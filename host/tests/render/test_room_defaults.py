@@ -1,4 +1,4 @@
-"""What a frame in the photo of a room has by default: preset, gathered light, filter and samples, and who wins."""
+"""What a frame in the photo of a room has by default: gathered light, filter and samples, and who wins."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from live_maps import SMALL_MAPS
 
 import colonnade
 from colonnade.design.generator import manifest_for
-from colonnade.render.room_defaults import default_config, with_room_defaults
+from colonnade.render.room_defaults import with_room_defaults
 from colonnade.scene.parser import scene_of
 
 
@@ -23,30 +23,29 @@ def tables(folder: Path, has_photo: bool = True, **more: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("has_photo", "more", "config"),
+    ("has_photo", "more", "gathers"),
     [
-        (True, {}, "textured"),
-        (True, {"paths": {"bounces": 2}, "frame": {"budget": 0.1}}, "textured"),
-        (True, {"paths": {"gather": 0}}, "small"),
-        (False, {}, "small"),
-        (False, {"paths": {"gather": 2}}, "textured"),
-        (True, {"background": {"room": ".", "colours": "albedo"}}, "small"),
+        (True, {}, 1),
+        (True, {"paths": {"bounces": 2}, "frame": {"budget": 0.1}}, 1),
+        (True, {"paths": {"gather": 0}}, 0),
+        (False, {}, 0),
+        (False, {"paths": {"gather": 2}}, 2),
+        (True, {"background": {"room": ".", "colours": "albedo"}}, 0),
     ],
 )
 def test_a_scene_that_leaves_it_open_gathers_in_a_photo(
-    tmp_path: Path, has_photo: bool, more: dict[str, Any], config: str
+    tmp_path: Path, has_photo: bool, more: dict[str, Any], gathers: int
 ) -> None:
     scene = scene_of(tables(tmp_path, has_photo, **more), "the scene", tmp_path)
-    assert default_config(scene) == config
-    gathers, line = with_room_defaults(scene, config, manifest_for(config).manifest)
-    assert gathers.paths.gather == scene.paths.gather or (gathers.paths.gather, gathers.frame.denoise) == (1, True)
-    assert (line is not None) == (gathers.paths.gather > scene.paths.gather)
-    assert with_room_defaults(scene, "small", manifest_for("small").manifest) == (scene, None)
+    found, line = with_room_defaults(scene, "small", manifest_for("small").manifest)
+    assert found.paths.gather == gathers
+    assert (line is not None) == (found.frame.denoise is True) == (gathers > scene.paths.gather)
+    assert with_room_defaults(scene, "tiny", manifest_for("tiny").manifest) == (scene, None)
 
 
 def test_a_named_filter_stays(tmp_path: Path) -> None:
     scene = scene_of(tables(tmp_path, frame={"denoise": False}), "the scene", tmp_path)
-    found, line = with_room_defaults(scene, "textured", manifest_for("textured").manifest)
+    found, line = with_room_defaults(scene, "small", manifest_for("small").manifest)
     assert (found.paths.gather, found.frame.denoise) == (1, False)
     assert line is not None and "filters" not in line
 
@@ -57,10 +56,9 @@ def test_the_picture_is_that_of_the_named_keys(tmp_path: Path) -> None:
     light = {"position": (0.9, 1.9, 0.2), "falloff": 1.5}
     scene = colonnade.Scene("cube", background={"room": "room"}, light=light, folder=tmp_path)
     size = (48, 36)
-    with pytest.warns(UserWarning, match="textured gathers the room's light and filters its noise.*16 samples a pixel"):
+    with pytest.warns(UserWarning, match="small gathers the room's light and filters its noise.*16 samples a pixel"):
         default = scene.render(overrides=SMALL_MAPS, size=size)
     named = scene.with_tables(paths={"gather": 1}, frame={"samples": 16, "denoise": True})
-    assert np.array_equal(default.pixels, named.render(config="textured", overrides=SMALL_MAPS, size=size).pixels)
+    assert np.array_equal(default.pixels, named.render(overrides=SMALL_MAPS, size=size).pixels)
     plain = scene.with_tables(paths={"gather": 0}).render(overrides=SMALL_MAPS, size=size)
-    small = scene.render(config="small", overrides=SMALL_MAPS, size=size, samples=4)
-    assert np.array_equal(plain.pixels, small.pixels)
+    assert not np.array_equal(plain.pixels, default.pixels)

@@ -161,7 +161,7 @@ def test_a_photo_that_is_brighter_than_its_lights_is_as_bright_in_what_gathers(f
     for ambient in (1.0, 0.2):
         text = f"light.colour = [0.0, 0.0, 0.0]\nambient.colour = {[ambient] * 3}\npaths.gather = 1\n"
         (folder / "scene.toml").write_text(MIRROR.replace("mirror", kind) + text)
-        request = RenderRequest(folder / "scene.toml", "textured", SMALL_MAPS, "model", SIZE, samples=4)
+        request = RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, "model", SIZE, samples=4)
         result = render(replace(request, encoder="live"))
         light[ambient] = result.image[result.object_mask].mean()
     assert light[0.2] == pytest.approx(light[1.0], rel=0.04)

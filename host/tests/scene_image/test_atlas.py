@@ -110,7 +110,7 @@ def test_an_image_keeps_its_textures_in_a_file(tmp_path) -> None:  # type: ignor
         np.testing.assert_array_equal(one.words, other.words)
     plain = pack(load_mesh("cube"), manifest)
     assert plain.header.texture is not None and not any(section.words.any() for section in plain.attributes)
-    with pytest.raises(UserError, match="the hardware has none: take --config textured, or set geometry"):
+    with pytest.raises(UserError, match="the hardware has none: take --config small, or set geometry"):
         pack(mesh, manifest_for("tiny").manifest)
 
 

@@ -76,7 +76,7 @@ def test_a_rest_in_a_photo_is_the_picture_of_render(tmp_path: Path) -> None:
     write_png(tmp_path / "attic" / "photo.png", decode_srgb(noise.astype(np.uint8)))
     file = tmp_path / "scene.toml"
     file.write_text(GATHERED)
-    size, config = (128, 96), "textured"
+    size, config = (128, 96), "small"
     session = Session(file, config, size=size)
     notes = session.state()["notes"]
     assert "room attic shows" in notes[-2] and "the object has the photo's grain" in notes[-1]

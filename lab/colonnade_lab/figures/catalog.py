@@ -182,39 +182,35 @@ def _paper_maps() -> Entry:
 
 
 def _gather() -> Entry:
-    """Gathered light on `edge`: its area, a pass of the RTL, and pictures of the model against the reference."""
-    override, scene = "frame.gather=true", "scenes/gathered.toml"
+    """Gathered light on `edge`: a pass of the RTL, and pictures of the model against the reference."""
 
     def render(backend: str, *options: str) -> tuple[str, ...]:
-        hardware = ("--config", "edge", "--set", override, "--backend", backend)
-        return ("colonnade", "render", scene, *hardware, *options, "--json", REPORT)
+        hardware = ("--config", "edge", "--backend", backend)
+        return ("colonnade", "render", "scenes/gathered.toml", *hardware, *options, "--json", REPORT)
 
     pictures = {backend: f"out/gathered-{backend}.png" for backend in ("reference", "model")}
     small = ("--size", "320x240", "--samples", "16", "--output")
     commands = {
-        "area": ("colonnade", "ppa", "--config", "edge", "--set", override, "--liberty", "ASAP7", "--json", REPORT),
         "pass": render("rtl", "--samples", "1"),
         "whole": render("rtl", "--samples", "1", "--relit"),
         **{f"-{backend}": render(backend, *small, picture) for backend, picture in pictures.items()},
         "compare": ("colonnade", "compare", "--no-dists", *pictures.values(), "--json", REPORT),
     }
-    return Entry("gather", "edge", commands, (override,), libraries=("ASAP7",))
+    return Entry("gather", "edge", commands)
 
 
 def _light() -> Entry:
     """Frames in known rooms against a path tracer, and a pass of the RTL over one of them, with gathered light."""
     scenes = [f"out/light/panorama-{rays}/attic-rough.toml" for rays in (1, 2)]
-    # Its meshes need more records than those of the benchmark
-    design = Design("edge", ("frame.gather=true", "columnBvhMemory.depth=262144"))
-    larger = (part for override in design.overrides for part in ("--set", override))
-    hardware = ("--config", design.config, *larger, "--backend", "rtl")
+    design = Design("edge")
+    hardware = ("--config", design.config, "--backend", "rtl")
     options = ("--samples", "1", "--size", "640x480", "--json", REPORT)
     commands = {
         "frames": ("tools/light", "frames", "--json", REPORT),
         "pass": ("colonnade", "render", scenes[0], *hardware, *options),
         "two": ("colonnade", "render", scenes[1], *hardware, *options),
     }
-    return Entry("light", "textured", commands, designs=(design,))
+    return Entry("light", "small", commands, designs=(design,))
 
 
 def catalog() -> dict[str, Entry]:
@@ -223,8 +219,6 @@ def catalog() -> dict[str, Entry]:
         _bench("edge"),
         _large(),
         _area("edge", "ASAP7"),
-        _bench("diffuse"),
-        _area("diffuse", "ASAP7"),
         Entry("rooms", "edge", {"": ("tools/room-frames", "edge", "640x480", "--compare", f"--json={REPORT}")}),
         _bench("lean", "--no-mirror"),
         _area("lean", "ASAP7"),
@@ -263,13 +257,12 @@ def catalog() -> dict[str, Entry]:
         _samples(),
         _gather(),
         _light(),
-        Entry("light-users", "textured", {"frames": ("tools/light", "frames", *USERS_ROOMS, "--json", REPORT)}),
-        Entry("assets", "textured", {"": ("tools/light", "samples", "--json", REPORT)}),
+        Entry("light-users", "small", {"frames": ("tools/light", "frames", *USERS_ROOMS, "--json", REPORT)}),
+        Entry("assets", "small", {"": ("tools/light", "samples", "--json", REPORT)}),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),
         _area("tiny", "ASAP7"),
-        _area("textured", "ASAP7", "--no-power"),
         _area("edge", "SKY130"),
         _bench("fpga", *_TWO, "--dram-latency", "15", "--dram-interval", "2"),
         _area("fpga", "ASAP7"),
@@ -284,6 +277,7 @@ def catalog() -> dict[str, Entry]:
         _paper_unit(),
         _paper_maps(),
         _study("ablation"),
+        _study("features", "ASAP7"),
         _study("scaling"),
         _study("bvh-tests"),
         _study("bvh-costs", "ASAP7"),

@@ -12,11 +12,9 @@ from colonnade_lab.ppa.equal_area import fastest_clock
 
 #: What each preset is for, and the command whose frames show that its RTL equals the model. The largest comes first.
 PRESETS = {
-    "edge": ("AR: rooms, mirrors, glass", "`make verify`, six rooms"),
+    "edge": ("AR: rooms, their light, mirrors, glass, textures", "`make verify`, six rooms"),
     "lean": ("as `edge`, narrower arithmetic, finer vertices", "`make verify`"),
-    "diffuse": ("as `edge`, diffuse objects only", "`make verify`"),
-    "textured": ("textures, colours at corners, emission, gathered light", "`make test`, by feature"),
-    "small": ("the simulator: rooms, mirrors, glass", "`make test`"),
+    "small": ("the simulator: `edge` of 2×2, the scene on chip", "`make test`"),
     "tiny": ("tests, the smallest array", "`make test`"),
     "fpga": ("an ECP5 board", "`make verify`"),
 }

@@ -12,7 +12,7 @@ from colonnade_lab.figures.data import Data
 from colonnade_lab.figures.facts import MEGAHERTZ, facts, text
 
 #: Presets of 10×8 arrays, which table 1 has.
-ARRAYS = ("edge", "lean", "diffuse")
+ARRAYS = ("edge", "lean")
 
 #: The entries that the page's commands measure.
 PARTS = (

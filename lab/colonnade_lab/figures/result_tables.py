@@ -156,20 +156,11 @@ def moved_rooms(data: Data) -> str:
 
 
 def gather(data: Data) -> str:
-    """What gathered light costs `edge`, and how near the model is to the reference."""
-    found, without = data.result("gather"), data.result("area-edge-asap7")
-    array = without["levels"]["array"]
-    column = without["levels"]["column"]["kge"]
-    more = (found["area"]["levels"]["array"]["kge"] - array["kge"]) / array["of_the_level_below"]
-    fo4 = [report["slowest_path"]["fo4"] for report in (without, found["area"])]
+    """Passes of `edge` that gather light, and how near the model is to the reference."""
+    found = data.result("gather")
     counters = (found[part]["counters"] for part in ("pass", "whole"))
     passes = [f"{one['cycles']:,} cycles, {one['raysGather']:,} gathered rays" for one in counters]
     rows = [
-        [
-            "a column of `edge`, and its part of the array",
-            f"{column:,.0f} kGE; + {more:.1f}, {100 * more / column:.1f} %",
-        ],
-        ["slowest path", f"{fo4[0]:.1f} FO4; with it {fo4[1]:.1f}"],
         ["a pass of the scene above, 640×480", passes[0]],
         ["without the photo, all pixels", passes[1]],
         ["model against reference, 16 samples, 320×240", f"{found['compare']['psnr']:.1f} dB"],

@@ -29,7 +29,7 @@ from colonnade.mesh.materials.mesh import Mesh
 MAX_MATERIALS = 256
 
 #: How to get hardware with textures, for messages.
-TEXTURE_HARDWARE = "take --config textured, or set geometry.cornerColours=true and geometry.textureBytes=16384"
+TEXTURE_HARDWARE = "take --config small, or set geometry.cornerColours=true and geometry.textureBytes=16384"
 
 #: What a material loses whose roughness is not rendered, by kind.
 _WITHOUT_ROUGHNESS = {"diffuse": lost.COATS, "mirror": lost.ROUGH_MIRROR, "glass": lost.ROUGH_GLASS}

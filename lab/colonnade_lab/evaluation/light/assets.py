@@ -33,7 +33,7 @@ SIZE, SAMPLES = (320, 240), 64
 #: Radiance of the environment, light of the lamp on a surface that faces it, and its place, in edges of the object.
 _AROUND, _LAMP, _OFFSET = (0.35, 0.38, 0.42), (0.7, 0.65, 0.6), (1.2, 1.6, 1.5)
 #: The preset that renders.
-_CONFIG = "textured"
+_CONFIG = "small"
 #: Files of Khronos that are measured for the pages: repository, commit, and git's name of each file's folder.
 REPOSITORY, COMMIT = "KhronosGroup/glTF-Sample-Models", "29355d2374f829c8f238b3c55ce06981455aa389"
 FILES = {

@@ -39,7 +39,7 @@ from colonnade_lab.evaluation.light.user_rooms import known_room
 from colonnade_lab.evaluation.region_metrics import compare_regions
 
 #: The preset that renders.
-CONFIG = "textured"
+CONFIG = "small"
 #: A pixel of the room has changed if a channel differs by more, of 255: the two pictures of the room without objects,
 #: that of the photo and that of the truth, differ by less.
 CHANGED = 8

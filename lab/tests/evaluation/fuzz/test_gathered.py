@@ -25,7 +25,7 @@ OPTIONS = (
 
 @pytest.fixture(scope="module")
 def manifest() -> Manifest:
-    return manifest_for("textured").manifest
+    return manifest_for("small").manifest
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_the_kind_reaches_registers_and_cube(manifest: Manifest, cases: tuple[Ca
 
 @pytest.mark.verilator
 def test_hardware_and_model_agree_on_corrupt_frames_that_gather() -> None:
-    """The campaign counts them. Long version: ``colonnade fuzz --config textured --frames 1000``."""
+    """The campaign counts them. Long version: ``colonnade fuzz --config small --frames 1000``."""
     report = fuzz(design_for("small", OPTIONS), 60, seed=1)
     assert report["disagreements"] == [] and report["legal_failures"] == 0
     assert report["kinds"]["gather"]["changed"] > 5 and "maps" not in report["kinds"]

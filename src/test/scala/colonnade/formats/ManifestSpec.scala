@@ -183,7 +183,7 @@ class ManifestSpec extends AnyFlatSpec with Matchers with Properties {
 
   it should "hash every field of records, maps, textures and frame registers, and nothing that the host only reads" in {
     val config =
-      ConfigIO.load("textured", Seq("columnBvhMemory.cache={}", "units.marches=2"))
+      ConfigIO.load("small", Seq("columnBvhMemory.cache={}", "units.marches=2"))
     val whole = Manifest(config)
     val hash  = whole("formatHash").str
     whole.value.remove("configHash")
