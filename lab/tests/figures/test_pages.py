@@ -371,7 +371,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| seed 1 | –, – |" in live and "15.0" not in live
     path = "| seed 1 | 30.00, 29.50 | 2.00, 2.25 | 2.00, 3.00 | -0.12 dB, -0.01° |"
     assert path in table(docs, "live-paths")
-    assert "60 kGE; + 3.0, 5.0 %" in table(docs, "gather")
+    assert "1,900 gathered rays" in table(docs, "gather")
     assert "50,000 cycles, 900 gathered rays" in table(docs, "gather")
     quality = table(docs, "light-quality")
     means = "| 1 pass, filtered | 30.0 | 30.0, 0.125, 0.125 | 30.0, 0.125 | 30.0, 0.125, 0.125 |"
