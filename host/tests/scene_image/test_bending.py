@@ -28,7 +28,7 @@ from colonnade.scene_image.packer import pack
 SIZE = (96, 72)
 
 
-@pytest.fixture(scope="module", params=["edge", "lean", "textured"])
+@pytest.fixture(scope="module", params=["edge", "lean", "small"])
 def manifest(request: pytest.FixtureRequest) -> Manifest:
     return Manifest.load(toolchain.project_root() / "configs" / "golden" / f"{request.param}.json")
 
