@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import echo, encoder_option, configuration_options, size_option
+from colonnade.cli.options import configuration_options, echo, encoder_option, size_option
 from colonnade.maps.encoders import Encoder
 
 

@@ -8,6 +8,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.environment.load import has_photo
 from colonnade.scene.model import Scene
 
+
 def with_room_defaults(
     scene: Scene, config: str, manifest: Manifest, in_sequence: bool = False
 ) -> tuple[Scene, str | None]:

@@ -29,7 +29,9 @@ def invoked(folder: Path, arguments: str) -> Result:
         return CliRunner().invoke(cli, shlex.split(arguments))
 
 
-@pytest.mark.parametrize("command", [hostile.RENDER, f"{hostile.RENDER} --backend reference", "pack s.toml --output p --config tiny"])
+@pytest.mark.parametrize(
+    "command", [hostile.RENDER, f"{hostile.RENDER} --backend reference", "pack s.toml --output p --config tiny"]
+)
 def test_a_note_is_a_line_and_with_strict_an_error(folder: Path, command: str) -> None:
     noted = invoked(folder, f"{command} --mesh x.obj")
     assert noted.exit_code == 0, noted.output
