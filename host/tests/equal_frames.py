@@ -19,10 +19,10 @@ PIPELINED = (
     *("array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
     *("units.triangleRows=2", "units.triangleLanes=2", *HELD),
 )
-#: Beside `small`, for frames in a room, so that their tests have one simulator: gathered light, pipelines, two marches
-#: of maps that two columns share.
+#: Beside `small`, for frames in a room, so that their tests have one simulator: pipelines, two marches of maps that two
+#: columns share.
 IN_ROOM = (
-    *("frame.gather=true", "array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
+    *("array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
     *("units.marches=2", "physicalAttributeMemory.columnsPerCopy=2"),
 )
 

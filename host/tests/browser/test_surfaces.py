@@ -89,7 +89,7 @@ def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: floa
     pictures = textured_sheet(tmp_path)
     for number, pixels in enumerate(pictures):
         pixels.tofile(tmp_path / f"{number}.bin")
-    text = json.loads((ROOT / "configs" / "golden" / "textured.json").read_text())
+    text = json.loads((ROOT / "configs" / "golden" / "small.json").read_text())
     manifest = Manifest.from_dict(text)
     sizes = [{"name": f"{n}.bin", "width": p.shape[1], "height": p.shape[0]} for n, p in enumerate(pictures)]
     job = {"module": str(MODULE), "manifest": text, "file": "sheet.gltf", "pictures": sizes}

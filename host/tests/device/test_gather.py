@@ -22,7 +22,6 @@ from colonnade.scene_image.file import LoadSection, SceneImage
 from colonnade.scene_image.packer import pack
 
 ROOMS = Path(__file__).parents[3] / "scenes" / "rooms"
-GATHERS = ("units.shadeInterval=3", "frame.gather=true")
 #: As in `edge`: shared triangle units, so many paths that a choice among them takes a cycle.
 MANY = (
     *("array.rows=4", "units.triangleRows=2", "units.triangleLanes=2", "units.pathContexts=64"),
@@ -62,10 +61,7 @@ def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, i
 @pytest.mark.parametrize(
     ("options", "in_room"),
     [
-        (
-            (*GATHERS, "physicalAttributeMemory=null", "array.columns=1", "frame.emission=true"),
-            False,
-        ),
+        (("physicalAttributeMemory=null", "array.columns=1"), False),
         (IN_ROOM, True),
         pytest.param((*IN_ROOM, *MANY), True, marks=pytest.mark.matrix),
     ],
@@ -109,7 +105,7 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
 def test_hardware_that_does_not_gather_takes_no_cycle() -> None:
     """Frames differ by the phase of their schedules, as from one to the next."""
     mesh, cycles = load_mesh("teapot:4"), []
-    for options in (GATHERS, GATHERS[:1]):
+    for options in ((), ("frame.gather=false",)):
         design = design_for("small", options)
         image = pack(mesh, design.manifest)
         registers = frame_registers(SCENE, image.header, design.manifest, 64, 48)

@@ -112,7 +112,7 @@ def test_each_pass_has_points_of_its_own() -> None:
 
 def test_what_cannot_gather_is_refused() -> None:
     with pytest.raises(UserError, match=r"set frame\.gather=true"):
-        DeviceScene.of(SCENE, manifest_for("small").manifest).registers((32, 24))
+        DeviceScene.of(SCENE, manifest_for("small", ("frame.gather=false",)).manifest).registers((32, 24))
     with pytest.raises(UserError, match=r"frame\.gather"):
         manifest_for("small", ("units.shadeInterval=128",))
     with pytest.raises(UserError, match=r"frame\.gather"):

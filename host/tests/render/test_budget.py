@@ -25,13 +25,12 @@ DATA = Path(__file__).parents[3] / "docs" / "data"
 SIZE = (24, 18)
 GATHERS = Scene(MeshSource(name="teapot:4"), paths=Paths(gather=1), frame=FrameSize(*SIZE))
 #: As in `test_gather.py`, so that the simulator is there.
-DESIGN = ("units.shadeInterval=3", "frame.gather=true", "physicalAttributeMemory=null", "array.columns=1")
-OPTIONS = (*DESIGN, "frame.emission=true")
+OPTIONS = ("physicalAttributeMemory=null", "array.columns=1")
 
 
 def test_the_estimate_is_that_of_the_rtl() -> None:
     """Passes of `edge` that the pages have, one whose columns are the bottleneck and one whose units are."""
-    manifest = manifest_for("edge", ("frame.gather=true",)).manifest
+    manifest = manifest_for("edge").manifest
     for name in ("gather", "light"):
         counters = json.loads((DATA / f"{name}.json").read_text())["result"]["pass"]["counters"]
         assert estimated_cycles(manifest, counters, True) == pytest.approx(counters["cycles"], rel=0.25)

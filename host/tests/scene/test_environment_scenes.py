@@ -158,7 +158,7 @@ def test_what_cannot_be_is_one_line(
     folder: Path, tmp_path: Path, text: str, options: tuple[str, ...], message: str
 ) -> None:
     (folder / "scene.toml").write_text(text)
-    sets = [word for override in SMALL_MAPS for word in ("--set", override)]
+    sets = [word for override in (*SMALL_MAPS, "frame.gather=false") for word in ("--set", override)]
     hardware = () if "--config" in options else ("--config", "small", *sets)
     common = ["render", str(folder / "scene.toml"), "--backend", "model", *hardware, *options]
     result = CliRunner().invoke(cli, [*common, "--output", str(tmp_path / "f.png")])

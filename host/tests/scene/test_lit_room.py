@@ -40,6 +40,7 @@ material.kind = "mirror"
 background.room = "attic"
 """
 LAMP = "light = {position = [0.6, 2.2, 0.6], colour = [0.5, 0.5, 0.5], falloff = 1.5}\n"
+UNGATHERED = "paths.gather = 0\n"
 
 
 @pytest.fixture(scope="module")
@@ -64,11 +65,11 @@ def decibels(one: RenderResult, other: RenderResult, mask: np.ndarray | None = N
 
 
 def test_a_scene_without_lights_gets_those_of_the_photo(folder: Path, told: list[str]) -> None:
-    frame(folder, MIRROR)
+    frame(folder, MIRROR + UNGATHERED)
     fitted = "the scene names no light: ambient light and 1 point light were fitted to the photo of room attic;"
     assert told == [f"{fitted} [[light]] and [ambient] name others"]
     for named in (LAMP, "ambient.colour = [0.3, 0.3, 0.3]\n"):
-        frame(folder, MIRROR + named)
+        frame(folder, MIRROR + named + UNGATHERED)
     frame(folder, MIRROR.replace("attic", "dark"))
     assert len(told) == 2 and "room dark has no photo to fit lights to: one light beside the object" in told[1]
 
@@ -115,6 +116,7 @@ def test_the_reference_is_composited_as_the_device_is(folder: Path, light: str) 
 
 def test_a_photo_that_is_too_bright_for_the_lights_of_a_scene_is_noted(folder: Path, told: list[str]) -> None:
     """Not with gathered light, and not with fitted lights: nothing that a scene says would help."""
+    (folder / "scene.toml").write_text(MIRROR + LAMP)
     room, extent = load_environment(folder / "attic"), load_mesh("cube").extent
     dim = replace(load_scene(folder / "scene.toml"), ambient=Colour((0.001,) * 3), light=Light(colour=(0.001,) * 3))
     for scene in (replace(dim, paths=Paths(gather=1)), replace(dim, names_light=False), dim):
@@ -146,7 +148,7 @@ def test_the_colours_of_a_room_can_be_chosen(folder: Path) -> None:
 
 def test_the_headroom_of_the_lights_does_not_change_the_object(folder: Path) -> None:
     """Lights are brighter by the headroom, and the object's albedo is darker by it."""
-    dim = MIRROR.replace("mirror", "diffuse") + LAMP.replace("0.5, 0.5, 0.5", "0.2, 0.2, 0.2")
+    dim = UNGATHERED + MIRROR.replace("mirror", "diffuse") + LAMP.replace("0.5, 0.5, 0.5", "0.2, 0.2, 0.2")
     photo, albedo = (
         frame(folder, dim + f'background.colours = "{colours}"\n', backend)
         for colours, backend in (("photo", "model"), ("albedo", "model"))
@@ -248,5 +250,5 @@ def test_a_second_view_needs_a_room_a_photo_and_gathered_light(folder: Path, tol
         frame(folder, 'mesh.name = "cube"\nbackground.second_view = "attic"\n')
     with pytest.raises(UserError, match=r"background.second_view is .*dark, which has no photo.png"):
         frame(folder, MIRROR + LAMP + 'background.second_view = "dark"\n')
-    frame(folder, MIRROR + LAMP + 'background.second_view = "attic"\n')
+    frame(folder, MIRROR + LAMP + UNGATHERED + 'background.second_view = "attic"\n')
     assert "has no effect: the scene gathers no light" in told[-1]

@@ -172,7 +172,7 @@ def test_a_moving_camera_keeps_the_light_of_the_frames_before(tmp_path: Path) ->
     Image.fromarray(np.repeat(np.uint8([[250], [20]]), 16, 0).repeat(64, 1)).save(tmp_path / "p.png")
     dark = "light = {position = [0, 9, 0], colour = [0, 0, 0]}\nframe.denoise = true\npaths.gather = 1\n"
     (tmp_path / "scene.toml").write_text(f'mesh.name = "teapot:6"\nbackground.panorama = "p.png"\n{dark}')
-    session = Session(tmp_path / "scene.toml", None, size=(96, 72))
+    session = Session(tmp_path / "scene.toml", "small", size=(96, 72))
     own = session.state()["camera"]
     x, y, z = own["position"]
     first, *_, last = (

@@ -10,6 +10,7 @@ from colonnade import _core
 from colonnade.design.generator import design_for, manifest_for
 from colonnade.design.manifest import Manifest, field_places, value_range
 from colonnade.device.bit_exact import loaded_model, model_frame
+from colonnade.scene_image.environment import map_memories
 from colonnade.scene_image.file import LoadSection
 
 from colonnade_lab.evaluation.fuzz.campaign import fuzz
@@ -76,9 +77,8 @@ def test_the_model_of_a_room_is_defined_on_all_words_and_registers(options: tupl
     random = np.random.default_rng(7)
     numbers = dict(manifest.numbers) | dict.fromkeys(("stackDepth", "bvh"), 0)
     model = _core.EnvironmentModel(numbers, dict(manifest.attributes.sizes), field_places(manifest.attributes.layouts))
-    for name, place in manifest.memories.items():
-        if name == "columnBvh":
-            continue
+    for name in map_memories(manifest):
+        place = manifest.memories[name]
         size = -(-int(place["bits"]) // 8)
         model.load(name, random.integers(0, 256, (int(place["depth"]) + 9, size), dtype=np.uint8))
         with pytest.raises(ValueError, match="words"):
