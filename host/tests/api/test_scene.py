@@ -126,7 +126,8 @@ def test_what_a_scene_leaves_open_is_a_warning_once_for_it(tmp_path: Path) -> No
     """Whatever is rendered of it: frames, a film, or a change."""
     write_attic(tmp_path / "attic", 96, 72)
     options = {"config": "small", "overrides": SMALL_MAPS, "size": (96, 72)}
-    scene = colonnade.Scene("cube", background={"room": "attic"}, motion={"turn": 60.0}, folder=tmp_path)
+    tables = {"background": {"room": "attic"}, "motion": {"turn": 60.0}, "frame": {"samples": 2}}
+    scene = colonnade.Scene("cube", **tables, folder=tmp_path)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         scene.render(**options)
