@@ -60,7 +60,7 @@ def test_an_order_saves_reads_from_dram(rays: _core.Rays) -> None:
 
 
 def test_the_caches_are_those_of_the_design() -> None:
-    assert cache_shape(manifest_for("edge").manifest) == ([8, 120, 320, 5, 3072, 12, 2], 64)
+    assert cache_shape(manifest_for("edge").manifest) == ([8, 120, 320, 5, 4096, 16, 2], 64)
     traffic = Scene(VERTICES, FACES).traffic(outside_rays(VERTICES, 50, seed=4), is_occlusion=True)
     assert traffic.records > 100 and traffic.bytes % 64 == 0
     with pytest.raises(UserError, match="no caches: choose one whose scene is in DRAM, such as edge"):

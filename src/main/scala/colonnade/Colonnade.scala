@@ -6,7 +6,7 @@ import chisel3.util.{Decoupled, Pipe}
 import colonnade.common.TimingSlice
 import colonnade.column.{Column, PathTracer, PathTracerModule, SharedLightCube}
 import colonnade.config.ColonnadeConfig
-import colonnade.environment.{AttributeArbiter, PhysicalAttributeMemory}
+import colonnade.environment.{AttributeArbiter, PhysicalAttributeMemory, TextureMemory}
 import colonnade.formats.{Load, Pixel, RegisterFile, RegisterPort}
 import colonnade.frame.{CounterFile, EnvironmentWindow, FrameController}
 import colonnade.memory.{DramPort, SceneMemory, SharedCache}
@@ -59,6 +59,13 @@ final class Colonnade(config: ColonnadeConfig, pathTracer: ColonnadeConfig => Pa
     val maps    = withReset(clears)(Module(new PhysicalAttributeMemory(config, ports.size, tagBits)))
     maps.io.load := load
     maps.io.ports.zip(ports).foreach { case (port, column) => port <> column }
+  }
+
+  // The textures
+  for (ports <- columns.flatMap(_.io.texture).grouped(TextureMemory.columns)) {
+    val textures = withReset(clears)(Module(new TextureMemory(config, ports.size))).io
+    textures.load := load
+    textures.ports.zip(ports).foreach { case (port, column) => port :<>= column }
   }
 
   // The light cube

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.experimental.hierarchy.{instantiable, public}
 import chisel3.util.{Decoupled, Valid}
 import colonnade.config.{ColonnadeConfig, PathConfig}
-import colonnade.environment.{AttributePort, ColumnEnvironment, EnvironmentMarches, TextureMemory}
+import colonnade.environment.{AttributePort, ColumnEnvironment, EnvironmentMarches}
 import colonnade.formats.{FrameRegisters, Load, Pixel}
 import colonnade.frame.{
   BackgroundWalker,
@@ -17,7 +17,7 @@ import colonnade.frame.{
   TileWalker
 }
 import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
-import colonnade.shading.CubePort
+import colonnade.shading.{CubePort, TexturePort}
 
 final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   private val banks = config.columnBvhMemory.banks
@@ -49,13 +49,16 @@ final class ColumnIO(config: ColonnadeConfig) extends Bundle {
   /** If columns share the maps of the environment. */
   val environment = Option.when(config.columnsPerCopy > 1)(AttributePort.ofColumn(config))
 
+  /** To the [[colonnade.environment.TextureMemory]]. */
+  val texture = config.geometry.texture.map(_ => new TexturePort(PathConfig(config)))
+
   /** To the [[SharedLightCube]]. */
   val cube = CubePort(config)
 
   val events = Output(new EventSums(config, 1)) // delayed by one cycle
 }
 
-/** A column: a path tracer, its record memory, the environment's marches and maps, and the textures. A reset clears all but
+/** A column: a path tracer, its record memory, and the environment's marches and maps. A reset clears all but
   * the memories.
   *
   * @param pathTracer makes the path tracer; specs pass another one with the same ports
@@ -134,13 +137,7 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
     marches
   }
 
-  // Textures: the column's own copy
-  for (port <- units.texture) {
-    val memory = Module(new TextureMemory(PathConfig(config))).io
-    memory.load := io.load
-    memory.port :<>= port
-  }
-
+  for ((port, texture) <- io.texture.zip(units.texture)) port :<>= texture
   for ((port, cube) <- io.cube.zip(units.cube)) port :<>= cube
 
   // Collect finished pixels

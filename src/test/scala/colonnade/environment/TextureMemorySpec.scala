@@ -3,7 +3,6 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Valid
 import chiseltest._
-import colonnade.TestParts._
 import colonnade.config.{ColonnadeConfig, PhysicalAttributeMemoryConfig, TextureLayout}
 import colonnade.formats.{AlbedoEntry, AttributeMemories, Load}
 import colonnade.{Packed, Simulation, TestConfigs}
@@ -11,24 +10,25 @@ import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-private class TextureHarness(config: ColonnadeConfig) extends Module {
-  private val memory = Module(new TextureMemory(config))
+private class TextureHarness(config: ColonnadeConfig, columns: Int) extends Module {
+  private val memory = Module(new TextureMemory(config, columns))
 
   val load = IO(Flipped(Valid(new Load(config))))
   memory.io.load := load
 
-  /** As a channel whose tags have no bits. */
-  private val port = memory.io.port
-  private val pins = Wire(new AttributeChannel(new MapPixel(TextureLayout.of(config)), new AlbedoEntry, 0))
-  port.req.valid           := pins.req.valid
-  port.req.bits.x          := pins.req.bits.content.x
-  port.req.bits.y          := pins.req.bits.content.y
-  pins.req.ready           := port.req.ready
-  pins.resp.valid          := port.resp.valid
-  pins.resp.bits.tag       := 0.U
-  pins.resp.bits.content   := port.resp.bits.colour
-  pins.resp.bits.isIllegal := port.resp.bits.isIllegal
-  val channel = FlatChannel(pins)
+  /** By column, as channels whose tags have no bits. */
+  val channels = memory.io.ports.map { port =>
+    val pins = Wire(new AttributeChannel(new MapPixel(TextureLayout.of(config)), new AlbedoEntry, 0))
+    port.req.valid           := pins.req.valid
+    port.req.bits.x          := pins.req.bits.content.x
+    port.req.bits.y          := pins.req.bits.content.y
+    pins.req.ready           := port.req.ready
+    pins.resp.valid          := port.resp.valid
+    pins.resp.bits.tag       := 0.U
+    pins.resp.bits.content   := port.resp.bits.colour
+    pins.resp.bits.isIllegal := port.resp.bits.isIllegal
+    FlatChannel(pins)
+  }
 }
 
 class TextureMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
@@ -53,27 +53,28 @@ class TextureMemorySpec extends AnyFlatSpec with ChiselScalatestTester {
     TestConfigs.tiny.copy(physicalAttributeMemory = Some(memory))
   }
 
-  it should "give the texels of the model, also of tiles that point beyond the heap" in {
-    val random = new Random(31)
-    val image  = new EnvironmentImage(asMap, random, illegal = 0.3)
-    val req    = new Packed(new MapPixel(TextureLayout.of(config)))
-    val resp   = new Packed(new AlbedoEntry)
-    test(new TextureHarness(config)).withAnnotations(Simulation.verilator) { dut =>
-      dut.clock.setTimeout(0)
-      val words =
-        AttributeMemories(config).map(memory => memory.name -> image.words(memory.name.replace("texture", "albedo")))
-      EnvironmentImage.load(dut.load, dut.clock, config, words.toMap)
-      val testers = {
-        val pixels    = image.corners ++ Seq.fill(400)(image.pixel())
-        val answers   = image.ask("albedo", pixels.map { case (x, y) => Seq(BigInt(x), BigInt(y)) })
-        val exchanges = pixels.zip(answers).map { case ((x, y), values) =>
-          val found = resp.pack(Seq("r", "g", "b").zip(values).toMap) | (values.last << resp.width)
-          Exchange(req.pack(Map("x" -> x, "y" -> y)), found)
+  for (columns <- 1 to 3)
+    it should s"give the texels of the model to columns, of $columns, also of tiles that point beyond the heap" in {
+      val random = new Random(31)
+      val image  = new EnvironmentImage(asMap, random, illegal = 0.3)
+      val req    = new Packed(new MapPixel(TextureLayout.of(config)))
+      val resp   = new Packed(new AlbedoEntry)
+      test(new TextureHarness(config, columns)).withAnnotations(Simulation.verilator) { dut =>
+        dut.clock.setTimeout(0)
+        val words =
+          AttributeMemories(config).map(memory => memory.name -> image.words(memory.name.replace("texture", "albedo")))
+        EnvironmentImage.load(dut.load, dut.clock, config, words.toMap)
+        val testers = dut.channels.zipWithIndex.map { case (channel, column) =>
+          val pixels    = image.corners ++ Seq.fill(400)(image.pixel())
+          val answers   = image.ask("albedo", pixels.map { case (x, y) => Seq(BigInt(x), BigInt(y)) })
+          val exchanges = pixels.zip(answers).map { case ((x, y), values) =>
+            val found = resp.pack(Seq("r", "g", "b").zip(values).toMap) | (values.last << resp.width)
+            Exchange(req.pack(Map("x" -> x, "y" -> y)), found)
+          }
+          assert(answers.exists(_.last == 1) && answers.exists(_.last == 0))
+          new ChannelTester(s"port $column", channel, tagBits = 0, exchanges, 0.7, random)
         }
-        assert(answers.exists(_.last == 1) && answers.exists(_.last == 0))
-        Seq(new ChannelTester("port", dut.channel, tagBits = 0, exchanges, 0.7, random))
+        ChannelTester.run(dut.clock, testers)
       }
-      ChannelTester.run(dut.clock, testers)
     }
-  }
 }
