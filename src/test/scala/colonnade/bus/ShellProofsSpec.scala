@@ -2,7 +2,7 @@ package colonnade.bus
 
 import chiseltest.ChiselScalatestTester
 import colonnade.config.ShellConfig
-import colonnade.{Proofs, TestConfigs}
+import colonnade.{Always, Matrix, Proofs, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 /** The rules of the bus, for all inputs. */
@@ -26,6 +26,7 @@ class ShellProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs
 
   behavior of "ImageLoader"
 
-  it should "read nothing outside the window, whatever the image" in
-    prove(cycles = 9)(new ImageLoaderProof(config, ShellConfig(128)))
+  for ((cycles, tag) <- Seq((8, Always), (9, Matrix)))
+    it should s"read nothing outside the window, whatever the image, in $cycles cycles" taggedAs tag in
+      prove(cycles)(new ImageLoaderProof(config, ShellConfig(128)))
 }

@@ -92,7 +92,8 @@ class ColumnSpec extends AnyFlatSpec with ChiselScalatestTester {
     "an environment, five paths, a ray set-up pipeline", {
       val config = withPaths(TestConfigs.withEnvironment(TestConfigs.environment), 5)
       config.copy(units = config.units.copy(rayInterval = 1))
-    }
+    },
+    Matrix
   )
   render(
     "two rows that share triangle units, pipelines, many paths, corner colours and emission, an environment", {

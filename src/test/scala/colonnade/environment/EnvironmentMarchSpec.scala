@@ -112,7 +112,7 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
 
         val image = new EnvironmentImage(config, random)
         EnvironmentImage.load(unit.load, unit.clock, config, image.words)
-        for (round <- 0 until 6) {
+        for (round <- 0 until 4) {
           val camera = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
           check(
             unit,
@@ -137,15 +137,15 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
         // Illegal maps and illegal registers, separately and together
         val illegal = new EnvironmentImage(config, random, illegal = 0.3)
         EnvironmentImage.load(unit.load, unit.clock, config, illegal.words)
-        val answers = for (round <- 0 until 12) yield {
+        val answers = for (round <- 0 until 8) yield {
           val camera = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
           check(
             unit,
             config,
             illegal.words,
             if (round < 4) camera.view else stimulus.wildView(),
-            Seq.fill(20)(stimulus.inRoom(camera)) ++ Seq.fill(20)(stimulus.fromElsewhere(camera)) ++
-              Seq.fill(20)(stimulus.anyRay()) ++ Seq.fill(20)(stimulus.anyPixel()),
+            Seq.fill(10)(stimulus.inRoom(camera)) ++ Seq.fill(10)(stimulus.fromElsewhere(camera)) ++
+              Seq.fill(10)(stimulus.anyRay()) ++ Seq.fill(10)(stimulus.anyPixel()),
             random,
             isSlow = round == 1
           )

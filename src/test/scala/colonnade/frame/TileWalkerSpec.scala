@@ -1,8 +1,8 @@
 package colonnade.frame
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.config.ColonnadeConfig
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -64,7 +64,7 @@ class TileWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (tileSize <- Seq(4, 32)) {
     it should s"walk tiles of $tileSize in Morton order without a gap" in {
       val tiles = Seq((0, 0), (tileSize, 0), (2 * tileSize, 3 * tileSize))
-      test(new TileWalker(config(tileSize))) { dut =>
+      test(new TileWalker(config(tileSize))).withAnnotations(Simulation.verilator) { dut =>
         dut.clock.setTimeout(0)
         val (positions, cycles) = walk(dut, (640, 480), tileSize, tiles, _ => true)
         assert(positions.map(_._2) == tiles.flatMap(pixels((640, 480), _, tileSize)))

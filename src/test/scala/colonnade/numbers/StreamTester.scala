@@ -26,17 +26,20 @@ object StreamTester {
     var pending  = Option.empty[BigInt]
     var idle     = 0
     while (results.size < inputs.size) {
-      offering = next < inputs.size && (offering || random.nextDouble() >= stalls)
+      if (!offering && next < inputs.size && random.nextDouble() >= stalls) {
+        offering = true
+        poke(in.bits, inputs(next))
+      }
       in.valid.poke(offering)
-      if (offering) poke(in.bits, inputs(next))
-      out.ready.poke(random.nextDouble() >= stalls)
+      val accepts = random.nextDouble() >= stalls
+      out.ready.poke(accepts)
 
       idle += 1
       val valid = out.valid.peekBoolean()
       val value = Option.when(valid)(peek(out.bits))
       require(pending.isEmpty || pending == value, s"the result ${pending.get} changed to $value before it was taken")
       pending = value
-      if (valid && out.ready.peekBoolean()) {
+      if (valid && accepts) {
         results += value.get
         pending = None
         idle = 0

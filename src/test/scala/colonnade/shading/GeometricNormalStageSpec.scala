@@ -1,7 +1,7 @@
 package colonnade.shading
 
 import chiseltest._
-import colonnade.{Always, Model, TestConfigs}
+import colonnade.{Always, Model, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -13,20 +13,21 @@ class GeometricNormalStageSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (vertexBits <- Seq(10, 16, 19))
     it should s"find a normal every three cycles with $vertexBits bits a coordinate" taggedAs
       Always.unless(vertexBits != 16) in
-      test(new GeometricNormalStage(TestConfigs.tiny.geometry.copy(vertexBits = vertexBits))) { dut =>
-        val random  = new Random(vertexBits)
-        val cases   = Seq.fill(500)(triangle(random, vertexBits)) ++ extremes(vertexBits)
-        val normals = Model.answers(TestConfigs.tiny, cases.map(_.flatten), "geometricnormal")
-        dut.clock.setTimeout(0)
-        for (cycle <- 0 until 3 * cases.size + GeometricNormalStage.normal0) {
-          dut.io.phase.poke(cycle % 3)
-          for (vertices <- cases.lift(cycle / 3); (port, vertex) <- dut.io.vertices.zip(vertices))
-            for ((component, value) <- port.axes.zip(vertex)) component.poke(value)
-          val of = cycle - GeometricNormalStage.normal0
-          if (of >= 0) dut.io.normal.expect(normals(of / 3)(of % 3), s"${cases(of / 3)}")
-          dut.clock.step()
+      test(new GeometricNormalStage(TestConfigs.tiny.geometry.copy(vertexBits = vertexBits)))
+        .withAnnotations(Simulation.verilator) { dut =>
+          val random  = new Random(vertexBits)
+          val cases   = Seq.fill(500)(triangle(random, vertexBits)) ++ extremes(vertexBits)
+          val normals = Model.answers(TestConfigs.tiny, cases.map(_.flatten), "geometricnormal")
+          dut.clock.setTimeout(0)
+          for (cycle <- 0 until 3 * cases.size + GeometricNormalStage.normal0) {
+            dut.io.phase.poke(cycle % 3)
+            for (vertices <- cases.lift(cycle / 3); (port, vertex) <- dut.io.vertices.zip(vertices))
+              for ((component, value) <- port.axes.zip(vertex)) component.poke(value)
+            val of = cycle - GeometricNormalStage.normal0
+            if (of >= 0) dut.io.normal.expect(normals(of / 3)(of % 3), s"${cases(of / 3)}")
+            dut.clock.step()
+          }
         }
-      }
 
   /** A triangle of any size, some without area. */
   private def triangle(random: Random, bits: Int): Seq[Seq[BigInt]] = {

@@ -1,8 +1,8 @@
 package colonnade.shading
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.formats.Lobe
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -15,7 +15,7 @@ class LobeStageSpec extends AnyFlatSpec with ChiselScalatestTester {
     val numbers = TestConfigs.withPrecision(mac, mac, div).numbers
 
     it should s"find a share every three cycles with ${numbers.cosineFraction} bits" in
-      test(new LobeStage(numbers, 4)) { dut =>
+      test(new LobeStage(numbers, 4)).withAnnotations(Simulation.verilator) { dut =>
         val random = new Random(div)
         val one    = 1 << numbers.cosineFraction
         val slopes = 1 << Lobe.slopeBits

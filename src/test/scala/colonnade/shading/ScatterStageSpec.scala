@@ -1,9 +1,9 @@
 package colonnade.shading
 
 import chiseltest._
-import colonnade.TestConfigs
 import colonnade.TestParts._
 import colonnade.config.NumberFormats
+import colonnade.{Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -15,7 +15,7 @@ class ScatterStageSpec extends AnyFlatSpec with ChiselScalatestTester {
   for (mac <- Seq(16, 32))
     it should s"scatter rays about an axis every three cycles with $mac bits" in {
       val config = TestConfigs.gathering(TestConfigs.withPrecision(mac, mac, 2 * mac))
-      test(new ScatterStage(config)) { dut =>
+      test(new ScatterStage(config)).withAnnotations(Simulation.verilator) { dut =>
         val shadeBits = NumberFormats.colourBits.+(6).min(mac)
         val random    = new Random(mac)
         val count     = 400

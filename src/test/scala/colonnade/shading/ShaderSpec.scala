@@ -43,15 +43,10 @@ class ShaderSpec extends AnyFlatSpec with ChiselScalatestTester {
       stalls: Int => Double = _ => 0
   ): Unit = {
     for (((light, hits), round) <- rounds.zipWithIndex) {
-      var poked                                        = Option.empty[HitCase]
-      def poke(port: ShadeRequest, hit: HitCase): Unit = if (!poked.exists(_ eq hit)) {
-        pokeHit(port, hit)
-        poked = Some(hit)
-      }
       pokeLight(shader.io, light)
       val results =
         StreamTester.exchange(shader.clock, shader.io.request, shader.io.lit, hits)(
-          poke,
+          pokeHit,
           peek
         )(random, stalls(round), 400)
       for (((hit, result), answer) <- hits.zip(results).zip(expected(config, light, hits))) {

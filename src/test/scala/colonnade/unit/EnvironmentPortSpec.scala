@@ -7,7 +7,7 @@ import colonnade.config.ColonnadeConfig
 import colonnade.environment.{EnvironmentRay, MarchCase}
 import colonnade.ray.RayRequest
 import colonnade.shading.EnvironmentSurface
-import colonnade.{Packed, TestConfigs}
+import colonnade.{Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -25,7 +25,7 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   it should "route each primary ray once, and store the last ray of each context" in
-    test(new EnvironmentPortHarness(config)) { dut =>
+    test(new EnvironmentPortHarness(config)).withAnnotations(Simulation.verilator) { dut =>
       val random               = new Random(4)
       val rays                 = new Packed(new RayRequest(config))
       val contexts             = config.units.pathContexts
@@ -99,7 +99,7 @@ class EnvironmentPortSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   it should "give a point to the shader once more, after the path from it has gathered" in {
     val gathering = TestConfigs.gathering(config)
-    test(new EnvironmentPortHarness(gathering)) { dut =>
+    test(new EnvironmentPortHarness(gathering)).withAnnotations(Simulation.verilator) { dut =>
       val random  = new Random(5)
       val points  = new Packed(new EnvironmentSurface(gathering))
       val rays    = new Packed(new RayRequest(gathering))
