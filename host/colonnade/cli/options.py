@@ -151,7 +151,7 @@ def encoder_option(command: Command) -> Command:
         "--encoder",
         type=click.Choice(ENCODERS),
         help="Encoder of a room's maps and of textures. live: that of a moving camera; offline: maps that are a little"
-        " better, in 20 seconds.  [default: live, where it writes the layout of the maps]",
+        " better, in far more time.  [default: live, where it writes the layout of the maps]",
     )(command)
 
 

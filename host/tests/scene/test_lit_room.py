@@ -118,6 +118,7 @@ def test_a_photo_that_is_too_bright_for_the_lights_of_a_scene_is_noted(folder: P
     """Not with gathered light, and not with fitted lights: nothing that a scene says would help."""
     (folder / "scene.toml").write_text(MIRROR + LAMP)
     room, extent = load_environment(folder / "attic"), load_mesh("cube").extent
+    (folder / "scene.toml").write_text(MIRROR + LAMP)
     dim = replace(load_scene(folder / "scene.toml"), ambient=Colour((0.001,) * 3), light=Light(colour=(0.001,) * 3))
     for scene in (replace(dim, paths=Paths(gather=1)), replace(dim, names_light=False), dim):
         assert not any("too dark" in line for line in told)
