@@ -15,6 +15,7 @@ PRESETS = {
     "edge": ("AR: rooms, their light, mirrors, glass, textures", "`make verify`, six rooms"),
     "lean": ("as `edge`, narrower arithmetic, finer vertices", "`make verify`"),
     "small": ("the simulator: `edge` of 2×2, the scene on chip", "`make test`"),
+    "traversal": ("rays of applications", "`make verify`"),
     "tiny": ("tests, the smallest array", "`make test`"),
     "fpga": ("an ECP5 board", "`make verify`"),
 }

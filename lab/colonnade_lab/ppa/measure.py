@@ -55,7 +55,7 @@ def measure(
         require_recordable(operation.stimulus, design.manifest)
     netlists: dict[str, Any] = {}
     units: dict[str, dict[str, Any]] = {}
-    for level in LEVELS:
+    for level in hierarchy.levels:
         for module in (*hierarchy.units(level), level.top):
             name = level.rest if module == level.top else module
             with progress.step(f"synthesising {name}"):

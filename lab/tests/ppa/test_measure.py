@@ -155,10 +155,11 @@ def test_register_outputs_are_named_after_the_register(small: Library) -> None:
     assert (path.begin, path.end) == ("unit.first", "unit.last")
 
 
-def test_synthesis_stops_at_units(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("top", "column"), [("Colonnade", "Column"), ("ColonnadeRays", "RayColumn")])
+def test_synthesis_stops_at_units(tmp_path: Path, top: str, column: str) -> None:
     sources = {
-        "Colonnade": "  Column columns_0 (\n  Column columns_1 (\n",
-        "Column": "  TraversalUnit a (\n  TraversalUnit b (\n  records records_0 (\n  Arbiter arbiter (\n",
+        top: f"  {column} columns_0 (\n  {column} columns_1 (\n",
+        column: "  TraversalUnit a (\n  TraversalUnit b (\n  records records_0 (\n  Arbiter arbiter (\n",
         "TraversalUnit": "  BoxUnit boxUnit (\n  Queue queue (\n  FetchStage fetch (\n",
         "BoxUnit": "  Divider one (\n  Divider other (\n",
         "FetchStage": "  RecordFetch one (\n  RecordFetch other (\n",
@@ -179,14 +180,14 @@ def test_synthesis_stops_at_units(tmp_path: Path) -> None:
     assert hierarchy.parts("BoxUnit") == {"Divider": 2}
     assert hierarchy.parts("TraversalUnit") == {}
     assert hierarchy.shape("records") == (8, 4)
-    assert hierarchy.closure("Column") == (["Arbiter", "Column"], ["TraversalUnit", "records"])
-    assert hierarchy.count("BoxUnit", "Colonnade") == 4
-    assert hierarchy.count("BoxUnit", "Colonnade", BOUNDARIES) == 0
+    assert hierarchy.closure(column) == (["Arbiter", column], ["TraversalUnit", "records"])
+    assert hierarchy.count("BoxUnit", top) == 4
+    assert hierarchy.count("BoxUnit", top, BOUNDARIES) == 0
     assert hierarchy.header("Queue") == "module Queue(\n  input clock\n);\nendmodule\n"
     assert [hierarchy.instances(unit, LEVELS[0]) for unit in ("TraversalUnit", "BoxUnit", "RecordFetch")] == [1, 1, 2]
     rays, records = hierarchy.memories()
     assert (rays.level, rays.unit, rays.count) == ("traversal_unit", "RecordFetch", 2)
-    assert (records.level, records.unit, records.count, records.bits) == ("column", "rest of Column", 1, 32)
+    assert (records.level, records.unit, records.count, records.bits) == ("column", f"rest of {column}", 1, 32)
 
 
 def test_flip_flops_and_their_clock_gate_are_counted(small: Library) -> None:

@@ -42,6 +42,10 @@ COLUMN = (
 )
 DEVICE = ("FrameController", "RegisterFile", "CounterFile", "SceneMemory")
 
+#: Modules of a device for rays of applications.
+QUERIES = ("RayQueries", "RunReader", "RayConverter", "HitConverter", "HitWriter")
+BATCHES = ("BatchReader", "RayPort", *DEVICE)
+
 #: Dividers and square roots: parts of units that are synthesised separately and counted in their unit.
 PARTS = re.compile(r"(Divider|PipelinedDivider|SquareRoot|RootDivider)(_\d+)?")
 
@@ -67,13 +71,17 @@ class Level:
     rest: str
 
 
-ARRAY = Level("array", "Colonnade", DEVICE, "rest of Colonnade")
-
 #: The levels, the lowest first.
 LEVELS = (
     Level("traversal_unit", "TraversalUnit", TRACE, "contexts"),
     Level("column", "Column", (*PATHS, *COLUMN), "rest of Column"),
-    ARRAY,
+    Level("array", "Colonnade", DEVICE, "rest of Colonnade"),
+)
+#: The same of a device for rays of applications.
+RAY_LEVELS = (
+    LEVELS[0],
+    Level("column", "RayColumn", (*QUERIES, *PATHS, *COLUMN), "rest of RayColumn"),
+    Level("array", "ColonnadeRays", BATCHES, "rest of ColonnadeRays"),
 )
 LEVEL_NAMES = tuple(level.name for level in LEVELS)
 
@@ -81,7 +89,7 @@ LEVEL_NAMES = tuple(level.name for level in LEVELS)
 REPLAYED = (LEVELS[0].top, *PATH_MODULES, TRIANGLES)
 
 #: Modules that the synthesis of another module treats as black boxes.
-BOUNDARIES = frozenset({*PATHS, *TRACE, *COLUMN, *DEVICE, "TraversalUnit", "Column"})
+BOUNDARIES = frozenset({*PATHS, *TRACE, *COLUMN, *QUERIES, *BATCHES, "TraversalUnit", "Column", "RayColumn"})
 
 
 @dataclass(frozen=True)
@@ -119,7 +127,12 @@ class FlopTable(Storage):
 
 
 class Hierarchy:
-    """The modules of a generated design and their instances, without memories."""
+    """The modules of a generated design and their instances, without memories.
+
+    Attributes:
+        files: The file of each module.
+        levels: The design's levels.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.files: dict[str, Path] = {}
@@ -138,6 +151,7 @@ class Hierarchy:
         for counts in self._instances.values():
             for kind in set(counts) - known:
                 del counts[kind]
+        self.levels = RAY_LEVELS if RAY_LEVELS[-1].top in self.files else LEVELS
 
     def units(self, level: Level) -> list[str]:
         """The units of a level that this design has."""
@@ -145,7 +159,7 @@ class Hierarchy:
 
     def instances(self, unit: str, level: Level) -> int:
         """Number of instances of a unit in a level, without those in the levels below."""
-        below = {other.top for other in LEVELS} - {level.top}
+        below = {other.top for other in self.levels} - {level.top}
         return 1 if unit == level.top else self.count(unit, level.top, below)
 
     def closure(self, top: str) -> tuple[list[str], list[str]]:
@@ -209,7 +223,7 @@ class Hierarchy:
 
     def _inside_units(self, modules: Iterable[str]) -> Iterator[tuple[str, str, str, int]]:
         """Module, level, unit and number of instances for each unit that contains a module of `modules`."""
-        for level in LEVELS:
+        for level in self.levels:
             for unit in (*self.units(level), level.top):
                 for module in modules:
                     number = self.count(module, unit, BOUNDARIES - {unit}) * self.instances(unit, level)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from colonnade.common import processes
+from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.frame_limits import check_size
@@ -146,8 +147,10 @@ def require_recordable(stimulus: Stimulus, manifest: Manifest) -> tuple[int, int
     """The size of the frame, checked before the work starts.
 
     Raises:
-        UserError: A program is missing, or the size is wrong.
+        UserError: A program is missing, the size is wrong, or the design has no frames.
     """
+    if manifest.config["frame"]["rays"]:
+        raise UserError("power is that of a frame, which a device with frame.rays has none of: give --no-power")
     for program, package in (("verilator", "verilator"), ("g++", "g++"), ("make", "make")):
         require_program(program, "power (--no-power leaves it out)", package)
     size = stimulus.size or whole_frame(int(manifest.config["array"]["rows"]))
