@@ -15,17 +15,17 @@ public:
     Batches(PackedScene& scene, const colonnade_rays_backend& backend, const Numbers& numbers, bool isRefined)
         : scene_(scene), backend_(backend), edge_(std::ldexp(scene.unit(), numbers.vertexBits)), isRefined_(isRefined) {}
 
+    /// Refined, the first of all hits: the device may find a face before tnear that is not, or miss the one in which a ray begins.
     void closest(const AppRay* rays, std::size_t count, std::uint32_t mode, AppHit* hits) {
+        for (std::size_t i = 0; i < count; ++i) hits[i] = {rays[i].tfar, 0, 0, UINT32_MAX, UINT32_MAX, 0, static_cast<std::uint32_t>(i)};
+        if (isRefined_) {
+            for (const AppHit& hit : all(rays, count, mode, 1)) hits[hit.ray] = hit;
+            return;
+        }
         query(rays, count, mode | COLONNADE_RAYS_HITS, [&](std::size_t i, const colonnade_rays_response& response, double t) {
-            hits[i] = {rays[i].tfar, 0, 0, UINT32_MAX, UINT32_MAX, 0, static_cast<std::uint32_t>(i)};
             if (response.id >= COLONNADE_RAYS_OUT_OF_RANGE) return;
-            const std::size_t face = faceOf(response);
             const auto [u, v] = scene_.weightsOf(response);
-            hits[i] = hitOf(i, face, {std::clamp(t, rays[i].tnear, rays[i].tfar), u, v, 0, (response.id & COLONNADE_RAYS_BACK_SIDE) != 0});
-            if (isRefined_)
-                settle(rays[i], mode, face, t, false, [&](std::size_t at, const PlaneHit& hit, bool isFirst) {
-                    if (isFirst || hit.t < hits[i].t) hits[i] = hitOf(i, at, hit);
-                });
+            hits[i] = hitOf(i, faceOf(response), {std::clamp(t, rays[i].tnear, rays[i].tfar), u, v, 0, (response.id & COLONNADE_RAYS_BACK_SIDE) != 0});
         });
     }
 
@@ -58,14 +58,14 @@ public:
                     return !isKnown;
                 };
                 const auto [u, v] = scene_.weightsOf(response);
-                if (!isRefined_) {
-                    if (isNew(face) && t >= rays[i].tnear && t <= rays[i].tfar)
-                        found[i].push_back(hitOf(i, face, {t, u, v, 0, (response.id & COLONNADE_RAYS_BACK_SIDE) != 0}));
-                } else if (std::find(known.begin(), known.end(), face) == known.end())
-                    settle(rays[i], mode, face, t, true, [&](std::size_t at, const PlaneHit& hit, bool) {
-                        if (isNew(at)) found[i].push_back(hitOf(i, at, hit));
-                    });
+                bool isSettled = std::find(known.begin(), known.end(), face) != known.end();
+                if (isRefined_ && !isSettled)
+                    isSettled = settle(rays[i], mode, face, t, most > 1, [&](std::size_t at, const PlaneHit& hit) {
+                                    if (isNew(at)) found[i].push_back(hitOf(i, at, hit));
+                                }) || most > 1;
                 isNew(face);
+                if (!isSettled && t >= rays[i].tnear && t <= rays[i].tfar)
+                    found[i].push_back(hitOf(i, face, {t, u, v, 0, (response.id & COLONNADE_RAYS_BACK_SIDE) != 0}));
                 if (found[i].size() >= most) return;
                 nextLive.push_back(i);
                 nextLeft.push_back(left[k]);
@@ -180,24 +180,26 @@ private:
     }
 
     bool accepts(const AppRay& ray, std::uint32_t mode, std::size_t face, const PlaneHit& hit) const {
-        return hit.least >= 0 && hit.t >= ray.tnear && hit.t <= ray.tfar && !(mode & (hit.backSide ? COLONNADE_RAYS_CULL_BACK : COLONNADE_RAYS_CULL_FRONT)) &&
+        return hit.t >= ray.tnear && hit.t <= ray.tfar && !(mode & (hit.backSide ? COLONNADE_RAYS_CULL_BACK : COLONNADE_RAYS_CULL_FRONT)) &&
                (scene_.isOpaque(face) || !(mode & COLONNADE_RAYS_OPAQUE_ONLY)) && (scene_.maskOf(face) & mode >> COLONNADE_RAYS_MASK_SHIFT);
     }
 
     /// Calls `take` with the hit of a face that the device found at t. Where its vertices say no, or with `takesAll`, also with those
-    /// of its neighbours near t: a face beside it, or in the same place.
-    template <class Take> void settle(const AppRay& ray, std::uint32_t mode, std::size_t face, double t, bool takesAll, const Take& take) {
+    /// of its neighbours near t: a face beside it, or in the same place. False if all say no: then the first hit stays the device's,
+    /// as an edge has no gap.
+    template <class Take> bool settle(const AppRay& ray, std::uint32_t mode, std::size_t face, double t, bool takesAll, const Take& take) {
         Faces& faces = scene_.faces();
-        bool isFirst = true;
+        bool isOn = false;
         const auto offer = [&](std::size_t at) {
             const std::optional<PlaneHit> hit = faces.hit(at, ray.origin, ray.direction);
-            if (!hit || !accepts(ray, mode, at, *hit)) return false;
-            if (at != face && std::abs(hit->t - t) > neighbourUnits * step(ray)) return false;
-            take(at, *hit, isFirst);
-            isFirst = false;
+            if (!hit || hit->least < 0 || (at != face && std::abs(hit->t - t) > neighbourUnits * step(ray))) return false;
+            isOn = true;
+            if (!accepts(ray, mode, at, *hit)) return false;
+            take(at, *hit);
             return true;
         };
         if (!offer(face) || takesAll) faces.around(face, offer);
+        return isOn;
     }
 
     PackedScene& scene_;
