@@ -28,10 +28,10 @@ enum colonnade_rays_status {
 
 /* A batch of rays in memory, 64 bytes. Addresses are multiples of 64, for the model those of this process. */
 struct colonnade_rays_batch {
-    uint64_t rays, hits;     /* rays in; hits out */
+    uint64_t rays, hits;     /* rays in, or a sensor; hits out */
     uint32_t count, mode;    /* 1 to 2^24 rays; the bits below */
-    float origin[3];         /* of the form `fan` */
-    float tnear, tfar;       /* tnear of the form `fan`; tfar is reserved */
+    float origin[3];         /* of the forms `fan` and `sensor` */
+    float tnear, tfar;       /* tnear of the form `fan`; both of the form `sensor` */
     uint32_t tag;            /* written to `done` when all hits are in memory; bit 31: refused, or failed */
     uint64_t done, reserved; /* 4 bytes at `done`; 0 */
 };
@@ -43,6 +43,7 @@ enum {
     COLONNADE_RAYS_OCCLUDED = 2,          /* a bit each, 64 rays a word; the first hit ends a ray */
     COLONNADE_RAYS_RESPONSE = 3,          /* bits of the above */
     COLONNADE_RAYS_FAN = 1 << 4,          /* rays have 16 bytes: direction and tfar */
+    COLONNADE_RAYS_SENSOR = 1 << 5,       /* no rays: `rays` has a colonnade_rays_sensor */
     COLONNADE_RAYS_CULL_FRONT = 1 << 8,   /* no hit where the corners turn counter-clockwise */
     COLONNADE_RAYS_CULL_BACK = 1 << 9,    /* no hit where they turn clockwise */
     COLONNADE_RAYS_OPAQUE_ONLY = 1 << 10, /* no hit of a face that is not opaque */
@@ -53,6 +54,13 @@ enum {
 /* A ray in memory, 32 bytes: hits are those at tnear <= t <= tfar of origin + t * direction. */
 struct colonnade_rays_record {
     float origin[3], tnear, direction[3], tfar;
+};
+
+/* What makes the rays of a batch of the form `sensor`, 64 bytes. Ray i is in column i % width of row i / width. Its
+ * direction is the float32 nearest to corner + column * right + row * down, modulo 2^32, times 2^-30. */
+struct colonnade_rays_sensor {
+    uint32_t corner[3], right[3], down[3];
+    uint32_t width, reserved[6]; /* columns: a multiple of 64, at most 2^24; 0 */
 };
 
 /* A hit in memory, 16 bytes. u, v are the weights of the second and third corner of the triangle as the device has it.
@@ -89,7 +97,6 @@ struct colonnade_rays_image {
     const uint8_t *records;
     size_t record_count, record_bytes;
     int32_t bounds_low[3], bounds_high[3]; /* vertex units */
-    const uint8_t *masks;                  /* by the device's number of a triangle */
     uint32_t scale_mantissa;               /* vertex units in the application's unit: mantissa * 2^(exponent - 24) */
     int32_t scale_exponent;
     int64_t base[3]; /* position (0, 0, 0) in steps of 2^(-gridFraction - exponent - 3) */
@@ -98,7 +105,7 @@ struct colonnade_rays_image {
 /* What traces batches: the model, or a device. Functions return a colonnade_rays_status. */
 struct colonnade_rays_backend {
     void *context;
-    int (*load)(void *context, const struct colonnade_rays_image *image); /* keeps `records` and `masks` until the next one */
+    int (*load)(void *context, const struct colonnade_rays_image *image); /* keeps `records` until the next one */
     int (*submit)(void *context, const struct colonnade_rays_batch *batch);
     int (*wait)(void *context); /* until all batches are done */
     void (*counters)(void *context, struct colonnade_rays_sums *counters);

@@ -3,7 +3,9 @@
 #include <nanobind/stl/optional.h>
 
 #include <cstring>
+#include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "binding.hpp"
@@ -22,12 +24,95 @@ template <class T> using Column = nb::ndarray<const T, nb::ndim<1>, nb::c_contig
 
 const colonnade_rays_ray* raysOf(const Eights<double>& rays) { return reinterpret_cast<const colonnade_rays_ray*>(rays.data()); }
 
+std::size_t rayBytes(const colonnade_rays_batch& batch) {
+    if (batch.mode & COLONNADE_RAYS_SENSOR) return sizeof(colonnade_rays_sensor);
+    return batch.count * std::size_t{batch.mode & COLONNADE_RAYS_FAN ? 16u : 32u};
+}
+
+std::size_t responseBytes(const colonnade_rays_batch& batch) {
+    const std::size_t count = batch.count;
+    const std::uint32_t response = batch.mode & COLONNADE_RAYS_RESPONSE;
+    return response == COLONNADE_RAYS_HITS ? 16 * count : response == COLONNADE_RAYS_RANGES ? 8 * count : (count + 63) / 64 * 8;
+}
+
+/// A device in Python as a backend: `colonnade.rays.device.RayDevice`. Its errors wait for the end of the library's call.
+class PythonDevice {
+public:
+    explicit PythonDevice(nb::object device) : device_(std::move(device)) {}
+
+    colonnade_rays_backend backend() {
+        return {this,
+                [](void* self, const colonnade_rays_image* image) { return call(self, [&](PythonDevice& device) { return device.load(*image); }); },
+                [](void* self, const colonnade_rays_batch* batch) { return call(self, [&](PythonDevice& device) { return device.submit(*batch); }); },
+                [](void* self) { return std::exchange(static_cast<PythonDevice*>(self)->status_, static_cast<int>(COLONNADE_RAYS_OK)); },
+                [](void* self, colonnade_rays_sums* sums) { call(self, [&](PythonDevice& device) { return device.read(*sums); }); },
+                nullptr};
+    }
+
+    void raise() {
+        if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
+    }
+
+private:
+    template <class Call> static int call(void* self, const Call& of) {
+        const nb::gil_scoped_acquire acquired;
+        auto& device = *static_cast<PythonDevice*>(self);
+        try {
+            return of(device);
+        } catch (...) {
+            device.error_ = std::current_exception();
+            return COLONNADE_RAYS_DEVICE;
+        }
+    }
+
+    int load(const colonnade_rays_image& image) {
+        nb::dict values;
+        const char* const axes[] = {"x", "y", "z"};
+        const auto name = [&](const char* group, int a) { return std::string(group) + "." + axes[a]; };
+        for (int a = 0; a < 3; ++a) {
+            values[name("bounds.low", a).c_str()] = image.bounds_low[a];
+            values[name("bounds.high", a).c_str()] = image.bounds_high[a];
+            values[name("placement.base", a).c_str()] = image.base[a];
+        }
+        values["placement.mantissa"] = image.scale_mantissa;
+        values["placement.exponent"] = image.scale_exponent;
+        values["scene.recordCount"] = image.record_count;
+        device_.attr("load")(values, nb::bytes(image.records, image.record_count * image.record_bytes), image.record_count);
+        return COLONNADE_RAYS_OK;
+    }
+
+    int submit(const colonnade_rays_batch& batch) {
+        const auto* const rays = reinterpret_cast<const char*>(batch.rays);
+        const nb::tuple found =
+            nb::cast<nb::tuple>(device_.attr("submit")(nb::bytes(&batch, sizeof batch), nb::bytes(rays, rayBytes(batch)), responseBytes(batch)));
+        const auto hits = nb::cast<nb::bytes>(found[1]);
+        std::memcpy(reinterpret_cast<void*>(batch.hits), hits.data(), hits.size());
+        const auto tag = nb::cast<std::uint32_t>(found[0]);
+        if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = tag;
+        if (tag >> 31) status_ = COLONNADE_RAYS_DEVICE;
+        return COLONNADE_RAYS_OK;
+    }
+
+    int read(colonnade_rays_sums& sums) {
+        const nb::object counters = device_.attr("counters")();
+        const auto of = [&](const char* name) { return nb::cast<std::uint64_t>(counters[name]); };
+        sums = {of("rays"), of("raysRefused"), of("raysInBox"), of("nodeReads"), of("boxTests"), of("triangleTests"), of("deepestStack")};
+        return COLONNADE_RAYS_OK;
+    }
+
+    nb::object device_;
+    int status_ = COLONNADE_RAYS_OK;
+    std::exception_ptr error_;
+};
+
 class Rays {
 public:
-    explicit Rays(const std::string& design) {
+    /// `device` None: the model.
+    Rays(const std::string& design, nb::object device) {
         const rays::Design parts(design);
-        model_ = std::make_unique<rays::ReadingModel>(Numbers(parts.numbers), parts.number("directionBits"), parts.format.layouts);
-        const colonnade_rays_backend backend = model_->backend();
+        if (device.is_none()) model_ = std::make_unique<rays::ReadingModel>(Numbers(parts.numbers), parts.number("directionBits"), parts.format.layouts);
+        else python_ = std::make_unique<PythonDevice>(std::move(device));
+        const colonnade_rays_backend backend = model_ ? model_->backend() : python_->backend();
         check(colonnade_rays_open(design.c_str(), &backend, &device_));
         check(colonnade_rays_scene_new(device_, &scene_));
     }
@@ -96,6 +181,7 @@ public:
 
     /// What the caches of an array read for rays: records, and lines from DRAM.
     Values traffic(const Eights<double>& rays, std::uint32_t mode, bool isOcclusion, const std::array<std::size_t, 7>& shape) {
+        if (!model_) throw std::invalid_argument("the traffic is that of the model");
         std::vector<std::vector<std::uint32_t>> reads;
         rays::Traffic found;
         model_->writeTo(&reads);
@@ -112,26 +198,24 @@ public:
         return {{"reads", static_cast<std::int64_t>(found.reads)}, {"lines", static_cast<std::int64_t>(found.lines)}};
     }
 
-    /// A batch from memory: its records in, 32 or 16 bytes each, and the bytes of its responses out.
-    Pixels<std::uint8_t> submit(const nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>& rays, std::uint32_t mode, const std::array<float, 3>& origin,
-                                float tnear) {
+    /// A batch of `count` rays from memory: the bytes of its records or its sensor in, and those of its responses out.
+    Pixels<std::uint8_t> submit(const Column<std::uint8_t>& rays, std::uint32_t count, std::uint32_t mode, const std::array<float, 3>& origin, float tnear, float tfar) {
         struct alignas(64) Line {
             std::uint8_t bytes[64];
         };
-        const std::size_t count = rays.shape(0), bytes = (mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_HITS ? 16 * count
-                                                         : (mode & COLONNADE_RAYS_RANGES)                        ? 8 * count
-                                                                                                                 : (count + 63) / 64 * 8;
-        if (rays.shape(1) != (mode & COLONNADE_RAYS_FAN ? 4 : 8)) throw std::invalid_argument("rays of this form have other records");
-        std::vector<Line> records(count / 2 + 1), responses(bytes / 64 + 1);
-        if (count != 0) std::memcpy(records.data()->bytes, rays.data(), 4 * rays.size());
         colonnade_rays_batch batch{};
+        batch.count = count;
+        batch.mode = mode;
+        const std::size_t bytes = responseBytes(batch);
+        if (rays.size() != rayBytes(batch)) throw std::invalid_argument("rays of this form have other records");
+        std::vector<Line> records(rays.size() / 64 + 1), responses(bytes / 64 + 1);
+        if (rays.size() != 0) std::memcpy(records.data()->bytes, rays.data(), rays.size());
         std::uint32_t done = 0;
         batch.rays = reinterpret_cast<std::uintptr_t>(records.data());
         batch.hits = reinterpret_cast<std::uintptr_t>(responses.data());
-        batch.count = static_cast<std::uint32_t>(count);
-        batch.mode = mode;
         std::copy(origin.begin(), origin.end(), batch.origin);
         batch.tnear = tnear;
+        batch.tfar = tfar;
         batch.tag = 1;
         batch.done = reinterpret_cast<std::uintptr_t>(&done);
         check(released([&] { return colonnade_rays_submit(scene_, &batch); }));
@@ -152,6 +236,7 @@ public:
     Values counters() const {
         colonnade_rays_sums c;
         colonnade_rays_counters(device_, &c);
+        if (python_) python_->raise();
         const auto value = [](std::uint64_t count) { return static_cast<std::int64_t>(count); };
         return {{"rays", value(c.rays)},          {"raysRefused", value(c.rays_refused)},     {"raysInBox", value(c.rays_in_box)},     {"nodeReads", value(c.node_reads)},
                 {"boxTests", value(c.box_tests)}, {"triangleTests", value(c.triangle_tests)}, {"deepestStack", value(c.deepest_stack)}};
@@ -159,6 +244,7 @@ public:
 
 private:
     void check(int status) const {
+        if (python_) python_->raise();
         if (status == COLONNADE_RAYS_NO_MEMORY) throw std::bad_alloc();
         if (status != COLONNADE_RAYS_OK) {
             const std::string error = colonnade_rays_error(device_);
@@ -193,6 +279,7 @@ private:
     }
 
     std::unique_ptr<rays::ReadingModel> model_;
+    std::unique_ptr<PythonDevice> python_;
     colonnade_rays_device* device_ = nullptr;
     colonnade_rays_scene* scene_ = nullptr;
 };
@@ -220,8 +307,8 @@ nb::list converted(const Values& numbers, const Eights<float>& rays, bool isLoca
 } // namespace
 
 void bind_rays(nb::module_& module) {
-    nb::class_<Rays>(module, "Rays", "A device that traces rays, with one scene: the calls of colonnade_rays.h, on the bit-exact model.")
-        .def(nb::init<const std::string&>(), "design"_a)
+    nb::class_<Rays>(module, "Rays", "A device that traces rays, with one scene: the calls of colonnade_rays.h, on the bit-exact model or a device.")
+        .def(nb::init<const std::string&, nb::object>(), "design"_a, "device"_a = nb::none())
         .def("add", &Rays::add, "vertices"_a, "faces"_a)
         .def("update", &Rays::update, "mesh"_a, "vertices"_a)
         .def("remove", &Rays::remove, "mesh"_a)
@@ -237,7 +324,7 @@ void bind_rays(nb::module_& module) {
         .def("occluded", &Rays::occluded, "rays"_a, "mode"_a)
         .def("order", &Rays::order, "rays"_a)
         .def("traffic", &Rays::traffic, "rays"_a, "mode"_a, "is_occlusion"_a, "shape"_a)
-        .def("submit", &Rays::submit, "rays"_a, "mode"_a, "origin"_a = std::array<float, 3>{}, "tnear"_a = 0.0f)
+        .def("submit", &Rays::submit, "rays"_a, "count"_a, "mode"_a, "origin"_a = std::array<float, 3>{}, "tnear"_a = 0.0f, "tfar"_a = std::numeric_limits<float>::infinity())
         .def("face", &Rays::face, "id"_a)
         .def("counters", &Rays::counters);
     module.def("convert_rays", &converted, "numbers"_a, "rays"_a, "is_local"_a, "mantissa"_a, "exponent"_a, "base"_a);

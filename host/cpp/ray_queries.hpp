@@ -3,7 +3,7 @@
 //   ray    mantissa exponent base[3] isLocal, record[8]  -> kind tMin tMax origin[3] direction[3], kind: legal, refused, out of range
 //   hit    mantissa exponent dominant entry t weights[3] -> t u v
 //   image  low[3] high[3] mantissa exponent base[3], hexadecimal records: loads a scene; no reply
-//   batch  mode count origin[3] tnear, words of its rays -> words of its hits
+//   batch  mode count origin[3] tnear tfar, words of its rays or its sensor -> words of its hits
 #pragma once
 #include "queries.hpp"
 #include "rays/tracer.hpp"
@@ -82,11 +82,12 @@ public:
         batch.count = static_cast<std::uint32_t>(query.number());
         for (float& each : batch.origin) each = floatOf(query.number());
         batch.tnear = floatOf(query.number());
+        batch.tfar = floatOf(query.number());
         const std::uint32_t form = batch.mode & COLONNADE_RAYS_RESPONSE;
-        const std::size_t rayWords = batch.mode & COLONNADE_RAYS_FAN ? 4 : 8;
+        const std::size_t words = batch.mode & COLONNADE_RAYS_SENSOR ? 16 : batch.count * (batch.mode & COLONNADE_RAYS_FAN ? 4 : 8);
         const std::size_t hitWords = form == COLONNADE_RAYS_OCCLUDED ? (batch.count + 63) / 64 * 2 : batch.count * (form == COLONNADE_RAYS_HITS ? 4 : 2);
-        std::vector<Line> rays(batch.count * rayWords / 16 + 1), hits(hitWords / 16 + 1);
-        for (std::size_t i = 0; i < batch.count * rayWords; ++i) rays[i / 16].words[i % 16] = static_cast<std::uint32_t>(query.number());
+        std::vector<Line> rays(words / 16 + 1), hits(hitWords / 16 + 1);
+        for (std::size_t i = 0; i < words; ++i) rays[i / 16].words[i % 16] = static_cast<std::uint32_t>(query.number());
         batch.rays = reinterpret_cast<std::uintptr_t>(rays.data());
         batch.hits = reinterpret_cast<std::uintptr_t>(hits.data());
         const colonnade_rays_backend backend = model_->backend();

@@ -8,14 +8,19 @@ import trimesh.ray.ray_pyembree
 import trimesh.ray.ray_triangle
 from colonnade.rays import RayMeshIntersector
 
+_BACKEND = os.environ.get("COLONNADE_RAYS_BACKEND", "model")
+_CONFIG = "edge" if _BACKEND == "model" else "traversal"
 _OVERRIDES = tuple(os.environ.get("COLONNADE_RAYS_OVERRIDES", "").split())
 
 
 class Intersector(RayMeshIntersector):
     """The device's rays, with the arguments of trimesh's two classes."""
 
-    def __init__(self, mesh: object = None, geometry: object = None, **options: bool) -> None:
-        super().__init__(mesh if mesh is not None else geometry, overrides=_OVERRIDES, **options)
+    def __init__(
+        self, mesh: object = None, geometry: object = None, **options: bool
+    ) -> None:
+        of = mesh if mesh is not None else geometry
+        super().__init__(of, _CONFIG, _OVERRIDES, backend=_BACKEND, **options)
 
 
 trimesh.ray.ray_pyembree.RayMeshIntersector = Intersector

@@ -58,7 +58,7 @@ FAST = Optimisation("-O3", 20000)
 #: For frames so small that compiling takes longer than simulating.
 QUICK = Optimisation("-O0", 2**31 - 1)
 
-_HARNESS = ("harness.cpp", "array.hpp", "dram.hpp", "dram_timing.hpp")
+_HARNESS = ("array.hpp", "dram.hpp", "dram_timing.hpp")
 
 #: Paths that make and the shell take as one word.
 _PLAIN_PATH = re.compile(r"[\w/.+@%,-]+", re.ASCII)
@@ -103,7 +103,8 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, wavefor
     tools = simulator_tools()
     harness = Path(__file__).parent / "harness"
     here = Path(__file__).parent
-    recipe = [here / "simulator_build.py", here / "simulator_sources.py", *(harness / name for name in _HARNESS)]
+    names = harness_of(design.manifest)
+    recipe = [here / "simulator_build.py", here / "simulator_sources.py", *(harness / name for name in names)]
     parts = [*tools.versions, *(path.read_text() for path in recipe), *verilator_command(tools), design.digest()]
     parts += ["waveform"] if waveform else []
     key = hashlib.sha256("".join(f"{len(part)}:{part}" for part in parts).encode()).hexdigest()[:20]
@@ -116,6 +117,11 @@ def build_simulator(design: GeneratedDesign, progress: Progress = QUIET, wavefor
     return folder / PROGRAM
 
 
+def harness_of(manifest: Manifest) -> tuple[str, ...]:
+    """The sources of a design's harness, its program first."""
+    return ("rays.cpp" if manifest.config["frame"]["rays"] else "harness.cpp", *_HARNESS)
+
+
 def _build(
     tools: Tools, design: GeneratedDesign, harness: Path, output: Path, log: Path, waveform: bool = False
 ) -> None:
@@ -125,13 +131,14 @@ def _build(
             raise UserError(f"make cannot build a simulator in {work.parent.parent}: set TMPDIR to a plain path")
         models = write_sources(design.sources, work)
         (work / "ports.hpp").write_text(ports_header(design.manifest, design.sources))
-        for name in _HARNESS:
+        program, *_ = names = harness_of(design.manifest)
+        for name in names:
             shutil.copy(harness / name, work / name)
         commands = [_verilate(tools, top, [path.relative_to(work) for path in paths]) for top, paths in models.items()]
         if waveform:
             commands = [[*command, *WAVEFORM_OPTIONS] for command in commands]
         inner = [top for top in models if top != DEVICE]
-        commands[-1] += ["--exe", "-o", PROGRAM, "harness.cpp", "-CFLAGS", " ".join(f"-I../obj_{top}" for top in inner)]
+        commands[-1] += ["--exe", "-o", PROGRAM, program, "-CFLAGS", " ".join(f"-I../obj_{top}" for top in inner)]
         commands[-1] += ["-CFLAGS", "-I..", "-LDFLAGS", " ".join(f"../obj_{top}/V{top}__ALL.a" for top in inner)]
         with log.open("w") as stream:
             for command in commands:
@@ -172,7 +179,7 @@ def ports_header(manifest: Manifest, sources: Sequence[Path]) -> str:
     """``ports.hpp``: macros with the port names and counts of this design, for the harness."""
     columns = int(manifest.config["array"]["columns"])
     header = "#pragma once\n#define EACH_COLUMN(DO) " + " ".join(f"DO({column})" for column in range(columns)) + "\n"
-    top = next(path for path in sources if path.stem == "Colonnade").read_text()
+    top = next((path.read_text() for path in sources if path.stem == "Colonnade"), "")
     # These port names end with their number format
     if match := re.search(r"io_pixels_0_bits_hit_distance_(\w+)", top):
         header += f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_bits_hit_distance_{match.group(1)}\n"

@@ -27,8 +27,12 @@ from pathlib import Path
 #: A column has a unit in each row, in its path tracer.
 UNIT, TRACER, COLUMN, DEVICE = "TraversalUnit", "PathTracer", "Column", "Colonnade"
 
-#: The path tracer's name in the column's model.
-TRACER_IN_COLUMN = f"{COLUMN}__DOT__tracer"
+#: The modules that have the units and the columns, and their names in the models of column and device.
+PARENTS = ((TRACER, f"{COLUMN}__DOT__tracer"), (DEVICE, DEVICE))
+
+#: Of a device for rays, whose modules get the names of a device's.
+RAY_PARENTS = ((COLUMN, COLUMN), ("RayArray", f"{DEVICE}__DOT__array"))
+RENAMED = {"RayColumn": COLUMN, "ColonnadeRays": DEVICE}
 
 #: The wrapper with registers at the unit's inputs.
 UNIT_MODEL = "UnitModel"
@@ -87,6 +91,11 @@ class Port:
 def both_edges(verilog: str) -> str:
     """The same modules with registers clocked on both edges: each change of the clock is a cycle."""
     return re.sub(r"@\(posedge (\w+)\)", r"@(edge \1)", verilog)
+
+
+def renamed(verilog: str) -> str:
+    """Modules of a device for rays by the names of a device's."""
+    return re.sub(rf"\b({'|'.join(RENAMED)})\b", lambda match: RENAMED[match[0]], verilog)
 
 
 def module_ports(verilog: str, module: str) -> list[Port]:
@@ -211,17 +220,19 @@ def write_sources(sources: Iterable[Path], folder: Path) -> dict[str, list[Path]
         The files of each model by top module: `UNIT_MODEL`, `COLUMN`, `DEVICE`.
     """
     verilog = {path.stem: both_edges(path.read_text()) for path in sources}
+    (of_units, units_path), (of_columns, columns_path) = RAY_PARENTS if RENAMED.keys() <= verilog.keys() else PARENTS
+    verilog = {RENAMED.get(module, module): renamed(text) for module, text in verilog.items()}
     ports = {module: module_ports(verilog[module], module) for module in (UNIT, COLUMN)}
-    tracer = open_module(verilog[TRACER], TRACER, UNIT, ports[UNIT])
-    device = open_module(verilog[DEVICE], DEVICE, COLUMN, ports[COLUMN])
+    opened = [
+        (open_module(verilog[of_units], of_units, UNIT, ports[UNIT]), "Unit", COLUMN, units_path),
+        (open_module(verilog[of_columns], of_columns, COLUMN, ports[COLUMN]), COLUMN, DEVICE, columns_path),
+    ]
     header = "#pragma once\n" + record_banks(verilog.get("ColumnBvhMemory"))
-    (folder / "coupling.hpp").write_text(
-        header + coupling(tracer, "Unit", COLUMN, TRACER_IN_COLUMN) + coupling(device, COLUMN, DEVICE, DEVICE)
-    )
+    (folder / "coupling.hpp").write_text(header + "".join(coupling(*each) for each in opened))
     for module in verilog:
         if module.startswith("records_"):
             verilog[module] = _RECORDS_ARRAY.sub(r"\1 /*verilator public_flat_rw*/;", verilog[module])
-    verilog |= {UNIT_MODEL: unit_model(UNIT, ports[UNIT]), TRACER: tracer.verilog, DEVICE: device.verilog}
+    verilog |= {UNIT_MODEL: unit_model(UNIT, ports[UNIT]), **{each.module: each.verilog for each, *_ in opened}}
     return {top: list(_written(verilog, top, folder / top)) for top in (UNIT_MODEL, COLUMN, DEVICE)}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from colonnade.common.types import Floats
 from colonnade.design.config_name import Overrides
-from colonnade.rays.scene import Hits, Scene
+from colonnade.rays.scene import Backend, Hits, Scene
 
 Indices = NDArray[np.int64]
 
@@ -22,13 +23,19 @@ class RayMeshIntersector:
         config: The design, as that of `Scene`.
         overrides: Its settings.
         scale_to_box: Ignored; a scene has its own scale.
+        backend: As that of `Scene`.
     """
 
     def __init__(
-        self, geometry: Any, config: str = "edge", overrides: Overrides = (), scale_to_box: bool = True
+        self,
+        geometry: Any,
+        config: str = "edge",
+        overrides: Overrides = (),
+        scale_to_box: bool = True,
+        backend: Backend = "model",
     ) -> None:
         self.mesh = geometry
-        self._design = config, overrides
+        self._design = partial(Scene, config=config, overrides=overrides, backend=backend)
         self._packed: tuple[int, Scene] | None = None
 
     @property
@@ -36,7 +43,7 @@ class RayMeshIntersector:
         """The mesh, packed."""
         key = hash(self.mesh)
         if self._packed is None or self._packed[0] != key:
-            self._packed = key, Scene(self.mesh.vertices, self.mesh.faces, *self._design)
+            self._packed = key, self._design(self.mesh.vertices, self.mesh.faces)
         return self._packed[1]
 
     def intersects_id(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +15,19 @@ from colonnade.common.types import Floats
 from colonnade.design.config_name import Overrides
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
+from colonnade.rays.device import RayDevice
+from colonnade.rays.sensor import Sensor
 from colonnade.rays.traffic import Traffic, cache_shape
 from colonnade.scene_image.packer import record_format
 
 #: Bits of a batch's mode, as `driver/include/colonnade_rays.h` has them.
 CULL_FRONT, CULL_BACK, OPAQUE_ONLY, ALL_MASKS = 1 << 8, 1 << 9, 1 << 10, 0xFF
+RANGES, OCCLUDED, FAN, SENSOR = 1, 2, 1 << 4, 1 << 5
+
+Backend = Literal["model", "rtl"] | RayDevice
+
+#: Values of a hit's id.
+MISS, OUT_OF_RANGE = 0xFFFFFFFF, 0xFFFFFFFE
 
 
 @dataclass(frozen=True)
@@ -58,9 +66,11 @@ class Scene:
         overrides: Settings of the design, "key=value".
         refine: t and weights of a hit from the vertices as they are, in double. Where these say that the ray misses
             the face, a neighbour of it may take its place. False: what the device answers.
+        backend: "model": the bit-exact model; "rtl": the simulated device, with `frame.rays`, or one of this design.
 
     Raises:
         UserError: A mesh or a design is wrong, or they do not fit; also of the methods that add or change meshes.
+        RuntimeError: The simulated hardware failed.
     """
 
     @checked
@@ -71,12 +81,16 @@ class Scene:
         config: str = "edge",
         overrides: Overrides = (),
         refine: bool = True,
+        backend: Backend = "model",
     ) -> None:
         from colonnade import _core
 
         self._lock = threading.Lock()
         self._manifest = manifest_for(config, overrides).manifest
-        self._rays: Any = _core.Rays(design_text(self._manifest))
+        device: RayDevice | None = None if isinstance(backend, str) else backend
+        if backend == "rtl":
+            device = RayDevice(config, overrides)
+        self._rays: Any = _core.Rays(design_text(self._manifest), device)
         self._rays.refine(refine)
         self._is_committed = False
         if vertices is not None:
@@ -130,6 +144,37 @@ class Scene:
     def occluded(self, rays: ArrayLike, mode: int = 0, mask: int = ALL_MASKS) -> NDArray[np.bool_]:
         """Whether each ray hits a face, bool [n]."""
         result: NDArray[np.bool_] = self._query("occluded", _rays(rays), mode | mask << 24)
+        return result
+
+    def ranges(self, sensor: Sensor, mode: int = 0, mask: int = ALL_MASKS) -> Floats:
+        """The t of the closest hit of a sensor's rays, float64 [height, width], of float32; inf for a miss.
+
+        The device makes the rays. Unlike `closest`, hits are those of the device, not refined.
+
+        Raises:
+            UserError: The sensor is too far away.
+        """
+        scale, count = 2.0**sensor.exponent, sensor.columns * sensor.height
+        limits = sensor.near * scale, sensor.far * scale
+        answer = self.submit(sensor.record(), count, mode | mask << 24 | SENSOR | RANGES, sensor.origin, *limits)
+        found = answer.view([("t", "<f4"), ("id", "<u4")]).reshape(sensor.height, sensor.columns)[:, : sensor.width]
+        if (found["id"] == OUT_OF_RANGE).any():
+            raise UserError("the sensor is 16 edges of the scene's box or more away: move it nearer")
+        return np.where(found["id"] == MISS, np.inf, found["t"] / scale)
+
+    def submit(
+        self,
+        records: NDArray[Any],
+        count: int,
+        mode: int,
+        origin: ArrayLike = (0, 0, 0),
+        near: float = 0,
+        far: float = np.inf,
+    ) -> NDArray[np.uint8]:
+        """Hand over a batch as it is: `records` in memory, of `count` rays or a sensor; the bytes of its hits."""
+        start = [float(value) for value in np.asarray(origin).astype(np.float32)]
+        data = np.ascontiguousarray(records).view(np.uint8).ravel()
+        result: NDArray[np.uint8] = self._query("submit", data, count, mode, start, near, far)
         return result
 
     def order(self, rays: ArrayLike) -> NDArray[np.uint32]:

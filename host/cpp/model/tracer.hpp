@@ -26,10 +26,11 @@ enum class Occlusion { none, transmissive, opaque };
 /// What an application's ray does not hit: triangles of a side, non-opaque ones, those without a bit of its mask.
 struct RayFilter {
     bool cullsFront, cullsBack, refusesClear;
-    std::uint8_t mask;
-    const std::uint8_t* masks; ///< by packed id; null: all bits
+    int mask; ///< of leaves, in place of their material
 
-    bool accepts(const Hit& hit) const { return !(hit.backSide ? cullsBack : cullsFront) && !(refusesClear && hit.isClear) && (!masks || (masks[hit.id] & mask) != 0); }
+    bool accepts(const Hit& hit, const Leaf& leaf) const {
+        return !(hit.backSide ? cullsBack : cullsFront) && !(refusesClear && hit.isClear) && (leaf.material & mask) != 0;
+    }
 };
 
 /// Finds the hits of prepared rays. Copies share the column memory.
@@ -106,7 +107,7 @@ private:
             const bool isHit = testTriangle(state.ray, leaf.verticesOf(i), id, numbers_, hit);
             log.addTriangle(leaf.verticesOf(i), id, isHit);
             hit.isClear = leaf.isClear;
-            if (!isHit || (state.filter && !state.filter->accepts(hit))) continue;
+            if (!isHit || (state.filter && !state.filter->accepts(hit, leaf))) continue;
             if (state.isShadow)
                 state.occlusion = std::max(state.occlusion, hit.isClear && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
             else state.best = hit;

@@ -37,8 +37,7 @@ public:
             throw Failure(COLONNADE_RAYS_BAD_MESH, "no face keeps an area at " + std::to_string(design.format.vertexBits) + " bits a coordinate: use a design with more");
         const std::size_t count = faces_.faces().size();
         const std::vector<std::array<mesh::Vector, 3>> normals(count);
-        const std::vector<std::uint8_t> materials(count);
-        const packer::FaceAttributes attributes{normals.data(), materials.data(), isClear_.data(), nullptr};
+        const packer::FaceAttributes attributes{normals.data(), masks_.data(), isClear_.data(), nullptr};
         tree_ = packer::buildTree(quantised_, attributes, design.format);
         packer_ = std::make_unique<packer::RecordPacker>(quantised_, attributes, tree_, design.format);
         checkFit(design);
@@ -114,11 +113,8 @@ private:
     }
 
     void describe(const Design& design) {
-        idMasks_.resize(indices_.size());
-        for (std::size_t id = 0; id < indices_.size(); ++id)
-            if (indices_[id] >= 0) idMasks_[id] = masks_[faceOfId(static_cast<std::uint32_t>(id))];
         const packer::Sections& s = packer_->sections();
-        image_ = {records_.data(), s.recordCount, design.format.recordBytes(), {}, {}, idMasks_.data(), 0, 0, {}};
+        image_ = {records_.data(), s.recordCount, design.format.recordBytes(), {}, {}, 0, 0, {}};
         const double mantissa = std::frexp(quantised_.scale, &image_.scale_exponent);
         image_.scale_mantissa = static_cast<std::uint32_t>(std::ldexp(mantissa, Placement::scaleBits));
         const int fraction = gridFraction_ + image_.scale_exponent + Placement::fractionBits;
@@ -136,7 +132,7 @@ private:
     int gridFraction_;
     Faces faces_;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> owners_;
-    std::vector<std::uint8_t> masks_, isClear_, idMasks_;
+    std::vector<std::uint8_t> masks_, isClear_; // of the faces; a leaf has the mask in place of a material
     packer::QuantisedMesh quantised_;
     bvh::Bvh tree_;
     std::unique_ptr<packer::RecordPacker> packer_;

@@ -8,7 +8,7 @@
 
 namespace colonnade::rays {
 
-static_assert(sizeof(colonnade_rays_batch) == 64 && sizeof(colonnade_rays_record) == 32 && sizeof(colonnade_rays_response) == 16, "formats in memory");
+static_assert(sizeof(colonnade_rays_batch) == 64 && sizeof(colonnade_rays_record) == 32 && sizeof(colonnade_rays_sensor) == 64 && sizeof(colonnade_rays_response) == 16, "formats in memory");
 
 /// Traces single rays. Copies share the scene, and may run at the same time.
 class RayTracer : public Tracer {
@@ -28,7 +28,6 @@ public:
             frame_.bounds.high[a] = image.bounds_high[a];
             placement_.base[a] = image.base[a];
         }
-        masks_ = image.masks;
     }
 
     bool isEmpty() const { return frame_.recordCount == 0; }
@@ -45,7 +44,7 @@ public:
         refused += converted.kind == ConvertedRay::Kind::refused;
         if (converted.kind != ConvertedRay::Kind::legal || isEmpty()) return miss;
         const RayFilter filter{(mode & COLONNADE_RAYS_CULL_FRONT) != 0, (mode & COLONNADE_RAYS_CULL_BACK) != 0, (mode & COLONNADE_RAYS_OPAQUE_ONLY) != 0,
-                               static_cast<std::uint8_t>(mode >> COLONNADE_RAYS_MASK_SHIFT), masks_};
+                               static_cast<int>(mode >> COLONNADE_RAYS_MASK_SHIFT)};
         const Ray prepared = prepareRay(converted.request, frame_.bounds, numbers_);
         if ((mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_OCCLUDED) {
             if (occlusion(prepared, &filter) != Occlusion::none) miss.id = 0;
@@ -66,7 +65,6 @@ private:
 
     int directionBits_;
     Placement placement_{};
-    const std::uint8_t* masks_ = nullptr;
 };
 
 /// The model as a backend: it traces a batch in several threads, before `submit` returns.
@@ -87,6 +85,7 @@ public:
 
 private:
     static constexpr std::size_t raysOfAThread = 512;
+    static constexpr std::uint32_t forms = COLONNADE_RAYS_FAN | COLONNADE_RAYS_SENSOR;
 
     int load(const colonnade_rays_image& image) {
         tracer_.load(image);
@@ -94,11 +93,15 @@ private:
     }
 
     int submit(const colonnade_rays_batch& batch) {
-        constexpr std::uint32_t known = COLONNADE_RAYS_RESPONSE | COLONNADE_RAYS_FAN | COLONNADE_RAYS_CULL_FRONT | COLONNADE_RAYS_CULL_BACK | COLONNADE_RAYS_OPAQUE_ONLY |
+        constexpr std::uint32_t known = COLONNADE_RAYS_RESPONSE | forms | COLONNADE_RAYS_CULL_FRONT | COLONNADE_RAYS_CULL_BACK | COLONNADE_RAYS_OPAQUE_ONLY |
                                         COLONNADE_RAYS_LOCAL | 0xffu << COLONNADE_RAYS_MASK_SHIFT;
         if ((batch.rays | batch.hits) % 64 != 0 || batch.done % 4 != 0 || batch.count == 0 || batch.count > 1u << 24 || (batch.mode & ~known) != 0 ||
-            (batch.mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_RESPONSE)
+            (batch.mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_RESPONSE || (batch.mode & forms) == forms)
             return COLONNADE_RAYS_BAD_BATCH;
+        if (batch.mode & COLONNADE_RAYS_SENSOR) {
+            const std::uint32_t width = reinterpret_cast<const colonnade_rays_sensor*>(batch.rays)->width;
+            if (width % 64 != 0 || width == 0 || width > 1u << 24) return COLONNADE_RAYS_BAD_BATCH;
+        }
         // Runs of whole words of occluded rays
         const std::size_t most = std::max<std::size_t>(1, std::min<std::size_t>(std::thread::hardware_concurrency(), batch.count / raysOfAThread));
         const std::size_t run = (batch.count / most + 64) / 64 * 64;
@@ -127,10 +130,11 @@ private:
         std::uint64_t word = 0;
         for (std::size_t i = first; i < last; ++i) {
             colonnade_rays_record ray;
-            if (batch.mode & COLONNADE_RAYS_FAN) {
-                std::memcpy(ray.direction, rays + 16 * i, 16);
+            if (batch.mode & forms) {
                 std::memcpy(ray.origin, batch.origin, sizeof ray.origin);
                 ray.tnear = batch.tnear;
+                if (batch.mode & COLONNADE_RAYS_FAN) std::memcpy(ray.direction, rays + 16 * i, 16);
+                else setSensorRay(ray, *reinterpret_cast<const colonnade_rays_sensor*>(rays), static_cast<std::uint32_t>(i), batch.tfar);
             } else std::memcpy(&ray, rays + sizeof ray * i, sizeof ray);
             const colonnade_rays_response response = tracer.response(ray, batch.mode);
             if (form == COLONNADE_RAYS_HITS) std::memcpy(hits + 16 * i, &response, 16);
@@ -142,6 +146,14 @@ private:
                 word = 0;
             }
         }
+    }
+
+    static void setSensorRay(colonnade_rays_record& ray, const colonnade_rays_sensor& sensor, std::uint32_t i, float tfar) {
+        for (int a = 0; a < 3; ++a) {
+            const std::uint32_t sum = sensor.corner[a] + i % sensor.width * sensor.right[a] + i / sensor.width * sensor.down[a];
+            ray.direction[a] = std::ldexp(static_cast<float>(static_cast<std::int32_t>(sum)), -30);
+        }
+        ray.tfar = tfar;
     }
 
     void add(const RayTracer& from) {

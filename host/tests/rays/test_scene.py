@@ -9,14 +9,14 @@ import pytest
 from exact_rays import EXACT, mesh_of, outside_rays, plane_hits, rays_of, truth
 
 from colonnade import UserError
-from colonnade.rays import Hits, Scene
-from colonnade.rays.scene import ALL_MASKS, CULL_BACK, CULL_FRONT, OPAQUE_ONLY
+from colonnade.rays import Hits, Scene, Sensor
+from colonnade.rays.scene import ALL_MASKS, CULL_BACK, CULL_FRONT, FAN, OCCLUDED, OPAQUE_ONLY, RANGES, SENSOR
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
 #: From above and from below through the first face of `SQUARE`.
 DOWN, UP = [0.7, 0.2, 2, 0, 0, 0, -1, np.inf], [0.7, 0.2, -2, 0, 0, 0, 1, np.inf]
-#: Bits of a batch's mode, and answers of 16 bytes.
-RANGES, OCCLUDED, FAN, MASKS = 1, 2, 1 << 4, ALL_MASKS << 24
+#: A batch's mode of all masks, and answers of 16 bytes.
+MASKS = ALL_MASKS << 24
 ANSWER = np.dtype([("t", "f4"), ("id", "u4"), ("u", "f4"), ("v", "f4")])
 
 
@@ -129,6 +129,18 @@ def test_hits_behind_the_origin_count_from_a_negative_tnear() -> None:
     assert scene.all([[*SQUARE[0][1], 0, 0, 0, -1, np.inf]]).t.tolist() == [0]
 
 
+@pytest.mark.parametrize("settings", ((), EXACT))
+def test_a_ray_hits_the_face_on_which_it_begins(settings: tuple[str, ...]) -> None:
+    starts = np.random.default_rng(9).random((100, 2))
+    for edge in (1e-4, 0.1, 1, 1e4):
+        scene = Scene(edge * (SQUARE[0] + [0, 0, 0.3]), SQUARE[1], overrides=settings)
+        scene.add(edge * (SQUARE[0] - [0, 0, 0.45]), SQUARE[1])
+        above = edge * np.column_stack([starts, np.full(100, 0.3)])
+        hits = scene.closest(rays_of(above, np.zeros((100, 3)) - [0, 0, 1], 0, np.inf))
+        assert (hits.mesh == 0).all()
+        assert (hits.t == 0).all()
+
+
 def test_rays_of_no_number_miss() -> None:
     scene = Scene(*SQUARE)
     bad = np.array([DOWN] * 8)
@@ -159,7 +171,10 @@ def test_batches_answer_alike_in_every_form() -> None:
     rays = outside_rays(vertices, 3001, seed=5)
     rays[:, :3] = rays[0, :3]
     records = rays.astype(np.float32)
-    submit = scene._rays.submit
+
+    def submit(part: Any, mode: int, *of_fan: Any) -> Any:
+        return scene.submit(part, len(part), mode, *of_fan)
+
     hits = submit(records, MASKS).view(ANSWER)
     assert (hits == np.concatenate([submit(part, MASKS).view(ANSWER) for part in np.array_split(records, 50)])).all()
     fan = submit(np.ascontiguousarray(records[:, 4:]), MASKS | FAN, records[0, :3], 0.0).view(ANSWER)
@@ -175,9 +190,48 @@ def test_batches_answer_alike_in_every_form() -> None:
 def test_batches_that_are_none_are_refused() -> None:
     scene = Scene(*SQUARE)
     scene.closest([DOWN])
-    for records, mode in (((1, 8), MASKS | 3), ((1, 8), MASKS | 1 << 5), ((0, 8), MASKS)):
-        with pytest.raises(ValueError, match="unknown mode"):
-            scene._rays.submit(np.zeros(records, np.float32), mode)
+    for records, mode in (((1, 8), MASKS | 3), ((1, 8), MASKS | 1 << 6), ((0, 8), MASKS)):
+        with pytest.raises(UserError, match="unknown mode"):
+            scene.submit(np.zeros(records, np.float32), records[0], mode)
+
+
+def test_a_sensor_makes_the_rays_of_a_fan() -> None:
+    """Sums of any bits, also those that wrap; rows that end in the middle of a thread's rays."""
+    scene, random = Scene(*mesh_of("torus"), refine=False), np.random.default_rng(3)
+    for width, count in ((64, 130), (1024, 4500)):
+        corner, right, down = units = random.integers(0, 1 << 32, size=(3, 3))
+        at = np.arange(count)[:, None]
+        sums = (corner + at % width * right + at // width * down) & 0xFFFFFFFF
+        ways = sums.astype(np.uint32).view(np.int32).astype(np.float32) * np.float32(2.0**-30)
+        record = np.array([*units.ravel(), width, *[0] * 6], np.uint32)
+        fan = np.column_stack([ways, np.full(count, 9, np.float32)])
+        origin = [0.1, 0.2, 0.3]
+        wanted = scene.submit(fan, count, MASKS | FAN, origin, 0.125)
+        assert (scene.submit(record, count, MASKS | SENSOR, origin, 0.125, 9) == wanted).all()
+        assert (wanted.view(ANSWER)["id"] != 0xFFFFFFFF).any()
+
+
+def test_ranges_of_a_sensor_are_those_of_its_rays() -> None:
+    scene = Scene(*mesh_of("torus"), refine=False)
+    sensor = Sensor((0, 0, 5), (-3, 2, -10), (0.06, 0, 0), (0, -0.05, 0), 100, 80)
+    y, x = np.mgrid[:80, :100, :1][:2]
+    ways = np.array(sensor.corner) + x * np.array(sensor.right) + y * np.array(sensor.down)
+    wanted = scene.closest(rays_of(np.zeros((8000, 3)) + sensor.origin, ways.reshape(-1, 3), 0, np.inf))
+    ranges = scene.ranges(sensor).ravel()
+    hits = np.isfinite(ranges) & (wanted.face >= 0)
+    assert (np.isfinite(ranges) == (wanted.face >= 0)).mean() > 0.999
+    assert 0.1 < hits.mean() < 0.9
+    assert np.median(np.abs(ranges[hits] - wanted.t[hits])) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    (({"right": (0, np.nan, 0)}, "not finite"), ({"width": 0}, "0 x 4 rays"), ({"origin": (100, 0, 0)}, "16 edges")),
+)
+def test_sensors_that_are_none_are_refused(changes: dict[str, Any], message: str) -> None:
+    given = {"origin": (0, 0, 1), "corner": (0, 0, -1), "right": (1, 0, 0), "down": (0, 1, 0), "width": 3, "height": 4}
+    with pytest.raises(UserError, match=message):
+        Scene(*SQUARE).ranges(Sensor(**(given | changes)))
 
 
 @pytest.mark.parametrize(

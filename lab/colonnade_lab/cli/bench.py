@@ -23,6 +23,8 @@ from colonnade.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from colonnade.common.progress import Progress
+
     from colonnade_lab.common.text_table import Table
 
 
@@ -60,6 +62,13 @@ if TYPE_CHECKING:
     type=click.Choice(("0", "1", "2", "4", "8", "16")),
     help="Banks of a DRAM with rows and refresh; 0: every read takes the same latency.  [default: 0]",
 )
+@click.option(
+    "--rays",
+    "rays",
+    type=click.IntRange(1, 1 << 24),
+    metavar="N",
+    help="Instead of frames, run batches of N rays of each kind on a device for rays, with one mesh.",
+)
 @click.option("--plot", type=FILE, metavar="FILE", help="Plot the utilisation of each stage as PNG.")
 @strict_option
 @json_option
@@ -71,6 +80,7 @@ def bench(
     jobs: int | None,
     reuse: bool,
     mirror: bool,
+    rays: int | None,
     plot: Path | None,
     json_file: Path | None,
     **memory: int | str | None,
@@ -98,6 +108,9 @@ def bench(
     from colonnade_lab.explore.bench import bench as run_benchmark
 
     terminal = progress.for_terminal()
+    if rays is not None:
+        finish(_batches(config, overrides, meshes[0] if meshes else "armadillo", rays, terminal), json_file)
+        return
     names = meshes or MESHES
     dram = {name: int(value) for name, value in memory.items() if value is not None}
 
@@ -134,6 +147,35 @@ def bench(
         echo_lines("\nAs mirrors, with one reflection:")
         report["mirror"] = measured(mirror=True)
     finish(report, json_file)
+
+
+def _batches(config: str, overrides: tuple[str, ...], mesh: str, rays: int, terminal: Progress) -> dict[str, Any]:
+    """Batches of a device for rays, see `colonnade_lab.evaluation.ray_bench`."""
+    from dataclasses import asdict, astuple
+
+    from colonnade.design.generator import manifest_for
+    from colonnade.mesh.load import load_mesh
+
+    from colonnade_lab.common.text_table import Column, Table
+    from colonnade_lab.evaluation.ray_bench import measured
+
+    table = Table(
+        (
+            Column("rays", 32, is_text=True),
+            Column("cycles", 11, ","),
+            Column("all", 6, ".3f", group="rays per cycle"),
+            Column("in box", 6, ".3f", group="rays per cycle"),
+            Column("nodes", 6, ".1f", group="a ray"),
+            Column("triangles", 9, ".1f", group="a ray"),
+        ),
+        echo,
+    )
+    kinds = []
+    for each in measured(load_mesh(mesh), config, overrides, rays, progress=terminal):
+        kinds.append(asdict(each))
+        table.print(*astuple(each))
+    full = manifest_for(config, overrides, terminal).manifest.config
+    return {"config": full, "mesh": mesh, "rays": rays, "kinds": kinds}
 
 
 def _table() -> Table:

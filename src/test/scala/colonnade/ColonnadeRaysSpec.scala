@@ -27,16 +27,18 @@ class ColonnadeRaysSpec extends AnyFlatSpec with ChiselScalatestTester with Matc
   private def check(name: String, config: ColonnadeConfig, tag: Tag): Unit =
     it should s"give the hits of the model, $name" taggedAs tag in
       test(new ColonnadeRays(config)).withAnnotations(Simulation.verilator) { dut =>
-        val slow = new RayBatches(dut, config, stall = 60, maxDelay = 90, seed = 2).run(Seq(66, 1, 64, 20, 65, 30))
-        info(s"246 rays of a slow memory in $slow cycles")
+        val slow =
+          new RayBatches(dut, config, stall = 60, maxDelay = 90, seed = 2).run(Seq(66, 1, 20, 10, 65, 1, 4, 66, 20))
+        info(s"253 rays of a slow memory in $slow cycles")
         if (tag == Matrix) {
-          val fast = new RayBatches(dut, config, stall = 0, maxDelay = 3, seed = 1).run(Seq(130, 64, 200, 1, 65, 100))
-          info(s"560 rays in $fast cycles")
+          val fast = new RayBatches(dut, config, stall = 0, maxDelay = 3, seed = 1).run(Seq(130, 64, 200, 1, 65, 100,
+            200, 64, 330))
+          info(s"1154 rays in $fast cycles")
         }
       }
 }
 
-/** Runs batches of all forms, a refused one and one that cannot be read among them. */
+/** Runs batches of all forms, refused ones and one that cannot be read among them. */
 private class RayBatches(dut: ColonnadeRays, config: ColonnadeConfig, stall: Int, maxDelay: Int, seed: Int)
     extends Matchers {
   private val random   = new Random(seed)
@@ -98,11 +100,12 @@ private class RayBatches(dut: ColonnadeRays, config: ColonnadeConfig, stall: Int
     * @return cycles
     */
   def run(counts: Seq[Int]): Int = {
-    val batches   = for ((count, i) <- counts.zipWithIndex) yield stimulus.batch(count, i % 3, isFan = i >= 3)
+    val batches   = for ((count, i) <- counts.zipWithIndex) yield stimulus.batch(count, i % 3, form = i / 3)
     val expected  = Model.batches(config, stimulus.image, stimulus.scene.records, batches.map(_.query))
     val addresses = batches.indices.map(i => (BigInt(0x100f80) + i * 0x4000, BigInt(0x200fc0) + i * 0x4000))
     val refused   = 2 // an extra batch of an unknown mode, and one whose rays cannot be read
     val broken    = 4
+    val illegal   = 7 // and one whose sensor is none
     var tail      = 0
 
     def submit(words: Seq[BigInt]): Unit = {
@@ -120,6 +123,10 @@ private class RayBatches(dut: ColonnadeRays, config: ColonnadeConfig, stall: Int
         memory.broken += rays + 0x3000
         submit(batch.words(rays + 0x3000, hits, 78, tags + 4 * 41))
       }
+      if (i == illegal) {
+        memory.store(rays + 0x3000, batch.rays.updated(9, BigInt(65)))
+        submit(batch.words(rays + 0x3000, hits, 79, tags + 4 * 42))
+      }
       submit(batch.words(rays, hits, 1000 + i, tags + 4 * i))
     }
     while (!dut.io.done.peekBoolean()) step()
@@ -128,7 +135,7 @@ private class RayBatches(dut: ColonnadeRays, config: ColonnadeConfig, stall: Int
       memory.words(hits + batch.hitBytes, 16).toSet shouldBe Set(BigInt(0x5a5a5a5a))
     }
     batches.indices.foreach(i => memory.words(tags + 4 * i, 1) shouldBe Seq(BigInt(1000 + i)))
-    Seq(77 -> 40, 78 -> 41).foreach { case (tag, at) =>
+    Seq(77 -> 40, 78 -> 41, 79 -> 42).foreach { case (tag, at) =>
       memory.words(tags + 4 * at, 1) shouldBe Seq(tag + RayBatch.errorBit)
     }
     memory.maxId shouldBe config.array.columns

@@ -5,7 +5,7 @@ import chisel3.experimental.hierarchy.{Definition, Instance}
 import chisel3.experimental.noPrefix
 import chisel3.util.{DecoupledIO, Valid}
 import colonnade.config.{ColonnadeConfig, TraversalConfig}
-import colonnade.formats.{RecordBroadcast, SceneMap}
+import colonnade.formats.{Leaf, RecordBroadcast, SceneMap}
 import colonnade.ray.PreparedRay
 import colonnade.unit.{TraceResult, TraversalUnit}
 
@@ -18,15 +18,17 @@ final private[colonnade] class TraversalRows(config: ColonnadeConfig) {
   /** By row. Their requests and events are the column's. */
   val units = Seq.fill(config.array.rows)(noPrefix(Instance(definition)).io)
 
-  /** Traces rays; `scene` is constant meanwhile, and `start` precedes the first one.
+  /** Traces rays; `scene` and `mask` are constant meanwhile, and `start` precedes the first one.
     *
+    * @param mask of rays of applications: they hit leaves with a bit in common
     * @return what each ray has met, in any order
     */
   def connect(
       from:       DecoupledIO[PreparedRay],
       scene:      SceneMap,
       start:      Bool,
-      broadcasts: Vec[Valid[RecordBroadcast]]
+      broadcasts: Vec[Valid[RecordBroadcast]],
+      mask:       Option[UInt] = None
   ): Valid[TraceResult] = noPrefix {
     val rays    = Module(new RayBus(config)).io
     val results = Module(new ResultBus(config)).io
@@ -43,6 +45,8 @@ final private[colonnade] class TraversalRows(config: ColonnadeConfig) {
       val group = Module(new TriangleGroup(config, rows.size)).io
       for ((unit, row) <- rows.zipWithIndex) {
         unit.triangleLanes :<>= group.rows(row)
+        for (rays <- mask; candidate = group.rows(row).candidate.bits; isMasked <- candidate.isMasked)
+          isMasked       := (new Leaf(config.geometry, candidate.record).material & rays) === 0.U
         group.waits(row) := unit.waitsForTriangles
       }
     }

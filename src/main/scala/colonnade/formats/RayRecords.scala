@@ -46,12 +46,31 @@ object RayPlacement {
   val fractionBits: Int = 3
 }
 
+/** What makes the rays of a sensor, 64 bytes. The direction at a column and row is the float nearest to (corner + column ·
+  * right + row · down) · 2^−30, of sums modulo 2^32.
+  */
+final class RaySensor extends Bundle {
+  val reserved = UInt(192.W)
+  val columns  = UInt(32.W)
+  val down     = RaySensor.vector
+  val right    = RaySensor.vector
+  val corner   = RaySensor.vector
+
+  def isLegal: Bool = columns(5, 0) === 0.U && columns =/= 0.U && columns <= RayBatch.maxCount.U
+}
+
+object RaySensor {
+  val fractionBits: Int = 30
+
+  def vector: Vec[UInt] = Vec(3, UInt(32.W))
+}
+
 /** A batch of rays in memory, 64 bytes; byte 0 is the lowest. */
 final class RayBatch extends Bundle {
   val reserved = UInt(64.W)
   val done     = UInt(64.W) // address of 4 bytes, to which `tag` goes when all hits are in memory; 0: none
   val tag      = UInt(32.W)
-  val tFar     = UInt(32.W) // reserved
+  val tFar     = new Float32
   val tNear    = new Float32
   val origin   = Vec(3, new Float32)
   val mode     = UInt(32.W)
@@ -61,16 +80,18 @@ final class RayBatch extends Bundle {
 
   def response: UInt     = mode(1, 0)
   def isFan: Bool        = mode(4)
+  def isSensor: Bool     = mode(5)
   def cullsFront: Bool   = mode(8)
   def cullsBack: Bool    = mode(9)
   def refusesClear: Bool = mode(10)
   def isLocal: Bool      = mode(11)
+  def mask: UInt         = mode(31, 24)
 
-  /** A device holds no masks: a batch with another mask than all ones is refused. Addresses fit those of the port. */
+  /** Addresses fit those of the port. */
   def isLegal: Bool = {
     val isAligned = rays(5, 0) === 0.U && hits(5, 0) === 0.U && done(1, 0) === 0.U
     val isInReach = (rays | hits | done)(63, Axi.addressBits) === 0.U
-    val isKnown   = response =/= 3.U && (mode & ~RayBatch.modes.U(32.W)) === 0.U && mode(31, 24).andR
+    val isKnown   = response =/= 3.U && !(isFan && isSensor) && (mode & ~RayBatch.modes.U(32.W)) === 0.U
     isAligned && isInReach && isKnown && count =/= 0.U && count <= RayBatch.maxCount.U
   }
 }
@@ -87,7 +108,7 @@ object RayBatch {
   /** Of a tag: the batch was refused, or has failed. */
   val errorBit: BigInt = BigInt(1) << 31
 
-  private val modes = BigInt("ff000f13", 16)
+  private val modes = BigInt("ff000f33", 16)
 }
 
 /** The ring of batches in memory: 2^sizeLog of them from `base` on, a multiple of 64. */

@@ -3,7 +3,7 @@ package colonnade.query
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled, Fill}
 import colonnade.axi.{Axi, AxiReadPort, AxiWritePort}
-import colonnade.formats.{RayBatch, RayRing}
+import colonnade.formats.{RayBatch, RayRing, RaySensor}
 
 /** `ring` is constant while batches run. */
 final class BatchReaderIO(columns: Int) extends Bundle {
@@ -16,6 +16,7 @@ final class BatchReaderIO(columns: Int) extends Bundle {
   /** A batch starts; it is constant while its runs run, of which some end, or fail. */
   val start    = Output(Bool())
   val batch    = Output(new RayBatch)
+  val right    = Output(RaySensor.vector) // of its sensor
   val runs     = Decoupled(new Run)
   val resolved = Input(UInt(log2Ceil(2 * columns + 1).W))
   val failed   = Input(Bool())
@@ -26,10 +27,11 @@ final class BatchReaderIO(columns: Int) extends Bundle {
   val isBusy   = Output(Bool())
 }
 
-/** Reads batches from a ring in memory, hands out their runs, and writes their tags: one batch after the other.
+/** Reads batches from a ring in memory, and the sensor of those that have one, hands out their runs, and writes their tags:
+  * one batch after the other.
   *
-  * An illegal batch has no runs. Its tag, and that of a batch of which a run has failed, have the error bit. A batch that
-  * cannot be read has no tag.
+  * An illegal batch, or one whose sensor cannot be read, has no runs. Its tag, and that of a batch of which a run has
+  * failed, have the error bit. A batch that cannot be read has no tag.
   */
 final class BatchReader(columns: Int) extends Module {
   val io = IO(new BatchReaderIO(columns))
@@ -47,36 +49,53 @@ final class BatchReader(columns: Int) extends Module {
   private val hits   = Reg(UInt(Axi.addressBits.W))
   private val inRuns = RegInit(0.U(32.W)) // runs that have not ended
   private val failed = Reg(Bool())
+  private val sensor = Reg(new RaySensor)
+  private val knows  = RegInit(false.B)   // the batch's sensor
   io.head   := head
   io.batch  := batch
+  io.right  := sensor.right
   io.isBusy := state =/= idle || io.tail =/= head
 
-  // Read a batch
-  private val slot = (head & ((1.U << io.ring.sizeLog) - 1.U)(RayRing.indexBits - 1, 0))
-  private val ar   = io.read.ar
+  // Read a batch, or its sensor
+  private val isBatch = batch.isLegal
+  private val asks    = isBatch && batch.isSensor && !knows
+  private val isLegal = isBatch && (!batch.isSensor || sensor.isLegal)
+  private val reads   = RegInit(false.B) // the sensor
+  private val slot    = (head & ((1.U << io.ring.sizeLog) - 1.U)(RayRing.indexBits - 1, 0))
+  private val ar      = io.read.ar
   ar.valid        := state === asking
   ar.bits.id      := 0.U
-  ar.bits.addr    := Cat(io.ring.base >> 6, 0.U(6.W)) + Cat(slot, 0.U(6.W))
+  ar.bits.addr    := Mux(reads, batch.rays, Cat(io.ring.base >> 6, 0.U(6.W)) + Cat(slot, 0.U(6.W)))
   ar.bits.len     := 0.U
   ar.bits.size    := Axi.size(RayBatch.bytes)
   ar.bits.burst   := Axi.incr
   io.read.r.ready := state === reading
   private val isUnread = io.read.r.bits.resp =/= Axi.okay
-  private val isLegal  = batch.isLegal
-  io.start := state === checking && isLegal
+  io.start := state === checking && !asks && isLegal
 
   // Hand out its runs
   private val count  = Mux(left > Run.rays.U, Run.rays.U, left)
   private val hitLog = Mux(batch.response === RayBatch.hits, 10.U, Mux(batch.response === RayBatch.ranges, 9.U, 3.U))
   private val begins = io.runs.fire
+  private val column = Reg(UInt(32.W)) // of a sensor
+  private val row    = Reg(RaySensor.vector)
+  private val dir    = Reg(RaySensor.vector)
+  private val wraps  = column + Run.rays.U === sensor.columns
   io.runs.valid      := state === running && left =/= 0.U
   io.runs.bits.rays  := rays
   io.runs.bits.hits  := hits
   io.runs.bits.count := count
+  io.runs.bits.dir   := dir
   when(begins) {
-    left := left - count
-    rays := rays + Mux(batch.isFan, (16 * Run.rays).U, (32 * Run.rays).U)
-    hits := hits + (1.U << hitLog)
+    left   := left - count
+    rays   := rays + Mux(batch.isFan, (16 * Run.rays).U, (32 * Run.rays).U)
+    hits   := hits + (1.U << hitLog)
+    column := Mux(wraps, 0.U, column + Run.rays.U)
+    for (axis <- 0 until 3) {
+      val next = row(axis) + sensor.down(axis)
+      when(wraps) { row(axis) := next }
+      dir(axis) := Mux(wraps, next, dir(axis) + (sensor.right(axis) << log2Ceil(Run.rays)))
+    }
   }
   inRuns := inRuns + begins - io.resolved
   when(io.failed) { failed := true.B }
@@ -97,17 +116,26 @@ final class BatchReader(columns: Int) extends Module {
   io.write.b.ready := state === ending
 
   private val isDone    = state === running && left === 0.U && inRuns === 0.U
-  private val leaves    = isDone && batch.done === 0.U || io.write.b.fire || (io.read.r.fire && isUnread)
-  private val isTagless = state === checking && !isLegal &&
+  private val leaves    = isDone && batch.done === 0.U || io.write.b.fire || (io.read.r.fire && isUnread && !reads)
+  private val isTagless = state === checking && !asks && !isLegal &&
     (batch.done === 0.U || batch.done(1, 0) =/= 0.U || (batch.done >> Axi.addressBits) =/= 0.U)
   when(state === idle && io.tail =/= head) { state := asking }
   when(ar.fire) { state := reading }
   when(io.read.r.fire) {
-    batch := io.read.r.bits.data.asTypeOf(batch)
+    when(reads) {
+      sensor := io.read.r.bits.data.asTypeOf(sensor)
+      when(isUnread) { sensor.columns := 0.U }
+    }.otherwise { batch := io.read.r.bits.data.asTypeOf(batch) }
+    knows := reads
+    reads := false.B
     state := checking
   }
   when(state === checking) {
-    state  := Mux(isLegal, running, writing)
+    state  := Mux(asks, asking, Mux(isLegal, running, writing))
+    reads  := asks
+    column := 0.U
+    row    := sensor.corner
+    dir    := sensor.corner
     left   := batch.count
     rays   := batch.rays
     hits   := batch.hits
@@ -120,7 +148,7 @@ final class BatchReader(columns: Int) extends Module {
     state := idle
     head  := head + 1.U
   }
-  io.isError := (leaves && (failed || isUnread && state === reading)) || isTagless ||
+  io.isError := (leaves && (failed || isUnread && state === reading && !reads)) || isTagless ||
     (io.write.b.fire && io.write.b.bits.resp =/= Axi.okay)
   io.raysDone := Mux(isDone, batch.count, 0.U)
 }

@@ -6,7 +6,7 @@ import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.axi.{AxiReadPort, AxiWritePort}
 import colonnade.column.{ColumnBvhController, TraversalRows}
 import colonnade.config.{ColonnadeConfig, PathConfig}
-import colonnade.formats.{Load, NodeRecord, RayBatch, RayRegisters}
+import colonnade.formats.{Load, NodeRecord, RayBatch, RayRegisters, RaySensor}
 import colonnade.memory.{ColumnBvhMemory, ColumnCache, LineBroadcast, Lines}
 
 /** Events of a column in one cycle; names as in the registers. */
@@ -28,6 +28,7 @@ final class RayColumnIO(config: ColonnadeConfig) extends Bundle {
 
   val registers = Input(new RayRegisters(config)) // constant while runs run, and so is the batch
   val batch     = Input(new RayBatch)
+  val right     = Input(RaySensor.vector)
   val start     = Input(Bool())                   // before the first run of a batch
   val load      = Flipped(Valid(new Load(config)))
   val runs      = Flipped(Decoupled(new Run))
@@ -54,6 +55,7 @@ final class RayColumn(config: ColonnadeConfig) extends Module {
   private val controller = Module(new ColumnBvhController(config)).io
   private val rows       = new TraversalRows(config)
   queries.batch     := io.batch
+  queries.right     := io.right
   queries.placement := io.registers.placement
   queries.bounds    := io.registers.bounds
   queries.runs :<>= io.runs
@@ -61,7 +63,8 @@ final class RayColumn(config: ColonnadeConfig) extends Module {
   io.failed   := queries.failed
   io.read :<>= queries.read
   io.write :<>= queries.write
-  queries.results := rows.connect(queries.rays, io.registers.scene, io.start, controller.broadcasts)
+  queries.results :=
+    rows.connect(queries.rays, io.registers.scene, io.start, controller.broadcasts, Some(io.batch.mask))
 
   // Records; the last requester is that of attributes, which nobody reads
   for ((port, unit) <- controller.requests.zip(rows.units)) port :<>= unit.requests

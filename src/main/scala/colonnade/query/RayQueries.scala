@@ -2,17 +2,18 @@ package colonnade.query
 
 import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled, Queue, RRArbiter, Valid}
-import colonnade.axi.{AxiReadPort, AxiWritePort}
+import colonnade.axi.{Axi, AxiReadPort, AxiWritePort}
 import colonnade.common.{ContextTable, Dispatcher}
 import colonnade.config.PathConfig
-import colonnade.formats.{Bounds, RayBatch, RayPlacement}
+import colonnade.formats.{Bounds, RayBatch, RayPlacement, RaySensor}
 import colonnade.ray.{PreparedRay, RaySetup}
 import colonnade.traversal.TriangleHit
 import colonnade.unit.TraceResult
 
-/** `batch`, `placement` and `bounds` are constant while runs are in the unit. */
+/** `batch`, `right` of its sensor, `placement` and `bounds` are constant while runs are in the unit. */
 final class RayQueriesIO(config: PathConfig) extends Bundle {
   val batch     = Input(new RayBatch)
+  val right     = Input(RaySensor.vector)
   val placement = Input(new RayPlacement)
   val bounds    = Input(new Bounds(config.numbers))
   val runs      = Flipped(Decoupled(new Run))
@@ -59,6 +60,7 @@ final class RayQueries(config: PathConfig) extends Module {
   reader.runs.valid := io.runs.valid && used =/= Run.blocks.U
   reader.runs.bits  := io.runs.bits
   reader.batch      := io.batch
+  reader.right      := io.right
   reader.block      := head
   io.read :<>= reader.axi
   when(begins) {
@@ -67,7 +69,7 @@ final class RayQueries(config: PathConfig) extends Module {
   }
 
   // Convert its rays, and prepare them
-  private val lanes     = Seq.fill(RayQueries.lanes)(Module(new RayConverter(config)).io)
+  private val lanes     = Seq.fill(RayQueries.lanes(config))(Module(new RayConverter(config)).io)
   private val dispatch  = Module(new Dispatcher(new BatchRay(config), lanes.size)).io
   private val converted = Module(new RRArbiter(new ConvertedRay(config), lanes.size)).io
   private val setup     = Module(RaySetup(config)).io
@@ -123,7 +125,7 @@ final class RayQueries(config: PathConfig) extends Module {
   private val entry      = Reg(new TracedHit(config))
   private val hasEntry   = RegInit(false.B)
   private val entryReady = Wire(Bool())
-  private val writing    = Module(new Queue(new Run, 4)).io
+  private val writing    = Module(new Queue(new WrittenRun, 4)).io
   private val reads      = Wire(Bool())
   private val isRead     = RegNext(reads, false.B)
   private val isFirst    = index === 0.U
@@ -131,7 +133,8 @@ final class RayQueries(config: PathConfig) extends Module {
   private val context    = Cat(tail, index)
   reads             := isComplete && !drops && !isRead && (!hasEntry || entryReady) && (!isFirst || writing.enq.ready)
   writing.enq.valid := reads && isFirst
-  writing.enq.bits  := runs(tail)
+  writing.enq.bits.hits  := runs(tail).hits
+  writing.enq.bits.count := runs(tail).count
   private val frees = drops || (reads && isLast)
   used := used + begins - frees
   when(reads) { index := Mux(isLast, 0.U, index + 1.U) }
@@ -186,8 +189,13 @@ final class RayQueries(config: PathConfig) extends Module {
 
 object RayQueries {
 
-  /** Converters of rays: a ray about every fifth cycle. */
-  val lanes: Int = 2
+  /** Converters of rays: enough for a ray of each traversal unit every 23 cycles. */
+  def lanes(config: PathConfig): Int = (2 * config.array.rows / 5).max(2)
+}
+
+final private class WrittenRun extends Bundle {
+  val hits  = UInt(Axi.addressBits.W)
+  val count = UInt(log2Ceil(Run.rays + 1).W)
 }
 
 final private class RayEntryPoint(config: PathConfig) extends Bundle {

@@ -4,13 +4,14 @@ import chisel3._
 import chisel3.util.{log2Ceil, Cat, Decoupled, Queue, Valid}
 import colonnade.axi.{Axi, AxiReadPort}
 import colonnade.config.PathConfig
-import colonnade.formats.{RayBatch, RayRecord}
+import colonnade.formats.{RayBatch, RayRecord, RaySensor}
 
 /** Consecutive rays of a batch, as many as a block of hits holds. */
 final class Run extends Bundle {
   val rays  = UInt(Axi.addressBits.W)
   val hits  = UInt(Axi.addressBits.W)
   val count = UInt(log2Ceil(Run.rays + 1).W)
+  val dir   = RaySensor.vector // of the first ray of a sensor
 }
 
 object Run {
@@ -35,6 +36,7 @@ final class RunReaderIO(config: PathConfig) extends Bundle {
   val batch = Input(new RayBatch)                 // constant while its runs are read
   val runs  = Flipped(Decoupled(new Run))
   val block = Input(UInt(log2Ceil(Run.blocks).W)) // of the run
+  val right = Input(RaySensor.vector)             // of the batch's sensor
   val axi   = new AxiReadPort(1, RayBatch.bytes)
   val rays  = Decoupled(new BatchRay(config))
 
@@ -42,8 +44,8 @@ final class RunReaderIO(config: PathConfig) extends Bundle {
   val failed = Valid(UInt(log2Ceil(Run.blocks).W))
 }
 
-/** Reads the rays of runs by bursts. A burst is read when all its beats have a place, so that the port never waits for the
-  * rays before it.
+/** Reads the rays of runs by bursts, or makes those of a sensor. A burst is read when all its beats have a place, so that
+  * the port never waits for the rays before it.
   */
 final class RunReader(config: PathConfig) extends Module {
   import RunReader._
@@ -60,8 +62,10 @@ final class RunReader(config: PathConfig) extends Module {
   private val beats    = Module(new Queue(new ReadBeat, queueDepth, useSyncReadMem = true)).io
   private val burst    = Run.beatsAt(address, left)
   private val ar       = io.axi.ar
-  io.runs.ready        := left === 0.U && begun.enq.ready
-  begun.enq.valid      := io.runs.valid && left === 0.U
+  private val sensor   = Module(new SensorReader).io
+  private val isSensor = io.batch.isSensor
+  io.runs.ready        := Mux(isSensor, sensor.runs.ready, left === 0.U && begun.enq.ready)
+  begun.enq.valid      := io.runs.valid && left === 0.U && !isSensor
   begun.enq.bits.block := io.block
   begun.enq.bits.count := io.runs.bits.count
   ar.valid             := left =/= 0.U && reserved +& burst <= queueDepth.U
@@ -74,7 +78,7 @@ final class RunReader(config: PathConfig) extends Module {
     address := address + (burst << log2Ceil(RayBatch.bytes))
     left    := left - burst
   }
-  when(io.runs.fire) {
+  when(io.runs.fire && !isSensor) {
     address := io.runs.bits.rays
     left    := Mux(isFan, (io.runs.bits.count +& 3.U) >> 2, (io.runs.bits.count +& 1.U) >> 1)
   }
@@ -94,18 +98,27 @@ final class RunReader(config: PathConfig) extends Module {
   private val slot     = Mux(isFan, index(1, 0), index(0) ## 0.U(1.W))
   private val quarters = VecInit(Seq.tabulate(4)(i => beats.deq.bits.data(128 * i + 127, 128 * i)))
   private val ofBatch  = Cat(io.batch.tNear.asUInt, io.batch.origin.asUInt)
-  private val record   = Mux(isFan, Cat(quarters(slot), ofBatch), Cat(quarters(slot | 1.U), quarters(slot)))
-  io.rays.valid                    := beats.deq.valid && begun.deq.valid
-  io.rays.bits.context             := Cat(run.block, index)
+  private val made     = Cat(io.batch.tFar.asUInt, sensor.rays.bits.dir.asUInt)
+  private val record   =
+    Mux(isFan || isSensor, Cat(Mux(isSensor, made, quarters(slot)), ofBatch), Cat(quarters(slot | 1.U), quarters(slot)))
+  sensor.right      := io.right
+  sensor.block      := io.block
+  sensor.runs.valid := io.runs.valid && isSensor
+  sensor.runs.bits  := io.runs.bits
+  sensor.rays.ready := io.rays.ready
+  private val isRead = beats.deq.valid && begun.deq.valid
+  io.rays.valid        := isRead || sensor.rays.valid
+  io.rays.bits.context :=
+    Mux(isSensor, Cat(sensor.rays.bits.block, sensor.rays.bits.index), Cat(run.block, index))
   io.rays.bits.isOccluded          := io.batch.response === RayBatch.occluded
   io.rays.bits.isLocal             := io.batch.isLocal
   io.rays.bits.filter.cullsFront   := io.batch.cullsFront
   io.rays.bits.filter.cullsBack    := io.batch.cullsBack
   io.rays.bits.filter.refusesClear := io.batch.refusesClear
   io.rays.bits.record              := record.asTypeOf(new RayRecord)
-  beats.deq.ready                  := io.rays.fire && (isLast || slot(1) && (slot(0) || !isFan))
-  begun.deq.ready                  := io.rays.fire && isLast
-  when(io.rays.fire) { index := Mux(isLast, 0.U, index + 1.U) }
+  beats.deq.ready                  := isRead && io.rays.ready && (isLast || slot(1) && (slot(0) || !isFan))
+  begun.deq.ready                  := isRead && io.rays.ready && isLast
+  when(isRead && io.rays.ready) { index := Mux(isLast, 0.U, index + 1.U) }
   io.failed.valid := beats.deq.fire && beats.deq.bits.isError
   io.failed.bits  := run.block
 }

@@ -81,6 +81,7 @@ final class TriangleTag(config: PartConfig) extends Bundle {
   val isPair         = Bool()
   val isTransmissive = Bool()
   val isNegative     = Bool() // the ray's direction, on its dominant axis
+  val isMasked       = Option.when(config.frame.rays)(Bool())
 }
 
 /** Depths of the vertices along the ray's dominant axis. */

@@ -77,4 +77,5 @@ final class TriangleSequencer(config: PartConfig) extends Module {
   io.tag.bits.isPair         := isPair
   io.tag.bits.isTransmissive := leaf.isClear
   io.tag.bits.isNegative     := candidate.ray.orientation.negative(2)
+  io.tag.bits.isMasked.zip(candidate.isMasked).foreach { case (to, from) => to := from }
 }

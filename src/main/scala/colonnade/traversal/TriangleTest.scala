@@ -13,6 +13,9 @@ final class TriangleCandidate(config: PartConfig) extends Bundle {
   val address = UInt(RecordFormats.addressBits(config).W)
   val record  = UInt(LeafRecord.recordBits(config.geometry).W)
   val ray     = new TriangleRay(config.numbers)
+
+  /** The ray's mask leaves the record's triangles out. */
+  val isMasked = Option.when(config.frame.rays)(Bool())
 }
 
 /** Where a ray intersects a triangle. */

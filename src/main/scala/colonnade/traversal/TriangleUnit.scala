@@ -63,7 +63,7 @@ final class TriangleUnit(config: PartConfig, distanceLanes: Int = 1, queueDepth:
 
   // The edge functions decide
   private val isSecond        = edges.io.isSecond
-  private val crossesTriangle = edges.io.crossesTriangle
+  private val crossesTriangle = edges.io.crossesTriangle && !tested.isMasked.getOrElse(false.B)
   private val isTaken         = pending.io.enq.ready && (!crossesTriangle || weights.io.crossed.ready)
   private val decides         = edges.io.decides && isTaken
   advances := !edges.io.decides || isTaken

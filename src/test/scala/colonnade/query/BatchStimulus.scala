@@ -7,20 +7,20 @@ import colonnade.unit.SmallScene
 
 import scala.util.Random
 
-/** A batch: its mode, its words of rays, and the origin and tNear of a fan. */
-final case class TestBatch(mode: BigInt, count: Int, ofFan: Seq[BigInt], rays: Seq[BigInt]) {
+/** A batch: its mode, its words of rays or of a sensor, and what these share: origin, tNear and tFar. */
+final case class TestBatch(mode: BigInt, count: Int, shared: Seq[BigInt], rays: Seq[BigInt]) {
   val response: Int = (mode & 3).toInt
   def hitBytes: Int = response match {
     case 0 => 16 * count
     case 1 => 8 * count
     case _ => (count + 63) / 64 * 8
   }
-  def query: Seq[BigInt] = Seq(mode, BigInt(count)) ++ ofFan ++ rays
+  def query: Seq[BigInt] = Seq(mode, BigInt(count)) ++ shared ++ rays
 
   /** The descriptor's words. */
   def words(rays: BigInt, hits: BigInt, tag: BigInt, done: BigInt): Seq[BigInt] = {
     def wide(value: BigInt) = Seq(value & 0xffffffffL, value >> 32)
-    wide(rays) ++ wide(hits) ++ Seq(BigInt(count), mode) ++ ofFan ++ Seq(BigInt(0), tag) ++ wide(done) ++ wide(0)
+    wide(rays) ++ wide(hits) ++ Seq(BigInt(count), mode) ++ shared ++ Seq(tag) ++ wide(done) ++ wide(0)
   }
 }
 
@@ -49,36 +49,48 @@ final class BatchStimulus(config: ColonnadeConfig, random: Random) {
     bounds ++ placed.scale ++ placed.base
   }
 
-  def batch(count: Int, response: Int, isFan: Boolean): TestBatch = {
+  /** @param form 0: rays, 1: a fan, 2: a sensor */
+  def batch(count: Int, response: Int, form: Int): TestBatch = {
     val isLocal = random.nextInt(3) == 0
     val flags   = Seq(
-      4  -> isFan,
+      4  -> (form == 1),
+      5  -> (form == 2),
       8  -> (random.nextInt(4) == 0),
       9  -> (random.nextInt(4) == 0),
       10 -> (random.nextInt(3) == 0),
       11 -> isLocal
     )
-    val mode  = (BigInt(255) << 24) + response + flags.collect { case (bit, true) => BigInt(1) << bit }.sum
-    val fan   = random.nextInt(2) -> origin()
-    val ofFan = (fan._2.map(_ + 0.0) :+ fan._1 * edge / 2).map(word)
-    val rays  = Seq.fill(count) {
-      val from   = if (isFan) fan._2 else origin()
+    val mask   = if (random.nextBoolean()) 255 else 1 + random.nextInt(15)
+    val mode   = (BigInt(mask) << 24) + response + flags.collect { case (bit, true) => BigInt(1) << bit }.sum
+    val from   = origin()
+    val ends   = Seq(random.nextInt(2) * edge / 2, if (random.nextInt(4) > 0) Double.PositiveInfinity else edge * 3)
+    val shared = ((if (isLocal) from.zip(corner).map { case (at, low) => at - low } else from) ++ ends).map(word)
+    val rays   = if (form == 2) sensor(from)
+    else Seq.fill(count) {
+      val start  = if (form == 1) from else origin()
       val target = corner.map(_ + edge * (0.2 + 0.6 * random.nextDouble()))
       val length = math.pow(2, random.nextInt(9) - 4)
-      val dir    = target.zip(from).map { case (to, at) => (to - at) * length }
+      val dir    = target.zip(start).map { case (to, at) => (to - at) * length }
       val limits = Seq.fill(2)(2 * random.nextDouble() / length).sorted
       val tNear  = if (random.nextBoolean()) 0 else limits.head
       val tFar   = if (random.nextBoolean()) Double.PositiveInfinity else limits.last
-      val words  = (from.zip(corner).map { case (at, low) => if (isLocal) at - low else at } :+ tNear) ++ dir :+ tFar
+      val words  = (start.zip(corner).map { case (at, low) => if (isLocal) at - low else at } :+ tNear) ++ dir :+ tFar
       val ray    = words.map(word).map(each => if (random.nextInt(200) == 0) BigInt(32, random) else each)
-      if (isFan) ray.drop(4) else ray
-    }
-    TestBatch(
-      mode,
-      count,
-      if (isLocal) fan._2.zip(corner).map { case (at, low) => word(at - low) } :+ ofFan.last else ofFan,
-      rays.flatten
-    )
+      if (form == 1) ray.drop(4) else ray
+    }.flatten
+    TestBatch(mode, count, shared, rays)
+  }
+
+  /** Words of a sensor that looks at the cube: directions of any length, down to those of a few digits. */
+  private def sensor(from: Seq[Double]): Seq[BigInt] = {
+    val scale                        = math.pow(2, random.nextInt(30))
+    val look                         = from.zip(corner).map { case (at, low) => low + edge / 2 - at }
+    val far                          = look.map(_.abs).max.max(edge)
+    def units(value: Double): BigInt = BigInt(math.round(value / far * scale)) & 0xffffffffL
+    val Seq(right, down)             = Seq.fill(2)(Seq.fill(3)(edge / 40 * (random.nextDouble() - 0.5)))
+    val width                        = 64 * (1 + random.nextInt(2))
+    val first                        = look.zip(right).map { case (at, step) => at - 32 * step }
+    Seq(first, right, down).flatMap(_.map(units)) ++ (BigInt(width) +: Seq.fill(6)(BigInt(0)))
   }
 
   /** In the cube, near it, or out of range. */

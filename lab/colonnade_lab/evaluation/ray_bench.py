@@ -1,0 +1,89 @@
+"""Rays a cycle of the simulated device for rays, by kind (docs/rays.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from colonnade.common.progress import QUIET, Progress
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.rays import Scene, Sensor
+from colonnade.rays.scene import ALL_MASKS, OCCLUDED, RANGES, SENSOR
+
+from colonnade_lab.evaluation.rays import rays_of_kind
+
+#: Columns of the sensor; counters of what a ray reads.
+_WIDTH, _READS = 256, ("nodeReads", "triangleTests")
+
+
+@dataclass(frozen=True)
+class DeviceRates:
+    """A batch of a kind.
+
+    Attributes:
+        kind: Its name.
+        cycles: Cycles of the device, from an idle device to the last hit in memory.
+        rays_per_cycle: Of all rays.
+        in_box: The same of rays that enter the box of the mesh.
+        node_reads: Nodes that a ray reads.
+        triangle_tests: Triangles that a ray tests.
+    """
+
+    kind: str
+    cycles: int
+    rays_per_cycle: float
+    in_box: float
+    node_reads: float
+    triangle_tests: float
+
+
+def sensor_of(mesh: Mesh, count: int) -> Sensor:
+    """A sensor of `count` rays, rounded up to whole rows, whose picture is the mesh's box; two edges away."""
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    width, height, depth = high - low
+    rows, away = -(-count // _WIDTH), 2 * max(width, height, depth)
+    origin = (low[0] + width / 2, low[1] + height / 2, high[2] + away)
+    return Sensor(origin, (-width / 2, height / 2, -away), (width / _WIDTH, 0, 0), (0, -height / rows, 0), _WIDTH, rows)
+
+
+def measured(
+    mesh: Mesh,
+    config: str,
+    overrides: tuple[str, ...],
+    count: int,
+    options: Sequence[str] = (),
+    progress: Progress = QUIET,
+) -> Iterator[DeviceRates]:
+    """Rates of each kind. The caches are those that the batch before it has left."""
+    from colonnade.rays.device import RayDevice
+
+    device = RayDevice(config, overrides, options, progress)
+    scene = Scene(mesh.vertices, mesh.faces, config, overrides, backend=device)
+    sensor = sensor_of(mesh, count)
+    y, x = np.mgrid[: sensor.height, : sensor.width].reshape(2, -1, 1)
+    ways = np.array(sensor.corner) + x * np.array(sensor.right) + y * np.array(sensor.down)
+    ends = np.zeros((len(ways), 1))
+    camera = np.hstack([np.zeros_like(ways) + sensor.origin, ends, ways, ends + np.inf])
+    occlusion = rays_of_kind("occlusion", mesh, count)
+    masks = ALL_MASKS << 24
+
+    def of_memory(rays: np.ndarray, mode: int = 0) -> Callable[[], object]:
+        return lambda: scene.submit(rays.astype(np.float32), len(rays), mode | masks)
+
+    kinds: dict[str, tuple[Callable[[], object], int]] = {
+        "sensor, ranges": (
+            lambda: scene.submit(sensor.record(), len(ways), masks | SENSOR | RANGES, sensor.origin),
+            len(ways),
+        ),
+        "sensor's rays from memory, hits": (of_memory(camera), len(ways)),
+        "occlusion, in order": (of_memory(occlusion[scene.order(occlusion)], OCCLUDED), count),
+        "off the surface, shuffled, hits": (of_memory(rays_of_kind("off the surface, shuffled", mesh, count)), count),
+        "from around, shuffled, hits": (of_memory(rays_of_kind("outside, shuffled", mesh, count)), count),
+    }
+    for kind, (run, rays) in kinds.items():
+        before = device.counters()
+        run()
+        found = {name: value - before[name] for name, value in device.counters().items()}
+        reads = (found[name] / rays for name in _READS)
+        yield DeviceRates(kind, found["cycles"], rays / found["cycles"], found["raysInBox"] / found["cycles"], *reads)
