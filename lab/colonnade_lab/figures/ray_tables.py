@@ -1,4 +1,4 @@
-"""The tables of ``docs/rays.md``: tests of other projects that pass, and rays a second of the model beside Embree's."""
+"""The tables of ``docs/rays.md``: tests of other projects that pass, and rays a second of model, Embree and device."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from colonnade_lab.common.markdown import markdown
 from colonnade_lab.figures.data import Data
+from colonnade_lab.figures.facts import AREA, MEGAHERTZ
 
 _TITLES = {
     "trimesh": "trimesh `test_ray.py`, `test_ray_upstream.py`, by ",
@@ -42,8 +43,25 @@ def rates(data: Data) -> str:
     return markdown([*titles, "nodes a ray", "triangles", "bytes of DRAM"], rows)
 
 
+def device(data: Data) -> str:
+    """Rays a cycle of the simulated `traversal` by kind, and those a second for its area."""
+    result, mm2 = data.result("ray-device"), data.result(AREA.format("traversal"))["levels"]["array"]["mm2_28nm"]
+    rows = [
+        [
+            each["kind"],
+            *(f"{each[name]:.1f}" for name in ("node_reads", "triangle_tests")),
+            f"{each['rays_per_cycle']:.2f}",
+            f"{each['rays_per_cycle'] * MEGAHERTZ:,.0f}",
+            f"{each['rays_per_cycle'] * MEGAHERTZ / mm2:,.0f}",
+        ]
+        for each in result["kinds"]
+    ]
+    titles = [f"rays, {result['rays']:,} of each kind", "nodes a ray", "triangles", "rays a cycle"]
+    return markdown([*titles, f"MRay/s at {MEGAHERTZ:g} MHz", f"a mm² at 28 nm, of {mm2:.2f}"], rows)
+
+
 def _number(value: float | None, unit: int = 1) -> str:
     return "–" if value is None else f"{value / unit:,.0f}"
 
 
-TABLES: Mapping[str, Callable[[Data], str]] = {"ray-suites": suites, "ray-rates": rates}
+TABLES: Mapping[str, Callable[[Data], str]] = {"ray-suites": suites, "ray-rates": rates, "ray-device": device}

@@ -141,6 +141,7 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         "bench-edge": bench | {"mirror": bench},
         "bench-fpga": bench | {"mirror": None},
         "area-edge-asap7": area(),
+        "area-traversal-asap7": area(),
         "area-edge-sky130": area(),
         "quality-edge": {"meshes": {"bunny": reference}},
         "quality-lean": {"meshes": {"bunny": reference}},
@@ -247,6 +248,10 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
                 for suite in ("trimesh", "embree")
                 for passed in (999, 1000)
             ]
+        },
+        "ray-device": {
+            "rays": 1000,
+            "kinds": [{"kind": "near", "node_reads": 2.0, "triangle_tests": 1.0, "rays_per_cycle": 3.5}],
         },
         "ray-rates": {
             "rays": 1000,
@@ -361,10 +366,11 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "| **array**, MGE | 4.00 | 3.00 | 2.00 | +100.0 | +50.0 | +5.7 |" in table(docs, "bvh-costs")
     row = "| SLIC | 16,384 | 56.2 | 30.0 dB, 1.5° | 40.00, 0.0100 | 40.00, 0.0100 | 12.50 | 2.0 |"
     assert row in table(docs, "paper-maps")
-    assert re.search(r"\| all \d+ \| 54.0 \|", table(docs, "measuring"))
+    assert re.search(r"\| all \d+ \| 57.0 \|", table(docs, "measuring"))
     assert "| Embree `embree_verify`: `a` | `0123456789` | 1,000 | 999 | 1,000 |" in table(docs, "ray-suites")
     assert "| near | 900, 901 | 2,000 | 1 | 2.0 | 1.0 | 50 |" in table(docs, "ray-rates")
     assert "| near | 900, – | 2,000 | – |" in table(docs, "ray-rates")
+    assert "| near | 2.0 | 1.0 | 3.50 | 700 |" in table(docs, "ray-device")
     assert "| Room | 97.0, 97.0, 97.0 |" in table(docs, "rebuilds")
     live = table(docs, "live-rooms")
     assert "| r | 0.050, 0.060 | 30.00, 30.00 | 1.25, 1.25 | 0.50, 0.50 | 97.8, 97.8 |" in live
