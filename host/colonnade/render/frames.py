@@ -84,7 +84,7 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
     """Raise a `UserError` for what the backend cannot show."""
     if request.sequence is not None:
         check_sequence(request, request.sequence, scene)
-    elif request.backend == "reference" and scene.mesh.animation is not None:
+    elif request.backend == "reference" and scene.is_animated:
         raise UserError("mesh.animation is for the rtl and the model backend: leave it out for the reference")
     elif request.frames > 1 and scene.objects and scene.motion.is_still:
         raise UserError(

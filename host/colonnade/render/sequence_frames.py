@@ -84,7 +84,7 @@ def sequence_frames(
             samples = prepared.scene.frame.samples
             with progress.step(f"{title}: computing the registers"):
                 pose = prepared.scene.at(share)
-                lit = prepared if motion.is_still and scene.mesh.animation is None else prepared.lit_at(pose, relit)
+                lit = prepared if motion.is_still and not scene.is_animated else prepared.lit_at(pose, relit)
                 frames = host_frames(
                     request, lit, size, [pose], motion.exposure(request.frames), progress, number, history
                 )

@@ -9,8 +9,10 @@ import numpy as np
 
 from colonnade.common import fixed_order, notes
 from colonnade.common.errors import UserError
-from colonnade.common.types import Floats
+from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
+from colonnade.mesh.clips.clip import Clip
+from colonnade.mesh.clips.joined import joined_clip, still_clip
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import PLAIN
 from colonnade.mesh.materials.mesh import Mesh, MeshPart
@@ -38,9 +40,9 @@ def joined_mesh(scene: Scene, environment: Environment | None, corner_colours: b
     taken: list[tuple[Floats, float]] = []
     for number, described in enumerate(scene.objects, 1):
         own = described.mesh
-        key = f"{own.source} {own.crease} {own.simplify}"
+        key = f"{own.source} {own.crease} {own.simplify} {own.animation}"
         if key not in loaded:
-            loaded[key] = load_mesh(own.source, own.crease, corner_colours, own.simplify)
+            loaded[key] = load_mesh(own.source, own.crease, corner_colours, own.simplify, own.animation)
             report_replaced(loaded[key], described.material)
         mesh = replace(loaded[key], materials=with_overrides(loaded[key].materials, described.material))
         poses.append(_pose(described, mesh, environment, f"object {number}", taken))
@@ -94,6 +96,7 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
     first_vertices = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     first_faces = np.cumsum([0, *(mesh.source_count for mesh in meshes)])
     index = [np.array([materials.index(material) for material in mesh.materials]) for mesh in meshes]
+    clip, clip_corners = _joined_clip(meshes, poses)
     return Mesh(
         vertices=np.concatenate([pose.to_world(mesh.vertices) for mesh, pose in zip(meshes, poses, strict=True)]),
         faces=np.concatenate(
@@ -121,7 +124,24 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
             MeshPart(mesh.name, int(first), mesh.extent.edge * pose.scale)
             for mesh, pose, first in zip(meshes, poses, first_faces[:-1], strict=True)
         ),
+        clip=clip,
+        clip_corners=clip_corners,
     )
+
+
+def _joined_clip(meshes: list[Mesh], poses: list[Pose]) -> tuple[Clip | None, Indices | None]:
+    """What moves the meshes, and its vertex at each corner of their faces; nothing if none moves."""
+    if all(mesh.clip is None for mesh in meshes):
+        return None, None
+    clips = [mesh.clip or still_clip(mesh.vertices) for mesh in meshes]
+    corners = [mesh.faces.astype(np.int64) if mesh.clip_corners is None else mesh.clip_corners for mesh in meshes]
+    first = np.cumsum([0, *(len(clip.positions) for clip in clips)])
+    placements = []
+    for pose in poses:
+        placement = np.eye(4)
+        placement[:3, :3], placement[:3, 3] = pose.rotation * pose.scale, pose.translate
+        placements.append(placement)
+    return joined_clip(clips, placements), np.concatenate([a + b for a, b in zip(corners, first[:-1], strict=True)])
 
 
 def _renumbered(mesh: Mesh, textures: list[Texture]) -> Mesh:

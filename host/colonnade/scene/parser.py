@@ -215,8 +215,6 @@ def _check_objects(data: Mapping[str, Any], in_room: bool) -> None:
             raise ValueError("object must be tables: [[object]]")
         if "mesh" not in one:
             raise ValueError(f"object {number} has no mesh: give object.mesh")
-        if "animation" in _table(one, "mesh"):
-            raise ValueError("mesh.animation is for a scene of one object: give [mesh] instead of [[object]]")
         placing = [key for key in ("stand_at", "size", "turn") if key in one]
         moving = [key for key in ("scale", "translate") if key in _table(one, "transform")]
         if placing and not in_room:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -41,6 +41,7 @@ class Bending:
         deltas, addresses = places["nearPair"]["body.deltas[0].x"][1], node["first"][1]
         numbers = (int(geometry["vertexBits"]), deltas, int(geometry["boxBits"]), addresses, 2 if colours else 1)
         words = tuple(int(word) for word in manifest.format_words)
+        clip, leaves = _in_order_of_use(clip, leaves)
         return cls(
             clip_file(clip, ClipTree(numbers, records, depth, leaves), places, words), words, int(clip.times[-1])
         )
@@ -67,6 +68,20 @@ class Bending:
         pose = self._target.pose(round(progress * self.duration))
         _, _, flat = self._target.refit(*self.vertices(pose), records.view(np.uint32), 0)
         return records, flat
+
+
+def _in_order_of_use(clip: GridClip, leaves: npt.NDArray[np.int64]) -> tuple[GridClip, npt.NDArray[np.int64]]:
+    """Vertices as leaves need them first: those of a leaf are near each other in memory."""
+    used, count = leaves[leaves >= 0], len(clip.vertices)
+    first = np.full(count, len(used))
+    np.minimum.at(first, used, np.arange(len(used)))
+    order = np.argsort(first, kind="stable")
+    numbers = np.full(count + 1, -1)  # the last one is the fourth vertex of a triangle
+    numbers[order] = np.arange(count)
+    changes = np.column_stack([numbers[clip.changes[:, 0]], clip.changes[:, 1:]])
+    changes = changes[np.argsort(changes[:, 0], kind="stable")]
+    corners = numbers[clip.corners].astype(np.int32)
+    return replace(clip, corners=corners, vertices=clip.vertices[order], changes=changes), numbers[leaves]
 
 
 def at_rest(clip: GridClip, manifest: Manifest) -> tuple[npt.NDArray[np.int32], Floats]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from animated_documents import arm
 from colonnade_lab.evaluation.studies.synthetic_attic import attic
 from colonnade_lab.evaluation.verify import verify
 
@@ -59,6 +60,28 @@ def room() -> Environment:
 
 def objects(*described: SceneObject) -> Scene:
     return Scene(described[0].mesh, objects=described)
+
+
+def test_clips_of_objects_play_where_they_are_placed(tmp_path: Path) -> None:
+    path = arm().write(tmp_path / "arm.gltf")
+    moving = MeshSource(path=path, animation="bend")
+    place = Transform((0.0, 90.0, 0.0), 2.0, (5.0, 1.0, 0.0))
+    scene = objects(
+        SceneObject(mesh=moving), SceneObject(mesh=MeshSource("cube")), SceneObject(mesh=moving, transform=place)
+    )
+    joined, own, cube = joined_mesh(scene, None), load_mesh(path, animation="bend"), load_mesh("cube")
+    assert scene.is_animated and joined.clip is not None and own.clip is not None
+    assert joined.clip.duration == own.clip.duration
+    parts = np.split(np.arange(len(joined.clip.positions)), np.cumsum([len(own.clip.positions), len(cube.vertices)]))
+    turned = object_pose(Scene(moving, transform=place), own.extent, None)
+    for time in (0.0, 0.4 * own.clip.duration, own.clip.duration):
+        pose, alone = joined.clip.pose(time), own.clip.pose(time)
+        found = joined.clip.vertices(pose.matrices, pose.weights)
+        expected = own.clip.vertices(alone.matrices, alone.weights)
+        for part, vertices in zip(parts, (expected, cube.vertices, turned.to_world(expected)), strict=True):
+            np.testing.assert_allclose(found[part], vertices, atol=1e-12)
+    still = joined_mesh(objects(SceneObject(mesh=MeshSource("cube")), SceneObject(mesh=MeshSource("cube"))), None)
+    assert still.clip is None and still.clip_corners is None
 
 
 def test_objects_keep_their_poses_materials_and_faces() -> None:

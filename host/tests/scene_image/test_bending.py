@@ -19,8 +19,11 @@ from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.device_frames import device_frames, render_model
 from colonnade.render.request import RenderRequest
-from colonnade.scene.model import Camera, FrameSize, MeshSource, Motion, Scene
+from colonnade.scene.model import Camera, FrameSize, MeshSource, Motion, Scene, SceneObject, Transform
+from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
+from colonnade.scene_image.bending import Bending
+from colonnade.scene_image.clip_file import NO_VERTEX
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.grid_clip import GridClip, grid_clip
 from colonnade.scene_image.packer import pack
@@ -66,9 +69,10 @@ def test_each_face_has_its_vertices_in_every_pose(
     image: SceneImage, mesh: Mesh, manifest: Manifest, clip: GridClip
 ) -> None:
     assert image.bending is not None
+    in_order = Bending.of(clip, manifest, 2, 1, np.array([[0, 0, 0, -1]]), False)
     for progress in (0.0, 0.3, 0.7, 1.0):
         pose = image.bending._target.pose(round(progress * image.bending.duration))
-        positions, _ = image.bending.vertices(pose)
+        positions, _ = in_order.vertices(pose)
         ids, leaves = leaves_of(image.posed(progress), manifest)
         faces = {int(source): face for face, source in enumerate(mesh.source_faces)}
         assert len(ids) == len(mesh.faces)
@@ -79,10 +83,17 @@ def test_each_face_has_its_vertices_in_every_pose(
         assert (low >= image.header.bounds_low).all() and (high <= image.header.bounds_high).all()
 
 
-def test_a_frame_shows_the_pose_of_its_moment(path: Path, mesh: Mesh, manifest: Manifest, tmp_path: Path) -> None:
+@pytest.mark.parametrize("others", [(), ((0.0, -1.5, 0.0), (-1.5, 0.0, 2.0))], ids=["one object", "three objects"])
+def test_a_frame_shows_the_pose_of_its_moment(
+    path: Path, manifest: Manifest, others: tuple[tuple[float, float, float], ...]
+) -> None:
     camera = Camera(position=(2.5, 3.0, 4.5), target=(-0.5, 0.5, 1.0), fov=70.0)
-    scene = Scene(MeshSource(path=path, animation="bend"), camera=camera, motion=Motion(turn=0.0))
-    masks = []
+    moving = MeshSource(path=path, animation="bend")
+    sources = [SceneObject(mesh=moving), *(SceneObject(mesh=MeshSource("cube")) for _ in others)]
+    places = [Transform(), *(Transform(translate=place, scale=0.4) for place in others)]
+    objects = tuple(replace(one, transform=place) for one, place in zip(sources, places, strict=True)) if others else ()
+    scene = Scene(moving, objects=objects, camera=camera, motion=Motion(turn=0.0))
+    mesh, masks = object_mesh(scene), []
     for progress in (0.1, 0.8):
         found = render_model(scene.at(progress), mesh, manifest, SIZE).object_mask
         assert mesh.clip is not None and mesh.clip_corners is not None
@@ -112,11 +123,23 @@ def test_a_clip_file_needs_an_animation(path: Path, mesh: Mesh, manifest: Manife
         still.clip_file()
 
 
+def test_vertices_of_a_clip_file_are_in_the_order_in_which_leaves_need_them(
+    path: Path, mesh: Mesh, manifest: Manifest
+) -> None:
+    words = np.frombuffer(
+        DeviceScene.of(Scene(MeshSource(path=path, animation="bend")), manifest, mesh).clip_file(), "<u4"
+    )
+    vertices, leaves = int(words[19]), int(words[20])
+    used = words[50 + 8 * vertices :][: 4 * leaves]
+    used = used[used != NO_VERTEX]
+    first = used[np.sort(np.unique(used, return_index=True)[1])]
+    np.testing.assert_array_equal(first, np.arange(vertices))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ('mesh = {path = "arm.gltf", animation = "bend", simplify = 100}', "leave out mesh.simplify"),
-        ('[[object]]\nmesh = {path = "arm.gltf", animation = "bend"}', "for a scene of one object"),
         ("mesh = {path = 'arm.gltf', animation = 3}", "mesh.animation"),
     ],
 )

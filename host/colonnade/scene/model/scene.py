@@ -103,6 +103,11 @@ class Scene:
         return replace(self, background=replace(self.background, room=folder))
 
     @property
+    def is_animated(self) -> bool:
+        """Whether a mesh has an animation."""
+        return any(mesh.animation is not None for mesh in (self.mesh, *(one.mesh for one in self.objects)))
+
+    @property
     def places_camera(self) -> bool:
         """Whether the camera may be elsewhere than that of the room's maps."""
         return self.frame_camera is not None or self.camera.position is not None or bool(self.motion.camera)
