@@ -46,9 +46,10 @@ enum colonnade_error {
     COLONNADE_NO_LIGHT,   /* the scene has no such light */
     COLONNADE_NO_SAMPLE,  /* no such number of passes, or no such pass */
     /* Of colonnade_mesh.h */
-    COLONNADE_NOT_A_CLIP,   /* no clip file, or one of another version, or numbers that no design has */
-    COLONNADE_OUTSIDE,      /* a vertex leaves the object's grid */
-    COLONNADE_OTHER_RECORDS /* the records are not those of the clip */
+    COLONNADE_NOT_A_CLIP,    /* no clip file, or one of another version, or numbers that no design has */
+    COLONNADE_OUTSIDE,       /* a vertex leaves the object's grid */
+    COLONNADE_OTHER_RECORDS, /* the records are not those of the clip */
+    COLONNADE_TOO_DEEP       /* a plan needs more boxes than the unit holds */
 };
 
 /* Bits of `interrupt.status` and `interrupt.enable`. */

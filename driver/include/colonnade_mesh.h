@@ -42,13 +42,14 @@ struct colonnade_vertex {
 struct colonnade_mesh_node {
     int32_t low[COLONNADE_MESH_CHILDREN][3], high[COLONNADE_MESH_CHILDREN][3];
     uint32_t address, first;
-    uint32_t nodes, children, next;
+    uint32_t nodes, children, next, leaf;
 };
 
 /* What a refit has found. */
 struct colonnade_refit {
     int32_t low[3], high[3]; /* bounds of the mesh, vertex units */
     uint32_t flat_pairs;     /* pairs that are too stretched for normals at their corners */
+    uint32_t cost;           /* nodes that a ray through the bounds reads on average, 2^-8: a tree wears as it bends */
 };
 
 /* Reads a clip file, which `colonnade pack --clip-file` writes. */
@@ -72,6 +73,44 @@ enum colonnade_error colonnade_mesh_skin(const struct colonnade_mesh *mesh, cons
 enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
                                           uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path,
                                           struct colonnade_refit *result);
+
+enum {
+    COLONNADE_PLAN_WORDS = 4,   /* of an entry */
+    COLONNADE_PLAN_BOXES = 128, /* that the unit holds */
+    COLONNADE_LINE_VERTICES = 4 /* of a line, which the unit reads at once */
+};
+
+/* Writes the plan of a refit in hardware: what `refit.plan` points at, the same for all copies and all poses. Answers its
+ * entries; with `plan` NULL it only counts them. `lines` has space for a word for each line of vertices. */
+enum colonnade_error colonnade_mesh_plan(const struct colonnade_mesh *mesh, const uint32_t *copy, uint32_t root,
+                                         struct colonnade_mesh_node *path, uint32_t *lines, uint32_t *plan, uint32_t *entries);
+
+/* A triangle of the program's own. */
+struct colonnade_triangle {
+    uint32_t vertices[3];
+    uint8_t material;
+    bool is_clear;
+};
+
+/* Triangles (0, 1, 2) and (1, 0, 3), or the first of them: the fourth vertex is then UINT32_MAX. */
+struct colonnade_leaf {
+    uint32_t vertices[4];
+    uint8_t material;
+    bool is_clear;
+};
+
+/* Pairs triangles along edges, each with the neighbour that gives the smallest box. Answers the number of leaves. `layout` is any
+ * clip of the design. `scratch` has space for vertex_count + 4 * count words. */
+uint32_t colonnade_mesh_pairs(const struct colonnade_mesh *layout, const struct colonnade_vertex *vertices,
+                              uint32_t vertex_count, const struct colonnade_triangle *triangles, uint32_t count,
+                              struct colonnade_leaf *leaves, uint32_t *scratch);
+
+/* Builds a tree over leaves, by the places of vertices; colonnade_mesh_refit writes its boxes. `mesh` is a copy of any clip of
+ * the design, and becomes that of the leaves: it can be refitted and planned, and has no pose. Space: leaf_words 16 bytes and
+ * scratch 4 words a leaf, copy at most 2 records a leaf. Packed ids are new ones. */
+void colonnade_mesh_build(struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
+                          const struct colonnade_leaf *leaves, uint32_t count, uint8_t *leaf_words, uint32_t *copy,
+                          uint32_t root, uint32_t *scratch);
 
 #ifdef __cplusplus
 }

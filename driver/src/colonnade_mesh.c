@@ -7,32 +7,6 @@
 
 enum format { NEAR_PAIR, TRIANGLE, FLAT_PAIR, FAR_PAIR };
 
-/* A record that is put together. */
-struct record {
-    uint32_t words[RECORD_WORDS];
-};
-
-static void put(struct record *record, uint32_t low, int32_t width, uint32_t value) {
-    uint32_t *word = &record->words[low / 32];
-    const uint32_t bits = value & (((uint32_t)1 << width) - 1), at = low % 32;
-    word[0] |= bits << at;
-    if (at + (uint32_t)width > 32) word[1] |= bits >> (32 - at);
-}
-
-static uint32_t get(const uint32_t *record, uint32_t low, int32_t width) {
-    const uint32_t *word = &record[low / 32], at = low % 32;
-    const uint32_t more = at + (uint32_t)width > 32 ? word[1] << (32 - at) : 0;
-    return (word[0] >> at | more) & (((uint32_t)1 << width) - 1);
-}
-
-static uint32_t *record_at(uint32_t *copy, uint32_t root, uint32_t address) {
-    return copy + (size_t)RECORD_WORDS * (address - root);
-}
-
-static void store(uint32_t *to, const struct record *record) {
-    for (int i = 0; i < RECORD_WORDS; ++i) to[i] = record->words[i];
-}
-
 /* The format of a pair: near or far, by its largest delta, else flat. */
 static enum format format_of(const struct colonnade_mesh *mesh, const struct colonnade_vertex *const corners[4]) {
     uint32_t reach = 0;
@@ -45,14 +19,14 @@ static enum format format_of(const struct colonnade_mesh *mesh, const struct col
     return reach >> mesh->delta_bits == 0 ? FAR_PAIR : FLAT_PAIR;
 }
 
-static void put_normal(const struct colonnade_mesh *mesh, struct record *record, enum format format, int corner,
+static void put_normal(const struct colonnade_mesh *mesh, struct colonnade_record *record, enum format format, int corner,
                        const int16_t code[2]) {
     for (int i = 0; i < 2; ++i) {
         const int place = 2 * corner + i;
         const uint32_t bits = (uint32_t)(int32_t)code[i];
-        if (format == TRIANGLE) put(record, mesh->fields[FIELD_NORMALS + place], OCTAHEDRAL_BITS, bits);
-        else put(record, mesh->fields[FIELD_HIGH_NORMALS + place], OCTAHEDRAL_BITS - 1, bits >> 1);
-        if (format == NEAR_PAIR) put(record, mesh->fields[FIELD_LOW_NORMALS + place], 1, bits);
+        if (format == TRIANGLE) colonnade_put(record, mesh->fields[FIELD_NORMALS + place], OCTAHEDRAL_BITS, bits);
+        else colonnade_put(record, mesh->fields[FIELD_HIGH_NORMALS + place], OCTAHEDRAL_BITS - 1, bits >> 1);
+        if (format == NEAR_PAIR) colonnade_put(record, mesh->fields[FIELD_LOW_NORMALS + place], 1, bits);
     }
 }
 
@@ -69,13 +43,13 @@ static bool write_leaf(const struct colonnade_mesh *mesh, const struct colonnade
     const struct colonnade_vertex *corners[4];
     const bool is_pair = colonnade_word(words, 3) >> 16 != COLONNADE_MESH_NO_VERTEX;
     const int count = is_pair ? 4 : 3;
-    struct record record = {{0}};
+    struct colonnade_record record = {{0}};
     const uint8_t *fields = mesh->fields;
     for (int i = 0; i < count; ++i) corners[i] = &vertices[colonnade_word(words, (size_t)i)];
     const enum format format = is_pair ? format_of(mesh, corners) : TRIANGLE;
-    put(&record, fields[FIELD_FORMAT], 2, format);
-    put(&record, fields[FIELD_MATERIAL], 8, get(to, fields[FIELD_MATERIAL], 8));
-    put(&record, fields[FIELD_IS_CLEAR], 1, get(to, fields[FIELD_IS_CLEAR], 1));
+    colonnade_put(&record, fields[FIELD_FORMAT], 2, format);
+    colonnade_put(&record, fields[FIELD_MATERIAL], 8, colonnade_field(to, fields[FIELD_MATERIAL], 8));
+    colonnade_put(&record, fields[FIELD_IS_CLEAR], 1, colonnade_field(to, fields[FIELD_IS_CLEAR], 1));
     for (int axis = 0; axis < 3; ++axis) low[axis] = high[axis] = corners[0]->position[axis];
     for (int i = 0; i < count; ++i) {
         const int32_t *at = corners[i]->position, *from = corners[0]->position;
@@ -83,21 +57,21 @@ static bool write_leaf(const struct colonnade_mesh *mesh, const struct colonnade
         for (int axis = 0; axis < 3; ++axis) {
             const int place = 3 * i + axis;
             const uint32_t delta = (uint32_t)(at[axis] - from[axis]);
-            if (!is_relative) put(&record, fields[FIELD_VERTICES + place], mesh->vertex_bits, (uint32_t)at[axis]);
-            else put(&record, fields[FIELD_DELTAS + place - 3], mesh->delta_bits, delta);
-            if (is_relative && format == FAR_PAIR) put(&record, fields[FIELD_SIGNS + place - 3], 1, delta >> 31);
+            if (!is_relative) colonnade_put(&record, fields[FIELD_VERTICES + place], mesh->vertex_bits, (uint32_t)at[axis]);
+            else colonnade_put(&record, fields[FIELD_DELTAS + place - 3], mesh->delta_bits, delta);
+            if (is_relative && format == FAR_PAIR) colonnade_put(&record, fields[FIELD_SIGNS + place - 3], 1, delta >> 31);
         }
         widen(low, high, at, at);
         if (format != FLAT_PAIR) put_normal(mesh, &record, format, i, corners[i]->normal);
     }
-    store(to, &record);
+    colonnade_store(to, &record);
     return format == FLAT_PAIR;
 }
 
 /* Writes a node from its children's boxes; where they lie stays. Answers its own box. */
 static void write_node(const struct colonnade_mesh *mesh, const struct colonnade_mesh_node *node, uint32_t *to, int32_t low[3],
                        int32_t high[3]) {
-    struct record record = {{0}};
+    struct colonnade_record record = {{0}};
     const uint8_t *fields = mesh->fields;
     const int32_t most = ((int32_t)1 << mesh->box_bits) - 1;
     for (int axis = 0; axis < 3; ++axis) low[axis] = node->low[0][axis], high[axis] = node->high[0][axis];
@@ -107,78 +81,87 @@ static void write_node(const struct colonnade_mesh *mesh, const struct colonnade
         if (exponent < 0) exponent = 0;
         while (((high[axis] - 1) >> exponent) + 1 - (low[axis] >> exponent) > most) ++exponent;
         const int32_t origin = low[axis] >> exponent;
-        put(&record, fields[FIELD_CORNER + axis], mesh->vertex_bits + 1, (uint32_t)((2 * origin + 1) << exponent));
+        colonnade_put(&record, fields[FIELD_CORNER + axis], mesh->vertex_bits + 1, (uint32_t)((2 * origin + 1) << exponent));
         for (uint32_t child = 0; child < node->children; ++child) {
             const uint8_t *planes = fields + FIELD_PLANES + 6 * child + axis;
             const int32_t raised = ((node->high[child][axis] - 1) >> exponent) + 1;
-            put(&record, planes[0], mesh->box_bits, (uint32_t)((node->low[child][axis] >> exponent) - origin));
-            put(&record, planes[3], mesh->box_bits, (uint32_t)(raised - origin));
+            colonnade_put(&record, planes[0], mesh->box_bits, (uint32_t)((node->low[child][axis] >> exponent) - origin));
+            colonnade_put(&record, planes[3], mesh->box_bits, (uint32_t)(raised - origin));
         }
     }
-    put(&record, fields[FIELD_FIRST], mesh->address_bits, get(to, fields[FIELD_FIRST], mesh->address_bits));
-    put(&record, fields[FIELD_LEAVES], COUNT_BITS, get(to, fields[FIELD_LEAVES], COUNT_BITS));
-    put(&record, fields[FIELD_NODES], COUNT_BITS, get(to, fields[FIELD_NODES], COUNT_BITS));
-    store(to, &record);
+    colonnade_put(&record, fields[FIELD_FIRST], mesh->address_bits,
+                  colonnade_field(to, fields[FIELD_FIRST], mesh->address_bits));
+    colonnade_put(&record, fields[FIELD_LEAVES], COUNT_BITS, colonnade_field(to, fields[FIELD_LEAVES], COUNT_BITS));
+    colonnade_put(&record, fields[FIELD_NODES], COUNT_BITS, colonnade_field(to, fields[FIELD_NODES], COUNT_BITS));
+    colonnade_store(to, &record);
 }
 
-/* The walk over the tree. Children of a node are beside each other, nodes first; subtrees follow depth first, so that both
- * records and leaves are met in their order. */
-struct walk {
-    const struct colonnade_mesh *mesh;
-    const struct colonnade_vertex *vertices;
-    uint32_t *copy;
-    uint32_t root, next, leaf; /* the next record and the next leaf */
-    uint32_t flat_pairs;
-};
-
-/* Enters a node and writes its leaves; answers whether it is one of the clip's tree. */
-static bool enter(struct walk *walk, struct colonnade_mesh_node *node, uint32_t address) {
+/* Enters a node; answers whether it is one of the clip's tree. */
+static bool enter(struct colonnade_mesh_walk *walk, uint32_t address) {
     const struct colonnade_mesh *mesh = walk->mesh;
-    const uint32_t *record = record_at(walk->copy, walk->root, address);
-    const uint32_t nodes = get(record, mesh->fields[FIELD_NODES], COUNT_BITS), step = mesh->leaf_records;
-    const uint32_t leaves = get(record, mesh->fields[FIELD_LEAVES], COUNT_BITS);
+    if (walk->open == mesh->depth) return false;
+    const uint32_t *record = walk->copy + (size_t)RECORD_WORDS * (address - walk->root);
+    const uint32_t nodes = colonnade_field(record, mesh->fields[FIELD_NODES], COUNT_BITS), step = mesh->leaf_records;
+    const uint32_t leaves = colonnade_field(record, mesh->fields[FIELD_LEAVES], COUNT_BITS);
+    struct colonnade_mesh_node *node = &walk->path[walk->open++];
     node->address = address;
-    node->first = get(record, mesh->fields[FIELD_FIRST], mesh->address_bits);
+    node->first = colonnade_field(record, mesh->fields[FIELD_FIRST], mesh->address_bits);
     node->nodes = nodes;
     node->children = nodes + leaves;
     node->next = 0;
+    node->leaf = walk->leaf;
     if (node->children == 0 || node->children > COLONNADE_MESH_CHILDREN || node->first != walk->next ||
         nodes + leaves * step > walk->root + mesh->records - walk->next || leaves > mesh->leaves - walk->leaf)
         return false;
     walk->next += nodes + leaves * step;
-    for (uint32_t i = 0; i < leaves; ++i) {
-        uint32_t *to = record_at(walk->copy, walk->root, node->first + nodes + i * step);
-        const uint8_t *words = mesh->leaf_words + 4 * (size_t)LEAF_WORDS * walk->leaf++;
-        walk->flat_pairs += write_leaf(mesh, walk->vertices, words, to, node->low[nodes + i], node->high[nodes + i]);
-    }
+    walk->leaf += leaves;
     return true;
+}
+
+struct colonnade_mesh_node *colonnade_mesh_next(struct colonnade_mesh_walk *walk) {
+    if (walk->open == 0) {
+        if (walk->next != walk->root) return NULL;
+        ++walk->next;
+        if (!enter(walk, walk->root)) return NULL;
+    }
+    for (;;) {
+        struct colonnade_mesh_node *node = &walk->path[walk->open - 1];
+        if (node->next == node->nodes) break;
+        if (!enter(walk, node->first + node->next++)) return NULL;
+    }
+    return &walk->path[--walk->open];
+}
+
+enum colonnade_error colonnade_mesh_end(const struct colonnade_mesh_walk *walk) {
+    const struct colonnade_mesh *mesh = walk->mesh;
+    const bool is_whole = walk->open == 0 && walk->next == walk->root + mesh->records && walk->leaf == mesh->leaves;
+    return is_whole ? COLONNADE_OK : COLONNADE_OTHER_RECORDS;
 }
 
 enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
                                           uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path,
                                           struct colonnade_refit *result) {
-    struct walk walk = {mesh, vertices, copy, root, root + 1, 0, 0};
-    struct colonnade_refit found;
-    uint32_t depth = 0;
-    if (!enter(&walk, path, root)) return COLONNADE_OTHER_RECORDS;
-    for (;;) {
-        struct colonnade_mesh_node *node = &path[depth];
-        if (node->next < node->nodes) {
-            ++depth;
-            if (depth == mesh->depth || !enter(&walk, &path[depth], node->first + node->next)) return COLONNADE_OTHER_RECORDS;
-            continue;
+    struct colonnade_mesh_walk walk = {mesh, copy, path, root, root, 0, 0};
+    struct colonnade_refit found = {{0}, {0}, 0, 0};
+    uint64_t areas = 0, area = 0;
+    for (struct colonnade_mesh_node *node; (node = colonnade_mesh_next(&walk)) != NULL;) {
+        for (uint32_t i = node->nodes; i < node->children; ++i) {
+            const uint32_t leaf = i - node->nodes;
+            uint32_t *to = copy + (size_t)RECORD_WORDS * (node->first + node->nodes + leaf * mesh->leaf_records - root);
+            const uint8_t *words = mesh->leaf_words + 4 * (size_t)LEAF_WORDS * (node->leaf + leaf);
+            found.flat_pairs += write_leaf(mesh, vertices, words, to, node->low[i], node->high[i]);
         }
-        write_node(mesh, node, record_at(copy, root, node->address), found.low, found.high);
-        if (depth == 0) break;
-        node = &path[--depth];
+        write_node(mesh, node, copy + (size_t)RECORD_WORDS * (node->address - root), found.low, found.high);
+        areas += area = colonnade_half_area(found.low, found.high);
+        if (walk.open == 0) break;
+        struct colonnade_mesh_node *parent = &path[walk.open - 1];
         for (int axis = 0; axis < 3; ++axis) {
-            node->low[node->next][axis] = found.low[axis];
-            node->high[node->next][axis] = found.high[axis];
+            parent->low[parent->next - 1][axis] = found.low[axis];
+            parent->high[parent->next - 1][axis] = found.high[axis];
         }
-        ++node->next;
     }
-    if (walk.next != root + mesh->records || walk.leaf != mesh->leaves) return COLONNADE_OTHER_RECORDS;
-    found.flat_pairs = walk.flat_pairs;
-    *result = found;
-    return COLONNADE_OK;
+    const enum colonnade_error error = colonnade_mesh_end(&walk);
+    found.cost = (uint32_t)(areas / (area / 256 + 1));
+    if (error == COLONNADE_OK) *result = found;
+    return error;
 }

@@ -42,6 +42,19 @@ enum field {
 
 _Static_assert(FIELD_IS_CLEAR + 1 == COLONNADE_MESH_FIELDS, "each field has its place");
 
+/* A walk over the tree of a copy. Children of a node are beside each other, nodes first; subtrees follow depth first. */
+struct colonnade_mesh_walk {
+    const struct colonnade_mesh *mesh;
+    const uint32_t *copy;
+    struct colonnade_mesh_node *path;
+    uint32_t root, next, leaf, open; /* the next record and leaf to be met; nodes on the path. At first `next` is `root` */
+};
+
+/* The next node, after all nodes below it; NULL at the end, or where the tree is not the clip's. */
+struct colonnade_mesh_node *colonnade_mesh_next(struct colonnade_mesh_walk *walk);
+/* Whether the walk has met the clip's tree. */
+enum colonnade_error colonnade_mesh_end(const struct colonnade_mesh_walk *walk);
+
 static inline int32_t colonnade_signed_word(const uint8_t *bytes, size_t index) {
     return (int32_t)colonnade_word(bytes, index);
 }
@@ -53,6 +66,35 @@ static inline uint32_t colonnade_half(const uint8_t *bytes, size_t index) {
 
 static inline int32_t colonnade_signed_half(const uint8_t *bytes, size_t index) {
     return (int16_t)colonnade_half(bytes, index);
+}
+
+/* A field of a record. */
+static inline uint32_t colonnade_field(const uint32_t *record, uint32_t low, int32_t width) {
+    const uint32_t *word = &record[low / 32], at = low % 32;
+    const uint32_t more = at + (uint32_t)width > 32 ? word[1] << (32 - at) : 0;
+    return (word[0] >> at | more) & (((uint32_t)1 << width) - 1);
+}
+
+/* A record that is put together. */
+struct colonnade_record {
+    uint32_t words[RECORD_WORDS];
+};
+
+static inline void colonnade_put(struct colonnade_record *record, uint32_t low, int32_t width, uint32_t value) {
+    uint32_t *word = &record->words[low / 32];
+    const uint32_t bits = value & (((uint32_t)1 << width) - 1), at = low % 32;
+    word[0] |= bits << at;
+    if (at + (uint32_t)width > 32) word[1] |= bits >> (32 - at);
+}
+
+static inline void colonnade_store(uint32_t *to, const struct colonnade_record *record) {
+    for (int i = 0; i < RECORD_WORDS; ++i) to[i] = record->words[i];
+}
+
+/* Half of a box's area. */
+static inline uint64_t colonnade_half_area(const int32_t low[3], const int32_t high[3]) {
+    const uint64_t x = (uint64_t)(high[0] - low[0]), y = (uint64_t)(high[1] - low[1]), z = (uint64_t)(high[2] - low[2]);
+    return x * y + y * z + z * x;
 }
 
 #endif

@@ -12,7 +12,7 @@ static void check(enum colonnade_error error) { add((uint32_t)error); }
 static uint32_t result(void) {
     struct colonnade_design design = {.tile_size = 0};
     struct colonnade_mesh mesh;
-    struct colonnade_refit refit = {{0}, {0}, 0};
+    struct colonnade_refit refit = {{0}, {0}, 0, 0};
     for (size_t i = 0; i < 32; ++i) design.format_hash[i / 4] |= (uint32_t)clip_table[16 + i] << (8 * (i % 4));
     check(colonnade_mesh_open(&mesh, &design, clip_table, sizeof clip_table));
     for (uint32_t frame = 0; frame < FRAMES; ++frame) {
