@@ -31,7 +31,7 @@ UNIT, TRACER, COLUMN, DEVICE = "TraversalUnit", "PathTracer", "Column", "Colonna
 PARENTS = ((TRACER, f"{COLUMN}__DOT__tracer"), (DEVICE, DEVICE))
 
 #: Of a device for rays, whose modules get the names of a device's.
-RAY_PARENTS = ((COLUMN, COLUMN), ("RayArray", f"{DEVICE}__DOT__array"))
+RAY_PARENTS = ((COLUMN, COLUMN), ("RayArray", f"{DEVICE}__DOT__RayArray"))
 RENAMED = {"RayColumn": COLUMN, "ColonnadeRays": DEVICE}
 
 #: The wrapper with registers at the unit's inputs.

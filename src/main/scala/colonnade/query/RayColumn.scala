@@ -71,10 +71,10 @@ final class RayColumn(config: ColonnadeConfig) extends Module {
   controller.requests.last.valid := false.B
   controller.requests.last.bits  := DontCare
   if (config.columnBvhMemory.cache.isEmpty) {
-    val memory = Module(new ColumnBvhMemory(config)).io
-    memory.banks <> controller.memory
-    memory.load := io.load
-    memory.holds.zip(io.holds).foreach { case (to, from) => to := from }
+    val memory = Module(new ColumnBvhMemory(config)) // simulators look for it by this name
+    memory.io.banks <> controller.memory
+    memory.io.load := io.load
+    memory.io.holds.zip(io.holds).foreach { case (to, from) => to := from }
   } else {
     val caches = controller.memory.map { port =>
       val cache = Module(new ColumnCache(config)).io
