@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from one_generator import OneGenerator
 
-from colonnade.common import notes
+from colonnade.common import notes, processes
 from colonnade.design.manifest import VERSION, Manifest
 
 if TYPE_CHECKING:
@@ -202,6 +203,16 @@ def quick_simulators(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
     """Build simulators that are soon compiled, but for tests with the mark `matrix`."""
     if request.node.get_closest_marker("matrix") is None:
         monkeypatch.setenv("COLONNADE_QUICK_SIMULATORS", "1")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_generator() -> Iterator[None]:
+    """Designs of this process are made by one Java."""
+    run = OneGenerator(processes.run)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(processes, "run", run)
+        yield
+    run.close()
 
 
 @pytest.fixture(scope="module")

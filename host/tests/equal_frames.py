@@ -12,8 +12,13 @@ from colonnade.device.bit_exact import render_model
 from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.scene_image.file import SceneImage
 
+_LIMITS = ("frame.maxBounces=4", "frame.lights=2")
 #: Limits of the frames, and banks that can be stalled.
-HELD = ("columnBvhMemory.holdable=true", "frame.maxBounces=4", "frame.lights=2")
+HELD = ("columnBvhMemory.holdable=true", *_LIMITS)
+#: Beside `tiny`: three units, sequential parts.
+HOLDABLE = ("array.rows=3", *HELD)
+#: Beside `tiny`: the narrowest arithmetic.
+NARROW = ("precision=16b16s32d", "geometry.triangleBits=null", *_LIMITS)
 #: Beside `tiny`: three units, two of which share two triangle units, and pipelines for all rays of a column.
 PIPELINED = (
     *("array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),

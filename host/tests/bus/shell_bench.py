@@ -197,7 +197,7 @@ async def frames_are_the_models(dut: Any) -> None:
     if shell.has_scene_port:
         assert shell.memory.overtaken > 0
     else:
-        for _ in range(4):
+        for _ in range(2):
             await shell.interrupt(LOAD, IS_LOADING)
             assert await shell.load() == 0
         await shell.set_frame()

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 from colonnade_lab.evaluation.fuzz.cases import coloured, textured
 from colonnade_lab.evaluation.throughput import figures, records_taken
-from equal_frames import PIPELINED, equal_frames
+from equal_frames import HOLDABLE, NARROW, PIPELINED, equal_frames
 from leaves import packed_triangles
 
 from colonnade.common.errors import UserError
@@ -32,14 +32,11 @@ TEAPOT = Scene(MeshSource(name="teapot:4"))
 SKY = Background(colour=(0.2, 0.3, 0.5))
 
 
-#: Configuration and overrides of the narrowest arithmetic.
-NARROW = ("16b16s32d", ("array.rows=1", "array.columns=1"))
-
 #: Name, configuration, overrides, mesh, stalls of the pixel sink.
 CASES = [
     ("tiny", "tiny", (), "teapot:4", Stalls(check_interval=1)),
     ("small, stalled sink", "small", (), "teapot:4", Stalls(40, 7, check_interval=1)),
-    ("narrow", *NARROW, "sphere:2", Stalls()),
+    ("narrow", "tiny", NARROW, "sphere:2", Stalls()),
 ]
 
 
@@ -118,7 +115,7 @@ SHINY = [
     ("mirror", "small", (), Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), (Light(),)),
     ("glass", "small", (), Material(kind="glass", albedo=(0.9, 1.0, 0.95), ior=1.45), (Light(),)),
     ("two lights", "small", (), Material(), TWO_LIGHTS),
-    ("narrow glass", *NARROW, Material(kind="glass", ior=2.4), (Light(falloff=0.5),)),
+    ("narrow glass", "tiny", NARROW, Material(kind="glass", ior=2.4), (Light(falloff=0.5),)),
 ]
 
 
@@ -140,10 +137,6 @@ def test_mirrors_glass_and_lights_equal_the_model(
     assert (counters["raysRefraction"] > 0) == (material.kind == "glass")
 
 
-#: Three units with two banks that can be stalled.
-HOLDABLE = ("array.rows=3", "columnBvhMemory.holdable=true")
-
-
 @pytest.mark.parametrize(
     "stalls",
     [
@@ -159,7 +152,7 @@ def test_random_memory_latency_changes_only_time(stalls: Stalls) -> None:
     holdable = design_for("tiny", HOLDABLE)
     image = pack(load_mesh("teapot:3"), holdable.manifest)
     flat = replace(TEAPOT, camera=Camera(direction=(-1.0, -0.2, 0.1)), material=Material(flat=True))
-    registers = [frame_registers(view, image.header, holdable.manifest, 40, 30) for view in (TEAPOT, flat)]
+    registers = [frame_registers(view, image.header, holdable.manifest, 28, 21) for view in (TEAPOT, flat)]
     held = equal_frames(holdable, image, registers, stalls)
     free = render_rtl(holdable, image, list(registers), replace(stalls, memory_percent=0)).frames
     for frame, quicker in zip(held, free, strict=True):

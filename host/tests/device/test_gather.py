@@ -82,7 +82,7 @@ def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_ro
     image = with_cube(pack(replace(mesh, materials=materials), design.manifest, materials), 5)
     if held is not None:
         image = with_environment(image, held, design.manifest)
-    size = (48, 36)
+    size = (48, 36) if in_room else (32, 24)
     still = frame_registers(scene, image.header, design.manifest, *size, held)
     untraced, mirrors = (
         frame_registers(replace(scene, paths=Paths(bounces=bounces)), image.header, design.manifest, *size, held)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from equal_frames import HELD, PIPELINED, assert_equal, equal_frames
+from equal_frames import HELD, HOLDABLE, PIPELINED, assert_equal, equal_frames
 
 from colonnade.design.generator import design_for
 from colonnade.device.bit_exact import render_model
@@ -24,13 +24,17 @@ LIGHTS = (Light(offset=(-1.0, 0.5, 2.0), colour=(0.2, 0.4, 0.9)),)
 #: Name, precision, overrides.
 SHAPES = [
     ("shared triangle units, pipelines", "tiny", PIPELINED),
-    (
-        "sequential parts, one slow bank",
-        "tiny",
+    ("sequential parts", "tiny", HOLDABLE),
+    pytest.param(
         (
-            *("array.rows=2", "units.pathContexts=7", "columnBvhMemory.snooping=false"),
-            *("columnBvhMemory.banks=1", "columnBvhMemory.readLatency=5", *HELD),
+            "sequential parts, one slow bank",
+            "tiny",
+            (
+                *("array.rows=2", "units.pathContexts=7", "columnBvhMemory.snooping=false"),
+                *("columnBvhMemory.banks=1", "columnBvhMemory.readLatency=5", *HELD),
+            ),
         ),
+        marks=pytest.mark.matrix,
     ),
     pytest.param(
         (

@@ -103,6 +103,7 @@ def test_an_altered_measurement_is_repeated(
     assert capsys.readouterr().err == (f"colonnade: the cached measurement {kept.name} was damaged and is made again\n")
 
 
-def test_a_mesh_that_does_not_fit_is_named() -> None:
+def test_a_mesh_that_does_not_fit_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measuring, "design_for", manifest_for)
     with pytest.raises(UserError, match=r"sphere:4 .*columnBvhMemory\.depth"):
         measured("sphere:4", "columnBvhMemory.depth=64")
