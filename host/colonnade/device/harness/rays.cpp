@@ -37,23 +37,25 @@ public:
         top_.io_read_ar_ready = moves();
         top_.io_write_aw_ready = writeBeats_ == 0 && moves();
         top_.io_write_w_ready = writeBeats_ != 0 && moves();
-        if (!top_.io_read_r_valid) offerRead();
-        if (!top_.io_write_b_valid && !answers_.empty() && answers_.front().due <= now_ && moves()) {
-            top_.io_write_b_valid = 1;
+        if (!offersRead_) offerRead();
+        if (!offersAnswer_ && !answers_.empty() && answers_.front().due <= now_ && moves()) {
+            offersAnswer_ = true;
             top_.io_write_b_bits_id = answers_.front().id;
             top_.io_write_b_bits_resp = 0;
         }
+        top_.io_read_r_valid = offersRead_;
+        top_.io_write_b_valid = offersAnswer_;
     }
 
-    /// Takes the transfers of this cycle, after the device has settled.
+    /// Takes the transfers of this cycle, after the device has settled; its inputs stay for the clock edge.
     void take() {
         if (top_.io_read_r_valid && top_.io_read_r_ready) {
-            top_.io_read_r_valid = 0;
+            offersRead_ = false;
             reads_.front().address += beatBytes;
             if (--reads_.front().beats == 0) reads_.pop_front();
         }
         if (top_.io_write_b_valid && top_.io_write_b_ready) {
-            top_.io_write_b_valid = 0;
+            offersAnswer_ = false;
             answers_.pop_front();
         }
         if (top_.io_read_ar_valid && top_.io_read_ar_ready)
@@ -85,7 +87,7 @@ private:
         const Burst& read = reads_.front();
         const unsigned char* const data = at(read.address);
         if (data) std::memcpy(&top_.io_read_r_bits_data, data, beatBytes);
-        top_.io_read_r_valid = 1;
+        offersRead_ = true;
         top_.io_read_r_bits_id = read.id;
         top_.io_read_r_bits_resp = data ? 0 : 3;
         top_.io_read_r_bits_last = read.beats == 1;
@@ -108,6 +110,7 @@ private:
     std::vector<unsigned char> regions_[4];
     std::deque<Burst> reads_, answers_;
     Burst write_{};
+    bool offersRead_ = false, offersAnswer_ = false;
     unsigned writeBeats_ = 0;
     std::uint64_t now_ = 0;
 };
