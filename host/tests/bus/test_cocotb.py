@@ -33,7 +33,7 @@ get_runner = pytest.importorskip("cocotb_tools.runner", reason="cocotb has no wh
 
 pytestmark = pytest.mark.skipif(shutil.which("iverilog") is None, reason="no iverilog: apt-get install iverilog")
 
-WIDTH, HEIGHT, FORMAT = 20, 6, 0
+WIDTH, HEIGHT, FORMAT = 18, 4, 0
 UNWRITTEN = 0xA5
 CACHE = {"lines": 16, "ways": 2, "misses": 4, "sharedLines": 32, "sharedWays": 2, "sharedMisses": 8, "busBytes": 16}
 
