@@ -9,13 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from colonnade.device.simulator_build import build_environment
+from colonnade.device import simulator_build
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGES = sorted(path.stem for path in (ROOT / "docs" / "start").glob("*.md"))
 
 #: For the bench of the examples: soon compiled, slow.
-QUICK = {"VERILATOR_FLAGS": "-MAKEFLAGS OPT_FAST=-O0 -MAKEFLAGS OPT_GLOBAL=-O0 --output-split 0 --noassert"}
+QUICK = {
+    "VERILATOR_FLAGS": "-MAKEFLAGS OPT_FAST=-O0 -MAKEFLAGS OPT_GLOBAL=-O0 --noassert "
+    f"--output-split {simulator_build.QUICK.split}"
+}
 
 
 def run_page(page: str, *options: str, environment: Mapping[str, str]) -> None:
@@ -26,7 +29,7 @@ def run_page(page: str, *options: str, environment: Mapping[str, str]) -> None:
 
 @pytest.mark.parametrize("page", ["newcomer", "soc"])
 def test_the_commands_of_a_starting_page_print_what_it_says(page: str) -> None:
-    run_page(page, environment=build_environment() | QUICK)
+    run_page(page, environment=simulator_build.build_environment() | QUICK)
 
 
 @pytest.mark.matrix
