@@ -121,33 +121,40 @@ object Model {
     "bvh"        -> (if (config.geometry.bvh) 1 else 0)
   )
 
-  private lazy val program: Path = synchronized {
+  /** What the C of a target does with a mesh; driver/tests/refit.c has the order of numbers. */
+  def refit(numbers: Seq[BigInt]): Seq[BigInt] = {
+    val input = new java.io.ByteArrayInputStream(numbers.mkString("", "\n", "\n").getBytes(UTF_8))
+    (Process(refitProgram.toString) #< input).!!.trim.split(' ').toSeq.map(BigInt(_))
+  }
+
+  private val driver = Paths.get("driver")
+
+  private lazy val program: Path = {
     val sources = Paths.get("host", "cpp")
-    val driver  = Paths.get("driver", "include")
-    val files   = Seq(sources, driver).flatMap(Files.walk(_).iterator.asScala).filter(p =>
-      p.toString.endsWith(".hpp") || p.toString.endsWith(".h") || p.endsWith("vectors.cpp")
-    ).sorted
+    built(sources.resolve("vectors.cpp"), Nil, Seq(sources, driver.resolve("include")), "g++", "-std=c++17", "-pthread")
+  }
+
+  private lazy val refitProgram: Path = {
+    val sources = Seq("colonnade_mesh.c", "colonnade_mesh_plan.c").map(driver.resolve("src").resolve(_))
+    val headers = Seq("include", "src").map(driver.resolve(_))
+    built(driver.resolve("tests").resolve("refit.c"), sources, headers, "gcc", "-std=c11")
+  }
+
+  /** A program, compiled once per version of the sources. */
+  private def built(main: Path, sources: Seq[Path], headers: Seq[Path], command: String*): Path = synchronized {
+    val files = headers.flatMap(Files.walk(_).iterator.asScala).filter(path =>
+      Seq(".hpp", ".h").exists(path.toString.endsWith)
+    ).sorted ++ sources :+ main
     val digest = MessageDigest.getInstance("SHA-256")
     files.foreach(file => digest.update(Files.readAllBytes(file)))
     val name  = digest.digest().take(8).map(byte => f"$byte%02x").mkString
-    val built = Paths.get("target", "model", s"vectors-$name")
+    val built = Paths.get("target", "model", s"${main.getFileName.toString.takeWhile(_ != '.')}-$name")
     if (!Files.exists(built)) {
       Files.createDirectories(built.getParent)
-      val fresh = Files.createTempFile(built.getParent, "vectors", "")
-      val exit  = Seq(
-        "g++",
-        "-std=c++17",
-        "-O2",
-        "-pthread",
-        "-I",
-        sources.toString,
-        "-I",
-        driver.toString,
-        sources.resolve("vectors.cpp").toString,
-        "-o",
-        fresh.toString
-      ).!
-      require(exit == 0, "the model did not compile: is g++ installed?")
+      val fresh   = Files.createTempFile(built.getParent, "program", "")
+      val options = "-O2" +: headers.flatMap(folder => Seq("-I", folder.toString))
+      val exit    = (command ++ options ++ (main +: sources).map(_.toString) ++ Seq("-o", fresh.toString)).!
+      require(exit == 0, s"$main did not compile: is ${command.head} installed?")
       Files.move(fresh, built, StandardCopyOption.REPLACE_EXISTING)
     }
     built

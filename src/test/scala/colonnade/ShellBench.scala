@@ -1,6 +1,7 @@
 package colonnade
 
 import chiseltest._
+import colonnade.axi.AxiMemory
 import colonnade.bus._
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{RecordFormats, RegisterMap}

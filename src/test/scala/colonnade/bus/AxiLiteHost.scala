@@ -1,6 +1,6 @@
 package colonnade.bus
 
-import colonnade.axi.AxiPins
+import colonnade.axi.{AxiPins, PinAccess}
 import org.scalatest.Assertions._
 
 import scala.util.Random

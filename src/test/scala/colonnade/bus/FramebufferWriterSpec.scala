@@ -3,7 +3,7 @@ package colonnade.bus
 import chisel3.{assert => _, _}
 import chiseltest._
 import colonnade.{OneSimulation, Simulation, TestConfigs}
-import colonnade.axi.AxiPins
+import colonnade.axi.{AxiMemory, AxiPins, WriteOrder}
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.Pixel
 import org.scalatest.flatspec.AnyFlatSpec

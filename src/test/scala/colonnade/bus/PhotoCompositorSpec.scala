@@ -3,7 +3,7 @@ package colonnade.bus
 import chisel3.{assert => _, _}
 import chiseltest._
 import colonnade.{Simulation, TestConfigs}
-import colonnade.axi.AxiPins
+import colonnade.axi.{AxiMemory, AxiPins}
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import org.scalatest.flatspec.AnyFlatSpec
 

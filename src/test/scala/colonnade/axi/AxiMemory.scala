@@ -1,6 +1,5 @@
-package colonnade.bus
+package colonnade.axi
 
-import colonnade.axi.AxiPins
 import org.scalatest.Assertions._
 
 import scala.collection.mutable
@@ -72,6 +71,7 @@ class AxiMemory(
     offer("b", answers.headOption) { burst => poke("bresp", response(burst.address)) }
     offer("r", reads.headOption) { burst =>
       val at = burst.address / busBytes * busBytes + sent * busBytes
+      poke("rid", burst.id)
       poke("rdata", (0 until busBytes).map(i => BigInt(bytes.getOrElse(at + i, 0xee)) << (8 * i)).sum)
       poke("rresp", response(burst.address))
       poke("rlast", if (sent == burst.beats - 1) 1 else 0)
@@ -83,7 +83,9 @@ class AxiMemory(
     while (writes.nonEmpty && data.nonEmpty) write(data.dequeue())
     if (fires("ar")) {
       val next = burst("ar")
-      reads.enqueue(next)
+      // Bursts of other ids may be answered earlier, but for the one that is under way
+      val isEarly = reads.size >= 2 && reads.last.id != next.id && random.nextBoolean()
+      reads.insert(if (isEarly) reads.size - 1 else reads.size, next)
       for (i <- 0 until next.beats * busBytes) read += next.address + i
     }
     if (fires("b")) answers.dequeue()
@@ -133,7 +135,7 @@ class AxiMemory(
     val last = address / busBytes * busBytes + beats * busBytes - 1
     assert(address / 4096 == last / 4096, "a burst crosses 4 KB")
     bursts += beats
-    Burst(address, beats, now + random.nextInt(maxDelay + 1))
+    Burst(peek(s"${channel}id"), address, beats, now + random.nextInt(maxDelay + 1))
   }
 
   private def write(taken: Beat): Unit = {
@@ -174,4 +176,4 @@ class AxiMemory(
 private final case class Beat(data: BigInt, strobes: BigInt, isLast: Boolean)
 
 /** A burst, answered from cycle `due` on. */
-private final case class Burst(address: BigInt, beats: Int, due: Int)
+private final case class Burst(id: BigInt, address: BigInt, beats: Int, due: Int)

@@ -1,8 +1,7 @@
-package colonnade.bus
+package colonnade.axi
 
 import chisel3._
 import chiseltest._
-import colonnade.axi.AxiPins
 
 /** Reads and drives pins by their names. */
 class PinAccess(pins: AxiPins) {
