@@ -42,6 +42,9 @@ extern "C" {
 #define COLONNADE_SHELL__CAPABILITIES__PIXELSTREAM_bm 0x20
 #define COLONNADE_SHELL__CAPABILITIES__PIXELSTREAM_bp 5
 #define COLONNADE_SHELL__CAPABILITIES__PIXELSTREAM_bw 1
+#define COLONNADE_SHELL__CAPABILITIES__REFIT_bm 0x40
+#define COLONNADE_SHELL__CAPABILITIES__REFIT_bp 6
+#define COLONNADE_SHELL__CAPABILITIES__REFIT_bw 1
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bm 0xf00
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bp 8
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bw 4
@@ -320,6 +323,112 @@ extern "C" {
 #define COLONNADE_SHELL__PHOTO_HASSTRENGTHS__VALUE_bp 0
 #define COLONNADE_SHELL__PHOTO_HASSTRENGTHS__VALUE_bw 1
 
+// reg - colonnade_shell::refit_control
+#define COLONNADE_SHELL__REFIT_CONTROL__VALUE_bm 0x1
+#define COLONNADE_SHELL__REFIT_CONTROL__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_CONTROL__VALUE_bw 1
+
+// reg - colonnade_shell::refit_status
+#define COLONNADE_SHELL__REFIT_STATUS__VALUE_bm 0x1
+#define COLONNADE_SHELL__REFIT_STATUS__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_STATUS__VALUE_bw 1
+
+// reg - colonnade_shell::refit_errors
+#define COLONNADE_SHELL__REFIT_ERRORS__ALIGNMENT_bm 0x1
+#define COLONNADE_SHELL__REFIT_ERRORS__ALIGNMENT_bp 0
+#define COLONNADE_SHELL__REFIT_ERRORS__ALIGNMENT_bw 1
+#define COLONNADE_SHELL__REFIT_ERRORS__RESPONSE_bm 0x2
+#define COLONNADE_SHELL__REFIT_ERRORS__RESPONSE_bp 1
+#define COLONNADE_SHELL__REFIT_ERRORS__RESPONSE_bw 1
+#define COLONNADE_SHELL__REFIT_ERRORS__PLAN_bm 0x4
+#define COLONNADE_SHELL__REFIT_ERRORS__PLAN_bp 2
+#define COLONNADE_SHELL__REFIT_ERRORS__PLAN_bw 1
+
+// reg - colonnade_shell::refit_flatPairs
+#define COLONNADE_SHELL__REFIT_FLATPAIRS__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_FLATPAIRS__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_FLATPAIRS__VALUE_bw 24
+
+// reg - colonnade_shell::refit_bounds_0
+#define COLONNADE_SHELL__REFIT_BOUNDS_0__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_BOUNDS_0__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_BOUNDS_0__VALUE_bw 24
+
+// reg - colonnade_shell::refit_bounds_1
+#define COLONNADE_SHELL__REFIT_BOUNDS_1__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_BOUNDS_1__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_BOUNDS_1__VALUE_bw 24
+
+// reg - colonnade_shell::refit_bounds_2
+#define COLONNADE_SHELL__REFIT_BOUNDS_2__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_BOUNDS_2__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_BOUNDS_2__VALUE_bw 24
+
+// reg - colonnade_shell::refit_bounds_3
+#define COLONNADE_SHELL__REFIT_BOUNDS_3__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_BOUNDS_3__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_BOUNDS_3__VALUE_bw 24
+
+// reg - colonnade_shell::refit_bounds_4
+#define COLONNADE_SHELL__REFIT_BOUNDS_4__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_BOUNDS_4__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_BOUNDS_4__VALUE_bw 24
+
+// reg - colonnade_shell::refit_bounds_5
+#define COLONNADE_SHELL__REFIT_BOUNDS_5__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_BOUNDS_5__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_BOUNDS_5__VALUE_bw 24
+
+// reg - colonnade_shell::refit_plan_low
+#define COLONNADE_SHELL__REFIT_PLAN_LOW__VALUE_bm 0xffffffff
+#define COLONNADE_SHELL__REFIT_PLAN_LOW__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_PLAN_LOW__VALUE_bw 32
+
+// reg - colonnade_shell::refit_plan_high
+#define COLONNADE_SHELL__REFIT_PLAN_HIGH__VALUE_bm 0xff
+#define COLONNADE_SHELL__REFIT_PLAN_HIGH__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_PLAN_HIGH__VALUE_bw 8
+
+// reg - colonnade_shell::refit_vertices_low
+#define COLONNADE_SHELL__REFIT_VERTICES_LOW__VALUE_bm 0xffffffff
+#define COLONNADE_SHELL__REFIT_VERTICES_LOW__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_VERTICES_LOW__VALUE_bw 32
+
+// reg - colonnade_shell::refit_vertices_high
+#define COLONNADE_SHELL__REFIT_VERTICES_HIGH__VALUE_bm 0xff
+#define COLONNADE_SHELL__REFIT_VERTICES_HIGH__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_VERTICES_HIGH__VALUE_bw 8
+
+// reg - colonnade_shell::refit_records_low
+#define COLONNADE_SHELL__REFIT_RECORDS_LOW__VALUE_bm 0xffffffff
+#define COLONNADE_SHELL__REFIT_RECORDS_LOW__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_RECORDS_LOW__VALUE_bw 32
+
+// reg - colonnade_shell::refit_records_high
+#define COLONNADE_SHELL__REFIT_RECORDS_HIGH__VALUE_bm 0xff
+#define COLONNADE_SHELL__REFIT_RECORDS_HIGH__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_RECORDS_HIGH__VALUE_bw 8
+
+// reg - colonnade_shell::refit_entries
+#define COLONNADE_SHELL__REFIT_ENTRIES__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_ENTRIES__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_ENTRIES__VALUE_bw 24
+
+// reg - colonnade_shell::refit_lines
+#define COLONNADE_SHELL__REFIT_LINES__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_LINES__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_LINES__VALUE_bw 24
+
+// reg - colonnade_shell::refit_count
+#define COLONNADE_SHELL__REFIT_COUNT__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_COUNT__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_COUNT__VALUE_bw 24
+
+// reg - colonnade_shell::refit_root
+#define COLONNADE_SHELL__REFIT_ROOT__VALUE_bm 0xffffff
+#define COLONNADE_SHELL__REFIT_ROOT__VALUE_bp 0
+#define COLONNADE_SHELL__REFIT_ROOT__VALUE_bw 24
+
 // addrmap - colonnade_shell
 typedef struct __attribute__ ((__packed__)) {
     uint32_t identity;
@@ -370,11 +479,33 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t photo_enabled;
     uint32_t stream_enabled;
     uint32_t photo_hasStrengths;
+    uint8_t RESERVED_108_11f[0x18];
+    uint32_t refit_control;
+    uint32_t refit_status;
+    uint32_t refit_errors;
+    uint32_t refit_flatPairs;
+    uint32_t refit_bounds_0;
+    uint32_t refit_bounds_1;
+    uint32_t refit_bounds_2;
+    uint32_t refit_bounds_3;
+    uint32_t refit_bounds_4;
+    uint32_t refit_bounds_5;
+    uint8_t RESERVED_148_14f[0x8];
+    uint32_t refit_plan_low;
+    uint32_t refit_plan_high;
+    uint32_t refit_vertices_low;
+    uint32_t refit_vertices_high;
+    uint32_t refit_records_low;
+    uint32_t refit_records_high;
+    uint32_t refit_entries;
+    uint32_t refit_lines;
+    uint32_t refit_count;
+    uint32_t refit_root;
 } colonnade_shell_t;
 
 
 #ifndef __cplusplus
-_Static_assert(sizeof(colonnade_shell_t) == 0x108, "Packing error");
+_Static_assert(sizeof(colonnade_shell_t) == 0x178, "Packing error");
 #endif
 
 #ifdef __cplusplus

@@ -19,6 +19,7 @@ from colonnade.common.errors import UserError
 @click.option("--black-box-memories", is_flag=True, help="Emit memories as black boxes, for SRAM macros.")
 @click.option("--axi", "bus_bytes", type=int, metavar="BYTES", help="Add the AXI4 shell, with a bus of 4 to 128 BYTES.")
 @click.option("--pixel-stream", is_flag=True, help="Add an AXI4-Stream of pixels to the shell of --axi.")
+@click.option("--refit", is_flag=True, help="Add a unit that bends meshes to the shell of --axi.")
 @json_option
 def generate(
     config: str,
@@ -29,6 +30,7 @@ def generate(
     black_box_memories: bool,
     bus_bytes: int | None,
     pixel_stream: bool,
+    refit: bool,
     json_file: Path | None,
 ) -> None:
     """Generate the accelerator: SystemVerilog files, their list filelist.f, and manifest.json.
@@ -54,7 +56,7 @@ def generate(
         echo_lines((design.dir / "manifest.json").read_text().rstrip("\n"))
     else:
         design = generator.generate(
-            config, overrides, output, manifest_only, black_box_memories, terminal, bus_bytes, pixel_stream
+            config, overrides, output, manifest_only, black_box_memories, terminal, bus_bytes, pixel_stream, refit
         )
     files = design_folder.listed(design.dir)
     manifest = json.loads((design.dir / "manifest.json").read_text())

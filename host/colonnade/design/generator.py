@@ -124,6 +124,7 @@ def generate(
     progress: Progress = QUIET,
     bus_bytes: int | None = None,
     pixel_stream: bool = False,
+    refit: bool = False,
 ) -> GeneratedDesign:
     """Generate into the user's folder ``output``; `design_folder` defines which folders it may replace.
 
@@ -136,11 +137,12 @@ def generate(
         progress: Shows the steps.
         bus_bytes: Generate the AXI4 shell, too, with a bus of so many bytes.
         pixel_stream: The shell has an AXI4-Stream of pixels.
+        refit: The shell has a unit that bends meshes.
     """
     check_replaceable(output)
     options = (MANIFEST_ONLY,) * manifest_only + ("--black-box-memories",) * black_box_memories
     options += () if bus_bytes is None else _shell_options(bus_bytes)
-    options += ("--pixel-stream",) * pixel_stream
+    options += ("--pixel-stream",) * pixel_stream + ("--refit",) * refit
     design = _cached(config, overrides, options, progress)
     replace_folder(design.dir, output)
     return GeneratedDesign(output, design.manifest)

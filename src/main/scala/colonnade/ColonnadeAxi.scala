@@ -9,6 +9,7 @@ import colonnade.column.{PathTracer, PathTracerModule}
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.RegisterMap
 import colonnade.memory.DramPort
+import colonnade.refit.{RefitReader, RefitUnit}
 
 /** The device in its AXI4 shell: registers by AXI4-Lite, images read and frames written by an AXI4 master, an interrupt;
   * docs/bus-shell.md.
@@ -31,6 +32,11 @@ final class ColonnadeAxi(
   /** With a pixel stream: rows of tiles. */
   val streamPins =
     Option.when(shell.pixelStream)(IO(AxiPins.stream(new PixelBeat(shell.busBytes))).suggestName("m_axis"))
+
+  /** With a refit unit: what it reads and writes. */
+  val refitPins = Option.when(shell.refit)(
+    IO(AxiPins.readsAndWrites(RefitReader.idBits, shell.busBytes)).suggestName("m_axi_refit")
+  )
   val interrupt = IO(Output(Bool())).suggestName("irq")
 
   private val slave      = Module(new AxiLiteSlave(ShellMap.addressBits))
@@ -132,10 +138,37 @@ final class ColonnadeAxi(
     pins.receive("r", guard.io.axi.r)
     guard
   }
-  private val guards = readGuard +: sceneGuard.toSeq
+  private val refitGuards = refitPins.map { pins =>
+    val unit   = withReset(clears)(Module(new RefitUnit(config, shell.busBytes)))
+    val reads  = Module(new AxiReadGuard(RefitReader.idBits, shell.busBytes, ColonnadeAxi.refitBursts))
+    val writes = Module(new AxiWriteGuard(RefitReader.idBits, shell.busBytes, ColonnadeAxi.refitBursts))
+    registers.io.refit.foreach { control =>
+      unit.io.start    := control.start
+      unit.io.settings := control.settings
+      control.result   := unit.io.result
+      control.errors   := unit.io.errors
+      control.isIdle   := unit.io.isIdle
+    }
+    reads.io.inner :<>= unit.io.reads
+    writes.io.inner :<>= unit.io.writes
+    Seq("aw" -> writes.io.axi.aw, "w" -> writes.io.axi.w, "ar" -> reads.io.axi.ar).foreach { case (channel, stream) =>
+      pins.drive(channel, stream)
+    }
+    pins.receive("b", writes.io.axi.b)
+    pins.receive("r", reads.io.axi.r)
+    writes.io.abandon := control.io.reset
+    (reads, writes)
+  }
+  private val guards = (readGuard +: sceneGuard.toSeq) ++ refitGuards.map(_._1)
   guards.foreach(_.io.abandon := control.io.reset)
   writeGuard.io.abandon := control.io.reset
-  control.io.busIsIdle  := writeGuard.io.isIdle && streamGuard.fold(true.B)(_.isIdle) && guards.map(
+  control.io.busIsIdle  := writeGuard.io.isIdle && refitGuards.fold(true.B)(_._2.io.isIdle) && streamGuard.fold(true.B)(
+    _.isIdle
+  ) && guards.map(
     _.io.isIdle
   ).reduce(_ && _)
+}
+
+private object ColonnadeAxi {
+  val refitBursts: Int = 64 // of the refit unit that are under way, reads and writes each
 }

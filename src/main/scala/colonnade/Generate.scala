@@ -3,7 +3,7 @@ package colonnade
 import chisel3.RawModule
 import colonnade.bus.ShellMap
 import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO, ShellConfig}
-import colonnade.formats.{FormatsPage, Manifest}
+import colonnade.formats.{FormatsPage, Manifest, RecordFormats}
 
 import java.io.IOException
 import java.nio.file.{AccessDeniedException, FileAlreadyExistsException, InvalidPathException, Path, Paths}
@@ -21,6 +21,7 @@ object Generate {
        |  --manifest-only       writes no Verilog
        |  --axi BYTES           puts the device into its AXI4 shell, with a bus of 4 to 128 BYTES; shell.json has its registers
        |  --pixel-stream        gives the shell an AXI4-Stream of pixels, to which frames can go
+       |  --refit               gives the shell a unit that bends meshes in DRAM
        |  --black-box-memories  leaves memories to be filled in; memories.json lists their shapes
        |  --formats-page FILE   writes the formats as a Markdown page
        |  --help                prints this
@@ -33,6 +34,7 @@ object Generate {
       formatsPage:      Option[String] = None,
       axi:              Option[ShellConfig] = None,
       pixelStream:      Boolean = false,
+      refit:            Boolean = false,
       manifestOnly:     Boolean = false,
       blackBoxMemories: Boolean = false,
       help:             Boolean = false
@@ -61,9 +63,15 @@ object Generate {
   private def generate(options: Options): Unit = {
     if (options.pixelStream && options.axi.isEmpty)
       throw new ConfigError("--pixel-stream is a port of the AXI4 shell: it needs --axi")
-    val axi    = options.axi.map(_.copy(pixelStream = options.pixelStream))
+    if (options.refit && options.axi.isEmpty)
+      throw new ConfigError("--refit is a unit of the AXI4 shell: it needs --axi")
+    val axi    = options.axi.map(_.copy(pixelStream = options.pixelStream, refit = options.refit))
     val name   = options.config.getOrElse(throw new ConfigError("--config is missing; see --help"))
     val config = ConfigIO.load(name, options.overrides)
+    if (options.refit && (config.columnBvhMemory.cache.isEmpty || new RecordFormats(config).recordBits != 256))
+      throw new ConfigError(
+        "--refit bends records of 256 bits in DRAM: it needs columnBvhMemory.cache, and geometry.vertexBits up to 19"
+      )
     if (config.frame.rays && axi.nonEmpty)
       throw new ConfigError("a device with frame.rays has no AXI4 shell: leave --axi out")
     if (options.output.isEmpty && options.formatsPage.isEmpty)
@@ -88,6 +96,7 @@ object Generate {
     case "--help" :: rest                => parse(rest, options.copy(help = true))
     case "--manifest-only" :: rest       => parse(rest, options.copy(manifestOnly = true))
     case "--pixel-stream" :: rest        => parse(rest, options.copy(pixelStream = true))
+    case "--refit" :: rest               => parse(rest, options.copy(refit = true))
     case "--black-box-memories" :: rest  => parse(rest, options.copy(blackBoxMemories = true))
     case Valued(name, "", _)             => throw new ConfigError(s"$name needs a value; see --help")
     case Valued("--config", value, rest) => parse(rest, options.copy(config = Some(value)))

@@ -4,6 +4,7 @@ import colonnade.bus._
 import colonnade.column.FakePathTracer
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{Manifest, RecordFormats}
+import colonnade.refit.BentMesh
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -18,6 +19,7 @@ class ColonnadeAxiSpec extends AnyFlatSpec with OneSimulation {
     frame = TestConfigs.tiny.frame.copy(tileSize = 4)
   )
   private val shell   = ShellConfig(16, 4)
+  private val bending = ShellConfig(16, 4, refit = true)
   private val (w, h)  = (13, 6)
   private val stride  = 64
   private val pixels  = BigInt(0x40000)
@@ -196,6 +198,41 @@ class ColonnadeAxiSpec extends AnyFlatSpec with OneSimulation {
     assert(bench.until("frameDone") == allDone)
     expectPicture(bench, scene)
   }
+
+  private def refits(dut: ColonnadeAxi): Unit = {
+    val bench          = new ShellBench(dut, config, bending, new Random(7))
+    val (host, memory) = (bench.host, bench.refits.get)
+    val mesh           = BentMesh(config, bench.random, 4, 3000, 3, 1)
+    def run(): Unit    = {
+      mesh.store(memory)
+      for ((name, value) <- mesh.settings) host.set(s"refit.$name", value)
+      host.set("refit.control", 1)
+    }
+    assert(host("capabilities") == (4 << 8 | 4 | 64) && host("refit.status") == 0)
+    memory.isSilent = true
+    run()
+    assert(host("refit.status") == 1 && !host.write(0x120, 1) && !host.write(0x150, 0))
+    memory.isSilent = false
+    while (host("refit.status") == 1) {}
+    assert(mesh.wrong(memory) == Nil && host("refit.errors") == 0 && host("refit.flatPairs") == mesh.flatPairs)
+    assert((0 until 6).map(i => host(s"refit.bounds[$i]")) == mesh.bounds)
+
+    // A soft reset ends its bursts
+    for (cycles <- Seq(10, 40, 90, 200)) {
+      run()
+      for (_ <- 0 until cycles) bench.cycle()
+      host.set("control", 4)
+      while (host("status") != 0) {}
+      assert(memory.isIdle && host("refit.status") == 0)
+    }
+    run()
+    while (host("refit.status") == 1) {}
+    assert(mesh.wrong(memory) == Nil && memory.written.size == 32 * mesh.records.size)
+  }
+
+  inOneSimulation(new ColonnadeAxi(config, bending, new FakePathTracer(_)))(
+    "bend meshes beside the device, and end the bursts of a refit in a soft reset" -> refits
+  )
 
   inOneSimulation(new ColonnadeAxi(config, shell, new FakePathTracer(_)))(
     "identify itself, refuse accesses that mean nothing, and interrupt while an enabled status bit is set" ->

@@ -56,6 +56,14 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
     run("--config", "tiny", "--output", output, "--manifest-only", "--axi", "16", "--pixel-stream")._1 shouldBe 0
   }
 
+  it should "refuse a refit unit without the shell, or a scene in DRAM" in Scratch { scratch =>
+    val output = scratch.resolve("out").toString
+    refused("--config", "edge", "--output", output, "--manifest-only", "--refit")("it needs --axi")
+    refused("--config", "tiny", "--output", output, "--manifest-only", "--axi", "16", "--refit")("columnBvhMemory.cache")
+    refused("--config", "edge", "--output", output, "--manifest-only", "--axi", "128", "--refit")("--axi with --refit")
+    run("--config", "edge", "--output", output, "--manifest-only", "--axi", "64", "--refit")._1 shouldBe 0
+  }
+
   it should "replace an earlier output, but no other directory" in Scratch { scratch =>
     val output = scratch.resolve("out")
     for (_ <- 0 until 2) run("--config", "tiny", "--output", output.toString, "--manifest-only")._1 shouldBe 0

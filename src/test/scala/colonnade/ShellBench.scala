@@ -17,7 +17,13 @@ class ShellBench(dut: ColonnadeAxi, config: ColonnadeConfig, shell: ShellConfig,
 
   dut.clock.setTimeout(0)
 
-  def cycle(): Unit = { memory.cycle(); dut.clock.step() }
+  /** Of the refit unit. */
+  val refits = dut.refitPins.map(new AxiMemory(_, shell.busBytes, random))
+
+  def cycle(): Unit = {
+    (memory +: refits.toSeq).foreach(_.cycle())
+    dut.clock.step()
+  }
 
   def interrupt: Boolean = dut.interrupt.peekBoolean()
 

@@ -21,22 +21,22 @@ final class AxiWriteGuardIO(idBits: Int, busBytes: Int) extends Bundle {
   *
   * It outlives the reset of the master, so the bus always sees whole bursts, and valid signals that hold. A beat passes in
   * one cycle. Data are offered from the second cycle after their address on, whether it has been accepted or not. At most
-  * [[AxiWriteGuard.maxBursts]] bursts wait for their answers.
+  * `maxBursts` bursts wait for their answers.
   */
-final class AxiWriteGuard(idBits: Int, busBytes: Int) extends Module {
+final class AxiWriteGuard(idBits: Int, busBytes: Int, maxBursts: Int = AxiWriteGuard.maxBursts) extends Module {
   val io = IO(new AxiWriteGuardIO(idBits, busBytes))
 
-  private val bursts = RegInit(0.U(log2Ceil(AxiWriteGuard.maxBursts + 1).W)) // without their answer
+  private val bursts = RegInit(0.U(log2Ceil(maxBursts + 1).W)) // without their answer
   private val aw     = Module(new Queue(io.axi.aw.bits.cloneType, 2))
   private val w      = Module(new Queue(io.axi.w.bits.cloneType, 2))
 
   // Beats that are owed for each address that has been offered, in order. They do not wait until it is accepted: a memory
   // may wait for them first (AXI4, A3.3.1).
-  private val owed        = Module(new Queue(UInt(8.W), AxiWriteGuard.maxBursts))
+  private val owed        = Module(new Queue(UInt(8.W), maxBursts))
   private val beats       = RegInit(0.U(8.W))
   private val isAnnounced = RegNext(io.axi.aw.valid && !io.axi.aw.ready, false.B)
 
-  private val canStart = bursts =/= AxiWriteGuard.maxBursts.U && !io.abandon
+  private val canStart = bursts =/= maxBursts.U && !io.abandon
   aw.io.enq.valid   := io.inner.aw.valid && canStart
   aw.io.enq.bits    := io.inner.aw.bits
   io.inner.aw.ready := aw.io.enq.ready && canStart

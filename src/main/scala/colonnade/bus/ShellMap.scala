@@ -5,6 +5,7 @@ import chisel3.util.log2Ceil
 import colonnade.axi.AxiLite
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{Access, Field, Json, Layout, Manifest, RegisterMap}
+import colonnade.refit.{RefitErrors, RefitPlan}
 
 /** A register of the shell.
   *
@@ -24,7 +25,9 @@ final case class ShellRegister(
   def words: Int = (width + AxiLite.dataBits - 1) / AxiLite.dataBits
 }
 
-/** Byte addresses of AXI4-Lite: the shell's registers, the same in every design, and those of the device. */
+/** Byte addresses of AXI4-Lite: the shell's registers, at the same address in every design that has them, and those of the
+  * device.
+  */
 object ShellMap {
   import Access.{ReadOnly, ReadWrite, WriteOnly}
 
@@ -38,7 +41,7 @@ object ShellMap {
   private val byteAddress = 40 // bits
 
   private val features =
-    Seq("environment", "sceneInDram", "mirrorsAndGlass", "cornerColours", "textures", "pixelStream")
+    Seq("environment", "sceneInDram", "mirrorsAndGlass", "cornerColours", "textures", "pixelStream", "refit")
   private val capabilityFields = bits(features) :+ Field("busBytesLog2", 8, 4, signed = false, fraction = 0)
 
   val registers: Seq[ShellRegister] = Seq(
@@ -72,8 +75,30 @@ object ShellMap {
     setting("photo.stride", 0xf8, 24, "Bytes from a line of the photo to the next."),
     setting("photo.enabled", 0xfc, 1, "1: the photo shows where the object does not."),
     setting("stream.enabled", 0x100, 1, "1: frames go to the pixel stream, not to the framebuffer."),
-    setting("photo.hasStrengths", 0x104, 1, "1: the photo's highest bytes are strengths of the shadow.")
-  )
+    setting("photo.hasStrengths", 0x104, 1, "1: the photo's highest bytes are strengths of the shadow."),
+    ShellRegister("refit.control", 0x120, 1, WriteOnly, "1 starts a refit."),
+    ShellRegister("refit.status", 0x124, 1, ReadOnly, "1: a refit runs."),
+    errors("refit", 0x128, new RefitErrors, "Errors of the last refit."),
+    ShellRegister("refit.flatPairs", 0x12c, RefitPlan.countBits, ReadOnly, "Pairs without normals of the last refit."),
+    setting("refit.plan", 0x150, byteAddress, "Address of the plan."),
+    setting("refit.vertices", 0x158, byteAddress, "Address of the vertices."),
+    setting("refit.records", 0x160, byteAddress, "Address of the root's record."),
+    setting("refit.entries", 0x168, RefitPlan.countBits, "Entries of the plan."),
+    setting("refit.lines", 0x16c, RefitPlan.countBits, "Lines of vertices."),
+    setting("refit.count", 0x170, RefitPlan.countBits, "Records of the mesh."),
+    setting("refit.root", 0x174, RefitPlan.countBits, "The root's address in the scene.")
+  ) ++ (0 until 6).map { i =>
+    ShellRegister(
+      s"refit.bounds[$i]",
+      0x130 + 4 * i,
+      RefitPlan.countBits,
+      ReadOnly,
+      "Bounds: low x, y, z, high x, y, z."
+    )
+  }
+
+  /** Those of a design. */
+  def of(shell: ShellConfig): Seq[ShellRegister] = registers.filter(shell.refit || !_.name.startsWith("refit."))
 
   /** Names of a register's parts, the lowest first. */
   def bitsOf(register: String): Seq[String] = registers.filter(_.name == register).flatMap(_.fields).map(_.name)
@@ -105,7 +130,8 @@ object ShellMap {
       config.frame.hasBounces,
       config.geometry.cornerColours,
       config.geometry.texture.nonEmpty,
-      shell.pixelStream
+      shell.pixelStream,
+      shell.refit
     )
     require(flags.size == features.size)
     val mask = flags.zipWithIndex.collect { case (true, bit) => 1 << bit }.sum

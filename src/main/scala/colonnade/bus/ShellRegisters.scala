@@ -6,6 +6,7 @@ import colonnade.axi.AxiLite
 import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{Access, RegisterFile, RegisterMap, RegisterPort}
+import colonnade.refit.{RefitErrors, RefitResult, RefitSettings}
 
 /** Pulses from the host. */
 final class ShellCommands extends Bundle {
@@ -30,7 +31,16 @@ final class PostedWrite(config: ColonnadeConfig) extends Bundle {
   val data    = UInt(AxiLite.dataBits.W)
 }
 
-final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
+/** The refit unit, as the registers see it. */
+final class RefitControl(config: ColonnadeConfig) extends Bundle {
+  val start    = Output(Bool())
+  val settings = Output(new RefitSettings(config))
+  val result   = Input(new RefitResult(config))
+  val errors   = Input(new RefitErrors)
+  val isIdle   = Input(Bool())
+}
+
+final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extends Bundle {
   val access = Flipped(new RegisterAccess(ShellMap.addressBits))
 
   /** To the device's registers. The port is lent to the shell's control in some cycles. */
@@ -39,6 +49,7 @@ final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
 
   val framebuffer = Output(new FramebufferSettings)
   val image       = Output(new ImageSettings)
+  val refit       = Option.when(shell.refit)(new RefitControl(config))
   val commands    = Output(new ShellCommands)
 
   /** All writes to the device's registers have arrived there. */
@@ -61,7 +72,7 @@ final class ShellRegistersIO(config: ColonnadeConfig) extends Bundle {
   * not written, or the value does not fit.
   */
 final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends Module {
-  val io = IO(new ShellRegistersIO(config))
+  val io = IO(new ShellRegistersIO(config, shell))
 
   private val request     = io.access.request.bits
   private val isDevice    = request.address >= (ShellMap.deviceBase / 4).U
@@ -83,7 +94,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private val writes  = accepts && request.isWrite && request.isWhole
 
   // Registers of the shell
-  private val settings = ShellMap.registers.filter(_.access == Access.ReadWrite).filterNot(_.name == "interrupt.status")
+  private val settings = ShellMap.of(shell).filter(_.access == Access.ReadWrite).filterNot(_.name == "interrupt.status")
   private val values   = settings.map { register =>
     register.name -> Seq.tabulate(register.words) { word =>
       val bits = (register.width - word * AxiLite.dataBits).min(AxiLite.dataBits)
@@ -95,6 +106,8 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private val isIdle    = !io.status.asUInt.orR
   private val canChange = !io.status.isQueued && !io.status.isResetting
 
+  private val startsRefit = WireInit(false.B)
+
   /** Whether a register may be written now, by its name. */
   private def mayWrite(name: String): Bool = name match {
     case "control" =>
@@ -105,11 +118,12 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
     case "photo.enabled"                                 => canChange && config.hasEnvironment.B
     case "stream.enabled"                                => canChange && shell.pixelStream.B
     case photo if photo.startsWith("photo.")             => canChange
-    case _                                               => true.B
+    case refit if refit.startsWith("refit.") => io.refit.get.isIdle && !startsRefit && !io.status.isResetting
+    case _                                   => true.B
   }
 
   private val writable = for {
-    register <- ShellMap.registers
+    register <- ShellMap.of(shell)
     if register.access != Access.ReadOnly
     word <- 0 until register.words
     bits   = (register.width - word * AxiLite.dataBits).min(AxiLite.dataBits)
@@ -120,6 +134,13 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private def written(name:     String, word: Int = 0) = writes && isWritable((name, word))
   private def writtenBits(name: String, bits: Int)     = Mux(written(name), request.data(bits - 1, 0), 0.U)
   for ((name, words) <- values; (word, index) <- words.zipWithIndex) when(written(name, index)) { word := request.data }
+
+  // Refits
+  for (refit <- io.refit) {
+    startsRefit := RegNext(written("refit.control") && request.data(0), false.B)
+    refit.start := startsRefit
+    refit.settings.elements.foreach { case (name, setting) => setting := value(s"refit.$name") }
+  }
 
   // Before the answer
   io.commands := RegNext(writtenBits("control", 3), 0.U).asTypeOf(io.commands)
@@ -172,9 +193,17 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
     "interrupt.status"   -> interrupts.io.status,
     "framebuffer.errors" -> io.framebufferErrors.asUInt,
     "image.errors"       -> io.imageErrors.asUInt
-  )
+  ) ++ io.refit.toSeq.flatMap { refit =>
+    val bounds = refit.result.low.axes ++ refit.result.high.axes
+    Map(
+      "refit.status"    -> Mux(refit.isIdle, 0.U, 1.U),
+      "refit.errors"    -> refit.errors.asUInt,
+      "refit.flatPairs" -> refit.result.flatPairs
+    ) ++
+      bounds.zipWithIndex.map { case (bound, i) => s"refit.bounds[$i]" -> bound }
+  }
   private val readable = for {
-    register <- ShellMap.registers
+    register <- ShellMap.of(shell)
     if register.access != Access.WriteOnly
     word <- 0 until register.words
     data = values.get(register.name).map(_(word)).orElse(observed.get(register.name))
