@@ -64,7 +64,8 @@ class RayDevice:
         self._before = self.counters()
         self._send(f"load {count} {len(records) // count}", records)
         written = dict.fromkeys((name for name, each in self._registers.items() if each.access == "rw"), 0)
-        for name, value in {**written, **values, "control.start": 1}.items():
+        commands = {name: 1 for name in ("control.invalidate", "control.start") if name in self._registers}
+        for name, value in {**written, **values, **commands}.items():
             for address, word in self._registers[name].encode(value):
                 self._send(f"write {address} {word}")
 
