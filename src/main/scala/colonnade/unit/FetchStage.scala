@@ -73,10 +73,10 @@ final class FetchStage(config: TraversalConfig) extends Module {
   io.triangles.bits.address := response.address
   io.triangles.bits.record  := response.record
   io.triangles.bits.ray     := triangleRay
-  io.triangles.bits.isMasked.foreach(_ := false.B)
 
   assert(!io.nodes.valid || io.nodes.ready, "the box unit does not accept its node")
   assert(!io.triangles.valid || io.triangles.ready, "the triangle unit does not accept its record")
+  io.triangles.bits.isMasked.foreach(_ := false.B) // the column compares masks
 
   // Errors and events
   private val error = recordFetch.io.error
