@@ -14,7 +14,7 @@ from colonnade.rays.scene import ALL_MASKS, OCCLUDED, RANGES, SENSOR
 from colonnade_lab.evaluation.rays import rays_of_kind
 
 #: Columns of the sensor; counters of what a ray reads.
-_WIDTH, _READS = 256, ("nodeReads", "triangleTests")
+_WIDTH, _READS = 512, ("nodeReads", "triangleTests")
 
 
 @dataclass(frozen=True)

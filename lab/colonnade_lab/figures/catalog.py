@@ -274,7 +274,7 @@ def catalog() -> dict[str, Entry]:
         Entry(
             "ray-rates", "edge", _colonnade("rays", "--config", "edge", "--mesh", "armadillo"), sources=("rays", "tree")
         ),
-        Entry("ray-device", "traversal", _colonnade("bench", "--config", "traversal", "--rays", "32768")),
+        Entry("ray-device", "traversal", _colonnade("bench", "--config", "traversal", "--rays", "262144")),
         Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}),
         _paper_unit(),
         _paper_maps(),
