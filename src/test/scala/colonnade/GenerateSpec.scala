@@ -59,7 +59,16 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
   it should "refuse a refit unit without the shell, or a scene in DRAM" in Scratch { scratch =>
     val output = scratch.resolve("out").toString
     refused("--config", "edge", "--output", output, "--manifest-only", "--refit")("it needs --axi")
-    refused("--config", "tiny", "--output", output, "--manifest-only", "--axi", "16", "--refit")("columnBvhMemory.cache")
+    refused(
+      "--config",
+      "tiny",
+      "--output",
+      output,
+      "--manifest-only",
+      "--axi",
+      "16",
+      "--refit"
+    )("columnBvhMemory.cache")
     refused("--config", "edge", "--output", output, "--manifest-only", "--axi", "128", "--refit")("--axi with --refit")
     run("--config", "edge", "--output", output, "--manifest-only", "--axi", "64", "--refit")._1 shouldBe 0
   }

@@ -32,7 +32,7 @@ final class BoxStack(config: ColonnadeConfig) extends Module {
   // Boxes go in a cycle after their item: no node reads earlier
   private val box    = Reg(new RefitBox(config))
   private val pushes = RegInit(false.B)
-  private val slot  = Reg(UInt(log2Ceil(RefitPlan.boxes).W))
+  private val slot   = Reg(UInt(log2Ceil(RefitPlan.boxes).W))
   when(pushes) { memory.write(slot, box.asUInt) }
   pushes := false.B
 
@@ -63,7 +63,7 @@ final class BoxStack(config: ColonnadeConfig) extends Module {
   io.isError             := io.items.fire && !isNode && !isLeaf
   private def push(value: RefitBox, to: UInt): Unit = {
     box    := value
-    slot  := to
+    slot   := to
     pushes := true.B
     depth  := to + 1.U
   }

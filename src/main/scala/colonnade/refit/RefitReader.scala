@@ -44,7 +44,8 @@ final class RefitReader(busBytes: Int) extends Module {
     val isHere = beat.valid && beat.bits.id === index.U
     if (pieces == 1) {
       data.valid := isHere
-      data.bits  := (if (last == 0) beat.bits.data else beat.bits.data.asTypeOf(Vec(last + 1, chiselTypeOf(data.bits)))(part))
+      data.bits  := (if (last == 0) beat.bits.data
+                    else beat.bits.data.asTypeOf(Vec(last + 1, chiselTypeOf(data.bits)))(part))
     } else {
       val before = Reg(UInt((8 * (entry - busBytes)).W))
       val count  = RegInit(0.U(log2Ceil(pieces).W))

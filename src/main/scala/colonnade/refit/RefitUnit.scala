@@ -62,7 +62,7 @@ final class RefitUnit(config: ColonnadeConfig, busBytes: Int) extends Module {
 
   private val isIdle =
     plan.io.isIdle && ring.io.isIdle && !leaves.items.valid &&
-    items.io.count === 0.U && stack.io.isIdle && nodes.isIdle &&
+      items.io.count === 0.U && stack.io.isIdle && nodes.isIdle &&
       writer.io.isIdle
   io.isIdle := isIdle
 

@@ -13,7 +13,7 @@ final class RefitStep(config: ColonnadeConfig) extends Bundle {
 }
 
 final class VertexRingIO(config: ColonnadeConfig) extends Bundle {
-  val start   = Input(Bool()) // the next line is the first of a plan
+  val start   = Input(Bool())                               // the next line is the first of a plan
   val entries = Flipped(Decoupled(new RefitEntry(config)))
   val data    = Flipped(Valid(UInt(RefitPlan.entryBits.W))) // of vertices, line by line
   val retired = Output(UInt(2.W))                           // lines that an entry has waited for
@@ -57,12 +57,12 @@ final class VertexRing(config: ColonnadeConfig) extends Module {
   when(reads) { index := Mux(isLast, 0.U, index + 1.U) }
 
   private val reading = Reg(new RefitStep(config))
-  private val slot   = Reg(UInt(RingSlot.bits.W))
+  private val slot    = Reg(UInt(RingSlot.bits.W))
   private val at      = Mux(moves, entry.slot(index), slot)
   private val vertex  = memory.read(at)
   when(moves) {
     isRead         := reads
-    slot          := at
+    slot           := at
     reading.entry  := entry
     reading.index  := index
     reading.isLast := isLast

@@ -81,12 +81,12 @@ final class BentMesh(
     )
   }
 
-  def entries: Int         = result.head.toInt
-  def lines: Int           = (vertices.size + RefitPlan.lineEntries - 1) / RefitPlan.lineEntries
-  def triangles: Int       = leaves.map(_.count(_ >= 0) - 2).sum
-  private def rest         = result.drop(1 + 4 * entries)
-  def flatPairs: BigInt    = rest.head
-  def bounds: Seq[BigInt]  = rest.slice(1, 7)
+  def entries: Int        = result.head.toInt
+  def lines: Int          = (vertices.size + RefitPlan.lineEntries - 1) / RefitPlan.lineEntries
+  def triangles: Int      = leaves.map(_.count(_ >= 0) - 2).sum
+  private def rest        = result.drop(1 + 4 * entries)
+  def flatPairs: BigInt   = rest.head
+  def bounds: Seq[BigInt] = rest.slice(1, 7)
 
   /** The settings of a refit, by name. */
   def settings: Seq[(String, BigInt)] = Seq[(String, BigInt)](
@@ -124,9 +124,9 @@ final class BentMesh(
 object BentMesh {
 
   /** Addresses in memory. */
-  val plan: BigInt     = 0x1000
+  val plan:     BigInt = 0x1000
   val vertices: BigInt = 0x100000
-  val records: BigInt  = 0x200020
+  val records:  BigInt = 0x200020
 
   /** A square of pairs, in which some leaves are triangles, along a curve that stays near.
     *
