@@ -16,9 +16,7 @@ _OVERRIDES = tuple(os.environ.get("COLONNADE_RAYS_OVERRIDES", "").split())
 class Intersector(RayMeshIntersector):
     """The device's rays, with the arguments of trimesh's two classes."""
 
-    def __init__(
-        self, mesh: object = None, geometry: object = None, **options: bool
-    ) -> None:
+    def __init__(self, mesh: object = None, geometry: object = None, **options: bool) -> None:
         of = mesh if mesh is not None else geometry
         super().__init__(of, _CONFIG, _OVERRIDES, backend=_BACKEND, **options)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -55,6 +56,7 @@ class Design:
     """Replaces generated Verilog."""
 
     text: str = "module Colonnade;"
+    manifest = SimpleNamespace(config={"frame": {"rays": False}})
 
     def digest(self) -> str:
         return self.text

@@ -139,9 +139,10 @@ def _large() -> Entry:
 
 
 def _paper_unit() -> Entry:
-    """The paper's unit, which traces and shades by itself, with the formats and functions of `edge`."""
+    """The paper's unit, which traces and shades by itself: the formats of `edge`, the functions of the paper's."""
     alone = ("triangleRows=1", "triangleLanes=1", "marches=1", "pathContexts=16", "rayInterval=32", "shadeInterval=128")
-    overrides = ("array.rows=1", "array.columns=1", *(f"units.{each}" for each in alone))
+    lacks = ("geometry.textureBytes=0", "geometry.cornerColours=false", "frame.gather=false", "frame.emission=false")
+    overrides = ("array.rows=1", "array.columns=1", *(f"units.{each}" for each in alone), *lacks)
     hardware = ("--config", "edge", *(part for override in overrides for part in ("--set", override)))
     commands = {
         "bench": ("colonnade", "bench", *hardware, "--reuse", *_TWO, "--no-mirror", "--json", REPORT),

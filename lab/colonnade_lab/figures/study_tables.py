@@ -1,4 +1,4 @@
-"""Tables of studies: energy and area, vertex bits and contexts, functions of `edge`."""
+"""The tables of ``docs/explore.md``: energy and area, vertex bits and contexts."""
 
 from __future__ import annotations
 
@@ -33,23 +33,11 @@ def trade(name: str, data: Data) -> str:
     return markdown([*titles, "kGE·cycle/ray", f"energy × area ÷ rate, to `{study['baseline']}`"], rows)
 
 
-def features(data: Data) -> str:
-    """Area of `edge` without a function, and the rate of objects that do not use it."""
-    study = data.result("features")
-    base = study["points"][0]["figures"]["array_mm2.asap7"]
-    rows = []
-    for point in study["points"]:
-        area, rate = (point["figures"][key] for key in ("array_mm2.asap7", "rays_per_cycle"))
-        rows.append([point["name"], f"{area:.2f}", f"{100 * (area / base - 1):+.1f} %", f"{rate:.2f}"])
-    return markdown(["design", "array, mm² at 28 nm", "to `edge`", "rays per cycle, bunny and armadillo"], rows)
-
-
 def number(value: float | None, form: str, scale: float = 1.0) -> str:
     """The scaled value as text; a dash without one."""
     return "–" if value is None else format(value * scale, form)
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {
-    "features": features,
-    **{name: partial(trade, name) for name in ("energy-area", "vertices-contexts")},
+    name: partial(trade, name) for name in ("energy-area", "vertices-contexts")
 }

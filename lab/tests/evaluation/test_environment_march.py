@@ -31,6 +31,8 @@ falloff = 1.6
 colour = [0.32, 0.32, 0.32]
 [background]
 room = "{room}"
+[paths]
+gather = 0
 """
 
 
