@@ -43,14 +43,15 @@ PASSES, LIGHTS = (4, 64), 2
 
 def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     """A room with a cube in it for each design that has maps. In the page other meshes stand on the cube's floor."""
-    groups = [{design: one for design, one in manifests.items() if one.gathers == gathers} for gathers in (True, False)]
-    kinds = [_kind(name, group) for group in groups]
+    designs = {design: one for design, one in manifests.items() if one.attributes is not None}
+    groups = [{design: one for design, one in designs.items() if one.gathers == gathers} for gathers in (True, False)]
+    kinds = [_kind(name, group) for group in groups if group]
     rooms = [kind.pop("room") for kind in kinds]
     return {**rooms[0], "kinds": kinds}
 
 
 def _kind(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
-    """What designs have that all gather light, or all do not; "room" is the same for both.
+    """What designs with maps have that all gather light, or all do not; "room" is the same for both.
 
     Raises:
         ValueError: The designs do not have the same maps.
@@ -61,8 +62,6 @@ def _kind(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     views: dict[str, dict[str, str]] = {}
     maps: list[dict[str, Any]] | None = None
     for design, manifest in manifests.items():
-        if manifest.attributes is None:
-            continue
         if manifest.gathers:
             scene = exposed(replace(scene, names_light=False, paths=replace(scene.paths, gather=1)))
         ready = DeviceScene.of(scene, manifest, load_mesh(MESH), encoder="live")
