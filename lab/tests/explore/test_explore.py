@@ -193,11 +193,20 @@ def test_an_interrupt_ends_all_jobs_within_two_seconds(study: Path) -> None:
 
 
 def descendants(number: int) -> list[int]:
-    """The processes of jobs below a process."""
+    """The processes of jobs below a process. Threads and processes may end while their files are read."""
     found = []
     for threads in Path(f"/proc/{number}/task").iterdir():
-        found += [int(child) for child in (threads / "children").read_text().split()]
-    return [child for child in found if b"explore.worker" in Path(f"/proc/{child}/cmdline").read_bytes()]
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            children = (threads / "children").read_text().split()
+            found += [int(child) for child in children if b"explore.worker" in command_line(int(child))]
+    return found
+
+
+def command_line(number: int) -> bytes:
+    """The arguments of a process, each ended by a zero byte; nothing of one that has ended."""
+    with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+        return Path(f"/proc/{number}/cmdline").read_bytes()
+    return b""
 
 
 @contextlib.contextmanager
