@@ -25,6 +25,7 @@ from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.frames import render_frames
 from colonnade.render.request import Backend, RenderRequest
 from colonnade.render.result import RenderResult
+from colonnade.render.room_defaults import tell_without_defaults
 from colonnade.scene import model
 from colonnade.scene.parser import read_tables, scene_file, scene_of
 from colonnade.scene.passes import of_a_device
@@ -226,6 +227,7 @@ class Scene:
         with _noted(self._notes):
             manifest = manifest_for(config, overrides, progress).manifest
             scene = of_a_device(self.description)
+            tell_without_defaults(scene, config, manifest)
             return DeviceScene.of(
                 scene, manifest, self.mesh, size=size, relit=relit, encoder=encoder, progress=progress
             )

@@ -87,6 +87,7 @@ def pack(
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
     from colonnade.device.scene import DeviceScene
+    from colonnade.render.room_defaults import tell_without_defaults
     from colonnade.scene.parser import load_scene
     from colonnade.scene.passes import of_a_device
     from colonnade.scene_image.dram_image import line_layout
@@ -120,6 +121,7 @@ def pack(
             f"--maps-image holds the maps of a room, and {scene} has none: give background.room or --background"
         )
     manifest = manifest_for(config, overrides, terminal).manifest
+    tell_without_defaults(described, config, manifest)
     if dram_image is not None:
         line_layout(manifest)
     with terminal.step("packing"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from colonnade.common import notes
 from colonnade.design.manifest import Manifest
 from colonnade.environment.load import has_photo
 from colonnade.scene.model import Scene
@@ -28,6 +29,13 @@ def with_room_defaults(
     gathering = replace(scene, paths=replace(scene.paths, gather=1), frame=replace(scene.frame, denoise=denoise))
     filtered = " and filters its noise" if denoise else ""
     return gathering, f"{config} gathers the room's light{filtered}, unless paths.gather = 0 or --denoise none"
+
+
+def tell_without_defaults(scene: Scene, config: str, manifest: Manifest) -> None:
+    """Tell that a packed scene does not gather light where `with_room_defaults` does."""
+    if manifest.gathers and _is_open(scene, False):
+        line = f"the packed scene does not gather the room's light, as colonnade render does by {config}"
+        notes.tell(f"{line}: set paths.gather = 1")
 
 
 def _is_open(scene: Scene, in_sequence: bool) -> bool:

@@ -11,8 +11,9 @@ from colonnade_lab.evaluation.studies.synthetic_attic import attic, write_room
 from live_maps import SMALL_MAPS
 
 import colonnade
+from colonnade.common import notes
 from colonnade.design.generator import manifest_for
-from colonnade.render.room_defaults import with_room_defaults
+from colonnade.render.room_defaults import tell_without_defaults, with_room_defaults
 from colonnade.scene.parser import scene_of
 
 
@@ -41,6 +42,15 @@ def test_a_scene_that_leaves_it_open_gathers_in_a_photo(
     assert found.paths.gather == gathers
     assert (line is not None) == (found.frame.denoise is True) == (gathers > scene.paths.gather)
     assert with_room_defaults(scene, "tiny", manifest_for("tiny").manifest) == (scene, None)
+
+
+@pytest.mark.parametrize(("more", "is_told"), [({}, True), ({"paths": {"gather": 0}}, False)])
+def test_a_packed_scene_tells_that_it_does_not_gather(tmp_path: Path, more: dict[str, Any], is_told: bool) -> None:
+    scene, lines = scene_of(tables(tmp_path, **more), "the scene", tmp_path), list[str]()
+    with notes.opened(lines.append):
+        tell_without_defaults(scene, "small", manifest_for("small").manifest)
+        tell_without_defaults(scene, "tiny", manifest_for("tiny").manifest)
+    assert ["gather the room's light" in line for line in lines] == [True] * is_told
 
 
 def test_a_named_filter_stays(tmp_path: Path) -> None:
