@@ -9,8 +9,11 @@
 
 #include "binding.hpp"
 #include "mesh/atlas.hpp"
+#include "mesh/baking.hpp"
 #include "mesh/cleaning.hpp"
+#include "mesh/coverage.hpp"
 #include "mesh/roughness.hpp"
+#include "mesh/swatches.hpp"
 #include "packer/records.hpp"
 #include "packer/surface_offset.hpp"
 
@@ -61,7 +64,7 @@ public:
             const FieldTuples& layouts)
         : format_{layoutsOf(layouts),          valueOf(format, "recordBits"), valueOf(format, "vertexBits"),
                   valueOf(format, "boxBits"),  valueOf(format, "stackDepth"), valueOf(format, "normalFraction"),
-                  valueOf(format, "children"), valueOf(format, "bvh") != 0, valueOf(format, "bends") != 0},
+                  valueOf(format, "children"), valueOf(format, "bvh") != 0,   valueOf(format, "bends") != 0},
           normals_(normals), materials_(materials), isClear_(isClear), colours_(colours) {
         checkFaces(faces, vertices.shape(0));
         if (faces.shape(0) == 0 || meshFaces.shape(0) != faces.shape(0)) throw std::invalid_argument("the numbers of faces differ, or are 0");
@@ -193,6 +196,92 @@ nb::tuple metalOf(const Texture& map, const Positions& uvs, double metallic, dou
     return result;
 }
 
+nb::tuple cutAlpha(const CornerRows<double>& corners, const Positions& uvs, const Rows<double>& alphas, const std::optional<Texture>& texture,
+                   const std::optional<nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>>& alpha, const Column<double>& linear, double factor,
+                   double cutoff, std::optional<double> paneFactor, double smallest, std::int64_t budget) {
+    std::vector<mesh::CoveredFace> faces(corners.shape(0));
+    if (std::min(uvs.shape(0), alphas.shape(0)) < faces.size() || linear.shape(0) < 256) throw std::invalid_argument("a face has no alpha");
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+        std::memcpy(&faces[i].corners, corners.data() + 9 * i, sizeof faces[i].corners);
+        std::memcpy(&faces[i].uvs, uvs.data() + 6 * i, sizeof faces[i].uvs);
+        std::memcpy(&faces[i].alphas, alphas.data() + 3 * i, sizeof faces[i].alphas);
+    }
+    mesh::Picture<std::uint8_t> colours{nullptr, 0, 0, 3, {}, {}, false}, shown = colours;
+    if (texture) colours = pictureOf(*texture);
+    if (texture && alpha) {
+        shown = colours;
+        shown.pixels = alpha->data();
+        shown.channels = 1;
+        if (shown.height != static_cast<std::int64_t>(alpha->shape(0)) || shown.width != static_cast<std::int64_t>(alpha->shape(1)))
+            throw std::invalid_argument("alpha is not of the picture's size");
+    }
+    std::vector<std::uint8_t> filled;
+    const mesh::AlphaCut cut = released([&] {
+        mesh::Coverage coverage(colours, shown, linear.data(), factor, cutoff);
+        if (alpha) filled = coverage.filled();
+        return mesh::cutAlpha(coverage, faces, smallest, budget, paneFactor);
+    });
+    std::vector<std::int64_t> owners;
+    std::vector<mesh::Corners> weights;
+    for (const mesh::CutPiece& piece : cut.pieces) {
+        owners.push_back(piece.owner);
+        weights.push_back(piece.weights);
+    }
+    std::vector<double> panes;
+    for (const mesh::Pane& pane : cut.panes) panes.insert(panes.end(), {pane.alpha, pane.colour[0], pane.colour[1], pane.colour[2]});
+    const auto width = static_cast<std::size_t>(shown.width), height = static_cast<std::size_t>(shown.height);
+    return nb::make_tuple(arrayOf<std::int8_t>(cut.kinds, {faces.size()}), arrayOf<std::int64_t>(owners, {owners.size()}),
+                          arrayOf<double>(weights, {weights.size(), 3, 3}), arrayOf<double>(panes, {cut.panes.size(), 4}), cut.isCoarse, cut.isBlended,
+                          arrayOf<std::uint8_t>(filled, {height, width, 3}));
+}
+
+nb::tuple swatches(const Texture& texture, const Positions& uvs, const Column<double>& linear) {
+    const std::size_t count = uvs.shape(0);
+    if (linear.shape(0) < 256) throw std::invalid_argument("there are too few values");
+    std::vector<std::uint8_t> isPlain(count);
+    std::vector<mesh::Corners> colours(count);
+    released([&] {
+        const mesh::Swatches own(pictureOf(texture), linear.data());
+        for (std::size_t i = 0; i < count; ++i)
+            if (const auto found = own.colours(rowsOf<mesh::Triangle>(uvs)[i])) {
+                isPlain[i] = 1;
+                colours[i] = *found;
+            }
+    });
+    return nb::make_tuple(arrayOf<bool>(isPlain, {count}), arrayOf<double>(colours, {count, 3, 3}));
+}
+
+nb::tuple baked(const Rows<double>& vertices, const Rows<std::int32_t>& faces, const CornerRows<double>& normals, const std::vector<std::tuple<Texture, double>>& maps,
+                const Column<std::int32_t>& index, const Positions& uvs, const nb::ndarray<const double, nb::shape<-1, 3, 4>, nb::c_contig, nb::device::cpu>& tangents,
+                std::int64_t budget) {
+    checkFaces(faces, vertices.shape(0));
+    const std::size_t count = faces.shape(0);
+    if (count == 0 || std::min({normals.shape(0), index.shape(0), uvs.shape(0), tangents.shape(0)}) < count) throw std::invalid_argument("a face has no relief");
+    const mesh::BakedMesh mesh = released([&] {
+        std::vector<mesh::NormalMap> own;
+        for (const auto& [texture, scale] : maps) own.emplace_back(pictureOf(texture), static_cast<float>(scale));
+        std::vector<mesh::ReliefFace> relief(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            relief[i].map = index.data()[i];
+            if (relief[i].map >= static_cast<std::int32_t>(own.size())) throw std::invalid_argument("a face has a map that does not exist");
+            std::memcpy(&relief[i].uvs, uvs.data() + 6 * i, sizeof relief[i].uvs);
+            std::memcpy(&relief[i].tangents, tangents.data() + 12 * i, sizeof relief[i].tangents);
+        }
+        return mesh::NormalBaker(vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces), vectorOf<mesh::Corners>(normals), own, relief).make(budget);
+    });
+    const std::size_t parts = mesh.pieces.size();
+    std::vector<mesh::Face> corners;
+    std::vector<std::int64_t> owners;
+    std::vector<mesh::Corners> weights;
+    for (const mesh::Piece& piece : mesh.pieces) {
+        corners.push_back(piece.face);
+        owners.push_back(piece.owner);
+        weights.push_back(piece.weights);
+    }
+    return nb::make_tuple(arrayOf<double>(mesh.vertices, {mesh.vertices.size(), 3}), arrayOf<std::int32_t>(corners, {parts, 3}),
+                          arrayOf<double>(mesh.normals, {parts, 3, 3}), arrayOf<std::int64_t>(owners, {parts}), arrayOf<double>(weights, {parts, 3, 3}), mesh.error);
+}
+
 nb::object atlas(const Positions& uvs, const Column<std::int32_t>& textures, const Rows<double>& factors, const std::vector<Texture>& pictures,
                  const Column<double>& linear, std::int64_t edge) {
     std::vector<mesh::Picture<std::uint8_t>> own;
@@ -230,6 +319,11 @@ void bind_packer(nb::module_& module) {
     module.def("sampled", &sampled<float>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
     module.def("atlas", &atlas, "uvs"_a, "textures"_a, "factors"_a, "pictures"_a, "linear"_a, "edge"_a,
                "Colours, texture coordinates and scale of an atlas; None for more paints than tiles. `textures` and `factors` are those of each face, -1 for none.");
+    module.def("cut_alpha", &cutAlpha, "corners"_a, "uvs"_a, "alphas"_a, "texture"_a.none(), "alpha"_a.none(), "linear"_a, "factor"_a, "cutoff"_a, "pane_factor"_a.none(),
+               "smallest"_a, "budget"_a,
+               "Kinds of faces, owners and weights of pieces, panes, whether cuts are coarse, whether blending is not shown, and the filled picture.");
+    module.def("swatches", &swatches, "texture"_a, "uvs"_a, "linear"_a, "Which faces show one colour, and the linear colours of their corners.");
+    module.def("baked", &baked, "vertices"_a, "faces"_a, "normals"_a, "maps"_a, "index"_a, "uvs"_a, "tangents"_a, "budget"_a);
     module.def("metal_of", &metalOf, "map"_a, "uvs"_a, "metallic"_a, "roughness"_a);
     module.def("merged_values", &mesh::mergedValues, "values"_a, "weights"_a, "kinds"_a, "count"_a);
 }

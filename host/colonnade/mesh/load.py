@@ -25,7 +25,7 @@ from colonnade.mesh.files import catalog
 from colonnade.mesh.files.formats import SUFFIXES, read_surface
 from colonnade.mesh.geometry import primitives, teapot
 from colonnade.mesh.geometry.cleaning import clean
-from colonnade.mesh.geometry.topology import Faces, merge_rows, subdivide, subdivide_corners
+from colonnade.mesh.geometry.topology import Faces, subdivide, subdivide_corners
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials.coverage import without_alpha
 from colonnade.mesh.materials.materials import PLAIN, MeshMaterial
@@ -261,8 +261,7 @@ def clean_mesh(
         parts = baked(vertices, faces, cleaned.normals, relief, losses)
         colours, uvs = (None if values is None else parts.corners(values) for values in (colours, uvs))
         sources_kept, materials_kept = sources_kept[parts.owners], materials_kept[parts.owners]
-        vertices, index = merge_rows(parts.vertices)
-        faces, corners_normals = index[parts.faces].astype(np.int32), parts.normals
+        vertices, faces, corners_normals = parts.vertices, parts.faces, parts.normals
     return Mesh(
         vertices=vertices,
         faces=faces,

@@ -12,8 +12,6 @@
 
 namespace colonnade::mesh {
 
-using Triangle = std::array<Pair, 3>;
-
 /// What the faces of a material show: a texture times a colour.
 struct Paint {
     std::int32_t texture;  ///< -1: none

@@ -3,12 +3,11 @@
 
 #include <utility>
 
+#include "texture.hpp"
 #include "topology.hpp"
 
 namespace colonnade::mesh {
 
-/// A position (u, v), or a size: to the right and down.
-using Pair = std::array<double, 2>;
 using Cell = std::array<std::int64_t, 2>;
 
 /// Edge of a tile, texels.

@@ -2,11 +2,17 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 namespace colonnade::mesh {
+
+/// A position (u, v), or a size: to the right and down.
+using Pair = std::array<double, 2>;
+/// Positions (u, v) of the corners of a face.
+using Triangle = std::array<Pair, 3>;
 
 /// What lies beyond a picture.
 enum class Wrap { repeat, mirror, clamp };

@@ -1,10 +1,8 @@
 """Cuts away what the alpha of materials does not show: the device's surfaces have no alpha.
 
-A face whose texels are all below the cutoff is dropped. One with texels on both sides is split into four, the largest
-first, until its pieces are as small as a texel or the mesh has `MAX_SPLIT_FACES`. What is left is cut along a line.
-The alpha of corners multiplies that of the texture. Without one it is linear on a face, so the line is exact.
-Of blended materials the cutoff is 1/2, and faces that are thinner everywhere become tinted panes without refraction.
-Their factor is the coverage of the material, which passes show (`colonnade.mesh.materials.materials.in_pass`).
+``cpp/mesh/coverage.hpp`` cuts the faces of a material. Of blended materials the cutoff is 1/2, and faces that are
+thinner everywhere become tinted panes without refraction. Their factor is the coverage of the material, which passes
+show (`colonnade.mesh.materials.materials.in_pass`).
 """
 
 from __future__ import annotations
@@ -18,17 +16,12 @@ from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
-from colonnade.mesh.geometry.topology import MAX_SPLIT_FACES, SMALLEST_SPLIT, subdivide_corners, triangle_points
+from colonnade.mesh.geometry.topology import MAX_SPLIT_FACES, SMALLEST_SPLIT
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials.materials import Alpha, MeshMaterial
-from colonnade.mesh.materials.pixel_boxes import PixelCounts, pixel_boxes, unfolded
 from colonnade.mesh.materials.surface import RawSurface
-from colonnade.mesh.materials.texture import Texture
+from colonnade.mesh.materials.texture import LINEAR, Texture
 
-#: Steps of samples along an edge of a face, at most.
-_STEPS = 32
-#: Samples that are taken at a time.
-_SAMPLES = 1 << 21
 #: Blended faces of less alpha are not shown.
 _THIN = 0.05
 
@@ -45,7 +38,7 @@ class _Pieces:
     owners: Indices
     weights: Floats
 
-    def __getitem__(self, chosen: npt.NDArray[np.bool_] | Indices) -> _Pieces:
+    def __getitem__(self, chosen: Indices) -> _Pieces:
         return _Pieces(self.owners[chosen], self.weights[chosen])
 
     @classmethod
@@ -53,11 +46,61 @@ class _Pieces:
         owners = np.concatenate([part.owners for part in parts])
         return cls(owners, np.concatenate([part.weights for part in parts]))
 
-    def uvs(self, surface: RawSurface) -> Floats:
-        """Positions in their textures, float64 [k, 3, 2]."""
-        assert surface.uvs is not None
-        found: Floats = fixed_order.product(self.weights, surface.uvs[self.owners])
-        return found
+
+@dataclass(frozen=True)
+class _Cut:
+    """The cut of a material's faces.
+
+    Attributes:
+        kinds: 1 for faces that are shown, -1 for those that are hidden, 0 for those of which pieces are, int8 [m].
+        pieces: The shown pieces.
+        panes: Of a blended material, alpha and mean colour of hidden faces, float64 [m, 4].
+        is_coarse: Pieces ended before they were small enough.
+        is_blended: Of a blended material, faces show alpha that is neither opaque nor invisible.
+        filled: The texture with the nearest shown colour where it is hidden; None without alpha.
+    """
+
+    kinds: npt.NDArray[np.int8]
+    pieces: _Pieces
+    panes: Floats
+    is_coarse: bool
+    is_blended: bool
+    filled: Texture | None
+
+
+def _cut(
+    surface: RawSurface, faces: Indices, texture: Texture | None, alpha: Alpha, factor: float, budget: int
+) -> _Cut:
+    """Cut a material's faces by the alpha of its texture, if that has one, times that of their corners.
+
+    Args:
+        surface: The surface.
+        faces: Those of the material, int64 [m].
+        texture: Its texture; None: without.
+        alpha: What counts.
+        factor: Of the alpha of panes.
+        budget: The most faces that pieces add.
+    """
+    from colonnade import _core
+
+    corners = surface.vertices[surface.faces[faces]]
+    uvs = np.zeros((len(faces), 3, 2)) if surface.uvs is None else surface.uvs[faces]
+    alphas = np.ones((len(faces), 3)) if surface.alphas is None else surface.alphas[faces]
+    kinds, owners, weights, panes, is_coarse, is_blended, filled = _core.cut_alpha(
+        np.ascontiguousarray(corners),
+        np.ascontiguousarray(uvs),
+        np.ascontiguousarray(alphas),
+        None if texture is None else texture.compiled,
+        None if texture is None else texture.alpha,
+        LINEAR,
+        alpha.factor,
+        alpha.cutoff,
+        factor if alpha.blends else None,
+        float(np.ptp(surface.vertices, axis=0).max()) * SMALLEST_SPLIT,
+        budget,
+    )
+    whole = None if texture is None or texture.alpha is None else replace(texture, pixels=filled, alpha=None)
+    return _Cut(kinds, _Pieces(faces[owners], weights), panes, is_coarse, is_blended, whole)
 
 
 def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
@@ -94,19 +137,18 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
         if alpha.blends and alpha.factor > 0.0:
             materials[number] = replace(materials[number], coverage=alpha.factor)
             alpha = replace(alpha, factor=1.0)
-        cut = _Cut(surface, texture if has_mask else None, alpha, has_corners)
-        inside, mixed, outside = cut.sorted(faces)
-        whole.append(inside)
-        if len(mixed):
-            found = cut.pieces(mixed, max(budget, 0), losses)
-            budget -= len(found.owners) - len(mixed)
-            pieces.append(found)
+        cut = _cut(surface, faces, texture, alpha, material.alpha.factor, max(budget, 0))
+        whole.append(faces[cut.kinds > 0])
+        budget -= len(cut.pieces.owners) - int((cut.kinds == 0).sum())
+        pieces.append(cut.pieces)
+        losses.add(lost.COARSE_CUTS, cut.is_coarse)
         if material.alpha.blends:
-            panes.append(_panes(surface, texture, material.alpha.factor, outside))
-            losses.add(lost.BLENDED, int(cut.is_blended(faces)))
-        if has_mask:
+            seen = (cut.kinds < 0) & (cut.panes[:, 0] >= _THIN)
+            panes.append((faces[seen], cut.panes[seen]))
+            losses.add(lost.BLENDED, cut.is_blended)
+        if cut.filled is not None:
             materials[number] = replace(materials[number], texture=len(textures))
-            textures.append(cut.filled())
+            textures.append(cut.filled)
     surface = replace(surface, materials=tuple(materials), textures=tuple(textures))
     surface, thin = _with_panes(surface, panes)
     kept = np.sort(np.concatenate([*whole, thin]))
@@ -116,33 +158,20 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
     return _split(surface, found[np.argsort(found.owners, kind="stable")])
 
 
-def _panes(
-    surface: RawSurface, texture: Texture | None, factor: float, faces: Indices
-) -> tuple[Indices, Floats, Floats]:
-    """Of faces that are not opaque, those that can be seen, their alpha and the colour of their texture."""
-    weights = triangle_points(4)
-    alpha, colours = np.full((len(faces), len(weights)), factor), np.ones((len(faces), 3))
-    if surface.alphas is not None:
-        alpha *= fixed_order.product(weights, surface.alphas[faces][..., None])[..., 0]
-    if texture is not None and surface.uvs is not None and len(faces):
-        at = fixed_order.product(weights, surface.uvs[faces]).reshape(-1, 2)
-        alpha *= texture.alphas(at).reshape(len(faces), -1)
-        shown = texture.colours(at).reshape(len(faces), -1, 3) * alpha[..., None]
-        colours = shown.sum(axis=1) / np.maximum(alpha.sum(axis=1, keepdims=True), 1e-12)
-    mean = alpha.mean(axis=1)
-    seen = mean >= _THIN
-    return faces[seen], mean[seen], colours[seen]
+def _with_panes(surface: RawSurface, panes: list[tuple[Indices, Floats]]) -> tuple[RawSurface, Indices]:
+    """The surface with thin faces as panes of their tint, and these faces.
 
-
-def _with_panes(surface: RawSurface, panes: list[tuple[Indices, Floats, Floats]]) -> tuple[RawSurface, Indices]:
-    """The surface with thin faces as panes of their tint, and these faces, of their alpha and texture's colour."""
+    Args:
+        surface: The surface.
+        panes: Faces, int64 [k], and their alpha and texture's colour, float64 [k, 4].
+    """
     faces = np.concatenate([np.zeros(0, dtype=np.int64), *(pane[0] for pane in panes)])
     if not len(faces):
         return surface, faces
-    alpha = np.concatenate([pane[1] for pane in panes])[:, None]
+    alpha, shown = np.split(np.concatenate([pane[1] for pane in panes]), [1], axis=1)
     index = surface.material_index.copy()
     albedo = np.array([material.albedo for material in surface.materials])[index[faces]]
-    albedo = albedo * np.concatenate([pane[2] for pane in panes])
+    albedo = albedo * shown
     if surface.colours is not None:
         own = surface.colours[faces].mean(axis=1)
         albedo = np.where(np.isfinite(own), own, albedo)
@@ -154,140 +183,6 @@ def _with_panes(surface: RawSurface, panes: list[tuple[Indices, Floats, Floats]]
         colours[faces] = np.nan
     all_materials = (*surface.materials, *materials)
     return replace(surface, materials=all_materials, face_materials=index, colours=colours), faces
-
-
-class _Cut:
-    """The cut of a material's faces by the alpha of its texture, if that has one, times that of their corners."""
-
-    def __init__(self, surface: RawSurface, texture: Texture | None, alpha: Alpha, has_corners: bool) -> None:
-        self._surface, self._texture, self._alpha = surface, texture, alpha
-        self._corners = surface.alphas if has_corners else None
-        #: Least product of both that is shown.
-        self._least = alpha.cutoff / max(alpha.factor, 1e-6)
-        if texture is not None:
-            assert texture.alpha is not None
-            self._opaque = unfolded(texture.alpha >= self._least * 255.0, texture.wrap)
-            self._marked = [PixelCounts(marks, texture) for marks in (~self._opaque, self._opaque)]
-
-    def sorted(self, faces: Indices) -> tuple[Indices, Indices, Indices]:
-        """Faces that are shown, those on both sides of the cutoff, and those that are hidden."""
-        kinds = self._kinds(_Pieces(faces, np.repeat(np.eye(3)[None], len(faces), axis=0)))
-        return faces[kinds == 1], faces[kinds == 0], faces[kinds == -1]
-
-    def pieces(self, faces: Indices, budget: int, losses: Losses) -> _Pieces:
-        """The shown parts of faces, of at most so many more."""
-        surface = self._surface
-        corners = surface.vertices[surface.faces]
-        smallest = float(np.ptp(surface.vertices, axis=0).max()) * SMALLEST_SPLIT
-        mixed, shown = _Pieces(faces, np.repeat(np.eye(3)[None], len(faces), axis=0)), []
-        while True:
-            own = fixed_order.product(mixed.weights, corners[mixed.owners])
-            edges = np.linalg.norm(own - np.roll(own, -1, axis=1), axis=2).max(axis=1)
-            texels = self._texels(mixed)
-            can_split = (edges > smallest) & (texels > 1.0)
-            # Pieces of about the same size at a time, the largest of them within the budget
-            chosen = np.flatnonzero(can_split & (edges > 0.5 * edges[can_split].max(initial=0.0)))
-            chosen = chosen[np.argsort(-edges[chosen], kind="stable")][: budget // 3]
-            if not len(chosen):
-                break
-            budget -= 3 * len(chosen)
-            rest = np.ones(len(edges), dtype=np.bool_)
-            rest[chosen] = False
-            parts = _Pieces(np.repeat(mixed.owners[chosen], 4), subdivide_corners(mixed.weights[chosen]))
-            kinds = self._kinds(parts)
-            budget += int((kinds == -1).sum())
-            shown.append(parts[kinds == 1])
-            mixed = _Pieces.joined(mixed[rest], parts[kinds == 0])
-        losses.add(lost.COARSE_CUTS, int(can_split.any()))
-        return _Pieces.joined(*shown, self._cut_straight(mixed))
-
-    def is_blended(self, faces: Indices) -> bool:
-        """Whether faces show texels, or points between their corners, that are neither opaque nor invisible."""
-        if self._corners is not None:
-            alphas = self._corners[faces] * self._alpha.factor
-            if ((alphas.max(axis=1) > 0.01) & (alphas.min(axis=1) < 0.99)).any():
-                return True
-        if self._texture is None:
-            return False
-        assert self._surface.uvs is not None and self._texture.alpha is not None
-        alpha = unfolded(self._texture.alpha, self._texture.wrap) * self._alpha.factor
-        counts = PixelCounts((alpha > 2.0) & (alpha < 253.0), self._texture)
-        return bool(counts.within(*pixel_boxes(self._surface.uvs[faces], self._texture)).any())
-
-    def filled(self) -> Texture:
-        """The texture with the nearest shown colour where it is hidden, so that filters find no other."""
-        from scipy.ndimage import distance_transform_edt
-
-        assert self._texture is not None
-        height, width = self._texture.pixels.shape[:2]
-        shown = self._opaque[:height, :width]
-        if not shown.any():
-            return replace(self._texture, alpha=None)
-        rows, columns = distance_transform_edt(~shown, return_distances=False, return_indices=True)
-        return replace(self._texture, pixels=self._texture.pixels[rows, columns], alpha=None)
-
-    def _alphas(self, pieces: _Pieces, weights: Floats) -> Floats:
-        """Alpha at points of pieces, by the weights of their corners, without the factor, float64 [k, n]."""
-        found = np.ones((len(pieces.owners), len(weights)))
-        if self._texture is not None:
-            at = fixed_order.product(weights, pieces.uvs(self._surface))
-            found *= self._texture.alphas(at.reshape(-1, 2)).reshape(found.shape)
-        if self._corners is not None:
-            own = fixed_order.product(pieces.weights, self._corners[pieces.owners][..., None])
-            found *= fixed_order.product(weights, own)[..., 0]
-        return found
-
-    def _texels(self, pieces: _Pieces) -> Floats:
-        """Texels of the texture along the longer side of each piece, float64 [k]."""
-        if self._texture is None:
-            return np.zeros(len(pieces.owners))
-        return np.asarray(np.ptp(pieces.uvs(self._surface) * self._texture.size, axis=1).max(axis=1))
-
-    def _kinds(self, pieces: _Pieces) -> npt.NDArray[np.int8]:
-        """1 for pieces that are shown, -1 for those that are hidden, 0 for others, int8 [k]."""
-        if self._texture is None:
-            shown = self._alphas(pieces, np.eye(3)) >= self._least
-            return np.where(shown.all(axis=1), 1, np.where(shown.any(axis=1), 0, -1)).astype(np.int8)
-        kinds = np.zeros(len(pieces.owners), dtype=np.int8)
-        if self._corners is None:
-            first, last = pixel_boxes(pieces.uvs(self._surface), self._texture)
-            hides, shows = (marked.within(first, last) > 0 for marked in self._marked)
-            kinds = np.where(hides & shows, 0, np.where(shows, 1, -1)).astype(np.int8)
-        # The box of a face is larger than the face: look at its own texels
-        extent = self._texels(pieces)
-        fraction, exponent = np.frexp(np.maximum(extent, 1.0))
-        steps = np.clip(2 ** (exponent - (fraction == 0.5)).astype(np.int64), 2, _STEPS)  # the next power of two
-        for count in np.unique(steps[kinds == 0]):
-            weights = triangle_points(int(count))
-            asked = np.flatnonzero((kinds == 0) & (steps == count))
-            for chunk in np.array_split(asked, -(-len(asked) * len(weights) // _SAMPLES) or 1):
-                shown = (self._alphas(pieces[chunk], weights) >= self._least).mean(axis=1)
-                is_sure = extent[chunk] <= 2 * count
-                kinds[chunk] = np.where(is_sure & (shown == 1), 1, np.where(is_sure & (shown == 0), -1, 0))
-        return kinds
-
-    def _cut_straight(self, pieces: _Pieces) -> _Pieces:
-        """The shown side of pieces, cut where the alpha of their corners crosses the cutoff."""
-        above = self._alphas(pieces, np.eye(3)) - self._least
-        shown = above >= 0
-        count = shown.sum(axis=1)
-        found = [pieces[count == 3]]
-        for inside in (1, 2):
-            # The corner that is alone comes first
-            chosen = np.flatnonzero(count == inside)
-            alone = (shown[chosen] if inside == 1 else ~shown[chosen]).argmax(axis=1)
-            order = (alone[:, None] + np.arange(3)) % 3
-            own = np.take_along_axis(pieces.weights[chosen], order[:, :, None], axis=1)
-            value = np.take_along_axis(above[chosen], order, axis=1)
-            share = (value[:, :1] / (value[:, :1] - value[:, 1:]))[:, :, None]
-            tip, cut = own[:, :1], own[:, :1] + share * (own[:, 1:] - own[:, :1])
-            owners = pieces.owners[chosen]
-            if inside == 1:
-                found.append(_Pieces(owners, np.concatenate([tip, cut], axis=1)))
-            else:
-                found.append(_Pieces(owners, np.stack([cut[:, 0], own[:, 1], own[:, 2]], axis=1)))
-                found.append(_Pieces(owners, np.stack([cut[:, 0], own[:, 2], cut[:, 1]], axis=1)))
-        return _Pieces.joined(*found)
 
 
 def _split(surface: RawSurface, pieces: _Pieces) -> RawSurface:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
-from colonnade.mesh.materials.texture import Texture, sampled
+from colonnade.mesh.materials.texture import Texture
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,34 +24,6 @@ class NormalMap:
 
     texture: Texture
     scale: float = 1.0
-
-    @cached_property
-    def levels(self) -> tuple[npt.NDArray[np.float32], ...]:
-        """Unit normals of the pixels, and their means over squares of 2, 4, … pixels, float32 [height, width, 3]."""
-        codes = self.texture.pixels
-        table = np.float32(2 / 255) * np.arange(256, dtype=np.float32) - np.float32(1)
-        level = table[codes]
-        level[..., :2] *= np.float32(self.scale)
-        level[..., 2] = np.maximum(level[..., 2], 0)
-        length = np.sqrt(level[..., 0] ** 2 + level[..., 1] ** 2 + level[..., 2] ** 2)[..., None]
-        level = np.where(
-            length > 0, level / np.maximum(length, np.float32(1e-6)), np.array([0, 0, 1], dtype=np.float32)
-        )
-        found = [level]
-        while max(level.shape[:2]) > 1:
-            level = np.pad(level, ((0, level.shape[0] % 2), (0, level.shape[1] % 2), (0, 0)), mode="edge")
-            rows = level[::2] + level[1::2]
-            level = (rows[:, ::2] + rows[:, 1::2]) / np.float32(4)
-            found.append(level)
-        return tuple(found)
-
-    def normals(self, uvs: Floats, level: int) -> Floats:
-        """Means of the map near texture coordinates, float64 [n, 2]: bilinear in a level, float64 [n, 3].
-
-        The mean of unit normals that differ is shorter than 1.
-        """
-        pixels = self.levels[min(level, len(self.levels) - 1)]
-        return sampled(pixels, uvs, self.texture.wrap, self.texture.is_nearest and level == 0)
 
 
 @dataclass(frozen=True, eq=False)
