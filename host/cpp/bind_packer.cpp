@@ -206,18 +206,18 @@ nb::tuple cutAlpha(const CornerRows<double>& corners, const Positions& uvs, cons
         std::memcpy(&faces[i].uvs, uvs.data() + 6 * i, sizeof faces[i].uvs);
         std::memcpy(&faces[i].alphas, alphas.data() + 3 * i, sizeof faces[i].alphas);
     }
-    mesh::Picture<std::uint8_t> colours{nullptr, 0, 0, 3, {}, {}, false}, shown = colours;
+    mesh::Picture<std::uint8_t> colours{nullptr, 0, 0, 3, {}, {}, false}, visible = colours;
     if (texture) colours = pictureOf(*texture);
     if (texture && alpha) {
-        shown = colours;
-        shown.pixels = alpha->data();
-        shown.channels = 1;
-        if (shown.height != static_cast<std::int64_t>(alpha->shape(0)) || shown.width != static_cast<std::int64_t>(alpha->shape(1)))
+        visible = colours;
+        visible.pixels = alpha->data();
+        visible.channels = 1;
+        if (visible.height != static_cast<std::int64_t>(alpha->shape(0)) || visible.width != static_cast<std::int64_t>(alpha->shape(1)))
             throw std::invalid_argument("alpha is not of the picture's size");
     }
     std::vector<std::uint8_t> filled;
     const mesh::AlphaCut cut = released([&] {
-        mesh::Coverage coverage(colours, shown, linear.data(), factor, cutoff);
+        mesh::Coverage coverage(colours, visible, linear.data(), factor, cutoff);
         if (alpha) filled = coverage.filled();
         return mesh::cutAlpha(coverage, faces, smallest, budget, paneFactor);
     });
@@ -229,7 +229,7 @@ nb::tuple cutAlpha(const CornerRows<double>& corners, const Positions& uvs, cons
     }
     std::vector<double> panes;
     for (const mesh::Pane& pane : cut.panes) panes.insert(panes.end(), {pane.alpha, pane.colour[0], pane.colour[1], pane.colour[2]});
-    const auto width = static_cast<std::size_t>(shown.width), height = static_cast<std::size_t>(shown.height);
+    const auto width = static_cast<std::size_t>(visible.width), height = static_cast<std::size_t>(visible.height);
     return nb::make_tuple(arrayOf<std::int8_t>(cut.kinds, {faces.size()}), arrayOf<std::int64_t>(owners, {owners.size()}),
                           arrayOf<double>(weights, {weights.size(), 3, 3}), arrayOf<double>(panes, {cut.panes.size(), 4}), cut.isCoarse, cut.isBlended,
                           arrayOf<std::uint8_t>(filled, {height, width, 3}));
@@ -321,7 +321,7 @@ void bind_packer(nb::module_& module) {
                "Colours, texture coordinates and scale of an atlas; None for more paints than tiles. `textures` and `factors` are those of each face, -1 for none.");
     module.def("cut_alpha", &cutAlpha, "corners"_a, "uvs"_a, "alphas"_a, "texture"_a.none(), "alpha"_a.none(), "linear"_a, "factor"_a, "cutoff"_a, "pane_factor"_a.none(),
                "smallest"_a, "budget"_a,
-               "Kinds of faces, owners and weights of pieces, panes, whether cuts are coarse, whether blending is not shown, and the filled picture.");
+               "Kinds of faces, owners and weights of pieces, panes, whether cuts are coarse, whether blending is not visible, and the filled picture.");
     module.def("swatches", &swatches, "texture"_a, "uvs"_a, "linear"_a, "Which faces show one colour, and the linear colours of their corners.");
     module.def("baked", &baked, "vertices"_a, "faces"_a, "normals"_a, "maps"_a, "index"_a, "uvs"_a, "tangents"_a, "budget"_a);
     module.def("metal_of", &metalOf, "map"_a, "uvs"_a, "metallic"_a, "roughness"_a);

@@ -122,13 +122,13 @@ private:
         std::size_t users = 0;
         for (std::size_t i = first; i < count; ++i) users += hasMap(pieces_.pieces[i]);
         const std::vector<Vector> points = trianglePoints(stepsOf(users));
-        std::vector<Vector> asked{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-        asked.insert(asked.end(), points.begin(), points.end());
+        std::vector<Vector> samples{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+        samples.insert(samples.end(), points.begin(), points.end());
         std::vector<double> errors(count - first);
         for (std::size_t i = first; i < count; ++i) {
             const Piece& piece = pieces_.pieces[i];
             if (!hasMap(piece)) continue;
-            const std::vector<Vector> found = normalsAt(piece, asked, width);
+            const std::vector<Vector> found = normalsAt(piece, samples, width);
             double spread = 0;
             for (std::size_t at = 0; at < points.size(); ++at) {
                 const Vector apart = difference(found[3 + at], weighted(points[at], Corners{found[0], found[1], found[2]}));
@@ -156,18 +156,18 @@ private:
             for (std::size_t i = 0; i < errors.size(); ++i)
                 if (pieces_.longest(pieces_.pieces[i]) > shortest * shortest) splittable[i] = errors[i];
             const double least = near * *std::max_element(splittable.begin(), splittable.end());
-            std::vector<std::int64_t> chosen;
+            std::vector<std::int64_t> selected;
             for (std::size_t i = 0; i < splittable.size(); ++i)
-                if (splittable[i] > least) chosen.push_back(static_cast<std::int64_t>(i));
-            std::stable_sort(chosen.begin(), chosen.end(), [&](std::int64_t a, std::int64_t b) { return errors[a] > errors[b]; });
-            chosen.resize(std::min(chosen.size(), static_cast<std::size_t>(budget / 2)));
+                if (splittable[i] > least) selected.push_back(static_cast<std::int64_t>(i));
+            std::stable_sort(selected.begin(), selected.end(), [&](std::int64_t a, std::int64_t b) { return errors[a] > errors[b]; });
+            selected.resize(std::min(selected.size(), static_cast<std::size_t>(budget / 2)));
             const PieceEdges edges(pieces_);
-            std::vector<std::uint8_t> marked = edges.closed(chosen);
-            while (!chosen.empty() && edges.sides(marked) > budget) {
-                chosen.resize(chosen.size() / 2);
-                marked = edges.closed(chosen);
+            std::vector<std::uint8_t> marked = edges.closed(selected);
+            while (!selected.empty() && edges.sides(marked) > budget) {
+                selected.resize(selected.size() / 2);
+                marked = edges.closed(selected);
             }
-            if (chosen.empty()) break;
+            if (selected.empty()) break;
             std::vector<double> kept;
             for (std::size_t i = 0; i < errors.size(); ++i)
                 if (!edges.isHit(i, marked)) kept.push_back(errors[i]);

@@ -40,7 +40,7 @@ public:
           size_{static_cast<double>(alpha.width), static_cast<double>(alpha.height)} {
         if (!hasPicture()) return;
         hidden_.emplace(alpha_, [&](std::int64_t x, std::int64_t y) { return !isOpaque(x, y); });
-        shown_.emplace(alpha_, [&](std::int64_t x, std::int64_t y) { return isOpaque(x, y); });
+        visible_.emplace(alpha_, [&](std::int64_t x, std::int64_t y) { return isOpaque(x, y); });
     }
 
     /// The shown parts of faces on both sides of the cutoff, of at most so many more; edges are not split below a length.
@@ -58,17 +58,17 @@ public:
             }
             isCoarse = largest > 0;
             // Pieces of about the same size at a time, the largest of them within the budget
-            std::vector<std::size_t> chosen;
+            std::vector<std::size_t> selected;
             for (std::size_t i = 0; i < edges.size(); ++i)
-                if (edges[i] > 0.5 * largest) chosen.push_back(i);
-            std::stable_sort(chosen.begin(), chosen.end(), [&](std::size_t a, std::size_t b) { return edges[a] > edges[b]; });
-            chosen.resize(std::min(chosen.size(), static_cast<std::size_t>(std::max<std::int64_t>(budget, 0) / 3)));
-            if (chosen.empty()) break;
-            budget -= 3 * static_cast<std::int64_t>(chosen.size());
-            std::vector<bool> isChosen(mixed.size());
+                if (edges[i] > 0.5 * largest) selected.push_back(i);
+            std::stable_sort(selected.begin(), selected.end(), [&](std::size_t a, std::size_t b) { return edges[a] > edges[b]; });
+            selected.resize(std::min(selected.size(), static_cast<std::size_t>(std::max<std::int64_t>(budget, 0) / 3)));
+            if (selected.empty()) break;
+            budget -= 3 * static_cast<std::int64_t>(selected.size());
+            std::vector<bool> isSelected(mixed.size());
             std::vector<CutPiece> parts, rest;
-            for (const std::size_t i : chosen) {
-                isChosen[i] = true;
+            for (const std::size_t i : selected) {
+                isSelected[i] = true;
                 for (const Corners& weights : quarters(mixed[i].weights)) {
                     const CutPiece part{mixed[i].owner, weights};
                     const int kind = kindOf(faces, part);
@@ -78,7 +78,7 @@ public:
                 }
             }
             for (std::size_t i = 0; i < mixed.size(); ++i)
-                if (!isChosen[i]) rest.push_back(mixed[i]);
+                if (!isSelected[i]) rest.push_back(mixed[i]);
             rest.insert(rest.end(), parts.begin(), parts.end());
             mixed = std::move(rest);
         }
@@ -137,7 +137,7 @@ public:
 
 private:
     /// Steps of samples along an edge of a face, at most.
-    static constexpr int mostSteps = 32;
+    static constexpr int maxSteps = 32;
 
     bool hasPicture() const { return alpha_.pixels != nullptr; }
     double alphaAt(std::int64_t x, std::int64_t y) const {
@@ -188,20 +188,20 @@ private:
     int kindOf(const std::vector<CoveredFace>& faces, const CutPiece& piece) const {
         const CoveredFace part = partOf(faces, piece);
         const auto share = [&](const std::vector<Vector>& points) {
-            std::size_t shown = 0;
-            for (const Vector& point : points) shown += alphaAt(part, point) >= least_;
-            return shown == points.size() ? 1 : shown == 0 ? -1 : 0;
+            std::size_t visible = 0;
+            for (const Vector& point : points) visible += alphaAt(part, point) >= least_;
+            return visible == points.size() ? 1 : visible == 0 ? -1 : 0;
         };
         if (!hasPicture()) return share({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
         if (faces[piece.owner].alphas == Vector{1, 1, 1}) {
             const PixelBox box(part.uvs, size_);
-            if (!(hidden_->within(box) > 0)) return shown_->within(box) > 0 ? 1 : -1;
-            if (!(shown_->within(box) > 0)) return -1;
+            if (!(hidden_->within(box) > 0)) return visible_->within(box) > 0 ? 1 : -1;
+            if (!(visible_->within(box) > 0)) return -1;
         }
         // The box of a face is larger than the face: look at its own texels
         const double extent = texels(part.uvs);
         int steps = 2;
-        while (steps < mostSteps && steps < extent) steps *= 2;
+        while (steps < maxSteps && steps < extent) steps *= 2;
         return extent <= 2 * steps ? share(trianglePoints(steps)) : 0;
     }
 
@@ -242,7 +242,7 @@ private:
     const double* linear_;
     double factor_, least_;
     Pair size_;
-    std::optional<PixelCounts> hidden_, shown_, blended_;
+    std::optional<PixelCounts> hidden_, visible_, blended_;
 };
 
 /// What of a material's faces is shown.

@@ -6,7 +6,7 @@
 namespace colonnade::mesh {
 
 /// Faces of a mesh that is split, at most (host/colonnade/mesh/geometry/topology.py).
-constexpr std::int64_t mostSplitFaces = 49152;
+constexpr std::int64_t maxSplitFaces = 49152;
 
 struct Piece {
     Face face;
@@ -125,9 +125,9 @@ public:
     }
 
     /// The longest edges of these pieces, and those of all pieces that have one: so pieces do not become slivers.
-    std::vector<std::uint8_t> closed(const std::vector<std::int64_t>& chosen) const {
+    std::vector<std::uint8_t> closed(const std::vector<std::int64_t>& selected) const {
         std::vector<std::uint8_t> marked(keys_.size());
-        for (const std::int64_t piece : chosen) marked[longest_[piece]] = 1;
+        for (const std::int64_t piece : selected) marked[longest_[piece]] = 1;
         for (bool isDone = false; !isDone;) {
             isDone = true;
             for (std::size_t i = 0; i < longest_.size(); ++i)

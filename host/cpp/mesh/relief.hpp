@@ -107,7 +107,7 @@ inline std::vector<Frames> framesOf(const std::vector<Vector>& vertices, const s
         const Vector first = difference(vertices[faces[i][1]], corner), second = difference(vertices[faces[i][2]], corner);
         const Triangle& uvs = relief[i].uvs;
         const Pair one{uvs[1][0] - uvs[0][0], uvs[1][1] - uvs[0][1]}, other{uvs[2][0] - uvs[0][0], uvs[2][1] - uvs[0][1]};
-        const double turn = one[0] * other[1] - one[1] * other[0], sign = (turn > 0) - (turn < 0), area = length(cross(first, second));
+        const double signedArea = one[0] * other[1] - one[1] * other[0], sign = (signedArea > 0) - (signedArea < 0), area = length(cross(first, second));
         for (int axis = 0; axis < 3; ++axis) along[i][axis] = (first[axis] * other[1] - second[axis] * one[1]) * sign;
         along[i] = unit(along[i]);
         for (double& component : along[i]) component *= area;
