@@ -12,17 +12,24 @@ export class Corners {
     this.materials = [];
     this.uvs = [];
     this.metalUvs = [];
+    /** Of each face: the number of its normal map, positions in it and tangents of its corners; or null. */
+    this.reliefs = [];
+    this.alphas = [];
+    this.hasOwnColours = [];
     this.hasNormals = false;
     this.hasColours = false;
     this.notes = new Set();
   }
 
-  /** `material`: a number; `uvs`, `metalUvs`: positions in its textures; null for none, as of normals and colours. */
-  add(vertices, normals, colours, material = 0, uvs = null, metalUvs = null) {
+  /** `material`: a number; `uvs`, `metalUvs`: positions in its textures; null for none, as of normals and colours, of `relief` and of `alphas`. */
+  add(vertices, normals, colours, material = 0, uvs = null, metalUvs = null, relief = null, alphas = null) {
     for (let i = 1; i + 1 < vertices.length; ++i) {
       this.materials.push(material);
+      this.reliefs.push(relief);
+      this.hasOwnColours.push(Number(Boolean(colours)));
       for (const corner of [0, i, i + 1]) {
         this.faces.push(vertices[corner]);
+        this.alphas.push(alphas?.[corner] ?? 1);
         this.normals.push(...(normals?.[corner] ?? [0, 0, 0]));
         this.colours.push(...(colours?.[corner] ?? [1, 1, 1]));
         this.uvs.push(...(uvs?.[corner] ?? [0, 0]));
@@ -34,15 +41,25 @@ export class Corners {
     this.hasColours ||= Boolean(colours?.some(Boolean));
   }
 
+  /** The numbers of the faces' normal maps, -1 for none, positions in them and tangents of three corners each. */
+  relief() {
+    const none = { map: -1, uvs: Array(3).fill([0, 0]), tangents: Array(3).fill([0, 0, 0, 0]) };
+    const own = this.reliefs.map((relief) => relief ?? none);
+    return { mapOf: Int32Array.from(own, ({ map }) => map), uvs: Float64Array.from(own.flatMap(({ uvs }) => uvs.flat())), tangents: Float64Array.from(own.flatMap(({ tangents }) => tangents.flat())) };
+  }
+
   mesh(vertices) {
     return {
       vertices: Float64Array.from(vertices),
       faces: Int32Array.from(this.faces),
       normals: this.hasNormals ? Float64Array.from(this.normals) : null,
       colours: this.hasColours ? Float64Array.from(this.colours) : null,
+      alphas: this.alphas.some((alpha) => alpha < 1) ? Float64Array.from(this.alphas) : null,
+      hasOwnColours: Int32Array.from(this.hasOwnColours),
       materialOf: Int32Array.from(this.materials),
       uvs: Float64Array.from(this.uvs),
       metalUvs: Float64Array.from(this.metalUvs),
+      relief: this.reliefs.some(Boolean) ? this.relief() : null,
       notes: [...this.notes],
     };
   }

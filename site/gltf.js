@@ -28,7 +28,8 @@ export function readGltf(bytes, name, files) {
     for (const primitive of document.entry("meshes", node.mesh).primitives ?? []) addPrimitive(document, primitive, matrix, { corners, materials, vertices, left });
   for (const [noun, count] of Object.entries(left)) if (count > 0) corners.notes.add(`${grouped(count)} ${noun}${count > 1 ? "s are" : " is"} not shown: only faces are rendered`);
   if (json.animations || json.skins) corners.notes.add("animations and skins are left out");
-  return { ...corners.mesh(vertices), materials: materials.materials, textures: materials.textures };
+  const mesh = corners.mesh(vertices);
+  return { ...mesh, relief: mesh.relief && { ...mesh.relief, maps: materials.maps }, materials: materials.materials, textures: materials.textures };
 }
 
 /** The nodes with a mesh of the default scene, and their transforms to the scene. */
@@ -88,8 +89,10 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
     if (found?.some((uv) => !uv.every((value) => Math.abs(value) <= MOST_UV))) throw document.error(`a primitive has texture coordinates beyond ${grouped(MOST_UV)}, or not finite: export it again`);
     return found;
   };
-  const { base, metal } = materials.materials[material];
+  const { base, metal, relief, alpha } = materials.materials[material];
   const [uvs, metalUvs] = [positionsIn(base), positionsIn(metal)];
+  const reliefUvs = relief && attribute(relief.coordinates, 2);
+  if (relief && !reliefUvs) corners.notes.add("faces with a normal map are smooth: they have no texture coordinates of the map");
   if (base && !uvs) corners.notes.add("faces without texture coordinates show no texture");
 
   const first = vertices.length / 3;
@@ -97,12 +100,17 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
   const normalMatrix = cofactors(matrix);
   const isMirrored = determinant(matrix) < 0;
   const normalOf = (vertex) => transform(normalMatrix, normalAt(vertex), 0).map((value) => (isMirrored ? -value : value));
+  const side = isMirrored ? -1 : 1;
+  const tangentAt = reliefUvs && attribute("TANGENT", 4);
+  const tangentOf = (vertex) => (tangentAt ? [...transform(matrix, tangentAt(vertex), 0), side * Math.sign(tangentAt(vertex)[3])] : [0, 0, 0, 0]);
+  const reliefOf = (face) => ({ map: relief.map, uvs: face.map((vertex) => relief.place(reliefUvs(vertex))), tangents: face.map(tangentOf) });
   // A face without positions has its plain colour, a textured one none of its vertices
   const number = (base && !uvs) || (metal && !metalUvs) ? materials.without(material, !uvs, !metalUvs) : material;
   const colourOf = (vertex) => [...own(vertex).subarray(0, 3)].map((value) => Math.max(0, Math.min(1, value)));
+  const alphas = alpha && own?.(0).length === 4 && Array.from({ length: count }, (_, vertex) => Math.max(0, Math.min(1, own(vertex)[3])));
   for (const face of trianglesOf(indices.values, mode)) {
     if (isMirrored) face.reverse();
-    corners.add(face.map((vertex) => first + vertex), normalAt && face.map(normalOf), own && !uvs && face.map(colourOf), number, uvs && face.map((vertex) => uvs[vertex]), metalUvs && face.map((vertex) => metalUvs[vertex]));
+    corners.add(face.map((vertex) => first + vertex), normalAt && face.map(normalOf), own && !uvs && face.map(colourOf), number, uvs && face.map((vertex) => uvs[vertex]), metalUvs && face.map((vertex) => metalUvs[vertex]), reliefUvs && reliefOf(face), alphas && face.map((vertex) => alphas[vertex]));
   }
 }
 

@@ -8,7 +8,6 @@ const METAL = 0.5;
 const WRAPS = new Map([[33648, 1], [33071, 2]]);
 const NEAREST = 9728;
 const USED = ["transmission", "ior", "emissive_strength", "pbrSpecularGlossiness"].map((name) => `KHR_materials_${name}`);
-const LOST = { normalTexture: "normal maps", occlusionTexture: "occlusion maps" };
 
 const clamped = (value) => Math.max(0, Math.min(1, value));
 const number = (value, otherwise) => (Number.isFinite(value) ? value : otherwise);
@@ -21,6 +20,8 @@ export class GltfMaterials {
     this.notes = notes;
     this.materials = [];
     this.textures = [];
+    /** Normal maps: their number in `textures`, and the factor of their tangential components. */
+    this.maps = [];
     /** By use: the number in `materials`, and in `textures`. */
     this.numbers = new Map();
     this.places = new Map();
@@ -41,7 +42,7 @@ export class GltfMaterials {
     return this.materials.push(found) - 1;
   }
 
-  /** A material; `base`, `metal` and `emissive` are the uses of its textures, or null; `factors` those of metal and roughness. */
+  /** A material; `base`, `metal`, `emissive` and `relief` are the uses of its textures, or null; `factors` those of metal and roughness. */
   read(material) {
     const { extensions = {} } = material;
     const extension = (name) => extensions[`KHR_materials_${name}`] ?? {};
@@ -51,23 +52,33 @@ export class GltfMaterials {
     const strength = Math.max(0, number(extension("emissive_strength").emissiveStrength, 1));
     const emission = colour(colour(material.emissiveFactor, [0, 0, 0]).map((value) => strength * value), [0, 0, 0]);
     const given = number(extension("ior").ior, IOR);
+    const alpha = this.alphaOf(material, surface);
     const isGlass = number(extension("transmission").transmissionFactor, 0) > 0.5;
     const [base, metal] = [surface.baseColorTexture, surface.metallicRoughnessTexture].map((info) => this.use(info));
     const isMetal = !surface.metallicRoughnessTexture && metallic >= METAL;
-    for (const [name, what] of Object.entries(LOST)) if (material[name]) this.notes.add(`${what} are left out: the command line ${name === "normalTexture" ? "bakes" : "names"} them`);
-    if (["MASK", "BLEND"].includes(material.alphaMode)) this.notes.add("surfaces with alpha are opaque: the command line cuts them out");
+    if (material.occlusionTexture) this.notes.add("occlusion maps are left out: ambient light reaches all surfaces");
     for (const name of Object.keys(extensions)) if (!USED.includes(name)) this.notes.add(`${name} is ignored`);
     return {
       kind: isGlass ? "glass" : isMetal ? "mirror" : "diffuse",
-      albedo,
+      albedo: isGlass && alpha?.blends ? albedo.map((value) => 1 - alpha.factor * (1 - value)) : albedo,
+      alpha: isGlass ? null : alpha,
+      coverage: 1,
       ior: given > 1 ? Math.min(given, MOST_IOR) : IOR,
       roughness: isGlass || isMetal ? roughness : 0,
       emission: isMetal && roughness <= MIRROR_ROUGHNESS ? [0, 0, 0] : emission,
       base,
       metal: isGlass ? null : metal,
       factors: [metallic, number(surface.roughnessFactor, 1)],
+      relief: this.relief(material.normalTexture),
       emissive: emission.some(Boolean) ? this.use(material.emissiveTexture) : null,
     };
+  }
+
+  /** The alpha of a material: factor, what is shown from `cutoff` on, and whether it blends; or null. */
+  alphaOf({ alphaMode, alphaCutoff }, { baseColorFactor }) {
+    if (!["MASK", "BLEND"].includes(alphaMode)) return null;
+    const cutoff = alphaMode === "MASK" ? number(alphaCutoff, 0.5) : 0.5;
+    return { factor: clamped(number(baseColorFactor?.[3], 1)), cutoff: Math.max(0, Math.min(2, cutoff)), blends: alphaMode === "BLEND" };
   }
 
   /** @returns {any} The metallic-roughness part of a material, or what stands for it. */
@@ -75,6 +86,12 @@ export class GltfMaterials {
     if (!older) return surface;
     const { glossinessFactor, diffuseFactor, diffuseTexture } = older;
     return { metallicFactor: 0, roughnessFactor: 1 - number(glossinessFactor, 1), baseColorFactor: diffuseFactor, baseColorTexture: diffuseTexture };
+  }
+
+  /** The use of a normal map, with its number in `maps`; or null. */
+  relief(info) {
+    const found = this.use(info);
+    return found && { ...found, map: this.maps.push({ texture: found.texture, scale: number(info.scale, 1) }) - 1 };
   }
 
   /** The use of a texture: its number in `textures`, the name of the positions in it, and a function from the file's; or null. */

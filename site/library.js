@@ -5,6 +5,7 @@ import { designLines, registerWrites } from "./design.js";
 const PACKED = [
   "triangles", "recordCount", "nodes", "leaves", "hasColours", "lowX", "lowY", "lowZ", "highX", "highY",
   "highZ", "shadingOffset", "treeDepth", "stackBound", "dropped", "flipped", "replaced", "reversed",
+  "smoothed",
 ];
 /** Those of the register map that do not depend on time. */
 const COUNTERS = [
@@ -32,6 +33,16 @@ function surfaceBytes(surfaces) {
   surfaces.forEach(({ entry, isGlass, texture, hasColours, factor }, i) => {
     [entry, Number(isGlass), texture, Number(hasColours)].forEach((value, at) => view.setInt32(40 * i + 4 * at, value, true));
     factor.forEach((value, at) => view.setFloat64(40 * i + 16 + 8 * at, value, true));
+  });
+  return new Uint8Array(view.buffer);
+}
+
+/** The bytes of colonnade_normal_map. */
+function mapBytes(maps) {
+  const view = new DataView(new ArrayBuffer(8 * maps.length));
+  maps.forEach(({ texture, scale }, i) => {
+    view.setInt32(8 * i, texture, true);
+    view.setFloat32(8 * i + 4, scale, true);
   });
   return new Uint8Array(view.buffer);
 }
@@ -110,11 +121,12 @@ export class Library {
    * before. `surfaces` and `surfaceOf`, of each face, are those of surfacesOf (surfaces.js).
    */
   pack(mesh, { surfaces, surfaceOf } = { surfaces: [plainSurface(mesh)], surfaceOf: new Int32Array(mesh.faces.length / 3) }) {
-    const { name, vertices, faces, normals = null, colours = null, uvs = null, textures = [] } = mesh;
+    const { name, vertices, faces, normals = null, colours = null, uvs = null, textures = [], relief = null } = mesh;
     const used = textures.map((texture) => (texture.pixels ? texture : BLANK));
-    return this.withArrays([vertices, faces, normals, colours, uvs, surfaceOf, surfaceBytes(surfaces), new Int32Array(PACKED.length), ...used.map(({ pixels }) => pixels)], (v, f, n, c, u, of, s, out, ...pixels) =>
+    const reliefs = [relief && mapBytes(relief.maps), relief?.mapOf ?? null, relief?.uvs ?? null, relief?.tangents ?? null];
+    return this.withArrays([vertices, faces, normals, colours, uvs, surfaceOf, surfaceBytes(surfaces), new Int32Array(PACKED.length), ...reliefs, ...used.map(({ pixels }) => pixels)], (v, f, n, c, u, of, s, out, maps, mapOf, mapUvs, tangents, ...pixels) =>
       this.withArrays([Int32Array.from(used.flatMap((texture, i) => textureWords(texture, pixels[i])))], (t) => {
-        const given = Uint32Array.of(v, vertices.length / 3, f, faces.length / 3, n, c, u, of, s, t, used.length);
+        const given = Uint32Array.of(v, vertices.length / 3, f, faces.length / 3, n, c, u, of, s, t, used.length, maps, relief?.maps.length ?? 0, mapOf, mapUvs, tangents);
         this.withArrays([given], (pointer) => this.check(this.wasm.colonnade_model_pack(pointer, out), name && `mesh ${name}`));
         const values = new Int32Array(this.wasm.memory.buffer, out, PACKED.length);
         return Object.fromEntries(PACKED.map((name, index) => [name, values[index]]));
@@ -129,6 +141,42 @@ export class Library {
       this.withArrays([Int32Array.from(textureWords(texture, pixels))], (map) => {
         this.check(this.wasm.colonnade_model_metal(map, u, count, f, is, rough));
         return { isMetal: new Uint8Array(this.wasm.memory.buffer, is, count).slice(), roughness: new Float64Array(this.wasm.memory.buffer, rough, count).slice() };
+      }),
+    );
+  }
+
+  /**
+   * What of the faces of a material its alpha shows: `kinds`, the `owners` and `weights` of pieces, `panes`, and the pixels of
+   * the texture, `filled` (colonnade_cut). `corners`, `uvs` and `alphas` are of the faces, `values` and `budget` as there.
+   */
+  cut({ corners, uvs, alphas, texture, values, budget }) {
+    const count = alphas.length / 3;
+    const alpha = texture?.alpha ?? null;
+    return this.withArrays([corners, uvs, alphas, Float64Array.from(values), texture?.pixels ?? null, alpha, new Uint32Array(8)], (c, u, a, v, pixels, shown, out) =>
+      this.withArrays([texture ? Int32Array.from(textureWords(texture, pixels)) : null], (picture) => {
+        this.withArrays([Uint32Array.of(c, u, a, count, picture, shown, v, budget)], (job) => this.check(this.wasm.colonnade_model_cut(job, out)));
+        const [kinds, pieces, owners, weights, panes, isCoarse, isBlended, filled] = new Uint32Array(this.wasm.memory.buffer, out, 8);
+        const copy = (Values, from, length) => (from ? new Values(this.wasm.memory.buffer, from, length).slice() : new Values(0));
+        return {
+          kinds: copy(Int8Array, kinds, count),
+          owners: copy(Int32Array, pieces ? owners : 0, pieces),
+          weights: copy(Float64Array, weights, 9 * pieces),
+          panes: copy(Float64Array, panes, 4 * count),
+          isCoarse: isCoarse !== 0,
+          isBlended: isBlended !== 0,
+          filled: alpha && copy(Uint8Array, filled, texture.pixels.length),
+        };
+      }),
+    );
+  }
+
+  /** Which faces show one colour of a texture, and the colours of their corners; `uvs` of their corners in it. */
+  swatches(texture, uvs) {
+    const count = uvs.length / 6;
+    return this.withArrays([texture.pixels, uvs, new Uint8Array(count), new Float64Array(9 * count)], (pixels, u, is, colours) =>
+      this.withArrays([Int32Array.from(textureWords(texture, pixels))], (picture) => {
+        this.check(this.wasm.colonnade_model_swatches(picture, u, count, is, colours));
+        return { isPlain: new Uint8Array(this.wasm.memory.buffer, is, count).slice(), colours: new Float64Array(this.wasm.memory.buffer, colours, 9 * count).slice() };
       }),
     );
   }

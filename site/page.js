@@ -13,7 +13,7 @@ import { Renderer, bytesOf, unpack } from "./renderer.js";
 import { RtlPanel } from "./rtlpanel.js";
 import { DEFAULTS, RANGES, followOf, followText, readState, writeState } from "./state.js";
 import { surfaceOf } from "./view.js";
-import { kindFor, placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
+import { hasRoom, placeOf, placedRoom, templateFor, visitorRoom } from "./visitor.js";
 
 const MOST_WORKERS = 8;
 /** A level surface so near to a double click counts, pixels of the maps. */
@@ -33,8 +33,8 @@ const page = (globalThis.colonnade = { frames: 0, picture: null });
 
 /** The room of the state, as the hardware has it; null if it has no maps. */
 function roomOf() {
-  const kind = kindFor(data.rooms[state.room], state.design);
-  return kind ? { ...data.rooms[state.room], ...kind } : null;
+  const room = data.rooms[state.room];
+  return hasRoom(room, state.design) ? room : null;
 }
 
 const scene = () => ({ state, mesh: page.mesh, manifest, packed });
@@ -54,7 +54,6 @@ function showNotes() {
 async function openDesign() {
   opened = { design: state.design, room: state.room };
   manifest = data.manifests[state.design];
-  await completeRoom(data.rooms[state.room]);
   const room = roomOf();
   const files = room ? room.views[state.design] : { plain: data.views[state.design] };
   const views = Object.fromEntries(Object.entries(files).map(([name, text]) => [name, bytesOf(text)]));
@@ -156,15 +155,6 @@ async function openRoom(found, files) {
   data.rooms[found.photo] = page.room = room;
   Object.assign(state, { design, room: found.photo, ...ROOM_START, azimuth: START.azimuth });
   await changeDesign();
-}
-
-/** Makes a visitor's room for the design, if it is another kind of one that has maps. */
-async function completeRoom(room) {
-  if (!room?.files || kindFor(room, state.design)) return;
-  const { template, design } = templateFor(data.rooms, state.design);
-  if (design !== state.design) return;
-  const { found, files, settings } = room.files;
-  Object.assign(room, await visitorRoom(renderer, manifest, template, found, files, settings, room.place));
 }
 
 /** Stands the object of a visitor's room on the surface at a pixel. */
@@ -340,7 +330,7 @@ async function start() {
   listDesigns(data);
   element("about").textContent = `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
   renderer = page.renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));
-  const now = () => ({ scene: scene(), room: roomOf(), discs: data.discs, isReady: Boolean(packed) && !queue.isBusy && isWhole() });
+  const now = () => ({ scene: scene(), room: roomOf(), samples: data.samples, isReady: Boolean(packed) && !queue.isBusy && isWhole() });
   picture = new Picture({ renderer, page, now, drawn: () => ray.draw(), fail: failWhenIdle });
   state = linkedState();
   const { mesh, follow: followed } = state;

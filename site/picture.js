@@ -6,7 +6,7 @@ import { passesOf, viewOf } from "./view.js";
 const COARSE = 4;
 
 /**
- * `now()` gives what is to be shown: the scene (view.js), its room or null, `discs` of lights, and `isReady`: design, room
+ * `now()` gives what is to be shown: the scene (view.js), its room or null, `samples` of passes (viewOf), and `isReady`: design, room
  * and mesh are those of the state. `page` has what tests read. `drawn()` is called after each frame, `fail(error)` for errors.
  */
 export class Picture {
@@ -73,8 +73,8 @@ export class Picture {
   }
 
   view(width, height, sample) {
-    const { scene, room, discs } = this.now();
-    return viewOf(scene, room, width, height, scene.state, sample, discs);
+    const { scene, room, samples } = this.now();
+    return viewOf(scene, room, width, height, scene.state, sample, samples);
   }
 
   /** Adds up the passes of the picture while nothing changes. */

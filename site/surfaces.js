@@ -12,7 +12,7 @@ const [KEPT_PIXELS, MOST_PIXELS] = [1 << 25, 1 << 29];
 /** The share of light that microfacets reflect at once (docs/gather.md). */
 export const microfacetAlbedo = (roughness) => 1 - roughness ** 4 / (0.25 + 0.9 * roughness ** 2 + 0.55 * roughness ** 4);
 
-/** The pixels of a picture's bytes, red, green and blue. */
+/** The pixels of a picture's bytes, red, green and blue, and their alpha; null if all are opaque. */
 async function decodedPicture(bytes) {
   const bitmap = await createImageBitmap(new Blob([bytes]), { premultiplyAlpha: "none", colorSpaceConversion: "none" });
   const { width, height } = bitmap;
@@ -20,7 +20,8 @@ async function decodedPicture(bytes) {
   const context = new OffscreenCanvas(width, height).getContext("2d");
   context.drawImage(bitmap, 0, 0);
   const { data } = context.getImageData(0, 0, width, height);
-  return { width, height, pixels: Uint8Array.from({ length: 3 * width * height }, (_, i) => data[4 * Math.floor(i / 3) + (i % 3)]) };
+  const alpha = Uint8Array.from({ length: width * height }, (_, i) => data[4 * i + 3]);
+  return { width, height, alpha: alpha.some((value) => value < 255) ? alpha : null, pixels: Uint8Array.from({ length: 3 * width * height }, (_, i) => data[4 * Math.floor(i / 3) + (i % 3)]) };
 }
 
 /** Decodes the pictures of a mesh's textures; surfaces of one that cannot be have their plain colours. */
@@ -28,18 +29,19 @@ export async function decodePictures(mesh, decodePicture = decodedPicture) {
   for (const texture of mesh.textures ?? []) Object.assign(texture, texture.picture ? await decodePicture(texture.picture).catch(() => null) : null);
   const isMissing = (use) => use && !mesh.textures[use.texture].pixels;
   for (const material of mesh.materials ?? [])
-    for (const name of ["base", "metal", "emissive"])
+    for (const name of ["base", "metal", "emissive", "relief"])
       if (isMissing(material[name])) {
         material[name] = null;
         mesh.notes.push("pictures of textures are missing, damaged or of another format than PNG, JPEG and WebP: their surfaces have plain colours");
       }
+  if (mesh.relief) mesh.relief.mapOf = mesh.relief.mapOf.map((map) => (map < 0 || isMissing(mesh.relief.maps[map]) ? -1 : map));
   while ((mesh.textures ?? []).reduce((sum, { pixels }) => sum + (pixels?.length ?? 0) / 3, 0) > KEPT_PIXELS) mesh.textures.forEach(halve);
   mesh.notes = [...new Set(mesh.notes)];
 }
 
 /** Every second pixel of a texture, as the mean of the four. */
 function halve(texture) {
-  const { width, height, pixels } = texture;
+  const { width, height, pixels, alpha } = texture;
   if (!pixels) return;
   const [columns, rows] = [width, height].map((length) => Math.ceil(length / 2));
   const at = (x, y, channel) => pixels[3 * (Math.min(y, height - 1) * width + Math.min(x, width - 1)) + channel];
@@ -47,6 +49,9 @@ function halve(texture) {
     const [x, y, channel] = [2 * (Math.floor(i / 3) % columns), 2 * Math.floor(i / 3 / columns), i % 3];
     return (at(x, y, channel) + at(x + 1, y, channel) + at(x, y + 1, channel) + at(x + 1, y + 1, channel)) / 4;
   };
+  const alphaAt = (x, y) => alpha[Math.min(y, height - 1) * width + Math.min(x, width - 1)];
+  const alphaMean = (x, y) => (alphaAt(x, y) + alphaAt(x + 1, y) + alphaAt(x, y + 1) + alphaAt(x + 1, y + 1)) / 4;
+  if (alpha) texture.alpha = Uint8Array.from({ length: columns * rows }, (_, i) => alphaMean(2 * (i % columns), 2 * Math.floor(i / columns)));
   Object.assign(texture, { width: columns, height: rows, pixels: Uint8Array.from({ length: 3 * columns * rows }, (_, i) => mean(i)) });
 }
 
@@ -67,7 +72,7 @@ function rendered(material, gathers, hasBounces) {
 }
 
 /** An entry of the material table, in values that a message holds. */
-const entryOf = ({ kind, roughness, ior, albedo, emission, isTextured }, hasCorners) => ({ kind, roughness, ior, albedo, emission, hasColours: hasCorners && !isTextured, hasTexture: isTextured });
+const entryOf = ({ kind, roughness, ior, albedo, emission, coverage, isTextured, isCorner }) => ({ kind, roughness, ior, albedo, emission, coverage, hasColours: isCorner && !isTextured, hasTexture: isTextured });
 
 /** The areas of faces. */
 function areasOf({ vertices, faces }) {
@@ -78,27 +83,6 @@ function areasOf({ vertices, faces }) {
   });
 }
 
-/** The materials of a mesh with those of metallic-roughness maps, and that of each face. */
-function mapped(library, { materials, materialOf, metalUvs, textures }) {
-  const found = [...materials];
-  const numbers = new Map();
-  const faces = Int32Array.from(materialOf);
-  materials.forEach((material, number) => {
-    if (!material.metal || material.kind !== "diffuse") return;
-    const own = [...materialOf.keys()].filter((face) => materialOf[face] === number);
-    const uvs = Float64Array.from(own.flatMap((face) => [...metalUvs.subarray(6 * face, 6 * face + 6)]));
-    const { isMetal, roughness } = library.metal(textures[material.metal.texture], uvs, material.factors);
-    own.forEach((face, i) => {
-      if (!isMetal[i]) return;
-      const key = [number, roughness[i]].join();
-      const emission = roughness[i] > MIRROR_ROUGHNESS ? material.emission : [0, 0, 0];
-      if (!numbers.has(key)) numbers.set(key, found.push({ ...material, kind: "mirror", roughness: roughness[i], emission }) - 1);
-      faces[face] = numbers.get(key);
-    });
-  });
-  return { found, faces };
-}
-
 /**
  * The materials of a file on a design: `entries` of its table, as `rendered` has them, `surfaces` and `surfaceOf` for
  * Library.pack, and notes. `gathers` and `headroom` are those of the frame.
@@ -106,20 +90,26 @@ function mapped(library, { materials, materialOf, metalUvs, textures }) {
 export function surfacesOf(library, mesh, { manifest, gathers, headroom }) {
   const most = manifest.config.frame.materials;
   const notes = [];
-  const { found, faces } = mapped(library, mesh);
+  const [hasTextures, hasCorners, hasBounces] = [Boolean(manifest.texture), hasRegister(manifest, "materials[0].hasCornerColours"), manifest.config.frame.maxBounces > 0];
+  const faces = mesh.materialOf;
+  const found = mesh.materials.map((material) => (hasCorners ? material : (material.ofTexture ?? material)));
   const areas = new Float64Array(found.length);
   areasOf(mesh).forEach((area, face) => (areas[faces[face]] += area));
-  const [hasTextures, hasCorners, hasBounces] = [Boolean(manifest.texture), hasRegister(manifest, "materials[0].hasCornerColours"), manifest.config.frame.maxBounces > 0];
+  const coloured = new Set(hasCorners ? faces.filter((number, face) => mesh.hasOwnColours[face] || found[number].ofTexture) : []);
   const means = mesh.textures.map((texture) => (texture.pixels ? meanOf(texture) : null));
-  const prepared = found.map((material) => {
+  const plain = found.map((material, number) => {
     const scaled = (colour, use) => (use ? colour.map((value, i) => value * means[use.texture][i]) : colour);
     const isTextured = Boolean(material.base) && hasTextures;
     if (material.base && !hasTextures) notes.push("this hardware has no textures: their surfaces have mean colours");
     const emission = scaled(material.emission, material.emissive);
-    return { ...material, emission, isTextured, paint: material.albedo, albedo: isTextured ? material.albedo : scaled(material.albedo, material.base) };
+    return { ...material, emission, isTextured, isCorner: coloured.has(number), paint: material.albedo, albedo: isTextured ? material.albedo : scaled(material.albedo, material.base) };
   });
   /** What materials differ in that share no entry: the colours of textures and corners are of no account. */
-  const keyOf = ({ kind, ior, emission, isTextured, albedo }) => JSON.stringify([kind, kind === "glass" && ior, emission, isTextured, !isTextured && !hasCorners && albedo]);
+  const keyOf = ({ kind, ior, emission, coverage, isTextured, isCorner, albedo }) => JSON.stringify([kind, kind === "glass" && ior, emission, coverage, isTextured, isTextured || isCorner || albedo]);
+  const shown = (materials) => materials.map((material) => rendered(material, gathers, hasBounces));
+  const distinct = (materials) => new Set(materials.filter((_, i) => areas[i] > 0).map((one) => keyOf(one) + one.roughness)).size;
+  // Plain colours that do not fit move to the corners
+  const prepared = distinct(shown(plain)) > most && hasCorners ? plain.map((material) => ({ ...material, isCorner: true })) : plain;
   const merge = () => {
     const kinds = [...new Set(prepared.map(keyOf))];
     const merged = library.merged(prepared.map(({ roughness }) => roughness), areas, prepared.map((one) => kinds.indexOf(keyOf(one))), most);
@@ -127,19 +117,19 @@ export function surfacesOf(library, mesh, { manifest, gathers, headroom }) {
     if (changed) notes.push(`the roughness of ${changed} materials is that of similar ones: this hardware has ${most}`);
     return prepared.map((material, i) => ({ ...material, roughness: merged[i] }));
   };
-  const shown = (materials) => materials.map((material) => rendered(material, gathers, hasBounces));
-  const distinct = (materials) => new Set(materials.map((one) => keyOf(one) + one.roughness)).size;
-  const used = (materials) => materials.filter((_, i) => areas[i] > 0);
-  const all = shown(distinct(used(shown(prepared))) > most ? merge() : prepared);
+  const all = shown(distinct(shown(prepared)) > most ? merge() : prepared);
   const entries = [];
   const places = new Map();
-  const order = [...all.keys()].sort((a, b) => areas[b] - areas[a]);
+  // As the host's table, or the largest first
+  const rankOf = (number) => 4 * Number(areas[number] === 0) + (all[number].isTextured ? 1 : 2 * Number(all[number].isCorner));
+  const isFull = distinct(all) > most;
+  const order = [...all.keys()].sort((a, b) => (isFull ? areas[b] - areas[a] : rankOf(a) - rankOf(b)));
   const near = (a, b) => 4 * Number(a.hasTexture !== b.isTextured) + 2 * Number(a.kind !== b.kind) + Math.abs(a.roughness - b.roughness) + a.albedo.reduce((sum, value, i) => sum + Math.abs(value - b.albedo[i]), 0) / 3;
   const surfaces = [];
   for (const number of order) {
     const material = all[number];
     const key = keyOf(material) + material.roughness;
-    if (!places.has(key) && entries.length < most) places.set(key, entries.push(entryOf(material, hasCorners)) - 1);
+    if (!places.has(key) && entries.length < most) places.set(key, entries.push(entryOf(material)) - 1);
     if (!places.has(key)) {
       const candidates = entries.map((entry, i) => ({ i, apart: near(entry, material) })).sort((a, b) => a.apart - b.apart);
       places.set(key, candidates[0].i);
@@ -149,7 +139,7 @@ export function surfacesOf(library, mesh, { manifest, gathers, headroom }) {
     const isDiffuse = material.kind === "diffuse";
     surfaces[number] = {
       entry,
-      isGlass: entries[entry].kind === "glass",
+      isGlass: entries[entry].kind === "glass" || entries[entry].coverage < 0.5,
       texture: material.isTextured && entries[entry].hasTexture ? material.base.texture : -1,
       hasColours: entries[entry].hasColours,
       factor: (material.isTextured ? material.paint : material.albedo).map((value) => value / (isDiffuse ? headroom : 1)),

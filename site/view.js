@@ -9,6 +9,8 @@ import { microfacetAlbedo } from "./surfaces.js";
 const LIGHT = [1.2, 1.6, 1.5];
 const GLASS = 1.5;
 const ROUGHNESS = 0.45;
+/** Of a pass's threshold of coverage, between entries (host/colonnade/scene/samples.py). */
+const GOLDEN = (Math.sqrt(5) - 1) / 2;
 /** Passes of a frame that rests, with gathered light and without. */
 const PASSES = [4, 64];
 
@@ -29,6 +31,17 @@ export function materialOf(scene, room) {
 
 /** What packing needs to know of surfaces (worker.js). */
 export const surfaceOf = (scene, room) => ({ material: materialOf(scene, room), gathers: gathers(scene, room), headroom: room?.headroom ?? 1 });
+
+/** An entry in a pass of this threshold, or in the only one: itself or clear, as often as its coverage says. */
+function inPass(entry, index, threshold) {
+  if (!(entry.coverage < 1)) return entry;
+  const clear = { kind: "glass", albedo: [1, 1, 1], roughness: 0, ior: 1, emission: [0, 0, 0], hasColours: false, hasTexture: false };
+  if (threshold !== null) return (threshold + index * GOLDEN) % 1 < entry.coverage ? entry : clear;
+  return entry.coverage < 0.5 ? { ...clear, albedo: entry.albedo.map((value) => 1 - entry.coverage * (1 - value)) } : entry;
+}
+
+/** The registers of the material table's entries, in a pass of this threshold. */
+export const tableRegisters = (entries, frame, threshold = null) => Object.assign({}, ...entries.map((entry, index) => entryRegisters(index, inPass(entry, index, threshold), frame)));
 
 /** The registers of an entry of the material table, as host/colonnade/registers/shading.py has them. */
 function entryRegisters(index, { kind, roughness, ior, albedo, emission, hasColours, hasTexture }, { headroom, exposure, numbers }) {
@@ -69,7 +82,7 @@ function entriesOf(scene, room) {
 }
 
 /** The registers that the mesh and the controls set. */
-function registersOf(scene, room) {
+function registersOf(scene, room, threshold) {
   const { state, manifest, packed } = scene;
   const { numbers, config } = manifest;
   const white = 2 ** numbers.colourBits - 1;
@@ -78,7 +91,7 @@ function registersOf(scene, room) {
   const registers = {
     ...(room ? {} : rgb("background", colourOf(state.background))),
     ...(room?.encoded ? roomRegisters(room, manifest) : {}),
-    ...Object.assign({}, ...entriesOf(scene, room).map((entry, index) => entryRegisters(index, entry, frame))),
+    ...tableRegisters(entriesOf(scene, room), frame, threshold),
     "bounds.low.x": packed.lowX, "bounds.low.y": packed.lowY, "bounds.low.z": packed.lowZ,
     "bounds.high.x": packed.highX, "bounds.high.y": packed.highY, "bounds.high.z": packed.highZ,
     "scene.recordCount": packed.recordCount,
@@ -100,11 +113,14 @@ export function poseIn({ manifest, packed }, room, orbit) {
 
 /**
  * A frame in a room, or without one. In a room an orbit turns the object, and moves the camera from that of the maps.
- * `sample`: index and count of a pass; `discs`: the points of lights' discs in each pass, by the number of passes.
+ * `sample`: index and count of a pass; `samples`: by the number of passes, for each the points of lights' discs, and by the
+ * number of lights the threshold of coverage.
  */
-export function viewOf(scene, room, width, height, orbit, sample = null, discs = {}) {
-  const registers = registersOf(scene, room);
-  const points = sample ? discs[sample.count][sample.index] : [];
+export function viewOf(scene, room, width, height, orbit, sample = null, samples = {}) {
+  const { discs, coverage } = sample ? samples[sample.count] : {};
+  const threshold = coverage?.[room ? (room.light?.lamps.length ?? 0) : 1][sample.index];
+  const registers = registersOf(scene, room, threshold ?? null);
+  const points = discs?.[sample.index] ?? [];
   if (room) {
     const inPhoto = Boolean(scene.state.photo) && isAtMaps(orbit);
     // Where there is no photo, the room is the device's

@@ -12,13 +12,12 @@ const LAMP_SHARE = 0.2;
 /** Points of its outline in edges, right and up, which nothing should hide. */
 const OUTLINE = [[0, 1], [-0.5, 0.5], [0.5, 0.5]];
 
-/** What a room has for a design (tools/browser/rooms.py); undefined if it has nothing. */
-export const kindFor = (room, design) => room?.kinds.find(({ views }) => design in views);
+/** Whether a design has a room (tools/browser/rooms.py). */
+export const hasRoom = (room, design) => Boolean(room && design in room.views);
 
 /** The room of the page whose view files are templates, and a design that has maps: the wanted one, if it has. */
 export function templateFor(rooms, wanted) {
-  const design = kindFor(rooms.living, wanted) ? wanted : "small";
-  return { template: { ...rooms.living, ...kindFor(rooms.living, design) }, design };
+  return { template: rooms.living, design: hasRoom(rooms.living, wanted) ? wanted : "small" };
 }
 
 /**
@@ -59,7 +58,12 @@ export async function placedRoom(renderer, room, template, place) {
     place,
     object,
     camera: { position: pose.position, right: axis(0), down: axis(1), forward: axis(2), lens: [lens.fx, lens.cx, lens.cy, lens.fy].map((value) => value / height) },
-    kinds: [{ views, maps: encoded.maps, headroom, encoded, ambient, light }],
+    views,
+    maps: encoded.maps,
+    headroom,
+    encoded,
+    ambient,
+    light,
     width,
     height,
   };

@@ -1,5 +1,6 @@
 // A worker with a model of its own. The first one packs meshes, and gives their records to the others.
 
+import { prepared } from "./coverage.js";
 import { readDepth } from "./depth.js";
 import { codesOf, encodeStill } from "./encoder.js";
 import { Library, plainSurface } from "./library.js";
@@ -50,7 +51,7 @@ export function serve(scope) {
     async read({ name, bytes, files }) {
       const found = readMesh(name, bytes, files);
       await decodePictures(found);
-      read = found;
+      read = prepared(library, found);
       const { vertices, faces, colours, materials, notes } = read;
       return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, hasMaterials: Boolean(materials), notes };
     },

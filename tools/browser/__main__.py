@@ -64,7 +64,7 @@ def main() -> None:
         "studies": found,
         "sliders": sliders,
         "rooms": {name: rooms.room_data(name, presets) for name in rooms.PLACEMENTS},
-        "discs": rooms.discs(),
+        "samples": rooms.samples(),
         "cycles": designs.recorded(texts),
         "views": {name: bundle.base64_text(view) for name, view in views.items()},
     }

@@ -42,20 +42,12 @@ PASSES, LIGHTS = (4, 64), 2
 
 
 def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
-    """A room with a cube in it for each design that has maps. In the page other meshes stand on the cube's floor."""
-    designs = {design: one for design, one in manifests.items() if one.attributes is not None}
-    groups = [{design: one for design, one in designs.items() if one.gathers == gathers} for gathers in (True, False)]
-    kinds = [_kind(name, group) for group in groups if group]
-    rooms = [kind.pop("room") for kind in kinds]
-    return {**rooms[0], "kinds": kinds}
-
-
-def _kind(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
-    """What designs with maps have that all gather light, or all do not; "room" is the same for both.
+    """A room with a cube in it for each design that has maps. In the page other meshes stand on the cube's floor.
 
     Raises:
         ValueError: The designs do not have the same maps.
     """
+    manifests = {design: one for design, one in manifests.items() if one.attributes is not None}
     scene = load_scene(SCENE)
     background = replace(scene.background, room=ROOT / "scenes" / "rooms" / name)
     scene = replace(scene, background=background, placement=PLACEMENTS[name])
@@ -80,14 +72,17 @@ def _kind(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     photo = io.BytesIO()
     Image.fromarray(ready.photo).save(photo, "JPEG", quality=88, subsampling=0)
     light = _light(ready) if ready.scene.paths.gather else None
-    room = {"photo": base64_text(photo.getvalue()), **_poses(ready)}
-    return {"views": views, "maps": maps, "headroom": ready.scene.headroom, "light": light, "room": room}
+    found = {"views": views, "maps": maps, "headroom": ready.scene.headroom, "light": light}
+    return {"photo": base64_text(photo.getvalue()), **_poses(ready), **found}
 
 
-def discs() -> dict[int, list[list[list[float]]]]:
-    """The points of lights' discs in each pass of a frame, by the number of its passes."""
+def samples() -> dict[int, dict[str, Any]]:
+    """By the number of passes of a frame: points of lights' discs in each, and its coverage by the number of lights."""
     return {
-        count: [[list(point) for point in sample.lights] for sample in samples_of_frame(count, LIGHTS)]
+        count: {
+            "discs": [[list(point) for point in sample.lights] for sample in samples_of_frame(count, LIGHTS)],
+            "coverage": [[each.coverage for each in samples_of_frame(count, lights)] for lights in range(LIGHTS + 1)],
+        }
         for count in PASSES
     }
 

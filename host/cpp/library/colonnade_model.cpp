@@ -6,8 +6,11 @@
 
 #include "live/vector_map.hpp"
 #include "mesh/atlas.hpp"
+#include "mesh/baking.hpp"
 #include "mesh/cleaning.hpp"
+#include "mesh/coverage.hpp"
 #include "mesh/roughness.hpp"
+#include "mesh/swatches.hpp"
 #include "model/frame.hpp"
 #include "packer/records.hpp"
 #include "packer/surface_offset.hpp"
@@ -29,12 +32,37 @@ struct Register {
     bool isSigned;
 };
 
+/// What a packed face is of a face of the mesh: the whole, or a part by weights of its corners.
+struct Part {
+    std::int64_t source;
+    bool isReversed;
+    mesh::Corners weights;
+
+    /// Values at its corners, of three for each face of the mesh.
+    template <class Value> std::array<Value, 3> corners(const double* values) const {
+        std::array<Value, 3> own;
+        std::memcpy(&own, values + 3 * own[0].size() * source, sizeof own);
+        if (isReversed) std::reverse(own.begin(), own.end());
+        return mesh::weighted(weights, own);
+    }
+};
+
 /// A mesh and what its records were made of; the packer refers to the others.
 struct Packed {
     mesh::CleanMesh clean;
+    std::vector<Part> parts;  ///< of each face
+    double apart = 0;         ///< of corner normals and normal maps, radians
     packer::QuantisedMesh quantised;
     bvh::Bvh tree;
     std::unique_ptr<packer::RecordPacker> packer;
+};
+
+/// A cut by alpha, as the caller reads it.
+struct Cut {
+    mesh::AlphaCut found;
+    std::vector<std::int32_t> owners;
+    std::vector<mesh::Corners> weights;
+    std::vector<std::uint8_t> filled;
 };
 
 struct Library {
@@ -55,6 +83,7 @@ struct Library {
     std::array<double, 11> counters;
     std::vector<RayStep> steps;
     std::vector<colonnade_step> result;
+    Cut cut;
 
     int number(const char* name) const { return static_cast<int>(lookUp(numbers, name)); }
 };
@@ -89,25 +118,28 @@ const char* readDesign(std::istringstream& design) {
     return nullptr;
 }
 
-mesh::Picture<std::uint8_t> pictureOf(const colonnade_texture& texture) {
-    return {texture.pixels, texture.height, texture.width, 3, static_cast<mesh::Wrap>(texture.wrap_u), static_cast<mesh::Wrap>(texture.wrap_v), texture.is_nearest != 0};
+/// Linear values of the codes of sRGB.
+const std::array<double, 256>& linearCodes() {
+    static const std::array<double, 256> values = [] {
+        std::array<double, 256> linear;
+        for (int code = 0; code < 256; ++code) linear[code] = linearFromSrgb(code / 255.0);
+        return linear;
+    }();
+    return values;
 }
 
-/// Three corners of a face, backwards if the face was reversed.
-template <class Corners> Corners inFaceOrder(Corners corners, bool isReversed) {
-    if (isReversed) std::reverse(corners.begin(), corners.end());
-    return corners;
+mesh::Picture<std::uint8_t> pictureOf(const colonnade_texture& texture) {
+    return {texture.pixels, texture.height, texture.width, 3, static_cast<mesh::Wrap>(texture.wrap_u), static_cast<mesh::Wrap>(texture.wrap_v), texture.is_nearest != 0};
 }
 
 using Codes = std::array<mesh::Row<std::int64_t>, 3>;
 
 /// The codes at the corners of clean faces; in those of textured ones red and green are positions in the atlas.
-std::vector<Codes> cornerCodes(const colonnade_mesh& mesh, const mesh::CleanMesh& clean, const std::vector<mesh::Triangle>* uvs) {
+std::vector<Codes> cornerCodes(const colonnade_mesh& mesh, const std::vector<Part>& parts, const std::vector<mesh::Triangle>* uvs) {
     const double white = static_cast<double>((1 << library->number("colourBits")) - 1);
-    std::vector<Codes> codes(clean.faces.size());
+    std::vector<Codes> codes(parts.size());
     for (std::size_t i = 0; i < codes.size(); ++i) {
-        const std::int64_t source = clean.sources[i];
-        const colonnade_surface& surface = mesh.surfaces[mesh.surface_of[source]];
+        const colonnade_surface& surface = mesh.surfaces[mesh.surface_of[parts[i].source]];
         if (surface.texture >= 0 && uvs) {
             const std::int64_t fraction = std::int64_t{1} << lookUp(library->textureSizes, "fractionBits"), edge = lookUp(library->textureSizes, "width");
             for (int corner = 0; corner < 3; ++corner)
@@ -115,12 +147,9 @@ std::vector<Codes> cornerCodes(const colonnade_mesh& mesh, const mesh::CleanMesh
                     codes[i][corner][axis] =
                         std::clamp<std::int64_t>(static_cast<std::int64_t>(std::rint((*uvs)[i][corner][axis] * static_cast<double>(fraction))), 0, edge * fraction - 1);
         } else if (surface.has_colours) {
-            Codes own;
-            for (int at = 0; at < 9; ++at) {
-                const double colour = mesh.colours ? std::clamp(mesh.colours[9 * source + at], 0.0, 1.0) : 1.0;
-                own[at / 3][at % 3] = static_cast<std::int64_t>(std::rint(colour * surface.factor[at % 3] * white));
-            }
-            codes[i] = inFaceOrder(own, clean.winding.reversed[i]);
+            const mesh::Corners own = mesh.colours ? parts[i].corners<mesh::Vector>(mesh.colours) : mesh::Corners{{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}};
+            for (int at = 0; at < 9; ++at)
+                codes[i][at / 3][at % 3] = static_cast<std::int64_t>(std::rint(std::clamp(own[at / 3][at % 3], 0.0, 1.0) * surface.factor[at % 3] * white));
         }
     }
     return codes;
@@ -175,10 +204,41 @@ void describe(colonnade_packed& packed, std::uint32_t faceCount) {
     packed.shading_offset = static_cast<std::int32_t>(packer::surfaceOffset(format, sections.largestTriangle));
     packed.tree_depth = static_cast<std::int32_t>(from.tree.tree.depth);
     packed.stack_bound = static_cast<std::int32_t>(from.tree.tree.stackBound);
-    packed.dropped = static_cast<std::int32_t>(faceCount - from.tree.order.size());
+    packed.dropped = static_cast<std::int32_t>(faceCount - from.clean.sources.size() + from.parts.size() - from.tree.order.size());
+    const double degrees = from.apart * 57.29577951308232;
+    packed.smoothed = degrees > 3 ? static_cast<std::int32_t>(std::rint(degrees)) : 0;
     packed.flipped = static_cast<std::int32_t>(from.clean.normals.flipped);
     packed.reversed = static_cast<std::int32_t>(from.clean.winding.mixed + from.clean.winding.inverted);
     packed.replaced = static_cast<std::int32_t>(from.clean.normals.replaced + from.clean.normals.missing);
+}
+
+/// Bakes the normal maps of a clean mesh into its corner normals.
+void bakeMaps(const colonnade_mesh& given, Packed& packed) {
+    mesh::CleanMesh& clean = packed.clean;
+    std::vector<mesh::NormalMap> maps;
+    for (std::uint32_t i = 0; i < given.map_count; ++i) maps.emplace_back(pictureOf(given.textures[given.maps[i].texture]), given.maps[i].scale);
+    std::vector<mesh::ReliefFace> relief(clean.faces.size());
+    bool hasMap = false;
+    for (std::size_t i = 0; i < relief.size(); ++i) {
+        relief[i].map = given.map_of[clean.sources[i]];
+        relief[i].uvs = packed.parts[i].corners<mesh::Pair>(given.map_uvs);
+        relief[i].tangents = packed.parts[i].corners<std::array<double, 4>>(given.tangents);
+        hasMap |= relief[i].map >= 0;
+    }
+    if (!hasMap) return;
+    const std::int64_t budget = mesh::maxSplitFaces - static_cast<std::int64_t>(clean.faces.size());
+    mesh::BakedMesh baked = mesh::NormalBaker(std::move(clean.vertices), clean.faces, std::move(clean.normals.normals), maps, relief).make(budget);
+    std::vector<Part> parts;
+    clean.faces.clear();
+    for (const mesh::Piece& piece : baked.pieces) {
+        const Part& whole = packed.parts[piece.owner];
+        parts.push_back({whole.source, whole.isReversed, piece.weights});
+        clean.faces.push_back(piece.face);
+    }
+    clean.vertices = std::move(baked.vertices);
+    clean.normals.normals = std::move(baked.normals);
+    packed.parts = std::move(parts);
+    packed.apart = baked.error;
 }
 
 } // namespace
@@ -216,6 +276,8 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
     next->clean = mesh::clean(raw, leastCosine, given.face_count);
     if (!next->clean.error.empty()) return refuse(next->clean.error);
     const mesh::CleanMesh& clean = next->clean;
+    for (std::size_t i = 0; i < clean.faces.size(); ++i) next->parts.push_back({clean.sources[i], clean.winding.reversed[i] != 0, {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}});
+    if (given.map_count > 0) bakeMaps(given, *next);
     next->quantised = packer::quantise(clean.vertices.data(), clean.vertices.size(), clean.faces.data(), clean.faces.size(), library->format.vertexBits);
     if (next->quantised.faces.empty()) return "no triangle keeps an area in this design's vertex units";
     std::vector<std::uint8_t> materials, isClear;
@@ -223,29 +285,25 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
     std::vector<mesh::Paint> paints;
     bool isTextured = false, hasColours = false;
     for (std::size_t i = 0; i < clean.faces.size(); ++i) {
-        const colonnade_surface& surface = given.surfaces[given.surface_of[clean.sources[i]]];
+        const Part& part = next->parts[i];
+        const colonnade_surface& surface = given.surfaces[given.surface_of[part.source]];
         materials.push_back(static_cast<std::uint8_t>(surface.entry));
         isClear.push_back(surface.is_glass != 0);
         paints.push_back({surface.texture, {surface.factor[0], surface.factor[1], surface.factor[2]}});
         isTextured |= surface.texture >= 0;
         hasColours |= surface.has_colours != 0;
-        if (given.uvs) {
-            std::memcpy(&uvs[i], given.uvs + 6 * clean.sources[i], sizeof uvs[i]);
-            uvs[i] = inFaceOrder(uvs[i], clean.winding.reversed[i]);
-        }
+        if (given.uvs) uvs[i] = part.corners<mesh::Pair>(given.uvs);
     }
     std::optional<mesh::Atlas> atlas;
     if (!library->textureSizes.empty() && isTextured) {
         std::vector<mesh::Picture<std::uint8_t>> textures;
         for (std::uint32_t i = 0; i < given.texture_count; ++i) textures.push_back(pictureOf(given.textures[i]));
-        double linear[256];
-        for (int code = 0; code < 256; ++code) linear[code] = linearFromSrgb(code / 255.0);
-        atlas = mesh::AtlasMaker(textures, linear, lookUp(library->textureSizes, "width")).make(uvs, paints);
+        atlas = mesh::AtlasMaker(textures, linearCodes().data(), lookUp(library->textureSizes, "width")).make(uvs, paints);
         if (!atlas) return "the mesh has more textured materials than the atlas has tiles";
     }
     if (!library->textureSizes.empty()) encodeAtlas(atlas);
     std::vector<Codes> codes;
-    if (library->format.layouts.count("colours") && (hasColours || atlas)) codes = cornerCodes(given, clean, atlas ? &atlas->uvs : nullptr);
+    if (library->format.layouts.count("colours") && (hasColours || atlas)) codes = cornerCodes(given, next->parts, atlas ? &atlas->uvs : nullptr);
     const packer::FaceAttributes attributes{clean.normals.normals.data(), materials.data(), isClear.data(), codes.empty() ? nullptr : codes.data()};
     next->tree = packer::buildTree(next->quantised, attributes, library->format);
     next->packer = std::make_unique<packer::RecordPacker>(next->quantised, attributes, next->tree, library->format);
@@ -340,6 +398,52 @@ const char* colonnade_model_metal(const colonnade_texture* map, const double* uv
         const mesh::FaceMetal face = mesh::metalOf(pictureOf(*map), uvs + 6 * i, factors);
         isMetal[i] = face.isMetal;
         roughness[i] = face.roughness;
+    }
+    return nullptr;
+}
+
+const char* colonnade_model_cut(const colonnade_alpha* from, colonnade_cut* to) {
+    std::vector<mesh::CoveredFace> faces(from->count);
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+        std::memcpy(&faces[i].corners, from->corners + 9 * i, sizeof faces[i].corners);
+        std::memcpy(&faces[i].uvs, from->uvs + 6 * i, sizeof faces[i].uvs);
+        std::memcpy(&faces[i].alphas, from->alphas + 3 * i, sizeof faces[i].alphas);
+    }
+    mesh::Picture<std::uint8_t> colours{nullptr, 0, 0, 3, {}, {}, false}, alpha = colours;
+    if (from->texture) colours = pictureOf(*from->texture);
+    if (from->alpha) {
+        alpha = colours;
+        alpha.pixels = from->alpha;
+        alpha.channels = 1;
+    }
+    mesh::Coverage coverage(colours, alpha, linearCodes().data(), from->values[0], from->values[1]);
+    const std::optional<double> paneFactor = from->values[2] < 0 ? std::nullopt : std::optional(from->values[2]);
+    Cut& cut = library->cut;
+    cut = {mesh::cutAlpha(coverage, faces, from->values[3], from->budget, paneFactor), {}, {}, {}};
+    for (const mesh::CutPiece& piece : cut.found.pieces) {
+        cut.owners.push_back(static_cast<std::int32_t>(piece.owner));
+        cut.weights.push_back(piece.weights);
+    }
+    if (from->alpha) cut.filled = coverage.filled();
+    *to = {cut.found.kinds.data(),
+           static_cast<std::uint32_t>(cut.owners.size()),
+           cut.owners.data(),
+           cut.weights.empty() ? nullptr : cut.weights[0][0].data(),
+           cut.found.panes.empty() ? nullptr : &cut.found.panes[0].alpha,
+           cut.found.isCoarse,
+           cut.found.isBlended,
+           cut.filled.data()};
+    return nullptr;
+}
+
+const char* colonnade_model_swatches(const colonnade_texture* texture, const double* uvs, std::uint32_t count, std::uint8_t* isPlain, double* colours) {
+    const mesh::Swatches swatches(pictureOf(*texture), linearCodes().data());
+    for (std::uint32_t i = 0; i < count; ++i) {
+        mesh::Triangle own;
+        std::memcpy(&own, uvs + 6 * i, sizeof own);
+        const std::optional<mesh::Corners> found = swatches.colours(own);
+        isPlain[i] = found.has_value();
+        if (found) std::memcpy(colours + 9 * i, &*found, sizeof *found);
     }
     return nullptr;
 }

@@ -24,8 +24,16 @@ struct colonnade_surface {
     double factor[3];
 };
 
+/* A picture as a normal map; `scale` is a factor of its tangential components. */
+struct colonnade_normal_map {
+    int32_t texture;
+    float scale;
+};
+
 /* `normals`: three for each face, of any length, 0 for none; or NULL. `colours`: linear red, green, blue at the corners, 0 to
- * 1; or NULL. `uvs`: two at each corner; NULL without textures. `surface_of`: of each face. */
+ * 1; or NULL. `uvs`: two at each corner; NULL without textures. `surface_of`: of each face. With `map_count`, of each face: the number of
+ * its normal map, -1 for none; at each corner two positions in it, and a tangent of the file, 0 for none, with the sign of the
+ * bitangent. */
 struct colonnade_mesh {
     const double *vertices;
     uint32_t vertex_count;
@@ -36,6 +44,10 @@ struct colonnade_mesh {
     const struct colonnade_surface *surfaces;
     const struct colonnade_texture *textures;
     uint32_t texture_count;
+    const struct colonnade_normal_map *maps;
+    uint32_t map_count;
+    const int32_t *map_of;
+    const double *map_uvs, *tangents;
 };
 
 /* A mesh as it is packed: numbers of records, bounds in vertex units. */
@@ -48,6 +60,28 @@ struct colonnade_packed {
     int32_t flipped;  /* faces whose normals pointed to their back, and were negated */
     int32_t replaced; /* corners whose normal pointed to the back of their face, or that had none */
     int32_t reversed; /* closed parts that did not point outward, and do now */
+    int32_t smoothed; /* degrees in the root mean square that corner normals differ from normal maps; 0 below 3 */
+};
+
+/* The faces of a material with alpha: positions, places in the texture and alpha of their corners. */
+struct colonnade_alpha {
+    const double *corners, *uvs, *alphas;
+    uint32_t count;
+    const struct colonnade_texture *texture; /* NULL: none */
+    const uint8_t *alpha;                    /* of the texture's pixels; NULL: opaque */
+    const double *values; /* factor; cutoff; factor of panes, -1 for a mask; edges below it are not split */
+    int32_t budget;       /* pieces that may be added */
+};
+
+/* What of them is shown; it is valid until the next call. */
+struct colonnade_cut {
+    const int8_t *kinds; /* of each face 1 shown, -1 hidden, 0 by its pieces */
+    uint32_t piece_count;
+    const int32_t *owners;
+    const double *weights; /* of the owner's corners, at each corner of a piece */
+    const double *panes;   /* of a blended material, alpha and mean colour of each hidden face */
+    int32_t is_coarse, is_blended;
+    const uint8_t *filled; /* the texture without its hidden pixels */
 };
 
 struct colonnade_step {
@@ -88,6 +122,12 @@ const char *colonnade_model_rows(uint32_t first, uint32_t last, uint16_t *colour
 
 /* The steps of a pixel's rays; they are valid until the next call. */
 uint32_t colonnade_model_trace(uint32_t x, uint32_t y, const struct colonnade_step **steps);
+
+/* Cuts the faces of a material by its alpha. */
+const char *colonnade_model_cut(const struct colonnade_alpha *alpha, struct colonnade_cut *cut);
+
+/* Which of so many faces show one colour of a texture, 0 or 1, and the linear colours of their corners. */
+const char *colonnade_model_swatches(const struct colonnade_texture *texture, const double *uvs, uint32_t count, uint8_t *is_plain, double *colours);
 
 /* Which of so many faces are metal, 0 or 1, and their mean roughness, by a metallic-roughness map: `uvs` of the corners, and
  * the factors of metallic and roughness. */

@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from built_page import MODULE, NEEDS_MODULE, ROOT, run_node
+from PIL import Image
 from textured_files import png
 
 from colonnade.design.manifest import Manifest
+from colonnade.device.bit_exact import render_model
+from colonnade.device.scene import DeviceScene
+from colonnade.mesh.files.catalog import VARIABLE
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import as_rendered, in_layer
+from colonnade.scene.parser import load_scene
 from colonnade.scene_image.packer import pack
 
 pytestmark = NEEDS_MODULE
 KINDS = {"rough metal": "metal"}
 
 
-def textured_sheet(folder: Path) -> list[np.ndarray]:
-    """A bent sheet with a picture, half of it metal of several roughnesses, and one with colours of vertices."""
+def textured_sheet(folder: Path) -> Path:
+    """A bent sheet with a picture and a normal map, half of it metal of several roughnesses, and one with colours."""
     steps = 12
     random = np.random.default_rng(5)
     base = random.integers(0, 256, (96, 64, 3)).astype(np.uint8)
@@ -41,7 +48,9 @@ def textured_sheet(folder: Path) -> list[np.ndarray]:
         np.concatenate([first, second]).astype(np.uint16).ravel(),
         np.stack([u, v, 1 + 0.3 * np.cos(3 * u)], axis=1).astype(np.float32),
     ]
-    parts = [array.tobytes() for array in arrays] + [png(base), png(metal)]
+    bumps = np.repeat(np.repeat(random.integers(80, 176, (4, 4, 3)), 8, axis=0), 8, axis=1).astype(np.uint8)
+    bumps[..., 2] = 255
+    parts = [array.tobytes() for array in arrays] + [png(base), png(metal), png(bumps)]
     starts = np.cumsum([0] + [-(-len(part) // 4) * 4 for part in parts])
     data = b"".join(part.ljust(-(-len(part) // 4) * 4, b"\0") for part in parts)
     kinds = ("VEC3", "VEC2", "VEC3", "SCALAR", "VEC3")
@@ -62,13 +71,14 @@ def textured_sheet(folder: Path) -> list[np.ndarray]:
                         "extensions": {"KHR_texture_transform": {"scale": [1, 1]}},
                     },
                     "roughnessFactor": 0.9,
-                }
+                },
+                "normalTexture": {"index": 2, "scale": 0.7},
             },
             {"pbrMetallicRoughness": {"metallicFactor": 0.0, "baseColorFactor": [0.5, 1.0, 0.25, 1.0]}},
         ],
-        "textures": [{"source": 0, "sampler": 0}, {"source": 1}],
+        "textures": [{"source": 0, "sampler": 0}, {"source": 1}, {"source": 2}],
         "samplers": [{"wrapS": 33648, "wrapT": 10497}],
-        "images": [{"bufferView": 5}, {"bufferView": 6}],
+        "images": [{"bufferView": 5}, {"bufferView": 6}, {"bufferView": 7}],
         "accessors": [
             {"bufferView": i, "componentType": 5123 if i == 3 else 5126, "count": array.size // width, "type": kind}
             for i, (array, kind, width) in enumerate(zip(arrays, kinds, (3, 2, 3, 1, 3), strict=True))
@@ -80,31 +90,106 @@ def textured_sheet(folder: Path) -> list[np.ndarray]:
         "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
     }
     (folder / "sheet.gltf").write_text(json.dumps(document))
-    return [base, metal]
+    return folder / "sheet.gltf"
+
+
+def beside_host(folder: Path, file: Path, headroom: float = 1.0, **job: Any) -> dict[str, Any]:
+    """What the tab makes of a glTF file: its entries, its notes."""
+    text = json.loads((ROOT / "configs" / "golden" / "small.json").read_text())
+    others = [other.name for other in file.parent.iterdir() if other.is_file() and other != file]
+    job |= {"module": str(MODULE), "manifest": text, "headroom": headroom, "gathers": "frame" not in job}
+    job |= {"file": file.name, "path": str(file), "beside": str(file.parent), "files": others}
+    run_node("surfaces.mjs", folder, job)
+    pictures = []
+    for number in range(len(list(folder.glob("picture-*")))):
+        with Image.open(folder / f"picture-{number}") as picture:
+            rgba = np.asarray(picture.convert("RGBA"))
+        rgba.tofile(folder / f"{number}.bin")
+        height, width = rgba.shape[:2]
+        pictures.append({"width": width, "height": height, "hasAlpha": bool((rgba[..., 3] < 255).any())})
+    run_node("surfaces.mjs", folder, job | {"pictures": pictures})
+    found: dict[str, Any] = json.loads((folder / "entries.json").read_text())
+    return found
 
 
 @pytest.mark.parametrize("headroom", [1.0, 2.0])
 def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: float) -> None:
     """Records, texture memory and the material table, whose order is the tab's own: the largest first."""
-    pictures = textured_sheet(tmp_path)
-    for number, pixels in enumerate(pictures):
-        pixels.tofile(tmp_path / f"{number}.bin")
-    text = json.loads((ROOT / "configs" / "golden" / "small.json").read_text())
-    manifest = Manifest.from_dict(text)
-    sizes = [{"name": f"{n}.bin", "width": p.shape[1], "height": p.shape[0]} for n, p in enumerate(pictures)]
-    job = {"module": str(MODULE), "manifest": text, "file": "sheet.gltf", "pictures": sizes}
-    run_node("surfaces.mjs", tmp_path, job | {"gathers": True, "headroom": headroom})
-
-    mesh = load_mesh(tmp_path / "sheet.gltf", corner_colours=True)
-    found = json.loads((tmp_path / "entries.json").read_text())
+    (tmp_path / "file").mkdir()
+    file = textured_sheet(tmp_path / "file")
+    manifest = Manifest.load(ROOT / "configs" / "golden" / "small.json")
+    found = beside_host(tmp_path, file, headroom)
+    mesh = load_mesh(file, corner_colours=True)
+    assert len(mesh.faces) > 1000  # split by the normal map
     rendered = [in_layer(as_rendered(one, gathers=True), "surface") for one in mesh.materials]
     keys = [(KINDS.get(one.kind, one.kind), one.roughness, one.texture is not None) for one in rendered]
     order = [keys.index((one["kind"], one["roughness"], one["hasTexture"])) for one in found["entries"]]
     assert sorted(order) == list(range(len(mesh.materials))) and len(order) > 4
-    assert not found["notes"]
+    assert found["notes"] == []
     numbers = np.argsort(order).astype(np.uint8)[mesh.face_materials]
     mesh = replace(mesh, materials=tuple(mesh.materials[number] for number in order), face_materials=numbers)
     image = pack(mesh, manifest, headroom=headroom, encoder="live")
     for section in image.attributes:
         assert (tmp_path / section.memory).read_bytes() == section.words.tobytes(), section.memory
     assert (tmp_path / "records.bin").read_bytes() == image.records.tobytes()
+
+
+def same_picture(folder: Path, file: Path, size: tuple[int, int] = (160, 120)) -> dict[str, Any]:
+    """Compare the tab's pass of a glTF file with the host's; returns what the tab found.
+
+    Colours of codes that the tab keeps at corners and the host in the material table differ by a step.
+    """
+    manifest = Manifest.load(ROOT / "configs" / "golden" / "small.json")
+    (folder / "scene.toml").write_text(f"[mesh]\npath = {json.dumps(str(file))}\n[frame]\nsamples = 4\n")
+    prepared = DeviceScene.of(load_scene(folder / "scene.toml"), manifest, encoder="live")
+    one = prepared.passes()[1]
+    registers = prepared.registers(size, one)
+    frame = render_model(manifest, prepared.image, registers)
+    writes = [pair for name, value in registers.items() for pair in manifest.registers[name].encode(value)]
+    job = {"writes": writes, "width": size[0], "height": size[1], "threshold": one.sample.coverage}
+    found = beside_host(folder, file, prepared.scene.headroom, frame=job)
+    colours = np.fromfile(folder / "colours.bin", "<u2").reshape(frame.colour.shape)
+    triangles = np.fromfile(folder / "triangles.bin", "<i4").reshape(frame.triangle.shape)
+    np.testing.assert_array_equal(triangles >= 0, frame.is_object)
+    assert frame.is_object.sum() > 500
+    np.testing.assert_array_equal(colours, frame.colour)
+    return found
+
+
+@pytest.mark.parametrize("mode", ["MASK", "BLEND"])
+def test_a_file_with_alpha_looks_as_by_the_host(tmp_path: Path, mode: str) -> None:
+    """A picture with a hole, thin and of one colour in parts, and a material that covers in part."""
+    (tmp_path / "file").mkdir()
+    file = textured_sheet(tmp_path / "file")
+    y, x = np.mgrid[:96, :64]
+    picture = np.random.default_rng(7).integers(0, 256, (96, 64, 4)).astype(np.uint8)
+    picture[:, 24:, :3] = (200, 40, 90)
+    picture[..., 3] = np.where((x - 20) ** 2 + (y - 40) ** 2 < 300, 0, np.where(y > 80, 60, 255))
+    document = json.loads(file.read_text())
+    document["images"][0] = {"uri": "data:image/png;base64," + base64.b64encode(png(picture)).decode()}
+    document["materials"][0] |= {"alphaMode": mode}
+    document["materials"][1] |= {"alphaMode": "BLEND"}
+    document["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"][3] = 0.6
+    file.write_text(json.dumps(document))
+    found = same_picture(tmp_path, file)
+    assert 0.6 in [entry["coverage"] for entry in found["entries"]]
+
+
+#: Files of Khronos in the folders of COLONNADE_MESHES.
+KHRONOS = ("AlphaBlendModeTest", "BoxInterleaved", "BoxTextured", "CesiumMilkTruck", "Duck", "FlightHelmet", "Fox")
+KHRONOS += ("2CylinderEngine", "TextureTransformTest", "WaterBottle")
+
+
+def khronos(name: str) -> Path | None:
+    folders = os.environ.get(VARIABLE, "").split(os.pathsep)
+    paths = (Path(folder) / name / "glTF" / f"{name}.gltf" for folder in folders)
+    flat = (Path(folder) / f"{name}.{kind}" for folder in folders for kind in ("gltf", "glb"))
+    return next((path for path in (*paths, *flat) if path.is_file()), None)
+
+
+@pytest.mark.parametrize("name", KHRONOS)
+def test_files_of_khronos_look_as_by_the_host(tmp_path: Path, name: str) -> None:
+    file = khronos(name)
+    if file is None:
+        pytest.skip(f"{name} is in the folders of {VARIABLE}")
+    same_picture(tmp_path, file)

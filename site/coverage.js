@@ -1,0 +1,167 @@
+// Prepares the faces of a file as the host does: metal by its maps, then without what alpha hides (host/colonnade/mesh/materials/
+// coverage.py), then swatches at the corners of faces (swatches.py).
+
+import { MIRROR_ROUGHNESS } from "./surfaces.js";
+
+/** As host/colonnade/mesh/geometry/topology.py: faces of a mesh that is split, and edges that are not, as part of the mesh. */
+const [MOST_SPLIT_FACES, SMALLEST_SPLIT] = [49152, 1 / 400];
+/** Blended faces of less alpha are not shown. */
+const THIN = 0.05;
+const WHOLE = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1);
+
+/** Values of some faces, so many each. */
+const valuesOf = (values, faces, width) => {
+  const found = new Float64Array(width * faces.length);
+  faces.forEach((face, i) => found.set(values.subarray(width * face, width * (face + 1)), width * i));
+  return found;
+};
+
+const facesOf = (mesh, number) => [...mesh.materialOf.keys()].filter((face) => mesh.materialOf[face] === number);
+
+/** The mesh of a file with materials, prepared for surfacesOf; another one is left. */
+export function prepared(library, mesh) {
+  if (!mesh.materials) return mesh;
+  const found = swatched(library, withoutAlpha(library, withMetal(library, mesh)));
+  return { ...found, notes: [...new Set(found.notes)] };
+}
+
+/** The mesh with the materials of metallic-roughness maps. */
+function withMetal(library, mesh) {
+  const { materials, metalUvs, textures } = mesh;
+  const found = [...materials];
+  const numbers = new Map();
+  const materialOf = Int32Array.from(mesh.materialOf);
+  materials.forEach((material, number) => {
+    if (!material.metal || material.kind !== "diffuse") return;
+    const own = facesOf(mesh, number);
+    const { isMetal, roughness } = library.metal(textures[material.metal.texture], valuesOf(metalUvs, own, 6), material.factors);
+    // By roughness, as the host numbers them
+    [...own.keys()].sort((a, b) => roughness[a] - roughness[b]).forEach((i) => {
+      if (!isMetal[i]) return;
+      const face = own[i];
+      const key = [number, roughness[i]].join();
+      const emission = roughness[i] > MIRROR_ROUGHNESS ? material.emission : [0, 0, 0];
+      if (!numbers.has(key)) numbers.set(key, found.push({ ...material, kind: "mirror", roughness: roughness[i], emission }) - 1);
+      materialOf[face] = numbers.get(key);
+    });
+  });
+  return { ...mesh, materials: found, materialOf };
+}
+
+/** The mesh without what its materials' alpha hides. */
+function withoutAlpha(library, mesh) {
+  if (!mesh.materials.some(({ alpha }) => alpha)) return mesh;
+  const materials = mesh.materials.map((material) => ({ ...material, alpha: null }));
+  const textures = [...mesh.textures];
+  const notes = [...mesh.notes];
+  const whole = [];
+  const parts = [];
+  const panes = [];
+  const corners = new Float64Array(3 * mesh.faces.length);
+  mesh.faces.forEach((vertex, corner) => corners.set(mesh.vertices.subarray(3 * vertex, 3 * vertex + 3), 3 * corner));
+  const edge = SMALLEST_SPLIT * Math.max(...[0, 1, 2].map((axis) => extent(mesh.vertices, axis)));
+  let budget = MOST_SPLIT_FACES - mesh.materialOf.length;
+  mesh.materials.forEach((material, number) => {
+    const faces = facesOf(mesh, number);
+    const { alpha, base } = material;
+    const texture = base ? mesh.textures[base.texture] : null;
+    const alphas = mesh.alphas ? valuesOf(mesh.alphas, faces, 3) : new Float64Array(3 * faces.length).fill(1);
+    if (!alpha || !faces.length) return void whole.push(...faces);
+    const isCovering = alpha.blends && alpha.factor > 0;
+    if (isCovering) materials[number].coverage = alpha.factor;
+    if (!texture?.alpha && alphas.every((value) => value === 1)) {
+      if (isCovering || alpha.factor >= alpha.cutoff) whole.push(...faces);
+      return;
+    }
+    const values = [isCovering ? 1 : alpha.factor, alpha.cutoff, alpha.blends ? alpha.factor : -1, edge];
+    const cut = library.cut({ corners: valuesOf(corners, faces, 9), uvs: valuesOf(mesh.uvs, faces, 6), alphas, texture, values, budget: Math.max(0, budget) });
+    faces.forEach((face, i) => {
+      if (cut.kinds[i] > 0) whole.push(face);
+      if (cut.kinds[i] < 0 && alpha.blends && cut.panes[4 * i] >= THIN) panes.push({ face, alpha: cut.panes[4 * i], colour: cut.panes.subarray(4 * i + 1, 4 * i + 4) });
+    });
+    cut.owners.forEach((owner, i) => parts.push({ owner: faces[owner], weights: cut.weights.subarray(9 * i, 9 * i + 9) }));
+    budget -= cut.owners.length - cut.kinds.filter((kind) => kind === 0).length;
+    if (cut.isCoarse) notes.push("outlines of alpha have more detail than faces");
+    if (cut.isBlended) notes.push("blended alpha is rounded: from one half on it is opaque");
+    if (cut.filled) materials[number].base = { ...base, texture: textures.push({ ...texture, pixels: cut.filled, alpha: null }) - 1 };
+  });
+  const found = { ...mesh, materials, textures, notes, materialOf: Int32Array.from(mesh.materialOf) };
+  const tints = new Map();
+  for (const { face, alpha, colour } of panes) {
+    const { albedo } = mesh.materials[mesh.materialOf[face]];
+    const own = mesh.colours && mesh.hasOwnColours[face] ? [0, 1, 2].map((channel) => [0, 1, 2].reduce((sum, corner) => sum + mesh.colours[9 * face + 3 * corner + channel], 0) / 3) : [...colour];
+    const tint = own.map((value, channel) => Math.round(1000 * (1 - alpha + alpha * value * albedo[channel])) / 1000);
+    if (!tints.has(tint.join())) tints.set(tint.join(), materials.push({ kind: "glass", albedo: tint, ior: 1, roughness: 0, emission: [0, 0, 0], coverage: 1 }) - 1);
+    found.materialOf[face] = tints.get(tint.join());
+    whole.push(face);
+  }
+  const pieces = [...whole.sort((a, b) => a - b).map((owner) => ({ owner, weights: WHOLE })), ...parts].sort((a, b) => a.owner - b.owner);
+  if (!pieces.length) throw new Error(`mesh ${mesh.name}: all its faces are transparent by their alpha: export it with alphaMode OPAQUE`);
+  return split(found, corners, pieces);
+}
+
+function extent(vertices, axis) {
+  let [low, high] = [Infinity, -Infinity];
+  for (let i = axis; i < vertices.length; i += 3) [low, high] = [Math.min(low, vertices[i]), Math.max(high, vertices[i])];
+  return high - low;
+}
+
+/** The mesh of pieces of its faces; `corners` are the positions of these. */
+function split(mesh, corners, pieces) {
+  /** Values of three corners of each piece, so many each. */
+  const interpolated = (values, width) => {
+    if (!values) return values;
+    const found = new Float64Array(3 * width * pieces.length);
+    pieces.forEach(({ owner, weights }, i) => {
+      const from = 3 * width * owner;
+      for (let at = 0; at < 3 * width; ++at) {
+        const [corner, part] = [Math.floor(at / width), at % width];
+        found[3 * width * i + at] = weights[3 * corner] * values[from + part] + weights[3 * corner + 1] * values[from + width + part] + weights[3 * corner + 2] * values[from + 2 * width + part];
+      }
+    });
+    return found;
+  };
+  const ofOwners = (values) => values && Int32Array.from(pieces, ({ owner }) => values[owner]);
+  const positions = interpolated(corners, 3);
+  const vertices = [...mesh.vertices];
+  const faces = Int32Array.from({ length: 3 * pieces.length }, (_, at) => {
+    const { owner, weights } = pieces[Math.floor(at / 3)];
+    const kept = [0, 1, 2].find((corner) => weights[3 * (at % 3) + corner] === 1);
+    // Corners that are kept keep their vertex
+    return kept === undefined ? vertices.push(...positions.subarray(3 * at, 3 * at + 3)) / 3 - 1 : mesh.faces[3 * owner + kept];
+  });
+  const { relief } = mesh;
+  return {
+    ...mesh,
+    vertices: Float64Array.from(vertices),
+    faces,
+    normals: interpolated(mesh.normals, 3),
+    colours: interpolated(mesh.colours, 3),
+    uvs: interpolated(mesh.uvs, 2),
+    alphas: null,
+    materialOf: ofOwners(mesh.materialOf),
+    hasOwnColours: ofOwners(mesh.hasOwnColours),
+    relief: relief && { ...relief, mapOf: ofOwners(relief.mapOf), uvs: interpolated(relief.uvs, 2), tangents: interpolated(relief.tangents, 4) },
+  };
+}
+
+/** The mesh with the colours of its textures at the corners of faces that show a single texel or colour. */
+function swatched(library, mesh) {
+  const materials = [...mesh.materials];
+  const materialOf = Int32Array.from(mesh.materialOf);
+  const colours = mesh.colours ? Float64Array.from(mesh.colours) : new Float64Array(3 * mesh.faces.length).fill(1);
+  let hasSwatches = false;
+  mesh.materials.forEach((material, number) => {
+    const faces = material.base ? facesOf(mesh, number) : [];
+    if (!faces.length) return;
+    const { isPlain, colours: found } = library.swatches(mesh.textures[material.base.texture], valuesOf(mesh.uvs, faces, 6));
+    const own = isPlain.includes(1) ? materials.push({ ...material, base: null, albedo: [1, 1, 1], ofTexture: material }) - 1 : -1;
+    faces.forEach((face, i) => {
+      if (!isPlain[i]) return;
+      hasSwatches = true;
+      materialOf[face] = own;
+      for (let at = 0; at < 9; ++at) colours[9 * face + at] = found[9 * i + at] * material.albedo[at % 3];
+    });
+  });
+  return hasSwatches ? { ...mesh, materials, materialOf, colours } : mesh;
+}
