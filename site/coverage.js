@@ -7,7 +7,7 @@ import { MIRROR_ROUGHNESS } from "./surfaces.js";
 const [MOST_SPLIT_FACES, SMALLEST_SPLIT] = [49152, 1 / 400];
 /** Blended faces of less alpha are not shown. */
 const THIN = 0.05;
-const WHOLE = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1);
+const WHOLE_FACE = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1);
 
 /** Values of some faces, so many each. */
 const valuesOf = (values, faces, width) => {
@@ -95,7 +95,7 @@ function withoutAlpha(library, mesh) {
     found.materialOf[face] = tints.get(tint.join());
     whole.push(face);
   }
-  const pieces = [...whole.sort((a, b) => a - b).map((owner) => ({ owner, weights: WHOLE })), ...parts].sort((a, b) => a.owner - b.owner);
+  const pieces = [...whole.sort((a, b) => a - b).map((owner) => ({ owner, weights: WHOLE_FACE })), ...parts].sort((a, b) => a.owner - b.owner);
   if (!pieces.length) throw new Error(`mesh ${mesh.name}: all its faces are transparent by their alpha: export it with alphaMode OPAQUE`);
   return split(found, corners, pieces);
 }
