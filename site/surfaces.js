@@ -121,7 +121,7 @@ export function surfacesOf(library, mesh, { manifest, gathers, headroom }) {
   const entries = [];
   const places = new Map();
   // As the host's table, or the largest first
-  const rankOf = (number) => 4 * Number(areas[number] === 0) + (all[number].isTextured ? 1 : 2 * Number(all[number].isCorner));
+  const rankOf = (number) => 4 * Number(areas[number] === 0) + Number(plain[number].isCorner);
   const isFull = distinct(all) > most;
   const order = [...all.keys()].sort((a, b) => (isFull ? areas[b] - areas[a] : rankOf(a) - rankOf(b)));
   const near = (a, b) => 4 * Number(a.hasTexture !== b.isTextured) + 2 * Number(a.kind !== b.kind) + Math.abs(a.roughness - b.roughness) + a.albedo.reduce((sum, value, i) => sum + Math.abs(value - b.albedo[i]), 0) / 3;

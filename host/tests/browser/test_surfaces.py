@@ -135,10 +135,7 @@ def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: floa
 
 
 def same_picture(folder: Path, file: Path, size: tuple[int, int] = (160, 120)) -> dict[str, Any]:
-    """Compare the tab's pass of a glTF file with the host's; returns what the tab found.
-
-    Colours of codes that the tab keeps at corners and the host in the material table differ by a step.
-    """
+    """Compare the tab's pass of a glTF file with the host's; returns what it found, and how many pixels show panes."""
     manifest = Manifest.load(ROOT / "configs" / "golden" / "small.json")
     (folder / "scene.toml").write_text(f"[mesh]\npath = {json.dumps(str(file))}\n[frame]\nsamples = 4\n")
     prepared = DeviceScene.of(load_scene(folder / "scene.toml"), manifest, encoder="live")
@@ -153,6 +150,9 @@ def same_picture(folder: Path, file: Path, size: tuple[int, int] = (160, 120)) -
     np.testing.assert_array_equal(triangles >= 0, frame.is_object)
     assert frame.is_object.sum() > 500
     np.testing.assert_array_equal(colours, frame.colour)
+    panes = [number for number, entry in enumerate(found["entries"]) if entry["kind"] == "glass"]
+    opaque = render_model(manifest, prepared.image, registers | {f"materials[{number}].kind": 0 for number in panes})
+    found["seenPanes"] = int((opaque.colour != colours).any(axis=2).sum())
     return found
 
 
@@ -164,7 +164,7 @@ def test_a_file_with_alpha_looks_as_by_the_host(tmp_path: Path, mode: str) -> No
     y, x = np.mgrid[:96, :64]
     picture = np.random.default_rng(7).integers(0, 256, (96, 64, 4)).astype(np.uint8)
     picture[:, 24:, :3] = (200, 40, 90)
-    picture[..., 3] = np.where((x - 20) ** 2 + (y - 40) ** 2 < 300, 0, np.where(y > 80, 60, 255))
+    picture[..., 3] = np.where((x - 20) ** 2 + (y - 40) ** 2 < 300, 0, np.where(y > 60, 60, 255))
     document = json.loads(file.read_text())
     document["images"][0] = {"uri": "data:image/png;base64," + base64.b64encode(png(picture)).decode()}
     document["materials"][0] |= {"alphaMode": mode}
@@ -173,6 +173,7 @@ def test_a_file_with_alpha_looks_as_by_the_host(tmp_path: Path, mode: str) -> No
     file.write_text(json.dumps(document))
     found = same_picture(tmp_path, file)
     assert 0.6 in [entry["coverage"] for entry in found["entries"]]
+    assert (found["seenPanes"] > 50) == (mode == "BLEND")
 
 
 #: Files of Khronos in the folders of COLONNADE_MESHES.
