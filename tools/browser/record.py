@@ -63,6 +63,8 @@ def record(name: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    found = {name: record(name) for name in PRESETS}
-    designs.RECORDINGS.write_text(json.dumps(found, separators=(",", ":")) + "\n", "utf-8")
-    print(f"colonnade: {designs.RECORDINGS.relative_to(designs.ROOT)}")
+    found = json.loads(designs.RECORDINGS.read_text("utf-8"))
+    for preset in PRESETS:  # one that is recorded stays, where a later one is stopped
+        found[preset] = record(preset)
+        designs.RECORDINGS.write_text(json.dumps(found, separators=(",", ":")) + "\n", "utf-8")
+        print(f"colonnade: {preset} in {designs.RECORDINGS.relative_to(designs.ROOT)}")
