@@ -52,7 +52,7 @@ export function prepareRoom(/** @type {any} */ library, /** @type {any} */ { pho
   const light = fitLight(world, colours, found.position, notes);
   const { albedo, headroom } = photoColours(colours, filled, normals, raysOfLens(own, width, height), found, light, gathers ? 1 : MOST_HEADROOM);
   const seen = gathers ? seenOf(filled, normals, colours, raysOfLens(own, width, height), found, width, height) : null;
-  return { width, height, lens: own, pose: found, depth: filled, normals, albedo, light, headroom, noise, surface: world, seen, notes };
+  return { width, height, lens: own, pose: found, depth: filled, normals, albedo, fittedLight: light, headroom, noise, surface: world, seen, notes };
 }
 
 /** View rays of the pixels, with z = 1: three of each. */

@@ -48,11 +48,11 @@ export async function placedRoom(renderer, room, template, place) {
   const scale = place.edge / 2;
   const object = { position: [place.point[0], place.point[1] + scale, place.point[2]], scale };
   const exposure = template.light?.exposure ?? 1;
-  const { position, colour, reach } = room.light.lamp;
+  const { position, colour, reach } = room.fittedLight.lamp;
   const lamp = { position, colour: Array(3).fill(colour * headroom * exposure), reach };
   const viewsOf = (views) => Object.fromEntries(Object.entries(views).map(([factor, text]) => [factor, roomView(bytesOf(text), template.object.scale, { ...room, lamp }, object, Number(factor))]));
   const views = Object.fromEntries(Object.entries(template.views).map(([design, views]) => [design, viewsOf(views)]));
-  const ambient = room.light.ambient * headroom * exposure;
+  const ambient = room.fittedLight.ambient * headroom * exposure;
   const light = template.light && { exposure, ...(await lightAt(renderer, room, object, lamp, exposure)) };
   return {
     place,
