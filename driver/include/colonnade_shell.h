@@ -45,6 +45,9 @@ extern "C" {
 #define COLONNADE_SHELL__CAPABILITIES__REFIT_bm 0x40
 #define COLONNADE_SHELL__CAPABILITIES__REFIT_bp 6
 #define COLONNADE_SHELL__CAPABILITIES__REFIT_bw 1
+#define COLONNADE_SHELL__CAPABILITIES__RAYS_bm 0x80
+#define COLONNADE_SHELL__CAPABILITIES__RAYS_bp 7
+#define COLONNADE_SHELL__CAPABILITIES__RAYS_bw 1
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bm 0xf00
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bp 8
 #define COLONNADE_SHELL__CAPABILITIES__BUSBYTESLOG2_bw 4
@@ -429,6 +432,26 @@ extern "C" {
 #define COLONNADE_SHELL__REFIT_ROOT__VALUE_bp 0
 #define COLONNADE_SHELL__REFIT_ROOT__VALUE_bw 24
 
+// reg - colonnade_shell::rays_windowBase_low
+#define COLONNADE_SHELL__RAYS_WINDOWBASE_LOW__VALUE_bm 0xffffffff
+#define COLONNADE_SHELL__RAYS_WINDOWBASE_LOW__VALUE_bp 0
+#define COLONNADE_SHELL__RAYS_WINDOWBASE_LOW__VALUE_bw 32
+
+// reg - colonnade_shell::rays_windowBase_high
+#define COLONNADE_SHELL__RAYS_WINDOWBASE_HIGH__VALUE_bm 0xff
+#define COLONNADE_SHELL__RAYS_WINDOWBASE_HIGH__VALUE_bp 0
+#define COLONNADE_SHELL__RAYS_WINDOWBASE_HIGH__VALUE_bw 8
+
+// reg - colonnade_shell::rays_windowEnd_low
+#define COLONNADE_SHELL__RAYS_WINDOWEND_LOW__VALUE_bm 0xffffffff
+#define COLONNADE_SHELL__RAYS_WINDOWEND_LOW__VALUE_bp 0
+#define COLONNADE_SHELL__RAYS_WINDOWEND_LOW__VALUE_bw 32
+
+// reg - colonnade_shell::rays_windowEnd_high
+#define COLONNADE_SHELL__RAYS_WINDOWEND_HIGH__VALUE_bm 0xff
+#define COLONNADE_SHELL__RAYS_WINDOWEND_HIGH__VALUE_bp 0
+#define COLONNADE_SHELL__RAYS_WINDOWEND_HIGH__VALUE_bw 8
+
 // addrmap - colonnade_shell
 typedef struct __attribute__ ((__packed__)) {
     uint32_t identity;
@@ -501,11 +524,15 @@ typedef struct __attribute__ ((__packed__)) {
     uint32_t refit_lines;
     uint32_t refit_count;
     uint32_t refit_root;
+    uint32_t rays_windowBase_low;
+    uint32_t rays_windowBase_high;
+    uint32_t rays_windowEnd_low;
+    uint32_t rays_windowEnd_high;
 } colonnade_shell_t;
 
 
 #ifndef __cplusplus
-_Static_assert(sizeof(colonnade_shell_t) == 0x178, "Packing error");
+_Static_assert(sizeof(colonnade_shell_t) == 0x188, "Packing error");
 #endif
 
 #ifdef __cplusplus

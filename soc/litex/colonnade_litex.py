@@ -55,9 +55,12 @@ class Colonnade(LiteXModule):  # type: ignore[misc]
     def __init__(self, platform: Any, design: str | Path) -> None:
         folder = Path(design)
         width = 8 * int(json.loads((folder / "shell.json").read_text())["busBytes"])
-        records = json.loads((folder / "manifest.json").read_text())["config"]["columnBvhMemory"]
+        config = json.loads((folder / "manifest.json").read_text())["config"]
+        records = config["columnBvhMemory"]
+        # A device for rays has an identifier for each column, and one for its batches
+        identifiers = int(config["array"]["columns"]).bit_length() if config["frame"].get("rays") else 1
         self.registers = axi.AXILiteInterface(data_width=32, address_width=32)
-        self.memory = axi.AXIInterface(data_width=width, address_width=32, id_width=1)
+        self.memory = axi.AXIInterface(data_width=width, address_width=32, id_width=identifiers)
         self.ev = _Interrupt()
         ports = {"i_clock": ClockSignal("sys"), "i_reset": ResetSignal("sys"), "o_irq": self.ev.irq}
         ports |= _ports("s_axil", self.registers, _LITE, is_slave=True)

@@ -2,7 +2,7 @@ package colonnade
 
 import chisel3._
 import chisel3.util.Mux1H
-import colonnade.axi.AxiPins
+import colonnade.axi.{AxiPins, AxiReadPort}
 import colonnade.bus._
 import colonnade.common.TimingSlice
 import colonnade.column.{PathTracer, PathTracerModule}
@@ -10,6 +10,16 @@ import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.RegisterMap
 import colonnade.memory.DramPort
 import colonnade.refit.{RefitReader, RefitUnit}
+
+/** Pins of a shell. */
+trait ShellPins {
+  def registerPins: AxiPins
+  def masterPins: AxiPins
+  def interrupt: Bool
+
+  /** Of a refit unit. */
+  def refitPins: Option[AxiPins] = None
+}
 
 /** The device in its AXI4 shell: registers by AXI4-Lite, images read and frames written by an AXI4 master, an interrupt;
   * docs/bus-shell.md.
@@ -20,7 +30,8 @@ final class ColonnadeAxi(
     config:     ColonnadeConfig,
     shell:      ShellConfig,
     pathTracer: ColonnadeConfig => PathTracerModule = new PathTracer(_)
-) extends Module {
+) extends Module
+    with ShellPins {
   val registerPins = IO(AxiPins.lite(ShellMap.addressBits)).suggestName("s_axil")
   val masterPins   = IO(AxiPins.readsAndWrites(BurstWriter.idBits, shell.busBytes)).suggestName("m_axi")
 
@@ -34,7 +45,7 @@ final class ColonnadeAxi(
     Option.when(shell.pixelStream)(IO(AxiPins.stream(new PixelBeat(shell.busBytes))).suggestName("m_axis"))
 
   /** With a refit unit: what it reads and writes. */
-  val refitPins = Option.when(shell.refit)(
+  override val refitPins = Option.when(shell.refit)(
     IO(AxiPins.readsAndWrites(RefitReader.idBits, shell.busBytes)).suggestName("m_axi_refit")
   )
   val interrupt = IO(Output(Bool())).suggestName("irq")
@@ -47,11 +58,7 @@ final class ColonnadeAxi(
 
   private val streamGuard = streamPins.map(_ => Module(new StreamGuard(shell.busBytes)))
 
-  // What a soft reset resets. An extra slice drives it from a register; the device then runs for a cycle after power-up
-  private val slice  = TimingSlice.extra(config)
-  private val clears =
-    if (slice.isEnabled) slice.flag(reset.asBool || control.io.resetNext, atReset = true)
-    else reset.asBool || control.io.reset
+  private val clears = ShellControl.clears(config, reset.asBool, control.io)
   private val device = withReset(clears)(Module(new Colonnade(config, pathTracer)))
   private val writer = withReset(clears)(Module(new FramebufferWriter(config, shell)))
   private val loader = withReset(clears)(Module(new ImageLoader(config, shell)))
@@ -59,14 +66,14 @@ final class ColonnadeAxi(
   // Registers
   registerPins.attach(slave.axi)
   registers.io.access :<>= slave.access
-  registers.io.framebufferErrors := control.io.errors
+  registers.io.framebufferErrors.get := control.io.errors
   registers.io.imageErrors       := loader.io.errors
   registers.io.status            := control.io.status
   registers.io.events            := control.io.events
   registers.io.deviceIsFree      := !control.io.start
   interrupt                      := registers.io.interrupt
   control.io.commands            := registers.io.commands
-  control.io.settings            := registers.io.framebuffer
+  control.io.settings            := registers.io.framebuffer.get
   control.io.writesAreDone       := registers.io.writesAreDone
 
   // The device's register port, a cycle later: the host's, or the start of a frame
@@ -130,14 +137,7 @@ final class ColonnadeAxi(
   master.foreach { case (channel, stream) => masterPins.drive(channel, stream) }
   masterPins.receive("b", writeGuard.io.axi.b)
   masterPins.receive("r", readGuard.io.axi.r)
-  private val sceneGuard = scenePins.map { pins =>
-    val cache = config.columnBvhMemory.cache.get
-    val guard = Module(new AxiReadGuard(DramPort.idBits(config), cache.busBytes, cache.sharedMisses + 2))
-    guard.io.inner :<>= device.io.memory.get
-    pins.drive("ar", guard.io.axi.ar)
-    pins.receive("r", guard.io.axi.r)
-    guard
-  }
+  private val sceneGuard = scenePins.map(ColonnadeAxi.guardScene(config, _, device.io.memory.get))
   private val refitGuards = refitPins.map { pins =>
     val unit   = withReset(clears)(Module(new RefitUnit(config, shell.busBytes)))
     val reads  = Module(new AxiReadGuard(RefitReader.idBits, shell.busBytes, ColonnadeAxi.refitBursts))
@@ -171,4 +171,14 @@ final class ColonnadeAxi(
 
 private object ColonnadeAxi {
   val refitBursts: Int = 64 // of the refit unit that are under way, reads and writes each
+
+  /** The guard between a device's reads of the scene and their pins. */
+  def guardScene(config: ColonnadeConfig, pins: AxiPins, memory: AxiReadPort): AxiReadGuard = {
+    val cache = config.columnBvhMemory.cache.get
+    val guard = Module(new AxiReadGuard(DramPort.idBits(config), cache.busBytes, cache.sharedMisses + 2))
+    guard.io.inner :<>= memory
+    pins.drive("ar", guard.io.axi.ar)
+    pins.receive("r", guard.io.axi.r)
+    guard
+  }
 }

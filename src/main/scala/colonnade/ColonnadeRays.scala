@@ -24,6 +24,10 @@ final class ColonnadeRaysIO(config: ColonnadeConfig) extends Bundle {
   )
   val memory = config.columnBvhMemory.cache.map(_ => DramPort(config))
   val done   = Output(Bool()) // no batch runs
+
+  /** Pulses: a batch has ended; one was refused, or has failed. */
+  val batchDone  = Output(Bool())
+  val batchError = Output(Bool())
 }
 
 /** A device that answers rays of applications: docs/rays.md. The host loads the records, writes the registers, puts batches
@@ -44,7 +48,9 @@ final class ColonnadeRays(config: ColonnadeConfig) extends Module {
   io.write :<>= array.write
   array.memoryHolds.zip(io.memoryHolds).foreach { case (to, from) => to := from }
   io.memory.zip(array.memory).foreach { case (to, from) => to :<>= from }
-  io.done := !array.isBusy
+  io.done       := !array.isBusy
+  io.batchDone  := array.head =/= RegNext(array.head, 0.U)
+  io.batchError := RegNext(array.batchError, false.B)
 
   // Counters and errors, since the last start
   private val status = registers.device

@@ -3,7 +3,7 @@ package colonnade
 import chisel3.RawModule
 import colonnade.bus.ShellMap
 import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO, ShellConfig}
-import colonnade.formats.{FormatsPage, Manifest, RecordFormats}
+import colonnade.formats.{FormatsPage, Manifest, RayBatch, RecordFormats}
 
 import java.io.IOException
 import java.nio.file.{AccessDeniedException, FileAlreadyExistsException, InvalidPathException, Path, Paths}
@@ -57,7 +57,7 @@ object Generate {
     }
 
   private def top(config: ColonnadeConfig, axi: Option[ShellConfig]): RawModule =
-    if (config.frame.rays) new ColonnadeRays(config)
+    if (config.frame.rays) axi.fold[RawModule](new ColonnadeRays(config))(new ColonnadeRaysAxi(config, _))
     else axi.fold[RawModule](new Colonnade(config))(new ColonnadeAxi(config, _))
 
   private def generate(options: Options): Unit = {
@@ -72,8 +72,10 @@ object Generate {
       throw new ConfigError(
         "--refit bends records of 256 bits in DRAM: it needs columnBvhMemory.cache, and geometry.vertexBits up to 19"
       )
-    if (config.frame.rays && axi.nonEmpty)
-      throw new ConfigError("a device with frame.rays has no AXI4 shell: leave --axi out")
+    if (config.frame.rays && axi.exists(_ != ShellConfig(RayBatch.bytes)))
+      throw new ConfigError(
+        s"a device with frame.rays has a bus of ${RayBatch.bytes} bytes: give --axi ${RayBatch.bytes} alone"
+      )
     if (options.output.isEmpty && options.formatsPage.isEmpty)
       throw new ConfigError("--output is missing; see --help")
 
@@ -82,7 +84,7 @@ object Generate {
       OutputFiles.replaceDirectory(path(directory)) { fresh =>
         if (!options.manifestOnly) {
           Emit(top(config, axi), fresh, options.blackBoxMemories)
-          val name = if (config.frame.rays) "ColonnadeRays" else if (axi.isEmpty) "Colonnade" else "ColonnadeAxi"
+          val name = if (axi.nonEmpty) "ColonnadeAxi" else if (config.frame.rays) "ColonnadeRays" else "Colonnade"
           CoreFile.write(name, fresh)
         }
         OutputFiles.writeFile(fresh.resolve("manifest.json"), formats.Json.pretty(Manifest(config)))

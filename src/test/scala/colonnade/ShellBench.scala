@@ -1,5 +1,6 @@
 package colonnade
 
+import chisel3.Module
 import chiseltest._
 import colonnade.axi.AxiMemory
 import colonnade.bus._
@@ -9,9 +10,18 @@ import org.scalatest.Assertions._
 
 import scala.util.Random
 
-/** A simulated [[ColonnadeAxi]] with a memory, and its driver. */
-class ShellBench(dut: ColonnadeAxi, config: ColonnadeConfig, shell: ShellConfig, val random: Random) {
-  val memory            = new AxiMemory(dut.masterPins, shell.busBytes, random)
+/** A simulated shell with a memory, and its driver.
+  *
+  * @param stall of the memory
+  */
+class ShellBench(
+    dut:        Module with ShellPins,
+    config:     ColonnadeConfig,
+    shell:      ShellConfig,
+    val random: Random,
+    stall:      Int = 50
+) {
+  val memory            = new AxiMemory(dut.masterPins, shell.busBytes, random, stall)
   val host              = new AxiLiteHost(dut.registerPins, random, () => cycle())
   private val registers = RegisterMap(config).map(register => register.name -> register).toMap
 

@@ -130,4 +130,10 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
 
 object ShellControl {
   val resetCycles: Int = 8 // of the shortest soft reset
+
+  /** What a soft reset resets. An extra slice drives it from a register; the device then runs for a cycle after power-up. */
+  def clears(config: ColonnadeConfig, reset: Bool, control: ShellControlIO): Bool = {
+    val slice = TimingSlice.extra(config)
+    if (slice.isEnabled) slice.flag(reset || control.resetNext, atReset = true) else reset || control.reset
+  }
 }

@@ -41,7 +41,7 @@ object ShellMap {
   private val byteAddress = 40 // bits
 
   private val features =
-    Seq("environment", "sceneInDram", "mirrorsAndGlass", "cornerColours", "textures", "pixelStream", "refit")
+    Seq("environment", "sceneInDram", "mirrorsAndGlass", "cornerColours", "textures", "pixelStream", "refit", "rays")
   private val capabilityFields = bits(features) :+ Field("busBytesLog2", 8, 4, signed = false, fraction = 0)
 
   val registers: Seq[ShellRegister] = Seq(
@@ -95,10 +95,18 @@ object ShellMap {
       ReadOnly,
       "Bounds: low x, y, z, high x, y, z."
     )
-  }
+  } ++ Seq(
+    setting("rays.windowBase", 0x178, byteAddress, "No batch reads or writes below this address."),
+    setting("rays.windowEnd", 0x180, byteAddress, "No batch reads or writes from this address on.")
+  )
 
-  /** Those of a design. */
-  def of(shell: ShellConfig): Seq[ShellRegister] = registers.filter(shell.refit || !_.name.startsWith("refit."))
+  /** Those of a design: of frames, or of rays. */
+  def of(config: ColonnadeConfig, shell: ShellConfig): Seq[ShellRegister] = {
+    val ofFrames = Seq("framebuffer", "photo", "stream")
+    val absent   =
+      (if (config.frame.rays) ofFrames else Seq("rays")) ++ Option.unless(shell.refit)("refit")
+    registers.filterNot(register => absent.contains(register.name.takeWhile(_ != '.')))
+  }
 
   /** Names of a register's parts, the lowest first. */
   def bitsOf(register: String): Seq[String] = registers.filter(_.name == register).flatMap(_.fields).map(_.name)
@@ -131,14 +139,17 @@ object ShellMap {
       config.geometry.cornerColours,
       config.geometry.texture.nonEmpty,
       shell.pixelStream,
-      shell.refit
+      shell.refit,
+      config.frame.rays
     )
     require(flags.size == features.size)
     val mask = flags.zipWithIndex.collect { case (true, bit) => 1 << bit }.sum
     BigInt(mask | (Integer.numberOfTrailingZeros(shell.busBytes) << 8))
   }
 
-  def frameSize(config: ColonnadeConfig): BigInt = BigInt(config.frame.maxWidth) | BigInt(config.frame.maxHeight) << 16
+  /** 0 of a device for rays. */
+  def frameSize(config: ColonnadeConfig): BigInt =
+    if (config.frame.rays) 0 else BigInt(config.frame.maxWidth) | BigInt(config.frame.maxHeight) << 16
 
   /** The manifest's format hash as eight words; the first has its first eight digits. */
   def formatHash(config: ColonnadeConfig): Seq[BigInt] =
@@ -169,12 +180,16 @@ object ShellMap {
     )
   )
 
-  /** Writes to the device's registers that the shell takes while a frame runs: at least one of each word, and 256. */
-  def postedWrites(config: ColonnadeConfig): Int = (1 << log2Ceil(writableWords(config).size)).max(256)
+  /** Writes to the device's registers that the shell takes while a frame runs: at least one of each word, and 256. Those of
+    * a device for rays do not wait.
+    */
+  def postedWrites(config: ColonnadeConfig): Int =
+    if (config.frame.rays) 2 else (1 << log2Ceil(writableWords(config).size)).max(256)
 
-  /** Words of the device's registers that may be written, without `control.start`: the shell starts frames. */
+  /** Words of the device's registers that may be written, without `control.start` where the shell starts frames. */
   def writableWords(config: ColonnadeConfig): Seq[Int] =
     RegisterMap(config)
-      .filter(register => register.access != Access.ReadOnly && register.name != "control.start")
+      .filter(_.access != Access.ReadOnly)
+      .filter(register => config.frame.rays || register.name != "control.start")
       .flatMap(register => register.address until register.address + register.words)
 }

@@ -47,16 +47,20 @@ final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extend
   val device       = Flipped(new RegisterPort(RegisterFile.addressBits(config)))
   val deviceIsFree = Input(Bool())
 
-  val framebuffer = Output(new FramebufferSettings)
+  /** Of a device for frames. */
+  val framebuffer = Option.unless(config.frame.rays)(Output(new FramebufferSettings))
   val image       = Output(new ImageSettings)
   val refit       = Option.when(shell.refit)(new RefitControl(config))
+
+  /** Of a device for rays: where its batches lie. */
+  val window = Option.when(config.frame.rays)(Output(new AddressWindow))
   val commands    = Output(new ShellCommands)
 
   /** All writes to the device's registers have arrived there. */
   val writesAreDone = Output(Bool())
 
   val status            = Input(new ShellStatus)
-  val framebufferErrors = Input(new FramebufferError)
+  val framebufferErrors = Option.unless(config.frame.rays)(Input(new FramebufferError))
   val imageErrors       = Input(new ImageError)
 
   /** Pulses, see [[Interrupts]]. */
@@ -65,7 +69,8 @@ final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extend
 }
 
 /** The registers of [[ShellMap]], and the way to those of the device. What is written there while a frame runs waits for
-  * its end; all of the device's registers fit.
+  * its end; all of the device's registers fit. A device for rays takes its tail while batches run, and its other registers
+  * while none does.
   *
   * A request is answered two cycles later; the device's register port is registered. The answer is an error, and a write
   * has no effect, if the address has no register, the register cannot be written or not now, some bytes of the word are
@@ -80,21 +85,23 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private val deviceWords = RegisterMap.size(RegisterMap(config))
   require(ShellMap.deviceBase + 4 * deviceWords <= (1 << ShellMap.addressBits), "the device's registers fit")
 
-  // Writes to the device wait while a frame runs
+  // Writes to the device wait while a frame runs; of a device for rays, they arrive before the next request
+  private val isForRays = config.frame.rays.B
   private val (posted, delivered) = withReset(reset.asBool || io.status.isResetting) {
     val queue = Module(new Queue(new PostedWrite(config), ShellMap.postedWrites(config), useSyncReadMem = true))
     (queue, TimingSlice.queue(queue.io.deq)) // of the memory's output
   }
-  private val delivers = delivered.valid && !io.status.isRunning
-  delivered.ready  := !io.status.isRunning
+  private val delivers = delivered.valid && (!io.status.isRunning || isForRays)
+  delivered.ready  := !io.status.isRunning || isForRays
   io.writesAreDone := !posted.io.deq.valid && !delivered.valid
 
-  io.access.request.ready := !isDevice || request.isWrite || (io.deviceIsFree && !delivers)
+  io.access.request.ready := (!isDevice || request.isWrite || (io.deviceIsFree && !delivers)) &&
+    ((io.writesAreDone && io.deviceIsFree) || !isForRays)
   private val accepts = io.access.request.fire
   private val writes  = accepts && request.isWrite && request.isWhole
 
   // Registers of the shell
-  private val settings = ShellMap.of(shell).filter(_.access == Access.ReadWrite).filterNot(_.name == "interrupt.status")
+  private val settings = ShellMap.of(config, shell).filter(_.access == Access.ReadWrite).filterNot(_.name == "interrupt.status")
   private val values   = settings.map { register =>
     register.name -> Seq.tabulate(register.words) { word =>
       val bits = (register.width - word * AxiLite.dataBits).min(AxiLite.dataBits)
@@ -112,18 +119,20 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private def mayWrite(name: String): Bool = name match {
     case "control" =>
       val commands = request.data(2, 0)
-      commands === 4.U || (commands === 2.U && isIdle) || (commands === 1.U && canChange && !io.status.isLoading)
+      commands === 4.U || (commands === 2.U && isIdle) ||
+      (commands === 1.U && canChange && !io.status.isLoading && !isForRays)
     case image if image.startsWith("image.")             => !io.status.isLoading
     case framebuffer if framebuffer.startsWith("frameb") => canChange
     case "photo.enabled"                                 => canChange && config.hasEnvironment.B
     case "stream.enabled"                                => canChange && shell.pixelStream.B
     case photo if photo.startsWith("photo.")             => canChange
+    case window if window.startsWith("rays.")            => isIdle
     case refit if refit.startsWith("refit.") => io.refit.get.isIdle && !startsRefit && !io.status.isResetting
     case _                                   => true.B
   }
 
   private val writable = for {
-    register <- ShellMap.of(shell)
+    register <- ShellMap.of(config, shell)
     if register.access != Access.ReadOnly
     word <- 0 until register.words
     bits   = (register.width - word * AxiLite.dataBits).min(AxiLite.dataBits)
@@ -152,26 +161,35 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   interrupts.io.enable := value("interrupt.enable")
   io.interrupt         := interrupts.io.interrupt
 
-  io.framebuffer.base               := value("framebuffer.base")
-  io.framebuffer.stride             := value("framebuffer.stride")
-  io.framebuffer.format             := value("framebuffer.format")
-  io.framebuffer.toStream           := value("stream.enabled")
-  io.framebuffer.window.base        := value("framebuffer.windowBase")
-  io.framebuffer.window.end         := value("framebuffer.windowEnd")
-  io.framebuffer.photo.base         := value("photo.base")
-  io.framebuffer.photo.stride       := value("photo.stride")
-  io.framebuffer.photo.isEnabled    := value("photo.enabled")
-  io.framebuffer.photo.hasStrengths := value("photo.hasStrengths")
-  io.framebuffer.photo.window.base  := value("photo.windowBase")
-  io.framebuffer.photo.window.end   := value("photo.windowEnd")
-  io.image.base                     := value("image.base")
-  io.image.bytes                    := value("image.bytes")
-  io.image.window.base              := value("image.windowBase")
-  io.image.window.end               := value("image.windowEnd")
+  for (framebuffer <- io.framebuffer) {
+    framebuffer.base               := value("framebuffer.base")
+    framebuffer.stride             := value("framebuffer.stride")
+    framebuffer.format             := value("framebuffer.format")
+    framebuffer.toStream           := value("stream.enabled")
+    framebuffer.window             := window("framebuffer")
+    framebuffer.photo.base         := value("photo.base")
+    framebuffer.photo.stride       := value("photo.stride")
+    framebuffer.photo.isEnabled    := value("photo.enabled")
+    framebuffer.photo.hasStrengths := value("photo.hasStrengths")
+    framebuffer.photo.window       := window("photo")
+  }
+  io.image.base   := value("image.base")
+  io.image.bytes  := value("image.bytes")
+  io.image.window := window("image")
+  io.window.foreach(_ := window("rays"))
+
+  private def window(of: String): AddressWindow = {
+    val window = Wire(new AddressWindow)
+    window.base := value(s"$of.windowBase")
+    window.end  := value(s"$of.windowEnd")
+    window
+  }
 
   // Registers of the device
+  private val tail           = RegisterMap(config).find(_.name == "rays.tail").fold(false.B)(deviceWord === _.address.U)
+  private val mayChange      = if (config.frame.rays) isIdle || (tail && io.status.isRunning && canChange) else canChange
   private val deviceWritable =
-    VecInit(ShellMap.writableWords(config).map(_.U === deviceWord)).asUInt.orR && canChange && posted.io.enq.ready
+    VecInit(ShellMap.writableWords(config).map(_.U === deviceWord)).asUInt.orR && mayChange && posted.io.enq.ready
   private val inDevice = isDevice && request.address < (ShellMap.deviceBase / 4 + deviceWords).U
   posted.io.enq.valid        := writes && inDevice && deviceWritable
   posted.io.enq.bits.address := deviceWord
@@ -189,11 +207,10 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
     "frameSize"    -> ShellMap.frameSize(config)
   ) ++ ShellMap.formatHash(config).zipWithIndex.map { case (word, index) => s"formatHash[$index]" -> word }
   private val observed = Map(
-    "status"             -> io.status.asUInt,
-    "interrupt.status"   -> interrupts.io.status,
-    "framebuffer.errors" -> io.framebufferErrors.asUInt,
-    "image.errors"       -> io.imageErrors.asUInt
-  ) ++ io.refit.toSeq.flatMap { refit =>
+    "status"           -> io.status.asUInt,
+    "interrupt.status" -> interrupts.io.status,
+    "image.errors"     -> io.imageErrors.asUInt
+  ) ++ io.framebufferErrors.map("framebuffer.errors" -> _.asUInt) ++ io.refit.toSeq.flatMap { refit =>
     val bounds = refit.result.low.axes ++ refit.result.high.axes
     Map(
       "refit.status"    -> Mux(refit.isIdle, 0.U, 1.U),
@@ -203,7 +220,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
       bounds.zipWithIndex.map { case (bound, i) => s"refit.bounds[$i]" -> bound }
   }
   private val readable = for {
-    register <- ShellMap.of(shell)
+    register <- ShellMap.of(config, shell)
     if register.access != Access.WriteOnly
     word <- 0 until register.words
     data = values.get(register.name).map(_(word)).orElse(observed.get(register.name))

@@ -43,7 +43,6 @@ class AxiMemory(
   private val reads   = mutable.Queue.empty[Burst]
   private val held    = mutable.Map.empty[String, Seq[BigInt]]
   private var beat    = 0                          // of the first write
-  private var sent    = 0                          // of the first read
   private var offered = Set.empty[String]
   private var now     = 0
 
@@ -57,6 +56,10 @@ class AxiMemory(
   /** The bytes of a range, which must all have been written. */
   def dump(address: BigInt, size: Int): Seq[Int] = (0 until size).map(i => bytes(address + i))
 
+  /** The words of a range. */
+  def words(address: BigInt, count: Int): Seq[BigInt] =
+    dump(address, 4 * count).grouped(4).map(_.zipWithIndex.map { case (byte, i) => BigInt(byte) << (8 * i) }.sum).toSeq
+
   def store(address: BigInt, words: Seq[BigInt]): Unit =
     for ((word, index) <- words.zipWithIndex; byte <- 0 until 4) {
       bytes(address + 4 * index + byte) = ((word >> (8 * byte)) & 255).toInt
@@ -68,13 +71,16 @@ class AxiMemory(
   def cycle(): Unit = {
     for ((channel, isReady) <- readies if has(s"${channel}valid"))
       poke(s"${channel}ready", if (isReady && !isSilent) 1 else 0)
-    offer("b", answers.headOption) { burst => poke("bresp", response(burst.address)) }
+    offer("b", answers.headOption) { burst =>
+      poke("bid", burst.id)
+      poke("bresp", response(burst.address))
+    }
     offer("r", reads.headOption) { burst =>
-      val at = burst.address / busBytes * busBytes + sent * busBytes
+      val at = burst.address / busBytes * busBytes + burst.sent * busBytes
       poke("rid", burst.id)
       poke("rdata", (0 until busBytes).map(i => BigInt(bytes.getOrElse(at + i, 0xee)) << (8 * i)).sum)
       poke("rresp", response(burst.address))
-      poke("rlast", if (sent == burst.beats - 1) 1 else 0)
+      poke("rlast", if (burst.sent == burst.beats - 1) 1 else 0)
     }
     for (channel <- Seq("aw", "w", "ar") if has(s"${channel}valid")) watch(channel)
     if (has("awvalid")) checkOrder()
@@ -83,20 +89,29 @@ class AxiMemory(
     while (writes.nonEmpty && data.nonEmpty) write(data.dequeue())
     if (fires("ar")) {
       val next = burst("ar")
-      // Bursts of other ids may be answered earlier, but for the one that is under way
-      val isEarly = reads.size >= 2 && reads.last.id != next.id && random.nextBoolean()
-      reads.insert(if (isEarly) reads.size - 1 else reads.size, next)
+      reads += next
       for (i <- 0 until next.beats * busBytes) read += next.address + i
     }
-    if (fires("b")) answers.dequeue()
+    if (fires("b")) {
+      answers.dequeue()
+      overtake(answers)
+    }
     if (fires("r")) {
-      sent += 1
-      if (sent == reads.head.beats) {
-        sent = 0
-        reads.dequeue()
-      }
+      reads.head.sent += 1
+      if (reads.head.sent == reads.head.beats) reads.dequeue()
+      overtake(reads)
     }
     now += 1
+  }
+
+  /** Makes the first burst of any id the next one: beats of different ids come between each other. */
+  private def overtake(bursts: mutable.Queue[Burst]): Unit = {
+    val firsts = bursts.groupBy(_.id).values.map(_.head).toSeq.sortBy(_.id)
+    if (firsts.size > 1) {
+      val next = firsts(random.nextInt(firsts.size))
+      bursts -= next
+      bursts.prepend(next)
+    }
   }
 
   /** Which channels the memory takes from in this cycle. */
@@ -166,7 +181,7 @@ class AxiMemory(
     }
 
   private def watch(channel: String): Unit = {
-    val now = sent(channel).map(peek)
+    lazy val now = sent(channel).map(peek)
     held.remove(channel).foreach(before => assert(now == before, s"$channel did not hold"))
     if (peek(s"${channel}valid") == 1 && peek(s"${channel}ready") == 0) held(channel) = now
   }
@@ -176,4 +191,6 @@ class AxiMemory(
 private final case class Beat(data: BigInt, strobes: BigInt, isLast: Boolean)
 
 /** A burst, answered from cycle `due` on. */
-private final case class Burst(id: BigInt, address: BigInt, beats: Int, due: Int)
+private final case class Burst(id: BigInt, address: BigInt, beats: Int, due: Int) {
+  var sent: Int = 0 // beats
+}
