@@ -49,11 +49,13 @@ enum colonnade_error {
     COLONNADE_NOT_A_CLIP,    /* no clip file, or one of another version, or numbers that no design has */
     COLONNADE_OUTSIDE,       /* a vertex leaves the object's grid */
     COLONNADE_OTHER_RECORDS, /* the records are not those of the clip */
-    COLONNADE_TOO_DEEP       /* a plan needs more boxes than the unit holds */
+    COLONNADE_TOO_DEEP,      /* a plan needs more boxes than the unit holds */
+    /* Of colonnade_batches.h */
+    COLONNADE_NO_RAYS /* the design traces no rays of applications */
 };
 
-/* Bits of `interrupt.status` and `interrupt.enable`. */
-enum { COLONNADE_FRAME_DONE = 1, COLONNADE_IMAGE_DONE = 2, COLONNADE_ERROR = 4 };
+/* Bits of `interrupt.status` and `interrupt.enable`. A device for rays ends batches in place of frames. */
+enum { COLONNADE_FRAME_DONE = 1, COLONNADE_BATCH_DONE = 1, COLONNADE_IMAGE_DONE = 2, COLONNADE_ERROR = 4 };
 
 enum { COLONNADE_MAX_MAPS = 10 };
 
@@ -88,6 +90,8 @@ struct colonnade_design {
     uint32_t posted_writes; /* writes to the device's registers that the shell takes while a frame runs */
     uint32_t scene_page;    /* byte address of `dram.page` and of `control.invalidate`; 0 if no scene lies in DRAM */
     uint32_t invalidate;
+    uint32_t rays_tail, rays_head;                    /* of a device for rays, like the next ones; 0: it has frames */
+    uint32_t bounds, scene, placement, ring;          /* byte addresses of the first words of these groups */
     uint32_t map_count;                               /* memories of a room's maps; 0: the device has no room */
     struct colonnade_memory maps[COLONNADE_MAX_MAPS]; /* an image's section for maps[i] has the target i + 1 */
 };

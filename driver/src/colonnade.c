@@ -1,31 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "colonnade.h"
 
-#include "colonnade_shell.h"
-
-#define REGISTER(name) ((uint32_t)offsetof(colonnade_shell_t, name))
+#include "colonnade_access.h"
 
 enum { IDENTITY = 0x434C4E44, DEVICE_BASE = 0x8000, IMAGE_ALIGNMENT = 128, PAGE_LOG = 12 };
 enum { EVENTS = COLONNADE_FRAME_DONE | COLONNADE_IMAGE_DONE | COLONNADE_ERROR };
-
-static uint32_t get(const struct colonnade *device, uint32_t address) {
-    return device->bus->read(device->bus->context, address);
-}
-
-static void set(const struct colonnade *device, uint32_t address, uint32_t value) {
-    device->bus->write(device->bus->context, address, value);
-}
-
-/* Writes a number of two words; the registers have 40 bits. */
-static void set_wide(const struct colonnade *device, uint32_t address, uint64_t value) {
-    set(device, address, (uint32_t)value);
-    set(device, address + 4, (uint32_t)(value >> 32));
-}
-
-/* Whether `bytes` bytes at `address` lie in a window of bus addresses. No sum overflows. */
-static bool contains(const struct colonnade_window *window, uint64_t address, uint64_t bytes) {
-    return window->end >> 40 == 0 && address >= window->base && address <= window->end && bytes <= window->end - address;
-}
 
 enum colonnade_error colonnade_probe(struct colonnade *device, const struct colonnade_bus *bus,
                                      const struct colonnade_design *design) {
@@ -250,7 +229,7 @@ const char *colonnade_error_name(enum colonnade_error error) {
         "ok",         "noDevice",    "unknownVersion", "otherFormat", "notAnImage",   "notAFrame", "truncated",   "tooLarge",
         "misaligned", "badRegister", "badFormat",      "noFrame",     "busy",         "timeout",   "busResponse", "badSection",
         "badLength",  "noPhoto",     "frameInvalid",   "noScene",     "notAView",     "badPose",   "badLens",     "tooFar",
-        "noLight",    "noSample",    "notAClip",       "outside",     "otherRecords", "tooDeep",
+        "noLight",    "noSample",    "notAClip",       "outside",     "otherRecords", "tooDeep",   "noRays",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }

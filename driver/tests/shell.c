@@ -8,7 +8,7 @@ enum { RUNNING = 1, QUEUED = 2, LOADING = 4, RESETTING = 8 };
 enum { START = 1, LOAD = 2, RESET = 4 };
 
 /* When a register can be written. */
-enum access { READ_ONLY, WRITE_ONLY, ALWAYS, NOT_LOADING, NOT_QUEUED, WITH_ENVIRONMENT };
+enum access { READ_ONLY, WRITE_ONLY, ALWAYS, NOT_LOADING, NOT_QUEUED, WITH_ENVIRONMENT, IDLE };
 
 #define WORD(name, bits, access) {offsetof(colonnade_shell_t, name), bits, access}
 #define WIDE(name, access) WORD(name##_low, 32, access), WORD(name##_high, 8, access)
@@ -52,6 +52,8 @@ static const struct {
     WORD(photo_stride, 24, NOT_QUEUED),
     WORD(photo_enabled, 1, WITH_ENVIRONMENT),
     WORD(photo_hasStrengths, 1, NOT_QUEUED),
+    WIDE(rays_windowBase, IDLE),
+    WIDE(rays_windowEnd, IDLE),
 };
 
 static void require(bool condition, const char *what, const struct shell *shell, uint32_t address, uint32_t value) {
@@ -103,8 +105,23 @@ static void command(struct shell *shell, uint32_t value) {
     else *status |= value == START ? QUEUED : LOADING;
 }
 
+/* Of a device for rays: its tail while batches run, all while none does. */
+static void write_rays(struct shell *shell, uint32_t address, uint32_t value) {
+    uint32_t *status = &shell->registers[AT(status)];
+    const bool is_tail = address == shell->design->rays_tail;
+    require(is_tail || address == DEVICE_BASE || address >= shell->design->frame_registers, "no register of rays", shell,
+            address, value);
+    require(*status == 0 || (is_tail && *status == RUNNING), "a register of the device", shell, address, value);
+    if (is_tail && value != shell->device[(shell->design->rays_head - DEVICE_BASE) / 4]) *status = RUNNING;
+    shell->device[(address - DEVICE_BASE) / 4] = value;
+}
+
 static void write_device(struct shell *shell, uint32_t address, uint32_t value) {
     const struct colonnade_design *design = shell->design;
+    if (design->rays_tail != 0) {
+        write_rays(shell, address, value);
+        return;
+    }
     const uint32_t status = shell->registers[AT(status)];
     const bool invalidates = design->scene_page != 0 && address == design->invalidate;
     const bool is_frame = address >= design->frame_registers && address < design->device_end && address % 4 == 0;
@@ -137,6 +154,7 @@ void shell_write(void *context, uint32_t address, uint32_t value) {
                 shell, address, value);
         require(changes, "a register of the photo", shell, address, value);
         break;
+    case IDLE: require(status == 0, "a register of batches", shell, address, value); break;
     case NOT_QUEUED: require(changes, "a register of a frame", shell, address, value); break;
     default: break;
     }

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "colonnade.h"
+#include "colonnade_batches.h"
 
 namespace nb = nanobind;
 using namespace nanobind::literals;
@@ -42,6 +42,12 @@ public:
         design_.posted_writes = numbers.at("posted_writes");
         design_.scene_page = numbers.at("scene_page");
         design_.invalidate = numbers.at("invalidate");
+        design_.rays_tail = numbers.at("rays_tail");
+        design_.rays_head = numbers.at("rays_head");
+        design_.bounds = numbers.at("bounds");
+        design_.scene = numbers.at("scene");
+        design_.placement = numbers.at("placement");
+        design_.ring = numbers.at("ring");
         if (maps.size() > COLONNADE_MAX_MAPS) throw std::invalid_argument("too many maps");
         design_.map_count = static_cast<std::uint32_t>(maps.size());
         for (std::size_t i = 0; i < maps.size(); ++i) design_.maps[i] = {maps[i].first, maps[i].second};
@@ -92,6 +98,35 @@ public:
 
     std::string result() {
         return run([&] { return colonnade_result(&device_); });
+    }
+
+    using Axes = std::array<std::int32_t, 3>;
+
+    std::string setRays(const Axes& low, const Axes& high, std::size_t count, std::uint32_t mantissa, std::int32_t exponent, const std::array<std::int64_t, 3>& base) {
+        colonnade_rays_image image{nullptr, count, 0, {}, {}, mantissa, exponent, {}};
+        std::copy(low.begin(), low.end(), image.bounds_low);
+        std::copy(high.begin(), high.end(), image.bounds_high);
+        std::copy(base.begin(), base.end(), image.base);
+        return run([&] { return colonnade_set_rays(&device_, &image); });
+    }
+
+    std::string openRing(std::uint64_t address, std::uint32_t sizeLog, Window window) {
+        const colonnade_window bounds{window.first, window.second};
+        return run([&] { return colonnade_open_ring(&ring_, &device_, address, sizeLog, &bounds); });
+    }
+
+    std::pair<std::string, std::uint64_t> nextBatch() {
+        std::uint64_t address = 0;
+        std::string error = run([&] { return colonnade_next_batch(&ring_, &address); });
+        return {std::move(error), address};
+    }
+
+    std::string submit() {
+        return run([&] { return colonnade_submit(&ring_); });
+    }
+
+    std::string waitBatches() {
+        return run([&] { return colonnade_wait_batches(&ring_, attempts); });
     }
 
     std::string reset() {
@@ -155,6 +190,7 @@ private:
     colonnade_bus bus_;
     colonnade_design design_{};
     colonnade device_{};
+    colonnade_ring ring_{};
     std::exception_ptr problem_;
 };
 
@@ -173,6 +209,11 @@ void bind_driver(nb::module_& module) {
         .def("start", &Driver::start, "base"_a, "stride"_a, "format"_a, "window"_a)
         .def("wait", &Driver::waitFor, "events"_a)
         .def("result", &Driver::result)
+        .def("set_rays", &Driver::setRays, "low"_a, "high"_a, "count"_a, "mantissa"_a, "exponent"_a, "base"_a)
+        .def("open_ring", &Driver::openRing, "address"_a, "size_log"_a, "window"_a)
+        .def("next_batch", &Driver::nextBatch)
+        .def("submit", &Driver::submit)
+        .def("wait_batches", &Driver::waitBatches)
         .def("reset", &Driver::reset)
         .def("acknowledge", &Driver::acknowledge, "events"_a)
         .def("enable_interrupts", &Driver::enableInterrupts, "events"_a)

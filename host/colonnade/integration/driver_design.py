@@ -9,6 +9,16 @@ from colonnade.design.manifest import Manifest
 from colonnade.integration.register_table import RegisterTable
 from colonnade.scene_image.environment import map_memories
 
+#: Registers of a device for rays, the first ones of their groups, by their names in ``struct colonnade_design``.
+_OF_RAYS = {
+    "rays_tail": "rays.tail",
+    "rays_head": "rays.head",
+    "bounds": "bounds.low.x",
+    "scene": "scene.recordCount",
+    "placement": "placement.mantissa",
+    "ring": "ring.base",
+}
+
 
 @dataclass(frozen=True)
 class DriverDesign:
@@ -17,7 +27,7 @@ class DriverDesign:
     Attributes:
         format_words: The format hash, 8 words.
         numbers: Those of ``struct colonnade_design`` by name. `scene_page` and `invalidate` are 0 if no scene lies in
-            DRAM.
+            DRAM, and so are those of rays in a design of frames.
         maps: Words of a record and number of records of each memory of a room's maps, in the order of their load
             targets, which begin at 1.
         errors: Names of the device's error bits, by their number.
@@ -51,13 +61,14 @@ class DriverDesign:
             "counter_count": max(counters) + 1,
             "tile_size": int(manifest.config["frame"]["tileSize"]),
             "posted_writes": table.posted_writes,
-            "scene_page": 0,
-            "invalidate": 0,
+            **dict.fromkeys(("scene_page", "invalidate", *_OF_RAYS), 0),
         }
         if manifest.config["columnBvhMemory"]["cache"]:
             if manifest.registers["dram.page"].words != 1:
                 raise ValueError("dram.page has more than one word")
             numbers |= {"scene_page": place("dram.page"), "invalidate": place("control.invalidate")}
+        if "rays.tail" in manifest.registers:
+            numbers |= {name: place(register) for name, register in _OF_RAYS.items()}
         return cls(tuple(manifest.format_words), numbers, _maps(manifest), errors, counters)
 
 

@@ -19,7 +19,7 @@ SPACE = 1 << 16
 
 _EFFECTS = {"interrupt.status": "clears", "interrupt.test": "sets"}
 
-#: The device's register that the shell keeps to itself.
+#: The device's register that the shell keeps to itself in a design of frames.
 _KEPT = "control.start"
 
 
@@ -114,7 +114,7 @@ def shell_block(shell: Mapping[str, Any]) -> RegisterBlock:
 def _device_block(manifest: Manifest, shell: Mapping[str, Any]) -> RegisterBlock:
     words: list[RegisterWord] = []
     for register in manifest.registers.values():
-        if register.name != _KEPT:
+        if register.name != _KEPT or "rays.tail" in manifest.registers:
             words += _words(
                 register.name, 4 * register.address, register.width, register.access, _description(register)
             )

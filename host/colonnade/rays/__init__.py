@@ -3,6 +3,7 @@
 from colonnade.rays.intersector import RayMeshIntersector
 from colonnade.rays.scene import Hits, Scene
 from colonnade.rays.sensor import Sensor
+from colonnade.rays.shell import RayShell
 from colonnade.rays.traffic import Traffic
 
-__all__ = ["Hits", "RayMeshIntersector", "Scene", "Sensor", "Traffic"]
+__all__ = ["Hits", "RayMeshIntersector", "RayShell", "Scene", "Sensor", "Traffic"]

@@ -6,6 +6,7 @@ import io
 import os
 import subprocess
 import weakref
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 
@@ -14,6 +15,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.config_name import Overrides
 from colonnade.design.generator import design_for
+from colonnade.design.manifest import Register
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import HUGE_PAGES
 
@@ -21,7 +23,41 @@ from colonnade.device.verilator import HUGE_PAGES
 _RAYS, _HITS, _TAG = 1 << 32, 2 << 32, 64
 
 
-class RayDevice:
+class RayBackend(ABC):
+    """A device that answers the batches of a `Scene`.
+
+    Args:
+        registers: Those of its design.
+    """
+
+    def __init__(self, registers: Mapping[str, Register]) -> None:
+        self._registers = registers
+        self._before: dict[str, int] = {}
+
+    @abstractmethod
+    def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
+        """Load records, and write the registers of a scene and its rays by name."""
+
+    @abstractmethod
+    def submit(self, batch: bytes, rays: bytes, size: int) -> tuple[int, bytes]:
+        """Run a batch, whose addresses are the device's; its tag, and `size` bytes of its hits."""
+
+    def counters(self) -> dict[str, int]:
+        """Sums since the device was made, of cycles too, by the names of the registers."""
+        sums = {}
+        for name, register in self._registers.items():
+            kind, _, counter = name.partition(".")
+            if kind == "counters":
+                value = register.decode([self._word(register.address + word) for word in range(register.words)])
+                before = self._before.get(counter, 0)
+                sums[counter] = max(value, before) if counter == "deepestStack" else value + before
+        return sums
+
+    @abstractmethod
+    def _word(self, address: int) -> int: ...
+
+
+class RayDevice(RayBackend):
     """A device of the Verilog, under Verilator.
 
     Args:
@@ -41,7 +77,7 @@ class RayDevice:
         design = design_for(config, overrides, progress)
         if not design.manifest.config["frame"]["rays"]:
             raise UserError("the design traces no rays of applications: choose one with frame.rays, such as traversal")
-        self._registers = design.manifest.registers
+        super().__init__(design.manifest.registers)
         program = build_simulator(design, progress)
         with ExitStack() as stack:
             process = stack.enter_context(
@@ -57,10 +93,9 @@ class RayDevice:
             stack.callback(process.stdin.close)
             self._commands, self._answers, self._errors = process.stdin.buffer, process.stdout.buffer, process.stderr
             self.close = weakref.finalize(self, stack.pop_all().close)
-        self._before: dict[str, int] = {}
 
     def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
-        """Load records, and write the registers of a scene and its rays by name."""
+        """See `RayBackend`."""
         self._before = self.counters()
         self._send(f"load {count} {len(records) // count}", records)
         written = dict.fromkeys((name for name, each in self._registers.items() if each.access == "rw"), 0)
@@ -70,24 +105,13 @@ class RayDevice:
                 self._send(f"write {address} {word}")
 
     def submit(self, batch: bytes, rays: bytes, size: int) -> tuple[int, bytes]:
-        """Run a batch, whose addresses are the simulator's; its tag, and `size` bytes of its hits."""
+        """See `RayBackend`."""
         words = [(_RAYS, 0), (_HITS, 8), (_TAG, 48)]
         for address, at in words:
             batch = batch[:at] + address.to_bytes(8, "little") + batch[at + 8 :]
         self._send(f"batch {self._registers['rays.tail'].address} {len(rays)} {size}", batch + rays)
         tag = int(self._line())
         return tag, self._answers.read(size)
-
-    def counters(self) -> dict[str, int]:
-        """Sums since the device was made, of cycles too, by the names of the registers."""
-        sums = {}
-        for name, register in self._registers.items():
-            kind, _, counter = name.partition(".")
-            if kind == "counters":
-                value = register.decode([self._word(register.address + word) for word in range(register.words)])
-                before = self._before.get(counter, 0)
-                sums[counter] = max(value, before) if counter == "deepestStack" else value + before
-        return sums
 
     def _word(self, address: int) -> int:
         self._send(f"read {address}")

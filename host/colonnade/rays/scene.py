@@ -15,7 +15,7 @@ from colonnade.common.types import Floats
 from colonnade.design.config_name import Overrides
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
-from colonnade.rays.device import RayDevice
+from colonnade.rays.device import RayBackend, RayDevice
 from colonnade.rays.sensor import Sensor
 from colonnade.rays.traffic import Traffic, cache_shape
 from colonnade.scene_image.packer import record_format
@@ -24,7 +24,7 @@ from colonnade.scene_image.packer import record_format
 CULL_FRONT, CULL_BACK, OPAQUE_ONLY, ALL_MASKS = 1 << 8, 1 << 9, 1 << 10, 0xFF
 RANGES, OCCLUDED, FAN, SENSOR = 1, 2, 1 << 4, 1 << 5
 
-Backend = Literal["model", "rtl"] | RayDevice
+Backend = Literal["model", "rtl"] | RayBackend
 
 #: Values of a hit's id.
 MISS, OUT_OF_RANGE = 0xFFFFFFFF, 0xFFFFFFFE
@@ -66,7 +66,8 @@ class Scene:
         overrides: Settings of the design, "key=value".
         refine: t and weights of a hit from the vertices as they are, in double. Where these say that the ray misses
             the face, a neighbour of it may take its place. False: what the device answers.
-        backend: "model": the bit-exact model; "rtl": the simulated device, with `frame.rays`, or one of this design.
+        backend: "model": the bit-exact model; "rtl": the simulated device, with `frame.rays`; or a device of this
+            design, such as a `RayShell`.
 
     Raises:
         UserError: A mesh or a design is wrong, or they do not fit; also of the methods that add or change meshes.
@@ -87,7 +88,7 @@ class Scene:
 
         self._lock = threading.Lock()
         self._manifest = manifest_for(config, overrides).manifest
-        device: RayDevice | None = None if isinstance(backend, str) else backend
+        device: RayBackend | None = None if isinstance(backend, str) else backend
         if backend == "rtl":
             device = RayDevice(config, overrides)
         self._rays: Any = _core.Rays(design_text(self._manifest), device)

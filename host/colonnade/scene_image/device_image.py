@@ -10,7 +10,7 @@ import numpy.typing as npt
 from colonnade.design.manifest import Manifest
 from colonnade.maps.image import AttributeImage
 from colonnade.scene_image.environment import map_sections
-from colonnade.scene_image.file import LoadSection, SceneImage
+from colonnade.scene_image.file import Loads, LoadSection
 
 MAGIC = b"CLNDLOAD"
 VERSION = 1
@@ -21,7 +21,7 @@ ALIGNMENT = 128
 _HEADER_WORDS = ALIGNMENT // 4
 
 
-def device_image(image: SceneImage, manifest: Manifest) -> bytes:
+def device_image(image: Loads, manifest: Manifest) -> bytes:
     """The image that a shell with this manifest loads.
 
     With a cache the scene lies in DRAM, and the image has the environment's maps only.

@@ -6,7 +6,7 @@ import numpy as np
 
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
-from colonnade.scene_image.file import SceneImage
+from colonnade.scene_image.file import Loads
 
 #: The address of the records is a multiple of this; register ``dram.page`` counts in it.
 PAGE_BYTES = 4096
@@ -39,7 +39,7 @@ def dram_lines(records: int, manifest: Manifest) -> int:
     return 2 * -(-records // (2 * line_layout(manifest)["records"]))
 
 
-def dram_image(image: SceneImage, manifest: Manifest) -> bytes:
+def dram_image(image: Loads, manifest: Manifest) -> bytes:
     """All lines of a scene; bytes between them are 0.
 
     Raises:

@@ -12,6 +12,7 @@ import json
 import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +44,18 @@ class LoadSection:
 
     memory: str
     words: npt.NDArray[np.uint8]
+
+
+class Loads(Protocol):
+    """What a device loads: `records` and `attributes` of a `SceneImage`."""
+
+    @property
+    def records(self) -> npt.NDArray[np.uint8]:
+        """See `SceneImage`."""
+
+    @property
+    def attributes(self) -> tuple[LoadSection, ...]:
+        """See `SceneImage`."""
 
 
 @dataclass(frozen=True)

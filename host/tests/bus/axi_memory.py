@@ -107,11 +107,11 @@ class AxiMemory:
                     if strobes[lane] == "1":
                         end = len(bits) - 8 * lane
                         self.bytes[first + lane] = int(bits[end - 8 : end], 2)
-            cocotb.start_soon(self._respond(answers, response))
+            cocotb.start_soon(self._respond(answers, int(burst.awid), response))
 
-    async def _respond(self, answers: Any, response: int) -> None:
+    async def _respond(self, answers: Any, identifier: int, response: int) -> None:
         await ClockCycles(self._dut.clock, 1 + self._random.randrange(self.latency))
-        await answers.send(answers._transaction_obj(bid=0, bresp=response))
+        await answers.send(answers._transaction_obj(bid=identifier, bresp=response))
 
     async def _read(self, addresses: Any, data: Any) -> None:
         reads: list[Read] = []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,9 @@ import pytest
 from exact_rays import mesh_of, outside_rays
 
 from colonnade import UserError
-from colonnade.rays import Scene, Sensor
+from colonnade.design.config_name import Overrides
+from colonnade.rays import RayShell, Scene, Sensor
+from colonnade.rays.device import RayBackend, RayDevice
 from colonnade.rays.scene import ALL_MASKS, FAN, OCCLUDED, RANGES
 
 #: The smallest design, and one of two columns and rows whose scene is in DRAM.
@@ -21,12 +25,15 @@ SMALL = (
 
 
 @pytest.mark.matrix
+@pytest.mark.parametrize("device", (RayDevice, RayShell.simulated), ids=("device", "shell"))
 @pytest.mark.parametrize("settings", ((), SMALL), ids=("records in memory", "scene in DRAM"))
-def test_hits_of_the_device_are_those_of_the_model(settings: tuple[str, ...]) -> None:
+def test_hits_of_the_device_are_those_of_the_model(
+    settings: tuple[str, ...], device: Callable[[str, Overrides], RayBackend]
+) -> None:
     vertices, faces = mesh_of("torus")
-    model, device = scenes = [
-        Scene(vertices, faces, "tiny", (*RAYS, *settings), backend=backend) for backend in ("model", "rtl")
-    ]
+    design: tuple[str, Overrides] = ("tiny", (*RAYS, *settings))
+    answering = device(*design)
+    scenes = [Scene(vertices, faces, *design), Scene(vertices, faces, *design, backend=answering)]
     rays = outside_rays(vertices, 400, seed=4)
 
     def both(call: Any) -> None:
@@ -45,8 +52,28 @@ def test_hits_of_the_device_are_those_of_the_model(settings: tuple[str, ...]) ->
         scene.set_mask(scene.add(vertices + 0.1, faces), 2)
     both(lambda scene: scene.closest(rays, mask=2).t)
     both(lambda scene: scene.closest(rays, mask=1).t)
-    wanted, found = model.counters(), device.counters()
+    wanted, found = (scene.counters() for scene in scenes)
     assert [found[name] for name in ("rays", "raysRefused")] == [wanted[name] for name in ("rays", "raysRefused")]
+
+
+@pytest.mark.matrix
+def test_refused_batches_stop_no_later_ones() -> None:
+    vertices, faces = mesh_of("torus")
+    rays = outside_rays(vertices, 200, seed=4).astype(np.float32)
+    device = RayShell.simulated("tiny", RAYS)
+    scenes = [Scene(vertices, faces, "tiny", RAYS, backend=backend) for backend in ("model", device)]
+    wanted, found = (scene.submit(rays, len(rays), ALL_MASKS << 24) for scene in scenes)
+    assert (wanted == found).all()
+
+    def batch(mode: int, count: int) -> tuple[bytes, bytes, int]:
+        words = struct.pack("<QQII5fIQQ", 0, 0, count, mode | ALL_MASKS << 24, 0, 0, 0, 0, 0, count, 0, 0)
+        return words, rays.tobytes(), 16 * len(rays)
+
+    refused = [batch(3, 199), batch(0, 0), batch(1 << 12, 198)]
+    answers = device.run([batch(0, 200), *refused, batch(0, 200), batch(RANGES, 7)])
+    assert [tag for tag, _ in answers] == [200, 199 | 1 << 31, 1 << 31, 198 | 1 << 31, 200, 7]
+    assert answers[0][1] == answers[4][1] == wanted.tobytes()
+    assert answers[5][1][:56] == wanted.reshape(-1, 16)[:7, :8].tobytes()
 
 
 def test_a_design_without_rays_is_refused() -> None:

@@ -70,11 +70,13 @@ public:
         ++now_;
         offerWrites();
         top_.m_axi_arready = moves();
-        top_.m_axi_bvalid = top_.m_axi_bvalid ? 1 : !answers_.empty() && answers_.front() <= now_ && moves();
+        top_.m_axi_bvalid = top_.m_axi_bvalid ? 1 : !answers_.empty() && answers_.front().due <= now_ && moves();
+        if (top_.m_axi_bvalid) top_.m_axi_bid = static_cast<CData>(answers_.front().id);
         top_.m_axi_rvalid = top_.m_axi_rvalid ? 1 : !reads_.empty() && reads_.front().due <= now_ && moves();
         if (top_.m_axi_rvalid) {
             const Burst& read = reads_.front();
             std::memcpy(&top_.m_axi_rdata, range(read.address + read.done * bus_, bus_), bus_);
+            top_.m_axi_rid = static_cast<CData>(read.id);
             top_.m_axi_rlast = read.done + 1 == read.beats;
         }
         scene_.offer();
@@ -84,8 +86,8 @@ public:
     /// Takes the transfers of this cycle; afterwards `offer` may change what was taken.
     void take() {
         checkOrder();
-        if (top_.m_axi_awvalid && top_.m_axi_awready) writes_.push_back(burst(top_.m_axi_awaddr, top_.m_axi_awlen));
-        if (top_.m_axi_arvalid && top_.m_axi_arready) reads_.push_back(burst(top_.m_axi_araddr, top_.m_axi_arlen));
+        if (top_.m_axi_awvalid && top_.m_axi_awready) writes_.push_back(burst(top_.m_axi_awaddr, top_.m_axi_awlen, top_.m_axi_awid));
+        if (top_.m_axi_arvalid && top_.m_axi_arready) reads_.push_back(burst(top_.m_axi_araddr, top_.m_axi_arlen, top_.m_axi_arid));
         if (top_.m_axi_wvalid && top_.m_axi_wready) takeBeat();
         while (!writes_.empty() && !beats_.empty()) write();
         if (top_.m_axi_bvalid && top_.m_axi_bready) {
@@ -112,7 +114,7 @@ public:
 private:
     struct Burst {
         std::uint64_t address, due;
-        unsigned beats, done;
+        unsigned beats, done, id;
     };
 
     struct Beat {
@@ -122,11 +124,11 @@ private:
 
     bool moves() { return stall_ == 0 || random_() % 100 >= stall_; }
 
-    Burst burst(std::uint64_t address, unsigned length) {
+    Burst burst(std::uint64_t address, unsigned length, unsigned id) {
         const std::uint64_t first = address / bus_ * bus_, end = first + (length + 1ull) * bus_;
         if (first / 4096 != (end - 1) / 4096) throw std::runtime_error("a burst crosses a page of 4 KB");
         range(first, end - first);
-        return {first, now_ + latency_, length + 1, 0};
+        return {first, now_ + latency_, length + 1, 0, id};
     }
 
     void offerWrites() {
@@ -176,8 +178,9 @@ private:
         ++burst.done;
         if (beat.isLast != (burst.done == burst.beats)) throw std::runtime_error("a burst does not end with its last beat");
         if (burst.done < burst.beats) return;
+        answers_.push_back(burst);
+        answers_.back().due = now_ + latency_;
         writes_.pop_front();
-        answers_.push_back(now_ + latency_);
     }
 
     VColonnadeAxi& top_;
@@ -186,10 +189,9 @@ private:
     std::mt19937 random_;
     BusBytes bytes_;
     Scene scene_;
-    std::deque<Burst> writes_, reads_;
+    std::deque<Burst> writes_, reads_, answers_;
     std::deque<Beat> beats_;        // without their address
     unsigned wholeBursts_ = 0;      // of them
-    std::deque<std::uint64_t> answers_;
     std::uint64_t now_ = 0, announced_ = 0, begun_ = 0; // addresses that were offered, bursts whose data were
     bool isAnnounced_ = false, isFirstBeat_ = true, takenB_ = false, takenR_ = false;
 };
