@@ -10,6 +10,7 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.rays import Scene, Sensor
 from colonnade.rays.scene import ALL_MASKS, OCCLUDED, RANGES, SENSOR
+from numpy.typing import NDArray
 
 from colonnade_lab.evaluation.rays import rays_of_kind
 
@@ -47,6 +48,37 @@ def sensor_of(mesh: Mesh, count: int) -> Sensor:
     return Sensor(origin, (-width / 2, height / 2, -away), (width / _WIDTH, 0, 0), (0, -height / rows, 0), _WIDTH, rows)
 
 
+def batches_of(mesh: Mesh, scene: Scene, count: int) -> dict[str, tuple[Callable[[Scene], NDArray[np.uint8]], int]]:
+    """Each kind: what runs its batch in a scene of the mesh and returns the bytes of its hits, and its rays.
+
+    Args:
+        mesh: The mesh.
+        scene: A scene of it, which orders the rays.
+        count: Rays of a kind; of a sensor, rounded up to whole rows.
+    """
+    sensor = sensor_of(mesh, count)
+    y, x = np.mgrid[: sensor.height, : sensor.width].reshape(2, -1, 1)
+    ways = np.array(sensor.corner) + x * np.array(sensor.right) + y * np.array(sensor.down)
+    ends = np.zeros((len(ways), 1))
+    camera = np.hstack([np.zeros_like(ways) + sensor.origin, ends, ways, ends + np.inf])
+    occlusion = rays_of_kind("occlusion", mesh, count)
+    masks = ALL_MASKS << 24
+
+    def of_memory(rays: np.ndarray, mode: int = 0) -> Callable[[Scene], NDArray[np.uint8]]:
+        return lambda scene: scene.submit(rays.astype(np.float32), len(rays), mode | masks)
+
+    return {
+        "sensor, ranges": (
+            lambda scene: scene.submit(sensor.record(), len(ways), masks | SENSOR | RANGES, sensor.origin),
+            len(ways),
+        ),
+        "sensor's rays from memory, hits": (of_memory(camera), len(ways)),
+        "occlusion, in order": (of_memory(occlusion[scene.order(occlusion)], OCCLUDED), count),
+        "off the surface, shuffled, hits": (of_memory(rays_of_kind("off the surface, shuffled", mesh, count)), count),
+        "from around, shuffled, hits": (of_memory(rays_of_kind("outside, shuffled", mesh, count)), count),
+    }
+
+
 def measured(
     mesh: Mesh,
     config: str,
@@ -60,30 +92,9 @@ def measured(
 
     device = RayDevice(config, overrides, options, progress)
     scene = Scene(mesh.vertices, mesh.faces, config, overrides, backend=device)
-    sensor = sensor_of(mesh, count)
-    y, x = np.mgrid[: sensor.height, : sensor.width].reshape(2, -1, 1)
-    ways = np.array(sensor.corner) + x * np.array(sensor.right) + y * np.array(sensor.down)
-    ends = np.zeros((len(ways), 1))
-    camera = np.hstack([np.zeros_like(ways) + sensor.origin, ends, ways, ends + np.inf])
-    occlusion = rays_of_kind("occlusion", mesh, count)
-    masks = ALL_MASKS << 24
-
-    def of_memory(rays: np.ndarray, mode: int = 0) -> Callable[[], object]:
-        return lambda: scene.submit(rays.astype(np.float32), len(rays), mode | masks)
-
-    kinds: dict[str, tuple[Callable[[], object], int]] = {
-        "sensor, ranges": (
-            lambda: scene.submit(sensor.record(), len(ways), masks | SENSOR | RANGES, sensor.origin),
-            len(ways),
-        ),
-        "sensor's rays from memory, hits": (of_memory(camera), len(ways)),
-        "occlusion, in order": (of_memory(occlusion[scene.order(occlusion)], OCCLUDED), count),
-        "off the surface, shuffled, hits": (of_memory(rays_of_kind("off the surface, shuffled", mesh, count)), count),
-        "from around, shuffled, hits": (of_memory(rays_of_kind("outside, shuffled", mesh, count)), count),
-    }
-    for kind, (run, rays) in kinds.items():
+    for kind, (run, rays) in batches_of(mesh, scene, count).items():
         before = device.counters()
-        run()
+        run(scene)
         found = {name: value - before[name] for name, value in device.counters().items()}
         reads = (found[name] / rays for name in _READS)
         yield DeviceRates(kind, found["cycles"], rays / found["cycles"], found["raysInBox"] / found["cycles"], *reads)

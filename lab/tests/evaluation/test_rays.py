@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 from colonnade.mesh.load import load_mesh
+from colonnade.rays import Scene
 
+from colonnade_lab.evaluation.ray_bench import batches_of
 from colonnade_lab.evaluation.rays import KINDS, measured
 
 
@@ -21,3 +23,24 @@ def test_hits_are_those_of_embree() -> None:
 
 def test_a_design_without_caches_has_no_traffic() -> None:
     assert [each.dram_bytes for each in measured(load_mesh("cube"), "small", (), 10)] == [None] * len(KINDS)
+
+
+#: Designs for rays: one traversal unit, and two columns of two rows whose scene is in DRAM, of 16 bits and of 24.
+_TINY = ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=256")
+_SMALL = ("array.rows=2", "array.columns=2", "units.triangleRows=2")
+_EXACT = ("geometry.vertexBits=24", "geometry.triangleBits=32")
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize(
+    ("config", "overrides"),
+    (("tiny", _TINY), ("traversal", _SMALL), ("traversal", (*_SMALL, *_EXACT))),
+    ids=("tiny", "small", "24 bits"),
+)
+def test_the_device_gives_the_hits_of_the_model_in_a_million_rays(config: str, overrides: tuple[str, ...]) -> None:
+    mesh = load_mesh("bunny")
+    model = Scene(mesh.vertices, mesh.faces, config, overrides)
+    device = Scene(mesh.vertices, mesh.faces, config, overrides, backend="rtl")
+    for kind, (run, rays) in batches_of(mesh, model, 200_000).items():
+        wanted = run(model)
+        assert rays >= 200_000 and wanted.any() and (run(device) == wanted).all(), kind
