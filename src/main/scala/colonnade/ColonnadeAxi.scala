@@ -67,14 +67,14 @@ final class ColonnadeAxi(
   registerPins.attach(slave.axi)
   registers.io.access :<>= slave.access
   registers.io.framebufferErrors.get := control.io.errors
-  registers.io.imageErrors       := loader.io.errors
-  registers.io.status            := control.io.status
-  registers.io.events            := control.io.events
-  registers.io.deviceIsFree      := !control.io.start
-  interrupt                      := registers.io.interrupt
-  control.io.commands            := registers.io.commands
-  control.io.settings            := registers.io.framebuffer.get
-  control.io.writesAreDone       := registers.io.writesAreDone
+  registers.io.imageErrors           := loader.io.errors
+  registers.io.status                := control.io.status
+  registers.io.events                := control.io.events
+  registers.io.deviceIsFree          := !control.io.start
+  interrupt                          := registers.io.interrupt
+  control.io.commands                := registers.io.commands
+  control.io.settings                := registers.io.framebuffer.get
+  control.io.writesAreDone           := registers.io.writesAreDone
 
   // The device's register port, a cycle later: the host's, or the start of a frame
   private val start = RegisterMap(config).find(_.name == "control.start").get
@@ -137,7 +137,7 @@ final class ColonnadeAxi(
   master.foreach { case (channel, stream) => masterPins.drive(channel, stream) }
   masterPins.receive("b", writeGuard.io.axi.b)
   masterPins.receive("r", readGuard.io.axi.r)
-  private val sceneGuard = scenePins.map(ColonnadeAxi.guardScene(config, _, device.io.memory.get))
+  private val sceneGuard  = scenePins.map(ColonnadeAxi.guardScene(config, _, device.io.memory.get))
   private val refitGuards = refitPins.map { pins =>
     val unit   = withReset(clears)(Module(new RefitUnit(config, shell.busBytes)))
     val reads  = Module(new AxiReadGuard(RefitReader.idBits, shell.busBytes, ColonnadeAxi.refitBursts))

@@ -76,6 +76,7 @@ final class ColonnadeRaysAxi(config: ColonnadeConfig, shell: ShellConfig) extend
   window.io.readIsIdle  := readGuard.io.isIdle
   window.io.writeIsIdle := writeGuard.io.isIdle
   readGuard.io.inner :<>= window.io.read
+  window.io.read.r.valid := readGuard.io.inner.r.valid && !isLoading
   writeGuard.io.inner :<>= window.io.write
   loader.io.axi.ar.ready := isLoading && readGuard.io.inner.ar.ready
   loader.io.axi.r.valid  := isLoading && readGuard.io.inner.r.valid

@@ -91,10 +91,11 @@ private class RayBatches(dut: ColonnadeRaysAxi, config: ColonnadeConfig, stall: 
   private def tag(at: Int): BigInt = memory.words(tags + 4 * at, 1).head
 
   /** The hits are those of the model, and no others are written. */
-  private def check(batch: TestBatch, hits: BigInt, expected: Seq[BigInt]): Unit = withClue(s"$batch: ".take(80)) {
-    memory.words(hits, batch.hitBytes / 4) shouldBe expected
-    memory.words(hits + batch.hitBytes, 16).toSet shouldBe Set(RayBatches.unwritten)
-  }
+  private def check(batch: TestBatch, hits: BigInt, expected: Seq[BigInt]): Unit =
+    withClue(s"${batch.count} rays, mode ${batch.mode.toString(16)}: ") {
+      memory.words(hits, batch.hitBytes / 4) shouldBe expected
+      memory.words(hits + batch.hitBytes, 16).toSet shouldBe Set(RayBatches.unwritten)
+    }
 
   private def place(batch: TestBatch, rays: BigInt, hits: BigInt): Unit = {
     memory.store(rays, batch.rays)
@@ -162,10 +163,10 @@ private class RayBatches(dut: ColonnadeRaysAxi, config: ColonnadeConfig, stall: 
     * written beyond the window.
     */
   def fuzz(rounds: Int): Unit = {
-    val batches    = Seq.tabulate(rounds)(i => stimulus.batch(1 + random.nextInt(80), i % 3, i / 3 % 3))
-    val expected   = Model.batches(config, stimulus.image, stimulus.scene.records, batches.map(_.query))
-    val rays       = BigInt(0x110000)
-    val hits       = BigInt(0x210000)
+    val batches  = Seq.tabulate(rounds)(i => stimulus.batch(1 + random.nextInt(80), i % 3, i / 3 % 3))
+    val expected = Model.batches(config, stimulus.image, stimulus.scene.records, batches.map(_.query))
+    val rays     = BigInt(0x110000)
+    val hits     = BigInt(0x210000)
     for ((batch, round) <- batches.zipWithIndex) {
       memory.store(tags, Seq.fill(4)(RayBatches.unwritten))
       place(stimulus.batch(80, 0, form = 0), rays, hits)
@@ -187,7 +188,7 @@ private class RayBatches(dut: ColonnadeRaysAxi, config: ColonnadeConfig, stall: 
       submit(batch.words(rays, hits, 1000, tags + 16))
       finish()
       tag(4) shouldBe 1000
-      check(batch, hits, expected(round))
+      withClue(s"after ${hostile.mkString("; ")}${if (isCut) ", cut" else ""}: ")(check(batch, hits, expected(round)))
       memory.written.filterNot(at => at >= window._1 && at < window._2) shouldBe Set()
       cycles = 0
     }
@@ -201,12 +202,12 @@ private object RayBatches {
 
 /** A batch of whose descriptor one or two fields are wrong, or nearly so. */
 private class HostileBatch(batch: TestBatch, random: Random, window: (BigInt, BigInt), index: Int) {
-  private val wide  = Seq(BigInt(64, random), BigInt(40, random), window._1 - 64, window._2, window._2 - 64, BigInt(0))
+  private val wide   = Seq(BigInt(64, random), BigInt(40, random), window._1 - 64, window._2, window._2 - 64, BigInt(0))
   private val counts = Seq(BigInt(0), RayBatch.maxCount + 1, BigInt(1) << 31, BigInt(1))
-  private val wrong = Seq.fill(1 + random.nextInt(2))(random.nextInt(6)).toSet
-  private val value = wide(random.nextInt(wide.size)) + (if (random.nextInt(4) == 0) 1 << random.nextInt(6) else 0)
-  private val count = if (wrong(3)) counts(random.nextInt(counts.size)) else BigInt(batch.count)
-  private val mode  = if (wrong(4)) batch.mode ^ (BigInt(1) << random.nextInt(32)) else batch.mode
+  private val wrong  = Seq.fill(1 + random.nextInt(2))(random.nextInt(6)).toSet
+  private val value  = wide(random.nextInt(wide.size)) + (if (random.nextInt(4) == 0) 1 << random.nextInt(6) else 0)
+  private val count  = if (wrong(3)) counts(random.nextInt(counts.size)) else BigInt(batch.count)
+  private val mode   = if (wrong(4)) batch.mode ^ (BigInt(1) << random.nextInt(32)) else batch.mode
 
   private def rays(at: BigInt) = if (wrong(0)) value else at
   private def hits(at: BigInt) = if (wrong(1)) value else at
@@ -220,9 +221,9 @@ private class HostileBatch(batch: TestBatch, random: Random, window: (BigInt, Bi
 
   /** The tag that it leaves, if its place is the one that was meant, and it needs no sensor. */
   def tag(rays: BigInt, hits: BigInt): Option[BigInt] = Option.unless(wrong(2) || mode.testBit(5)) {
-    val isLegal = (mode & 3) != 3 && (mode & ~BigInt("ff000f13", 16)) == 0
-    val taken   = count * (if (mode.testBit(4)) 16 else 32)
-    val answers = (count * Seq(128, 64, 1)((mode & 3).toInt.min(2)) + 7) / 8
+    val isLegal                         = (mode & 3) != 3 && (mode & ~BigInt("ff000f13", 16)) == 0
+    val taken                           = count * (if (mode.testBit(4)) 16 else 32)
+    val answers                         = (count * Seq(128, 64, 1)((mode & 3).toInt.min(2)) + 7) / 8
     def fits(at: BigInt, bytes: BigInt) = at % 64 == 0 && at >= window._1 && at + (bytes + 63) / 64 * 64 <= window._2
     val isFine = isLegal && count > 0 && count <= RayBatch.maxCount && fits(this.rays(rays), taken) &&
       fits(this.hits(hits), answers)

@@ -53,8 +53,8 @@ final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extend
   val refit       = Option.when(shell.refit)(new RefitControl(config))
 
   /** Of a device for rays: where its batches lie. */
-  val window = Option.when(config.frame.rays)(Output(new AddressWindow))
-  val commands    = Output(new ShellCommands)
+  val window   = Option.when(config.frame.rays)(Output(new AddressWindow))
+  val commands = Output(new ShellCommands)
 
   /** All writes to the device's registers have arrived there. */
   val writesAreDone = Output(Bool())
@@ -86,7 +86,7 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   require(ShellMap.deviceBase + 4 * deviceWords <= (1 << ShellMap.addressBits), "the device's registers fit")
 
   // Writes to the device wait while a frame runs; of a device for rays, they arrive before the next request
-  private val isForRays = config.frame.rays.B
+  private val isForRays           = config.frame.rays.B
   private val (posted, delivered) = withReset(reset.asBool || io.status.isResetting) {
     val queue = Module(new Queue(new PostedWrite(config), ShellMap.postedWrites(config), useSyncReadMem = true))
     (queue, TimingSlice.queue(queue.io.deq)) // of the memory's output
@@ -101,8 +101,9 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private val writes  = accepts && request.isWrite && request.isWhole
 
   // Registers of the shell
-  private val settings = ShellMap.of(config, shell).filter(_.access == Access.ReadWrite).filterNot(_.name == "interrupt.status")
-  private val values   = settings.map { register =>
+  private val settings =
+    ShellMap.of(config, shell).filter(_.access == Access.ReadWrite).filterNot(_.name == "interrupt.status")
+  private val values = settings.map { register =>
     register.name -> Seq.tabulate(register.words) { word =>
       val bits = (register.width - word * AxiLite.dataBits).min(AxiLite.dataBits)
       RegInit(0.U(bits.W)).suggestName(s"${register.name.replace('.', '_')}_$word")
@@ -186,8 +187,8 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   }
 
   // Registers of the device
-  private val tail           = RegisterMap(config).find(_.name == "rays.tail").fold(false.B)(deviceWord === _.address.U)
-  private val mayChange      = if (config.frame.rays) isIdle || (tail && io.status.isRunning && canChange) else canChange
+  private val tail      = RegisterMap(config).find(_.name == "rays.tail").fold(false.B)(deviceWord === _.address.U)
+  private val mayChange = if (config.frame.rays) isIdle || (tail && io.status.isRunning && canChange) else canChange
   private val deviceWritable =
     VecInit(ShellMap.writableWords(config).map(_.U === deviceWord)).asUInt.orR && mayChange && posted.io.enq.ready
   private val inDevice = isDevice && request.address < (ShellMap.deviceBase / 4 + deviceWords).U
