@@ -23,15 +23,15 @@ struct colonnade_ring {
  * colonnade_set_scene. COLONNADE_BUSY: batches run. */
 enum colonnade_error colonnade_set_rays(struct colonnade *device, const struct colonnade_rays_image *image);
 
-/* Opens a ring of 2^`size_log` places, 1 to 15, of which all but one take batches. Batches, rays, hits and tags lie in
+/* Opens a ring of 2^`size_log` slots, 1 to 15, of which all but one take batches. Batches, rays, hits and tags lie in
  * `window`, whose ends are multiples of 64: an access beyond it fails. Again after a reset. */
 enum colonnade_error colonnade_open_ring(struct colonnade_ring *ring, struct colonnade *device, uint64_t address,
                                          uint32_t size_log, const struct colonnade_window *window);
 
-/* The bus address of the place for the next batch; COLONNADE_BUSY: all are taken. */
-enum colonnade_error colonnade_next_batch(const struct colonnade_ring *ring, uint64_t *place);
+/* The bus address of the slot for the next batch; COLONNADE_BUSY: all are taken. */
+enum colonnade_error colonnade_next_batch(const struct colonnade_ring *ring, uint64_t *slot);
 
-/* Hands over the batch at that place, also while others run. What the processor has written to memory before is there. */
+/* Hands over the batch at that slot, also while others run. What the processor has written to memory before is there. */
 enum colonnade_error colonnade_submit(struct colonnade_ring *ring);
 
 /* Waits until all batches have ended, `attempts` polls or waits at most for each. Their tags tell which of them failed. */

@@ -45,10 +45,10 @@ static uint32_t waiting(const struct colonnade_ring *ring) {
     return (ring->tail - get(ring->device, ring->device->design->rays_head)) & COUNT_MASK;
 }
 
-enum colonnade_error colonnade_next_batch(const struct colonnade_ring *ring, uint64_t *place) {
+enum colonnade_error colonnade_next_batch(const struct colonnade_ring *ring, uint64_t *slot) {
     const uint32_t mask = (1u << ring->size_log) - 1;
     if (waiting(ring) >= mask) return COLONNADE_BUSY;
-    *place = ring->address + (uint64_t)BATCH_BYTES * (ring->tail & mask);
+    *slot = ring->address + (uint64_t)BATCH_BYTES * (ring->tail & mask);
     return COLONNADE_OK;
 }
 

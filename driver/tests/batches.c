@@ -1,4 +1,4 @@
-/* Batches of rays against shell.c: places of the ring, waits, and what the driver refuses.
+/* Batches of rays against shell.c: slots of the ring, waits, and what the driver refuses.
  * Prints nothing and returns 0, or the line that failed. */
 #include "colonnade_batches.h"
 
@@ -39,7 +39,7 @@ int main(void) {
     const struct colonnade_bus bus = {shell_read, shell_write, end_batch, &shell};
     struct colonnade device;
     struct colonnade_ring ring;
-    uint64_t place;
+    uint64_t slot;
     shell = shell_of(&design, 3);
     shell.device[HEAD] = shell.device[TAIL] = 0xFFFE; /* of an earlier ring */
     CHECK(colonnade_probe(&device, &bus, &design) == COLONNADE_OK);
@@ -70,22 +70,22 @@ int main(void) {
     static const uint32_t expected[] = {1, 2, 3, 4, 5, 6, 77, 0, 7, (uint32_t)-8, 9, 0, (uint32_t)-10, 0xFFFFFFFF, 0, 11};
     CHECK(memcmp(shell.device + FIRST, expected, sizeof expected) == 0 && shell.device[0] == 1);
 
-    /* All places but one, around the end of the ring and of the count */
+    /* All slots but one, around the end of the ring and of the count */
     CHECK(colonnade_open_ring(&ring, &device, 0x1040, 2, &window) == COLONNADE_OK);
     CHECK(shell.device[RING] == 0x1040 && shell.device[RING + 2] == 2 && shell.registers[AT(rays_windowEnd_low)] == 0x3000);
     for (uint32_t i = 0; i < COUNT; ++i) {
-        CHECK(colonnade_next_batch(&ring, &place) == COLONNADE_OK && place == 0x1040 + 64 * ((2 + i) % 4));
+        CHECK(colonnade_next_batch(&ring, &slot) == COLONNADE_OK && slot == 0x1040 + 64 * ((2 + i) % 4));
         CHECK(colonnade_submit(&ring) == COLONNADE_OK && shell.device[TAIL] == ((0xFFFF + i) & 0xFFFF));
     }
     uint32_t writes = shell.writes;
-    CHECK(colonnade_next_batch(&ring, &place) == COLONNADE_BUSY && colonnade_submit(&ring) == COLONNADE_BUSY);
+    CHECK(colonnade_next_batch(&ring, &slot) == COLONNADE_BUSY && colonnade_submit(&ring) == COLONNADE_BUSY);
     CHECK(colonnade_set_rays(&device, &image) == COLONNADE_BUSY);
     CHECK(colonnade_open_ring(&ring, &device, 0x1040, 2, &window) == COLONNADE_BUSY && shell.writes == writes);
 
-    /* One ends, and then no more: its place is free */
+    /* One ends, and then no more: its slot is free */
     ended = 1;
     CHECK(colonnade_wait_batches(&ring, 5) == COLONNADE_TIMEOUT && sleeps == 6);
-    CHECK(colonnade_next_batch(&ring, &place) == COLONNADE_OK && place == 0x1040 + 64);
+    CHECK(colonnade_next_batch(&ring, &slot) == COLONNADE_OK && slot == 0x1040 + 64);
     ended = COUNT;
     CHECK(colonnade_wait_batches(&ring, 1) == COLONNADE_OK && sleeps == 8 && ended == 1);
     CHECK(colonnade_wait_batches(&ring, 0) == COLONNADE_OK && sleeps == 8);
