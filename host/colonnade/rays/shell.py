@@ -17,7 +17,7 @@ from colonnade.rays.device import RayBackend
 from colonnade.scene_image.dram_image import PAGE_BYTES
 from colonnade.scene_image.file import LoadSection
 
-#: The ring has 2^SIZE_LOG places, of which all but one take batches; tags lie behind it.
+#: The ring has 2^SIZE_LOG slots, of which all but one take batches; tags lie behind it.
 _SIZE_LOG, _BATCH_BYTES, _TAG_BYTES = 4, 64, 4
 _WORDS = {"rays": 0, "hits": 8, "done": 48}
 
@@ -75,7 +75,7 @@ class RayShell(Shell, RayBackend):
         if len(batches) >= 1 << _SIZE_LOG:
             raise UserError(f"there are {len(batches)} batches: hand over {(1 << _SIZE_LOG) - 1} at most")
         free, tags = self._ring + PAGE_BYTES, self._ring + (_BATCH_BYTES << _SIZE_LOG)
-        places = []
+        slots = []
         self._begin(None)
         for number, (batch, rays, size) in enumerate(batches):
             words = {"rays": free, "hits": self._stored("the rays", free, rays), "done": tags + _TAG_BYTES * number}
@@ -83,15 +83,15 @@ class RayShell(Shell, RayBackend):
             self._require_memory("the hits", words["hits"], free - words["hits"])
             for name, at in _WORDS.items():
                 batch = batch[:at] + words[name].to_bytes(8, "little") + batch[at + 8 :]
-            error, place = self._driver.next_batch()
+            error, slot = self._driver.next_batch()
             self._check(error)
-            self.transport.store(place, batch)
+            self.transport.store(slot, batch)
             self._check(self._driver.submit())
-            places.append((words["done"], words["hits"], size))
+            slots.append((words["done"], words["hits"], size))
         self._check(self._driver.wait_batches())
         return [
             (int.from_bytes(self.transport.fetch(done, _TAG_BYTES), "little"), self.transport.fetch(hits, size))
-            for done, hits, size in places
+            for done, hits, size in slots
         ]
 
     def _word(self, address: int) -> int:

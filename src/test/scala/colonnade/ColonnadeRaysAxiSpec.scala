@@ -97,7 +97,7 @@ private class RayBatches(dut: ColonnadeRaysAxi, config: ColonnadeConfig, stall: 
       memory.words(hits + batch.hitBytes, 16).toSet shouldBe Set(RayBatches.unwritten)
     }
 
-  private def place(batch: TestBatch, rays: BigInt, hits: BigInt): Unit = {
+  private def store(batch: TestBatch, rays: BigInt, hits: BigInt): Unit = {
     memory.store(rays, batch.rays)
     memory.store(hits, Seq.fill(batch.hitBytes / 4 + 16)(RayBatches.unwritten))
   }
@@ -115,7 +115,7 @@ private class RayBatches(dut: ColonnadeRaysAxi, config: ColonnadeConfig, stall: 
 
     for ((batch, i) <- batches.zipWithIndex) {
       val (rays, hits) = addresses(i)
-      place(batch, rays, hits)
+      store(batch, rays, hits)
       if (i == refused) submit(batch.copy(mode = batch.mode | 4).words(rays, hits, 77, tags + 4 * 40))
       if (i == broken) {
         memory.response = address => if (address == rays + 0x3000) 2 else 0
@@ -169,7 +169,7 @@ private class RayBatches(dut: ColonnadeRaysAxi, config: ColonnadeConfig, stall: 
     val hits     = BigInt(0x210000)
     for ((batch, round) <- batches.zipWithIndex) {
       memory.store(tags, Seq.fill(4)(RayBatches.unwritten))
-      place(stimulus.batch(80, 0, form = 0), rays, hits)
+      store(stimulus.batch(80, 0, form = 0), rays, hits)
       val hostile = Seq.tabulate(3)(i => new HostileBatch(batches(random.nextInt(rounds)), random, window, i))
       hostile.foreach(each => submit(each.words(rays, hits, tags)))
       val isCut = random.nextBoolean()
@@ -184,7 +184,7 @@ private class RayBatches(dut: ColonnadeRaysAxi, config: ColonnadeConfig, stall: 
       } else {
         for ((each, i) <- hostile.zipWithIndex; left <- each.tag(rays, hits)) withClue(each) { tag(i) shouldBe left }
       }
-      place(batch, rays, hits)
+      store(batch, rays, hits)
       submit(batch.words(rays, hits, 1000, tags + 16))
       finish()
       tag(4) shouldBe 1000
