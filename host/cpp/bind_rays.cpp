@@ -83,8 +83,7 @@ private:
 
     int submit(const colonnade_rays_batch& batch) {
         const auto* const rays = reinterpret_cast<const char*>(batch.rays);
-        const nb::tuple found =
-            nb::cast<nb::tuple>(device_.attr("submit")(nb::bytes(&batch, sizeof batch), nb::bytes(rays, rayBytes(batch)), responseBytes(batch)));
+        const nb::tuple found = nb::cast<nb::tuple>(device_.attr("submit")(nb::bytes(&batch, sizeof batch), nb::bytes(rays, rayBytes(batch)), responseBytes(batch)));
         const auto hits = nb::cast<nb::bytes>(found[1]);
         std::memcpy(reinterpret_cast<void*>(batch.hits), hits.data(), hits.size());
         const auto tag = nb::cast<std::uint32_t>(found[0]);
@@ -324,7 +323,8 @@ void bind_rays(nb::module_& module) {
         .def("occluded", &Rays::occluded, "rays"_a, "mode"_a)
         .def("order", &Rays::order, "rays"_a)
         .def("traffic", &Rays::traffic, "rays"_a, "mode"_a, "is_occlusion"_a, "shape"_a)
-        .def("submit", &Rays::submit, "rays"_a, "count"_a, "mode"_a, "origin"_a = std::array<float, 3>{}, "tnear"_a = 0.0f, "tfar"_a = std::numeric_limits<float>::infinity())
+        .def("submit", &Rays::submit, "rays"_a, "count"_a, "mode"_a, "origin"_a = std::array<float, 3>{}, "tnear"_a = 0.0f,
+             "tfar"_a = std::numeric_limits<float>::infinity())
         .def("face", &Rays::face, "id"_a)
         .def("counters", &Rays::counters);
     module.def("convert_rays", &converted, "numbers"_a, "rays"_a, "is_local"_a, "mantissa"_a, "exponent"_a, "base"_a);

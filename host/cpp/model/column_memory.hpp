@@ -74,7 +74,8 @@ private:
             nodes_.push_back(node);
             if (!node.isLegal) continue;
             for (int i = 0; i < node.nodes; ++i) waiting.push_back(node.first + static_cast<std::size_t>(i));
-            for (int i = 0; i < node.leaves; ++i) addLeaf((node.first + static_cast<std::size_t>(node.nodes) + static_cast<std::size_t>(i) * leafRecords) & addressMask());
+            for (int i = 0; i < node.leaves; ++i)
+                addLeaf((node.first + static_cast<std::size_t>(node.nodes) + static_cast<std::size_t>(i) * leafRecords) & addressMask());
         }
     }
 

@@ -36,7 +36,8 @@ struct FaceAttributes {
 class Pairing {
 public:
     Pairing(const QuantisedMesh& quantised, const FaceAttributes& attributes, const RecordFormat& format)
-        : quantised_(quantised), attributes_(attributes), fields_(format.layouts), normalFraction_(format.normalFraction), bends_(format.bends), codes_(quantised.faces.size()) {
+        : quantised_(quantised), attributes_(attributes), fields_(format.layouts), normalFraction_(format.normalFraction), bends_(format.bends),
+          codes_(quantised.faces.size()) {
         for (std::size_t face = 0; face < codes_.size(); ++face)
             for (int i = 0; i < 3; ++i) {
                 const mesh::Vector& normal = attributes_.cornerNormals[meshFace(face)][i];
@@ -55,8 +56,7 @@ public:
 
     /// Two faces; none if they are no pair. `begins` are the corners at which each begins their common edge.
     std::optional<Leaf> pair(std::uint32_t one, std::uint32_t other, std::array<int, 2>& begins) const {
-        if (attributes_.materials[meshFace(one)] != attributes_.materials[meshFace(other)] ||
-            attributes_.isClear[meshFace(one)] != attributes_.isClear[meshFace(other)])
+        if (attributes_.materials[meshFace(one)] != attributes_.materials[meshFace(other)] || attributes_.isClear[meshFace(one)] != attributes_.isClear[meshFace(other)])
             return {};
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) {

@@ -60,9 +60,11 @@ public:
                 const auto [u, v] = scene_.weightsOf(response);
                 bool isSettled = std::find(known.begin(), known.end(), face) != known.end();
                 if (isRefined_ && !isSettled)
-                    isSettled = settle(rays[i], mode, face, t, most > 1, [&](std::size_t at, const PlaneHit& hit) {
-                                    if (isNew(at)) found[i].push_back(hitOf(i, at, hit));
-                                }) || most > 1;
+                    isSettled = settle(rays[i], mode, face, t, most > 1,
+                                       [&](std::size_t at, const PlaneHit& hit) {
+                                           if (isNew(at)) found[i].push_back(hitOf(i, at, hit));
+                                       }) ||
+                                most > 1;
                 isNew(face);
                 if (!isSettled && t >= rays[i].tnear && t <= rays[i].tfar)
                     found[i].push_back(hitOf(i, face, {t, u, v, 0, (response.id & COLONNADE_RAYS_BACK_SIDE) != 0}));

@@ -8,7 +8,8 @@
 
 namespace colonnade::rays {
 
-static_assert(sizeof(colonnade_rays_batch) == 64 && sizeof(colonnade_rays_record) == 32 && sizeof(colonnade_rays_sensor) == 64 && sizeof(colonnade_rays_response) == 16, "formats in memory");
+static_assert(sizeof(colonnade_rays_batch) == 64 && sizeof(colonnade_rays_record) == 32 && sizeof(colonnade_rays_sensor) == 64 && sizeof(colonnade_rays_response) == 16,
+              "formats in memory");
 
 /// Traces single rays. Copies share the scene, and may run at the same time.
 class RayTracer : public Tracer {
