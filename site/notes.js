@@ -16,7 +16,6 @@ export function notesOf(scene, room) {
   if (mesh.hasColours && !hasRegister(manifest, "materials[0].hasCornerColours")) notes.push("this hardware has no corner colours: the mesh has one colour");
   if (state.room && !room) notes.push(manifest.attributes ? "the page has rooms for presets only" : "this hardware has no maps of a room");
   if (room && !isAtMaps(state)) notes.push("the camera is not that of the photo: the room is drawn from its maps");
-  if (room && !room.light) notes.push("this hardware does not gather the light of the room: choose small");
   if (room?.light?.share) notes.push(`the photo shows ${Math.round(100 * room.light.share)} % of the directions around the object; its mean light comes from the others`);
   const material = materialOf(scene, room);
   if (mesh.hasMaterials && material !== "file") notes.push("one material in place of those of the file");

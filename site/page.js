@@ -58,7 +58,7 @@ async function openDesign() {
   const files = room ? room.views[state.design] : { plain: data.views[state.design] };
   const views = Object.fromEntries(Object.entries(files).map(([name, text]) => [name, bytesOf(text)]));
   const maps = (room?.maps ?? []).map(({ words, ...map }) => ({ ...map, words: bytesOf(words) }));
-  const light = room?.light ? (room.light.radiance ?? bytesOf(room.light.cube)) : null;
+  const light = room ? (room.light.radiance ?? bytesOf(room.light.cube)) : null;
   Object.assign(page, { light: room?.light, middle: room?.object.position });
   await renderer.open({ module: page.module, manifest, views, maps, light, photo: room && (await photoOf(room)) });
 }

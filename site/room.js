@@ -14,7 +14,7 @@ const MARGIN = [1, 0.5, 1.5];
 const LEAST_HEIGHT = 0.3;
 const [GRID, REACHES, MOST_FALLOFF] = [[7, 5, 7], [0, 1, 2], 4];
 const BRIGHTNESS = 0.5;
-const [MOST_HEADROOM, CLAMPED, DARK] = [4, 0.005, 1e-4];
+const DARK = 1e-4;
 
 const range = (count) => Array.from({ length: count }, (_, index) => index);
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -28,10 +28,10 @@ function quantile(values, share) {
 
 /**
  * What the device and the page need of a room. `photo` has the pixels of the maps' part, RGBA, `whole` the photo's size;
- * `lens` is that of the photo; `pose` from view space to the world, or null: it is that of the floor. `gathers`: the light
- * of the photo is gathered, so the room's lights have its scale.
+ * `lens` is that of the photo; `pose` from view space to the world, or null: it is that of the floor. The
+ * room's lights have the scale of the photo, whose light is gathered.
  */
-export function prepareRoom(/** @type {any} */ library, /** @type {any} */ { photo, whole, depth, lens, pose, gathers }) {
+export function prepareRoom(/** @type {any} */ library, /** @type {any} */ { photo, whole, depth, lens, pose }) {
   const { width, height } = photo;
   if (Math.abs(depth.width * whole.height - depth.height * whole.width) > 0.03 * depth.width * whole.height)
     throw new Error(`the depth map is ${depth.width} × ${depth.height}, the photo ${whole.width} × ${whole.height}: both have to show the same part of the room`);
@@ -50,9 +50,10 @@ export function prepareRoom(/** @type {any} */ library, /** @type {any} */ { pho
   });
   const colours = linearOf(photo.data);
   const light = fitLight(world, colours, found.position, notes);
-  const { albedo, headroom } = photoColours(colours, filled, normals, raysOfLens(own, width, height), found, light, gathers ? 1 : MOST_HEADROOM);
-  const seen = gathers ? seenOf(filled, normals, colours, raysOfLens(own, width, height), found, width, height) : null;
-  return { width, height, lens: own, pose: found, depth: filled, normals, albedo, fittedLight: light, headroom, noise, surface: world, seen, notes };
+  const rays = raysOfLens(own, width, height);
+  const albedo = photoColours(colours, filled, normals, rays, found, light);
+  const seen = seenOf(filled, normals, colours, rays, found, width, height);
+  return { width, height, lens: own, pose: found, depth: filled, normals, albedo, fittedLight: light, noise, surface: world, seen, notes };
 }
 
 /** View rays of the pixels, with z = 1: three of each. */
@@ -179,16 +180,13 @@ function fitLight(world, colours, eye, notes) {
   return { ambient: best.ambient, lamp: best.lamp };
 }
 
-/** The colours with which the room, relit, is its photo: sRGB codes of photo / light, at most 1 by the headroom. */
-function photoColours(colours, depth, normals, rays, pose, { ambient, lamp }, most) {
+/** The colours with which the room, relit, is its photo: sRGB codes of photo / light, at most 1. */
+function photoColours(colours, depth, normals, rays, pose, { ambient, lamp }) {
   const result = new Float64Array(colours.length);
-  const brightest = new Float64Array(depth.length);
   for (let i = 0; i < depth.length; ++i) {
     const point = turned(pose.rotation, range(3).map((axis) => rays[3 * i + axis] * depth[i])).map((value, axis) => value + pose.position[axis]);
     const light = Math.max(DARK, ambient + lamp.colour * exposure(point, turned(pose.rotation, normals.subarray(3 * i, 3 * i + 3)), lamp.position, lamp.reach));
     for (let channel = 0; channel < 3; ++channel) result[3 * i + channel] = colours[3 * i + channel] / light;
-    brightest[i] = Math.max(...result.subarray(3 * i, 3 * i + 3));
   }
-  const headroom = Math.max(1, Math.min(most, 15 / Math.max(ambient, lamp.colour), quantile(brightest, 1 - CLAMPED)));
-  return { albedo: Uint8Array.from(result, (value) => encode(Math.min(1, value / headroom))), headroom };
+  return Uint8Array.from(result, (value) => encode(Math.min(1, value)));
 }

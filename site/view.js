@@ -17,7 +17,7 @@ const PASSES = [4, 64];
 const colourOf = (hex) => [0, 2, 4].map((at) => decode(parseInt(hex.slice(at, at + 2), 16)));
 
 /** Whether frames gather the light of the room. */
-const gathers = ({ state }, room) => Boolean(room?.light && state.gather);
+const gathers = ({ state }, room) => Boolean(room && state.gather);
 
 export const passesOf = (scene, room) => PASSES[Number(gathers(scene, room))];
 
@@ -118,7 +118,7 @@ export function poseIn({ manifest, packed }, room, orbit) {
  */
 export function viewOf(scene, room, width, height, orbit, sample = null, samples = {}) {
   const { discs, coverage } = sample ? samples[sample.count] : {};
-  const threshold = coverage?.[room ? (room.light?.lamps.length ?? 0) : 1][sample.index];
+  const threshold = coverage?.[room ? room.light.lamps.length : 1][sample.index];
   const registers = registersOf(scene, room, threshold ?? null);
   const points = discs?.[sample.index] ?? [];
   if (room) {
@@ -129,10 +129,10 @@ export function viewOf(scene, room, width, height, orbit, sample = null, samples
       file: String(room.height / height),
       camera: roomCamera(room, width, height, orbit),
       object: poseIn(scene, room, orbit),
-      lights: (room.light?.lamps ?? []).map((lamp, index) => ({ ...lamp, position: onDisc(lamp, room.object.position, points[index]) })),
+      lights: room.light.lamps.map((lamp, index) => ({ ...lamp, position: onDisc(lamp, room.object.position, points[index]) })),
       registers: { ...registers, ...window },
       sample,
-      exposure: room.light?.exposure ?? 1,
+      exposure: room.light.exposure,
       inPhoto,
     };
   }

@@ -34,7 +34,7 @@ export async function visitorRoom(renderer, manifest, template, found, files, { 
   const photo = pixelsOf(bitmap, template.width, template.height);
   const { lens, pose, step } = meta ?? { lens: lensOf(degrees, whole), pose: null, step: millimetres / 1000 };
   const depth = { name: found.depth, bytes: files.get(found.depth) };
-  const room = await renderer.room({ manifest, photo, whole, lens, pose, depth, step, gathers: template.light !== null });
+  const room = await renderer.room({ manifest, photo, whole, lens, pose, depth, step });
   const { ignored } = found;
   if (!meta) room.notes.push(`the photo's width is taken as ${degrees}°, a step of a PNG of depth as ${millimetres} mm`);
   if (ignored.length > 0) room.notes.push(`${ignored.join(" and ")} ${ignored.length > 1 ? "are" : "is"} not read`);
@@ -43,24 +43,24 @@ export async function visitorRoom(renderer, manifest, template, found, files, { 
 
 /** What the page needs of a room whose object stands at its place: camera, object, light and view files. */
 export async function placedRoom(renderer, room, template, place) {
-  const { pose, lens, width, height, headroom, encoded } = room;
+  const { pose, lens, width, height, encoded } = room;
   const axis = (column) => pose.rotation.map((row) => row[column]);
   const scale = place.edge / 2;
   const object = { position: [place.point[0], place.point[1] + scale, place.point[2]], scale };
-  const exposure = template.light?.exposure ?? 1;
+  const exposure = template.light.exposure;
   const { position, colour, reach } = room.fittedLight.lamp;
-  const lamp = { position, colour: Array(3).fill(colour * headroom * exposure), reach };
+  const lamp = { position, colour: Array(3).fill(colour * exposure), reach };
   const viewsOf = (views) => Object.fromEntries(Object.entries(views).map(([factor, text]) => [factor, roomView(bytesOf(text), template.object.scale, { ...room, lamp }, object, Number(factor))]));
   const views = Object.fromEntries(Object.entries(template.views).map(([design, views]) => [design, viewsOf(views)]));
-  const ambient = room.fittedLight.ambient * headroom * exposure;
-  const light = template.light && { exposure, ...(await lightAt(renderer, room, object, lamp, exposure)) };
+  const ambient = room.fittedLight.ambient * exposure;
+  const light = { exposure, ...(await lightAt(renderer, room, object, lamp, exposure)) };
   return {
     place,
     object,
     camera: { position: pose.position, right: axis(0), down: axis(1), forward: axis(2), lens: [lens.fx, lens.cx, lens.cy, lens.fy].map((value) => value / height) },
     views,
     maps: encoded.maps,
-    headroom,
+    headroom: 1,
     encoded,
     ambient,
     light,

@@ -51,12 +51,11 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     scene = load_scene(SCENE)
     background = replace(scene.background, room=ROOT / "scenes" / "rooms" / name)
     scene = replace(scene, background=background, placement=PLACEMENTS[name])
+    gathered = exposed(replace(scene, names_light=False, paths=replace(scene.paths, gather=1)))
     views: dict[str, dict[str, str]] = {}
     maps: list[dict[str, Any]] | None = None
     for design, manifest in manifests.items():
-        if manifest.gathers:
-            scene = exposed(replace(scene, names_light=False, paths=replace(scene.paths, gather=1)))
-        ready = DeviceScene.of(scene, manifest, load_mesh(MESH), encoder="live")
+        ready = DeviceScene.of(gathered, manifest, load_mesh(MESH), encoder="live")
         views[design] = {
             str(pixel): base64_text(ready.view_file(size, composited=True)) for pixel, size in SIZES.items()
         }
@@ -71,8 +70,7 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
     assert ready.photo is not None
     photo = io.BytesIO()
     Image.fromarray(ready.photo).save(photo, "JPEG", quality=88, subsampling=0)
-    light = _light(ready) if ready.scene.paths.gather else None
-    found = {"views": views, "maps": maps, "headroom": ready.scene.headroom, "light": light}
+    found = {"views": views, "maps": maps, "headroom": ready.scene.headroom, "light": _light(ready)}
     return {"photo": base64_text(photo.getvalue()), **_poses(ready), **found}
 
 

@@ -122,15 +122,7 @@ final class ColonnadeAxi(
 
   // Reads: of an image, or of the photo while a frame runs
   private val isLoading = control.io.status.isLoading
-  private val readers   = Seq(isLoading -> loader.io.axi) ++ writer.io.photo.map(!isLoading -> _)
-  readGuard.io.inner.ar.valid := VecInit(readers.map { case (isOn, reader) => isOn && reader.ar.valid }).asUInt.orR
-  readGuard.io.inner.ar.bits  := Mux1H(readers.map { case (isOn, reader) => isOn -> reader.ar.bits })
-  readGuard.io.inner.r.ready  := VecInit(readers.map { case (isOn, reader) => isOn && reader.r.ready }).asUInt.orR
-  for ((isOn, reader) <- readers) {
-    reader.ar.ready := isOn && readGuard.io.inner.ar.ready
-    reader.r.valid  := isOn && readGuard.io.inner.r.valid
-    reader.r.bits   := readGuard.io.inner.r.bits
-  }
+  ColonnadeAxi.shareReads(readGuard, Seq(isLoading -> loader.io.axi) ++ writer.io.photo.map(!isLoading -> _))
 
   // The bus
   private val master = Seq("aw" -> writeGuard.io.axi.aw, "w" -> writeGuard.io.axi.w, "ar" -> readGuard.io.axi.ar)
@@ -171,6 +163,19 @@ final class ColonnadeAxi(
 
 private object ColonnadeAxi {
   val refitBursts: Int = 64 // of the refit unit that are under way, reads and writes each
+
+  /** Connects a guard to the one of its readers whose condition holds; the others see neither its addresses nor data. */
+  def shareReads(guard: AxiReadGuard, readers: Seq[(Bool, AxiReadPort)]): Unit = {
+    val port = guard.io.inner
+    port.ar.valid := VecInit(readers.map { case (isOn, reader) => isOn && reader.ar.valid }).asUInt.orR
+    port.ar.bits  := Mux1H(readers.map { case (isOn, reader) => isOn -> reader.ar.bits })
+    port.r.ready  := VecInit(readers.map { case (isOn, reader) => isOn && reader.r.ready }).asUInt.orR
+    for ((isOn, reader) <- readers) {
+      reader.ar.ready := isOn && port.ar.ready
+      reader.r.valid  := isOn && port.r.valid
+      reader.r.bits   := port.r.bits
+    }
+  }
 
   /** The guard between a device's reads of the scene and their pins. */
   def guardScene(config: ColonnadeConfig, pins: AxiPins, memory: AxiReadPort): AxiReadGuard = {

@@ -75,17 +75,8 @@ final class ColonnadeRaysAxi(config: ColonnadeConfig, shell: ShellConfig) extend
   window.io.innerWrite :<>= device.io.write
   window.io.readIsIdle  := readGuard.io.isIdle
   window.io.writeIsIdle := writeGuard.io.isIdle
-  readGuard.io.inner :<>= window.io.read
-  window.io.read.r.valid := readGuard.io.inner.r.valid && !isLoading
   writeGuard.io.inner :<>= window.io.write
-  loader.io.axi.ar.ready := isLoading && readGuard.io.inner.ar.ready
-  loader.io.axi.r.valid  := isLoading && readGuard.io.inner.r.valid
-  loader.io.axi.r.bits   := readGuard.io.inner.r.bits
-  when(isLoading) {
-    readGuard.io.inner.ar.valid := loader.io.axi.ar.valid
-    readGuard.io.inner.ar.bits  := loader.io.axi.ar.bits
-    readGuard.io.inner.r.ready  := loader.io.axi.r.ready
-  }
+  ColonnadeAxi.shareReads(readGuard, Seq(isLoading -> loader.io.axi, !isLoading -> window.io.read))
 
   // The bus
   Seq("aw" -> writeGuard.io.axi.aw, "w" -> writeGuard.io.axi.w, "ar" -> readGuard.io.axi.ar).foreach {
