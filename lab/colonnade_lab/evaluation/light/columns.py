@@ -40,6 +40,8 @@ from colonnade_lab.evaluation.region_metrics import compare_regions
 
 #: The preset that renders.
 CONFIG = "small"
+#: What it needs for all lights of a user's room.
+_MORE_LIGHTS = ("frame.lights=8",)
 #: A pixel of the room has changed if a channel differs by more, of 255: the two pictures of the room without objects,
 #: that of the photo and that of the truth, differ by less.
 CHANGED = 8
@@ -58,13 +60,25 @@ class Column:
         gather: Gathered rays of a path.
         denoise: The host's filter of the picture, as that of a scene.
         light: What is known: ``panorama``, the lights, and the panorama of all other light; ``lights``, these alone;
-            ``around``, the whole panorama, in which lights are found; ``photo``, nothing.
+            ``exposed``, the whole panorama with its exposure; ``around``, the panorama alone; ``photo``, nothing.
+        has_maps: Albedo and normals of a user's room are known, too.
     """
 
     passes: int
     gather: int = 1
     denoise: bool | Denoiser = False
     light: str = "panorama"
+    has_maps: bool = False
+
+    @property
+    def knows_lights(self) -> bool:
+        """Whether the scene has the room's own lights."""
+        return self.light in ("panorama", "lights")
+
+    @property
+    def scene(self) -> str:
+        """The scene that has what is known, of `files.LIGHTS` or `files.USERS_LIGHTS`."""
+        return f"{self.light}-{self.gather}{'-maps' if self.has_maps else ''}"
 
 
 def columns(is_users: bool = False) -> dict[str, Column]:
@@ -74,7 +88,16 @@ def columns(is_users: bool = False) -> dict[str, Column]:
         filtered = {
             f"{count} pass{'es' if count > 1 else ''}, filtered": replace(known, passes=count) for count in PASSES
         }
-        return filtered | {"photo alone": replace(photo, passes=PASSES[-1])}
+        best, alone = replace(known, passes=PASSES[-1]), replace(photo, passes=PASSES[-1])
+        return filtered | {
+            "true exposure": replace(best, light="exposed"),
+            "true lights": replace(best, light="panorama"),
+            "true maps": replace(best, has_maps=True),
+            "true lights, maps": replace(best, light="panorama", has_maps=True),
+            "photo alone": alone,
+            "photo alone, true maps": replace(alone, has_maps=True),
+            "photo alone, true lights": replace(alone, light="lights"),
+        }
     found = {"ambient light": Column(4, gather=0, light="lights")}
     for passes in PASSES:
         count = f"{passes} pass{'es' if passes > 1 else ''}"
@@ -188,13 +211,14 @@ def _frame(
 
 def _colonnade(scenes: Mapping[str, Path], room: KnownRoom) -> dict[str, NDArray[np.uint8]]:
     """The pictures of all columns; those that differ in their filter alone have the same passes, rendered once."""
-    manifest, pictures = manifest_for(CONFIG).manifest, {}
+    pictures: dict[str, NDArray[np.uint8]] = {}
     passes: dict[Column, tuple[HostFrame, FramePasses]] = {}
     for title, column in columns(room.is_users).items():
         unfiltered = replace(column, denoise=False)
         if unfiltered not in passes:
-            scene = load_scene(scenes[f"{column.light}-{column.gather}"]).with_samples(column.passes)
+            scene = load_scene(scenes[column.scene]).with_samples(column.passes)
             encoder: Encoder = "live" if room.is_users else "offline"
+            manifest = manifest_for(CONFIG, _MORE_LIGHTS if room.is_users and column.knows_lights else ()).manifest
             prepared = DeviceScene.of(exposed(scene), manifest, size=room.frame, encoder=encoder)
             request = RenderRequest(scene, CONFIG, backend="model", denoise=column.gather > 0)
             (frame,) = host_frames(request, prepared, room.frame, [prepared.scene], 0.0, QUIET)

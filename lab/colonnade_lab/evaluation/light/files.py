@@ -58,10 +58,13 @@ def write_panorama(path: Path, radiance: Floats) -> None:
             stream.write(file.read_bytes())
 
 
-#: The scenes of a frame: what is known of the light (see `columns.Column`), and the gathered rays of a path.
+#: The scenes of a frame: what is known of the light, and the gathered rays of a path, as `columns.Column` says.
 LIGHTS = ("lights-0", "panorama-1", "panorama-2", "around-1", "photo-0", "photo-1")
 #: Those of a user's room.
-USERS_LIGHTS = ("around-1", "photo-1")
+USERS_LIGHTS = (
+    *("around-1", "exposed-1", "panorama-1", "around-1-maps", "panorama-1-maps"),
+    *("photo-1", "photo-1-maps", "lights-1"),
+)
 
 
 def write_scenes(
@@ -69,12 +72,12 @@ def write_scenes(
 ) -> dict[str, Path]:
     """Write a room's folder, its objects as glTF files, and a scene for each frame; returns the scenes.
 
-    ``light`` is one of `LIGHTS`; ``lights`` are the room's, as the objects see them. The folder of a user's room has
-    neither albedo nor normals.
+    ``light`` is one of `LIGHTS`, or of `USERS_LIGHTS`; ``lights`` are the room's, as the objects see them. The folder of
+    a user's room has neither albedo nor normals, unless ``light`` names maps.
     """
-    known, gather = light.split("-")
+    known, gather, *maps = light.split("-")
     write_room(folder / name, environment)
-    if room.is_users:
+    if room.is_users and not maps:
         for derived in ("albedo.png", "normal.png"):
             (folder / name / derived).unlink()
     scenes = {}
@@ -89,10 +92,10 @@ def write_scenes(
         if known in ("lights", "panorama"):
             lines += _lights(name, lights)
         lines += ["[background]", f'room = "{name}"', *([] if room.is_users else ['shadows = "photo"'])]
-        if known in ("panorama", "around"):
+        if known in ("panorama", "exposed", "around"):
             panorama = stored(name) / ("around.hdr" if known == "panorama" else "panorama.hdr")
             lines += [f"panorama = {json.dumps(str(panorama))}"]
-            lines += [] if room.is_users else ["panorama_exposure = 1.0"]
+            lines += [] if room.is_users and known == "around" else ["panorama_exposure = 1.0"]
         width, height = room.frame
         lines += ["", "[paths]", f"gather = {gather}", "", "[frame]", f"width = {width}", f"height = {height}"]
         scenes[frame] = folder / f"{name}-{frame}.toml"
