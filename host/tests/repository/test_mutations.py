@@ -37,8 +37,8 @@ def tool(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 def test_the_page_lists_the_mutations_of_all_modules(tool: dict[str, Any]) -> None:
     page = tool["page"](TABLE)
-    assert page.count("\n| ") == len(TABLE) + 1
-    assert "| `bus` | `RowBuffer` | `RowBufferSpec` | `Mux(isTaken, tagOf(pixel), tag)` → `tag` |\n" in page
+    assert page.count("\n|") == len(TABLE) + 2
+    assert "|`bus`|`RowBuffer`|`RowBufferSpec`|`Mux(isTaken, tagOf(pixel), tag)` → `tag`|\n" in page
 
 
 def test_a_module_without_a_mutation_is_named(tool: dict[str, Any]) -> None:

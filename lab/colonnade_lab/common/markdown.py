@@ -14,5 +14,4 @@ def markdown(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     cells = [list(row) for row in rows]
     are_numbers = [all(_NUMBER.fullmatch(row[index]) for row in cells) for index in range(1, len(titles))]
     rule = ["---", *("---:" if is_number else "---" for is_number in are_numbers)]
-    lines = [f"| {' | '.join(line)} |" for line in (titles, *cells)]
-    return "\n".join([lines[0], f"|{'|'.join(rule)}|", *lines[1:]])
+    return "\n".join(f"|{'|'.join(line)}|" for line in (titles, rule, *cells))

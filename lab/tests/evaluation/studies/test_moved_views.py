@@ -17,7 +17,7 @@ def test_a_moved_camera_sees_the_room() -> None:
     assert 0.95 < report.worst <= report.right <= 1.0
     assert 1.0 < report.steps < 30.0
     lines = table({3: replace(report, right=0.96, worst=0.955)}).splitlines()
-    assert lines[2].startswith("| 3 | lean-to |") and "96.00, 95.50" in lines[2]
+    assert lines[2].startswith("|3|lean-to|") and "96.00, 95.50" in lines[2]
 
 
 def test_cameras_stand_beside_that_of_the_maps() -> None:

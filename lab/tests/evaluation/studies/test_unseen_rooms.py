@@ -89,7 +89,7 @@ def test_a_room_is_measured() -> None:
     np.testing.assert_allclose(report.device + sum(report.causes.values()), 1.0)
     assert report.bytes == {"albedo": 16384, "normals": 16384, "planes": 12288}
     lines = table({3: report, 4: replace(report, device=0.5)}).splitlines()
-    assert lines[2].startswith("| 3 | lean-to |") and lines[-1].startswith("| worst |") and "**50.0**" in lines[-1]
+    assert lines[2].startswith("|3|lean-to|") and lines[-1].startswith("|worst|") and "**50.0**" in lines[-1]
 
 
 def test_the_real_surface_is_in_the_maps_where_the_camera_sees_it() -> None:

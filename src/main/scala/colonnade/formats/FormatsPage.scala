@@ -76,8 +76,8 @@ object FormatsPage {
         |memory with a load target of its own, and a word takes the low bits of a load's record; the manifest's `memories` says
         |how many there are, how wide, and for which target. Tiles lie row by row.""".stripMargin
     case Some(_) =>
-      val rows = AttributeMemories(config).map(m => s"| `${m.name}` | ${m.target} | ${m.depth} | ${m.bits} |")
-      val head = Seq("| memory | load target | words | bits |", "|---|---|---|---|")
+      val rows = AttributeMemories(config).map(m => s"|`${m.name}`|${m.target}|${m.depth}|${m.bits}|")
+      val head = Seq("|memory|load target|words|bits|", "|---|---|---|---|")
       """The maps of an environment. Each of their parts is a memory with a load target of its own; a word takes the low bits of a load's
         |record. Tiles lie row by row.""".stripMargin + (head ++ rows).mkString("\n\n", "\n", "")
   }
@@ -85,7 +85,7 @@ object FormatsPage {
   private def table(kind: chisel3.Data): String = table(numbersOf(kind))
 
   private def table(numbers: Seq[(String, Int, String)]): String =
-    table("field | low bit | number", FieldFamily.of(numbers))
+    table("field|low bit|number", FieldFamily.of(numbers))
 
   private def numbersOf(kind: chisel3.Data): Seq[(String, Int, String)] =
     Layout.of(kind).map(f => (f.name, f.offset, number(f.width, f.signed, f.fraction)))
@@ -103,14 +103,14 @@ object FormatsPage {
       val numbers = all.filter(_.access == access).map { r =>
         (r.name, r.address, number(r.width, r.signed, 0) + r.limit.fold("")(limit => s", to $limit"))
       }
-      s"${titles(access)}:\n\n${table("register | address | number", FieldFamily.of(numbers))}"
+      s"${titles(access)}:\n\n${table("register|address|number", FieldFamily.of(numbers))}"
     }
     parts.mkString("\n\n")
   }
 
   private def table(head: String, families: Seq[FieldFamily]): String = {
-    val rows = families.map(family => s"`${family.pattern}` | ${family.positions} | ${family.kind}")
-    (head +: "---|---|---" +: rows).map(row => s"| $row |").mkString("\n").replace("| ---|---|--- |", "|---|---|---|")
+    val rows = families.map(family => s"`${family.pattern}`|${family.positions}|${family.kind}")
+    (head +: "---|---|---" +: rows).map(row => s"|$row|").mkString("\n")
   }
 
   private def number(width: Int, signed: Boolean, fraction: Int): String = {

@@ -37,7 +37,7 @@ class ShellMapSpec extends AnyFlatSpec {
   }
 
   it should "be the table of docs/bus-shell.md" in {
-    val rows     = Files.readAllLines(Paths.get("docs", "bus-shell.md")).asScala.filter(_.startsWith("| 0x"))
+    val rows     = Files.readAllLines(Paths.get("docs", "bus-shell.md")).asScala.filter(_.startsWith("|0x"))
     val expected = ShellMap.registers.filterNot(_.name.matches("formatHash.[1-7].|refit.bounds.[1-5].")).map {
       register =>
         (f"0x${register.address}%02x", register.name, register.access.label)

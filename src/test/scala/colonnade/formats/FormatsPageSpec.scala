@@ -36,10 +36,10 @@ class FormatsPageSpec extends AnyFlatSpec with Matchers {
   }
 
   it should "name the memories of the maps in a table" in {
-    FormatsPage(ConfigIO.load("small")) should include("\n| `albedo.descriptors` | 1 |")
+    FormatsPage(ConfigIO.load("small")) should include("\n|`albedo.descriptors`|1|")
   }
 
-  private val Row   = """\| `(.*)` \| (.*\d.*) \| .* \|""".r
+  private val Row   = """\|`(.*)`\|(.*\d.*)\|.*\|""".r
   private val Index = """\[([ijk])<(\d+)\]""".r
   private val Term  = """(\d*)([ijk]?)""".r
 
