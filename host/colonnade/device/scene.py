@@ -226,10 +226,12 @@ class DeviceScene:
         """What bends the mesh on a target (docs/driver.md, "Meshes that bend").
 
         Raises:
-            UserError: The scene has no animation.
+            UserError: The scene has neither an animation nor a motion of an object.
         """
         if self.image.bending is None:
-            raise UserError("a clip file has an animation, and the scene has none: give mesh.animation")
+            raise UserError(
+                "a clip file has what moves, and the scene has none: give mesh.animation or object.motion"
+            )
         return self.image.bending.file
 
     def dram_image(self) -> bytes:

@@ -49,8 +49,8 @@ def device_frames(
             notes.tell(line)
     prepared, note = within_budget(prepared, size, note, progress)
     with progress.step("computing the registers"):
-        poses = [prepared.scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
-        exposure, history = scene.motion.exposure(request.frames), History.of(request.denoise or False, request.frames)
+        poses = [prepared.scene.at(fraction) for fraction in scene.frame_progress(request.frames)]
+        exposure, history = scene.opening(request.frames), History.of(request.denoise or False, request.frames)
         frames = host_frames(request, prepared, size, poses, exposure, progress, history=history)
         registers = [[frame.registers(one) for one in frame.passes] for frame in frames]
         if note is not None:

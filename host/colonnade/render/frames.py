@@ -85,11 +85,13 @@ def _check_frames(request: RenderRequest, scene: Scene, size: Size, manifest: Ma
     if request.sequence is not None:
         check_sequence(request, request.sequence, scene)
     elif request.backend == "reference" and scene.is_animated:
-        raise UserError("mesh.animation is for the rtl and the model backend: leave it out for the reference")
-    elif request.frames > 1 and scene.objects and scene.motion.is_still:
         raise UserError(
-            f"nothing moves in these {request.frames} frames, since several objects stand still: give motion.light, or"
-            " motion.turn or motion.translate, which move all of them"
+            "mesh.animation and object.motion are for the rtl and the model backend: leave them out for the reference"
+        )
+    elif request.frames > 1 and scene.objects and scene.is_still:
+        raise UserError(
+            f"nothing moves in these {request.frames} frames, since several objects stand still: give object.motion to"
+            " one, motion.light, or motion.turn or motion.translate, which move all of them"
         )
     if request.waveform is not None:
         _check_waveform(request, size)
@@ -125,8 +127,8 @@ def _reference_frames(
 ) -> Iterator[RenderResult]:
     from colonnade.render.reference_frames import ReferenceOptions, reference_frames
 
-    options = ReferenceOptions(scene.motion.exposure(request.frames), request.relit, request.truth)
-    poses = [scene.at(fraction) for fraction in scene.motion.frame_progress(request.frames)]
+    options = ReferenceOptions(scene.opening(request.frames), request.relit, request.truth)
+    poses = [scene.at(fraction) for fraction in scene.frame_progress(request.frames)]
     mesh = None if isinstance(request.mesh, str) else request.mesh
     for index, result in enumerate(reference_frames(poses, manifest, size, progress, options, mesh)):
         if note is not None and index == 0:

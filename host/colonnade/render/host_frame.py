@@ -177,9 +177,7 @@ class HostFrame:
         to_view = np.linalg.inv(np.vstack([view.view_to_mesh, (0.0, 0.0, 0.0, 1.0)]))
         camera = Camera.of(view).moved(room.camera_to_world @ to_view)
         guide = Guide.of(points[y[:, None], x], mask)
-        found = self._without_noise(
-            "room", ratio, passes.ratio_variance(), guide, camera, prepared.scene.motion.is_still
-        )
+        found = self._without_noise("room", ratio, passes.ratio_variance(), guide, camera, prepared.scene.is_still)
         return replace(sums, ratio=np.rint(found * count * sums.unshadowed).astype(sums.ratio.dtype))
 
     def _faces(self, frame: Frame) -> npt.NDArray[np.int64]:

@@ -47,7 +47,7 @@ class ReferenceOptions:
     """Options of the reference's frames.
 
     Attributes:
-        exposure: Progress of the motion during a frame (`Motion.exposure`).
+        exposure: Progress of the motion during a frame (`Scene.opening`).
         relit: Show the room under the scene's lights, not its photo.
         truth: Mesh file of the room's real geometry, which replaces its depth map.
     """

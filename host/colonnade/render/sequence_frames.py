@@ -70,9 +70,9 @@ def sequence_frames(
         sequence, scene, manifest, size, encode, mesh, every=every, relit=relit, encoder=encoder,
         progress=progress,
     )  # fmt: skip
-    samples, motion = scene.frame.samples, scene.motion
+    samples = scene.frame.samples
     history = History.of(request.denoise or False, request.frames)
-    for number, share in enumerate(motion.frame_progress(request.frames)):
+    for number, share in enumerate(scene.frame_progress(request.frames)):
         title = f"frame {number + 1} of {request.frames}"
         begun = time.perf_counter()
         try:
@@ -84,9 +84,9 @@ def sequence_frames(
             samples = prepared.scene.frame.samples
             with progress.step(f"{title}: computing the registers"):
                 pose = prepared.scene.at(share)
-                lit = prepared if motion.is_still and not scene.is_animated else prepared.lit_at(pose, relit)
+                lit = prepared if scene.is_still else prepared.lit_at(pose, relit)
                 frames = host_frames(
-                    request, lit, size, [pose], motion.exposure(request.frames), progress, number, history
+                    request, lit, size, [pose], scene.opening(request.frames), progress, number, history
                 )
                 registers = [frames[0].registers(one) for one in frames[0].passes]
             for line in (note, _BETWEEN if every > 1 else None):
@@ -100,7 +100,7 @@ def sequence_frames(
         report = replace(
             result.report,
             time=time_of,
-            share=None if motion.is_still else share,
+            share=None if scene.is_still else share,
             seconds=seconds | dict(result.report.seconds),
         )
         yield replace(result, report=report)

@@ -12,13 +12,14 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh.clips.clip import Clip
-from colonnade.mesh.clips.joined import joined_clip, still_clip
+from colonnade.mesh.clips.joined import STILL_SECONDS, Place, joined_clip, still_clip
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import PLAIN
 from colonnade.mesh.materials.mesh import Mesh, MeshPart
 from colonnade.mesh.materials.palette import MAX_MATERIALS
 from colonnade.mesh.materials.texture import Texture
 from colonnade.scene.model import Material, Scene, SceneObject
+from colonnade.scene.object_motion import moving_place, still_place
 from colonnade.scene.object_pose import Pose, footprint_of, free_placement, rotation_matrix, standing_pose
 from colonnade.scene.standing import surface_point
 from colonnade.scene.view import with_overrides
@@ -47,7 +48,7 @@ def joined_mesh(scene: Scene, environment: Environment | None, corner_colours: b
         mesh = replace(loaded[key], materials=with_overrides(loaded[key].materials, described.material))
         poses.append(_pose(described, mesh, environment, f"object {number}", taken))
         meshes.append(_flat(mesh) if described.material.flat else mesh)
-    return _joined(meshes, poses)
+    return _joined(scene, meshes, poses, environment)
 
 
 def report_replaced(mesh: Mesh, overrides: Material) -> None:
@@ -87,7 +88,7 @@ def _flat(mesh: Mesh) -> Mesh:
     return replace(mesh, corner_normals=np.repeat(normals[:, None], 3, axis=1))
 
 
-def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
+def _joined(scene: Scene, meshes: list[Mesh], poses: list[Pose], environment: Environment | None) -> Mesh:
     textures = list(dict.fromkeys(texture for mesh in meshes for texture in mesh.textures))
     meshes = [_renumbered(mesh, textures) for mesh in meshes]
     materials = list(dict.fromkeys(material for mesh in meshes for material in mesh.materials))
@@ -96,7 +97,7 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
     first_vertices = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     first_faces = np.cumsum([0, *(mesh.source_count for mesh in meshes)])
     index = [np.array([materials.index(material) for material in mesh.materials]) for mesh in meshes]
-    clip, clip_corners = _joined_clip(meshes, poses)
+    clip, clip_corners = _joined_clip(meshes, _places(scene, meshes, poses, environment))
     return Mesh(
         vertices=np.concatenate([pose.to_world(mesh.vertices) for mesh, pose in zip(meshes, poses, strict=True)]),
         faces=np.concatenate(
@@ -129,19 +130,26 @@ def _joined(meshes: list[Mesh], poses: list[Pose]) -> Mesh:
     )
 
 
-def _joined_clip(meshes: list[Mesh], poses: list[Pose]) -> tuple[Clip | None, Indices | None]:
+def _places(scene: Scene, meshes: list[Mesh], poses: list[Pose], environment: Environment | None) -> list[Place]:
+    """Where the objects are over the time of the longest animation."""
+    vertical = scene.camera.up if environment is None else (0.0, 1.0, 0.0)
+    seconds = max(0.0 if mesh.clip is None else mesh.clip.duration for mesh in meshes) or STILL_SECONDS
+    return [
+        moving_place(pose, mesh.extent.centre, described.stages, vertical, seconds)
+        if described.motion
+        else still_place(pose)
+        for described, mesh, pose in zip(scene.objects, meshes, poses, strict=True)
+    ]
+
+
+def _joined_clip(meshes: list[Mesh], places: list[Place]) -> tuple[Clip | None, Indices | None]:
     """What moves the meshes, and its vertex at each corner of their faces; nothing if none moves."""
-    if all(mesh.clip is None for mesh in meshes):
+    if all(mesh.clip is None for mesh in meshes) and not any(place.tracks for place in places):
         return None, None
     clips = [mesh.clip or still_clip(mesh.vertices) for mesh in meshes]
     corners = [mesh.faces.astype(np.int64) if mesh.clip_corners is None else mesh.clip_corners for mesh in meshes]
     first = np.cumsum([0, *(len(clip.positions) for clip in clips)])
-    placements = []
-    for pose in poses:
-        placement = np.eye(4)
-        placement[:3, :3], placement[:3, 3] = pose.rotation * pose.scale, pose.translate
-        placements.append(placement)
-    return joined_clip(clips, placements), np.concatenate([a + b for a, b in zip(corners, first[:-1], strict=True)])
+    return joined_clip(clips, places), np.concatenate([a + b for a, b in zip(corners, first[:-1], strict=True)])
 
 
 def _renumbered(mesh: Mesh, textures: list[Texture]) -> Mesh:

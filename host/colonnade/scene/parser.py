@@ -233,10 +233,11 @@ def _message(error: ErrorDetails) -> str:
     table, *rest = (str(part) for part in error["loc"] if isinstance(part, str))
     name = {"placement": "object", "more_lights": "light", "objects": "object"}.get(table, table)
     node = _node(table)
-    if table == "objects" and rest and rest[0] in ("mesh", "transform", "material"):
+    if table == "objects" and rest and rest[0] in ("mesh", "transform", "material", "motion"):
         inner, *rest = rest
         name, node = f"object.{inner}", _plain(node["properties"][inner])
-        if error["type"] == "dataclass_type":
+        node = _plain(node.get("items", node))
+        if error["type"] in ("dataclass_type", "tuple_type"):
             return f"{name} must be a table"
     if table == "motion" and rest[:1] == ["camera"]:
         rest = rest[1:]

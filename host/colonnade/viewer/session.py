@@ -190,7 +190,7 @@ class Session:
             scene = scene.with_camera(_moved(scene.scene.camera, camera))
         scene = replace(scene, scene=scene.scene.with_samples(samples))
         number = self._number if history is not None else 0
-        passes = scene.passes(exposure=scene.scene.motion.exposure(1), number=number)
+        passes = scene.passes(exposure=scene.scene.opening(1), number=number)
         denoise = (scene.scene.frame.denoise or False) if samples > 1 or history is not None else False
         look = self._look if scene.photo is not None else None
         frame = HostFrame(scene, self.size, tuple(passes), denoise=denoise, look=look, history=history)

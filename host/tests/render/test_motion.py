@@ -23,7 +23,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
-from colonnade.scene.model import Motion
+from colonnade.scene.model import MeshSource, Motion, Scene
 from colonnade.scene.object_pose import object_pose, rotation_about
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import make_view
@@ -130,7 +130,7 @@ def test_the_scene_is_packed_once(folder: Path, monkeypatch: pytest.MonkeyPatch)
 
 @given(frames=st.integers(1, 200), turn=st.sampled_from([360.0, -720.0, 90.0]))
 def test_frames_are_evenly_spaced(frames: int, turn: float) -> None:
-    shares = Motion(turn=turn).frame_progress(frames)
+    shares = Scene(MeshSource("cube"), motion=Motion(turn=turn)).frame_progress(frames)
     assert len(shares) == frames and shares[0] == 0.0
     np.testing.assert_allclose(np.diff(shares), shares[1] if frames > 1 else 0.0, atol=1e-12)
     if frames > 1:

@@ -85,7 +85,7 @@ def test_a_framing_camera_starts_where_it_frames() -> None:
 
 
 def test_a_moving_camera_is_no_closed_motion() -> None:
-    assert not MOVING.motion.is_still and MOVING.motion.frame_progress(3) == [0.0, 0.5, 1.0]
+    assert not MOVING.motion.is_still and MOVING.frame_progress(3) == [0.0, 0.5, 1.0]
 
 
 def test_lights_beside_the_object_stay_while_the_camera_moves() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,9 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.joined_mesh import joined_mesh
-from colonnade.scene.model import Material, MeshSource, Scene, SceneObject, Transform
+from colonnade.scene.model import Material, MeshSource, Motion, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene.object_mesh import object_mesh
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import object_pose, rotation_about, rotation_matrix
 from colonnade.scene.parser import load_scene
 from colonnade.scene.standing import Footprint, free_place, surface_point
 
@@ -82,6 +83,42 @@ def test_clips_of_objects_play_where_they_are_placed(tmp_path: Path) -> None:
             np.testing.assert_allclose(found[part], vertices, atol=1e-12)
     still = joined_mesh(objects(SceneObject(mesh=MeshSource("cube")), SceneObject(mesh=MeshSource("cube"))), None)
     assert still.clip is None and still.clip_corners is None
+
+
+def test_an_object_moves_by_itself_about_its_centre() -> None:
+    keys = (
+        ObjectKey(0.5, turn=90.0, translate=(1.0, 0.0, 0.0)),
+        ObjectKey(turn=360.0, rotate=(0.0, 0.0, 30.0), translate=(0.0, 0.5, 0.0)),
+    )
+    place = Transform((0.0, 30.0, 0.0), 2.0, (5.0, 1.0, 0.0))
+    sphere = SceneObject(mesh=MeshSource("sphere:2"))
+    scene = objects(SceneObject(mesh=MeshSource("cube"), transform=place, motion=keys), sphere)
+    joined, cube = joined_mesh(scene, None), load_mesh("cube")
+    assert scene.is_animated and not scene.is_still and joined.clip is not None
+    start = object_pose(Scene(MeshSource("cube"), transform=place), cube.extent, None)
+    for progress, turn, lean, shift in ((0.0, 0, 0, (0, 0)), (0.25, 45, 0, (0.5, 0)), (0.75, 225, 15, (0.5, 0.25))):
+        pose = joined.clip.pose(progress * joined.clip.duration)
+        found = joined.clip.vertices(pose.matrices, pose.weights)
+        turned = rotation_about((0.0, 1.0, 0.0), turn) @ rotation_matrix(Transform(rotate=(0.0, 0.0, lean)))
+        own = (cube.vertices - cube.extent.centre) @ (2.0 * turned @ start.rotation).T
+        moved = start.to_world(cube.extent.centre) + np.array([*shift, 0.0])
+        np.testing.assert_allclose(found[: len(own)], own + moved, atol=1e-12)
+        np.testing.assert_allclose(found[len(own) :], load_mesh("sphere:2").vertices, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("keys", "last"),
+    [
+        ((ObjectKey(turn=720.0),), 0.75),
+        ((ObjectKey(0.5, translate=(1.0, 0.0, 0.0)), ObjectKey(translate=(0.0, 0.0, 0.0))), 0.75),
+        ((ObjectKey(turn=90.0),), 1.0),
+        ((ObjectKey(translate=(1.0, 0.0, 0.0)),), 1.0),
+    ],
+)
+def test_frames_leave_out_the_end_if_all_objects_return(keys: tuple[ObjectKey, ...], last: float) -> None:
+    still = SceneObject(mesh=MeshSource("cube"))
+    scene = replace(objects(still, replace(still, motion=keys)), motion=Motion(turn=0.0))
+    assert scene.frame_progress(4)[-1] == last
 
 
 def test_objects_keep_their_poses_materials_and_faces() -> None:

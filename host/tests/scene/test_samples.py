@@ -133,10 +133,10 @@ def test_a_light_in_the_centre_of_the_object_faces_the_camera() -> None:
 def test_the_shutter_opens_for_a_part_of_the_interval(shutter: float, frames: int, turn: float) -> None:
     motion = Motion(turn=turn, shutter=shutter)
     scene = replace(TEAPOT, motion=motion).with_samples(8)
-    progress = motion.frame_progress(frames)
+    progress = scene.frame_progress(frames)
     interval = progress[1] if frames > 1 else 1.0
     for start in progress:
-        times = [one.motion_progress for one in frame_passes(scene.at(start), exposure=motion.exposure(frames))]
+        times = [one.motion_progress for one in frame_passes(scene.at(start), exposure=scene.opening(frames))]
         expected = start + (np.arange(8) + 0.5) / 8 * shutter * interval
         np.testing.assert_allclose(np.sort(times), np.minimum(expected, 1.0), atol=1e-12)
 

@@ -19,7 +19,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.device_frames import device_frames, render_model
 from colonnade.render.request import RenderRequest
-from colonnade.scene.model import Camera, FrameSize, MeshSource, Motion, Scene, SceneObject, Transform
+from colonnade.scene.model import Camera, FrameSize, MeshSource, Motion, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.bending import Bending
@@ -103,6 +103,20 @@ def test_a_frame_shows_the_pose_of_its_moment(
         expected = render_model(scene, still, manifest, SIZE).object_mask
         assert expected.sum() > 300 and (found != expected).sum() <= 0.03 * expected.sum()
         masks.append(found)
+    assert (masks[0] != masks[1]).sum() > 100
+
+
+def test_frames_show_objects_where_their_motion_has_them(manifest: Manifest) -> None:
+    camera = Camera(position=(0.5, 3.0, 6.0), target=(0.5, 0.5, 0.0))
+    ball = SceneObject(mesh=MeshSource("sphere:80"), transform=Transform(translate=(-2.0, 0.0, 0.0)))
+    moving = replace(ball, motion=(ObjectKey(translate=(4.0, 0.0, 0.0)),))
+    cube = SceneObject(mesh=MeshSource("cube"))
+    scene = Scene(ball.mesh, objects=(moving, cube), camera=camera, motion=Motion(turn=0.0))
+    masks = [render_model(scene.at(at), object_mesh(scene), manifest, SIZE).object_mask for at in (0.0, 0.75)]
+    for mask, x in zip(masks, (-2.0, 1.0), strict=True):
+        placed = replace(scene, objects=(replace(ball, transform=Transform(translate=(x, 0.0, 0.0))), cube))
+        expected = render_model(placed, object_mesh(placed), manifest, SIZE).object_mask
+        assert expected.sum() > 300 and (mask != expected).sum() <= 0.03 * expected.sum()
     assert (masks[0] != masks[1]).sum() > 100
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +11,38 @@ from colonnade.common.types import Floats, Indices
 from colonnade.mesh.clips.clip import INFLUENCES, Clip, Morphs, Nodes
 from colonnade.mesh.clips.tracks import Track
 
+#: Duration of motions beside which no animation plays.
+STILL_SECONDS = 1.0
 _NO_ROTATION = np.array([[0.0, 0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a clip is in the scene of all.
+
+    Attributes:
+        nodes: A chain of nodes, each the child of the one before; the last carries the clip.
+        tracks: What moves them.
+    """
+
+    nodes: Nodes
+    tracks: tuple[Track, ...] = ()
+
+    @classmethod
+    def of(cls, matrices: Sequence[Floats], tracks: tuple[Track, ...] = ()) -> Place:
+        """That of transforms to their parents, float64 [4, 4] each, with tracks of the first."""
+        count = len(matrices)
+        return cls(
+            Nodes(
+                tuple(range(-1, count - 1)),
+                tuple(range(count)),
+                np.array(matrices),
+                np.array([matrix[:3, 3] for matrix in matrices]),
+                np.repeat(_NO_ROTATION, count, axis=0),
+                np.ones((count, 3)),
+            ),
+            tracks,
+        )
 
 
 def still_clip(vertices: Floats) -> Clip:
@@ -20,7 +52,7 @@ def still_clip(vertices: Floats) -> Clip:
     return Clip(
         name="",
         duration=0.0,
-        nodes=_root(np.eye(4)),
+        nodes=Place.of([np.eye(4)]).nodes,
         tracks=(),
         joints=np.zeros(1, dtype=np.int64),
         inverses=np.eye(4)[None],
@@ -31,39 +63,46 @@ def still_clip(vertices: Floats) -> Clip:
     )
 
 
-def joined_clip(clips: Sequence[Clip], placements: Sequence[Floats]) -> Clip:
+def joined_clip(clips: Sequence[Clip], places: Sequence[Place]) -> Clip:
     """All clips at once, each beginning at 0 and staying at its end.
 
     Args:
         clips: The clips.
-        placements: From the scene of each to that of all, float64 [4, 4].
+        places: Of each in the scene of all.
     """
     morphs = [clip.morphs for clip in clips]
-    # Each clip has a root more: its placement
-    nodes = _offsets([len(clip.nodes.parents) + 1 for clip in clips])
+    # Before the nodes of each clip are those of its place
+    nodes = _offsets(
+        [len(place.nodes.parents) + len(clip.nodes.parents) for place, clip in zip(places, clips, strict=True)]
+    )
     bones = _offsets([len(clip.joints) for clip in clips])
     vertices = _offsets([len(clip.positions) for clip in clips])
     targets = _offsets([len(one.weights) for one in morphs])
-    roots = [_root(placement) for placement in placements]
-    parts = [part for root, clip in zip(roots, clips, strict=True) for part in (root, clip.nodes)]
+    parts = [part for place, clip in zip(places, clips, strict=True) for part in (place.nodes, clip.nodes)]
 
     def shifted(values: Sequence[Indices], by: Sequence[int]) -> Indices:
         return np.concatenate([value + first for value, first in zip(values, by, strict=True)])
 
-    own = [first + 1 for first in nodes]
+    own = [first + len(place.nodes.parents) for first, place in zip(nodes, places, strict=True)]
     return Clip(
-        name=" + ".join(clip.name for clip in clips if clip.tracks),
-        duration=max(clip.duration for clip in clips),
+        name=" + ".join(clip.name for clip in clips if clip.name),
+        duration=max(clip.duration for clip in clips) or STILL_SECONDS,
         nodes=Nodes(
             parents=tuple(
                 parent
-                for clip, first in zip(clips, nodes, strict=True)
-                for parent in (-1, *(first if old < 0 else first + 1 + old for old in clip.nodes.parents))
+                for place, clip, first, inner in zip(places, clips, nodes, own, strict=True)
+                for parent in (
+                    *(old if old < 0 else first + old for old in place.nodes.parents),
+                    *(inner - 1 if old < 0 else inner + old for old in clip.nodes.parents),
+                )
             ),
             order=tuple(
                 node
-                for clip, first in zip(clips, nodes, strict=True)
-                for node in (first, *(first + 1 + old for old in clip.nodes.order))
+                for place, clip, first, inner in zip(places, clips, nodes, own, strict=True)
+                for node in (
+                    *(first + old for old in place.nodes.order),
+                    *(inner + old for old in clip.nodes.order),
+                )
             ),
             matrices=np.concatenate([part.matrices for part in parts]),
             translations=np.concatenate([part.translations for part in parts]),
@@ -72,8 +111,11 @@ def joined_clip(clips: Sequence[Clip], placements: Sequence[Floats]) -> Clip:
         ),
         tracks=tuple(
             Track(track.node + first, track.path, track.times, track.values, track.interpolation)
-            for clip, first in zip(clips, own, strict=True)
-            for track in clip.tracks
+            for tracks, first in (
+                *((place.tracks, first) for place, first in zip(places, nodes, strict=True)),
+                *((clip.tracks, first) for clip, first in zip(clips, own, strict=True)),
+            )
+            for track in tracks
         ),
         joints=shifted([clip.joints for clip in clips], own),
         inverses=np.concatenate([clip.inverses for clip in clips]),
@@ -90,10 +132,6 @@ def joined_clip(clips: Sequence[Clip], placements: Sequence[Floats]) -> Clip:
             normals=np.concatenate([one.normals for one in morphs]),
         ),
     )
-
-
-def _root(matrix: Floats) -> Nodes:
-    return Nodes((-1,), (0,), matrix[None], np.zeros((1, 3)), _NO_ROTATION, np.ones((1, 3)))
 
 
 def _offsets(counts: Sequence[int]) -> list[int]:

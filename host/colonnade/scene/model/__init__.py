@@ -6,7 +6,7 @@ them. Values are checked when a scene is constructed, from a file or in code; un
 
 from colonnade.scene.model.camera import Camera, CameraKey, FrameSize, Motion
 from colonnade.scene.model.light import Background, Colour, Light, Paths, PointLight
-from colonnade.scene.model.objects import Material, MeshSource, Placement, SceneObject, Transform
+from colonnade.scene.model.objects import Material, MeshSource, ObjectKey, Placement, SceneObject, Transform
 from colonnade.scene.model.scene import Scene, interpolate
 from colonnade.scene.model.values import MAX_BOUNCES, MAX_EDGE, MAX_OBJECTS, Denoiser, Vector
 
@@ -24,6 +24,7 @@ __all__ = [
     "Material",
     "MeshSource",
     "Motion",
+    "ObjectKey",
     "Paths",
     "Placement",
     "PointLight",

@@ -11,7 +11,7 @@ from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
 from colonnade.common.limits import MAX_SAMPLES
-from colonnade.scene.model.values import STRICT, Denoiser, Diameter, Float, Fraction, RoomPixel, WorldVector
+from colonnade.scene.model.values import STRICT, Degrees, Denoiser, Diameter, Float, Fraction, RoomPixel, WorldVector
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -83,7 +83,7 @@ class Motion:
         shutter: How long each frame is exposed, as a fraction of the interval to the next one.
     """
 
-    turn: Annotated[Float, Interval(ge=-36000.0, le=36000.0)] | None = None
+    turn: Degrees | None = None
     stand_at: RoomPixel | None = None
     translate: WorldVector | None = None
     light: WorldVector | None = None
@@ -115,20 +115,6 @@ class Motion:
     @property
     def _only_turns(self) -> bool:
         return self.stand_at is None and self.translate is None and self.light is None and not self.camera
-
-    def frame_progress(self, frames: int) -> list[float]:
-        """Progress of each frame along the motion, evenly spaced from 0.0 to 1.0.
-
-        A closed motion leaves out 1.0, so that an animation repeats without a pause.
-        """
-        return [frame / self._intervals(frames) for frame in range(frames)]
-
-    def exposure(self, frames: int) -> float:
-        """Progress during the exposure of one of `frames` frames. A single frame's interval is the whole motion."""
-        return self.shutter / self._intervals(frames)
-
-    def _intervals(self, frames: int) -> int:
-        return max(frames if self.is_closed else frames - 1, 1)
 
 
 @dataclass(frozen=True, config=STRICT)

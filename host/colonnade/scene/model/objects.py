@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Annotated, Literal
 
 from annotated_types import Interval
-from pydantic import StrictBool, model_validator
+from pydantic import BeforeValidator, StrictBool, model_validator
 from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
 from colonnade.mesh.materials.materials import Kind
-from colonnade.scene.model.values import STRICT, File, Float, LinearColour, RoomPixel, Text, Triangles, WorldVector
+from colonnade.scene.model.values import (
+    STRICT,
+    Degrees,
+    File,
+    Float,
+    Fraction,
+    LinearColour,
+    RoomPixel,
+    Text,
+    Triangles,
+    WorldVector,
+)
+
+
+def _as_keys(value: object) -> object:
+    """A single table is a single key."""
+    return (value,) if isinstance(value, Mapping) else value
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -103,6 +120,25 @@ class Placement:
 
 
 @dataclass(frozen=True, config=STRICT)
+class ObjectKey:
+    """Where an object is at a moment of the motion: a table ``[[object.motion]]``. None: as at the key before.
+
+    Before the first key it is where its place is, without a turn.
+
+    Attributes:
+        at: Progress of the motion.
+        turn: Rotation about the vertical through its centre, degrees, after ``rotate``.
+        rotate: Rotation about x, then y, then z through its centre, degrees.
+        translate: Shift from its place, world units.
+    """
+
+    at: Fraction = 1.0
+    turn: Degrees | None = None
+    rotate: tuple[Degrees, Degrees, Degrees] | None = None
+    translate: WorldVector | None = None
+
+
+@dataclass(frozen=True, config=STRICT)
 class SceneObject(Placement):
     """One of several objects: a table ``[[object]]``. In a room it stands, unless its transform scales or moves it.
 
@@ -110,11 +146,36 @@ class SceneObject(Placement):
         mesh: Its mesh.
         transform: Its pose in the world; if it stands, only the rotation.
         material: Overrides of its mesh's materials.
+        motion: Its own motion, by ascending progress, from its place on; straight ways and even turns in between.
     """
 
     mesh: MeshSource = field(kw_only=True)
     transform: Transform = field(default_factory=Transform, kw_only=True)
     material: Material = field(default_factory=Material, kw_only=True)
+    motion: Annotated[tuple[ObjectKey, ...], BeforeValidator(_as_keys)] = field(default=(), kw_only=True)
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Self:
+        times = [key.at for key in self.motion]
+        if sorted(set(times)) != times:
+            raise ValueError("object.motion.at must ascend from key to key")
+        return self
+
+    @property
+    def stages(self) -> list[tuple[float, tuple[float, ...]]]:
+        """Progress and state at the keys of its motion, from 0 on: turn, rotation about x, y, z, and shift."""
+        found: list[tuple[float, tuple[float, ...]]] = [(0.0, (0.0,) * 7)]
+        for key in self.motion:
+            turn, rotate, shift = found[-1][1][:1], found[-1][1][1:4], found[-1][1][4:]
+            turn = turn if key.turn is None else (key.turn,)
+            found.append((key.at, (*turn, *(key.rotate or rotate), *(key.translate or shift))))
+        return found[1:] if len(found) > 1 and found[1][0] == 0.0 else found
+
+    @property
+    def returns(self) -> bool:
+        """Whether its own motion ends as it begins."""
+        (_, first), *_, (_, last) = [*self.stages, self.stages[-1]]
+        return first[4:] == last[4:] and not any((b - a) % 360.0 for a, b in zip(first[:4], last[:4], strict=True))
 
     @property
     def stands(self) -> bool:

@@ -104,8 +104,29 @@ class Scene:
 
     @property
     def is_animated(self) -> bool:
-        """Whether a mesh has an animation."""
-        return any(mesh.animation is not None for mesh in (self.mesh, *(one.mesh for one in self.objects)))
+        """Whether a mesh has an animation, or an object a motion of its own."""
+        has_animation = any(mesh.animation is not None for mesh in (self.mesh, *(one.mesh for one in self.objects)))
+        return has_animation or any(one.motion for one in self.objects)
+
+    @property
+    def is_still(self) -> bool:
+        """Whether nothing moves."""
+        return self.motion.is_still and not self.is_animated
+
+    def frame_progress(self, frames: int) -> list[float]:
+        """Progress of each frame along the motion, evenly spaced from 0.0 to 1.0.
+
+        A closed motion leaves out 1.0, so that an animation repeats without a pause.
+        """
+        return [frame / self._intervals(frames) for frame in range(frames)]
+
+    def opening(self, frames: int) -> float:
+        """Progress while the shutter is open for one of `frames` frames. A single frame's interval is the motion."""
+        return self.motion.shutter / self._intervals(frames)
+
+    def _intervals(self, frames: int) -> int:
+        is_closed = self.motion.is_closed and all(one.returns for one in self.objects)
+        return max(frames if is_closed else frames - 1, 1)
 
     @property
     def places_camera(self) -> bool:

@@ -30,6 +30,7 @@ def _require_text(value: object) -> object:
 Float = Annotated[float, Strict()]
 Coordinate = Annotated[Float, Interval(ge=-MAX_COORDINATE, le=MAX_COORDINATE)]
 Fraction = Annotated[Float, Interval(ge=0.0, le=1.0)]
+Degrees = Annotated[Float, Interval(ge=-36000.0, le=36000.0)]
 Diameter = Annotated[Float, Interval(ge=0.0, le=1e6)]
 Intensity = Annotated[Float, Interval(ge=0.0, le=15.0)]
 MapPixel = Annotated[Float, Interval(ge=0.0, le=MAX_EDGE)]
