@@ -8,10 +8,10 @@
 #include <optional>
 
 #include "binding.hpp"
+#include "mesh/alpha_cut.hpp"
 #include "mesh/atlas.hpp"
 #include "mesh/baking.hpp"
 #include "mesh/cleaning.hpp"
-#include "mesh/coverage.hpp"
 #include "mesh/roughness.hpp"
 #include "mesh/swatches.hpp"
 #include "packer/records.hpp"

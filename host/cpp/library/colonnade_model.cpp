@@ -5,10 +5,10 @@
 #include <sstream>
 
 #include "live/vector_map.hpp"
+#include "mesh/alpha_cut.hpp"
 #include "mesh/atlas.hpp"
 #include "mesh/baking.hpp"
 #include "mesh/cleaning.hpp"
-#include "mesh/coverage.hpp"
 #include "mesh/roughness.hpp"
 #include "mesh/swatches.hpp"
 #include "model/frame.hpp"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -28,26 +30,19 @@ def subdivide(vertices: Floats, faces: npt.NDArray[np.int64]) -> tuple[Floats, n
     edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     middle = inverse.reshape(-1, 3) + len(vertices)
-    a, b, c = faces.T
-    ab, bc, ca = middle.T
-    quarters = np.stack([np.stack(corners, 1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))], 1)
-    return np.concatenate([vertices, vertices[unique].mean(axis=1)]), quarters.reshape(-1, 3)
+    return np.concatenate([vertices, vertices[unique].mean(axis=1)]), _quarters(faces, middle)
 
 
 def subdivide_corners(values: Floats) -> Floats:
     """Values of the corners of faces after `subdivide`: float64 [m, 3, k] becomes [4·m, 3, k]."""
-    a, b, c = np.moveaxis(values, 1, 0)
-    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-    quarters = np.stack([np.stack(corners, 1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))], 1)
-    return quarters.reshape(-1, 3, values.shape[2])
+    return _quarters(values, (values + values[:, [1, 2, 0]]) / 2)
 
 
-def triangle_points(steps: int) -> Floats:
-    """Weights of the corners at points that are spread evenly over a triangle, float64 [steps · (steps + 1) / 2, 3]."""
-    a, b = np.meshgrid(np.arange(steps), np.arange(steps), indexing="ij")
-    inside = a + b < steps
-    first, second = (a[inside] + 1 / 3) / steps, (b[inside] + 1 / 3) / steps
-    return np.stack([first, second, 1 - first - second], axis=1)
+def _quarters(corners: npt.NDArray[Any], middles: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The corners of the four parts of faces: [m, 3, …] and the middles of their edges become [4·m, 3, …]."""
+    (a, b, c), (ab, bc, ca) = np.moveaxis(corners, 1, 0), np.moveaxis(middles, 1, 0)
+    parts = [np.stack(part, 1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    return np.stack(parts, 1).reshape(-1, *corners.shape[1:])
 
 
 def merge_rows(rows: Floats) -> tuple[Floats, npt.NDArray[np.int64]]:

@@ -1,6 +1,6 @@
 """Cuts away what the alpha of materials does not show: the device's surfaces have no alpha.
 
-``cpp/mesh/coverage.hpp`` cuts the faces of a material. Of blended materials the cutoff is 1/2, and faces that are
+``cpp/mesh/alpha_cut.hpp`` cuts the faces of a material. Of blended materials the cutoff is 1/2, and faces that are
 thinner everywhere become tinted panes without refraction. Their factor is the coverage of the material, which passes
 show (`colonnade.mesh.materials.materials.in_pass`).
 """
