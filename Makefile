@@ -40,7 +40,7 @@ bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where
 soc: setup ## a LiteX SoC in the simulator: boots, computes views, renders by the driver, compares with the model
 	@tools/soc
 
-live: setup ## a mirror in a room before a moving camera: videos, time and energy a frame, out/live/index.html
+live: setup ## objects that move in a room, a mirror before a moving camera: videos, time, energy, out/live/index.html
 	@$(venv)/python tools/live
 
 browser: setup ## the packer and the model as one HTML file, out/browser/index.html

@@ -11,6 +11,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from colonnade_lab.evaluation.demonstration.measure import FrameCost
+from colonnade_lab.evaluation.demonstration.moved import MovedCost
 
 #: The device's clock.
 MEGAHERTZ = 200.0
@@ -78,15 +79,94 @@ def figures(costs: Sequence[FrameCost], energy: Energy) -> dict[str, float | Non
     return found | {"microjoules": None if rays is None else 1e-3 * rays * energy.nanojoules}
 
 
-def page(ways: Sequence[Way], size: tuple[int, int], rate: float, notes: Sequence[str], energy: Energy) -> str:
+@dataclass(frozen=True)
+class Moved:
+    """The frames of a scene whose objects move.
+
+    Attributes:
+        triangles: Of all objects.
+        costs: Of its frames.
+        video: MP4 file.
+        rate: Frames a second of the video.
+    """
+
+    triangles: int
+    costs: Sequence[MovedCost]
+    video: Path
+    rate: float
+
+    def figures(self, energy: Energy) -> dict[str, float | None]:
+        """Means of a frame with all of its samples.
+
+        Keys: ``refit``, milliseconds, and ``triangles``, refitted in one; ``rays`` in the objects' box, ``nodes``,
+        read by one of them, ``worst_nodes``, of the worst frame; ``steps`` of marches; ``frame``, milliseconds;
+        ``rate``, a second; ``millijoules``.
+        """
+
+        def mean(value: Callable[[MovedCost], float]) -> float:
+            return sum(map(value, self.costs)) / len(self.costs)
+
+        refit = mean(lambda cost: cost.refit_ms)
+        rays = mean(lambda cost: cost.samples * cost.rays_in_box)
+        cycles = [cost.samples * cost.cycles for cost in self.costs if cost.cycles is not None]
+        frame = 1e-3 * sum(cycles) / len(cycles) / MEGAHERTZ if cycles else None
+        return {
+            "refit": refit,
+            "triangles": self.triangles / refit,
+            "rays": rays,
+            "nodes": mean(lambda cost: cost.node_reads) / mean(lambda cost: cost.rays_in_box),
+            "worst_nodes": max(cost.node_reads / max(cost.rays_in_box, 1) for cost in self.costs),
+            "steps": mean(lambda cost: cost.samples * cost.march_steps),
+            "frame": frame,
+            "rate": None if frame is None else 1e3 / frame,
+            "millijoules": 1e-6 * rays * energy.nanojoules,
+        }
+
+    def rows(self, energy: Energy) -> list[dict[str, str]]:
+        """Rows of the page's table."""
+        found = self.figures(energy)
+        names = {
+            "refit": "pose, vertices and records, the driver on a core: ms",
+            "triangles": "refitted triangles a millisecond",
+            "rays": "rays in the objects' box",
+            "nodes": "nodes that one of them reads",
+            "worst_nodes": "of the worst frame",
+            "steps": "march steps",
+            "frame": "frame, 200 MHz: ms",
+            "rate": "frames a second",
+            "millijoules": "energy of the rays: mJ",
+        }
+        return [
+            {"name": name, "cell": "–" if (value := found[key]) is None else f"{value:,.4g}"}
+            for key, name in names.items()
+        ]
+
+    def simulated(self) -> list[list[str]]:
+        """Rows of frames that the RTL rendered."""
+        return [
+            [f"{number}", f"{cost.rays_in_box:,}", f"{cost.march_steps:,}", f"{cost.cycles:,}", f"{cost.differing:,}"]
+            for number, cost in enumerate(self.costs)
+            if cost.cycles is not None
+        ]
+
+
+def page(
+    ways: Sequence[Way],
+    size: tuple[int, int],
+    rate: float,
+    notes: Sequence[str],
+    energy: Energy,
+    moved: Moved | None = None,
+) -> str:
     """The HTML of the page, with its videos.
 
     Args:
-        ways: The ways to compare.
+        ways: The ways to compare; none: that part is left out.
         size: Of the frames, pixels.
         rate: Frames a second.
         notes: How it was measured, one sentence each.
         energy: Of a ray.
+        moved: Frames of objects that move; None: that part is left out.
     """
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -96,14 +176,27 @@ def page(ways: Sequence[Way], size: tuple[int, int], rate: float, notes: Sequenc
         lstrip_blocks=True,
     )
     return environment.get_template("live.html.jinja").render(
-        frames=len(ways[0].costs),
+        frames=len(ways[0].costs) if ways else 0,
         size=f"{size[0]}×{size[1]} pixels",
         rate=f"{rate:g}",
         ways=[{"title": way.title, "video": base64.b64encode(way.video.read_bytes()).decode("ascii")} for way in ways],
         rows=_rows([figures(way.costs, energy) for way in ways]),
         notes=notes,
         simulated=[row for way in ways for row in _simulated(way)],
+        moved=None if moved is None else _moved_part(moved, energy),
     )
+
+
+def _moved_part(moved: Moved, energy: Energy) -> dict[str, Any]:
+    return {
+        "frames": len(moved.costs),
+        "rate": f"{moved.rate:g}",
+        "triangles": f"{moved.triangles:,}",
+        "samples": moved.costs[0].samples,
+        "video": base64.b64encode(moved.video.read_bytes()).decode("ascii"),
+        "rows": moved.rows(energy),
+        "simulated": moved.simulated(),
+    }
 
 
 def _rows(columns: Sequence[Mapping[str, float | None]]) -> list[dict[str, Any]]:

@@ -138,7 +138,7 @@ def _cost(
         rtl = render_rtl(demonstration.design, prepared.image, [registers]).frames[0]
         require_no_errors(rtl.errors)
         cycles = rtl.counters["cycles"]
-        differing = _differing(rtl, frame)
+        differing = differing_pixels(rtl, frame)
     is_key = encode_ms is not None
     assert prepared.maps is not None
     return FrameCost(
@@ -152,7 +152,7 @@ def _cost(
     )
 
 
-def _differing(one: Frame, other: Frame) -> int:
+def differing_pixels(one: Frame, other: Frame) -> int:
     """Pixels that differ in colour, object or shadow."""
     assert one.ratio is not None and other.ratio is not None
     differs = (one.colour != other.colour).any(axis=2) | (one.is_object != other.is_object)

@@ -12,10 +12,10 @@ from colonnade.environment.sequence import load_sequence
 from colonnade.scene.parser import load_scene
 from live_maps import SMALL_MAPS
 
-from colonnade_lab.evaluation.demonstration import measure, walk
+from colonnade_lab.evaluation.demonstration import measure, moved, walk
 from colonnade_lab.evaluation.demonstration.measure import FrameCost
-from colonnade_lab.evaluation.studies.synthetic_attic import RoomModel, attic_parts
-from colonnade_lab.report.live_page import MEGAHERTZ, Energy, Way, figures, page
+from colonnade_lab.evaluation.studies.synthetic_attic import RoomModel, attic_parts, write_attic
+from colonnade_lab.report.live_page import MEGAHERTZ, Energy, Moved, Way, figures, page
 
 SIZE = (96, 72)
 SINGLE = ("array.rows=1", "array.columns=1", *SMALL_MAPS)
@@ -68,3 +68,32 @@ def test_the_page_adds_up(tmp_path: Path) -> None:
     text = page([Way(2, costs, tmp_path / "a.mp4")], (640, 480), 30.0, ["A <note>."], Energy(1.5, ""))
     assert "data:video/mp4;base64,ZmlsbQ==" in text and "A &lt;note&gt;." in text and "200,000" in text
     assert "http" not in text.replace("http-equiv", ""), "it loads nothing"
+
+
+@pytest.mark.parametrize("rtl", [[], pytest.param([1], marks=pytest.mark.verilator)])
+def test_costs_of_frames_of_objects_that_move(tmp_path: Path, rtl: list[int]) -> None:
+    ball = 'mesh = {name = "sphere:8"}\nsize = 0.3\n'
+    text = f"[[object]]\n{ball}stand_at = [40, 55]\nmotion = {{translate = [0.4, 0.1, 0.0]}}\n"
+    text += f'[[object]]\n{ball}stand_at = [60, 60]\nmaterial = {{kind = "mirror"}}\n[background]\nroom = "attic"\n'
+    text += "[light]\nposition = [0.6, 2.2, 0.6]\n[paths]\ngather = 1\n[frame]\nsamples = 2\n"
+    (tmp_path / "scene.toml").write_text(text)
+    write_attic(tmp_path / "attic", *SIZE)
+    frames: list[np.ndarray] = []
+    scene, design = load_scene(tmp_path / "scene.toml"), design_for("small", SINGLE)
+    triangles, costs = moved.run(scene, design, SIZE, 3, frames.append, rtl)
+    assert triangles > 0 and [frame.shape for frame in frames] == [(72, 96, 3)] * 3
+    assert not np.array_equal(frames[0], frames[2])
+    assert [cost.cycles is not None for cost in costs] == [number in rtl for number in range(3)]
+    assert all(cost.differing == 0 and cost.rays_in_box > 0 and cost.refit_ms > 0 for cost in costs)
+
+
+def test_the_page_has_the_objects(tmp_path: Path) -> None:
+    (tmp_path / "a.mp4").write_bytes(b"film")
+    costs = [moved.MovedCost(4, 2.0, 1000, 3000, 5), moved.MovedCost(4, 4.0, 3000, 7000, 5, 100_000)]
+    objects = Moved(6000, costs, tmp_path / "a.mp4", 30.0)
+    found = objects.figures(Energy(1.5, ""))
+    assert found["triangles"] == pytest.approx(2000.0) and found["nodes"] == pytest.approx(2.5)
+    assert found["worst_nodes"] == pytest.approx(3.0) and found["frame"] == pytest.approx(2.0)
+    assert found["rate"] == pytest.approx(500.0) and found["millijoules"] == pytest.approx(0.012)
+    text = page([], (640, 480), 30.0, [], Energy(1.5, ""), objects)
+    assert "data:video/mp4;base64,ZmlsbQ==" in text and "6,000 triangles" in text and "100,000" in text
