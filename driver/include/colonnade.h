@@ -51,7 +51,9 @@ enum colonnade_error {
     COLONNADE_OTHER_RECORDS, /* the records are not those of the clip */
     COLONNADE_TOO_DEEP,      /* a plan needs more boxes than the unit holds */
     /* Of colonnade_batches.h */
-    COLONNADE_NO_RAYS /* the design traces no rays of applications */
+    COLONNADE_NO_RAYS, /* the design traces no rays of applications */
+    /* Of colonnade_refit_start, in colonnade_mesh.h */
+    COLONNADE_NO_REFIT /* the shell has no unit that refits */
 };
 
 /* Bits of `interrupt.status` and `interrupt.enable`. A device for rays ends batches in place of frames. */

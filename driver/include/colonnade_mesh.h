@@ -85,6 +85,22 @@ enum {
 enum colonnade_error colonnade_mesh_plan(const struct colonnade_mesh *mesh, const uint32_t *copy, uint32_t root,
                                          struct colonnade_mesh_node *path, uint32_t *lines, uint32_t *plan, uint32_t *entries);
 
+/* A refit for the unit of the shell: bus addresses, and numbers. What the processor has written there is in memory. */
+struct colonnade_refit_job {
+    uint64_t plan, vertices; /* multiples of 64 */
+    uint64_t records;        /* of the root's record, a multiple of 32 */
+    uint32_t entries;        /* of the plan */
+    uint32_t vertex_count, count; /* of the mesh: vertices, records */
+    uint32_t root;                /* the root's address in the scene */
+};
+
+/* Starts a refit, also while a frame runs that does not read this copy. With an error nothing is written. */
+enum colonnade_error colonnade_refit_start(struct colonnade *device, const struct colonnade_refit_job *job);
+
+/* Waits for its end, `attempts` polls at most: the unit has no interrupt. `result` has no cost. After an error of the unit,
+ * COLONNADE_BUS_RESPONSE or, of a plan, COLONNADE_OTHER_RECORDS, the copy may be written in part. */
+enum colonnade_error colonnade_refit_wait(struct colonnade *device, uint32_t attempts, struct colonnade_refit *result);
+
 /* A triangle of the program's own. */
 struct colonnade_triangle {
     uint32_t vertices[3];

@@ -230,6 +230,7 @@ const char *colonnade_error_name(enum colonnade_error error) {
         "misaligned", "badRegister", "badFormat",      "noFrame",     "busy",         "timeout",   "busResponse", "badSection",
         "badLength",  "noPhoto",     "frameInvalid",   "noScene",     "notAView",     "badPose",   "badLens",     "tooFar",
         "noLight",    "noSample",    "notAClip",       "outside",     "otherRecords", "tooDeep",   "noRays",
+        "noRefit",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }

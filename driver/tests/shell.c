@@ -8,7 +8,7 @@ enum { RUNNING = 1, QUEUED = 2, LOADING = 4, RESETTING = 8 };
 enum { START = 1, LOAD = 2, RESET = 4 };
 
 /* When a register can be written. */
-enum access { READ_ONLY, WRITE_ONLY, ALWAYS, NOT_LOADING, NOT_QUEUED, WITH_ENVIRONMENT, IDLE };
+enum access { READ_ONLY, WRITE_ONLY, ALWAYS, NOT_LOADING, NOT_QUEUED, WITH_ENVIRONMENT, IDLE, NOT_REFITTING };
 
 #define WORD(name, bits, access) {offsetof(colonnade_shell_t, name), bits, access}
 #define WIDE(name, access) WORD(name##_low, 32, access), WORD(name##_high, 8, access)
@@ -54,6 +54,23 @@ static const struct {
     WORD(photo_hasStrengths, 1, NOT_QUEUED),
     WIDE(rays_windowBase, IDLE),
     WIDE(rays_windowEnd, IDLE),
+    WORD(refit_control, 1, WRITE_ONLY),
+    WORD(refit_status, 1, READ_ONLY),
+    WORD(refit_errors, 3, READ_ONLY),
+    WORD(refit_flatPairs, 24, READ_ONLY),
+    WORD(refit_bounds_0, 24, READ_ONLY),
+    WORD(refit_bounds_1, 24, READ_ONLY),
+    WORD(refit_bounds_2, 24, READ_ONLY),
+    WORD(refit_bounds_3, 24, READ_ONLY),
+    WORD(refit_bounds_4, 24, READ_ONLY),
+    WORD(refit_bounds_5, 24, READ_ONLY),
+    WIDE(refit_plan, NOT_REFITTING),
+    WIDE(refit_vertices, NOT_REFITTING),
+    WIDE(refit_records, NOT_REFITTING),
+    WORD(refit_entries, 24, NOT_REFITTING),
+    WORD(refit_lines, 24, NOT_REFITTING),
+    WORD(refit_count, 24, NOT_REFITTING),
+    WORD(refit_root, 24, NOT_REFITTING),
 };
 
 static void require(bool condition, const char *what, const struct shell *shell, uint32_t address, uint32_t value) {
@@ -132,6 +149,12 @@ static void write_device(struct shell *shell, uint32_t address, uint32_t value) 
     shell->device[(address - DEVICE_BASE) / 4] = value;
 }
 
+static void require_no_refit(const struct shell *shell, uint32_t address, uint32_t value) {
+    const bool has_unit = (shell->registers[AT(capabilities)] & COLONNADE_SHELL__CAPABILITIES__REFIT_bm) != 0;
+    const bool is_idle = (shell->registers[AT(status)] & RESETTING) == 0 && shell->registers[AT(refit_status)] == 0;
+    require(has_unit && is_idle, "a register of a refit", shell, address, value);
+}
+
 void shell_write(void *context, uint32_t address, uint32_t value) {
     struct shell *shell = context;
     ++shell->accesses;
@@ -156,9 +179,15 @@ void shell_write(void *context, uint32_t address, uint32_t value) {
         break;
     case IDLE: require(status == 0, "a register of batches", shell, address, value); break;
     case NOT_QUEUED: require(changes, "a register of a frame", shell, address, value); break;
+    case NOT_REFITTING: require_no_refit(shell, address, value); break;
     default: break;
     }
     if (address == 4 * AT(control)) command(shell, value);
+    else if (address == 4 * AT(refit_control)) {
+        require_no_refit(shell, address, value);
+        shell->registers[AT(refit_status)] = value;
+        shell->registers[AT(refit_errors)] = 0;
+    }
     else if (address == 4 * AT(interrupt_status)) shell->registers[address / 4] &= ~value;
     else if (address == 4 * AT(interrupt_test)) shell->registers[AT(interrupt_status)] |= value;
     else shell->registers[address / 4] = value;

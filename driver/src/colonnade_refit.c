@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "colonnade_access.h"
+#include "colonnade_mesh.h"
+
+enum { LINE_BYTES = 64, RECORD_BYTES = 32, ADDRESS_BITS = 40, COUNT_BITS = 24 };
+
+enum colonnade_error colonnade_refit_start(struct colonnade *device, const struct colonnade_refit_job *job) {
+    if ((device->capabilities & COLONNADE_SHELL__CAPABILITIES__REFIT_bm) == 0) return COLONNADE_NO_REFIT;
+    if ((job->plan | job->vertices) % LINE_BYTES != 0 || job->records % RECORD_BYTES != 0) return COLONNADE_MISALIGNED;
+    const uint32_t lines = job->vertex_count / COLONNADE_LINE_VERTICES + (job->vertex_count % COLONNADE_LINE_VERTICES != 0);
+    if ((job->plan | job->vertices | job->records) >> ADDRESS_BITS != 0 ||
+        (job->entries | lines | job->count | job->root) >> COUNT_BITS != 0)
+        return COLONNADE_TOO_LARGE;
+    if (get(device, REGISTER(status)) & COLONNADE_SHELL__STATUS__ISRESETTING_bm || get(device, REGISTER(refit_status)) != 0)
+        return COLONNADE_BUSY;
+    set_wide(device, REGISTER(refit_plan_low), job->plan);
+    set_wide(device, REGISTER(refit_vertices_low), job->vertices);
+    set_wide(device, REGISTER(refit_records_low), job->records);
+    set(device, REGISTER(refit_entries), job->entries);
+    set(device, REGISTER(refit_lines), lines);
+    set(device, REGISTER(refit_count), job->count);
+    set(device, REGISTER(refit_root), job->root);
+    __sync_synchronize();
+    set(device, REGISTER(refit_control), COLONNADE_SHELL__REFIT_CONTROL__VALUE_bm);
+    return COLONNADE_OK;
+}
+
+enum colonnade_error colonnade_refit_wait(struct colonnade *device, uint32_t attempts, struct colonnade_refit *result) {
+    if ((device->capabilities & COLONNADE_SHELL__CAPABILITIES__REFIT_bm) == 0) return COLONNADE_NO_REFIT;
+    while (get(device, REGISTER(refit_status)) != 0)
+        if (attempts-- == 0) return COLONNADE_TIMEOUT;
+    __sync_synchronize();
+    const uint32_t errors = get(device, REGISTER(refit_errors));
+    if (errors & COLONNADE_SHELL__REFIT_ERRORS__RESPONSE_bm) return COLONNADE_BUS_RESPONSE;
+    if (errors & COLONNADE_SHELL__REFIT_ERRORS__ALIGNMENT_bm) return COLONNADE_MISALIGNED;
+    if (errors & COLONNADE_SHELL__REFIT_ERRORS__PLAN_bm) return COLONNADE_OTHER_RECORDS;
+    for (uint32_t axis = 0; axis < 3; ++axis) {
+        result->low[axis] = (int32_t)get(device, REGISTER(refit_bounds_0) + 4 * axis);
+        result->high[axis] = (int32_t)get(device, REGISTER(refit_bounds_3) + 4 * axis);
+    }
+    result->flat_pairs = get(device, REGISTER(refit_flatPairs));
+    result->cost = 0;
+    return COLONNADE_OK;
+}
