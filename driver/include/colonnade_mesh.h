@@ -87,9 +87,9 @@ enum colonnade_error colonnade_mesh_plan(const struct colonnade_mesh *mesh, cons
 
 /* A refit for the unit of the shell: bus addresses, and numbers. What the processor has written there is in memory. */
 struct colonnade_refit_job {
-    uint64_t plan, vertices; /* multiples of 64 */
-    uint64_t records;        /* of the root's record, a multiple of 32 */
-    uint32_t entries;        /* of the plan */
+    uint64_t plan, vertices;      /* multiples of 64 */
+    uint64_t records;             /* of the root's record, a multiple of 32 */
+    uint32_t entries;             /* of the plan */
     uint32_t vertex_count, count; /* of the mesh: vertices, records */
     uint32_t root;                /* the root's address in the scene */
 };

@@ -229,9 +229,7 @@ class DeviceScene:
             UserError: The scene has neither an animation nor a motion of an object.
         """
         if self.image.bending is None:
-            raise UserError(
-                "a clip file has what moves, and the scene has none: give mesh.animation or object.motion"
-            )
+            raise UserError("a clip file has what moves, and the scene has none: give mesh.animation or object.motion")
         return self.image.bending.file
 
     def dram_image(self) -> bytes:

@@ -72,7 +72,7 @@ def test_the_page_adds_up(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rtl", [[], pytest.param([1], marks=pytest.mark.verilator)])
 def test_costs_of_frames_of_objects_that_move(tmp_path: Path, rtl: list[int]) -> None:
-    ball = 'mesh = {name = "sphere:8"}\nsize = 0.3\n'
+    ball = 'mesh = {name = "sphere:2"}\nsize = 0.3\n'
     text = f"[[object]]\n{ball}stand_at = [40, 55]\nmotion = {{translate = [0.4, 0.1, 0.0]}}\n"
     text += f'[[object]]\n{ball}stand_at = [60, 60]\nmaterial = {{kind = "mirror"}}\n[background]\nroom = "attic"\n'
     text += "[light]\nposition = [0.6, 2.2, 0.6]\n[paths]\ngather = 1\n[frame]\nsamples = 2\n"
