@@ -72,8 +72,8 @@ def write_scenes(
 ) -> dict[str, Path]:
     """Write a room's folder, its objects as glTF files, and a scene for each frame; returns the scenes.
 
-    ``light`` is one of `LIGHTS`, or of `USERS_LIGHTS`; ``lights`` are the room's, as the objects see them. The folder of
-    a user's room has neither albedo nor normals, unless ``light`` names maps.
+    ``light`` is one of `LIGHTS`, or of `USERS_LIGHTS`; ``lights`` are the room's, as the objects see them. The folder
+    of a user's room has neither albedo nor normals, unless ``light`` names maps.
     """
     known, gather, *maps = light.split("-")
     write_room(folder / name, environment)
