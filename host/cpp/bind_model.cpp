@@ -89,6 +89,29 @@ public:
         return nb::cast(result);
     }
 
+    /// Closest hits of rays as in `trace`, and where rays from there begin.
+    nb::dict nearest(const Vectors& origins, const Vectors& directions) {
+        const std::size_t count = origins.shape(0);
+        std::int64_t *triangle, *instance, *distance, *start, *normal;
+        nb::dict result;
+        result["triangle"] = makeArray<std::int64_t>({count}, triangle);
+        result["instance"] = makeArray<std::int64_t>({count}, instance);
+        result["distance"] = makeArray<std::int64_t>({count}, distance);
+        result["start"] = makeArray<std::int64_t>({count, 3}, start);
+        result["normal"] = makeArray<std::int64_t>({count, 3}, normal);
+        for (std::size_t i = 0; i < count; ++i) {
+            const NearestHit hit = device_.nearest(requestOf(origins, directions, i));
+            triangle[i] = hit.triangle;
+            instance[i] = hit.instance;
+            distance[i] = hit.distance;
+            for (std::size_t a = 0; a < 3; ++a) {
+                start[3 * i + a] = static_cast<std::int64_t>(hit.start[a]);
+                normal[3 * i + a] = hit.normal[a];
+            }
+        }
+        return result;
+    }
+
     /// Sets up rays and tests each against its own box, for comparison with exact arithmetic.
     nb::dict testBoxes(const Vectors& origins, const Vectors& directions, const Vectors& corners, const Vectors& exponents, const Vectors& low, const Vectors& high) {
         const std::size_t count = origins.shape(0);
@@ -186,6 +209,9 @@ void bind_model(nb::module_& module) {
             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
         .def("trace", &Model::trace, "origins"_a, "directions"_a,
              "Packed ids of the closest hits, int64 [n], -1 for a miss. Origins and directions: int64 [n, 3], grid steps.")
+        .def("nearest", &Model::nearest, "origins"_a, "directions"_a,
+             "The same hits as `trace`: triangle (packed id) and instance int64 [n], -1 for a miss; distance int64 [n] along the dominant axis, grid steps; start int64 [n, 3], "
+             "where rays from the hit begin, grid steps; normal int64 [n, 3], geometric, against the ray, 11 fraction bits.")
         .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a, "high"_a,
              "Tests each ray against one box (planes corner + (low << exponent), corner + (high << exponent), vertex units). Returns enters (the object's box), is_hit, "
              "and the prepared ray in its permuted frame: heading int64 [n, 4] (axis, three signs), origin int64 [n, 3], shear int64 [n, 2].")

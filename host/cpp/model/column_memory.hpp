@@ -20,17 +20,19 @@ public:
         isDecoded_ = false;
     }
 
-    /// Sets the number of records, and decodes what a ray can reach from the root; without a tree the leaves, from record 0.
-    void divide(std::size_t recordCount, std::size_t root, bool bvh, std::size_t leafRecords) {
-        const std::array<std::size_t, 4> given{recordCount, root, bvh, leafRecords};
-        if (isDecoded_ && given == given_) return;
+    /// Sets the number of records, and decodes what a ray can reach from the roots; without a tree the leaves, from record 0.
+    void divide(std::size_t recordCount, const std::vector<std::size_t>& roots, bool bvh, std::size_t leafRecords) {
+        const std::array<std::size_t, 3> given{recordCount, bvh, leafRecords};
+        if (isDecoded_ && given == given_ && roots == roots_) return;
         given_ = given;
+        roots_ = roots;
         recordCount_ = recordCount;
         nodes_.clear();
         leaves_.clear();
         nodeAt_.assign(recordCount, none);
         leafAt_.assign(recordCount, none);
-        if (bvh) reach(root, leafRecords);
+        if (bvh)
+            for (const std::size_t root : roots) reach(root, leafRecords);
         else
             for (std::size_t address = 0; address < recordCount; address += leafRecords) addLeaf(address);
         isDecoded_ = true;
@@ -84,7 +86,8 @@ private:
     int normalFraction_;
     std::vector<std::uint8_t> bytes_, zero_;
     std::size_t recordBytes_ = 0, recordCount_ = 0;
-    std::array<std::size_t, 4> given_{};
+    std::array<std::size_t, 3> given_{};
+    std::vector<std::size_t> roots_;
     bool isDecoded_ = false;
     std::vector<std::uint32_t> nodeAt_, leafAt_; ///< by address: index of what was decoded
     std::vector<Node> nodes_;

@@ -26,9 +26,9 @@ inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, co
 
 /// The manifest's `numbers` (docs/numbers.md), and the configuration values that traversal depends on.
 struct Numbers {
-    int vertexBits, boxBits, gridBits, gridFraction, sceneBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits, entrySlackShift,
-        entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits, boxPadLog, stepFraction, stepReach, nodeBits,
-        nearFraction, nearBits, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
+    int vertexBits, boxBits, gridBits, gridFraction, sceneBits, directionBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
+        entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits, boxPadLog, stepFraction,
+        stepReach, nodeBits, nearFraction, nearBits, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
     int stackDepth;
     bool bvh;
 
@@ -39,6 +39,7 @@ struct Numbers {
         gridBits = take("gridBits");
         gridFraction = take("gridFraction");
         sceneBits = take("sceneBits");
+        directionBits = take("directionBits");
         mantissaBits = take("mantissaBits");
         shearFraction = take("shearFraction");
         shearDigits = take("shearDigits");

@@ -13,6 +13,14 @@ struct Pixel {
     Wide distance;
 };
 
+/// The closest hit of a ray: packed id and instance, -1 for a miss; distance along the dominant axis; where rays from there begin, grid steps;
+/// geometric normal against the ray.
+struct NearestHit {
+    std::int64_t triangle = -1, instance = -1, distance = 0;
+    WideVector start{};
+    Vector normal{};
+};
+
 class Device : public PathTracer {
 public:
     /// `limits`: the largest value of each register that the device accepts, by name.
@@ -36,7 +44,7 @@ public:
         for (const auto& [name, limit] : limits_)
             if (const auto found = legal.find(name); found != legal.end()) found->second = std::min(found->second, limit);
         frame_ = Frame(legal, numbers_);
-        memory_->divide(frame_.recordCount, frame_.root, numbers_.bvh, frame_.leafRecords());
+        memory_->divide(frame_.recordCount, frame_.roots, numbers_.bvh, frame_.leafRecords());
         counters = {};
         errors = {};
     }
@@ -48,6 +56,16 @@ public:
         for (int a = 0; a < 3; ++a)
             request.direction[a] = floorShift<Wide>(frame_.cameraDirection[a], -frame_.stepShift) + Wide(x) * frame_.stepX[a] + Wide(y) * frame_.stepY[a];
         return request;
+    }
+
+    /// The closest hit of a ray that is no pixel's.
+    NearestHit nearest(const RayRequest& request) {
+        const Ray ray = prepareRay(request, frame_.bounds, numbers_);
+        const Hit hit = trace(ray);
+        if (!hit.found) return {};
+        const Surface surface = surfaceOf(ray, hit, faceAt(hit), numbers_);
+        return {static_cast<std::int64_t>(hit.id), hit.instance, static_cast<std::int64_t>(distanceOf(ray, hit)),
+                offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_), surface.faceForwardNormal};
     }
 
     Pixel render(std::int64_t x, std::int64_t y) {

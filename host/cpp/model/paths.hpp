@@ -71,9 +71,15 @@ protected:
         }
     }
 
+    /// The attributes of a hit triangle in the world, without colours.
+    Face faceAt(const Hit& hit) const {
+        const Face face = memory_->faceOf(hit.id);
+        return frame_.instances.empty() ? face : instances::toWorld(face, frame_.instances[static_cast<std::size_t>(hit.instance)], numbers_);
+    }
+
     /// The object where a ray hits it; nothing if the colours of its leaf are outside the scene.
     std::optional<ObjectPoint> pointOf(const Ray& ray, const Hit& hit) {
-        Face face = memory_->faceOf(hit.id);
+        Face face = faceAt(hit);
         const Material& material = frame_.lighting.materialOf(face);
         if ((material.hasCornerColours || material.hasTexture) && !memory_->readColours(hit.id, face)) {
             errors.illegalRecord = true;

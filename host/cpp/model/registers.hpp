@@ -3,6 +3,7 @@
 #include "bounce.hpp"
 #include "environment_view.hpp"
 #include "gather.hpp"
+#include "instances.hpp"
 
 namespace colonnade {
 
@@ -24,7 +25,9 @@ struct Frame {
     int stepShift;
     Bounds bounds;
     Lighting lighting;
-    std::size_t recordCount, root;
+    std::size_t recordCount;
+    std::vector<std::size_t> roots{0}; ///< of the scene's tree, or of each instance's
+    std::vector<Instance> instances; ///< none: the scene's tree is in the world's axes
     bool hasColours; ///< each leaf is followed by its companion
     std::uint64_t watchdogCycles;
     bool hasEnvironment;
@@ -87,7 +90,22 @@ struct Frame {
                                           {takeIfThere(name + "lobe.alpha"), takeIfThere(name + "lobe.slope"), takeIfThere(name + "lobe.peak")}});
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));
-        root = static_cast<std::size_t>(take("scene.root"));
+        roots = {static_cast<std::size_t>(take("scene.root"))};
+        for (int i = 0; i < takeIfThere("scene.instances"); ++i) {
+            const std::string name = entry("instances", i);
+            Instance instance{};
+            instance.shift = static_cast<int>(take(name + "shift"));
+            instance.origin = vector(name + "origin");
+            instance.root = static_cast<std::size_t>(take(name + "root"));
+            instance.materialBase = static_cast<int>(take(name + "materialBase"));
+            for (int row = 0; row < 3; ++row) {
+                instance.matrix[row] = vector(name + "matrix[" + std::to_string(row) + "]");
+                instance.normal[row] = vector(name + "normal[" + std::to_string(row) + "]");
+            }
+            instances.push_back(instance);
+        }
+        if (!instances.empty()) roots.clear();
+        for (const Instance& instance : instances) roots.push_back(instance.root);
         hasColours = takeIfThere("scene.hasColours") != 0;
         watchdogCycles = static_cast<std::uint64_t>(takeIfThere("frame.watchdogCycles"));
         gather.bounces = static_cast<int>(takeIfThere("gather.bounces"));

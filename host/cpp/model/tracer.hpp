@@ -40,20 +40,15 @@ public:
     Hit trace(const Ray& ray, const RayFilter* filter = nullptr) {
         const Hit best = Hit::none(ray.tMax);
         if (!ray.enters) return best;
-        ++counters.raysInBox;
-        TraceState state{ray, best, false, filter, Occlusion::none};
-        run(state);
-        if (state.best.found) log.addHit(state.best.id, static_cast<double>(state.best.t));
-        return state.best;
+        const Hit hit = frame_.instances.empty() ? search(ray, filter, false).best : nearestOfInstances(ray, best);
+        if (hit.found) log.addHit(hit.id, static_cast<double>(hit.t));
+        return hit;
     }
 
     /// The occluders of a prepared shadow ray; the first opaque triangle ends the search.
     Occlusion occlusion(const Ray& ray, const RayFilter* filter = nullptr) {
         if (!ray.enters) return Occlusion::none;
-        ++counters.raysInBox;
-        TraceState state{ray, Hit::none(ray.tMax), true, filter, Occlusion::none};
-        run(state);
-        return state.occlusion;
+        return frame_.instances.empty() ? search(ray, filter, true).occlusion : occlusionByInstances(ray);
     }
 
     Counters counters{};
@@ -77,6 +72,7 @@ private:
     /// State of a ray's traversal. A shadow ray keeps its tMax, as transmissive triangles do not end it.
     struct TraceState {
         const Ray& ray;
+        std::size_t root;
         Hit best;
         bool isShadow;
         const RayFilter* filter;
@@ -84,6 +80,40 @@ private:
 
         bool isOver() const { return occlusion == Occlusion::opaque; }
     };
+
+    /// Traces a prepared ray from a root, by default that of the scene.
+    TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0) {
+        ++counters.raysInBox;
+        TraceState state{ray, frame_.roots[instance], Hit::none(ray.tMax), isShadow, filter, Occlusion::none};
+        run(state);
+        return state;
+    }
+
+    /// The nearest hit of a ray of the world: the least (t, instance, id), t along that ray.
+    Hit nearestOfInstances(const Ray& world, Hit best) {
+        for (std::size_t i = 0; i < frame_.instances.size(); ++i) {
+            const ObjectRay object = instances::toObject(world, best.t, frame_.instances[i], numbers_);
+            const Ray ray = prepareRay(object.request, instances::cube(numbers_), numbers_);
+            if (!ray.enters) continue;
+            Hit hit = search(ray, nullptr, false, i).best;
+            if (!hit.found) continue;
+            hit.t = instances::toWorld(floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t, object, numbers_);
+            hit.instance = static_cast<int>(i);
+            if (hit.t < best.t) best = hit;
+        }
+        return best;
+    }
+
+    /// What a shadow ray of the world meets; the first opaque triangle ends the search.
+    Occlusion occlusionByInstances(const Ray& world) {
+        Occlusion occlusion = Occlusion::none;
+        for (std::size_t i = 0; i < frame_.instances.size() && occlusion != Occlusion::opaque; ++i) {
+            const ObjectRay object = instances::toObject(world, world.tMax, frame_.instances[i], numbers_);
+            const Ray ray = prepareRay(object.request, instances::cube(numbers_), numbers_);
+            if (ray.enters) occlusion = std::max(occlusion, search(ray, nullptr, true, i).occlusion);
+        }
+        return occlusion;
+    }
 
     void run(TraceState& state) {
         if (numbers_.bvh) traverse(state);
@@ -119,7 +149,7 @@ private:
         std::array<StackEntry, 256> stack;
         std::size_t depth = 0;
         std::uint64_t nodeVisits = 0;
-        StackEntry next{false, static_cast<std::uint32_t>(frame_.root), 0};
+        StackEntry next{false, static_cast<std::uint32_t>(state.root), 0};
         for (bool busy = !errors.watchdog; busy;) {
             busy = false;
             if (next.isLeaf) {

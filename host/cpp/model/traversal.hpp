@@ -13,6 +13,8 @@ struct Hit {
     bool backSide;
     /// The triangle lets light through.
     bool isClear = false;
+    /// That was hit, in a scene of instances.
+    int instance = 0;
 
     /// That of a ray that has hit nothing yet: only hits with t < `tMax` count.
     static Hit none(std::int64_t tMax) { return {false, tMax, 0, {}, false}; }

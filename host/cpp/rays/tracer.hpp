@@ -22,7 +22,7 @@ public:
     void load(const colonnade_rays_image& image) {
         memory_->load(image.records, image.record_count, image.record_bytes);
         frame_.recordCount = image.record_count;
-        memory_->divide(frame_.recordCount, frame_.root, numbers_.bvh, frame_.leafRecords());
+        memory_->divide(frame_.recordCount, frame_.roots, numbers_.bvh, frame_.leafRecords());
         placement_ = {image.scale_mantissa, image.scale_exponent, {}};
         for (int a = 0; a < 3; ++a) {
             frame_.bounds.low[a] = image.bounds_low[a];
