@@ -37,6 +37,20 @@ private:
     std::istream& words_;
 };
 
+inline void readOrientation(Query& query, Ray& ray) {
+    ray.enters = true;
+    ray.axis = static_cast<int>(query.number());
+    for (auto& sign : ray.negative) sign = query.number() != 0;
+}
+
+inline Ray readTriangleRay(Query& query) {
+    Ray ray{};
+    readOrientation(query, ray);
+    ray.origin = query.vector();
+    for (auto& shear : ray.shear) shear = query.number();
+    return ray;
+}
+
 /// The bytes of records, which are hexadecimal words, the last digits first; and their number.
 inline std::pair<std::vector<std::uint8_t>, std::size_t> readRecordBytes(std::istream& words) {
     std::vector<std::uint8_t> bytes;

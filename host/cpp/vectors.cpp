@@ -30,32 +30,19 @@
 //   pixel  x y                                            -> colour[3] isObject triangle distance ratio[3]
 //          with an environment if its lines precede the registers
 //
-// Environment maps: see environment_queries.hpp; rays of applications: see ray_queries.hpp.
+// Environment maps: see environment_queries.hpp; instances: see instance_queries.hpp; rays of applications: see ray_queries.hpp.
 #include <optional>
 #include <sstream>
 
 #include "model/frame.hpp"
 #include "packer/leaf.hpp"
 #include "environment_queries.hpp"
+#include "instance_queries.hpp"
 #include "ray_queries.hpp"
 
 namespace {
 
 using namespace colonnade;
-
-void readOrientation(Query& query, Ray& ray) {
-    ray.enters = true;
-    ray.axis = static_cast<int>(query.number());
-    for (auto& sign : ray.negative) sign = query.number() != 0;
-}
-
-Ray readTriangleRay(Query& query) {
-    Ray ray{};
-    readOrientation(query, ray);
-    ray.origin = query.vector();
-    for (auto& shear : ray.shear) shear = query.number();
-    return ray;
-}
 
 void replyRaySetup(Query& query, const Numbers& n) {
     const bool isShadow = query.number() != 0;
@@ -337,6 +324,8 @@ int main() try {
         else if (kind == "hit") replyHit(query, numbers, directionBits);
         else if (kind == "image") batches.load(query, words, rays::Model(numbers, directionBits, scene.layouts()));
         else if (kind == "batch") batches.reply(query);
+        else if (kind == "instanceray") replyInstanceRay(query, numbers);
+        else if (kind == "instanceface") replyInstanceFace(query, numbers);
         else if (kind == "bounce") replyBounce(query, numbers);
         else if (kind == "cornernormal") replyCornerNormal(query, numbers);
         else if (kind == "geometricnormal") replyGeometricNormal(query, numbers);

@@ -6,7 +6,7 @@ import colonnade.config.{ColonnadeConfig, PathConfig, TraversalConfig}
 import colonnade.environment.MarchPort
 import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast, RecordRequest, UnitPosition}
 import colonnade.shading.{CubePort, TexturePort}
-import colonnade.unit.{AttributeFetch, FetchEvents, PathEvents, PathHits, PathUnit, TraversalEvents}
+import colonnade.unit.{AttributeFetch, FetchEvents, InstanceWalk, PathEvents, PathHits, PathUnit, TraversalEvents}
 
 /** Events of a [[PathTracer]] in one cycle. */
 final class PathTracerEvents(config: ColonnadeConfig) extends Bundle {
@@ -67,7 +67,15 @@ final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config)
 
   // Rays and their results
   hits.trace :<>= paths.trace
-  hits.results := rows.connect(hits.rays, scene, io.start, io.broadcasts)
+  if (config.frame.hasInstances) {
+    val walk = Module(new InstanceWalk(pathConfig)).io
+    walk.scene     := scene
+    walk.instances := io.registers.instances.get
+    walk.rays :<>= hits.rays
+    walk.objectResults := rows.connect(walk.objectRays, scene, io.start, io.broadcasts)
+    hits.results       := walk.results
+    hits.instances.get := io.registers.instances.get
+  } else hits.results := rows.connect(hits.rays, scene, io.start, io.broadcasts)
 
   // Records
   hits.start := io.start

@@ -158,6 +158,7 @@ final case class ColumnBvhMemoryConfig(
   * @param emission   materials have a colour that diffuse surfaces emit
   * @param gather     diffuse surfaces gather light: docs/gather.md
   * @param rays       rays of applications and their hits in place of pixels: docs/rays.md
+  * @param instances  objects with a transform of their own: docs/path-tracer.md; 0: none
   */
 final case class FrameConfig(
     maxWidth:   Int = 1920,
@@ -169,7 +170,8 @@ final case class FrameConfig(
     hits:       Boolean = true,
     emission:   Boolean = false,
     gather:     Boolean = false,
-    rays:       Boolean = false
+    rays:       Boolean = false,
+    instances:  Int = 0
 ) {
   Require.within("frame.maxWidth", maxWidth, 8, 4096)
   Require.within("frame.maxHeight", maxHeight, 8, 4096)
@@ -177,10 +179,19 @@ final case class FrameConfig(
   Require.within("frame.materials", materials, 1, 256)
   Require.within("frame.lights", lights, 1, 8)
   Require.within("frame.maxBounces", maxBounces, 0, 15)
+  Require.within("frame.instances", instances, 0, FrameConfig.maxInstances)
+  Require("frame.instances", instances != 1, "is 0 or at least 2: one object moves by the registers of the camera")
   Require("frame.gather", !gather || maxBounces > 0, "needs frame.maxBounces of at least 1")
 
   /** The device supports mirrors and glass. */
   val hasBounces: Boolean = maxBounces > 0
+
+  /** Objects have transforms of their own. */
+  val hasInstances: Boolean = instances > 0
+}
+
+object FrameConfig {
+  val maxInstances: Int = 16
 }
 
 /** A whole generator configuration: immutable, checked at construction. The names, types and defaults of the parameters
@@ -203,9 +214,12 @@ final case class ColonnadeConfig(
     s"needs units.shadeInterval below ${UnitsConfig.sequentialShadeInterval}"
   )
 
+  Require("frame.instances", !frame.hasInstances || geometry.bvh, "needs geometry.bvh=true")
+
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
   if (frame.rays) {
+    Require("frame.rays", !frame.hasInstances, "needs frame.instances=0")
     Require("frame.rays", frame.maxBounces == 0, "needs frame.maxBounces=0")
     Require("frame.rays", physicalAttributeMemory.isEmpty, "needs physicalAttributeMemory=null")
     Require("frame.rays", units.rayInterval == 1, "needs units.rayInterval=1")

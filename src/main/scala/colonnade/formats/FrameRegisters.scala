@@ -97,6 +97,9 @@ final class SceneMap(config: ColonnadeConfig) extends Bundle {
   /** The record of the root node. */
   val root = UInt(RecordFormats.addressBits(config).W)
 
+  /** Instances that are on, from the first one; 0: the tree of `root` is in the axes of the world. */
+  val instances = Option.when(config.frame.hasInstances)(UInt(NumberFormats.bitLength(config.frame.instances).W))
+
   /** Leaves have companions. */
   val hasColours = Option.when(config.geometry.cornerColours)(Bool())
 
@@ -149,6 +152,7 @@ final class FrameRegisters(config: ColonnadeConfig) extends Bundle with SceneReg
   val environment = config.physicalAttributeMemory.map(_ => new EnvironmentView(numbers))
   val dram        = config.columnBvhMemory.cache.map(_ => new SceneInDram)
   val gather      = Gather(config)
+  val instances   = Option.when(config.frame.hasInstances)(Vec(config.frame.instances, new ObjectInstance(config)))
 }
 
 object FrameRegisters {

@@ -22,7 +22,8 @@ object RegisterLimits {
       "shading.bounces"             -> BigInt(config.frame.maxBounces),
       "shading.shadowTransmittance" -> one,
       "gather.bounces"              -> BigInt(Gather.maxBounces),
-      "scene.recordCount"           -> BigInt(config.columnBvhMemory.depth)
+      "scene.recordCount"           -> BigInt(config.columnBvhMemory.depth),
+      "scene.instances"             -> BigInt(config.frame.instances)
     ) ++ materials
     val max = Layout.of(RegisterMap.settings(config)).map(field => field.name -> ((BigInt(1) << field.width) - 1)).toMap
     limits.filter { case (name, limit) => max.get(name).exists(limit < _) }.toMap

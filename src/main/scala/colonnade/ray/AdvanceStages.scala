@@ -81,6 +81,7 @@ final class AdvanceStages(config: PathConfig) extends Module {
   }
 
   private val prepared = Wire(new PreparedRay(config))
+  prepared.root.foreach(_ := DontCare)
   prepared.context         := io.ray.context
   prepared.isShadow        := io.ray.isShadow
   prepared.enters          := io.enters

@@ -157,6 +157,7 @@ final class EntryDatapath(config: PathConfig) extends Module {
 
   io.enters := tNear.zext <= tFar && !ray.isZero(2)
   private val output = io.output
+  output.root.foreach(_ := DontCare)
   output.context         := ray.context
   output.isShadow        := ray.isShadow
   output.enters          := io.enters

@@ -3,7 +3,7 @@ package colonnade.ray
 import chisel3._
 import colonnade.common.Context
 import colonnade.config.{NumberFormats, PartConfig, PathConfig}
-import colonnade.formats.Vec3
+import colonnade.formats.{RecordFormats, Vec3}
 import colonnade.numbers.{Fixed, FixedPointFormat, Rounding}
 
 /** Number formats of a ray (docs/numbers.md). */
@@ -139,6 +139,9 @@ final class PreparedRay(config: PartConfig) extends Bundle {
   val tEntry   = new Fixed(formats.entry)
   val tMax     = new Fixed(formats.grid) // hits with t < `tMax` count; never negative
   val limits   = Option.when(config.frame.rays)(new EntryLimits(numbers))
+
+  /** The root of its object's tree; ray set-up does not know it. */
+  val root = Option.when(config.frame.hasInstances)(UInt(RecordFormats.addressBits(config).W))
 }
 
 object PermutedFrame {

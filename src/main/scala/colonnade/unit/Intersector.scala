@@ -69,7 +69,7 @@ final class Intersector(config: TraversalConfig) extends Module {
   hitTable.io.start.valid        := io.rays.valid
   hitTable.io.start.bits.context := ray.context
   hitTable.io.start.bits.tMax    := ray.tMax
-  fetch(io.fetches(0), io.rays.valid, ray.context, Traversal.root(config, io.scene))
+  fetch(io.fetches(0), io.rays.valid, ray.context, Traversal.root(config, ray, io.scene))
 
   // Traverse the BVH
   private val step = traversal.io.steps

@@ -2,31 +2,20 @@ package colonnade.unit
 
 import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
-import colonnade.common.{Choice, Context, ContextTable}
+import colonnade.common.{Choice, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.environment.HitDistance
-import colonnade.formats.{Leaf, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
-import colonnade.numbers.{Fixed, Rounding}
+import colonnade.formats.{Leaf, ObjectInstance, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.numbers.Fixed
 import colonnade.ray.{PreparedRay, RayFormats, TriangleRay}
 import colonnade.shading.{Occlusion, ShadingPipeline}
 import colonnade.traversal.HitPoint
 
-/** The closest hit of a ray that is to be shaded. */
-final class SurfaceHit(config: PathConfig) extends Bundle {
-  val context   = Context(config)
-  val isPrimary = Bool()
-  val id        = UInt(RecordFormats.idBits(config).W) // packed triangle id
-  val t         = new Fixed(new RayFormats(config.numbers).grid)
+/** What the resolution of a hit needs. */
+private final class ClosestHit(config: PathConfig) extends Bundle {
+  val id = UInt(RecordFormats.idBits(config).W) // packed triangle id
 
-  /** From the ray's origin along its dominant axis. */
-  val distance = Option.when(config.frame.hits || config.hasEnvironment)(HitDistance(config))
-}
-
-object SurfaceHit {
-
-  /** The distance of a hit at `t` of a ray that enters the object's box at `tEntry`, in whole units. */
-  def distance(config: PathConfig, tEntry: UInt, t: Fixed): UInt =
-    Rounding.floor(tEntry, -config.numbers.gridFraction) +& t.integer.asUInt
+  /** From where the ray enters the box, along its dominant axis. */
+  val t = new Fixed(new RayFormats(config.numbers).grid)
 }
 
 final class PathHitsIO(config: PathConfig) extends Bundle {
@@ -42,6 +31,9 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
   val requests   = Decoupled(new RecordRequest(config))
   val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
   val events     = Output(new FetchEvents(AttributeFetch.slotConfig(config)))
+
+  /** Objects with transforms of their own. */
+  val instances = Option.when(config.frame.hasInstances)(Input(Vec(config.frame.instances, new ObjectInstance(config))))
 
   /** By material: its colour depends on the companion of a leaf. */
   val wantsColours = scene.hasColours.map(_ => Input(Vec(config.frame.materials, Bool())))
@@ -96,6 +88,14 @@ final class PathHits(config: PathConfig) extends Module {
     hits.write(result.context, result.hit.point)
   }
 
+  // The instance that each context hits. A shadow ray replaces it: the shader sends it after it has accepted the hit that
+  // casts the ray
+  private val instanceOf = result.instance.map { number =>
+    val table = Reg(Vec(paths.contexts, chiselTypeOf(number)))
+    when(io.results.valid) { table(result.context) := number }
+    table
+  }
+
   // A hit with a surface to shade, or whose distance is measured
   private val shades   = control.startsShading
   private val distance = control.readsDistance
@@ -127,7 +127,7 @@ final class PathHits(config: PathConfig) extends Module {
   attributes.hits.bits.id      := hit.id
   attributes.readyNext         := decoder.readyNext
   attributes.wantsColours      := io.wantsColours.fold(false.B)(
-    ShadingPipeline.material(config, _, new Leaf(config.geometry, record.record).material)
+    ShadingPipeline.material(config, _, materialOf(record.record, record.hit.context))
   )
   trace.attributeError := attributes.error
   io.events            := attributes.events
@@ -136,10 +136,10 @@ final class PathHits(config: PathConfig) extends Module {
   decoder.leaf.bits.context  := record.hit.context
   decoder.leaf.bits.isSecond := record.hit.id(0)
   decoder.leaf.bits.record   := record.record
-  decoder.mayTakeNext        := trace.hitsReadyNext
-  private val granted = decoder.grantNext
-  private val face    = decoder.face.bits
-  trace.hits.valid                     := decoder.face.valid
+  // Faces: in the axes of their leaves, or with instances in those of the world
+  private val (granted, offered) = io.instances.fold(facesOfLeaves)(facesInWorld)
+  private val face               = offered.bits
+  trace.hits.valid                     := offered.valid
   trace.hits.bits.context              := face.context
   trace.hits.bits.ray                  := rays.read(granted.bits, granted.valid)
   trace.hits.bits.hit                  := hits.read(granted.bits, granted.valid)
@@ -154,10 +154,29 @@ final class PathHits(config: PathConfig) extends Module {
     colours := table.read(granted.bits, granted.valid)
   }
   assert(!trace.hits.valid || trace.hits.ready, "the shader does not accept its hit")
-}
 
-/** What the resolution of a hit needs. */
-private final class ClosestHit(config: PathConfig) extends Bundle {
-  val id = UInt(RecordFormats.idBits(config).W)
-  val t  = new Fixed(new RayFormats(config.numbers).grid)
+  /** The context whose face comes next, and faces, in the axes of their leaves. */
+  private def facesOfLeaves: (Valid[UInt], Valid[HitFace]) = {
+    decoder.mayTakeNext := trace.hitsReadyNext
+    (decoder.grantNext, decoder.face)
+  }
+
+  /** The same in the axes of the world. */
+  private def facesInWorld(instances: Vec[ObjectInstance]): (Valid[UInt], Valid[HitFace]) = {
+    val faces = Module(new WorldFaces(config)).io
+    faces.objectFace    := decoder.face
+    faces.instance      := instances(instanceOf.get(faces.context))
+    faces.hasInstances  := io.scene.instances.get =/= 0.U
+    faces.mayTakeNext   := trace.hitsReadyNext
+    decoder.mayTakeNext := faces.mayComeNext
+    (faces.grantNext, faces.face)
+  }
+
+  /** The material of the face of a leaf, in the scene. */
+  private def materialOf(leaf: UInt, context: UInt): UInt = {
+    val material = new Leaf(config.geometry, leaf).material
+    io.instances.zip(instanceOf).fold(material) { case (instances, table) =>
+      Mux(io.scene.instances.get =/= 0.U, material + instances(table(context)).materialBase, material)
+    }
+  }
 }

@@ -1,9 +1,9 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Decoupled, Valid}
+import chisel3.util.{log2Ceil, Decoupled, Valid}
 import colonnade.common.Context
-import colonnade.config.PathConfig
+import colonnade.config.{PartConfig, PathConfig}
 import colonnade.ray.PreparedRay
 import colonnade.shading.{Occlusion, ShadeRequest}
 import colonnade.traversal.TriangleHit
@@ -37,4 +37,13 @@ final class TraceResult(config: PathConfig) extends Bundle {
 
   /** The hit triangle is not opaque. */
   val isClear = Option.when(config.frame.rays)(Bool())
+
+  /** The hit object; traversal units do not know it. */
+  val instance = InstanceNumber(config)
+}
+
+/** The number of an instance, in designs that have them. */
+object InstanceNumber {
+  def apply(config: PartConfig): Option[UInt] =
+    Option.when(config.frame.hasInstances)(UInt(log2Ceil(config.frame.instances).W))
 }

@@ -5,6 +5,7 @@ import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.common.Context
 import colonnade.config.TraversalConfig
 import colonnade.formats.{NodeRecord, SceneMap}
+import colonnade.ray.PreparedRay
 import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalStack, TraversalStep}
 
 final class TraversalIO(config: TraversalConfig) extends Bundle {
@@ -88,11 +89,11 @@ final class Traversal(config: TraversalConfig) extends Module {
 
 object Traversal {
 
-  /** The first record of every ray: the root node, or without a BVH the first leaf. */
-  def root(config: TraversalConfig, scene: SceneMap): NodeRef = {
+  /** The first record of a ray: the root node of the scene or of its object, or without a BVH the first leaf. */
+  def root(config: TraversalConfig, ray: PreparedRay, scene: SceneMap): NodeRef = {
     val root = Wire(new NodeRef(config))
     root.isLeaf  := (!config.geometry.bvh).B
-    root.address := (if (config.geometry.bvh) scene.root else 0.U)
+    root.address := (if (config.geometry.bvh) ray.root.getOrElse(scene.root) else 0.U)
     root
   }
 }

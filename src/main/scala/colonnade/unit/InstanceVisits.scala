@@ -1,0 +1,136 @@
+package colonnade.unit
+
+import chisel3._
+import chisel3.util.{Arbiter, Decoupled, Queue, RegEnable, Valid}
+import colonnade.common.{Context, ContextTable}
+import colonnade.config.PathConfig
+import colonnade.formats.ObjectInstance
+import colonnade.instance.{InstanceTransform, ObjectScale}
+import colonnade.numbers.{Fixed, Rounding}
+import colonnade.ray.{PreparedRay, RayFormats, RaySetup, TriangleRay}
+
+/** A context whose ray is to be traced in an instance; hits before `tMax` count, along the ray of the world. */
+final class InstanceStep(config: PathConfig) extends Bundle {
+  val context  = Context(config)
+  val instance = InstanceNumber(config).get
+  val tMax     = new Fixed(new RayFormats(config.numbers).grid)
+}
+
+/** A ray in an object whose cube it enters. */
+final class VisitedRay(config: PathConfig) extends Bundle {
+  val visit    = new InstanceStep(config)
+  val isShadow = Bool()
+  val tEntry   = new Fixed(new RayFormats(config.numbers).entry)
+  val scale    = new ObjectScale(config.numbers)
+}
+
+final class InstanceVisitsIO(config: PathConfig) extends Bundle {
+  val instances = Input(Vec(config.frame.instances, new ObjectInstance(config)))
+
+  /** Rays of the world, for their first instance; contexts for another one. */
+  val rays  = Flipped(Decoupled(new PreparedRay(config)))
+  val again = Flipped(Valid(new InstanceStep(config)))
+
+  /** To the traversal units; the same ray for who waits for its result, in the cycle in which it leaves. */
+  val objectRays = Decoupled(new PreparedRay(config))
+  val visited    = Valid(new VisitedRay(config))
+
+  /** Contexts whose ray does not enter the cube of the object. */
+  val missed = Valid(new InstanceStep(config))
+}
+
+/** Transforms rays of the world to the axes of objects, and prepares them there. Contexts are tokens: each queue can hold all
+  * of them. A ray that is on its way goes before a new one.
+  */
+final class InstanceVisits(config: PathConfig) extends Module {
+  private val numbers = config.numbers
+
+  val io = IO(new InstanceVisitsIO(config))
+
+  // The rays of the world, and the contexts that wait
+  private val ray      = io.rays.bits
+  private val worlds   = ContextTable(config, new WorldRay(config))
+  private val fresh    = Module(new Queue(new InstanceStep(config), config.contexts)).io
+  private val again    = Module(new Queue(new InstanceStep(config), config.contexts)).io
+  private val arbiter  = Module(new Arbiter(new InstanceStep(config), 2)).io
+  private val newWorld = Wire(new WorldRay(config))
+  newWorld.isShadow       := ray.isShadow
+  newWorld.ray            := ray.ray.forTriangles
+  fresh.enq.valid         := io.rays.valid
+  fresh.enq.bits.context  := ray.context
+  fresh.enq.bits.instance := 0.U
+  fresh.enq.bits.tMax     := ray.tMax
+  io.rays.ready           := fresh.enq.ready
+  when(fresh.enq.fire) { worlds.write(ray.context, newWorld) }
+  again.enq.valid := io.again.valid
+  again.enq.bits  := io.again.bits
+  assert(!again.enq.valid || again.enq.ready, "a context waits twice")
+  arbiter.in(0) :<>= again.deq
+  arbiter.in(1) :<>= fresh.deq
+
+  // The table is read in one cycle, and the ray enters the transform in the next
+  private val transform = Module(new InstanceTransform(config)).io
+  private val isRead    = RegInit(false.B)
+  private val starts    = transform.visit.ready && !isRead && arbiter.out.valid
+  private val visit     = RegEnable(arbiter.out.bits, starts)
+  private val world     = worlds.read(arbiter.out.bits.context, starts)
+  isRead                        := starts
+  arbiter.out.ready             := transform.visit.ready && !isRead
+  transform.visit.valid         := isRead
+  transform.visit.bits.context  := visit.context
+  transform.visit.bits.tMax     := visit.tMax
+  transform.visit.bits.isShadow := world.isShadow
+  transform.visit.bits.ray      := world.ray
+  transform.instance            := io.instances(visit.instance)
+
+  // Set-up; meanwhile what else is known of the ray waits in a queue
+  private val setup = Module(RaySetup(config)).io
+  private val tags  = Module(new Queue(new SetupTag(config), InstanceVisits.inSetup)).io
+  setup.request.valid := transform.ray.valid && tags.enq.ready
+  setup.request.bits  := transform.ray.bits.request
+  transform.ray.ready := setup.request.ready && tags.enq.ready
+  tags.enq.valid      := setup.request.fire
+  tags.enq.bits.visit := visit
+  tags.enq.bits.scale := transform.ray.bits.scale
+  tags.enq.bits.limit := transform.ray.bits.limit
+  setup.bounds.low.axes.foreach(_ := 0.U)
+  setup.bounds.high.axes.foreach(_ := ((BigInt(1) << numbers.vertexBits) - 1).U)
+
+  // To a traversal unit, with what is left of the limit at the entry
+  private val prepared = setup.ray.bits
+  private val known    = tags.deq.bits
+  private val left     = known.limit.zext -& Rounding.floor(prepared.tEntry.natural, -numbers.gridFraction).zext
+  private val most     = (BigInt(1) << (numbers.gridBits - 1)) - 1
+  io.objectRays.valid     := setup.ray.valid && prepared.enters
+  io.objectRays.bits      := prepared
+  io.objectRays.bits.tMax := Fixed(new RayFormats(numbers).grid, Rounding.saturate(left, BigInt(0), most))
+  io.objectRays.bits.root.foreach(_ := io.instances(known.visit.instance).root)
+  setup.ray.ready          := !prepared.enters || io.objectRays.ready
+  tags.deq.ready           := setup.ray.fire
+  io.visited.valid         := io.objectRays.fire
+  io.visited.bits.visit    := known.visit
+  io.visited.bits.isShadow := prepared.isShadow
+  io.visited.bits.tEntry   := prepared.tEntry
+  io.visited.bits.scale    := known.scale
+  io.missed.valid          := setup.ray.valid && !prepared.enters
+  io.missed.bits           := known.visit
+}
+
+private object InstanceVisits {
+
+  /** Rays in sequential set-up, and one that waits. */
+  val inSetup: Int = 4
+}
+
+/** What the transform reads of a ray. */
+final private class WorldRay(config: PathConfig) extends Bundle {
+  val isShadow = Bool()
+  val ray      = new TriangleRay(config.numbers)
+}
+
+/** What is known of a ray in set-up. */
+final private class SetupTag(config: PathConfig) extends Bundle {
+  val visit = new InstanceStep(config)
+  val scale = new ObjectScale(config.numbers)
+  val limit = UInt((config.numbers.sceneBits + 1).W)
+}

@@ -1,0 +1,48 @@
+package colonnade.instance
+
+import chisel3._
+import chiseltest._
+import colonnade.TestParts._
+import colonnade.config.ColonnadeConfig
+import colonnade.numbers.Fixed
+import colonnade.ray.RayFormats
+import colonnade.{Packed, PackedStreams, PackedUnit, Simulation}
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.util.Random
+
+private class WorldDistanceHarness(config: ColonnadeConfig)
+    extends PackedUnit(new ObjectDistance(config), new Fixed(new RayFormats(config.numbers).grid)) {
+  private val unit = Module(new WorldDistance(config)).io
+  connect(unit.distance, unit.t)
+}
+
+/** Distances along the ray of the world equal the model's, bit for bit; those out of range are the largest. */
+class WorldDistanceSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+  behavior of "WorldDistance"
+
+  for (config <- InstanceStimulus.formats)
+    it should s"equal the model under random stalls, ${config.precision}" in
+      test(new WorldDistanceHarness(config)).withAnnotations(Simulation.verilator) { dut =>
+        val random   = new Random(9)
+        val stimulus = new InstanceStimulus(config, random)
+        val cases    = stimulus.cases(900)
+        val entered  = cases.zip(stimulus.answers(cases)).filter(_._2.entry.nonEmpty)
+        val input    = new Packed(new ObjectDistance(config))
+        val payloads = entered.map { case (each, expected) =>
+          input.pack(Map(
+            "tEntry"                -> expected.entry.get._1,
+            "t"                     -> each.beyond,
+            "scale.length.mantissa" -> expected.mantissa,
+            "scale.length.exponent" -> expected.exponent,
+            "scale.shift"           -> BigInt(each.transform.shift)
+          ))
+        }
+        val (found, _) = PackedStreams.run(dut, payloads, 0.5, 0.4, random)
+        for ((t, (each, expected)) <- found.zip(entered))
+          withClue(s"$each: ")(t shouldBe expected.entry.get._2)
+        found.size should be > 300
+        found.distinct.size should be > 200
+      }
+}

@@ -1,0 +1,69 @@
+package colonnade.unit
+
+import chiseltest._
+import colonnade.TestParts._
+import colonnade.instance.InstanceStimulus
+import colonnade.{Model, OneSimulation, RandomPorts, TestConfigs}
+import org.scalatest.flatspec.AnyFlatSpec
+import org.scalatest.matchers.should.Matchers
+
+import scala.collection.mutable
+import scala.util.Random
+
+/** Faces in the world equal the model's, in their order, however they come and are accepted. */
+class WorldFacesSpec extends AnyFlatSpec with OneSimulation with Matchers {
+  behavior of "WorldFaces"
+
+  private val config = InstanceStimulus.withInstances(TestConfigs.tiny, 2)
+
+  inOneSimulation(new WorldFaces(config))(
+    "transform faces"                 -> transform(few = 1, hasInstances = true),
+    "as the shader is ready"          -> transform(few = 7, hasInstances = true),
+    "forward faces without instances" -> transform(few = 3, hasInstances = false)
+  )
+
+  /** A face may leave in one of `few` cycles. */
+  private def transform(few: Int, hasInstances: Boolean)(dut: WorldFaces): Unit = {
+    val random               = new Random(few)
+    val io                   = dut.io
+    val waiting              = mutable.Queue.empty[(BigInt, Seq[BigInt])]
+    var (done, cycle)        = (0, 0)
+    var (mayCome, isLeaving) = (false, false)
+    dut.clock.setTimeout(0)
+    io.hasInstances.poke(hasInstances)
+    while (done < 60) {
+      cycle should be < 60 * 200
+      val comes = mayCome && random.nextInt(3) == 0
+      io.objectFace.valid.poke(comes)
+      val normals = RandomPorts.randomise(io.objectFace.bits.normals, random) ++
+        RandomPorts.randomise(io.objectFace.bits.geometricNormal, random)
+      val material = RandomPorts.randomise(io.objectFace.bits.material, random)
+      val context  = RandomPorts.randomise(io.objectFace.bits.context, random).head
+      if (comes) {
+        val matrix  = RandomPorts.randomise(io.instance.normal, random)
+        val base    = RandomPorts.randomise(io.instance.materialBase, random)
+        val request = normals ++ material ++ matrix ++ base
+        val inWorld = Model.answers(config, Seq(request), "instanceface").head
+        waiting.enqueue(context -> (if (hasInstances) inWorld else normals ++ material))
+      }
+      val accepts = random.nextInt(few) == 0
+      io.mayTakeNext.poke(accepts)
+      io.face.valid.expect(isLeaving)
+      if (isLeaving) {
+        val (of, expected) = waiting.dequeue()
+        io.face.bits.context.expect(of)
+        val found = RandomPorts.peek(io.face.bits.normals) ++ RandomPorts.peek(io.face.bits.geometricNormal)
+        found :+ io.face.bits.material.peekInt() shouldBe expected
+        done += 1
+      }
+      mayCome = io.mayComeNext.peekBoolean()
+      isLeaving = io.grantNext.valid.peekBoolean()
+      if (isLeaving) {
+        accepts shouldBe true
+        io.grantNext.bits.expect(waiting.head._1)
+      }
+      dut.clock.step()
+      cycle += 1
+    }
+  }
+}
