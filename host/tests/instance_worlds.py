@@ -13,10 +13,12 @@ from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import new_model
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
-from colonnade.registers.instances import Instance, instance_registers, world_frame
+from colonnade.registers.instances import instance_registers
 from colonnade.scene.model import MeshSource, Scene
+from colonnade.scene_image.header import Instance
 from colonnade.scene_image.joined_images import joined_records
 from colonnade.scene_image.packer import pack
+from colonnade.scene_image.world import world_frame
 
 Floats = NDArray[np.float64]
 MESHES = ("sphere:2", "torus", "cube")
@@ -54,7 +56,7 @@ class World:
         self.model.load(records)
         self.count = len(transforms)
         self.instances = [
-            Instance(images[i % len(images)].header, matrix, self.roots[i % len(images)], i % 2)
+            Instance.of(images[i % len(images)].header, matrix, self.roots[i % len(images)], i % 2)
             for i, matrix in enumerate(transforms)
         ]
         self.frame = world_frame(self.instances, self.numbers)
@@ -89,6 +91,6 @@ class World:
 
     def triangles(self, i: int) -> tuple[Floats, NDArray[np.int64]]:
         """Vertices of an instance on the world's grid, and its faces."""
-        mesh, matrix = self.meshes[i % len(self.meshes)], self.instances[i].transform
+        mesh, matrix = self.meshes[i % len(self.meshes)], np.array(self.instances[i].transform)
         placed = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
         return (placed - np.array(self.frame.offset)) * self.steps, mesh.faces.astype(np.int64)

@@ -16,21 +16,22 @@ from colonnade.common.image_io import resized_photo
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.device.gathered_light import scene_cube, with_cube
+from colonnade.device.packed_objects import pack_objects, placed_image
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
 from colonnade.registers.view_file import view_file
 from colonnade.scene.cameras import check_camera
+from colonnade.scene.joined_mesh import with_transform
 from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, photo_strength, view_photo
-from colonnade.scene.model import Camera, Scene
+from colonnade.scene.model import Camera, Scene, Transform
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.passes import frame_passes
 from colonnade.scene.view import View, make_view, place, rendered_materials
 from colonnade.scene_image.device_image import device_image, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.environment import with_environment
-from colonnade.scene_image.packer import pack
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
@@ -111,7 +112,7 @@ class DeviceScene:
         maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest, encode or encoder)
         mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
         materials = rendered_materials(mesh.materials, lit.scene)
-        image = pack(mesh, manifest, materials, lit.scene.headroom, encoder, scene.mesh.children)
+        image = pack_objects(mesh, manifest, materials, lit.scene.headroom, encoder, scene.mesh.children)
         image = image.posed(scene.motion_progress)
         if maps is not None:
             image = with_environment(image, maps, manifest)
@@ -174,6 +175,31 @@ class DeviceScene:
         """
         moved = replace(self, scene=replace(self.scene, camera=camera, frame_camera=None))
         return moved if self.environment is None else replace(moved, photo=None, strength=None)
+
+    @checked
+    def with_transform(self, number: int, transform: Transform, *, relit: bool = False) -> DeviceScene:
+        """The scene with one of several objects elsewhere, as if its file had the transform; the records stay.
+
+        Args:
+            number: Of the object in the file, from 1.
+            transform: Its pose in the world.
+            relit: As in `of`.
+
+        Raises:
+            UserError: There is no such object, the objects are packed as one mesh, or one is too small for the scene.
+        """
+        if not self.image.header.instances or self.mesh is None:
+            raise UserError(
+                "an object moves alone if it is an instance: raise frame.instances to the number of objects"
+            )
+        if not 1 <= number <= len(self.scene.objects):
+            raise UserError(f"there is no object {number}: the scene has {len(self.scene.objects)}")
+        objects = list(self.scene.objects)
+        objects[number - 1] = replace(objects[number - 1], transform=transform)
+        mesh = with_transform(self.mesh, number - 1, transform)
+        scene = replace(self.scene, objects=tuple(objects))
+        image = placed_image(self.image, mesh, self.manifest)
+        return replace(self, scene=scene, mesh=mesh, image=image, strength=None).lit_at(scene, relit)
 
     def passes(self, scene: Scene | None = None, exposure: float = 0.0, number: int = 0) -> list[Scene]:
         """The passes of a frame (`frame_passes`) at another moment of `scene`; None: of `scene` itself."""

@@ -3,53 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from colonnade.common.errors import UserError
 from colonnade.registers.surface_offset import surface_offset
-from colonnade.scene_image.header import ImageHeader, ObjectFrame
+from colonnade.scene_image.header import Instance, ObjectFrame
+from colonnade.scene_image.world import world_bounds
 
 AXES = "xyz"
 MATRIX_BITS = 25
 NORMAL_FRACTION = 14
 #: Roundings between world and object, in steps of each: of the ray's origin, its direction and the way back.
 OBJECT_STEPS, WORLD_STEPS = 6, 8
-
-
-@dataclass(frozen=True)
-class Instance:
-    """A mesh at a place of the world.
-
-    Attributes:
-        header: Of the mesh's scene image.
-        transform: From mesh to world coordinates, float [4, 4]; it may mirror, scale and shear.
-        root: Address of the mesh's root node.
-        material_base: Added to the materials of its faces.
-    """
-
-    header: ImageHeader
-    transform: NDArray[np.float64]
-    root: int = 0
-    material_base: int = 0
-
-    @property
-    def corners(self) -> NDArray[np.float64]:
-        """The corners of the mesh's box in the world, float64 [8, 3]."""
-        frame, low, high = self.header.frame, self.header.bounds_low, self.header.bounds_high
-        units = np.array([[(low, high)[i >> a & 1][a] for a in range(3)] for i in range(8)], float)
-        return (units / frame.scale + np.array(frame.offset)) @ self.transform[:3, :3].T + self.transform[:3, 3]
-
-
-def world_frame(instances: Sequence[Instance], numbers: Mapping[str, int]) -> ObjectFrame:
-    """The frame of a world whose cube holds all instances."""
-    corners = np.concatenate([instance.corners for instance in instances])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    scale = float(((1 << numbers["vertexBits"]) - 3) / (high - low).max())
-    middle = (low + high) / 2 - (1 << numbers["vertexBits"]) / 2 / scale
-    return ObjectFrame(scale, (float(middle[0]), float(middle[1]), float(middle[2])))
 
 
 def instance_registers(instances: Sequence[Instance], world: ObjectFrame, numbers: Mapping[str, int]) -> dict[str, int]:
@@ -63,12 +29,10 @@ def instance_registers(instances: Sequence[Instance], world: ObjectFrame, number
     Raises:
         UserError: An instance is flat, or too small for the world.
     """
-    corners = (np.concatenate([instance.corners for instance in instances]) - world.offset) * world.scale
-    low, high = np.floor(corners.min(axis=0)) - 1, np.ceil(corners.max(axis=0)) + 1
-    last, offset = (1 << numbers["vertexBits"]) - 1, 0
-    registers = {"scene.instances": len(instances)}
+    low, high = world_bounds(instances, world, numbers)
+    registers, offset = {"scene.instances": len(instances)}, 0
     for a, axis in enumerate(AXES):
-        registers |= {f"bounds.low.{axis}": int(max(low[a], 0)), f"bounds.high.{axis}": int(min(high[a], last))}
+        registers |= {f"bounds.low.{axis}": low[a], f"bounds.high.{axis}": high[a]}
     for number, instance in enumerate(instances):
         placed, least = _placed(number, instance, world, numbers)
         registers |= {f"instances[{number}].{name}": value for name, value in placed.items()}
@@ -80,20 +44,21 @@ def _placed(
     number: int, instance: Instance, world: ObjectFrame, numbers: Mapping[str, int]
 ) -> tuple[dict[str, int], int]:
     """Registers of an instance, and the least offset from its surface, grid steps of the world."""
-    frame, linear = instance.header.frame, instance.transform[:3, :3]
+    transform = np.array(instance.transform)
+    frame, linear = instance.frame, transform[:3, :3]
     stretches = np.linalg.svd(linear, compute_uv=False)
     if not stretches[-1] > 1e-4 * stretches[0]:
-        raise UserError(f"instance {number} is flat: its transform must not scale an axis to nothing")
+        raise UserError(f"object {number + 1} is flat: its transform must not scale an axis to nothing")
     inverse = np.linalg.inv(linear)
     matrix = frame.scale / world.scale * inverse
     shift = MATRIX_BITS - 2 - int(np.floor(np.log2(np.abs(matrix).max())))
     # A ray starts in the reach of the world's cube, and must do so in the object's scene
     reach = 1.5 * np.sqrt(3) * (1 << numbers["vertexBits"]) * np.linalg.svd(matrix, compute_uv=False)[0]
     if not (1 <= shift < 64 and reach * 2.0 ** numbers["gridFraction"] < 1 << (numbers["sceneBits"] - 1)):
-        raise UserError(f"instance {number} is too small for the scene: make it larger, or the scene smaller")
+        raise UserError(f"object {number + 1} is too small for the scene: make it larger, or the scene smaller")
     largest = (1 << (MATRIX_BITS - 1)) - 1
     steps = world.scale * 2.0 ** numbers["gridFraction"]
-    corner = (linear @ np.array(frame.offset) + instance.transform[:3, 3] - np.array(world.offset)) * steps
+    corner = (linear @ np.array(frame.offset) + transform[:3, 3] - np.array(world.offset)) * steps
     normal = inverse.T * stretches[-1]
     registers = {"shift": shift, "root": instance.root, "materialBase": instance.material_base}
     for a, axis in enumerate(AXES):
@@ -101,6 +66,6 @@ def _placed(
         for b, column in enumerate(AXES):
             registers[f"matrix[{a}].{column}"] = int(np.clip(np.rint(np.ldexp(matrix[a, b], shift)), -largest, largest))
             registers[f"normal[{a}].{column}"] = int(np.rint(np.ldexp(normal[a, b], NORMAL_FRACTION)))
-    own = surface_offset(numbers, instance.header.largest_triangle) + OBJECT_STEPS
+    own = surface_offset(numbers, instance.largest_triangle) + OBJECT_STEPS
     least = (own * stretches[0] * world.scale / frame.scale + WORLD_STEPS) * stretches[0] / stretches[-1]
     return registers, int(np.ceil(least))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from colonnade.common.errors import UserError
@@ -56,17 +58,21 @@ def check_surfaces(view: View, manifest: Manifest) -> None:
             raise UserError(f"glass has an index of refraction of {material.ior:g}; it must be from 1 to {MAX_IOR}")
 
 
+def largest_offset(numbers: Mapping[str, int]) -> int:
+    """The largest `shading.offset`, grid steps."""
+    return max(1, min(1 << (numbers["vertexBits"] - 2 + numbers["gridFraction"]), (1 << (numbers["gridBits"] - 2)) - 1))
+
+
 def surface_registers(view: View, header: ImageHeader, manifest: Manifest) -> dict[str, int]:
     """Compute the registers of ambient light, background, materials and shading."""
     numbers = manifest.numbers
     white = (1 << numbers["colourBits"]) - 1
     step = header.frame.scale * 2.0 ** numbers["gridFraction"]
-    maximum = min(2.0 ** (numbers["vertexBits"] - 2 + numbers["gridFraction"]), 2.0 ** (numbers["gridBits"] - 2) - 1)
     offset = (
         surface_offset(numbers, header.largest_triangle) if view.shadow_offset is None else view.shadow_offset * step
     )
     result = {
-        "shading.offset": int(np.clip(np.rint(offset), 1, max(1.0, maximum))),
+        "shading.offset": int(np.clip(np.rint(offset), 1, largest_offset(numbers))),
         "shading.flat": int(view.flat),
         "shading.shadows": int(view.shadows),
         "shading.lights": len(view.lights),

@@ -19,6 +19,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.device.scene import DeviceScene
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
+from colonnade.render.hit_faces import hit_faces
 from colonnade.render.report import FrameReport
 from colonnade.render.result import RenderResult
 from colonnade.render.sky import sky_of
@@ -182,8 +183,8 @@ class HostFrame:
 
     def _faces(self, frame: Frame) -> npt.NDArray[np.int64]:
         """The faces of the mesh's file in the first pass, -1 for a miss, int64 [height, width]."""
-        source = np.append(self.prepared.image.source_faces.astype(np.int64), -1)
-        return source[np.where(frame.is_object, frame.triangle, -1)]
+        packed = np.where(frame.is_object, frame.triangle, -1).astype(np.int64)
+        return hit_faces(self.prepared.image, self.prepared.mesh, packed, self._hits(frame)[1])
 
     def _hits(self, frame: Frame) -> tuple[Floats, Floats]:
         """Depth and position of the first pass, NaN for a miss, mesh units, float64 [height, width] and with [3]."""

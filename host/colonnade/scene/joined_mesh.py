@@ -15,10 +15,10 @@ from colonnade.mesh.clips.clip import Clip
 from colonnade.mesh.clips.joined import STILL_SECONDS, Place, joined_clip, still_clip
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import PLAIN
-from colonnade.mesh.materials.mesh import Mesh, MeshPart
+from colonnade.mesh.materials.mesh import Mesh, MeshPart, PlacedMesh
 from colonnade.mesh.materials.palette import MAX_MATERIALS
 from colonnade.mesh.materials.texture import Texture
-from colonnade.scene.model import Material, Scene, SceneObject
+from colonnade.scene.model import Material, Scene, SceneObject, Transform
 from colonnade.scene.object_motion import moving_place, still_place
 from colonnade.scene.object_pose import Pose, footprint_of, free_placement, rotation_matrix, standing_pose
 from colonnade.scene.standing import surface_point
@@ -125,6 +125,10 @@ def _joined(scene: Scene, meshes: list[Mesh], poses: list[Pose], environment: En
             MeshPart(mesh.name, int(first), mesh.extent.edge * pose.scale)
             for mesh, pose, first in zip(meshes, poses, first_faces[:-1], strict=True)
         ),
+        objects=tuple(
+            PlacedMesh(mesh.vertices, mesh.faces, mesh.corner_normals, pose.matrix)
+            for mesh, pose in zip(meshes, poses, strict=True)
+        ),
         clip=clip,
         clip_corners=clip_corners,
     )
@@ -140,6 +144,22 @@ def _places(scene: Scene, meshes: list[Mesh], poses: list[Pose], environment: En
         else still_place(pose)
         for described, mesh, pose in zip(scene.objects, meshes, poses, strict=True)
     ]
+
+
+def with_transform(mesh: Mesh, number: int, transform: Transform) -> Mesh:
+    """A joined mesh with another pose of one of its objects, numbered from 0."""
+    pose = Pose(rotation_matrix(transform), transform.scale, np.array(transform.translate))
+    first_vertex = sum(len(one.vertices) for one in mesh.objects[:number])
+    first_face = sum(len(one.faces) for one in mesh.objects[:number])
+    moved, vertices, normals = mesh.objects[number], mesh.vertices.copy(), mesh.corner_normals.copy()
+    vertices[first_vertex : first_vertex + len(moved.vertices)] = pose.to_world(moved.vertices)
+    turned = fixed_order.product(moved.corner_normals, pose.rotation.T)
+    normals[first_face : first_face + len(moved.faces)] = turned
+    stretch = pose.scale / float(np.cbrt(np.linalg.det(moved.transform[:3, :3])))
+    part = replace(mesh.parts[number], edge=mesh.parts[number].edge * stretch)
+    objects, parts = list(mesh.objects), list(mesh.parts)
+    objects[number], parts[number] = replace(moved, transform=pose.matrix), part
+    return replace(mesh, vertices=vertices, corner_normals=normals, objects=tuple(objects), parts=tuple(parts))
 
 
 def _joined_clip(meshes: list[Mesh], places: list[Place]) -> tuple[Clip | None, Indices | None]:

@@ -34,6 +34,13 @@ class Pose:
     scale: float
     translate: Floats
 
+    @property
+    def matrix(self) -> Floats:
+        """From mesh space to world space, float64 [4, 4]."""
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.rotation * self.scale, self.translate
+        return matrix
+
     def to_world(self, points: Floats) -> Floats:
         """Transform points [..., 3] from mesh space to world space."""
         return np.asarray(fixed_order.product(points, self.rotation.T) * self.scale + self.translate, dtype=np.float64)

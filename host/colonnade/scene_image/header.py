@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from colonnade.common.types import Floats
 from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.mesh.materials.mesh import Extent, MeshPart
 
@@ -43,6 +44,42 @@ class ObjectFrame:
 
     scale: float
     offset: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A packed mesh at a place of the world.
+
+    Attributes:
+        frame: Transform from mesh space to its own vertex units.
+        bounds_low, bounds_high: Of the mesh, its vertex units, inclusive.
+        largest_triangle: Greatest extent of its triangles along an axis, its vertex units.
+        transform: From mesh to world coordinates, four rows of four; it may mirror, scale and shear.
+        root: Address of its root node.
+        material_base: Added to the materials of its faces.
+    """
+
+    frame: ObjectFrame
+    bounds_low: tuple[int, int, int]
+    bounds_high: tuple[int, int, int]
+    largest_triangle: int
+    transform: tuple[tuple[float, ...], ...]
+    root: int = 0
+    material_base: int = 0
+
+    @staticmethod
+    def of(header: ImageHeader, transform: Floats, root: int = 0, material_base: int = 0) -> Instance:
+        """The mesh of an image at a place; `transform` is float64 [4, 4]."""
+        rows = tuple(tuple(float(value) for value in row) for row in transform)
+        box = (header.frame, header.bounds_low, header.bounds_high, header.largest_triangle)
+        return Instance(*box, rows, root, material_base)
+
+    @property
+    def corners(self) -> Floats:
+        """The corners of the mesh's box in the world, float64 [8, 3]."""
+        low, high, matrix = self.bounds_low, self.bounds_high, np.array(self.transform)
+        units = np.array([[(low, high)[i >> a & 1][a] for a in range(3)] for i in range(8)], float)
+        return np.asarray((units / self.frame.scale + np.array(self.frame.offset)) @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 @dataclass(frozen=True)
@@ -117,6 +154,8 @@ class ImageHeader:
         room: The room; None without a room's maps.
         parts: The objects of a scene with several, by their source faces.
         texture: The textures; None for hardware without.
+        instances: The objects that have transforms of their own, whose world `frame` and bounds are; empty: the records
+            are one mesh.
         light: The memory of the light cube, after all others; empty without gathered light.
         parallax: Of the light cube, the register `gather.parallax`.
     """
@@ -139,6 +178,7 @@ class ImageHeader:
     room: EnvironmentHeader | None = None
     parts: tuple[MeshPart, ...] = ()
     texture: TextureHeader | None = None
+    instances: tuple[Instance, ...] = ()
     light: tuple[LoadedMemory, ...] = ()
     parallax: int = 0
 
@@ -178,9 +218,16 @@ class ImageHeader:
         if texture := values["texture"]:
             memories = tuple(LoadedMemory(**memory) for memory in texture["memories"])
             values["texture"] = TextureHeader(**{**texture, "memories": memories})
-        # Files that are older than gathered light lack the key
+        # Older files lack these keys
+        values["instances"] = tuple(_instance(one) for one in values.get("instances", ()))
         values["light"] = tuple(LoadedMemory(**memory) for memory in values.get("light", ()))
         return ImageHeader(**values)
+
+
+def _instance(values: Mapping[str, Any]) -> Instance:
+    frame, rows = values["frame"], tuple(tuple(row) for row in values["transform"])
+    frame = ObjectFrame(frame["scale"], tuple(frame["offset"]))
+    return Instance(**{**_with_tuples(values), "frame": frame, "transform": rows})
 
 
 def _with_tuples(values: Mapping[str, Any]) -> dict[str, Any]:

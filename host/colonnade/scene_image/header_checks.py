@@ -36,10 +36,7 @@ def check_header(header: Any) -> None:
     _require(0 < bits <= _MAX_RECORD_BITS and bits % 32 == 0)
     for key in ("format_hash", "mesh"):
         _require(isinstance(header[key], str))
-    for key in ("bounds_low", "bounds_high"):
-        _require(len([_count(value) for value in _list(header[key])]) == 3)
-    _numbers(header["frame"]["offset"], 3)
-    _require(_number(header["frame"]["scale"]) > 0)
+    _check_box(header)
     for key in ("low", "high"):
         _numbers(header["extent"][key], 3)
     outline = _list(header["extent"]["outline"])
@@ -61,11 +58,30 @@ def check_header(header: Any) -> None:
     for part in _list(header["parts"]):
         _require(isinstance(part["name"], str) and _number(part["edge"]) > 0)
         _count(part["first_face"])
+    for instance in _list(header.get("instances", [])):
+        _check_instance(instance)
     _check_tree(header["tree"])
     _check_environment(header["room"])
     _check_texture(header["texture"])
     _check_memories(header.get("light", []))
     _count(header.get("parallax", 0))
+
+
+def _check_box(described: Any) -> None:
+    for key in ("bounds_low", "bounds_high"):
+        _require(len([_count(value) for value in _list(described[key])]) == 3)
+    _numbers(described["frame"]["offset"], 3)
+    _require(_number(described["frame"]["scale"]) > 0)
+
+
+def _check_instance(instance: Any) -> None:
+    _check_box(instance)
+    for key in ("largest_triangle", "root", "material_base"):
+        _count(instance[key])
+    rows = _list(instance["transform"])
+    _require(len(rows) == 4)
+    for row in rows:
+        _numbers(row, 4)
 
 
 def _check_tree(tree: Any) -> None:

@@ -80,7 +80,7 @@ def own_hits(kind: str, config: str, share: float) -> tuple[int, int]:
         ids = hits["triangle"][mine] - 2 * world.roots[i]
         corners = vertices[faces[image.source_faces[ids]]]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        outward[mine] = normal * np.sign(np.linalg.det(world.instances[i].transform[:3, :3]))
+        outward[mine] = normal * np.sign(np.linalg.det(np.array(world.instances[i].transform)[:3, :3]))
     outside &= (outward * ways).sum(axis=1) < 0
     outward = outward[outside] / np.linalg.norm(outward[outside], axis=1, keepdims=True)
     across = np.cross(outward, random.normal(size=outward.shape))
@@ -126,10 +126,12 @@ def test_without_instances_the_registers_of_instances_change_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scale", "message"), [((1, 1, 0), "instance 0 is flat"), ((1e-3, 1e-3, 1e-3), "instance 0 is too small")]
+    ("scale", "message"), [((1, 1, 0), "object 1 is flat"), ((1e-3, 1e-3, 1e-3), "object 1 is too small")]
 )
 def test_transforms_out_of_range_are_refused(scale: tuple[float, float, float], message: str) -> None:
     world = World(SMALL, [np.eye(4)])
     matrix = np.diag([*scale, 1.0])
     with pytest.raises(UserError, match=message):
-        instance_registers([replace(world.instances[0], transform=matrix)], world.frame, world.numbers)
+        instance_registers(
+            [replace(world.instances[0], transform=tuple(map(tuple, matrix)))], world.frame, world.numbers
+        )

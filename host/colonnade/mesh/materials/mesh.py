@@ -59,6 +59,23 @@ class MeshPart:
 
 
 @dataclass(frozen=True)
+class PlacedMesh:
+    """The geometry of one of the objects of a joined mesh, in its own space; its faces follow those of earlier ones.
+
+    Attributes:
+        vertices: float64 [n, 3].
+        faces: int32 [m, 3].
+        corner_normals: float64 [m, 3, 3].
+        transform: From there to the joined mesh, float64 [4, 4]: a rotation, a scale and a translation.
+    """
+
+    vertices: Floats
+    faces: Faces
+    corner_normals: Floats
+    transform: Floats
+
+
+@dataclass(frozen=True)
 class Mesh:
     """A clean triangle mesh: no duplicate vertices, no degenerate or duplicate triangles.
 
@@ -74,6 +91,7 @@ class Mesh:
         name: Name for reports.
         notes: Lines on what the file holds and a picture does not show, and on what was repaired.
         parts: The objects of a joined mesh, in the order of their source faces; none of a single mesh.
+        objects: Their geometry.
         corner_colours: Linear colours at the corners of the faces, 0 to 1, 0 on faces whose material has none, float64
             [m, 3, 3]; None: no material has any.
         textures: Base-colour textures of the materials.
@@ -93,6 +111,7 @@ class Mesh:
     name: str
     notes: tuple[str, ...] = ()
     parts: tuple[MeshPart, ...] = ()
+    objects: tuple[PlacedMesh, ...] = ()
     corner_colours: Floats | None = None
     textures: tuple[Texture, ...] = ()
     corner_uvs: Floats | None = None

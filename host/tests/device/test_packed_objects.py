@@ -1,0 +1,125 @@
+"""Objects as instances: pictures are those of one mesh, and an object moves while the records stay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.common.image_io import encode_srgb
+from colonnade.common.types import Floats
+from colonnade.design.generator import manifest_for
+from colonnade.design.manifest import Manifest
+from colonnade.device.bit_exact import render_model
+from colonnade.device.scene import DeviceScene
+from colonnade.quality.image_metrics import psnr
+from colonnade.render.hit_faces import hit_faces
+from colonnade.scene.model import Camera, Material, MeshSource, Scene, SceneObject, Transform
+from colonnade.scene_image.file import SceneImage
+
+SIZE = (120, 90)
+RED, MIRROR = Material(albedo=(0.8, 0.2, 0.1)), Material(kind="mirror")
+OBJECTS = (
+    SceneObject(mesh=MeshSource("sphere:3"), material=RED, transform=Transform(translate=(-1.2, 0.0, 0.0))),
+    SceneObject(
+        mesh=MeshSource("torus"), material=MIRROR, transform=Transform((0.0, 30.0, 70.0), 0.9, (1.3, 0.0, 0.2))
+    ),
+    SceneObject(
+        mesh=MeshSource("sphere:3"), material=MIRROR, transform=Transform(scale=0.6, translate=(0.0, 1.5, -1.0))
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def manifest() -> Manifest:
+    return manifest_for("tiny", ("frame.instances=3", "frame.maxBounces=4")).manifest
+
+
+def scene(*objects: SceneObject) -> Scene:
+    camera = Camera(position=(2.0, 2.5, 6.0), target=(0.0, 0.3, 0.0))
+    return Scene(objects[0].mesh, objects=objects, camera=camera)
+
+
+def joined(described: Scene, manifest: Manifest) -> DeviceScene:
+    """The objects as one mesh: the design has fewer instances."""
+    config = {**manifest.config, "frame": {**manifest.config["frame"], "instances": 0}}
+    return DeviceScene.of(described, replace(manifest, config=config))
+
+
+def picture(prepared: DeviceScene, manifest: Manifest) -> Floats:
+    frame = render_model(manifest, prepared.image, prepared.registers(SIZE))
+    assert frame.is_object.mean() > 0.05 and not frame.errors
+    return encode_srgb(frame.colour / 4095.0)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_instances_show_what_one_mesh_shows(count: int, manifest: Manifest) -> None:
+    described = scene(*OBJECTS[:count])
+    instances, one = DeviceScene.of(described, manifest), joined(described, manifest)
+    assert len(instances.image.header.instances) == count and not one.image.header.instances
+    found, expected = picture(instances, manifest), picture(one, manifest)
+    assert psnr(expected, found) >= 40.0
+    turned = DeviceScene.of(scene(*OBJECTS[:count][::-1]), manifest)
+    assert psnr(picture(turned, manifest), found) >= 40.0
+
+
+def test_a_mesh_of_several_objects_is_packed_once(manifest: Manifest) -> None:
+    first, _, third = DeviceScene.of(scene(*OBJECTS), manifest).image.header.instances
+    assert (first.root, third.root) == (0, 0)
+    assert first.material_base != third.material_base
+    glass = replace(OBJECTS[2], material=Material(kind="glass"))  # another bit in its leaves
+    first, other = DeviceScene.of(scene(OBJECTS[0], glass), manifest).image.header.instances
+    assert first.root != other.root
+
+
+def test_an_object_moves_without_packing(manifest: Manifest) -> None:
+    place = Transform((20.0, 0.0, 10.0), 1.1, (1.5, 0.8, -0.6))
+    before = DeviceScene.of(scene(*OBJECTS), manifest)
+    moved = before.with_transform(2, place)
+    packed = DeviceScene.of(scene(OBJECTS[0], replace(OBJECTS[1], transform=place), OBJECTS[2]), manifest)
+    assert moved.image.records is before.image.records
+    np.testing.assert_array_equal(moved.image.records, packed.image.records)
+    assert moved.registers(SIZE) == packed.registers(SIZE)
+    assert psnr(picture(before, manifest), picture(moved, manifest)) < 35.0
+    assert moved.mesh is not None and packed.mesh is not None
+    np.testing.assert_array_equal(moved.mesh.corner_normals, packed.mesh.corner_normals)
+    assert moved.image.header.parts[1].edge == pytest.approx(packed.image.header.parts[1].edge)
+
+
+def test_faces_are_those_of_the_object_that_is_hit(manifest: Manifest) -> None:
+    prepared = DeviceScene.of(scene(*OBJECTS), manifest)
+    view, mesh = prepared.view(SIZE), prepared.mesh
+    assert mesh is not None
+    frame = render_model(manifest, prepared.image, prepared.registers(SIZE))
+    x, y = np.arange(SIZE[0])[None, :, None], np.arange(SIZE[1])[:, None, None]
+    rays = view.direction + x * view.step_x + y * view.step_y
+    depth = frame.distance / (prepared.image.header.frame.scale * np.abs(rays).max(axis=2))
+    positions = view.origin + depth[..., None] * rays
+    faces = hit_faces(prepared.image, mesh, np.where(frame.is_object, frame.triangle, -1), positions)
+    assert ((faces >= 0) == frame.is_object).all()
+    starts = [part.first_face for part in mesh.parts]
+    for number, transform in enumerate(one.transform for one in OBJECTS):
+        mine = (np.searchsorted(starts, faces, side="right") - 1 == number) & (faces >= 0)
+        assert mine.sum() > 50
+        if number != 1:  # a sphere
+            radii = np.linalg.norm(positions[mine] - np.array(transform.translate), axis=1)
+            assert np.ptp(radii) < 0.1 * transform.scale
+
+
+def test_more_objects_than_instances_are_one_mesh(manifest: Manifest) -> None:
+    many = DeviceScene.of(
+        scene(*OBJECTS, replace(OBJECTS[0], transform=Transform(translate=(0.0, -2.0, 0.0)))), manifest
+    )
+    assert not many.image.header.instances
+    with pytest.raises(UserError, match=r"raise frame\.instances"):
+        many.with_transform(1, Transform())
+    with pytest.raises(UserError, match="there is no object 4"):
+        DeviceScene.of(scene(*OBJECTS), manifest).with_transform(4, Transform())
+
+
+def test_an_image_file_keeps_its_instances(tmp_path: Path, manifest: Manifest) -> None:
+    image = DeviceScene.of(scene(*OBJECTS), manifest).image
+    assert SceneImage.load(image.save(tmp_path), manifest).header.instances == image.header.instances
