@@ -1,94 +1,62 @@
-/* Refits by the unit of the shell against shell.c: registers, waits, and what the driver refuses.
- * Prints nothing and returns 0, or the line that failed. */
-#include "check.h"
+/* Plans and refits of meshes for the spec of the unit. Input, numbers: those of a mesh, as below; the places of all fields; four
+ * vertices of each leaf; five numbers of each vertex; the words of each record. Output: entries of the plan and its words; flat
+ * pairs, bounds; the words of each record. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+
 #include "colonnade_mesh.h"
-#include "shell.h"
 
-enum { HAS_REFIT = COLONNADE_SHELL__CAPABILITIES__REFIT_bm, RESETTING = 8 };
-
-static const struct colonnade_design design = {.device_end = DEVICE_BASE + 4};
-static struct shell shell;
-static uint32_t polls, ends_after, errors;
-
-/* The unit ends after so many reads of its status. */
-static uint32_t poll(void *context, uint32_t address) {
-    if (address == 4 * AT(refit_status) && shell.registers[AT(refit_status)] != 0 && polls++ == ends_after) {
-        shell.registers[AT(refit_status)] = 0;
-        shell.registers[AT(refit_errors)] = errors;
-    }
-    return shell_read(context, address);
+static int64_t number(void) {
+    int64_t value;
+    if (scanf("%" SCNd64, &value) != 1) exit(1);
+    return value;
 }
 
-static enum colonnade_error refit(struct colonnade *device, const struct colonnade_refit_job *job, uint32_t attempts,
-                                  struct colonnade_refit *result) {
-    polls = 0;
-    const enum colonnade_error error = colonnade_refit_start(device, job);
-    return error != COLONNADE_OK ? error : colonnade_refit_wait(device, attempts, result);
+static void *space(size_t count, size_t size) {
+    void *found = calloc(count + 1, size);
+    if (found == NULL) exit(1);
+    return found;
+}
+
+static void print(const uint32_t *words, size_t count) {
+    for (size_t i = 0; i < count; ++i) printf("%" PRIu32 " ", words[i]);
 }
 
 int main(void) {
-    const struct colonnade_bus bus = {poll, shell_write, NULL, &shell};
-    const struct colonnade_refit_job job = {0x1234567840, 0x8080, 0x9020, 5, 9, 7, 3};
-    struct colonnade_refit result = {.cost = 77};
-    struct colonnade device;
-    shell = shell_of(&design, 3);
-    CHECK(colonnade_probe(&device, &bus, &design) == COLONNADE_OK);
-
-    /* A shell without the unit */
-    CHECK(colonnade_refit_start(&device, &job) == COLONNADE_NO_REFIT && shell.writes == 0);
-    CHECK(colonnade_refit_wait(&device, 1, &result) == COLONNADE_NO_REFIT && result.cost == 77);
-    shell.registers[AT(capabilities)] = HAS_REFIT;
-    CHECK(colonnade_probe(&device, &bus, &design) == COLONNADE_OK);
-
-    /* Refused, without a write */
-    static const struct {
-        struct colonnade_refit_job job;
-        enum colonnade_error error;
-    } wrong[] = {
-        {{0x20, 0x8080, 0x9020, 5, 9, 7, 3}, COLONNADE_MISALIGNED},
-        {{0x40, 0x8090, 0x9020, 5, 9, 7, 3}, COLONNADE_MISALIGNED},
-        {{0x40, 0x8080, 0x9010, 5, 9, 7, 3}, COLONNADE_MISALIGNED},
-        {{(uint64_t)1 << 40, 0x8080, 0x9020, 5, 9, 7, 3}, COLONNADE_TOO_LARGE},
-        {{0x40, 0x8080, (uint64_t)1 << 40, 5, 9, 7, 3}, COLONNADE_TOO_LARGE},
-        {{0x40, 0x8080, 0x9020, 1 << 24, 9, 7, 3}, COLONNADE_TOO_LARGE},
-        {{0x40, 0x8080, 0x9020, 5, 1 << 26, 7, 3}, COLONNADE_TOO_LARGE},
-        {{0x40, 0x8080, 0x9020, 5, 9, 1 << 24, 3}, COLONNADE_TOO_LARGE},
-        {{0x40, 0x8080, 0x9020, 5, 9, 7, 1 << 24}, COLONNADE_TOO_LARGE},
-    };
-    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i)
-        CHECK(colonnade_refit_start(&device, &wrong[i].job) == wrong[i].error && shell.writes == 0);
-    shell.registers[AT(status)] = RESETTING;
-    CHECK(colonnade_refit_start(&device, &job) == COLONNADE_BUSY && shell.writes == 0);
-    shell.registers[AT(status)] = 1; /* a frame runs */
-
-    /* One that ends */
-    shell.registers[AT(refit_bounds_0)] = 11;
-    shell.registers[AT(refit_bounds_0) + 5] = 65535;
-    shell.registers[AT(refit_flatPairs)] = 4;
-    ends_after = 3;
-    CHECK(refit(&device, &job, 3, &result) == COLONNADE_OK);
-    CHECK(result.low[0] == 11 && result.high[2] == 65535 && result.flat_pairs == 4 && result.cost == 0);
-    const uint32_t *registers = shell.registers;
-    CHECK(registers[AT(refit_plan_low)] == 0x34567840 && registers[AT(refit_plan_high)] == 0x12);
-    CHECK(registers[AT(refit_vertices_low)] == 0x8080 && registers[AT(refit_records_low)] == 0x9020);
-    CHECK(registers[AT(refit_entries)] == 5 && registers[AT(refit_lines)] == 3);
-    CHECK(registers[AT(refit_count)] == 7 && registers[AT(refit_root)] == 3);
-
-    /* One that does not end in time, and what comes meanwhile and after */
-    CHECK(refit(&device, &job, 2, &result) == COLONNADE_TIMEOUT);
-    const uint32_t writes = shell.writes;
-    ends_after = UINT32_MAX;
-    CHECK(colonnade_refit_start(&device, &job) == COLONNADE_BUSY && shell.writes == writes);
-    ends_after = polls;
-    CHECK(colonnade_refit_wait(&device, 1, &result) == COLONNADE_OK);
-
-    /* Errors of the unit leave the result */
-    static const enum colonnade_error found[] = {COLONNADE_MISALIGNED, COLONNADE_BUS_RESPONSE, COLONNADE_OTHER_RECORDS};
-    for (size_t i = 0; i < 3; ++i) {
-        ends_after = 0;
-        errors = 1u << i;
-        result.cost = 77;
-        CHECK(refit(&device, &job, 1, &result) == found[i] && result.cost == 77);
+    struct colonnade_mesh mesh = {0};
+    int32_t *const bits[] = {&mesh.vertex_bits, &mesh.delta_bits, &mesh.box_bits, &mesh.address_bits};
+    uint32_t *const counts[] = {&mesh.leaf_records, &mesh.records, &mesh.depth, &mesh.vertices, &mesh.leaves};
+    for (size_t i = 0; i < 4; ++i) *bits[i] = (int32_t)number();
+    for (size_t i = 0; i < 5; ++i) *counts[i] = (uint32_t)number();
+    const uint32_t root = (uint32_t)number();
+    for (size_t i = 0; i < COLONNADE_MESH_FIELDS; ++i) mesh.fields[i] = (uint8_t)number();
+    uint8_t *leaves = space(mesh.leaves, 16);
+    for (size_t i = 0; i < 4 * (size_t)mesh.leaves; ++i) {
+        const uint32_t vertex = (uint32_t)number();
+        for (size_t byte = 0; byte < 4; ++byte) leaves[4 * i + byte] = (uint8_t)(vertex >> (8 * byte));
     }
+    mesh.leaf_words = leaves;
+    struct colonnade_vertex *vertices = space(mesh.vertices, sizeof *vertices);
+    for (size_t i = 0; i < mesh.vertices; ++i) {
+        for (size_t axis = 0; axis < 3; ++axis) vertices[i].position[axis] = (int32_t)number();
+        for (size_t k = 0; k < 2; ++k) vertices[i].normal[k] = (int16_t)number();
+    }
+    uint32_t *records = space(mesh.records, 32);
+    for (size_t i = 0; i < 8 * (size_t)mesh.records; ++i) records[i] = (uint32_t)number();
+
+    struct colonnade_mesh_node *path = space(mesh.depth, sizeof *path);
+    uint32_t *lines = space(mesh.vertices, sizeof *lines), entries;
+    if (colonnade_mesh_plan(&mesh, records, root, path, lines, NULL, &entries) != COLONNADE_OK) return 1;
+    uint32_t *plan = space(entries, 16);
+    if (colonnade_mesh_plan(&mesh, records, root, path, lines, plan, &entries) != COLONNADE_OK) return 1;
+    struct colonnade_refit result;
+    if (colonnade_mesh_refit(&mesh, vertices, records, root, path, &result) != COLONNADE_OK) return 1;
+    printf("%" PRIu32 " ", entries);
+    print(plan, COLONNADE_PLAN_WORDS * (size_t)entries);
+    printf("%" PRIu32 " ", result.flat_pairs);
+    for (int axis = 0; axis < 3; ++axis) printf("%" PRId32 " ", result.low[axis]);
+    for (int axis = 0; axis < 3; ++axis) printf("%" PRId32 " ", result.high[axis]);
+    print(records, 8 * (size_t)mesh.records);
     return 0;
 }

@@ -94,7 +94,7 @@ def test_a_wait_by_interrupts_enables_its_events_and_leaves_the_others_as_they_w
 
 
 def test_a_refit_by_the_unit_is_refused_or_waited_for() -> None:
-    run_silently(compile_test("refit", "shell"))
+    run_silently(compile_test("refit_unit", "shell"))
 
 
 def test_batches_take_the_places_of_their_ring_in_turn() -> None:
