@@ -154,7 +154,7 @@ CASES |= {
         f"{X} --mesh cube", "has 1 [[object]]", {"x.toml": '[[object]]\nmesh.name = "cube"\n'}
     ),
     "objects-and-frames": Case(
-        f"{X} --frames 2", "stand still: give motion.light", {"x.toml": '[[object]]\nmesh.name = "cube"\n'}
+        f"{X} --frames 2", "stand still: give object.motion", {"x.toml": '[[object]]\nmesh.name = "cube"\n'}
     ),
     "nan-ior": Case(X, "material.ior", scene('[material]\nkind = "glass"\nior = nan\n')),
     "zero-width": Case(X, "frame.width", scene("[frame]\nwidth = 0\n")),

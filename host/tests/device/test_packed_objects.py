@@ -16,6 +16,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
 from colonnade.quality.image_metrics import psnr
+from colonnade.registers.instances import MATRIX_BITS, NORMAL_FRACTION
 from colonnade.render.hit_faces import hit_faces
 from colonnade.scene.model import Camera, Material, MeshSource, Scene, SceneObject, Transform
 from colonnade.scene_image.file import SceneImage
@@ -53,6 +54,11 @@ def picture(prepared: DeviceScene, manifest: Manifest) -> Floats:
     frame = render_model(manifest, prepared.image, prepared.registers(SIZE))
     assert frame.is_object.mean() > 0.05 and not frame.errors
     return encode_srgb(frame.colour / 4095.0)
+
+
+def test_registers_of_instances_are_as_wide_as_the_design_says(manifest: Manifest) -> None:
+    assert manifest.registers["instances[0].matrix[0].x"].width == MATRIX_BITS
+    assert manifest.registers["instances[0].normal[0].x"].width == NORMAL_FRACTION + 2
 
 
 @pytest.mark.parametrize("count", [2, 3])

@@ -57,5 +57,8 @@ class InstanceTransformSpec extends AnyFlatSpec with ChiselScalatestTester with 
               Seq(expected.limit, expected.mantissa, expected.exponent, BigInt(each.transform.shift))
             Seq("request.context", "request.isShadow").map(ray(_)) shouldBe Seq(BigInt(i % 5), BigInt(i % 2))
           }
+        val interval = PackedStreams.run(dut, payloads)._2 / payloads.size
+        info(s"$interval cycles a ray")
+        interval should be <= 30
       }
 }

@@ -42,6 +42,9 @@ class WorldDistanceSpec extends AnyFlatSpec with ChiselScalatestTester with Matc
         val (found, _) = PackedStreams.run(dut, payloads, 0.5, 0.4, random)
         for ((t, (each, expected)) <- found.zip(entered))
           withClue(s"$each: ")(t shouldBe expected.entry.get._2)
+        val interval = PackedStreams.run(dut, payloads)._2 / payloads.size
+        info(s"$interval cycles a hit")
+        interval should be <= 23
         found.size should be > 300
         found.distinct.size should be > 200
       }
