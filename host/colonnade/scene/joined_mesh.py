@@ -155,7 +155,7 @@ def with_transform(mesh: Mesh, number: int, transform: Transform) -> Mesh:
     vertices[first_vertex : first_vertex + len(moved.vertices)] = pose.to_world(moved.vertices)
     turned = fixed_order.product(moved.corner_normals, pose.rotation.T)
     normals[first_face : first_face + len(moved.faces)] = turned
-    stretch = pose.scale / float(np.cbrt(np.linalg.det(moved.transform[:3, :3])))
+    stretch = pose.scale / float(np.linalg.norm(moved.transform[:3, 0], axis=0))
     part = replace(mesh.parts[number], edge=mesh.parts[number].edge * stretch)
     objects, parts = list(mesh.objects), list(mesh.parts)
     objects[number], parts[number] = replace(moved, transform=pose.matrix), part

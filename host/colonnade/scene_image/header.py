@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.mesh.materials.mesh import Extent, MeshPart
@@ -79,7 +80,8 @@ class Instance:
         """The corners of the mesh's box in the world, float64 [8, 3]."""
         low, high, matrix = self.bounds_low, self.bounds_high, np.array(self.transform)
         units = np.array([[(low, high)[i >> a & 1][a] for a in range(3)] for i in range(8)], float)
-        return np.asarray((units / self.frame.scale + np.array(self.frame.offset)) @ matrix[:3, :3].T + matrix[:3, 3])
+        own = units / self.frame.scale + np.array(self.frame.offset)
+        return np.asarray(fixed_order.product(own, matrix[:3, :3].T) + matrix[:3, 3])
 
 
 @dataclass(frozen=True)

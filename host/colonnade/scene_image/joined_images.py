@@ -47,7 +47,7 @@ def _moved(image: SceneImage, base: int, manifest: Manifest) -> Bytes:
     offset, width, _ = field_places(manifest.layouts)["node"]["first"]
     bits = np.unpackbits(image.records[is_node], axis=1, bitorder="little")
     places = np.arange(width)
-    first = bits[:, offset + places].astype(np.int64) @ (np.int64(1) << places)
+    first = (bits[:, offset + places].astype(np.int64) << places).sum(axis=1)
     bits[:, offset + places] = (first + base)[:, None] >> places & 1
     records = image.records.copy()
     records[is_node] = np.packbits(bits, axis=1, bitorder="little")

@@ -122,8 +122,8 @@ def test_one_frame_is_the_plain_one(folder: Path) -> None:
 
 def test_the_scene_is_packed_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     packed: list[object] = []
-    whole = device_scene.pack
-    monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given) or whole(*given))
+    whole = device_scene.pack_objects
+    monkeypatch.setattr(device_scene, "pack_objects", lambda *given: packed.append(given) or whole(*given))
     assert len(list(render_frames(RenderRequest(scene_file(folder, ALONE), "tiny", (), "model", SIZE, 5)))) == 5
     assert len(packed) == 1
 

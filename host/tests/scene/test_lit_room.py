@@ -173,8 +173,8 @@ def test_a_photo_that_is_brighter_than_its_lights_is_as_bright_in_what_gathers(f
 def test_corners_of_faces_are_packed_darker_by_the_headroom(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "scene.toml").write_text(MIRROR.replace("mirror", "diffuse") + LAMP)
     packed: list[object] = []
-    whole = device_scene.pack
-    monkeypatch.setattr(device_scene, "pack", lambda *given: packed.append(given[3]) or whole(*given))
+    whole = device_scene.pack_objects
+    monkeypatch.setattr(device_scene, "pack_objects", lambda *given: packed.append(given[3]) or whole(*given))
     prepared = DeviceScene.of(load_scene(folder / "scene.toml"), manifest_for("small", SMALL_MAPS).manifest)
     assert packed == [prepared.scene.headroom] and prepared.scene.headroom > 1
 
