@@ -229,8 +229,7 @@ const char *colonnade_error_name(enum colonnade_error error) {
         "ok",         "noDevice",    "unknownVersion", "otherFormat", "notAnImage",   "notAFrame", "truncated",   "tooLarge",
         "misaligned", "badRegister", "badFormat",      "noFrame",     "busy",         "timeout",   "busResponse", "badSection",
         "badLength",  "noPhoto",     "frameInvalid",   "noScene",     "notAView",     "badPose",   "badLens",     "tooFar",
-        "noLight",    "noSample",    "notAClip",       "outside",     "otherRecords", "tooDeep",   "noRays",
-        "noRefit",
+        "noLight",    "noSample",    "notAClip",       "outside",     "otherRecords", "tooDeep",   "noRays",      "noRefit",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }

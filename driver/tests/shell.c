@@ -187,8 +187,7 @@ void shell_write(void *context, uint32_t address, uint32_t value) {
         require_no_refit(shell, address, value);
         shell->registers[AT(refit_status)] = value;
         shell->registers[AT(refit_errors)] = 0;
-    }
-    else if (address == 4 * AT(interrupt_status)) shell->registers[address / 4] &= ~value;
+    } else if (address == 4 * AT(interrupt_status)) shell->registers[address / 4] &= ~value;
     else if (address == 4 * AT(interrupt_test)) shell->registers[AT(interrupt_status)] |= value;
     else shell->registers[address / 4] = value;
 }

@@ -209,9 +209,10 @@ void bind_model(nb::module_& module) {
             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
         .def("trace", &Model::trace, "origins"_a, "directions"_a,
              "Packed ids of the closest hits, int64 [n], -1 for a miss. Origins and directions: int64 [n, 3], grid steps.")
-        .def("nearest", &Model::nearest, "origins"_a, "directions"_a,
-             "The same hits as `trace`: triangle (packed id) and instance int64 [n], -1 for a miss; distance int64 [n] along the dominant axis, grid steps; start int64 [n, 3], "
-             "where rays from the hit begin, grid steps; normal int64 [n, 3], geometric, against the ray, 11 fraction bits.")
+        .def(
+            "nearest", &Model::nearest, "origins"_a, "directions"_a,
+            "The same hits as `trace`: triangle (packed id) and instance int64 [n], -1 for a miss; distance int64 [n] along the dominant axis, grid steps; start int64 [n, 3], "
+            "where rays from the hit begin, grid steps; normal int64 [n, 3], geometric, against the ray, 11 fraction bits.")
         .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a, "high"_a,
              "Tests each ray against one box (planes corner + (low << exponent), corner + (high << exponent), vertex units). Returns enters (the object's box), is_hit, "
              "and the prepared ray in its permuted frame: heading int64 [n, 4] (axis, three signs), origin int64 [n, 3], shear int64 [n, 2].")

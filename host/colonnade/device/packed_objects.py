@@ -55,7 +55,8 @@ def placed_image(image: SceneImage, mesh: Mesh, manifest: Manifest) -> SceneImag
 
 def _parts(mesh: Mesh, materials: Sequence[MeshMaterial]) -> list[Mesh]:
     """The objects in their own spaces, each with the materials of its faces alone."""
-    parts, first = [], 0
+    parts: list[Mesh] = []
+    first = 0
     for one in mesh.objects:
         own = np.s_[first : first + len(one.faces)]
         used, index = np.unique(mesh.face_materials[own], return_inverse=True)

@@ -81,8 +81,7 @@ inline Vector toWorld(const Vector& normal, const Instance& instance, const Numb
     const Wide longest = (Wide(1) << n.normalFraction) - 1;
     const WideVector wide = {normal[0], normal[1], normal[2]};
     Vector rotated;
-    for (int a = 0; a < 3; ++a)
-        rotated[a] = static_cast<std::int64_t>(clamp(nearestEven<Wide>(product(instance.normal[a], wide), normalFraction), -longest, longest));
+    for (int a = 0; a < 3; ++a) rotated[a] = static_cast<std::int64_t>(clamp(nearestEven<Wide>(product(instance.normal[a], wide), normalFraction), -longest, longest));
     return rotated;
 }
 
