@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
 from colonnade.maps.encoders import Encoder
@@ -30,13 +31,16 @@ def pack_objects(
 ) -> SceneImage:
     """Pack a mesh, or the objects of a joined mesh as instances if the design and its tables can hold them so.
 
-    Objects of equal records share them. One mesh holds: more objects than `frame.instances`, animations, textures, and
-    objects too small for a transform. Arguments and errors are those of `pack`.
+    Objects of equal records share them. One mesh holds, and a note says: more objects than `frame.instances`,
+    animations, textures, and objects too small for a transform. Arguments and errors are those of `pack`.
     """
-    if 0 < len(mesh.objects) <= int(manifest.config["frame"].get("instances", 0)) and not (mesh.clip or mesh.textures):
-        own = [pack(part, manifest, part.materials, headroom, encoder, children) for part in _parts(mesh, materials)]
-        if (image := _joined(own, mesh, manifest)) is not None:
-            return image
+    if mesh.objects and (most := int(manifest.config["frame"].get("instances", 0))):
+        try:
+            _check(mesh, most)
+            own = [pack(part, manifest, part.materials, headroom, encoder, children) for part in _parts(mesh, materials)]
+            return _joined(own, mesh, manifest)
+        except _OneMesh as reason:
+            notes.tell(f"the objects are packed as one mesh: {reason}")
     return pack(mesh, manifest, materials, headroom, encoder, children)
 
 
@@ -80,15 +84,32 @@ def _parts(mesh: Mesh, materials: Sequence[MeshMaterial]) -> list[Mesh]:
     return parts
 
 
-def _joined(own: Sequence[SceneImage], mesh: Mesh, manifest: Manifest) -> SceneImage | None:
-    """The image of all objects; None if they need more materials, only some have colours, or one is too small."""
+class _OneMesh(Exception):
+    """Why one mesh holds the objects."""
+
+
+def _check(mesh: Mesh, most: int) -> None:
+    """Refuse objects that are no instances of a design with `most`."""
+    if len(mesh.objects) > most:
+        raise _OneMesh(f"they are {len(mesh.objects)}, frame.instances is {most}")
+    if mesh.clip or mesh.textures:
+        raise _OneMesh("an instance is neither animated nor textured")
+
+
+def _joined(own: Sequence[SceneImage], mesh: Mesh, manifest: Manifest) -> SceneImage:
+    """The image of all objects.
+
+    Raises:
+        _OneMesh: They need more materials, only some have colours, or one is too small.
+    """
     keys = [image.records.tobytes() for image in own]
     tables = list(dict.fromkeys(image.header.materials for image in own))
     bases = dict(zip(tables, np.cumsum([0, *map(len, tables)]).tolist(), strict=False))
-    if sum(map(len, tables)) > int(manifest.config["frame"]["materials"]):
-        return None
+    count, most = sum(map(len, tables)), int(manifest.config["frame"]["materials"])
+    if count > most:
+        raise _OneMesh(f"they have {count} materials, frame.materials is {most}")
     if len({image.header.has_colours for image in own}) > 1:
-        return None
+        raise _OneMesh("only some have corner colours")
     images = [own[keys.index(key)] for key in dict.fromkeys(keys)]
     records, roots = joined_records(images, manifest)
     root_of = dict(zip(dict.fromkeys(keys), roots, strict=True))
@@ -111,8 +132,8 @@ def _joined(own: Sequence[SceneImage], mesh: Mesh, manifest: Manifest) -> SceneI
     )
     try:
         header = _placed(header, instances, mesh, manifest)
-    except UserError:  # one mesh holds what transforms cannot
-        return None
+    except UserError as error:
+        raise _OneMesh(str(error)) from None
     return replace(
         images[0], header=header, records=records, source_faces=np.concatenate([one.source_faces for one in images])
     )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.registers.surface_offset import surface_offset
 from colonnade.scene_image.header import Instance, ObjectFrame
@@ -46,26 +48,26 @@ def _placed(
     """Registers of an instance, and the least offset from its surface, grid steps of the world."""
     transform = np.array(instance.transform)
     frame, linear = instance.frame, transform[:3, :3]
-    stretches = np.linalg.svd(linear, compute_uv=False)
-    if not stretches[-1] > 1e-4 * stretches[0]:
+    largest, _, least = fixed_order.stretches(linear)
+    if not least > 1e-4 * largest:
         raise UserError(f"object {number + 1} is flat: its transform must not scale an axis to nothing")
-    inverse = np.linalg.inv(linear)
+    inverse = fixed_order.inverse(linear)
     matrix = frame.scale / world.scale * inverse
-    shift = MATRIX_BITS - 2 - int(np.floor(np.log2(np.abs(matrix).max())))
+    shift = MATRIX_BITS - 1 - math.frexp(np.abs(matrix).max())[1]
     # A ray starts in the reach of the world's cube, and must do so in the object's scene
-    reach = 1.5 * np.sqrt(3) * (1 << numbers["vertexBits"]) * np.linalg.svd(matrix, compute_uv=False)[0]
+    reach = 1.5 * np.sqrt(3) * (1 << numbers["vertexBits"]) * frame.scale / world.scale / least
     if not (1 <= shift < 64 and reach * 2.0 ** numbers["gridFraction"] < 1 << (numbers["sceneBits"] - 1)):
         raise UserError(f"object {number + 1} is too small for the scene: make it larger, or the scene smaller")
-    largest = (1 << (MATRIX_BITS - 1)) - 1
+    limit = (1 << (MATRIX_BITS - 1)) - 1
     steps = world.scale * 2.0 ** numbers["gridFraction"]
-    corner = (linear @ np.array(frame.offset) + transform[:3, 3] - np.array(world.offset)) * steps
-    normal = inverse.T * stretches[-1]
+    corner = (fixed_order.product(linear, np.array(frame.offset)) + transform[:3, 3] - np.array(world.offset)) * steps
+    normal = inverse.T * least
     registers = {"shift": shift, "root": instance.root, "materialBase": instance.material_base}
     for a, axis in enumerate(AXES):
         registers[f"origin.{axis}"] = int(np.rint(corner[a]))
         for b, column in enumerate(AXES):
-            registers[f"matrix[{a}].{column}"] = int(np.clip(np.rint(np.ldexp(matrix[a, b], shift)), -largest, largest))
+            registers[f"matrix[{a}].{column}"] = int(np.clip(np.rint(np.ldexp(matrix[a, b], shift)), -limit, limit))
             registers[f"normal[{a}].{column}"] = int(np.rint(np.ldexp(normal[a, b], NORMAL_FRACTION)))
     own = surface_offset(numbers, instance.largest_triangle) + OBJECT_STEPS
-    least = (own * stretches[0] * world.scale / frame.scale + WORLD_STEPS) * stretches[0] / stretches[-1]
-    return registers, int(np.ceil(least))
+    offset = (own * largest * world.scale / frame.scale + WORLD_STEPS) * largest / least
+    return registers, math.ceil(offset)

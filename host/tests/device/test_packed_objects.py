@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
 from colonnade.common.types import Floats
@@ -18,7 +19,7 @@ from colonnade.device.scene import DeviceScene
 from colonnade.quality.image_metrics import psnr
 from colonnade.registers.instances import MATRIX_BITS, NORMAL_FRACTION
 from colonnade.render.hit_faces import hit_faces
-from colonnade.scene.model import Camera, Material, MeshSource, Scene, SceneObject, Transform
+from colonnade.scene.model import Camera, Material, MeshSource, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene_image.file import SceneImage
 
 SIZE = (120, 90)
@@ -115,15 +116,37 @@ def test_faces_are_those_of_the_object_that_is_hit(manifest: Manifest) -> None:
             assert np.ptp(radii) < 0.1 * transform.scale
 
 
-def test_more_objects_than_instances_are_one_mesh(manifest: Manifest) -> None:
-    many = DeviceScene.of(
-        scene(*OBJECTS, replace(OBJECTS[0], transform=Transform(translate=(0.0, -2.0, 0.0)))), manifest
-    )
+def with_notes(described: Scene, manifest: Manifest) -> tuple[DeviceScene, list[str]]:
+    lines: list[str] = []
+    with notes.opened(lines.append):
+        return DeviceScene.of(described, manifest), lines
+
+
+def test_more_objects_than_instances_are_one_mesh_by_a_note(manifest: Manifest) -> None:
+    fourth = replace(OBJECTS[0], transform=Transform(translate=(0.0, -2.0, 0.0)))
+    many, lines = with_notes(scene(*OBJECTS, fourth), manifest)
     assert not many.image.header.instances
+    assert lines == ["the objects are packed as one mesh: they are 4, frame.instances is 3"]
+    assert not with_notes(scene(*OBJECTS), manifest)[1]
     with pytest.raises(UserError, match=r"raise frame\.instances"):
         many.with_transform(1, Transform())
     with pytest.raises(UserError, match="there is no object 4"):
         DeviceScene.of(scene(*OBJECTS), manifest).with_transform(4, Transform())
+
+
+@pytest.mark.parametrize(
+    ("second", "reason"),
+    [
+        (replace(OBJECTS[1], transform=Transform(scale=1e-6)), "object 2 is too small for the scene"),
+        (replace(OBJECTS[1], motion=(ObjectKey(turn=90.0),)), "an instance is neither animated"),
+    ],
+)
+def test_objects_that_no_transform_holds_are_one_mesh_by_a_note(
+    second: SceneObject, reason: str, manifest: Manifest
+) -> None:
+    prepared, lines = with_notes(scene(OBJECTS[0], second), manifest)
+    assert not prepared.image.header.instances
+    assert [reason in line for line in lines if "one mesh" in line] == [True]
 
 
 def test_an_image_file_keeps_its_instances(tmp_path: Path, manifest: Manifest) -> None:
