@@ -11,6 +11,9 @@ const picture = canvas.getContext("2d");
 let state = null;
 /** The camera that was moved, or null: that of the file. */
 let camera = null;
+/** The moment of the motion that is shown, 0 to 1, or null: its start; and when the motion began, while it plays. */
+let at = null;
+let began = null;
 let isWanted = false;
 let isBusy = false;
 /** The wait for a camera that rests, milliseconds, and its timer. */
@@ -80,11 +83,13 @@ async function draw() {
   if (isBusy) return;
   isBusy = true;
   try {
-    while (isWanted) {
+    while (isWanted || began !== null) {
       isWanted = false;
+      if (began !== null) at = ((performance.now() - began) / 1000 / state.seconds) % 1;
       await frame();
     }
   } catch (error) {
+    pause();
     fail(`the server does not answer: ${error.message}`);
   } finally {
     isBusy = false;
@@ -101,9 +106,12 @@ async function accumulate(before = 0) {
 
 /** Shows a picture, of the first sample or of those so far; returns its figures, or nothing if it came too late. */
 async function frame(isStill = false) {
-  const address = new URLSearchParams({ ...(camera && { camera: [...camera.position, ...camera.target].join() }), ...(isStill && { still: "1" }) });
+  const address = new URLSearchParams({ ...(camera && { camera: [...camera.position, ...camera.target].join() }), ...(at !== null && { at }), ...(isStill && { still: "1" }) });
   const response = await fetch(`frame?${address}`);
-  if (!response.ok) return fail(await response.text());
+  if (!response.ok) {
+    pause();
+    return fail(await response.text());
+  }
   const figures = JSON.parse(response.headers.get("X-Frame"));
   const { width, height } = figures;
   const pixels = new Uint8ClampedArray(await response.arrayBuffer());
@@ -131,6 +139,7 @@ function showFigures({ width, height, milliseconds, rays, samples, final }) {
     ["frames in the last second", times.length],
     ["time of packing", state && `${state.milliseconds.toFixed(0)} ms`],
     ["camera", position],
+    ...(at === null || !state?.seconds ? [] : [["moment", `${(at * state.seconds).toFixed(2)} of ${state.seconds.toFixed(2)} s`]]),
   ];
   element("figures").tBodies[0].replaceChildren(
     ...rows.map((cells) => {
@@ -153,7 +162,13 @@ const sameCamera = (a, b) => a && JSON.stringify([a.position, a.target]) === JSO
 function receive(now) {
   // A camera of the file that has changed comes before one that was moved
   if (state && !sameCamera(state.camera, now.camera)) camera = null;
+  const isFirst = state === null;
   state = now;
+  if (!state.seconds) {
+    pause();
+    at = null;
+  } else if (isFirst && state.plays) play();
+  element("play").hidden = !state.seconds;
   element("scene").textContent = document.title = now.scene;
   element("notes").replaceChildren(...now.notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
   fail(now.error);
@@ -167,6 +182,23 @@ async function save() {
   element("status").textContent = `The camera is in ${state.scene}.`;
 }
 
+/** Plays the motion from the moment that is shown. */
+function play() {
+  began = performance.now() - 1000 * (at ?? 0) * state.seconds;
+  element("play").textContent = "Pause";
+  draw();
+}
+
+function pause() {
+  began = null;
+  element("play").textContent = "Play";
+}
+
+function toggle() {
+  if (began !== null) pause();
+  else if (state?.seconds) play();
+}
+
 function back() {
   camera = null;
   draw();
@@ -174,10 +206,12 @@ function back() {
 
 element("save").onclick = save;
 element("back").onclick = back;
+element("play").onclick = toggle;
 window.addEventListener("keydown", ({ key, ctrlKey, metaKey }) => {
   if (ctrlKey || metaKey) return;
   if (key === "s") save();
   else if (key === "r") back();
+  else if (key === "p") toggle();
 });
 listen(stage, actions);
 stage.addEventListener("pointerdown", () => (element("hint").hidden = true));

@@ -67,16 +67,17 @@ class _Handler(PrivateHandler):
             self._events()
         elif target == "GET frame":
             fields = parse_qs(query)
-            self._frame(_camera(fields["camera"][0]) if "camera" in fields else None, "still" in fields)
+            camera = _camera(fields["camera"][0]) if "camera" in fields else None
+            self._frame(camera, _moment(fields["at"][0]) if "at" in fields else None, "still" in fields)
         elif target == "POST camera" and self.headers.get_content_type() == "application/json":
             self.server.session.save(_camera(body))
             self.answer(200, b"saved")
         else:
             raise Refused(404, "nothing is here")
 
-    def _frame(self, camera: ViewCamera | None, is_still: bool) -> None:
+    def _frame(self, camera: ViewCamera | None, at: float | None, is_still: bool) -> None:
         session = self.server.session
-        frame = session.still(camera) if is_still else session.frame(camera)
+        frame = session.still(camera, at) if is_still else session.frame(camera, at)
         height, width, _ = frame.pixels.shape
         pixels = np.full((height, width, 4), 255, np.uint8)
         pixels[..., :3] = frame.pixels
@@ -94,6 +95,17 @@ class _Handler(PrivateHandler):
             text = ":\n\n" if state["version"] == version else f"data: {json.dumps(state)}\n\n"
             version = state["version"]
             self.wfile.write(text.encode())
+
+
+def _moment(content: str) -> float:
+    """Progress of a motion."""
+    try:
+        at = float(content)
+    except ValueError:
+        at = -1.0
+    if not 0.0 <= at <= 1.0:
+        raise Refused(400, "the progress of a motion is a number from 0 to 1")
+    return at
 
 
 def _camera(content: str | bytes) -> ViewCamera:

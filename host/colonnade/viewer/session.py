@@ -31,12 +31,15 @@ from colonnade.scene.model.values import WorldVector
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import exposed
 from colonnade.scene.view import place
+from colonnade.scene_image.file import SceneImage
 from colonnade.viewer.camera_table import save_camera
 
 #: Seconds between two looks at the files.
 _INTERVAL = 0.02
 #: Samples a pixel of a camera that rests, unless the scene names several.
 STILL_SAMPLES = 16
+#: Seconds of a motion without an animation.
+MOTION_SECONDS = 6.0
 #: Counters of rays.
 _RAYS = ("raysPrimary", "raysShadow", "raysReflection", "raysRefraction", "raysGather")
 
@@ -77,9 +80,10 @@ class ViewFrame:
 
 @dataclass
 class _Picture:
-    """A picture of a camera: the passes that come, the sums of the others, and what they show."""
+    """A picture of a camera at a moment: the passes that come, the sums of the others, and what they show."""
 
     camera: ViewCamera | None
+    at: float | None
     version: int
     frame: HostFrame
     coming: list[Scene]
@@ -134,6 +138,7 @@ class Session:
         self._rest: _Picture | None = None
         self._history: History | None = None
         self._number = 0
+        self._image: SceneImage | None = None
         self._load()
 
     def state(self, version: int | None = None, timeout: float = 0.0) -> dict[str, Any]:
@@ -148,44 +153,51 @@ class Session:
                 self._changed.wait_for(lambda: self.has_ended or self._state["version"] != version, timeout)
             return self._state | {"error": self._error}
 
-    def frame(self, camera: ViewCamera | None = None) -> ViewFrame:
+    def frame(self, camera: ViewCamera | None = None, at: float | None = None) -> ViewFrame:
         """Render a frame of one sample of the scene that was last right, as `colonnade render --samples 1`.
 
         If noise is filtered, it also has the light of the frames before, as those of a motion have.
 
         Args:
             camera: In place of the scene's own.
+            at: Progress of the scene's motion, 0.0 to 1.0; None: its start.
 
         Raises:
             UserError: The camera is out of the hardware's range.
         """
         with self._rendering:
             self._number += 1
-            return self._next(self._picture(camera, 1, self._history))
+            return self._next(self._picture(camera, at, 1, self._history))
 
-    def still(self, camera: ViewCamera | None = None) -> ViewFrame:
+    def still(self, camera: ViewCamera | None = None, at: float | None = None) -> ViewFrame:
         """Render the next sample of a camera that rests: the picture has one more than that of the last call.
 
-        The last picture is that of `colonnade render` with as many samples; further calls give it again. Another camera
-        or version of the scene begins anew.
+        The last picture is that of `colonnade render` with as many samples; further calls give it again. Another
+        camera, moment or version of the scene begins anew.
 
         Args:
             camera: In place of the scene's own.
+            at: Progress of the scene's motion, 0.0 to 1.0; None: its start.
 
         Raises:
             UserError: The camera is out of the hardware's range.
         """
         with self._rendering:
             rest = self._rest
-            if rest is None or (rest.camera, rest.version) != (camera, self._state["version"]):
-                rest = self._rest = self._picture(camera, self._samples)
+            if rest is None or (rest.camera, rest.at, rest.version) != (camera, at, self._state["version"]):
+                rest = self._rest = self._picture(camera, at, self._samples)
             if rest.last is None or rest.coming:
                 rest.last = self._next(rest)
             return rest.last
 
-    def _picture(self, camera: ViewCamera | None, samples: int, history: History | None = None) -> _Picture:
+    def _picture(
+        self, camera: ViewCamera | None, at: float | None, samples: int, history: History | None = None
+    ) -> _Picture:
         """A picture of so many samples, of which none is rendered."""
         scene = self._scene
+        if at is not None:
+            pose = scene.scene.at(at)
+            scene = replace(scene.lit_at(pose), scene=pose)
         if camera is not None:
             scene = scene.with_camera(_moved(scene.scene.camera, camera))
         scene = replace(scene, scene=scene.scene.with_samples(samples))
@@ -194,11 +206,12 @@ class Session:
         denoise = (scene.scene.frame.denoise or False) if samples > 1 or history is not None else False
         look = self._look if scene.photo is not None else None
         frame = HostFrame(scene, self.size, tuple(passes), denoise=denoise, look=look, history=history)
-        return _Picture(camera, self._state["version"], frame, passes, frame.no_passes())
+        return _Picture(camera, at, self._state["version"], frame, passes, frame.no_passes())
 
     def _next(self, picture: _Picture) -> ViewFrame:
         """Render the next sample of a picture, with the passes of other layers after it."""
         begun, rays, frame, sums = time.perf_counter(), 0, picture.frame, picture.sums
+        self._hold(frame.prepared)
         coming = [one.sample.layer != "surface" for one in picture.coming]
         for _ in range([*coming, False].index(False, 1)):
             one = picture.coming.pop(0)
@@ -211,6 +224,12 @@ class Session:
         pixels = frame.pixels(sums, is_whole=not picture.coming)
         seconds = time.perf_counter() - begun
         return ViewFrame(pixels, picture.version, 1e3 * seconds, rays, sums.sums.samples, self._samples)
+
+    def _hold(self, scene: DeviceScene) -> None:
+        """Load the image of a moment, unless the device has it."""
+        if self._image is not scene.image:
+            self._device.load(scene.image)
+            self._image = scene.image
 
     def save(self, camera: ViewCamera) -> None:
         """Write a camera into the scene file.
@@ -290,7 +309,7 @@ class Session:
         scene.registers(self.size, composited=True)
         packed = time.perf_counter()
         with self._rendering, self._changed:
-            self._device.load(scene.image)
+            self._hold(scene)
             self._scene, self._look, self._samples = scene, look, description.frame.samples or 1
             self._history = History.of(description.frame.denoise or False, STILL_SAMPLES)
             self._state = self._described(scene) | {
@@ -319,6 +338,8 @@ class Session:
             "scene": self.file.name,
             "size": list(self.size),
             "triangles": scene.image.header.triangles,
+            "seconds": None if scene.scene.is_still else _seconds(scene),
+            "plays": scene.scene.is_animated,
             "camera": {
                 "position": tuple(camera.position.tolist()),
                 "target": tuple((camera.position - depth * camera.axes[2]).tolist()),
@@ -326,6 +347,12 @@ class Session:
                 "span": float(np.linalg.norm(camera.step_y)) * self.size[1],
             },
         }
+
+
+def _seconds(scene: DeviceScene) -> float:
+    """Duration of a scene's motion: that of its animation, if it has one."""
+    bending = scene.image.bending
+    return bending.duration / (1 << 16) if scene.scene.has_animation and bending is not None else MOTION_SECONDS
 
 
 def _moved(camera: Camera, to: ViewCamera) -> Camera:

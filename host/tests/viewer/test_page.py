@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.server
+import re
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -70,6 +71,20 @@ def test_the_page_keeps_its_policy_and_saves_its_camera(page: Page, server: View
     page.reload()
     page.wait_for_selector("body[data-frames]")
     assert not complaints
+
+
+def test_a_motion_plays_until_it_is_paused(page: Page, server: ViewServer, file: Path) -> None:
+    file.write_text(file.read_text() + "[motion]\nturn = 90.0\n")
+    page.goto(server.link)
+    page.wait_for_selector("body[data-frames]")
+    expect(page.get_by_text("moment")).to_have_count(0)
+    page.keyboard.press("p")
+    body, above_four = page.locator("body"), re.compile("^([5-9]|[1-9][0-9]+)$")
+    expect(body).to_have_attribute("data-frames", above_four)
+    expect(page.get_by_text("moment")).to_have_count(1)
+    page.get_by_role("button", name="Pause").click()
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    expect(body).to_have_attribute("data-samples", above_four)  # it rests
 
 
 def test_a_page_of_another_site_gets_nothing(

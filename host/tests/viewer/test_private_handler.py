@@ -80,6 +80,9 @@ REFUSED = {
     "markup": (get("").replace("GET", "<script>alert(1)</script>"), 404, "nothing is here"),
     "post-events": (post("").replace("camera", "events"), 404, "nothing is here"),
     "get-camera": (get("camera"), 404, "nothing is here"),
+    "moment-text": (get("frame?at=now"), 400, "a number from 0 to 1"),
+    "moment-nan": (get("frame?at=nan"), 400, "a number from 0 to 1"),
+    "moment-after": (get("frame?at=1.01"), 400, "a number from 0 to 1"),
     # Framing
     "length-negative": (post(CAMERA, "Content-Length: -1"), 400, "Content-Length is no number"),
     "length-text": (post(CAMERA, "Content-Length: abc"), 400, "Content-Length is no number"),
@@ -219,7 +222,7 @@ def test_a_bug_is_one_line(
 ) -> None:
     right = server.session.frame
 
-    def wrong(camera: object) -> None:
+    def wrong(*_: object) -> None:
         raise ZeroDivisionError("of\na test")
 
     monkeypatch.setattr(server.session, "frame", wrong)

@@ -14,7 +14,7 @@ from PIL import Image
 
 import colonnade
 from colonnade.common.errors import UserError
-from colonnade.viewer.session import Session, ViewCamera
+from colonnade.viewer.session import MOTION_SECONDS, Session, ViewCamera
 
 SIZE = (48, 36)
 OBJ = """mtllib m.mtl
@@ -180,4 +180,44 @@ def test_a_moving_camera_keeps_the_light_of_the_frames_before(tmp_path: Path) ->
     )
     after, before = (np.median(np.abs(np.diff(pixels[30:50, 20:60], axis=1))) for pixels in (last, first))
     assert after < 0.4 * before
+    session.close()
+
+
+MOVING = """[[object]]
+mesh = {name = "cube"}
+
+[[object]]
+mesh = {name = "octahedron"}
+transform.translate = [2.0, 0.0, 0.0]
+motion = [{translate = [0.0, 1.0, 0.0], turn = 90.0}]
+
+[camera]
+position = [2.0, 2.0, 6.0]
+target = [1.0, 0.0, 0.0]
+"""
+
+
+@pytest.mark.parametrize("text", [MOVING, 'mesh.name = "octahedron"\nmotion.turn = 90.0\n'])
+def test_a_moment_of_a_motion_is_that_of_render(file: Path, text: str) -> None:
+    file.write_text(text)
+    session = Session(file, "tiny", size=SIZE)
+    expected = [one.pixels for one in colonnade.Scene.load(file).frames(3, config="tiny", size=SIZE, samples=1)]
+    for number in (1, 0, 2, 1):
+        np.testing.assert_array_equal(session.frame(at=number / 2).pixels, expected[number])
+    np.testing.assert_array_equal(session.frame().pixels, expected[0])
+    assert (expected[1] != expected[0]).any()
+    half = session.still(at=0.5)
+    assert session.still(at=0.5).samples == half.samples + 1 and session.still(at=0.6).samples == 1
+    session.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds", "plays"),
+    [(MOVING, MOTION_SECONDS, True), ('mesh.name = "cube"\nmotion.turn = 0.0\n', None, False)],
+)
+def test_the_page_knows_how_long_a_motion_is(file: Path, text: str, seconds: float | None, plays: bool) -> None:
+    file.write_text(text)
+    session = Session(file, "tiny", size=SIZE)
+    state = session.state()
+    assert (state["seconds"], state["plays"]) == (seconds, plays)
     session.close()

@@ -103,10 +103,14 @@ class Scene:
         return replace(self, background=replace(self.background, room=folder))
 
     @property
+    def has_animation(self) -> bool:
+        """Whether a mesh has an animation."""
+        return any(mesh.animation is not None for mesh in (self.mesh, *(one.mesh for one in self.objects)))
+
+    @property
     def is_animated(self) -> bool:
         """Whether a mesh has an animation, or an object a motion of its own."""
-        has_animation = any(mesh.animation is not None for mesh in (self.mesh, *(one.mesh for one in self.objects)))
-        return has_animation or any(one.motion for one in self.objects)
+        return self.has_animation or any(one.motion for one in self.objects)
 
     @property
     def is_still(self) -> bool:
