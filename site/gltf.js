@@ -2,7 +2,7 @@
 // colours and materials. Draco is not read.
 
 import { Corners } from "./corners.js";
-import { DRACO, READ_EXTENSIONS } from "./gltfchecks.js";
+import { DRACO, INSTANCING, READ_EXTENSIONS } from "./gltfchecks.js";
 import { COMPRESSION, GltfDocument, grouped } from "./gltfdocument.js";
 import { GltfMaterials } from "./gltfmaterials.js";
 
@@ -11,6 +11,9 @@ const MOST_TRANSFORM = 1e100;
 /** As host/colonnade/mesh/materials/texture.py. */
 const MOST_UV = 1e6;
 const [POINTS, TRIANGLES, FAN] = [0, 4, 6];
+/** Attributes of a mesh at several places, as host/colonnade/mesh/files/gltf_nodes.py. */
+const OF_COPIES = [["TRANSLATION", [0, 0, 0]], ["ROTATION", [0, 0, 0, 1]], ["SCALE", [1, 1, 1]]];
+const MOST_COPIES = 1 << 16;
 
 /** A mesh, as of readMesh; `files` has the other dropped files by name. */
 export function readGltf(bytes, name, files) {
@@ -41,11 +44,27 @@ function* nodesOf(document) {
   while (pending.length > 0) {
     const { index, parent } = pending.pop();
     const node = document.entry("nodes", index);
-    const matrix = multiply(parent, matrixOf(document, node, index));
-    if (!matrix.every((value) => Math.abs(value) < MOST_TRANSFORM)) throw document.error(`the transform of node ${index} is not finite, or too large: export it again`);
+    const finite = (matrix) => {
+      if (!matrix.every((value) => Math.abs(value) < MOST_TRANSFORM)) throw document.error(`the transform of node ${index} is not finite, or too large: export it again`);
+      return matrix;
+    };
+    const matrix = finite(multiply(parent, matrixOf(document, node, index)));
     for (const child of [...(node.children ?? [])].reverse()) pending.push({ index: child, parent: matrix });
-    if (node.mesh !== undefined) yield { node, matrix };
+    if (node.mesh !== undefined) for (const copy of copiesOf(document, node, index)) yield { node, matrix: copy ? finite(multiply(matrix, copy)) : matrix };
   }
+}
+
+/** Where a node has its mesh: transforms to the node, or null for its own place alone. */
+function copiesOf(document, node, index) {
+  const extension = node.extensions?.[INSTANCING];
+  if (!extension) return [null];
+  const given = Object.fromEntries(OF_COPIES.filter(([name]) => name in (extension.attributes ?? {})).map(([name]) => [name, document.array(extension.attributes[name])]));
+  const count = Object.values(given).reduce((most, array) => Math.max(most, array.count), 0);
+  if (count === 0 || !OF_COPIES.every(([name, { length }]) => !given[name] || (given[name].count === count && given[name].width === length)))
+    throw document.error(`the copies of node ${index} (${INSTANCING}) are not valid: export it again`);
+  if (count > MOST_COPIES) throw document.error(`node ${index} has ${grouped(count)} copies of its mesh: at most ${grouped(MOST_COPIES)} are read`);
+  const part = ([name, otherwise], copy) => (given[name] ? [...given[name].values.subarray(otherwise.length * copy, otherwise.length * (copy + 1))] : otherwise);
+  return Array.from({ length: count }, (_, copy) => composed(...OF_COPIES.map((one) => part(one, copy))));
 }
 
 /** The triangles of a primitive's corners. */
@@ -124,16 +143,19 @@ function matrixOf(document, node, index) {
     return values;
   };
   if (node.matrix !== undefined) return part("matrix", Array(16).fill(0));
-  const rotation = part("rotation", [0, 0, 0, 1]);
+  return composed(part("translation", [0, 0, 0]), part("rotation", [0, 0, 0, 1]), part("scale", [1, 1, 1]));
+}
+
+/** The transform of a rotation, a quaternion of any length, after a scale and before a translation. */
+function composed(translation, rotation, scale) {
   const length = Math.hypot(...rotation) || 1;
   const [x, y, z, w] = rotation.map((value) => value / length);
-  const scale = part("scale", [1, 1, 1]);
   const columns = [
     [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
     [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
     [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
   ];
-  return [...columns.flatMap((column, axis) => [...column.map((value) => value * scale[axis]), 0]), ...part("translation", [0, 0, 0]), 1];
+  return [...columns.flatMap((column, axis) => [...column.map((value) => value * scale[axis]), 0]), ...translation, 1];
 }
 
 const multiply = (a, b) =>

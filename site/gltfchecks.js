@@ -2,11 +2,12 @@
 // materials only the factors are checked.
 
 export const DRACO = "KHR_draco_mesh_compression";
+export const INSTANCING = "EXT_mesh_gpu_instancing";
 /** Extensions that a file may require. */
 export const READ_EXTENSIONS = [
   "KHR_materials_transmission", "KHR_materials_ior", "KHR_materials_emissive_strength", "KHR_materials_pbrSpecularGlossiness", DRACO,
   "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_materials_unlit", "KHR_texture_transform", "KHR_texture_basisu",
-  "EXT_texture_webp", "EXT_texture_avif",
+  INSTANCING, "EXT_texture_webp", "EXT_texture_avif",
 ];
 const [MOST_ELEMENTS, MOST_LEVELS, MOST_DIGITS] = [100_000_000, 64, 40];
 

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+_INSTANCING = "EXT_mesh_gpu_instancing"
+_NO_DATA = {"componentType": 5126, "count": 3, "type": "VEC3"}
 _DATA = POINTS.tobytes() + np.array([0, 1, 2], np.uint16).tobytes()
 
 
@@ -95,6 +97,26 @@ def _sparse(**changes: Any) -> bytes:
     return _accessor(sparse=sparse | {"values": {"bufferView": 0, "byteOffset": 20}} | changes)
 
 
+def _copies(many: int = 0, **arrays: np.ndarray) -> bytes:
+    """The triangle at several places; ``many``: so many copies with a translation of 0."""
+    document = json.loads(_arrays(arrays)) if arrays else gltf(accessors=[], bufferViews=[])
+    accessors, views = document["accessors"], document["bufferViews"]
+    numbers = {name: 2 + number for number, name in enumerate(arrays)}
+    views = [view | {"buffer": 1} for view in views]
+    accessors = [accessor | {"bufferView": 2 + number} for number, accessor in enumerate(accessors)]
+    if many:
+        numbers["TRANSLATION"] = 2 + len(accessors)
+        changes = {"indices": {"bufferView": 1, "componentType": 5123}, "values": {"bufferView": 0}}
+        accessors.append(_NO_DATA | {"count": many, "sparse": changes | {"count": 1}})
+    return _text(
+        nodes=[{"mesh": 0, "translation": [0, 0, 1], "extensions": {_INSTANCING: {"attributes": numbers}}}],
+        accessors=gltf()["accessors"] + accessors,
+        bufferViews=gltf()["bufferViews"] + views,
+        buffers=gltf()["buffers"] + document["buffers"],
+        extensionsRequired=[_INSTANCING],
+    )
+
+
 def _moved(value: float) -> bytes:
     points = POINTS.copy()
     points[1, 0] = value
@@ -108,7 +130,6 @@ def _chain(count: int, children: int) -> list[dict[str, Any]]:
 
 _FOUR = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.float32)
 _MESHOPT = "EXT_meshopt_compression"
-_NO_DATA = {"componentType": 5126, "count": 3, "type": "VEC3"}
 
 #: By name and suffix: words of the error, and the file.
 REFUSED: dict[str, tuple[str, bytes]] = {
@@ -185,6 +206,11 @@ REFUSED: dict[str, tuple[str, bytes]] = {
     "matrix.gltf": ("transform of node 0 is not finite, or too large", _node(matrix=[1e300] * 16)),
     "matrix-short.gltf": ("transform of node 0 is not valid", _node(matrix=[1] * 15)),
     "rotation.gltf": ("transform of node 0 is not valid", _node(rotation=[0, 0, 1])),
+    "copies-none.gltf": ("the copies of node 0 (EXT_mesh_gpu_instancing) are not valid", _copies()),
+    "copies-some.gltf": ("the copies of node 0", _copies(TRANSLATION=POINTS, SCALE=POINTS[:2])),
+    "copies-width.gltf": ("the copies of node 0", _copies(ROTATION=POINTS)),
+    "copies-many.gltf": ("node 0 has 65,537 copies of its mesh: at most 65,536 are read", _copies(65_537)),
+    "copies-infinite.gltf": ("the transform of node 0 is not finite", _copies(TRANSLATION=np.full_like(POINTS, np.inf))),
     "meshopt.gltf": (f"its meshes are compressed ({_MESHOPT})", _text(extensionsRequired=[_MESHOPT])),
     "meshopt-optional.gltf": (
         f"its meshes are compressed ({_MESHOPT})",
@@ -231,6 +257,11 @@ READ: dict[str, bytes] = {
     "rotation-huge.gltf": _node(rotation=[1e300, 0, 0, 1e300]),
     "mirrored.gltf": _node(scale=[-2, 1, 1], rotation=[0.1, 0.2, 0.3, 0.4]),
     "matrix.gltf": _node(matrix=[0, 2, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 7, 8, 9, 1]),
+    "copies.gltf": _copies(TRANSLATION=POINTS),
+    "copies-turned.gltf": _copies(
+        SCALE=np.float32([[1, 2, 3], [-1, 1, 1]]), ROTATION=np.int16([[0, 0, 32767, 0], [9000, 0, 0, 20000]])
+    ),
+    "copies-100.gltf": _copies(100, ROTATION=np.zeros((100, 4), np.float32)),
     "strip.gltf": _arrays({"POSITION": _FOUR}, mode=5),
     "fan.gltf": _arrays({"POSITION": _FOUR}, np.array([0, 1, 3, 2], np.uint8), mode=6),
     "lines-too.gltf": _text(meshes=[{"primitives": [{"mode": 1}, *gltf()["meshes"][0]["primitives"]]}]),

@@ -75,6 +75,9 @@ INFLUENCES = Loss.of(
 BENT_RELIEF = Loss.of(
     "normal map of an animated mesh", "not shown", "its smooth normals are", "normal maps of an animated mesh"
 )
+BENT_COPIES = Loss.of(
+    "copy of an animated mesh", "not shown", "its node has one: give each a node", "copies of an animated mesh"
+)
 BENT_ALPHA = Loss.of(
     "partly transparent material of an animated mesh",
     "opaque",

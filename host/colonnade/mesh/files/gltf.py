@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
+from colonnade.common.limits import MAX_TRIANGLES
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
@@ -24,7 +25,7 @@ from colonnade.mesh.files.gltf_clip import ClipReader
 from colonnade.mesh.files.gltf_document import COMPRESSION, GltfDocument
 from colonnade.mesh.files.gltf_draco import DracoPrimitives, PrimitiveArrays
 from colonnade.mesh.files.gltf_metal import metal_of, of_map
-from colonnade.mesh.files.gltf_nodes import mesh_nodes
+from colonnade.mesh.files.gltf_nodes import INSTANCING, mesh_nodes
 from colonnade.mesh.files.gltf_relief import relief_of
 from colonnade.mesh.files.gltf_textures import GltfTextures
 from colonnade.mesh.files.resolver import References
@@ -127,7 +128,8 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
     parts: list[_Part] = []
     # Of surfaces that no texture or corner colours; metal by a map keeps these, too
     plain: set[tuple[Vector, float]] = set()
-    for index, node, matrix in mesh_nodes(document, losses):
+    triangles = 0
+    for index, node, matrix in mesh_nodes(document, losses, is_animated=clip is not None):
         losses.add(lost.SKINS, clip is None and "skin" in node)
         for primitive in document.entry("meshes", node["mesh"]).get("primitives", []):
             losses.add(lost.MORPHS, 0 if clip is not None else len(primitive.get("targets", [])))
@@ -140,6 +142,9 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
                 losses.add(lost.BENT_RELIEF, part.surface.relief is not None)
                 part = replace(part, surface=replace(part.surface, relief=None))
             parts.append(part)
+            triangles += len(part.surface.faces)
+            if triangles > MAX_TRIANGLES:
+                raise document.error(f"it has more than {MAX_TRIANGLES:,} triangles: leave some out")
             if part.material != default and part.has_one_colour:
                 material = from_gltf(document.entry("materials", part.material))
                 if material.alpha is None:
@@ -201,7 +206,7 @@ def _count_other(document: GltfDocument, losses: Losses, is_animated: bool) -> N
             losses.add(extension_loss(name))
     for node in json.get("nodes", []):
         names = node.get("extensions", {})
-        losses.update((extension_loss(name), 1) for name in names if name != "KHR_lights_punctual")
+        losses.update((extension_loss(name), 1) for name in names if name not in ("KHR_lights_punctual", INSTANCING))
 
 
 def _primitive(

@@ -19,6 +19,7 @@ READ_EXTENSIONS = (
     "KHR_materials_unlit",
     "KHR_texture_transform",
     "KHR_texture_basisu",
+    "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "EXT_texture_avif",
 )

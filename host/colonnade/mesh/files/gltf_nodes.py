@@ -16,12 +16,22 @@ from colonnade.mesh.clips.clip import Nodes, rotations
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.losses import Losses
 
+#: The extension of a node that has its mesh at several places, and components of its attributes.
+INSTANCING = "EXT_mesh_gpu_instancing"
+_OF_COPIES = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
+#: Places of a mesh, at most.
+MAX_COPIES = 1 << 16
 #: Largest magnitude of a transform's element, in the scene.
 _MAX_TRANSFORM = 1e100
 
 
-def mesh_nodes(document: GltfDocument, losses: Losses) -> Iterator[tuple[int, Mapping[str, Any], Floats]]:
-    """The nodes with a mesh of the default scene, with their numbers, and transforms to the scene, float64 [4, 4]."""
+def mesh_nodes(
+    document: GltfDocument, losses: Losses, *, is_animated: bool = False
+) -> Iterator[tuple[int, Mapping[str, Any], Floats]]:
+    """The nodes with a mesh of the default scene, with their numbers, and transforms to the scene, float64 [4, 4].
+
+    A node with copies of its mesh comes once for each; if it is animated, once.
+    """
     json = document.json
     scenes, nodes = json.get("scenes", []), json.get("nodes", [])
     if scenes:
@@ -35,12 +45,41 @@ def mesh_nodes(document: GltfDocument, losses: Losses) -> Iterator[tuple[int, Ma
     while pending:
         index, parent = pending.pop()
         node = document.entry("nodes", index)
-        matrix = fixed_order.product(parent, _local(document, index, node))
-        if not (np.abs(matrix) < _MAX_TRANSFORM).all():
-            raise document.error(f"the transform of node {index} is not finite, or too large: export it again")
+        matrix = _finite(document, index, fixed_order.product(parent, _local(document, index, node)))
         pending += [(child, matrix) for child in reversed(node.get("children", []))]
-        if "mesh" in node:
-            yield index, node, matrix
+        if "mesh" not in node:
+            continue
+        extension = node.get("extensions", {}).get(INSTANCING)
+        places = np.eye(4)[np.newaxis] if extension is None else _copies(document, index, extension)
+        if is_animated:
+            losses.add(lost.BENT_COPIES, len(places) - 1)
+            places = np.eye(4)[np.newaxis]
+        for copy in _finite(document, index, fixed_order.product(matrix, places)):
+            yield index, node, copy
+
+
+def _copies(document: GltfDocument, index: int, extension: Mapping[str, Any]) -> Floats:
+    """Where a node has its mesh: transforms to the node, float64 [n, 4, 4]."""
+    given = {name: accessor for name, accessor in extension.get("attributes", {}).items() if name in _OF_COPIES}
+    values = {name: document.array(accessor).astype(np.float64) for name, accessor in given.items()}
+    count = max(map(len, values.values()), default=0)
+    if count == 0 or any(value.shape != (count, _OF_COPIES[name]) for name, value in values.items()):
+        raise document.error(f"the copies of node {index} ({INSTANCING}) are not valid: export it again")
+    if count > MAX_COPIES:
+        raise document.error(f"node {index} has {count:,} copies of its mesh: at most {MAX_COPIES:,} are read")
+    rotation = values.get("ROTATION", np.array([[0.0, 0.0, 0.0, 1.0]]))
+    length = np.sqrt(fixed_order.dot(rotation, rotation))[:, np.newaxis]
+    placed = np.tile(np.eye(4), (count, 1, 1))
+    placed[:, :3, :3] = rotations(rotation / np.where(length > 0, length, 1.0))
+    placed[:, :3, :3] *= values.get("SCALE", np.ones((1, 3)))[:, np.newaxis]
+    placed[:, :3, 3] = values.get("TRANSLATION", 0.0)
+    return placed
+
+
+def _finite(document: GltfDocument, index: int, matrices: Floats) -> Floats:
+    if not (np.abs(matrices) < _MAX_TRANSFORM).all():
+        raise document.error(f"the transform of node {index} is not finite, or too large: export it again")
+    return matrices
 
 
 def all_nodes(document: GltfDocument) -> Nodes:
