@@ -178,7 +178,8 @@ def test_a_file_with_alpha_looks_as_by_the_host(tmp_path: Path, mode: str) -> No
 
 #: Files of Khronos in the folders of COLONNADE_MESHES.
 KHRONOS = ("AlphaBlendModeTest", "BoxInterleaved", "BoxTextured", "CesiumMilkTruck", "Duck", "FlightHelmet", "Fox")
-KHRONOS += ("2CylinderEngine", "TextureTransformTest", "WaterBottle")
+KHRONOS += ("2CylinderEngine", "Avocado", "BoomBox", "DamagedHelmet", "Lantern", "Suzanne")
+KHRONOS += ("TextureTransformTest", "WaterBottle")
 
 
 def khronos(name: str) -> Path | None:
