@@ -14,6 +14,7 @@ PATHS = (
     *("RayGenerator", "SequentialRaySetup", "RaySetupPipeline", "SequentialShader", "ShadingPipeline"),
     *("BounceUnit", "BouncePipeline", "ShadowRays", "ColourUnit"),
     *("BounceScheduler", "EnvironmentRays", "RtController"),
+    *("InstanceWalk", "WorldFaces"),
 )
 TRACE = ("BoxUnit", "TraversalStack", "RecordFetch", "HitTable")
 

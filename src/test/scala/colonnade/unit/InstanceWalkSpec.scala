@@ -9,7 +9,7 @@ import colonnade.formats.ObjectInstance
 import colonnade.instance.{InstanceCase, InstanceStimulus, WorldRay}
 import colonnade.ray.PreparedRay
 import colonnade.shading.Occlusion
-import colonnade.{Packed, Simulation, TestConfigs}
+import colonnade.{Packed, Proofs, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -46,7 +46,7 @@ private class InstanceWalkHarness(config: ColonnadeConfig) extends Module {
 /** However traversal units accept rays and return results: each ray is traced in one instance after the other, ends once,
   * and has the nearest hit, of equal ones that of the first instance; a shadow ray ends at an opaque triangle.
   */
-class InstanceWalkSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
+class InstanceWalkSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Proofs {
   behavior of "InstanceWalk"
 
   private val config = InstanceStimulus.withInstances(TestConfigs.tiny, 3)
@@ -56,6 +56,19 @@ class InstanceWalkSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       for ((instances, rays) <- Seq(3 -> 50, 0 -> 20, 2 -> 20, 1 -> 20))
         withClue(s"$instances instances: ")(new InstanceWalkDriver(dut, config, instances).run(rays))
     }
+
+  it should "resolve each visit once, for any hits, and results in any order" in {
+    val narrow = InstanceStimulus.withInstances(TestConfigs.withPrecision(16, 16, 16), 3)
+    prove(18)(
+      new InstanceResultsProof(
+        narrow.copy(
+          geometry = narrow.geometry.copy(vertexBits = 10, triangleBits = Some(16)),
+          units = narrow.units.copy(pathContexts = 2)
+        ),
+        limit = 16
+      )
+    )
+  }
 }
 
 /** Sends rays, plays the traversal units, and follows each ray by the model. */
