@@ -1,8 +1,8 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Queue, RegEnable, Valid}
-import colonnade.common.{Context, ContextTable}
+import chisel3.util.{RegEnable, Valid}
+import colonnade.common.ContextTable
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.instance.WorldDistance
 import colonnade.shading.Occlusion
@@ -11,9 +11,8 @@ import colonnade.traversal.TriangleHit
 final class InstanceResultsIO(config: PathConfig) extends Bundle {
   val count = Input(UInt(NumberFormats.bitLength(config.frame.instances).W))
 
-  /** A ray goes to the traversal units; a context whose ray misses an object's cube. */
+  /** A ray goes to the traversal units, or misses an object's cube. */
   val visited = Flipped(Valid(new VisitedRay(config)))
-  val missed  = Flipped(Valid(new InstanceStep(config)))
 
   /** From the traversal units. */
   val objectResults = Flipped(Valid(new TraceResult(config)))
@@ -24,7 +23,7 @@ final class InstanceResultsIO(config: PathConfig) extends Bundle {
 }
 
 /** Compares the hits of a ray in one instance after the other: the nearest one stays, of equal ones the first. A visit
-  * lasts four cycles, with a hit to measure some 20. Contexts are tokens: each queue can hold all of them.
+  * lasts four cycles, with a hit to measure some 20.
   */
 final class InstanceResults(config: PathConfig) extends Module {
   private object State extends ChiselEnum { val idle, loading, measuring, leaving = Value }
@@ -33,40 +32,31 @@ final class InstanceResults(config: PathConfig) extends Module {
   val io = IO(new InstanceResultsIO(config))
 
   // Contexts to resolve
-  private val visits   = ContextTable(config, new VisitedRay(config))
-  private val found    = ContextTable(config, new TraceResult(config))
-  private val nearest  = ContextTable(config, new NearestHit(config))
-  private val resolved = Module(new Queue(Context(config), config.contexts)).io
-  private val missed   = Module(new Queue(new InstanceStep(config), config.contexts)).io
-  when(io.visited.valid) { visits.write(io.visited.bits.visit.context, io.visited.bits) }
+  private val visits  = ContextTable(config, new VisitedRay(config))
+  private val found   = ContextTable(config, new TraceResult(config))
+  private val nearest = ContextTable(config, new NearestHit(config))
+  private val waiting = new WaitingContexts(config)
+  private val visited = io.visited.bits
+  when(io.visited.valid) { visits.write(visited.visit.context, visited) }
   when(io.objectResults.valid) { found.write(io.objectResults.bits.context, io.objectResults.bits) }
-  resolved.enq.valid := io.objectResults.valid
-  resolved.enq.bits  := io.objectResults.bits.context
-  missed.enq.valid   := io.missed.valid
-  missed.enq.bits    := io.missed.bits
-  assert(!resolved.enq.valid || resolved.enq.ready, "a context ends twice")
-  assert(!missed.enq.valid || missed.enq.ready, "a context misses twice")
+  waiting.enter(io.visited.valid && !visited.enters, visited.visit.context)
+  waiting.enter(io.objectResults.valid, io.objectResults.bits.context)
 
   // One of them, and what is known of it
   private val state     = RegInit(idle)
-  private val starts    = state === idle && (resolved.deq.valid || missed.deq.valid)
-  private val isHit     = resolved.deq.valid
-  private val context   = Mux(isHit, resolved.deq.bits, missed.deq.bits.context)
-  private val hasMissed = RegEnable(!isHit, starts)
-  private val past      = RegEnable(missed.deq.bits, starts)
-  resolved.deq.ready := starts && isHit
-  missed.deq.ready   := starts && !isHit
+  private val starts    = state === idle && waiting.next.valid
+  private val context   = waiting.next.bits
   private val isLoading = state === loading
   private val readRay   = visits.read(context, starts)
-  private val readVisit = Mux(hasMissed, past, readRay.visit)
   private val readBest  = nearest.read(context, starts)
   private val ray       = RegEnable(readRay, isLoading)
-  private val visit     = RegEnable(readVisit, isLoading)
+  private val visit     = RegEnable(readRay.visit, isLoading)
   private val result    = RegEnable(found.read(context, starts), isLoading)
   private val best      = Reg(new NearestHit(config))
+  waiting.take(starts)
   when(isLoading) {
     best := readBest
-    when(readVisit.instance === 0.U) {
+    when(readRay.visit.instance === 0.U) {
       best.hasHit    := false.B
       best.occlusion := Occlusion.none
     }
@@ -74,7 +64,7 @@ final class InstanceResults(config: PathConfig) extends Module {
 
   // Its distance along the ray of the world
   private val isMeasuring = state === measuring
-  private val isMeasured  = isMeasuring && !hasMissed && !ray.isShadow && result.hasHit
+  private val isMeasured  = isMeasuring && ray.enters && !ray.isShadow && result.hasHit
   private val isIssued    = RegInit(false.B)
   private val distance    = Module(new WorldDistance(config)).io
   distance.distance.valid       := isMeasured && !isIssued
@@ -93,7 +83,7 @@ final class InstanceResults(config: PathConfig) extends Module {
       best.instance := visit.instance
     }
   }
-  when(isMeasuring && !hasMissed && ray.isShadow && result.occlusion.asUInt > best.occlusion.asUInt) {
+  when(isMeasuring && ray.enters && ray.isShadow && result.occlusion.asUInt > best.occlusion.asUInt) {
     best.occlusion := result.occlusion
   }
   when(starts) { state := loading }

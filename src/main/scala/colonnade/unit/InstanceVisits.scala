@@ -1,7 +1,7 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{Arbiter, Decoupled, Queue, RegEnable, Valid}
+import chisel3.util.{Decoupled, Pipe, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
 import colonnade.formats.ObjectInstance
@@ -16,9 +16,10 @@ final class InstanceStep(config: PathConfig) extends Bundle {
   val tMax     = new Fixed(new RayFormats(config.numbers).grid)
 }
 
-/** A ray in an object whose cube it enters. */
+/** A ray in the axes of an object, whose cube it enters or misses. */
 final class VisitedRay(config: PathConfig) extends Bundle {
   val visit    = new InstanceStep(config)
+  val enters   = Bool()
   val isShadow = Bool()
   val tEntry   = new Fixed(new RayFormats(config.numbers).entry)
   val scale    = new ObjectScale(config.numbers)
@@ -31,56 +32,51 @@ final class InstanceVisitsIO(config: PathConfig) extends Bundle {
   val rays  = Flipped(Decoupled(new PreparedRay(config)))
   val again = Flipped(Valid(new InstanceStep(config)))
 
-  /** To the traversal units; the same ray for who waits for its result, in the cycle in which it leaves. */
+  /** To the traversal units those that enter; all for who waits for results, in the cycle in which they leave. */
   val objectRays = Decoupled(new PreparedRay(config))
   val visited    = Valid(new VisitedRay(config))
-
-  /** Contexts whose ray does not enter the cube of the object. */
-  val missed = Valid(new InstanceStep(config))
 }
 
-/** Transforms rays of the world to the axes of objects, and prepares them there. Contexts are tokens: each queue can hold all
-  * of them. A ray that is on its way goes before a new one.
-  */
+/** Transforms rays of the world to the axes of objects, and prepares them there. */
 final class InstanceVisits(config: PathConfig) extends Module {
   private val numbers = config.numbers
 
   val io = IO(new InstanceVisitsIO(config))
 
-  // The rays of the world, and the contexts that wait
-  private val ray      = io.rays.bits
-  private val worlds   = ContextTable(config, new WorldRay(config))
-  private val fresh    = Module(new Queue(new InstanceStep(config), config.contexts)).io
-  private val again    = Module(new Queue(new InstanceStep(config), config.contexts)).io
-  private val arbiter  = Module(new Arbiter(new InstanceStep(config), 2)).io
-  private val newWorld = Wire(new WorldRay(config))
-  newWorld.isShadow       := ray.isShadow
-  newWorld.ray            := ray.ray.forTriangles
-  fresh.enq.valid         := io.rays.valid
-  fresh.enq.bits.context  := ray.context
-  fresh.enq.bits.instance := 0.U
-  fresh.enq.bits.tMax     := ray.tMax
-  io.rays.ready           := fresh.enq.ready
-  when(fresh.enq.fire) { worlds.write(ray.context, newWorld) }
-  again.enq.valid := io.again.valid
-  again.enq.bits  := io.again.bits
-  assert(!again.enq.valid || again.enq.ready, "a context waits twice")
-  arbiter.in(0) :<>= again.deq
-  arbiter.in(1) :<>= fresh.deq
+  // The rays of the world, their next visits, and the contexts that wait for them. A visit has one writer: a ray that is on
+  // its way goes before a new one
+  private val ray     = io.rays.bits
+  private val worlds  = ContextTable(config, new WorldRay(config))
+  private val steps   = ContextTable(config, new InstanceStep(config))
+  private val waiting = new WaitingContexts(config)
+  private val again   = Pipe(io.again)
+  private val world   = Wire(new WorldRay(config))
+  private val first   = Wire(new InstanceStep(config))
+  private val next    = Mux(again.valid, again.bits, first)
+  world.isShadow := ray.isShadow
+  world.ray      := ray.ray.forTriangles
+  first.context  := ray.context
+  first.instance := 0.U
+  first.tMax     := ray.tMax
+  io.rays.ready  := !again.valid
+  when(io.rays.fire) { worlds.write(ray.context, world) }
+  when(io.rays.valid || again.valid) { steps.write(next.context, next) }
+  waiting.enter(io.rays.valid || again.valid, next.context)
 
-  // The table is read in one cycle, and the ray enters the transform in the next
+  // The tables are read in one cycle, and the ray enters the transform in the next
   private val transform = Module(new InstanceTransform(config)).io
   private val isRead    = RegInit(false.B)
-  private val starts    = transform.visit.ready && !isRead && arbiter.out.valid
-  private val visit     = RegEnable(arbiter.out.bits, starts)
-  private val world     = worlds.read(arbiter.out.bits.context, starts)
+  private val starts    = transform.visit.ready && !isRead && waiting.next.valid
+  private val step      = steps.read(waiting.next.bits, starts)
+  private val started   = worlds.read(waiting.next.bits, starts)
+  private val visit     = RegEnable(step, isRead)
+  waiting.take(starts)
   isRead                        := starts
-  arbiter.out.ready             := transform.visit.ready && !isRead
   transform.visit.valid         := isRead
-  transform.visit.bits.context  := visit.context
-  transform.visit.bits.tMax     := visit.tMax
-  transform.visit.bits.isShadow := world.isShadow
-  transform.visit.bits.ray      := world.ray
+  transform.visit.bits.context  := step.context
+  transform.visit.bits.tMax     := step.tMax
+  transform.visit.bits.isShadow := started.isShadow
+  transform.visit.bits.ray      := started.ray
   transform.instance            := io.instances(visit.instance)
 
   // Set-up; meanwhile what else is known of the ray waits in a queue
@@ -107,13 +103,12 @@ final class InstanceVisits(config: PathConfig) extends Module {
   io.objectRays.bits.root.foreach(_ := io.instances(known.visit.instance).root)
   setup.ray.ready          := !prepared.enters || io.objectRays.ready
   tags.deq.ready           := setup.ray.fire
-  io.visited.valid         := io.objectRays.fire
+  io.visited.valid         := setup.ray.fire
   io.visited.bits.visit    := known.visit
+  io.visited.bits.enters   := prepared.enters
   io.visited.bits.isShadow := prepared.isShadow
   io.visited.bits.tEntry   := prepared.tEntry
   io.visited.bits.scale    := known.scale
-  io.missed.valid          := setup.ray.valid && !prepared.enters
-  io.missed.bits           := known.visit
 }
 
 private object InstanceVisits {

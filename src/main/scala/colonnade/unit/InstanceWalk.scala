@@ -36,7 +36,6 @@ final class InstanceWalk(config: PathConfig) extends Module {
   visits.again          := results.again
   results.count         := count
   results.visited       := visits.visited
-  results.missed        := visits.missed
   results.objectResults := io.objectResults
   when(isOff) { results.objectResults.valid := false.B }
 

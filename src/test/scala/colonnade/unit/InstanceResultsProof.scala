@@ -46,12 +46,11 @@ class InstanceResultsProof(config: PathConfig, limit: Int) extends Module {
 
   private val left = visited.visit.context
   private val goes = leaves && place(left) === Place.waiting
-  dut.visited.valid               := goes && enters
+  dut.visited.valid               := goes
   dut.visited.bits                := visited
   dut.visited.bits.visit.instance := instance(left)
   dut.visited.bits.isShadow       := isShadow(left)
-  dut.missed.valid                := goes && !enters
-  dut.missed.bits                 := dut.visited.bits.visit
+  dut.visited.bits.enters         := enters
   when(goes) { place(left) := Mux(enters, Place.traced, Place.found) }
 
   private val ended = result.context

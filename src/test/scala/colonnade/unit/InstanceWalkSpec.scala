@@ -59,13 +59,13 @@ class InstanceWalkSpec extends AnyFlatSpec with ChiselScalatestTester with Match
 
   it should "resolve each visit once, for any hits, and results in any order" in {
     val narrow = InstanceStimulus.withInstances(TestConfigs.withPrecision(16, 16, 16), 3)
-    prove(18)(
+    prove(20)(
       new InstanceResultsProof(
         narrow.copy(
           geometry = narrow.geometry.copy(vertexBits = 10, triangleBits = Some(16)),
           units = narrow.units.copy(pathContexts = 2)
         ),
-        limit = 16
+        limit = 17
       )
     )
   }
