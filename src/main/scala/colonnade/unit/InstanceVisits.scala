@@ -7,7 +7,7 @@ import colonnade.config.PathConfig
 import colonnade.formats.ObjectInstance
 import colonnade.instance.{InstanceTransform, ObjectScale}
 import colonnade.numbers.{Fixed, Rounding}
-import colonnade.ray.{PreparedRay, RayFormats, RaySetup, TriangleRay}
+import colonnade.ray.{PreparedRay, RayFormats, SequentialRaySetup, TriangleRay}
 
 /** A context whose ray is to be traced in an instance; hits before `tMax` count, along the ray of the world. */
 final class InstanceStep(config: PathConfig) extends Bundle {
@@ -79,8 +79,8 @@ final class InstanceVisits(config: PathConfig) extends Module {
   transform.visit.bits.ray      := started.ray
   transform.instance            := io.instances(visit.instance)
 
-  // Set-up; meanwhile what else is known of the ray waits in a queue
-  private val setup = Module(RaySetup(config)).io
+  // Set-up, as slow as the transform; meanwhile what else is known of the ray waits in a queue
+  private val setup = Module(new SequentialRaySetup(config)).io
   private val tags  = Module(new Queue(new SetupTag(config), InstanceVisits.inSetup)).io
   setup.request.valid := transform.ray.valid && tags.enq.ready
   setup.request.bits  := transform.ray.bits.request
