@@ -11,7 +11,7 @@ const MOST_TRANSFORM = 1e100;
 /** As host/colonnade/mesh/materials/texture.py. */
 const MOST_UV = 1e6;
 const [POINTS, TRIANGLES, FAN] = [0, 4, 6];
-/** Attributes of a mesh at several places, as host/colonnade/mesh/files/gltf_nodes.py. */
+/** Attributes of copies of a mesh, as host/colonnade/mesh/files/gltf_nodes.py. */
 const OF_COPIES = [["TRANSLATION", [0, 0, 0]], ["ROTATION", [0, 0, 0, 1]], ["SCALE", [1, 1, 1]]];
 const MOST_COPIES = 1 << 16;
 
@@ -54,7 +54,7 @@ function* nodesOf(document) {
   }
 }
 
-/** Where a node has its mesh: transforms to the node, or null for its own place alone. */
+/** The transforms of copies of a mesh to their node, or null for the node alone. */
 function copiesOf(document, node, index) {
   const extension = node.extensions?.[INSTANCING];
   if (!extension) return [null];

@@ -98,7 +98,7 @@ def _sparse(**changes: Any) -> bytes:
 
 
 def _copies(many: int = 0, **arrays: np.ndarray) -> bytes:
-    """The triangle at several places; ``many``: so many copies with a translation of 0."""
+    """Copies of the triangle; ``many``: so many with a translation of 0."""
     document = json.loads(_arrays(arrays)) if arrays else gltf(accessors=[], bufferViews=[])
     accessors, views = document["accessors"], document["bufferViews"]
     numbers = {name: 2 + number for number, name in enumerate(arrays)}
@@ -210,7 +210,7 @@ REFUSED: dict[str, tuple[str, bytes]] = {
     "copies-some.gltf": ("the copies of node 0", _copies(TRANSLATION=POINTS, SCALE=POINTS[:2])),
     "copies-width.gltf": ("the copies of node 0", _copies(ROTATION=POINTS)),
     "copies-many.gltf": ("node 0 has 65,537 copies of its mesh: at most 65,536 are read", _copies(65_537)),
-    "copies-infinite.gltf": ("the transform of node 0 is not finite", _copies(TRANSLATION=np.full_like(POINTS, np.inf))),
+    "copies-infinite.gltf": ("transform of node 0 is not finite", _copies(TRANSLATION=np.full_like(POINTS, np.inf))),
     "meshopt.gltf": (f"its meshes are compressed ({_MESHOPT})", _text(extensionsRequired=[_MESHOPT])),
     "meshopt-optional.gltf": (
         f"its meshes are compressed ({_MESHOPT})",

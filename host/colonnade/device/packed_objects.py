@@ -34,10 +34,11 @@ def pack_objects(
     Objects of equal records share them. One mesh holds, and a note says: more objects than `frame.instances`,
     animations, textures, and objects too small for a transform. Arguments and errors are those of `pack`.
     """
-    if mesh.objects and (most := int(manifest.config["frame"].get("instances", 0))):
+    if mesh.objects and (limit := int(manifest.config["frame"].get("instances", 0))):
         try:
-            _check(mesh, most)
-            own = [pack(part, manifest, part.materials, headroom, encoder, children) for part in _parts(mesh, materials)]
+            _check(mesh, limit)
+            parts = _parts(mesh, materials)
+            own = [pack(part, manifest, part.materials, headroom, encoder, children) for part in parts]
             return _joined(own, mesh, manifest)
         except _OneMesh as reason:
             notes.tell(f"the objects are packed as one mesh: {reason}")
@@ -88,10 +89,10 @@ class _OneMesh(Exception):
     """Why one mesh holds the objects."""
 
 
-def _check(mesh: Mesh, most: int) -> None:
-    """Refuse objects that are no instances of a design with `most`."""
-    if len(mesh.objects) > most:
-        raise _OneMesh(f"they are {len(mesh.objects)}, frame.instances is {most}")
+def _check(mesh: Mesh, limit: int) -> None:
+    """Refuse objects that are no instances of a design with so many."""
+    if len(mesh.objects) > limit:
+        raise _OneMesh(f"they are {len(mesh.objects)}, frame.instances is {limit}")
     if mesh.clip or mesh.textures:
         raise _OneMesh("an instance is neither animated nor textured")
 
@@ -105,9 +106,9 @@ def _joined(own: Sequence[SceneImage], mesh: Mesh, manifest: Manifest) -> SceneI
     keys = [image.records.tobytes() for image in own]
     tables = list(dict.fromkeys(image.header.materials for image in own))
     bases = dict(zip(tables, np.cumsum([0, *map(len, tables)]).tolist(), strict=False))
-    count, most = sum(map(len, tables)), int(manifest.config["frame"]["materials"])
-    if count > most:
-        raise _OneMesh(f"they have {count} materials, frame.materials is {most}")
+    count, limit = sum(map(len, tables)), int(manifest.config["frame"]["materials"])
+    if count > limit:
+        raise _OneMesh(f"they have {count} materials, frame.materials is {limit}")
     if len({image.header.has_colours for image in own}) > 1:
         raise _OneMesh("only some have corner colours")
     images = [own[keys.index(key)] for key in dict.fromkeys(keys)]

@@ -16,10 +16,10 @@ from colonnade.mesh.clips.clip import Nodes, rotations
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.losses import Losses
 
-#: The extension of a node that has its mesh at several places, and components of its attributes.
+#: The extension of a node that has copies of its mesh, and components of its attributes.
 INSTANCING = "EXT_mesh_gpu_instancing"
 _OF_COPIES = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
-#: Places of a mesh, at most.
+#: Copies of a mesh, at most.
 MAX_COPIES = 1 << 16
 #: Largest magnitude of a transform's element, in the scene.
 _MAX_TRANSFORM = 1e100
@@ -50,16 +50,16 @@ def mesh_nodes(
         if "mesh" not in node:
             continue
         extension = node.get("extensions", {}).get(INSTANCING)
-        places = np.eye(4)[np.newaxis] if extension is None else _copies(document, index, extension)
+        copies = np.eye(4)[np.newaxis] if extension is None else _copies(document, index, extension)
         if is_animated:
-            losses.add(lost.BENT_COPIES, len(places) - 1)
-            places = np.eye(4)[np.newaxis]
-        for copy in _finite(document, index, fixed_order.product(matrix, places)):
+            losses.add(lost.BENT_COPIES, len(copies) - 1)
+            copies = np.eye(4)[np.newaxis]
+        for copy in _finite(document, index, fixed_order.product(matrix, copies)):
             yield index, node, copy
 
 
 def _copies(document: GltfDocument, index: int, extension: Mapping[str, Any]) -> Floats:
-    """Where a node has its mesh: transforms to the node, float64 [n, 4, 4]."""
+    """The transforms of copies to their node, float64 [n, 4, 4]."""
     given = {name: accessor for name, accessor in extension.get("attributes", {}).items() if name in _OF_COPIES}
     values = {name: document.array(accessor).astype(np.float64) for name, accessor in given.items()}
     count = max(map(len, values.values()), default=0)
