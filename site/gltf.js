@@ -12,7 +12,7 @@ const MOST_TRANSFORM = 1e100;
 const MOST_UV = 1e6;
 const [POINTS, TRIANGLES, FAN] = [0, 4, 6];
 /** Attributes of copies of a mesh, as host/colonnade/mesh/files/gltf_nodes.py. */
-const OF_COPIES = [["TRANSLATION", [0, 0, 0]], ["ROTATION", [0, 0, 0, 1]], ["SCALE", [1, 1, 1]]];
+const OF_COPIES = { TRANSLATION: [0, 0, 0], ROTATION: [0, 0, 0, 1], SCALE: [1, 1, 1] };
 const MOST_COPIES = 1 << 16;
 
 /** A mesh, as of readMesh; `files` has the other dropped files by name. */
@@ -58,13 +58,18 @@ function* nodesOf(document) {
 function copiesOf(document, node, index) {
   const extension = node.extensions?.[INSTANCING];
   if (!extension) return [null];
-  const given = Object.fromEntries(OF_COPIES.filter(([name]) => name in (extension.attributes ?? {})).map(([name]) => [name, document.array(extension.attributes[name])]));
-  const count = Object.values(given).reduce((most, array) => Math.max(most, array.count), 0);
-  if (count === 0 || !OF_COPIES.every(([name, { length }]) => !given[name] || (given[name].count === count && given[name].width === length)))
+  const given = {};
+  for (const name in OF_COPIES) if (name in (extension.attributes ?? {})) given[name] = document.array(extension.attributes[name]);
+  const arrays = Object.entries(given);
+  const count = arrays.reduce((largest, [, array]) => Math.max(largest, array.count), 0);
+  if (count === 0 || !arrays.every(([name, array]) => array.count === count && array.width === OF_COPIES[name].length))
     throw document.error(`the copies of node ${index} (${INSTANCING}) are not valid: export it again`);
   if (count > MOST_COPIES) throw document.error(`node ${index} has ${grouped(count)} copies of its mesh: at most ${grouped(MOST_COPIES)} are read`);
-  const part = ([name, otherwise], copy) => (given[name] ? [...given[name].values.subarray(otherwise.length * copy, otherwise.length * (copy + 1))] : otherwise);
-  return Array.from({ length: count }, (_, copy) => composed(...OF_COPIES.map((one) => part(one, copy))));
+  const part = (name, copy) => {
+    const width = OF_COPIES[name].length;
+    return given[name] ? [...given[name].values.subarray(width * copy, width * (copy + 1))] : OF_COPIES[name];
+  };
+  return Array.from({ length: count }, (_, copy) => composed(part("TRANSLATION", copy), part("ROTATION", copy), part("SCALE", copy)));
 }
 
 /** The triangles of a primitive's corners. */
