@@ -83,7 +83,7 @@ async function draw() {
   if (isBusy) return;
   isBusy = true;
   try {
-    while (isWanted || began !== null) {
+    while (isWanted || (began !== null && !document.hidden)) {
       isWanted = false;
       if (began !== null) at = ((performance.now() - began) / 1000 / state.seconds) % 1;
       await frame();
@@ -214,6 +214,7 @@ window.addEventListener("keydown", ({ key, ctrlKey, metaKey }) => {
   else if (key === "p") toggle();
 });
 listen(stage, actions);
+document.addEventListener("visibilitychange", () => began !== null && draw());
 stage.addEventListener("pointerdown", () => (element("hint").hidden = true));
 page.actions = actions;
 new EventSource("events").onmessage = ({ data }) => receive(JSON.parse(data));

@@ -70,13 +70,6 @@ def solve(matrix: Floats, right_side: Floats) -> Floats:
     return solution
 
 
-def inverse(matrix: Floats) -> Floats:
-    """The inverse of a matrix [3, 3], by cofactors; its determinant must not be 0."""
-    x, y, z = matrix
-    cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
-    return np.asarray(cofactors / dot(x, cofactors[:, 0]))
-
-
 def stretches(matrix: Floats) -> tuple[float, float, float]:
     """The singular values of a matrix [3, 3], largest first, by the one-sided method of Jacobi."""
     columns = list(np.array(matrix.T, np.float64))

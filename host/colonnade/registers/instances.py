@@ -9,6 +9,7 @@ import numpy as np
 
 from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
+from colonnade.common.vectors import cofactors
 from colonnade.registers.surface_offset import surface_offset
 from colonnade.scene_image.header import Instance, ObjectFrame
 from colonnade.scene_image.world import world_bounds
@@ -51,7 +52,8 @@ def _placed(
     largest, _, least = fixed_order.stretches(linear)
     if not least > 1e-4 * largest:
         raise UserError(f"object {number + 1} is flat: its transform must not scale an axis to nothing")
-    inverse = fixed_order.inverse(linear)
+    turning = cofactors(linear)
+    inverse = turning.T / fixed_order.dot(linear[:, 0], turning[:, 0])
     matrix = frame.scale / world.scale * inverse
     shift = MATRIX_BITS - 1 - math.frexp(np.abs(matrix).max())[1]
     # A ray starts in the reach of the world's cube, and must do so in the object's scene

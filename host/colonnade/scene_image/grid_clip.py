@@ -12,8 +12,8 @@ import numpy.typing as npt
 from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
-from colonnade.common.vectors import unit_vectors
-from colonnade.mesh.clips.clip import Clip, Pose, cofactors
+from colonnade.common.vectors import cofactors, unit_vectors
+from colonnade.mesh.clips.clip import Clip, Pose
 from colonnade.mesh.clips.keys import Keys, baked
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene_image.header import ObjectFrame

@@ -51,14 +51,11 @@ def test_solutions_of_systems(seed: int, size: int) -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1), flat=st.sampled_from([1.0, 1e-3, 0.0]))
-def test_singular_values_and_inverses(seed: int, flat: float) -> None:
+def test_singular_values(seed: int, flat: float) -> None:
     generator = np.random.default_rng(seed)
     matrix = generator.normal(size=(3, 3)) * [1.0, flat, 1.0] * 10.0 ** generator.integers(-3, 4)
     expected = np.linalg.svd(matrix, compute_uv=False)
     np.testing.assert_allclose(fixed_order.stretches(matrix), expected, rtol=1e-9, atol=1e-12 * expected[0])
-    if expected[2] > 1e-6 * expected[0]:
-        identity = fixed_order.product(matrix, fixed_order.inverse(matrix))
-        np.testing.assert_allclose(identity, np.eye(3), atol=1e-8)
 
 
 @pytest.mark.parametrize(

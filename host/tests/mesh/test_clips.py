@@ -64,6 +64,17 @@ def test_rest_of_nodes_that_do_not_bend_is_the_mesh_without_its_clip(tmp_path: P
     np.testing.assert_allclose(still.corner_normals, moving.corner_normals, atol=1e-12)
 
 
+def test_of_copies_of_a_mesh_one_is_animated(tmp_path: Path, mesh: Mesh) -> None:
+    document = arm()
+    shifts = document.add([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 5.0, 0.0]])
+    document.json["nodes"][5]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": shifts}}}
+    file = document.write(tmp_path / "a.gltf")
+    animated = load_mesh(file, animation="bend")
+    np.testing.assert_array_equal(animated.vertices, mesh.vertices)
+    assert [note for note in animated.notes if "2 copies of an animated mesh are not shown" in note]
+    assert len(load_mesh(file).faces) == len(mesh.faces) + 4
+
+
 def test_a_value_jumps_at_a_step(mesh: Mesh) -> None:
     assert mesh.clip is not None
     before, after = mesh.clip.pose(0.625, before=True), mesh.clip.pose(0.625)

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gltf_documents import READ
 
 from colonnade.common.errors import UserError
+from colonnade.mesh.files import gltf
 from colonnade.mesh.geometry.topology import subdivide
 from colonnade.mesh.load import clean_mesh, load_mesh
 
@@ -28,6 +30,14 @@ def test_vertices_merge_by_position_and_bad_faces_are_removed() -> None:
     assert mesh.source_faces.tolist() == [1]
     assert mesh.source_count == 5
     assert len(mesh.vertices) == 3
+
+
+def test_copies_of_a_mesh_have_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.gltf").write_bytes(READ["copies.gltf"])
+    assert len(load_mesh(tmp_path / "a.gltf").faces) == 3
+    monkeypatch.setattr(gltf, "MAX_TRIANGLES", 2)
+    with pytest.raises(UserError, match="it has more than 2 triangles: leave some out"):
+        load_mesh(tmp_path / "a.gltf")
 
 
 def test_normals_are_weighted_by_angle() -> None:

@@ -26,15 +26,6 @@ def rotations(quaternions: Floats) -> Floats:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-def cofactors(linear: Floats) -> Floats:
-    """What turns normals as ``linear`` [..., 3, 3] turns surfaces: its inverse transpose, times its determinant.
-
-    It exists for flat transforms, too.
-    """
-    x, y, z = (linear[..., i] for i in range(3))
-    return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)
-
-
 @dataclass(frozen=True)
 class Nodes:
     """A forest of coordinate systems.

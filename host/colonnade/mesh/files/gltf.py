@@ -17,15 +17,14 @@ from numpy.typing import NDArray
 from colonnade.common import fixed_order
 from colonnade.common.limits import MAX_TRIANGLES
 from colonnade.common.types import Floats, Indices
-from colonnade.common.vectors import unit_vectors
+from colonnade.common.vectors import cofactors, unit_vectors
 from colonnade.mesh import losses as lost
-from colonnade.mesh.clips.clip import cofactors
-from colonnade.mesh.files.gltf_checks import DRACO, READ_EXTENSIONS
+from colonnade.mesh.files.gltf_checks import DRACO, INSTANCING, READ_EXTENSIONS
 from colonnade.mesh.files.gltf_clip import ClipReader
 from colonnade.mesh.files.gltf_document import COMPRESSION, GltfDocument
 from colonnade.mesh.files.gltf_draco import DracoPrimitives, PrimitiveArrays
 from colonnade.mesh.files.gltf_metal import metal_of, of_map
-from colonnade.mesh.files.gltf_nodes import INSTANCING, mesh_nodes
+from colonnade.mesh.files.gltf_nodes import mesh_nodes
 from colonnade.mesh.files.gltf_relief import relief_of
 from colonnade.mesh.files.gltf_textures import GltfTextures
 from colonnade.mesh.files.resolver import References

@@ -10,6 +10,8 @@ from colonnade.common.errors import UserError
 from colonnade.mesh.materials.materials import USED_EXTENSIONS
 
 DRACO = "KHR_draco_mesh_compression"
+#: The extension of a node that has copies of its mesh.
+INSTANCING = "EXT_mesh_gpu_instancing"
 #: Extensions whose content is read, and checked.
 READ_EXTENSIONS = (
     *USED_EXTENSIONS,
@@ -19,7 +21,7 @@ READ_EXTENSIONS = (
     "KHR_materials_unlit",
     "KHR_texture_transform",
     "KHR_texture_basisu",
-    "EXT_mesh_gpu_instancing",
+    INSTANCING,
     "EXT_texture_webp",
     "EXT_texture_avif",
 )

@@ -12,9 +12,9 @@ from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.terminal_text import plain
 from colonnade.common.types import Floats, Indices
-from colonnade.common.vectors import unit_vectors
+from colonnade.common.vectors import cofactors, unit_vectors
 from colonnade.mesh import losses as lost
-from colonnade.mesh.clips.clip import INFLUENCES, Clip, Morphs, cofactors
+from colonnade.mesh.clips.clip import INFLUENCES, Clip, Morphs
 from colonnade.mesh.clips.tracks import Track
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.files.gltf_draco import PrimitiveArrays

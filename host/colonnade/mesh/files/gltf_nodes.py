@@ -13,11 +13,11 @@ from colonnade.common import fixed_order
 from colonnade.common.types import Floats
 from colonnade.mesh import losses as lost
 from colonnade.mesh.clips.clip import Nodes, rotations
+from colonnade.mesh.files.gltf_checks import INSTANCING
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.losses import Losses
 
-#: The extension of a node that has copies of its mesh, and components of its attributes.
-INSTANCING = "EXT_mesh_gpu_instancing"
+#: Components of the attributes of copies of a mesh.
 _OF_COPIES = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
 #: Copies of a mesh, at most.
 MAX_COPIES = 1 << 16
