@@ -44,7 +44,7 @@ COLUMN = (
 DEVICE = ("FrameController", "RegisterFile", "CounterFile", "SceneMemory")
 
 #: Modules of a device for rays of applications.
-QUERIES = ("RayQueries", "RunReader", "RayConverter", "HitConverter", "HitWriter")
+QUERIES = ("RayQueries", "RunReader", "RayRing", "RayConverter", "HitConverter", "HitWriter")
 BATCHES = ("BatchReader", "RayPort", *DEVICE)
 
 #: Dividers and square roots: parts of units that are synthesised separately and counted in their unit.

@@ -7,7 +7,7 @@ import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.RayBatch
 import colonnade.memory.DramPort
-import colonnade.query.{RayPort, Run}
+import colonnade.query.RayPort
 
 /** The device for rays in its AXI4 shell: registers by AXI4-Lite, images, batches, rays and hits by an AXI4 master, an
   * interrupt; docs/bus-shell.md. Its module and pins have the names of [[ColonnadeAxi]].
@@ -17,7 +17,7 @@ final class ColonnadeRaysAxi(config: ColonnadeConfig, shell: ShellConfig) extend
   override val desiredName: String = "ColonnadeAxi"
 
   private val idBits    = RayPort.idBits(config.array.columns + 1)
-  private val maxBursts = 2 * Run.blocks * (config.array.columns + 1) // more wait
+  private val maxBursts = 8 * (config.array.columns + 1) // more wait
 
   val registerPins = IO(AxiPins.lite(ShellMap.addressBits)).suggestName("s_axil")
   val masterPins   = IO(AxiPins.readsAndWrites(idBits, shell.busBytes)).suggestName("m_axi")

@@ -29,12 +29,12 @@ class ColonnadeRaysAxiSpec extends AnyFlatSpec with ChiselScalatestTester with M
     it should s"give the hits of the model, also after hostile batches and soft resets, $name" taggedAs tag in
       test(new ColonnadeRaysAxi(config, RayBatches.shell)).withAnnotations(Simulation.verilator) { dut =>
         val slow = new RayBatches(dut, config, stall = 60, maxDelay = 90, seed = 2)
-        info(s"253 rays of a slow memory in ${slow.run(Seq(66, 1, 20, 10, 65, 1, 4, 66, 20))} cycles")
+        info(s"509 rays of a slow memory in ${slow.run(Seq(66, 1, 20, 10, 65, 1, 4, 322, 20))} cycles")
         slow.refuses()
         slow.fuzz(if (tag == Matrix) 1000 else 8)
         if (tag == Matrix) {
           val fast = new RayBatches(dut, config, stall = 0, maxDelay = 3, seed = 1)
-          info(s"1154 rays in ${fast.run(Seq(130, 64, 200, 1, 65, 100, 200, 64, 330))} cycles")
+          info(s"1854 rays in ${fast.run(Seq(130, 64, 200, 1, 65, 100, 900, 64, 330))} cycles")
         }
       }
 }

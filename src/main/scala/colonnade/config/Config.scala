@@ -1,5 +1,7 @@
 package colonnade.config
 
+import chisel3.util.isPow2
+
 /** Shape of the array.
   *
   * @param rows     traversal units that share one column memory (N)
@@ -76,7 +78,7 @@ final case class GeometryConfig(
   * @param triangleLanes parallel triangle units of a group of rows
   * @param triangleRows  rows of a column in a group, which shares its triangle units
   * @param marches       environment marches of a column, if the device supports an environment
-  * @param pathContexts  pixels in flight in a column's path unit
+  * @param pathContexts  pixels in flight in a column's path unit; with frame.rays: its rays, a power of two from 64 on
   * @param rayInterval   most cycles between rays that ray set-up takes, while the rays that it has prepared are taken: 1
   *                      chooses a pipeline, 32 one ray after the other
   * @param shadeInterval most cycles of the shader for a light on a diffuse hit, while what it has shaded is taken and
@@ -98,7 +100,7 @@ final case class UnitsConfig(
   Require.within("units.triangleLanes", triangleLanes, 1, 4)
   Require.within("units.triangleRows", triangleRows, 1, UnitsConfig.maxTriangleRows)
   Require.within("units.marches", marches, 1, UnitsConfig.maxMarches)
-  Require.within("units.pathContexts", pathContexts, 1, UnitsConfig.maxPathContexts)
+  Require.within("units.pathContexts", pathContexts, 1, UnitsConfig.maxRayContexts)
   Require.oneOf("units.rayInterval", rayInterval, UnitsConfig.rayIntervals)
   Require.oneOf("units.shadeInterval", shadeInterval, UnitsConfig.shadeIntervals)
 }
@@ -106,6 +108,7 @@ final case class UnitsConfig(
 object UnitsConfig {
   val maxMarches:      Int = 16
   val maxPathContexts: Int = 256
+  val maxRayContexts:  Int = 1024
   val maxTriangleRows: Int = 16
 
   /** Intervals of sequential ray set-up and of the sequential shader, which hold at all formats. */
@@ -218,12 +221,21 @@ final case class ColonnadeConfig(
 
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
+  Require(
+    "units.pathContexts",
+    frame.rays || units.pathContexts <= UnitsConfig.maxPathContexts,
+    s"must be at most ${UnitsConfig.maxPathContexts} without frame.rays"
+  )
   if (frame.rays) {
     Require("frame.rays", !frame.hasInstances, "needs frame.instances=0")
     Require("frame.rays", frame.maxBounces == 0, "needs frame.maxBounces=0")
     Require("frame.rays", physicalAttributeMemory.isEmpty, "needs physicalAttributeMemory=null")
     Require("frame.rays", units.rayInterval == 1, "needs units.rayInterval=1")
-    Require("frame.rays", units.pathContexts == UnitsConfig.maxPathContexts, "needs units.pathContexts=256")
+    Require(
+      "frame.rays",
+      units.pathContexts >= 64 && isPow2(units.pathContexts),
+      "needs units.pathContexts of 64, 128, …"
+    )
     Require("frame.rays", numbers.gridBits <= 38, "needs geometry.triangleBits of at most 38")
     Require("frame.rays", numbers.directionBits <= 64, "needs precision.mac and frame.maxWidth for 64-bit directions")
   }

@@ -16,7 +16,7 @@ final class BatchReaderIO(columns: Int) extends Bundle {
   /** A batch starts; it is constant while its runs run, of which some end, or fail. */
   val start    = Output(Bool())
   val batch    = Output(new RayBatch)
-  val right    = Output(RaySensor.vector) // of its sensor
+  val sensor   = Output(new RaySensor) // of the batch
   val runs     = Decoupled(new Run)
   val resolved = Input(UInt(log2Ceil(2 * columns + 1).W))
   val failed   = Input(Bool())
@@ -53,7 +53,7 @@ final class BatchReader(columns: Int) extends Module {
   private val knows  = RegInit(false.B)   // the batch's sensor
   io.head   := head
   io.batch  := batch
-  io.right  := sensor.right
+  io.sensor := sensor
   io.isBusy := state =/= idle || io.tail =/= head
 
   // Read a batch, or its sensor
@@ -75,26 +75,45 @@ final class BatchReader(columns: Int) extends Module {
 
   // Hand out its runs
   private val count  = Mux(left > Run.rays.U, Run.rays.U, left)
-  private val hitLog = Mux(batch.response === RayBatch.hits, 10.U, Mux(batch.response === RayBatch.ranges, 9.U, 3.U))
   private val begins = io.runs.fire
-  private val column = Reg(UInt(32.W)) // of a sensor
+  private val column = Reg(UInt(32.W))                                 // of a sensor
   private val row    = Reg(RaySensor.vector)
   private val dir    = Reg(RaySensor.vector)
-  private val wraps  = column + Run.rays.U === sensor.columns
-  io.runs.valid      := state === running && left =/= 0.U
-  io.runs.bits.rays  := rays
-  io.runs.bits.hits  := hits
-  io.runs.bits.count := count
-  io.runs.bits.dir   := dir
+  private val band   = Reg(UInt(Axi.addressBits.W))                    // hits of its rows
+  private val isTile = Reg(Bool())
+  private val width  = Mux(isTile, Run.tileColumns.U, Run.rays.U)
+  private val wraps  = column + width === sensor.columns
+  private val hitLog = Mux(batch.response === RayBatch.hits, 4.U, 3.U) // of the bytes of a hit or a range
+
+  /** Rows of the sensor that have so many rays are traced in tiles, not those of occlusion. */
+  private def hasTiles(left: UInt): Bool =
+    batch.isSensor && batch.response =/= RayBatch.occluded && left >= (sensor.columns << log2Ceil(Run.tileRows))
+  io.runs.valid       := state === running && left =/= 0.U
+  io.runs.bits.rays   := rays
+  io.runs.bits.hits   := hits
+  io.runs.bits.count  := count
+  io.runs.bits.dir    := dir
+  io.runs.bits.isTile := isTile
   when(begins) {
-    left   := left - count
+    val rest = left - count
+    left   := rest
     rays   := rays + Mux(batch.isFan, (16 * Run.rays).U, (32 * Run.rays).U)
-    hits   := hits + (1.U << hitLog)
-    column := Mux(wraps, 0.U, column + Run.rays.U)
+    hits   := hits + Mux(batch.response === RayBatch.occluded, (Run.rays / 8).U, width << hitLog)
+    column := Mux(wraps, 0.U, column + width)
     for (axis <- 0 until 3) {
-      val next = row(axis) + sensor.down(axis)
+      val next = row(axis) + Mux(isTile, sensor.down(axis) << log2Ceil(Run.tileRows), sensor.down(axis))
       when(wraps) { row(axis) := next }
-      dir(axis) := Mux(wraps, next, dir(axis) + (sensor.right(axis) << log2Ceil(Run.rays)))
+      dir(axis) := Mux(
+        wraps,
+        next,
+        dir(axis) + (sensor.right(axis) << Mux(isTile, log2Ceil(Run.tileColumns).U, log2Ceil(Run.rays).U))
+      )
+    }
+    when(wraps) { isTile := hasTiles(rest) }
+    when(wraps && isTile) {
+      val next = band + (sensor.columns << log2Ceil(Run.tileRows) << hitLog)
+      band := next
+      hits := next
     }
   }
   inRuns := inRuns + begins - io.resolved
@@ -139,6 +158,8 @@ final class BatchReader(columns: Int) extends Module {
     left   := batch.count
     rays   := batch.rays
     hits   := batch.hits
+    band   := batch.hits
+    isTile := hasTiles(batch.count)
     failed := !isLegal
   }
   when(isDone) { state := writing }

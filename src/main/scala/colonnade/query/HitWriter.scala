@@ -8,11 +8,12 @@ import colonnade.formats.RayBatch
 /** Words of 8 bytes of a run: one, or two of a hit. */
 final class HitWords extends Bundle {
   val words  = UInt(128.W)
-  val isLast = Bool() // of the run
+  val isLast = Bool() // of consecutive ones
+  val isEnd  = Bool() // of the run
 }
 
 final class HitWriterIO extends Bundle {
-  val address = Input(UInt(Axi.addressBits.W)) // of the run's hits
+  val address = Input(UInt(Axi.addressBits.W)) // of consecutive hits
   val isWide  = Input(Bool())                  // words come in twos
   val hits    = Flipped(Decoupled(new HitWords))
   val axi     = new AxiWritePort(1, RayBatch.bytes)
@@ -23,7 +24,7 @@ final class HitWriterIO extends Bundle {
   val isIdle  = Output(Bool())
 }
 
-/** Writes the hits of runs, in order, by bursts of whole beats; a run's first and last beat may be partial. The beats of a
+/** Writes the hits of runs, in order, by bursts of whole beats; the first and last beat of consecutive ones may be partial. The beats of a
   * burst are complete before its address goes out, so that the port never waits for them.
   */
 final class HitWriter extends Module {
@@ -32,15 +33,16 @@ final class HitWriter extends Module {
   // Pack words into a beat
   private val beat     = Reg(Vec(8, UInt(64.W)))
   private val isFilled = RegInit(0.U(8.W))
-  private val position = RegInit(0.U(3.W))                            // in the run
+  private val position = RegInit(0.U(3.W))                                // of consecutive ones
   private val at       = position + io.address(5, 3)
   private val lanes    = Mux(io.isWide, UIntToOH(at) | UIntToOH(at | 1.U), UIntToOH(at))(7, 0)
   private val isFull   = lanes(7)
-  private val beats    = Module(new Queue(new PackedBeat, 2 * Run.burstBeats, useSyncReadMem = true)).io
-  private val isPushed = RegInit(false.B)                             // the beat is complete
+  private val beats    = Module(new Queue(new PackedBeat, HitWriter.runBeats, useSyncReadMem = true)).io
+  private val isPushed = RegInit(false.B)                                 // the beat is complete
   private val isLast   = Reg(Bool())
+  private val isEnd    = Reg(Bool())
   private val ends     = Module(new Queue(new PackedRun, 2)).io
-  private val count    = RegInit(0.U(log2Ceil(Run.burstBeats + 2).W)) // of the run's beats
+  private val count    = RegInit(0.U(log2Ceil(HitWriter.runBeats + 1).W)) // of their beats
   private val first    = Reg(UInt(Axi.addressBits.W))
   private val leaves   = isPushed && beats.enq.ready && (!isLast || ends.enq.ready)
   io.hits.ready := !isPushed || leaves
@@ -57,6 +59,7 @@ final class HitWriter extends Module {
     position := Mux(io.hits.bits.isLast, 0.U, position + Mux(io.isWide, 2.U, 1.U))
     isPushed := isFull || io.hits.bits.isLast
     isLast   := io.hits.bits.isLast
+    isEnd    := io.hits.bits.isEnd
     first    := io.address
   }
   beats.enq.valid         := leaves
@@ -65,12 +68,14 @@ final class HitWriter extends Module {
   ends.enq.valid          := leaves && isLast
   ends.enq.bits.address   := Cat(first >> 6, 0.U(6.W))
   ends.enq.bits.beats     := count + 1.U
+  ends.enq.bits.isEnd     := isEnd
 
-  // Write the beats of a run
+  // Write them
   private val address = Reg(UInt(Axi.addressBits.W))
-  private val left    = RegInit(0.U(log2Ceil(Run.burstBeats + 2).W)) // without an address
+  private val left    = RegInit(0.U(log2Ceil(HitWriter.runBeats + 1).W)) // without an address
   private val sending = RegInit(0.U(log2Ceil(Run.burstBeats + 1).W))
-  private val bursts  = Module(new Queue(Bool(), 8)).io              // awaited: the last one of its run
+  private val bursts  = Module(new Queue(Bool(), 8)).io                  // awaited: the last one of its run
+  private val endsRun = Reg(Bool())
   private val burst   = Run.beatsAt(address, left)
   private val aw      = io.axi.aw
   private val w       = io.axi.w
@@ -82,10 +87,11 @@ final class HitWriter extends Module {
   aw.bits.size     := Axi.size(RayBatch.bytes)
   aw.bits.burst    := Axi.incr
   bursts.enq.valid := aw.fire
-  bursts.enq.bits  := burst === left
+  bursts.enq.bits  := burst === left && endsRun
   when(ends.deq.fire) {
     address := ends.deq.bits.address
     left    := ends.deq.bits.beats
+    endsRun := ends.deq.bits.isEnd
   }
   when(aw.fire) {
     address := address + (burst << log2Ceil(RayBatch.bytes))
@@ -111,6 +117,12 @@ final class HitWriter extends Module {
   io.isIdle  := !isPushed && position === 0.U && !ends.deq.valid && left === 0.U && !bursts.deq.valid
 }
 
+private object HitWriter {
+
+  /** Beats of a run of hits, which begins with a beat. */
+  val runBeats: Int = Run.rays * 16 / RayBatch.bytes
+}
+
 final private class PackedBeat extends Bundle {
   val data     = UInt(Run.beatBits.W)
   val isFilled = UInt(8.W) // by word of 8 bytes
@@ -118,5 +130,6 @@ final private class PackedBeat extends Bundle {
 
 final private class PackedRun extends Bundle {
   val address = UInt(Axi.addressBits.W)
-  val beats   = UInt(log2Ceil(Run.burstBeats + 2).W)
+  val beats   = UInt(log2Ceil(HitWriter.runBeats + 1).W)
+  val isEnd   = Bool()
 }

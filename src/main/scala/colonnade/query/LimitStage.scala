@@ -2,7 +2,7 @@ package colonnade.query
 
 import chisel3._
 import chisel3.util.{Cat, Decoupled, RegEnable}
-import colonnade.config.NumberFormats
+import colonnade.config.PathConfig
 import colonnade.formats.RayPlacement
 import colonnade.numbers.{Float32, Rounding}
 
@@ -14,52 +14,42 @@ final class FloatLimits extends Bundle {
   val dominant = UInt(8.W) // its biased exponent
 }
 
-final class GridLimits(numbers: NumberFormats) extends Bundle {
-  val tMin = UInt((numbers.sceneBits + 1).W)
-  val tMax = UInt((numbers.sceneBits + 1).W)
-}
-
-final class LimitStageIO(numbers: NumberFormats) extends Bundle {
-  val exponent = Input(SInt(RayPlacement.exponentBits.W))
-  val in       = Flipped(Decoupled(new FloatLimits))
-  val out      = Decoupled(new GridLimits(numbers))
+final class LimitStageIO(config: PathConfig) extends Bundle {
+  val exponent = Input(SInt(RayPlacement.exponentBits.W)) // constant while a ray is in the unit
+  val in       = Flipped(Decoupled(new PlacedRay(config)))
+  val out      = Decoupled(new ConvertedRay(config))
 }
 
 /** Converts a ray's limits to grid steps: docs/numbers.md, section 9, rule 4.
   *
-  * One multiplier takes the halves of two products of 72 bits, one shifter drops their fractions. Limits take
-  * [[PositionStage.steps]] cycles at most; the next ones are accepted when the result is taken.
+  * One multiplier takes the halves of two products of 72 bits, one shifter drops their fractions. Throughput: a ray every
+  * [[PositionStage.interval]] cycles; latency: 8 cycles. All steps stand still while a result is not taken.
   */
-final class LimitStage(numbers: NumberFormats) extends Module {
-  val io = IO(new LimitStageIO(numbers))
+final class LimitStage(config: PathConfig) extends Module {
+  val io = IO(new LimitStageIO(config))
 
+  private val numbers   = config.numbers
   private val half      = Float32.mantissaBits
   private val totalBits = 3 * half
   private val limitBits = numbers.sceneBits + 1
-  private val last      = 7
 
   // A product in steps 0 and 1, and in 2 and 3; its fraction dropped in the step after next, and rounded in the next
-  private val step  = RegInit(last.U(3.W))
-  private val ready = RegInit(true.B)
-  private val ray   = Reg(new FloatLimits)
-  private val ends  = step === last.U
-  io.in.ready  := ready || io.out.fire
-  io.out.valid := ends && !ready
-  when(!ends) { step := step + 1.U }
-  when(io.out.fire) { ready := true.B }
-  when(io.in.fire) {
-    ray   := io.in.bits
-    step  := 0.U
-    ready := false.B
-  }
+  private val arrives = io.in.fire
+  private val step    = RegInit(VecInit.fill(8)(false.B))
+  private val moves   = !step.last || io.out.ready
+  private val placed  = RegEnable(io.in.bits, arrives)
+  private val ray     = placed.limits
+  io.in.ready  := moves && !step.take(PositionStage.interval - 1).reduce(_ || _)
+  io.out.valid := step.last
+  when(moves) { step.zip(arrives +: step).foreach { case (to, from) => to := from } }
 
-  private val product = held(Mux(step(1), ray.tFar, ray.tNear).mantissa *
-    Mux(step(0), ray.product(2 * half - 1, half), ray.product(half - 1, 0)))
+  private val product = held(Mux(step(2) || step(3), ray.tFar, ray.tNear).mantissa *
+    Mux(step(1) || step(3), ray.product(2 * half - 1, half), ray.product(half - 1, 0)))
   private val low   = held(product) // of the lower halves, where the product is of the upper ones
   private val total = held(Cat(product +& (low >> half).asUInt, low(half - 1, 0))(totalBits - 1, 0))
 
   // In grid steps, rounded down; the exponents of numbers of two bytes fit their sums
-  private val isNear = step === 3.U
+  private val isNear = step(3)
   private val limit  = Mux(isNear, ray.tNear, ray.tFar)
   private val offset = (3 * half + 2 * Float32.half).S(RayConverter.exponentBits.W)
   private val amount = offset - limit.biased.zext - ray.dominant.zext -
@@ -71,11 +61,16 @@ final class LimitStage(numbers: NumberFormats) extends Module {
   private val unlimited        = ((BigInt(1) << limitBits) - 1).U
   private val saturates        = held(isHuge)
   private val rounded          = Mux(saturates || (floored.andR && increment), unlimited, floored + increment)
-  private val result           = Reg(new GridLimits(numbers))
-  when(step === 4.U) { result.tMin := Mux(ray.tNear.isNegative || ray.tNear.isZero, 0.U, rounded) }
-  when(step === 6.U) { result.tMax := Mux(ray.tFar.isZero, 1.U, rounded) }
-  io.out.bits := result
+  private val tMin             = Reg(UInt(limitBits.W))
+  private val tMax             = Reg(UInt(limitBits.W))
+  private val last             = RegEnable(placed, moves && step(5)) // before the next ray comes
+  when(step(4)) { tMin := Mux(ray.tNear.isNegative || ray.tNear.isZero, 0.U, rounded) }
+  when(step(6)) { tMax := Mux(last.limits.tFar.isZero, 1.U, rounded) }
+  io.out.bits := last.converted
+  for (limit <- io.out.bits.request.limits) {
+    limit.tMin := tMin
+    limit.tMax := tMax
+  }
 
-  /** Holds while a result is offered. */
-  private def held[T <: Data](value: T): T = RegEnable(value, !ends)
+  private def held[T <: Data](value: T): T = RegEnable(value, moves)
 }

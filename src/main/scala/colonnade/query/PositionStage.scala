@@ -1,7 +1,7 @@
 package colonnade.query
 
 import chisel3._
-import chisel3.util.{Cat, Decoupled, RegEnable}
+import chisel3.util.{Cat, Decoupled, Mux1H, RegEnable}
 import colonnade.config.PathConfig
 import colonnade.formats.RayPlacement
 import colonnade.numbers.{Fixed, Float32, Rounding}
@@ -21,8 +21,9 @@ final class PositionStageIO(config: PathConfig) extends Bundle {
 
 /** Converts a ray's origin and direction: docs/numbers.md, section 9, rules 1 to 3, and the product of rule 4.
   *
-  * One component a cycle passes a shifter, a sum with `base` and a multiplier, which a last cycle uses for the product. A
-  * ray takes [[PositionStage.steps]] cycles; the next one is accepted when the result is taken.
+  * One component a cycle passes a shifter, a sum with `base` and a multiplier, which a last cycle uses for the product.
+  * Throughput: a ray every [[PositionStage.interval]] cycles; latency: [[PositionStage.steps]] cycles. All steps stand
+  * still while a result is not taken.
   */
 final class PositionStage(config: PathConfig) extends Module {
   import PositionStage._
@@ -33,35 +34,27 @@ final class PositionStage(config: PathConfig) extends Module {
   private val directionBits = numbers.directionBits
   private val half          = Float32.mantissaBits
 
-  // A ray, and its step: the component that the shifter has
-  private val step  = RegInit((steps - 1).U(4.W))
-  private val empty = RegInit(true.B)
-  private val ray   = Reg(new BatchRay(config))
-  private val ends  = step === (steps - 1).U
-  io.rays.ready   := empty || io.placed.fire
-  io.placed.valid := ends && !empty
-  when(!ends) { step := step + 1.U }
-  when(io.placed.fire) { empty := true.B }
-  when(io.rays.fire) {
-    ray   := io.rays.bits
-    step  := 0.U
-    empty := false.B
-  }
-  private val record  = ray.record
-  private val isFirst = step === 0.U
+  // The steps that have a ray: a ray comes when the one before it is through with its record
+  private val arrives = io.rays.fire
+  private val step    = RegInit(VecInit.fill(steps)(false.B))
+  private val moves   = !step.last || io.placed.ready
+  private val ray     = RegEnable(io.rays.bits, arrives)
+  io.rays.ready   := moves && !step.take(interval - 1).reduce(_ || _)
+  io.placed.valid := step.last
+  when(moves) { step.zip(arrives +: step).foreach { case (to, from) => to := from } }
+  private val record = ray.record
 
   // The largest component of the direction; rays that are none
   private val largest  = record.dir.reduce((a, b) => Mux(b.magnitude > a.magnitude, b, a))
-  private val dominant = RegEnable(largest, isFirst)
+  private val dominant = held(largest, 0)
   private val isFinite = (record.origin ++ record.dir).map(_.isFinite).reduce(_ && _)
   private val isEmpty  = record.tNear.isNan || record.tFar.isNan || !record.tNear.isAtMost(record.tFar) ||
     (record.tFar.isNegative && !record.tFar.isZero)
-  private val isRefused = RegEnable(!isFinite || isEmpty || largest.isZero, isFirst)
+  private val isRefused = held(!isFinite || isEmpty || largest.isZero, 0)
 
   // Shift a component: the mantissa is at the top of a fixed-point number, with a digit behind it for rounding
-  private val components   = VecInit(record.origin ++ record.dir)
-  private val component    = components(Mux(step > 5.U, 5.U, step)(2, 0))
-  private val isDirection  = step >= 3.U
+  private val component    = Mux1H(step.take(interval), record.origin ++ record.dir)
+  private val isDirection  = step.slice(3, interval).reduce(_ || _)
   private val gridExponent = RayConverter.gridExponent(numbers, io.placement.exponent)
   private val toOrigin     = (fixedBits + Float32.half - RayPlacement.fractionBits).S(RayConverter.exponentBits.W) -
     component.biased.zext - gridExponent
@@ -82,14 +75,12 @@ final class PositionStage(config: PathConfig) extends Module {
 
   // Positions: minus the base, times the scale; the product of two mantissas is the last one
   private val operandBits = numbers.gridBits + 6
-  private val bases       = VecInit(io.placement.base.axes)
-  private val base        = Mux(ray.isLocal, 0.S, bases((step - 2.U)(1, 0))) // read in steps 2 to 4
+  private val base        = Mux(ray.isLocal, 0.S, Mux1H(step.slice(2, 5), io.placement.base.axes))
   private val difference  = rounded -& base
   private val isDistant   = held(isHuge || Rounding.saturate(difference, operandBits) =/= difference)
   private val operand     = held(Rounding.narrow(difference, operandBits))
-  private val isProduct   = step === 6.U
   private val product     = held(
-    Mux(isProduct, dominant.mantissa.zext.pad(operandBits), operand) * io.placement.mantissa.zext
+    Mux(step(6), dominant.mantissa.zext.pad(operandBits), operand) * io.placement.mantissa.zext
   )
   private val wasDistant = held(isDistant)
   private val position   = Rounding.nearestEven(product, half + RayPlacement.fractionBits)
@@ -101,40 +92,47 @@ final class PositionStage(config: PathConfig) extends Module {
   private val scale    = Reg(UInt((2 * half).W))
   private val isTooFar = Reg(Bool())
   for (axis <- 0 until 3) {
-    when(step === (4 + axis).U) {
+    when(step(4 + axis)) {
       request.origin.axes(axis) := Fixed(request.origin.axes(axis).format, Rounding.narrow(position, numbers.sceneBits))
     }
-    when(step === (5 + axis).U) { request.dir.axes(axis) := Rounding.narrow(rounded, directionBits) }
+    when(step(5 + axis)) { request.dir.axes(axis) := Rounding.narrow(rounded, directionBits) }
   }
-  when(step >= 4.U && step <= 6.U) { isTooFar := (isTooFar && step =/= 4.U) || wasDistant || !isInRange }
-  when(step === 7.U) { scale := product.asUInt(2 * half - 1, 0) }
+  when(step.slice(4, 7).reduce(_ || _)) { isTooFar := (isTooFar && !step(4)) || wasDistant || !isInRange }
+  when(step(7)) { scale := product.asUInt(2 * half - 1, 0) }
 
-  private val converted = io.placed.bits.converted
+  // The rest of the ray, before the next one comes
+  private val last       = held(ray, 5)
+  private val length     = held(dominant, 6)
+  private val wasRefused = held(isRefused, 6)
+  private val converted  = io.placed.bits.converted
   converted.request          := request
-  converted.request.context  := ray.context
-  converted.request.isShadow := ray.isOccluded
-  for (direction <- converted.request.dir.axes) when(isRefused || isTooFar) { direction := 0.S }
+  converted.request.context  := last.context
+  converted.request.isShadow := last.isOccluded
+  for (direction <- converted.request.dir.axes) when(wasRefused || isTooFar) { direction := 0.S }
   for (limits <- converted.request.limits) {
     limits        := DontCare
-    limits.filter := ray.filter
+    limits.filter := last.filter
   }
-  converted.scale.dominant       := dominant
-  converted.scale.tFar           := record.tFar
-  converted.scale.isOutOfRange   := isTooFar && !isRefused
-  converted.isRefused            := isRefused
-  io.placed.bits.limits.tNear    := record.tNear
-  io.placed.bits.limits.tFar     := record.tFar
+  converted.scale.dominant       := length
+  converted.scale.tFar           := last.record.tFar
+  converted.scale.isOutOfRange   := isTooFar && !wasRefused
+  converted.isRefused            := wasRefused
+  io.placed.bits.limits.tNear    := last.record.tNear
+  io.placed.bits.limits.tFar     := last.record.tFar
   io.placed.bits.limits.product  := scale
-  io.placed.bits.limits.dominant := dominant.biased
+  io.placed.bits.limits.dominant := length.biased
 
-  /** Holds while a result is offered. */
-  private def held[T <: Data](value: T): T = RegEnable(value, !ends)
+  private def held[T <: Data](value: T): T = RegEnable(value, moves)
+
+  /** The value of a ray in a step, until that of the next one. */
+  private def held[T <: Data](value: T, in: Int): T = RegEnable(value, moves && step(in))
 }
 
 object PositionStage {
 
-  /** Cycles a ray. */
-  val steps: Int = 9
+  /** Cycles of a ray, and those between rays: a component each. */
+  val steps:    Int = 9
+  val interval: Int = 6
 
   /** Bits of a coordinate in fractions of a grid step. */
   private val fixedBits = 62

@@ -58,7 +58,7 @@ final class RayArray(config: ColonnadeConfig) extends Module {
   for ((column, index) <- columns.zipWithIndex) {
     column.registers := io.registers
     column.batch     := reader.batch
-    column.right     := reader.right
+    column.sensor    := reader.sensor
     column.start     := reader.start
     column.load      := load
     column.runs :<>= dispatch.takers(index)

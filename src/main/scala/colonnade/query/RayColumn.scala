@@ -28,7 +28,7 @@ final class RayColumnIO(config: ColonnadeConfig) extends Bundle {
 
   val registers = Input(new RayRegisters(config)) // constant while runs run, and so is the batch
   val batch     = Input(new RayBatch)
-  val right     = Input(RaySensor.vector)
+  val sensor    = Input(new RaySensor)
   val start     = Input(Bool())                   // before the first run of a batch
   val load      = Flipped(Valid(new Load(config)))
   val runs      = Flipped(Decoupled(new Run))
@@ -55,7 +55,7 @@ final class RayColumn(config: ColonnadeConfig) extends Module {
   private val controller = Module(new ColumnBvhController(config)).io
   private val rows       = new TraversalRows(config)
   queries.batch     := io.batch
-  queries.right     := io.right
+  queries.sensor    := io.sensor
   queries.placement := io.registers.placement
   queries.bounds    := io.registers.bounds
   queries.runs :<>= io.runs

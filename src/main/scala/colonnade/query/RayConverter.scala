@@ -1,7 +1,7 @@
 package colonnade.query
 
 import chisel3._
-import chisel3.util.{Decoupled, RegEnable}
+import chisel3.util.Decoupled
 import colonnade.common.Context
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{RayPlacement, RayRecord}
@@ -37,31 +37,19 @@ final class RayConverterIO(config: PathConfig) extends Bundle {
   val converted = Decoupled(new ConvertedRay(config))
 }
 
-/** Converts an application's rays to grid steps: docs/numbers.md, section 9. In order, a ray every [[PositionStage.steps]]
-  * cycles: [[PositionStage]] converts the positions, then [[LimitStage]] the limits.
+/** Converts an application's rays to grid steps: docs/numbers.md, section 9. In order, a ray every
+  * [[PositionStage.interval]] cycles: [[PositionStage]] converts the positions, then [[LimitStage]] the limits.
   */
 final class RayConverter(config: PathConfig) extends Module {
   val io = IO(new RayConverterIO(config))
 
   private val positions = Module(new PositionStage(config)).io
-  private val limits    = Module(new LimitStage(config.numbers)).io
+  private val limits    = Module(new LimitStage(config)).io
   positions.placement := io.placement
   limits.exponent     := io.placement.exponent
   positions.rays :<>= io.rays
-
-  // The limits of a ray, and the rest of it
-  private val placed = positions.placed
-  private val ray    = RegEnable(placed.bits.converted, placed.fire)
-  placed.ready       := limits.in.ready
-  limits.in.valid    := placed.valid
-  limits.in.bits     := placed.bits.limits
-  io.converted.valid := limits.out.valid
-  limits.out.ready   := io.converted.ready
-  io.converted.bits  := ray
-  for (limit <- io.converted.bits.request.limits) {
-    limit.tMin := limits.out.bits.tMin
-    limit.tMax := limits.out.bits.tMax
-  }
+  limits.in :<>= positions.placed
+  io.converted :<>= limits.out
 }
 
 object RayConverter {

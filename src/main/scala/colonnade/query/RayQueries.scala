@@ -1,8 +1,8 @@
 package colonnade.query
 
 import chisel3._
-import chisel3.util.{log2Ceil, Cat, Decoupled, Queue, RRArbiter, Valid}
-import colonnade.axi.{Axi, AxiReadPort, AxiWritePort}
+import chisel3.util.{log2Ceil, Decoupled, Queue, RRArbiter, Valid}
+import colonnade.axi.{AxiReadPort, AxiWritePort}
 import colonnade.common.{ContextTable, Dispatcher}
 import colonnade.config.PathConfig
 import colonnade.formats.{Bounds, RayBatch, RayPlacement, RaySensor}
@@ -10,10 +10,10 @@ import colonnade.ray.{PreparedRay, RaySetup}
 import colonnade.traversal.TriangleHit
 import colonnade.unit.TraceResult
 
-/** `batch`, `right` of its sensor, `placement` and `bounds` are constant while runs are in the unit. */
+/** `batch`, its `sensor`, `placement` and `bounds` are constant while runs are in the unit. */
 final class RayQueriesIO(config: PathConfig) extends Bundle {
   val batch     = Input(new RayBatch)
-  val right     = Input(RaySensor.vector)
+  val sensor    = Input(new RaySensor)
   val placement = Input(new RayPlacement)
   val bounds    = Input(new Bounds(config.numbers))
   val runs      = Flipped(Decoupled(new Run))
@@ -33,48 +33,43 @@ final class RayQueriesIO(config: PathConfig) extends Bundle {
   val refuses = Output(Bool())
 }
 
-/** Traces runs of rays: docs/rays.md, hardware. A run has a block of contexts, one for each of its rays, whose tables hold
-  * what is known of it. Blocks are filled, and written when all their rays have ended, in the order of runs.
+/** Traces runs of rays: docs/rays.md, hardware. A ray has a context, whose tables hold what is known of it: the next one of
+  * a ring, so that the hits of rays, which end in any order, are read in the order of rays.
   *
-  * A result is always accepted; a ray waits for a traversal unit, which waits for nothing here. So each block ends.
+  * A result is always accepted; a ray waits for a traversal unit, which waits for nothing here. So each ray ends.
   */
 final class RayQueries(config: PathConfig) extends Module {
   val io = IO(new RayQueriesIO(config))
 
   private val isOccluded = io.batch.response === RayBatch.occluded
 
-  // Blocks
-  private val blockBits = log2Ceil(Run.blocks)
-  private val rayBits   = log2Ceil(Run.rays)
-  private val head      = RegInit(0.U(blockBits.W))
-  private val tail      = RegInit(0.U(blockBits.W))
-  private val used      = RegInit(0.U(log2Ceil(Run.blocks + 1).W))
-  private val runs      = Reg(Vec(Run.blocks, new Run))
-  private val left      = Reg(Vec(Run.blocks, UInt(log2Ceil(Run.rays + 1).W))) // rays that have not ended
-  private val hasFailed = Reg(Vec(Run.blocks, Bool()))
-
-  // Read a run
+  // Read runs; their rays take contexts
   private val reader = Module(new RunReader(config)).io
-  private val begins = io.runs.fire
-  io.runs.ready     := reader.runs.ready && used =/= Run.blocks.U
-  reader.runs.valid := io.runs.valid && used =/= Run.blocks.U
-  reader.runs.bits  := io.runs.bits
-  reader.batch      := io.batch
-  reader.right      := io.right
-  reader.block      := head
+  private val ring   = Module(new RayRing(config)).io
+  io.runs.ready              := reader.runs.ready && ring.runs.ready
+  reader.runs.valid          := io.runs.valid && ring.runs.ready
+  reader.runs.bits           := io.runs.bits
+  ring.runs.valid            := io.runs.valid && reader.runs.ready
+  ring.runs.bits.hits        := io.runs.bits.hits
+  ring.runs.bits.count       := io.runs.bits.count
+  ring.runs.bits.isTile      := io.runs.bits.isTile
+  reader.batch               := io.batch
+  reader.sensor              := io.sensor
+  reader.context             := ring.next.bits
+  ring.issued.valid          := reader.rays.fire
+  ring.issued.bits.isLast    := reader.isLast
+  ring.issued.bits.hasFailed := reader.hasFailed
   io.read :<>= reader.axi
-  when(begins) {
-    head       := head + 1.U
-    runs(head) := io.runs.bits
-  }
 
-  // Convert its rays, and prepare them
+  // Convert them, and prepare them
   private val lanes     = Seq.fill(RayQueries.lanes(config))(Module(new RayConverter(config)).io)
   private val dispatch  = Module(new Dispatcher(new BatchRay(config), lanes.size)).io
   private val converted = Module(new RRArbiter(new ConvertedRay(config), lanes.size)).io
   private val setup     = Module(RaySetup(config)).io
   private val scales    = ContextTable(config, new RayScale)
-  dispatch.items :<>= reader.rays
+  dispatch.items.valid := reader.rays.valid && ring.next.valid
+  dispatch.items.bits  := reader.rays.bits
+  reader.rays.ready    := dispatch.items.ready && ring.next.valid
   for (((lane, taker), result) <- lanes.zip(dispatch.takers).zip(converted.in)) {
     lane.placement := io.placement
     lane.rays :<>= taker
@@ -108,66 +103,42 @@ final class RayQueries(config: PathConfig) extends Module {
     result.isClear := io.results.bits.isClear.get
     results.write(io.results.bits.context, result)
   }
-  for (block <- 0 until Run.blocks) {
-    def isIn(valid: Bool, context: UInt) = valid && Run.block(context) === block.U
-    left(block) := left(block) - (isIn(io.results.valid, io.results.bits.context) +& isIn(misses, prepared.context))
-    when(reader.failed.valid && reader.failed.bits === block.U) { hasFailed(block) := true.B }
-    when(begins && head === block.U) {
-      left(block)      := io.runs.bits.count
-      hasFailed(block) := false.B
-    }
-  }
+  ring.ends(0).valid := io.results.valid
+  ring.ends(0).bits  := io.results.bits.context
+  ring.ends(1).valid := misses
+  ring.ends(1).bits  := prepared.context
 
-  // Read the tables of the oldest block when all its rays have ended
-  private val isComplete = used =/= 0.U && left(tail) === 0.U
-  private val drops      = isComplete && hasFailed(tail)
-  private val index      = RegInit(0.U(rayBits.W))
-  private val entry      = Reg(new TracedHit(config))
-  private val hasEntry   = RegInit(false.B)
-  private val entryReady = Wire(Bool())
-  private val writing    = Module(new Queue(new WrittenRun, 4)).io
-  private val reads      = Wire(Bool())
-  private val isRead     = RegNext(reads, false.B)
-  private val isFirst    = index === 0.U
-  private val isLast     = index +& 1.U === runs(tail).count
-  private val context    = Cat(tail, index)
-  reads             := isComplete && !drops && !isRead && (!hasEntry || entryReady) && (!isFirst || writing.enq.ready)
-  writing.enq.valid := reads && isFirst
-  writing.enq.bits.hits  := runs(tail).hits
-  writing.enq.bits.count := runs(tail).count
-  private val frees = drops || (reads && isLast)
-  used := used + begins - frees
-  when(reads) { index := Mux(isLast, 0.U, index + 1.U) }
-  when(frees) { tail := tail + 1.U }
-  when(entryReady) { hasEntry := false.B }
-  private val (scale, from, result) =
-    (scales.read(context, reads), entries.read(context, reads), results.read(context, reads))
-  when(isRead) {
-    hasEntry         := true.B
-    entry.scale      := scale
-    entry.hasHit     := from.enters && result.hasHit
-    entry.tEntry     := from.t
-    entry.hit        := result.hit
-    entry.isClear    := result.isClear
-    entry.hasWeights := io.batch.response === RayBatch.hits
-  }
+  // What has become of the oldest ray
+  private val traced  = Wire(new TracedHit(config))
+  private val ended   = ring.rays.bits
+  private val writing = Module(new Queue(new PlacedRun, 4)).io
+  private val offers  = ring.rays.valid && !ended.drops && (!ended.isFirst || writing.enq.ready)
+  private val isReady = Wire(Bool())
+  private val drops   = ring.rays.fire && ended.drops && ended.isLast
+  ring.rays.ready   := ended.drops || (isReady && (!ended.isFirst || writing.enq.ready))
+  writing.enq.valid := ring.rays.fire && !ended.drops && ended.isFirst
+  writing.enq.bits  := ended.run
+  private def read[T <: Data](table: SyncReadMem[T]): T = table.read(ring.read.bits, ring.read.valid)
+  private val (scale, from, result) = (read(scales), read(entries), read(results))
+  traced.scale      := scale
+  traced.hasHit     := from.enters && result.hasHit
+  traced.tEntry     := from.t
+  traced.hit        := result.hit
+  traced.isClear    := result.isClear
+  traced.hasWeights := io.batch.response === RayBatch.hits
 
   // Occluded rays: a bit each
-  private val position  = RegInit(0.U(rayBits.W)) // in the run
-  private val isEnd     = position +& 1.U === writing.deq.bits.count
   private val bits      = RegInit(0.U(Run.rays.W))
   private val hasWord   = RegInit(false.B)
   private val converter = Module(new HitConverter(config)).io
   private val writer    = Module(new HitWriter).io
   converter.placement  := io.placement
-  converter.hits.valid := hasEntry && !isOccluded
-  converter.hits.bits  := entry
-  entryReady           := hasEntry && Mux(isOccluded, !hasWord, converter.hits.ready)
-  private val passes = Mux(isOccluded, entryReady, writer.hits.fire)
-  when(passes) { position := Mux(isEnd, 0.U, position + 1.U) }
-  when(entryReady && isOccluded) {
-    bits    := bits | (entry.hasHit << position)
-    hasWord := isEnd
+  converter.hits.valid := offers && !isOccluded
+  converter.hits.bits  := traced
+  isReady              := Mux(isOccluded, !hasWord, converter.hits.ready)
+  when(offers && isOccluded && !hasWord) {
+    bits    := bits | (traced.hasHit << ended.index)
+    hasWord := ended.isLast
   }
   when(writer.hits.fire && isOccluded) {
     bits    := 0.U
@@ -175,13 +146,22 @@ final class RayQueries(config: PathConfig) extends Module {
   }
 
   // Write
-  writer.address          := writing.deq.bits.hits
+  private val position = RegInit(0.U(log2Ceil(Run.rays).W))    // in the run
+  private val isEnd    = position +& 1.U === writing.deq.bits.count
+  private val isRow    = writing.deq.bits.isTile && position(log2Ceil(Run.tileColumns) - 1, 0).andR
+  private val offset   = RegInit(0.U(RayQueries.offsetBits.W)) // of a row of a tile
+  when(writer.hits.fire && !isOccluded) { position := Mux(isEnd, 0.U, position + 1.U) }
+  when(writer.hits.fire && isRow) {
+    offset := Mux(isEnd, 0.U, offset + (io.sensor.columns << Mux(writer.isWide, 4.U, 3.U)))
+  }
+  writer.address          := writing.deq.bits.hits + offset
   writer.isWide           := io.batch.response === RayBatch.hits
   writer.hits.valid       := Mux(isOccluded, hasWord, converter.records.valid)
   writer.hits.bits.words  := Mux(isOccluded, bits, converter.records.bits.asUInt)
-  writer.hits.bits.isLast := isOccluded || isEnd
+  writer.hits.bits.isLast := isOccluded || isEnd || isRow
+  writer.hits.bits.isEnd  := isOccluded || isEnd
   converter.records.ready := writer.hits.ready && !isOccluded
-  writing.deq.ready       := writer.hits.fire && writer.hits.bits.isLast
+  writing.deq.ready       := writer.hits.fire && writer.hits.bits.isEnd
   io.write :<>= writer.axi
   io.resolved := writer.written +& writer.failed +& drops
   io.failed   := writer.failed || drops
@@ -189,13 +169,11 @@ final class RayQueries(config: PathConfig) extends Module {
 
 object RayQueries {
 
-  /** Converters of rays: enough for a ray of each traversal unit every 23 cycles. */
-  def lanes(config: PathConfig): Int = (2 * config.array.rows / 5).max(2)
-}
+  /** Of a tile's last row: three rows of a sensor of the most rays. */
+  private val offsetBits = log2Ceil((Run.tileRows - 1) * 16 * RayBatch.maxCount + 1)
 
-final private class WrittenRun extends Bundle {
-  val hits  = UInt(Axi.addressBits.W)
-  val count = UInt(log2Ceil(Run.rays + 1).W)
+  /** Converters of rays: enough for a ray of each traversal unit every 15 cycles. */
+  def lanes(config: PathConfig): Int = (2 * config.array.rows / 5).max(2)
 }
 
 final private class RayEntryPoint(config: PathConfig) extends Bundle {

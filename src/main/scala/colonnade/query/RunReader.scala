@@ -1,25 +1,30 @@
 package colonnade.query
 
 import chisel3._
-import chisel3.util.{log2Ceil, Cat, Decoupled, Queue, Valid}
+import chisel3.util.{log2Ceil, Cat, Decoupled, Queue}
 import colonnade.axi.{Axi, AxiReadPort}
+import colonnade.common.Context
 import colonnade.config.PathConfig
 import colonnade.formats.{RayBatch, RayRecord, RaySensor}
 
-/** Consecutive rays of a batch, as many as a block of hits holds. */
+/** Rays of a batch: consecutive ones, or a tile of a sensor, row by row. */
 final class Run extends Bundle {
-  val rays  = UInt(Axi.addressBits.W)
-  val hits  = UInt(Axi.addressBits.W)
-  val count = UInt(log2Ceil(Run.rays + 1).W)
-  val dir   = RaySensor.vector // of the first ray of a sensor
+  val rays   = UInt(Axi.addressBits.W)
+  val hits   = UInt(Axi.addressBits.W)
+  val count  = UInt(log2Ceil(Run.rays + 1).W)
+  val dir    = RaySensor.vector // of the first ray of a sensor
+  val isTile = Bool()
 }
 
 object Run {
-  val rays:   Int = 64
-  val blocks: Int = 4
+  val rays: Int = 64
+
+  /** Columns and rows of a tile. */
+  val tileColumns: Int = 16
+  val tileRows:    Int = rays / tileColumns
 
   /** Beats of a burst, which begins at any and ends at a multiple of this length: it crosses no 4 KB. */
-  val burstBeats: Int = 16
+  val burstBeats: Int = 8
   val beatBits:   Int = 8 * RayBatch.bytes
 
   /** Beats up to the end of a burst at an address. */
@@ -28,20 +33,19 @@ object Run {
     val most = burstBeats.U -& address(low + log2Ceil(burstBeats) - 1, low)
     Mux(left < most, left, most)
   }
-
-  def block(context: UInt): UInt = context(log2Ceil(rays * blocks) - 1, log2Ceil(rays))
 }
 
 final class RunReaderIO(config: PathConfig) extends Bundle {
-  val batch = Input(new RayBatch)                 // constant while its runs are read
-  val runs  = Flipped(Decoupled(new Run))
-  val block = Input(UInt(log2Ceil(Run.blocks).W)) // of the run
-  val right = Input(RaySensor.vector)             // of the batch's sensor
-  val axi   = new AxiReadPort(1, RayBatch.bytes)
-  val rays  = Decoupled(new BatchRay(config))
+  val batch   = Input(new RayBatch)    // constant while its runs are read
+  val runs    = Flipped(Decoupled(new Run))
+  val sensor  = Input(new RaySensor)   // of the batch
+  val axi     = new AxiReadPort(1, RayBatch.bytes)
+  val rays    = Decoupled(new BatchRay(config))
+  val context = Input(Context(config)) // of the ray that comes out
 
-  /** A read of the block's rays has failed. */
-  val failed = Valid(UInt(log2Ceil(Run.blocks).W))
+  /** The ray is the last one of its run; it comes with rays that could not be read. */
+  val isLast    = Output(Bool())
+  val hasFailed = Output(Bool())
 }
 
 /** Reads the rays of runs by bursts, or makes those of a sensor. A burst is read when all its beats have a place, so that
@@ -58,22 +62,21 @@ final class RunReader(config: PathConfig) extends Module {
   private val address  = Reg(UInt(Axi.addressBits.W))
   private val left     = RegInit(0.U(log2Ceil(Run.rays + 1).W))
   private val reserved = RegInit(0.U(log2Ceil(queueDepth + 1).W))
-  private val begun    = Module(new Queue(new BegunRun, Run.blocks)).io
+  private val begun    = Module(new Queue(UInt(log2Ceil(Run.rays + 1).W), aheadRuns)).io
   private val beats    = Module(new Queue(new ReadBeat, queueDepth, useSyncReadMem = true)).io
   private val burst    = Run.beatsAt(address, left)
   private val ar       = io.axi.ar
   private val sensor   = Module(new SensorReader).io
   private val isSensor = io.batch.isSensor
-  io.runs.ready        := Mux(isSensor, sensor.runs.ready, left === 0.U && begun.enq.ready)
-  begun.enq.valid      := io.runs.valid && left === 0.U && !isSensor
-  begun.enq.bits.block := io.block
-  begun.enq.bits.count := io.runs.bits.count
-  ar.valid             := left =/= 0.U && reserved +& burst <= queueDepth.U
-  ar.bits.id           := 0.U
-  ar.bits.addr         := address
-  ar.bits.len          := burst - 1.U
-  ar.bits.size         := Axi.size(RayBatch.bytes)
-  ar.bits.burst        := Axi.incr
+  io.runs.ready   := Mux(isSensor, sensor.runs.ready, left === 0.U && begun.enq.ready)
+  begun.enq.valid := io.runs.valid && left === 0.U && !isSensor
+  begun.enq.bits  := io.runs.bits.count
+  ar.valid        := left =/= 0.U && reserved +& burst <= queueDepth.U
+  ar.bits.id      := 0.U
+  ar.bits.addr    := address
+  ar.bits.len     := burst - 1.U
+  ar.bits.size    := Axi.size(RayBatch.bytes)
+  ar.bits.burst   := Axi.incr
   when(ar.fire) {
     address := address + (burst << log2Ceil(RayBatch.bytes))
     left    := left - burst
@@ -93,23 +96,20 @@ final class RunReader(config: PathConfig) extends Module {
 
   // Rays
   private val index    = RegInit(0.U(log2Ceil(Run.rays).W))
-  private val run      = begun.deq.bits
-  private val isLast   = index +& 1.U === run.count
+  private val isLast   = index +& 1.U === begun.deq.bits
   private val slot     = Mux(isFan, index(1, 0), index(0) ## 0.U(1.W))
   private val quarters = VecInit(Seq.tabulate(4)(i => beats.deq.bits.data(128 * i + 127, 128 * i)))
   private val ofBatch  = Cat(io.batch.tNear.asUInt, io.batch.origin.asUInt)
-  private val made     = Cat(io.batch.tFar.asUInt, sensor.rays.bits.dir.asUInt)
+  private val made     = Cat(io.batch.tFar.asUInt, sensor.directions.bits.asUInt)
   private val record   =
     Mux(isFan || isSensor, Cat(Mux(isSensor, made, quarters(slot)), ofBatch), Cat(quarters(slot | 1.U), quarters(slot)))
-  sensor.right      := io.right
-  sensor.block      := io.block
-  sensor.runs.valid := io.runs.valid && isSensor
-  sensor.runs.bits  := io.runs.bits
-  sensor.rays.ready := io.rays.ready
+  sensor.sensor           := io.sensor
+  sensor.runs.valid       := io.runs.valid && isSensor
+  sensor.runs.bits        := io.runs.bits
+  sensor.directions.ready := io.rays.ready
   private val isRead = beats.deq.valid && begun.deq.valid
-  io.rays.valid        := isRead || sensor.rays.valid
-  io.rays.bits.context :=
-    Mux(isSensor, Cat(sensor.rays.bits.block, sensor.rays.bits.index), Cat(run.block, index))
+  io.rays.valid                    := isRead || sensor.directions.valid
+  io.rays.bits.context             := io.context
   io.rays.bits.isOccluded          := io.batch.response === RayBatch.occluded
   io.rays.bits.isLocal             := io.batch.isLocal
   io.rays.bits.filter.cullsFront   := io.batch.cullsFront
@@ -119,19 +119,17 @@ final class RunReader(config: PathConfig) extends Module {
   beats.deq.ready                  := isRead && io.rays.ready && (isLast || slot(1) && (slot(0) || !isFan))
   begun.deq.ready                  := isRead && io.rays.ready && isLast
   when(isRead && io.rays.ready) { index := Mux(isLast, 0.U, index + 1.U) }
-  io.failed.valid := beats.deq.fire && beats.deq.bits.isError
-  io.failed.bits  := run.block
+  io.isLast    := Mux(isSensor, sensor.isLast, isLast)
+  io.hasFailed := beats.deq.fire && beats.deq.bits.isError
 }
 
 object RunReader {
 
-  /** Beats that are read or awaited: a run's. */
+  /** Beats that are read or awaited. */
   private val queueDepth = 2 * Run.burstBeats
-}
 
-final private class BegunRun extends Bundle {
-  val block = UInt(log2Ceil(Run.blocks).W)
-  val count = UInt(log2Ceil(Run.rays + 1).W)
+  /** Runs that are read before their rays leave. */
+  private val aheadRuns = 2
 }
 
 final private class ReadBeat extends Bundle {

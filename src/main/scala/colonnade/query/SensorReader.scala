@@ -5,50 +5,50 @@ import chisel3.util.{log2Ceil, Decoupled, RegEnable}
 import colonnade.formats.RaySensor
 import colonnade.numbers.{Float32, Normalise}
 
-/** A ray of a sensor: its block and number in it, and its direction. */
-final class SensorRay extends Bundle {
-  val block = UInt(log2Ceil(Run.blocks).W)
-  val index = UInt(log2Ceil(Run.rays).W)
-  val dir   = Vec(3, new Float32)
-}
-
 final class SensorReaderIO extends Bundle {
-  val right = Input(RaySensor.vector)             // constant while rays are in the unit
-  val runs  = Flipped(Decoupled(new Run))
-  val block = Input(UInt(log2Ceil(Run.blocks).W)) // of the run
-  val rays  = Decoupled(new SensorRay)
+  val sensor     = Input(new RaySensor) // constant while rays are in the unit
+  val runs       = Flipped(Decoupled(new Run))
+  val directions = Decoupled(Vec(3, new Float32))
+  val isLast     = Output(Bool())       // of its run
 }
 
-/** Makes the rays of runs of a sensor, by an addition each: a ray a cycle, and a cycle between runs. */
+/** Makes the directions of runs of a sensor, by an addition each: one a cycle, and a cycle between runs. */
 final class SensorReader extends Module {
   val io = IO(new SensorReaderIO)
 
   // A sum a cycle
   private val left   = RegInit(0.U(log2Ceil(Run.rays + 1).W))
-  private val block  = RegEnable(io.block, io.runs.fire)
-  private val index  = Reg(UInt(log2Ceil(Run.rays).W))
   private val sums   = Reg(RaySensor.vector)
+  private val starts = Reg(RaySensor.vector) // of the tile's row
+  private val isTile = Reg(Bool())
+  private val column = Reg(UInt(log2Ceil(Run.tileColumns).W))
+  private val wraps  = isTile && column.andR
   private val makes  = left =/= 0.U
   private val valids = Seq.fill(3)(RegInit(false.B))
-  private val moves  = !valids.last || io.rays.ready
+  private val moves  = !valids.last || io.directions.ready
   io.runs.ready := !makes
   when(makes && moves) {
-    left  := left - 1.U
-    index := index + 1.U
-    sums.zip(io.right).foreach { case (sum, step) => sum := sum + step }
+    left   := left - 1.U
+    column := column + 1.U
+    for (axis <- 0 until 3) {
+      val sum = Mux(wraps, starts(axis), sums(axis)) + Mux(wraps, io.sensor.down(axis), io.sensor.right(axis))
+      sums(axis) := sum
+      when(wraps) { starts(axis) := sum }
+    }
   }
   when(io.runs.fire) {
-    left  := io.runs.bits.count
-    index := 0.U
-    sums  := io.runs.bits.dir
+    left   := io.runs.bits.count
+    sums   := io.runs.bits.dir
+    starts := io.runs.bits.dir
+    isTile := io.runs.bits.isTile
+    column := 0.U
   }
   when(moves) { valids.zip(makes +: valids).foreach { case (to, from) => to := from } }
 
   // Its magnitude, its leading digits, and the nearest float
-  io.rays.valid      := valids.last
-  io.rays.bits.block := Seq.iterate(block, 4)(load).last
-  io.rays.bits.index := Seq.iterate(index, 4)(load).last
-  for ((sum, float) <- sums.zip(io.rays.bits.dir)) {
+  io.directions.valid := valids.last
+  io.isLast           := Seq.iterate(left === 1.U, 4)(load).last
+  for ((sum, float) <- sums.zip(io.directions.bits)) {
     val width    = sum.getWidth
     val digits   = load(Normalise(load(Normalise.magnitude(sum.asSInt)), width))
     val rest     = digits.mantissa(width - Float32.mantissaBits - 1, 0)

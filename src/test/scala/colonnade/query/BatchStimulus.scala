@@ -65,7 +65,7 @@ final class BatchStimulus(config: ColonnadeConfig, random: Random) {
     val from   = origin()
     val ends   = Seq(random.nextInt(2) * edge / 2, if (random.nextInt(4) > 0) Double.PositiveInfinity else edge * 3)
     val shared = ((if (isLocal) from.zip(corner).map { case (at, low) => at - low } else from) ++ ends).map(word)
-    val rays   = if (form == 2) sensor(from)
+    val rays   = if (form == 2) sensor(from, if (count < 512) 64 else 128)
     else Seq.fill(count) {
       val start  = if (form == 1) from else origin()
       val target = corner.map(_ + edge * (0.2 + 0.6 * random.nextDouble()))
@@ -82,13 +82,12 @@ final class BatchStimulus(config: ColonnadeConfig, random: Random) {
   }
 
   /** Words of a sensor that looks at the cube: directions of any length, down to those of a few digits. */
-  private def sensor(from: Seq[Double]): Seq[BigInt] = {
+  private def sensor(from: Seq[Double], width: Int): Seq[BigInt] = {
     val scale                        = math.pow(2, random.nextInt(30))
     val look                         = from.zip(corner).map { case (at, low) => low + edge / 2 - at }
     val far                          = look.map(_.abs).max.max(edge)
     def units(value: Double): BigInt = BigInt(math.round(value / far * scale)) & 0xffffffffL
     val Seq(right, down)             = Seq.fill(2)(Seq.fill(3)(edge / 40 * (random.nextDouble() - 0.5)))
-    val width                        = 64 * (1 + random.nextInt(2))
     val first                        = look.zip(right).map { case (at, step) => at - 32 * step }
     Seq(first, right, down).flatMap(_.map(units)) ++ (BigInt(width) +: Seq.fill(6)(BigInt(0)))
   }
