@@ -1,6 +1,7 @@
 """A spinning LiDAR in a street: ranges of its beams by `colonnade.rays`, and a picture of the points (docs/rays.md).
 
-Usage: python examples/rays/lidar.py [--output PICTURE] [--beams N] [--columns N] [--config DESIGN] [--backend model]
+Usage: python examples/rays/lidar.py [--output PICTURE] [--beams N] [--columns N] [--config DESIGN]
+                                     [--backend model | simulated]   simulated: the device in its shell, on a bus
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ import numpy as np
 from colonnade.common.atomic_files import replacing
 from colonnade.common.processes import tool
 from colonnade.mesh.geometry import primitives
-from colonnade.rays import Scene
+from colonnade.rays import RayShell, Scene
 from numpy.typing import NDArray
 from PIL import Image
 
 Floats = NDArray[np.float64]
-#: What answers the rays.
-BACKENDS = ("model",)
+#: What answers the rays, and the design that it has unless another is named.
+BACKENDS = {"model": "edge", "simulated": "traversal"}
 #: Place of the sensor and its reach, metres; elevations of its lowest and highest beam, degrees.
 SENSOR, REACH, ELEVATIONS = (0.0, 0.0, 1.8), 120.0, (-24.8, 2.0)
 #: The camera of the picture and what it looks at, metres; half of its width at distance 1.
@@ -88,12 +89,17 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("lidar.png"))
     parser.add_argument("--beams", type=int, default=64)
     parser.add_argument("--columns", type=int, default=2048)
-    parser.add_argument("--config", default="edge")
+    parser.add_argument("--config")
     parser.add_argument("--backend", choices=BACKENDS, default="model")
     options = parser.parse_args()
-    scene, rays = Scene(*street(), options.config), turn(options.beams, options.columns)
+    config = options.config or BACKENDS[options.backend]
+    shell = RayShell.simulated(config) if options.backend == "simulated" else None
+    scene, rays = Scene(*street(), config, backend=shell or "model"), turn(options.beams, options.columns)
     hits = scene.closest(rays)
     found = hits.face >= 0
+    if shell is not None:
+        counters = shell.counters()
+        print(f"{counters['rays']:,} rays in {counters['cycles']:,} cycles of the device")
     print(f"{found.sum():,} of {len(rays):,} rays hit, {hits.t[found].min():.2f} to {hits.t[found].max():.2f} m")
     print(f"a vertex unit is {1000 * scene.unit:.1f} mm")
     with replacing(options.output) as stream:

@@ -164,12 +164,18 @@ final class ColonnadeAxi(
 private object ColonnadeAxi {
   val refitBursts: Int = 64 // of the refit unit that are under way, reads and writes each
 
-  /** Connects a guard to the one of its readers whose condition holds; the others see neither its addresses nor data. */
+  /** Connects a guard to the one of its readers whose condition holds; the others see neither its addresses nor data. A
+    * reader may have fewer ids.
+    */
   def shareReads(guard: AxiReadGuard, readers: Seq[(Bool, AxiReadPort)]): Unit = {
     val port = guard.io.inner
     port.ar.valid := VecInit(readers.map { case (isOn, reader) => isOn && reader.ar.valid }).asUInt.orR
-    port.ar.bits  := Mux1H(readers.map { case (isOn, reader) => isOn -> reader.ar.bits })
-    port.r.ready  := VecInit(readers.map { case (isOn, reader) => isOn && reader.r.ready }).asUInt.orR
+    port.ar.bits  := Mux1H(readers.map { case (isOn, reader) =>
+      val address = Wire(chiselTypeOf(port.ar.bits))
+      address := reader.ar.bits
+      isOn    -> address
+    })
+    port.r.ready := VecInit(readers.map { case (isOn, reader) => isOn && reader.r.ready }).asUInt.orR
     for ((isOn, reader) <- readers) {
       reader.ar.ready := isOn && port.ar.ready
       reader.r.valid  := isOn && port.r.valid

@@ -1,6 +1,7 @@
 package colonnade
 
 import chiseltest._
+import circt.stage.ChiselStage
 import colonnade.bus.ShellMap
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import colonnade.formats.{Access, RayBatch, RayPlacement, RegisterMap}
@@ -24,6 +25,10 @@ class ColonnadeRaysAxiSpec extends AnyFlatSpec with ChiselScalatestTester with M
   check("tiny", tiny, Always)
   check("two columns of two rows", small, Matrix)
   check("24-bit vertices", RayConfigs.withVertices(24, 32), Matrix)
+
+  it should "elaborate with several columns" in {
+    ChiselStage.emitCHIRRTL(new ColonnadeRaysAxi(small, RayBatches.shell)) should include("ColonnadeAxi")
+  }
 
   private def check(name: String, config: ColonnadeConfig, tag: Tag): Unit =
     it should s"give the hits of the model, also after hostile batches and soft resets, $name" taggedAs tag in

@@ -234,7 +234,7 @@ final case class ColonnadeConfig(
     Require(
       "frame.rays",
       units.pathContexts >= 64 && isPow2(units.pathContexts),
-      "needs units.pathContexts of 64, 128, …"
+      "needs units.pathContexts as a power of two from 64 on"
     )
     Require("frame.rays", numbers.gridBits <= 38, "needs geometry.triangleBits of at most 38")
     Require("frame.rays", numbers.directionBits <= 64, "needs precision.mac and frame.maxWidth for 64-bit directions")
