@@ -110,14 +110,14 @@ final class RayQueries(config: PathConfig) extends Module {
 
   // What has become of the oldest ray
   private val traced  = Wire(new TracedHit(config))
-  private val ended   = ring.rays.bits
+  private val oldest  = ring.rays.bits
   private val writing = Module(new Queue(new PlacedRun, 4)).io
-  private val offers  = ring.rays.valid && !ended.drops && (!ended.isFirst || writing.enq.ready)
+  private val offers  = ring.rays.valid && !oldest.drops && (!oldest.isFirst || writing.enq.ready)
   private val isReady = Wire(Bool())
-  private val drops   = ring.rays.fire && ended.drops && ended.isLast
-  ring.rays.ready   := ended.drops || (isReady && (!ended.isFirst || writing.enq.ready))
-  writing.enq.valid := ring.rays.fire && !ended.drops && ended.isFirst
-  writing.enq.bits  := ended.run
+  private val drops   = ring.rays.fire && oldest.drops && oldest.isLast
+  ring.rays.ready   := oldest.drops || (isReady && (!oldest.isFirst || writing.enq.ready))
+  writing.enq.valid := ring.rays.fire && !oldest.drops && oldest.isFirst
+  writing.enq.bits  := oldest.run
   private def read[T <: Data](table: SyncReadMem[T]): T = table.read(ring.read.bits, ring.read.valid)
   private val (scale, from, result) = (read(scales), read(entries), read(results))
   traced.scale      := scale
@@ -137,8 +137,8 @@ final class RayQueries(config: PathConfig) extends Module {
   converter.hits.bits  := traced
   isReady              := Mux(isOccluded, !hasWord, converter.hits.ready)
   when(offers && isOccluded && !hasWord) {
-    bits    := bits | (traced.hasHit << ended.index)
-    hasWord := ended.isLast
+    bits    := bits | (traced.hasHit << oldest.index)
+    hasWord := oldest.isLast
   }
   when(writer.hits.fire && isOccluded) {
     bits    := 0.U

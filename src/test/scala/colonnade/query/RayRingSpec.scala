@@ -19,28 +19,28 @@ class RayRingSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
     it should s"offer rays in their order, with $contexts contexts" in
       test(new RayRing(PathConfig(tiny.copy(units = tiny.units.copy(pathContexts = contexts)))))
         .withAnnotations(Simulation.verilator) { dut =>
-          val patient = new RingBench(dut, contexts, new Random(1), takes = 0.5)
+          val patient = new RingBench(dut, contexts, new Random(1), readiness = 0.5)
           patient.run(60)
-          patient.mostInFlight shouldBe contexts
-          val eager  = new RingBench(dut, contexts, new Random(2), takes = 1)
+          patient.maxInFlight shouldBe contexts
+          val eager  = new RingBench(dut, contexts, new Random(2), readiness = 1)
           val cycles = eager.run(60)
-          info(f"${eager.rays / cycles.toDouble}%.2f rays a cycle, of ${eager.mostInFlight} in flight at most")
+          info(f"${eager.rays / cycles.toDouble}%.2f rays a cycle, of ${eager.maxInFlight} in flight at most")
         }
 }
 
 /** Hands over runs of any length, and ends their rays by both ports. */
-private class RingBench(dut: RayRing, contexts: Int, random: Random, takes: Double) extends Matchers {
+private class RingBench(dut: RayRing, contexts: Int, random: Random, readiness: Double) extends Matchers {
   private case class Ray(run: Int, index: Int, context: Int)
 
-  private val counts    = mutable.ArrayBuffer[Int]()
-  private val failed    = mutable.Set[Int]()         // runs
-  private val issued    = mutable.Queue[Ray]()       // not taken, the oldest one first
-  private val traced    = mutable.ArrayBuffer[Ray]() // not ended
-  private val ended     = mutable.Set[Int]()         // contexts, as the unit knows of them
-  private var issuing   = (0, 0)                     // run and index of the ray that comes next
-  private var read      = Option.empty[Int]          // the context whose tables were read in the last cycle
-  var mostInFlight: Int = 0
-  var rays: Int         = 0
+  private val counts   = mutable.ArrayBuffer[Int]()
+  private val failed   = mutable.Set[Int]()         // runs
+  private val issued   = mutable.Queue[Ray]()       // not taken, the oldest one first
+  private val traced   = mutable.ArrayBuffer[Ray]() // not resolved
+  private val resolved = mutable.Set[Int]()         // contexts, as the unit knows of them
+  private var issuing  = (0, 0)                     // run and index of the ray that comes next
+  private var read     = Option.empty[Int]          // the context whose tables were read in the last cycle
+  var maxInFlight: Int = 0
+  var rays: Int        = 0
 
   /** @return cycles */
   def run(runs: Int): Int = {
@@ -56,7 +56,7 @@ private class RingBench(dut: RayRing, contexts: Int, random: Random, takes: Doub
       dut.io.runs.bits.count.poke(count)
       val accepts = hasRun && dut.io.runs.ready.peekBoolean()
 
-      // A ray takes the context that is offered
+      // A ray readiness the context that is offered
       val (run, index) = issuing
       val hasContext   = dut.io.next.valid.peekBoolean()
       val issues       = run < counts.size && hasContext && random.nextDouble() < 0.8
@@ -75,11 +75,11 @@ private class RingBench(dut: RayRing, contexts: Int, random: Random, takes: Doub
       }
 
       // The oldest one is taken
-      dut.io.rays.ready.poke(random.nextDouble() < takes)
+      dut.io.rays.ready.poke(random.nextDouble() < readiness)
       if (dut.io.rays.valid.peekBoolean()) {
         val oldest = issued.head
         read shouldBe Some(oldest.context)
-        ended should contain(oldest.context)
+        resolved should contain(oldest.context)
         val offered = dut.io.rays.bits
         offered.run.hits.peekInt() shouldBe oldest.run
         offered.run.count.peekInt() shouldBe counts(oldest.run)
@@ -89,7 +89,7 @@ private class RingBench(dut: RayRing, contexts: Int, random: Random, takes: Doub
         offered.drops.peekBoolean() shouldBe failed(oldest.run)
         if (dut.io.rays.ready.peekBoolean()) {
           issued.dequeue()
-          ended -= oldest.context
+          resolved -= oldest.context
           rays += 1
           if (oldest.index + 1 == counts(oldest.run)) taken += 1
         }
@@ -103,10 +103,10 @@ private class RingBench(dut: RayRing, contexts: Int, random: Random, takes: Doub
         traced += ray
         if (fails) failed += run
         issuing = if (isLast) (run + 1, 0) else (run, index + 1)
-        mostInFlight = mostInFlight.max(issued.size)
+        maxInFlight = maxInFlight.max(issued.size)
       }
       if (accepts) counts += count
-      ended ++= ends.flatten.map(_.context)
+      resolved ++= ends.flatten.map(_.context)
       dut.clock.step()
     }
     issued shouldBe empty
