@@ -145,6 +145,10 @@ def designs(data: Data) -> str:
     rows.append([f"`edge`, {MEGAHERTZ:g} MHz", *(text(own, key) for key in ("mrays", "mm2", "mraysPerMm2"))])
     at_clock = (text(own, key) for key in ("mraysAtClock", "mm2", "mraysPerMm2AtClock"))
     rows.append([f"`edge`, {text(own, 'mhz')} MHz, by its paths", *at_clock])
+    rays = data.result("ray-device")["kinds"][0]["in_box"] * MEGAHERTZ
+    area = data.result(AREA.format("traversal"))["levels"]["array"]["mm2_28nm"]
+    title = f"`traversal`, rays of a sensor, {MEGAHERTZ:g} MHz"
+    rows.append([title, f"{rays:.0f}", f"{area:.2f}", f"{rays / area:.0f}"])
     rows.append(["MMsRT ([2023](https://doi.org/10.1142/s021812662350192x)), by simulator", "82.9", "0.856", "97"])
     return markdown(["design", "in-box MRay/s", "mm² at 28 nm", "MRay/s/mm²"], rows)
 

@@ -251,7 +251,9 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         },
         "ray-device": {
             "rays": 1000,
-            "kinds": [{"kind": "near", "node_reads": 2.0, "triangle_tests": 1.0, "rays_per_cycle": 3.5}],
+            "kinds": [
+                {"kind": "near", "node_reads": 2.0, "triangle_tests": 1.0, "rays_per_cycle": 3.5, "in_box": 3.25}
+            ],
         },
         "ray-rates": {
             "rays": 1000,
@@ -371,6 +373,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "|near|900, 901|2,000|1|2.0|1.0|50|" in table(docs, "ray-rates")
     assert "|near|900, –|2,000|–|" in table(docs, "ray-rates")
     assert "|near|2.0|1.0|3.50|700|" in table(docs, "ray-device")
+    assert "|`traversal`, rays of a sensor, 200 MHz|650|" in table(docs, "designs")
     assert "|Room|97.0, 97.0, 97.0|" in table(docs, "rebuilds")
     live = table(docs, "live-rooms")
     assert "|r|0.050, 0.060|30.00, 30.00|1.25, 1.25|0.50, 0.50|97.8, 97.8|" in live
