@@ -1,7 +1,7 @@
 """A spinning LiDAR in a street: ranges of its beams by `colonnade.rays`, and a picture of the points (docs/rays.md).
 
 Usage: python examples/rays/lidar.py [--output PICTURE] [--beams N] [--columns N] [--config DESIGN]
-                                     [--backend model | simulated]   simulated: the device in its shell, on a bus
+                                     [--backend model | simulated]   simulated: a small device in its shell, on a bus
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 Floats = NDArray[np.float64]
-#: What answers the rays, and the design that it has unless another is named.
+#: What answers the rays, and the design that it has unless another is named; a simulator of few units is built soon.
 BACKENDS = {"model": "edge", "simulated": "traversal"}
+SMALL = ("array.rows=4", "array.columns=2", "units.triangleRows=4")
 #: Place of the sensor and its reach, metres; elevations of its lowest and highest beam, degrees.
 SENSOR, REACH, ELEVATIONS = (0.0, 0.0, 1.8), 120.0, (-24.8, 2.0)
 #: The camera of the picture and what it looks at, metres; half of its width at distance 1.
@@ -93,8 +94,10 @@ def main() -> None:
     parser.add_argument("--backend", choices=BACKENDS, default="model")
     options = parser.parse_args()
     config = options.config or BACKENDS[options.backend]
-    shell = RayShell.simulated(config) if options.backend == "simulated" else None
-    scene, rays = Scene(*street(), config, backend=shell or "model"), turn(options.beams, options.columns)
+    overrides = SMALL if config == "traversal" else ()
+    shell = RayShell.simulated(config, overrides) if options.backend == "simulated" else None
+    scene = Scene(*street(), config, overrides, backend=shell or "model")
+    rays = turn(options.beams, options.columns)
     hits = scene.closest(rays)
     found = hits.face >= 0
     if shell is not None:
