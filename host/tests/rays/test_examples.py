@@ -60,6 +60,15 @@ def test_the_lidar_draws_its_points(tmp_path: Path, run: Callable[..., str]) -> 
     assert colours is not None and 500 < sum(count for count, colour in colours if colour != (16, 18, 24)) < 8192
 
 
+@pytest.mark.matrix
+def test_the_lidar_sees_the_same_by_a_device_in_its_shell(tmp_path: Path, run: Callable[..., str]) -> None:
+    pictures = []
+    for backend in ("model", "simulated"):
+        pictures.append(tmp_path / f"{backend}.png")
+        run("lidar", "--beams", "8", "--columns", "256", "--backend", backend, "--output", pictures[-1])
+    assert pictures[0].read_bytes() == pictures[1].read_bytes()
+
+
 @pytest.mark.parametrize("mesh", ("torus:24", pytest.param("rock:20000", marks=pytest.mark.matrix)))
 def test_baked_occlusion_is_that_of_embree(tmp_path: Path, run: Callable[..., str], mesh: str) -> None:
     pytest.importorskip("embreex")
