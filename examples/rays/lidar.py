@@ -19,8 +19,10 @@ from PIL import Image
 
 Floats = NDArray[np.float64]
 #: What answers the rays, and the design that it has unless another is named; a simulator of few units is built soon.
-BACKENDS = {"model": "edge", "simulated": "traversal"}
-SMALL = ("array.rows=4", "array.columns=2", "units.triangleRows=4")
+BACKENDS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "model": ("edge", ()),
+    "simulated": ("traversal", ("array.rows=4", "array.columns=2", "units.triangleRows=4")),
+}
 #: Place of the sensor and its reach, metres; elevations of its lowest and highest beam, degrees.
 SENSOR, REACH, ELEVATIONS = (0.0, 0.0, 1.8), 120.0, (-24.8, 2.0)
 #: The camera of the picture and what it looks at, metres; half of its width at distance 1.
@@ -93,8 +95,7 @@ def main() -> None:
     parser.add_argument("--config")
     parser.add_argument("--backend", choices=BACKENDS, default="model")
     options = parser.parse_args()
-    config = options.config or BACKENDS[options.backend]
-    overrides = SMALL if config == "traversal" else ()
+    config, overrides = (options.config, ()) if options.config else BACKENDS[options.backend]
     shell = RayShell.simulated(config, overrides) if options.backend == "simulated" else None
     scene = Scene(*street(), config, overrides, backend=shell or "model")
     rays = turn(options.beams, options.columns)

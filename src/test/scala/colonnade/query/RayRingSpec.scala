@@ -56,7 +56,7 @@ private class RingBench(dut: RayRing, contexts: Int, random: Random, readiness: 
       dut.io.runs.bits.count.poke(count)
       val accepts = hasRun && dut.io.runs.ready.peekBoolean()
 
-      // A ray readiness the context that is offered
+      // A ray has the context that is offered
       val (run, index) = issuing
       val hasContext   = dut.io.next.valid.peekBoolean()
       val issues       = run < counts.size && hasContext && random.nextDouble() < 0.8
