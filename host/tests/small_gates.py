@@ -78,4 +78,4 @@ def recording(netlist: Netlist, cycles: list[tuple[int, int]]) -> Recording:
     def joined(ports: dict[str, Any]) -> tuple[Port, ...]:
         return tuple(Port(name, len(bits)) for name, bits in ports.items() if name != "clock")
 
-    return Recording(joined(netlist.inputs), joined(netlist.outputs), tuple(cycles), 0, {}, {})
+    return Recording(joined(netlist.inputs), joined(netlist.outputs), tuple(cycles), 0, {})

@@ -24,7 +24,14 @@ from colonnade.device.simulator_build import (
 )
 
 _TOP = "ColonnadeAxi"
-_SEQUENCES = ("axi_rules.hpp", "axi_slave.hpp", "axi_bench.hpp", "sequences.hpp")
+_SEQUENCES = (
+    "axi_rules.hpp",
+    "axi_slave.hpp",
+    "axi_bench.hpp",
+    "sequences.hpp",
+    "frame_sequences.hpp",
+    "batch_sequences.hpp",
+)
 _HARNESS = ("shell.cpp", "shell_memory.hpp", "bus_bytes.hpp", "dram.hpp", "dram_timing.hpp", *_SEQUENCES)
 
 

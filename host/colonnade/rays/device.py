@@ -9,12 +9,13 @@ import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
+from pathlib import Path
 
 from colonnade.common import processes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.config_name import Overrides
-from colonnade.design.generator import design_for
+from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.design.manifest import Register
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import HUGE_PAGES
@@ -65,6 +66,8 @@ class RayDevice(RayBackend):
         overrides: Settings of the design, "key=value".
         options: Options of the simulator, see `rays.cpp`.
         progress: Shows the building of the simulator.
+        design: Its Verilog; None: it is generated.
+        folder: The simulator's working directory.
 
     Raises:
         UserError: The design has no frame.rays, or a program is missing.
@@ -72,9 +75,15 @@ class RayDevice(RayBackend):
     """
 
     def __init__(
-        self, config: str, overrides: Overrides = (), options: Sequence[str] = (), progress: Progress = QUIET
+        self,
+        config: str,
+        overrides: Overrides = (),
+        options: Sequence[str] = (),
+        progress: Progress = QUIET,
+        design: GeneratedDesign | None = None,
+        folder: Path | None = None,
     ) -> None:
-        design = design_for(config, overrides, progress)
+        design = design or design_for(config, overrides, progress)
         if not design.manifest.config["frame"]["rays"]:
             raise UserError("the design traces no rays of applications: choose one with frame.rays, such as traversal")
         super().__init__(design.manifest.registers)
@@ -83,6 +92,7 @@ class RayDevice(RayBackend):
             process = stack.enter_context(
                 processes.started(
                     [program, *options],
+                    cwd=folder,
                     env=os.environ | HUGE_PAGES,
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,

@@ -23,7 +23,9 @@ _WORDS = {"rays": 0, "hits": 8, "done": 48}
 
 
 @dataclass(frozen=True)
-class _Records:
+class RayRecords:
+    """What a device for rays loads."""
+
     records: NDArray[np.uint8]
     attributes: tuple[LoadSection, ...] = ()
 
@@ -55,7 +57,7 @@ class RayShell(Shell, RayBackend):
     def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
         """See `RayBackend`."""
         self._before = self.counters()
-        self._ring = self._loaded(_Records(np.frombuffer(records, np.uint8).reshape(count, -1)))
+        self._ring = self._loaded(RayRecords(np.frombuffer(records, np.uint8).reshape(count, -1)))
         self._require_memory("the ring of batches", self._ring, PAGE_BYTES)
         low, high, base = (
             [values[f"{name}.{axis}"] for axis in "xyz"] for name in ("bounds.low", "bounds.high", "placement.base")

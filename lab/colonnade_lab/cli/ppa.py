@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from colonnade.cli.options import (
@@ -18,6 +18,11 @@ from colonnade.cli.options import (
     size_option,
     strict_option,
 )
+
+if TYPE_CHECKING:
+    from colonnade.design.manifest import Manifest
+
+    from colonnade_lab.ppa.power.workload import Workload
 
 
 @click.command()
@@ -52,12 +57,17 @@ from colonnade.cli.options import (
 @click.option("--mesh", default="teapot", show_default=True, metavar="MESH", help="Mesh of the power workload.")
 @size_option("Frame size of the power workload.  [default: small enough to replay the whole frame]")
 @click.option(
+    "--rays",
+    type=click.IntRange(1, 1 << 20),
+    metavar="N",
+    help="Rays of each batch of the power workload, for a device for rays.  [default: 2048]",
+)
+@click.option(
     "--cycles",
     type=click.IntRange(min=1),
-    default=16000,
-    show_default=True,
     metavar="N",
-    help="Maximum number of cycles to replay on the gate netlist, at some tens per second.",
+    help="Maximum number of cycles to replay on the gate netlist, at some tens per second.  [default: 16000 of a "
+    "frame, 200000 of a batch]",
 )
 @click.option(
     "--rates",
@@ -77,7 +87,8 @@ def ppa(
     megahertz: float,
     mesh: str,
     size: str | None,
-    cycles: int,
+    rays: int | None,
+    cycles: int | None,
     rates: Path | None,
     json_file: Path | None,
 ) -> None:
@@ -87,7 +98,8 @@ def ppa(
     area per bit; queues are flip-flops. Without --liberty the gates are Yosys's generic ones, without delays. Results
     are cached per unit: a second run takes seconds.
 
-    For power the RTL renders a frame, and the inputs of one traversal unit are replayed on its gate netlist.
+    For power the RTL renders a frame, or runs a batch of each kind of rays, and the inputs of one traversal unit are
+    replayed on its gate netlist.
     """
     from colonnade.common.frame_size import parse_size
 
@@ -106,16 +118,15 @@ def ppa(
 
     from colonnade_lab.ppa.equal_area import at_clock, at_equal_area, rates_of
     from colonnade_lab.ppa.measure import measure
-    from colonnade_lab.ppa.power.recording import Stimulus
     from colonnade_lab.ppa.power.report import Operation
     from colonnade_lab.ppa.summary import UnitTable, summary
 
     terminal = progress.for_terminal()
-    faster = None
-    if rates is not None:
-        faster = rates_of(rates, manifest_for(config, overrides, terminal).manifest.config_hash)
+    manifest = manifest_for(config, overrides, terminal).manifest
+    faster = None if rates is None else rates_of(rates, manifest.config_hash)
     table = UnitTable(echo)
-    operation = Operation(megahertz, Stimulus.of_benchmark(mesh, pixels, cycles)) if power else None
+    workloads = _workloads(manifest, mesh, pixels, rays, cycles) if power else ()
+    operation = Operation(megahertz, workloads) if power else None
     report: Mapping[str, Any] = measure(config, overrides, liberties, delay, operation, terminal, finished=table.print)
     for line in summary(report):
         echo(line)
@@ -123,6 +134,26 @@ def ppa(
         echo(at_equal_area(report, faster))
         echo(at_clock(report, faster))
     finish(report, json_file)
+
+
+def _workloads(
+    manifest: Manifest, mesh: str, size: tuple[int, int] | None, rays: int | None, cycles: int | None
+) -> Sequence[Workload]:
+    """A frame, or a batch of each kind."""
+    from colonnade.common.errors import UserError
+
+    from colonnade_lab.evaluation.ray_bench import KINDS
+    from colonnade_lab.ppa.power.batch import BatchWorkload
+    from colonnade_lab.ppa.power.frame import FrameWorkload
+
+    frame = FrameWorkload.of_benchmark(mesh, size, cycles or 16_000)
+    if not manifest.config["frame"]["rays"]:
+        if rays is not None:
+            raise UserError("--rays is for a device with frame.rays: leave it out")
+        return (frame,)
+    if size is not None:
+        raise UserError("--size is for a device that renders, and this one has frame.rays: give --rays")
+    return [BatchWorkload(frame.mesh, kind, rays or 2048, cycles or 200_000) for kind in KINDS]
 
 
 def _fpga(config: str, overrides: tuple[str, ...]) -> Mapping[str, Any]:

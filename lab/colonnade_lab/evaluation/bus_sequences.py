@@ -1,8 +1,12 @@
-"""Sequences at the bus of the AXI4 shell: each abuses it, then renders a frame, which must be the model's."""
+"""Sequences at the bus of the AXI4 shell: each abuses it, then does legal work, whose result must be the model's.
+
+The work is a frame, or of a device for rays a batch.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,15 +15,21 @@ from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import GeneratedDesign
+from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 from colonnade.device.bit_exact import render_model
 from colonnade.device.shell_build import build_shell_simulator
 from colonnade.device.verilator import run_program
 from colonnade.mesh.load import load_mesh
+from colonnade.rays import Scene, Sensor
+from colonnade.rays.device import RayBackend
+from colonnade.rays.scene import ALL_MASKS, FAN, OCCLUDED, SENSOR
+from colonnade.rays.shell import RayRecords
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.dram_image import PAGE_BYTES, dram_image
+from colonnade.scene_image.file import Loads
 from colonnade.scene_image.packer import pack
 
 _WIDTH, _HEIGHT, _FORMAT = 20, 6, 0
@@ -29,6 +39,10 @@ _WATCHDOG_CYCLES = 100_000
 _QUIET = ("frame.width", "frame.height", "frame.watchdogCycles", "dram.page")
 _UNWRITTEN = 0xA5
 _IMAGE, _FRAMEBUFFER, _SCENE, _MEMORY = 0x1000, 0x80000, 0x100000, 0x180000
+# Of batches: the window, and the ring in it (`batch_sequences.hpp`)
+_WINDOW, _WINDOW_BYTES, _RING, _RING_LOG = 0x80000, 0x33000, 0x1000, 5
+_RAY_REGISTERS = ("rays.tail", "rays.head", "errors.batch")
+_BATCHES = 180
 
 
 @dataclass(frozen=True)
@@ -38,12 +52,13 @@ class SequenceResult:
     Attributes:
         sequences: How many were run: all, or those up to the tenth that broke a rule.
         ended: Those whose abuse has ended.
-        exact: Those whose frame is the model's.
+        exact: Those whose frame, or hits, are the model's.
         violations: Rules of AXI or of the shell that were broken, each time.
         failed: Sequences that broke one.
         cycles: Simulated cycles.
         bursts: Bursts of the masters.
         accesses: Accesses to registers.
+        batches: Batches of rays that have ended.
         broken_rules: A line for each broken rule, with the sequence in which it was broken first.
     """
 
@@ -55,6 +70,7 @@ class SequenceResult:
     cycles: int
     bursts: int
     accesses: int
+    batches: int
     broken_rules: tuple[str, ...]
 
     @property
@@ -88,6 +104,34 @@ def _write_job(folder: Path, design: GeneratedDesign) -> int:
     """The job of the testbench and its files; the bytes of the bus."""
     manifest = design.manifest
     shell = json.loads((design.dir / "shell.json").read_text())
+    base = int(shell["deviceBase"])
+
+    def address(name: str) -> int:
+        return base + 4 * manifest.registers[name].address
+
+    write_work = _write_batches if manifest.config["frame"]["rays"] else _write_frame
+    image, values, lines = write_work(folder, manifest, address)
+    (folder / "image").write_bytes(device_image(image, manifest))
+    lines.append(f"image {_IMAGE} image")
+    if manifest.config["columnBvhMemory"]["cache"]:
+        (folder / "scene").write_bytes(dram_image(image, manifest))
+        values["dram.page"] = _SCENE // PAGE_BYTES
+        lines += [f"scene {_SCENE} scene", f"invalidate {address('control.invalidate')}"]
+    lines += [f"register {r['name']} {r['address']} {r['width']} {r['access']}" for r in shell["registers"]]
+    end = max(register.address + register.words for register in manifest.registers.values())
+    lines.append(f"device {address('control.start')} {base} {base + 4 * end}")
+    for name, value in values.items():
+        for word_address, word in manifest.registers[name].encode(value):
+            lines.append(f"frame {base + 4 * word_address} {word} {int(name not in _QUIET)}")
+    lines += [f"error {address(name)}" for name in manifest.registers if name.startswith("errors.")]
+    (folder / "job").write_text("\n".join(lines) + "\n")
+    return int(shell["busBytes"])
+
+
+def _write_frame(
+    folder: Path, manifest: Manifest, address: Callable[[str], int]
+) -> tuple[Loads, dict[str, int], list[str]]:
+    """A frame: its image, its registers, and lines of the job."""
     image = pack(load_mesh(_MESH), manifest)
     scene = load_scene(project_root() / "scenes" / "object.toml").with_mesh(_MESH)
     values = dict(frame_registers(scene, image.header, manifest, _WIDTH, _HEIGHT))
@@ -97,23 +141,55 @@ def _write_job(folder: Path, design: GeneratedDesign) -> int:
     stride = -(-_WIDTH // tile) * tile * PIXEL_BYTES[_FORMAT]
     expected = np.full((_HEIGHT, stride), _UNWRITTEN, np.uint8)
     expected[:, : _WIDTH * PIXEL_BYTES[_FORMAT]] = framebuffer_bytes(model, _FORMAT)
-    (folder / "image").write_bytes(device_image(image, manifest))
     (folder / "framebuffer").write_bytes(expected.tobytes())
-    lines = [f"image {_IMAGE} image", f"framebuffer {_FRAMEBUFFER} framebuffer {stride}"]
-    if manifest.config["columnBvhMemory"]["cache"]:
-        (folder / "scene").write_bytes(dram_image(image, manifest))
-        values["dram.page"] = _SCENE // PAGE_BYTES
-        lines.append(f"scene {_SCENE} scene")
-        invalidate = manifest.registers["control.invalidate"].address
-        lines.append(f"invalidate {int(shell['deviceBase']) + 4 * invalidate}")
-    lines += [f"register {r['name']} {r['address']} {r['width']} {r['access']}" for r in shell["registers"]]
-    base = int(shell["deviceBase"])
-    end = max(register.address + register.words for register in manifest.registers.values())
-    lines.append(f"device {base + 4 * manifest.registers['control.start'].address} {base} {base + 4 * end}")
-    for name, value in values.items():
-        for address, word in manifest.registers[name].encode(value):
-            lines.append(f"frame {base + 4 * address} {word} {int(name not in _QUIET)}")
-    errors = [register for name, register in manifest.registers.items() if name.startswith("errors.")]
-    lines += [f"error {base + 4 * register.address}" for register in errors]
-    (folder / "job").write_text("\n".join(lines) + "\n")
-    return int(shell["busBytes"])
+    return image, values, [f"framebuffer {_FRAMEBUFFER} framebuffer {stride}"]
+
+
+class _Asked(RayBackend):
+    """Keeps what a device is asked, and answers nothing."""
+
+    def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
+        """See `RayBackend`."""
+        self.values, self.records = dict(values), np.frombuffer(records, np.uint8).reshape(count, -1)
+
+    def submit(self, batch: bytes, rays: bytes, size: int) -> tuple[int, bytes]:
+        """See `RayBackend`."""
+        self.batch, self.rays = batch, rays
+        return int.from_bytes(batch[44:48], "little"), bytes(size)
+
+    def _word(self, address: int) -> int:
+        return 0
+
+
+def _write_batches(
+    folder: Path, manifest: Manifest, address: Callable[[str], int]
+) -> tuple[Loads, dict[str, int], list[str]]:
+    """Batches of rays: the image of their scene, its registers, and lines of the job."""
+    mesh, asked = load_mesh(_MESH), _Asked(manifest.registers)
+    design = json.dumps(manifest.config)
+    (folder / "design.json").write_text(design)
+    of_design = mesh.vertices, mesh.faces, str(folder / "design.json")
+    scenes = Scene(*of_design, backend=asked), Scene(*of_design)
+    window = _WINDOW, _WINDOW + _WINDOW_BYTES
+    lines = [" ".join(("rays", *(str(address(name)) for name in _RAY_REGISTERS), *map(str, window)))]
+    random = np.random.default_rng(1)
+    for number in range(_BATCHES):
+        way = random.normal(size=(60 if number % 10 == 0 else 1 + number % 13, 3))
+        start = 3 * way / np.linalg.norm(way, axis=1, keepdims=True)
+        target = random.uniform(-1.2, 1.2, start.shape) * np.abs(mesh.vertices).max(axis=0)
+        limits = np.zeros((len(way), 1)), np.full((len(way), 1), np.inf)
+        rays = np.hstack([start, limits[0], target - start, limits[1]]).astype(np.float32)
+        mode, origin = number // 9 % 3 | ALL_MASKS << 24, start[0]
+        form, count = SENSOR if number % 9 == 8 else (0, FAN)[number % 2], len(way)
+        records = np.ascontiguousarray(rays[:, 4:] if form == FAN else rays)
+        if form == SENSOR:
+            sensor = Sensor(tuple(origin), tuple(-origin - 0.5), (0.02, 0, 0.01), (0, 0.3, 0), 64, 2)
+            records, count = np.frombuffer(sensor.record(), np.uint8), 128 if mode & 3 == OCCLUDED else 64
+        hits = [scene.submit(records, count, mode | form, origin) for scene in scenes][1]
+        parts = {"batch": asked.batch, "rays": asked.rays, "hits": hits.tobytes()}
+        for part, content in parts.items():
+            (folder / f"{part}{number}").write_bytes(content)
+        lines.append(f"batch batch{number} rays{number} hits{number}")
+    values = {name: 0 for name, each in manifest.registers.items() if each.access == "rw" and name != "rays.tail"}
+    ring = {"ring.base": _WINDOW + _RING, "ring.sizeLog": _RING_LOG}
+    return RayRecords(asked.records), values | asked.values | ring, lines

@@ -14,6 +14,14 @@ from numpy.typing import NDArray
 
 from colonnade_lab.evaluation.rays import rays_of_kind
 
+#: Kinds of batches.
+KINDS = (
+    "sensor, ranges",
+    "sensor's rays from memory, hits",
+    "occlusion, in order",
+    "off the surface, shuffled, hits",
+    "from around, shuffled, hits",
+)
 #: Columns of the sensor; counters of what a ray reads.
 _WIDTH, _READS = 512, ("nodeReads", "triangleTests")
 
@@ -49,7 +57,7 @@ def sensor_of(mesh: Mesh, count: int) -> Sensor:
 
 
 def batches_of(mesh: Mesh, scene: Scene, count: int) -> dict[str, tuple[Callable[[Scene], NDArray[np.uint8]], int]]:
-    """Each kind: what runs its batch in a scene of the mesh and returns the bytes of its hits, and its rays.
+    """Each of `KINDS`: what runs its batch in a scene of the mesh and returns the bytes of its hits, and its rays.
 
     Args:
         mesh: The mesh.
@@ -67,16 +75,17 @@ def batches_of(mesh: Mesh, scene: Scene, count: int) -> dict[str, tuple[Callable
     def of_memory(rays: np.ndarray, mode: int = 0) -> Callable[[Scene], NDArray[np.uint8]]:
         return lambda scene: scene.submit(rays.astype(np.float32), len(rays), mode | masks)
 
-    return {
-        "sensor, ranges": (
-            lambda scene: scene.submit(sensor.record(), len(ways), masks | SENSOR | RANGES, sensor.origin),
-            len(ways),
-        ),
-        "sensor's rays from memory, hits": (of_memory(camera), len(ways)),
-        "occlusion, in order": (of_memory(occlusion[scene.order(occlusion)], OCCLUDED), count),
-        "off the surface, shuffled, hits": (of_memory(rays_of_kind("off the surface, shuffled", mesh, count)), count),
-        "from around, shuffled, hits": (of_memory(rays_of_kind("outside, shuffled", mesh, count)), count),
-    }
+    def of_sensor(scene: Scene) -> NDArray[np.uint8]:
+        return scene.submit(sensor.record(), len(ways), masks | SENSOR | RANGES, sensor.origin)
+
+    found = (
+        (of_sensor, len(ways)),
+        (of_memory(camera), len(ways)),
+        (of_memory(occlusion[scene.order(occlusion)], OCCLUDED), count),
+        (of_memory(rays_of_kind("off the surface, shuffled", mesh, count)), count),
+        (of_memory(rays_of_kind("outside, shuffled", mesh, count)), count),
+    )
+    return dict(zip(KINDS, found, strict=True))
 
 
 def measured(

@@ -116,10 +116,10 @@ def power(
 ) -> None:
     """Estimate the power of a row that renders a frame."""
     from colonnade_lab.ppa.measure import measure
-    from colonnade_lab.ppa.power.recording import Stimulus
+    from colonnade_lab.ppa.power.frame import FrameWorkload
     from colonnade_lab.ppa.power.report import Operation
 
-    operation = Operation(clock, Stimulus(scene, mesh, size, window))
+    operation = Operation(clock, (FrameWorkload(scene, mesh, size, window),))
     with _configuration(config) as path, _files(library) as files:
         report = measure(str(path), overrides, files, operation=operation)
     of_units = {name: unit.get("power_mw") for name, unit in report["units"].items()}

@@ -264,7 +264,7 @@ def catalog() -> dict[str, Entry]:
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),
         _area("tiny", "ASAP7"),
-        _area("traversal", "ASAP7", "--no-power"),
+        _area("traversal", "ASAP7", "--mesh", "armadillo"),
         _area("edge", "SKY130"),
         _bench("fpga", *_TWO, "--dram-latency", "15", "--dram-interval", "2"),
         _area("fpga", "ASAP7"),

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from colonnade_lab.common.markdown import markdown
 from colonnade_lab.figures.data import Data
 from colonnade_lab.figures.facts import AREA, MEGAHERTZ
+from colonnade_lab.ppa.power.sums import KINDS
 
 _TITLES = {
     "trimesh": "trimesh `test_ray.py`, `test_ray_upstream.py`, by ",
@@ -44,8 +45,9 @@ def rates(data: Data) -> str:
 
 
 def device(data: Data) -> str:
-    """Rays a cycle of the simulated `traversal` by kind, and those a second for its area."""
-    result, mm2 = data.result("ray-device"), data.result(AREA.format("traversal"))["levels"]["array"]["mm2_28nm"]
+    """Rays a cycle of the simulated `traversal` by kind, those a second for its area, and the energy of a ray."""
+    result, area = data.result("ray-device"), data.result(AREA.format("traversal"))
+    mm2, batches = area["levels"]["array"]["mm2_28nm"], {each["scene"]["kind"]: each for each in area["batches"]}
     rows = [
         [
             each["kind"],
@@ -53,11 +55,13 @@ def device(data: Data) -> str:
             f"{each['rays_per_cycle']:.2f}",
             f"{each['rays_per_cycle'] * MEGAHERTZ:,.0f}",
             f"{each['rays_per_cycle'] * MEGAHERTZ / mm2:,.0f}",
+            ", ".join(f"{batches[each['kind']][kind]['at_28nm']['energy_per_any_ray_nj']:.2f}" for kind in KINDS),
         ]
         for each in result["kinds"]
     ]
     titles = [f"rays, {result['rays']:,} of each kind", "nodes a ray", "triangles", "rays a cycle"]
-    return markdown([*titles, f"MRay/s at {MEGAHERTZ:g} MHz", f"a mm² at 28 nm, of {mm2:.2f}"], rows)
+    titles += [f"MRay/s at {MEGAHERTZ:g} MHz", f"a mm² at 28 nm, of {mm2:.2f}"]
+    return markdown([*titles, "nJ a ray without glitches, with"], rows)
 
 
 def _number(value: float | None, unit: int = 1) -> str:

@@ -15,7 +15,7 @@ from colonnade_lab.ppa.netlist import memories
 from colonnade_lab.ppa.netlist.hierarchy import LEVEL_NAMES, LEVELS, Hierarchy, Level, Memory
 from colonnade_lab.ppa.netlist.mapped import Netlist
 from colonnade_lab.ppa.netlist.synthesis import Technology, count_gates, require_yosys, synthesise, technology
-from colonnade_lab.ppa.power.recording import require_recordable
+from colonnade_lab.ppa.power.record import require_recordable
 from colonnade_lab.ppa.power.report import Operation, measure_power
 from colonnade_lab.ppa.timing import opensta
 from colonnade_lab.ppa.timing.static import Analysis, Timing, TimingPath, gates_by_name
@@ -40,7 +40,7 @@ def measure(
         overrides: Changes to the configuration, ``key.path=value``.
         liberties: Liberty files or folders; empty: Yosys's generic gates.
         delay: Target delay of abc, ns.
-        operation: Clock and frame for power, which needs liberties; None: no power.
+        operation: Clock and workloads for power, which needs liberties; None: no power.
         progress: Shows the steps.
         finished: See `Finished`.
 
@@ -52,7 +52,8 @@ def measure(
     design = black_boxed_design_for(config, overrides, progress)
     hierarchy = Hierarchy(design.dir)
     if tech.library and operation:
-        require_recordable(operation.stimulus, design.manifest)
+        for workload in operation.workloads:
+            require_recordable(workload, design.manifest)
     netlists: dict[str, Any] = {}
     units: dict[str, dict[str, Any]] = {}
     for level in hierarchy.levels:
@@ -66,9 +67,16 @@ def measure(
             finished(level.name, name, units[name])
     with progress.step("timing the whole traversal unit"):
         whole = _timing(Netlist(netlists, LEVELS[0].top, tech.library), tech) if tech.library else None
-    power = None
-    if tech.library and operation:
-        power = measure_power(design, config, overrides, hierarchy, netlists, tech, operation, progress)
+    power, batches = None, list[dict[str, Any]]()
+    for workload in operation.workloads if tech.library and operation else ():
+        assert operation is not None
+        found = measure_power(
+            design, config, overrides, hierarchy, netlists, tech, workload, operation.megahertz, progress
+        )
+        if design.manifest.config["frame"]["rays"]:
+            batches.append(found)
+            continue
+        power = found
         for name, of_unit in power.pop("units").items():
             units[name] |= of_unit
     array = design.manifest.config["array"]
@@ -100,6 +108,7 @@ def measure(
             "um2_per_gate": memories.CHIP_GATE_UM2,
         },
         "power": power,
+        "batches": batches,
         "power_mw": power["glitch_aware"]["total_mw"] if power else None,
         "energy_per_ray_nj": power["glitch_aware"]["energy_per_ray_nj"] if power else None,
     }

@@ -102,7 +102,9 @@ def summary(report: Mapping[str, Any]) -> Iterator[str]:
     if report["opensta"]:
         yield f"paths compared with OpenSTA: {format_opensta(report['opensta'])}"
     if report["power"]:
-        yield from power_lines(report)
+        yield from power_lines(report["power"], report["units"])
+    for batch in report["batches"]:
+        yield from power_lines(batch, batch["units"])
     yield ""
     yield f"kGE: {used['gates']}. Memories: {_rates()}; their kGE are area at {CHIP_NODE}."
     if used["liberty"]:

@@ -13,6 +13,7 @@ CACHE = {"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2,
 CACHE |= {"busBytes": 32, "parity": True}
 PLAIN, CACHED = ("array.columns=2",), ("array.columns=2", f"columnBvhMemory.cache={json.dumps(CACHE)}")
 
+RAYS = ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=64")
 IN_ROOM = ("array.columns=2", 'physicalAttributeMemory={"width":96,"height":72}', "frame.maxBounces=1")
 
 
@@ -32,3 +33,20 @@ def test_no_abuse_at_the_bus_breaks_a_rule_or_the_next_frame(overrides: tuple[st
     assert result.broken_rules == ()
     assert result.sequences == result.ended == result.exact == sequences
     assert result.is_right and result.bursts > 10 * sequences
+
+
+@pytest.mark.parametrize(
+    ("overrides", "sequences"),
+    [
+        pytest.param((), 25, id="records in memory"),
+        pytest.param((), 1_000, id="records in memory, many", marks=pytest.mark.matrix),
+        pytest.param(CACHED, 500, id="scene in DRAM, many", marks=pytest.mark.matrix),
+    ],
+)
+def test_no_abuse_at_the_bus_breaks_a_rule_or_the_batch_of_rays_that_follows(
+    overrides: tuple[str, ...], sequences: int
+) -> None:
+    result = run_sequences(shell_design_for("tiny", (*RAYS, *overrides), bus_bytes=64), sequences)
+    assert result.broken_rules == ()
+    assert result.sequences == result.ended == result.exact == sequences
+    assert result.batches > 400 * sequences

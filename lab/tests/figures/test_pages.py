@@ -16,6 +16,7 @@ from colonnade_lab.evaluation.bench import design_result, mesh_result
 from colonnade_lab.figures import pages
 from colonnade_lab.figures.catalog import SAMPLES
 from colonnade_lab.figures.data import Data
+from colonnade_lab.ppa.power.sums import KINDS
 
 DOCS = toolchain.project_root() / "docs"
 PATH = {"ns": 1.0, "fo4": 50.0, "from": "a", "to": "b", "gates": 9}
@@ -66,6 +67,7 @@ def area() -> dict[str, Any]:
             "zero_delay": POWER,
             "glitch_aware": POWER,
         },
+        "batches": [{"scene": {"kind": "near"}, **{key: {"at_28nm": {"energy_per_any_ray_nj": 1.5}} for key in KINDS}}],
     }
 
 
@@ -372,7 +374,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "|Embree `embree_verify`: `a`|`0123456789`|1,000|999|1,000|" in table(docs, "ray-suites")
     assert "|near|900, 901|2,000|1|2.0|1.0|50|" in table(docs, "ray-rates")
     assert "|near|900, –|2,000|–|" in table(docs, "ray-rates")
-    assert "|near|2.0|1.0|3.50|700|" in table(docs, "ray-device")
+    assert re.search(r"\|near\|2.0\|1.0\|3.50\|700\|\d+\|1.50, 1.50\|", table(docs, "ray-device"))
     assert "|`traversal`, rays of a sensor, 200 MHz|650|" in table(docs, "designs")
     assert "|Room|97.0, 97.0, 97.0|" in table(docs, "rebuilds")
     live = table(docs, "live-rooms")

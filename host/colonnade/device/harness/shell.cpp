@@ -17,11 +17,13 @@
 #include <fstream>
 #include <iostream>
 #include <map>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 
-#include "sequences.hpp"
+#include "batch_sequences.hpp"
+#include "frame_sequences.hpp"
 #include "shell_memory.hpp"
 
 namespace {
@@ -149,6 +151,17 @@ void run(const std::string& job, std::map<std::string, unsigned>& options, const
             std::cout << "value " << name << ' ' << value << '\n';
         } else throw std::runtime_error("unknown command: " + line);
     }
+}
+
+/// Runs sequences of consecutive seeds; prints what was broken, and counts. Ends after ten that broke a rule: hangs take long.
+int runSequences(const std::string& job, std::map<std::string, unsigned>& options) {
+    const SequenceJob parsed(job);
+    std::unique_ptr<Sequences> sequences;
+    if (parsed.batches.empty()) sequences = std::make_unique<FrameSequences>(parsed, options["--bus"], options["--memory"]);
+    else sequences = std::make_unique<BatchSequences>(parsed, options["--bus"], options["--memory"]);
+    for (unsigned i = 0; i < options["--sequences"] && sequences->failed() < 10; ++i) sequences->run(options["--seed"] + i);
+    sequences->print();
+    return 0;
 }
 
 } // namespace

@@ -18,9 +18,6 @@ PATHS = (
 )
 TRACE = ("BoxUnit", "TraversalStack", "RecordFetch", "HitTable")
 
-#: Modules of a column that follow the paths of its traversal units.
-PATH_MODULES = ("PathUnit", "PathHits", "RayBus", "ResultBus")
-
 #: The triangle units of a group of rows.
 TRIANGLES = "TriangleGroup"
 
@@ -85,9 +82,6 @@ RAY_LEVELS = (
     Level("array", "ColonnadeRays", BATCHES, "rest of ColonnadeRays"),
 )
 LEVEL_NAMES = tuple(level.name for level in LEVELS)
-
-#: The modules whose power is measured: the traversal unit, then those of the column that work for it.
-REPLAYED = (LEVELS[0].top, *PATH_MODULES, TRIANGLES)
 
 #: Modules that the synthesis of another module treats as black boxes.
 BOUNDARIES = frozenset({*PATHS, *TRACE, *COLUMN, *QUERIES, *BATCHES, "TraversalUnit", "Column", "RayColumn"})

@@ -1,81 +1,110 @@
-"""The counted part of a recorded frame: its cycles and rays."""
+"""The workload of a device that renders: a frame."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
 
+from colonnade.common import processes
 from colonnade.common.errors import UserError
+from colonnade.common.progress import Progress
+from colonnade.design.frame_limits import check_size
+from colonnade.design.generator import GeneratedDesign
+from colonnade.design.manifest import Manifest
+from colonnade.design.toolchain import project_root
+from colonnade.device.scene import DeviceScene
+from colonnade.device.simulator_build import build_simulator
+from colonnade.device.simulator_sources import TRACER
+from colonnade.device.verilator import write_job
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.scene.model import Scene
+from colonnade.scene.object_mesh import object_mesh
+from colonnade.scene.parser import load_scene
 
-from colonnade_lab.ppa.netlist.hierarchy import REPLAYED, TRIANGLES
+from colonnade_lab.ppa.netlist.hierarchy import LEVELS, TRIANGLES
 from colonnade_lab.ppa.power.recording import Recording
+from colonnade_lab.ppa.power.window import Window, window_of
+from colonnade_lab.ppa.power.workload import OneColumn, Workload
 
-#: Ports that count positions, pixels, shadow rays and hits, of the module that follows paths.
+#: Ports that count positions, pixels, shadow rays and hits, of the module that follows paths, and in-box rays.
 _POSITIONS, _PIXELS, _SHADOW, _HITS = "io_positions", "io_pixels", "io_events_raysShadow", "io_events_hits"
+_COLUMN_RAYS = "io_rays"
 
-#: Ports that count in-box rays: of the module that traces rays, and of a column.
-_IN_BOX, _COLUMN_RAYS = "io_events_intersector_raysInBox", "io_rays"
+#: Modules of a column that follow the paths of its traversal units.
+PATH_MODULES = ("PathUnit", "PathHits", "RayBus", "ResultBus")
 
 
 @dataclass(frozen=True)
-class Frame:
-    """The counted part of a recorded frame.
+class FrameWorkload(Workload):
+    """A frame, and how much of it is recorded.
 
     Attributes:
-        begin: First counted cycle.
-        end: The cycle after the last one.
-        counts: Numbers of pixels, rays (primary and shadow), in-box rays and hits of the column.
-        traced: In-box rays of the traversal unit.
-        shares: The row's part of the power of each replayed module.
-        records_share: The row's part of the reads of records.
+        scene: The scene; its mesh is not read.
+        mesh: The mesh.
+        size: Width and height, pixels; None: `whole_frame`.
+        cycles: Maximum number of recorded cycles from the start of the frame.
     """
 
-    begin: int
-    end: int
-    counts: Mapping[str, int]
-    traced: int
-    shares: Mapping[str, float]
-    records_share: float
+    modules: ClassVar[tuple[str, ...]] = (LEVELS[0].top, *PATH_MODULES, TRIANGLES)
+    outer: ClassVar[str] = TRACER
 
-    @property
-    def cycles(self) -> int:
-        """Number of counted cycles."""
-        return self.end - self.begin
+    scene: Scene
+    mesh: Mesh
+    size: tuple[int, int] | None
+    cycles: int
 
-    @property
-    def rays(self) -> float:
-        """The row's part of the rays."""
-        return self.counts["rays"] * self.traced / (self.counts["rays_in_box"] or 1)
+    @staticmethod
+    def of_benchmark(mesh: str, size: tuple[int, int] | None, cycles: int) -> FrameWorkload:
+        """The benchmark scene with a mesh, a name or a file."""
+        scene = load_scene(project_root() / "scenes" / "object.toml").with_mesh(mesh)
+        return FrameWorkload(scene, object_mesh(scene, corner_colours=True), size, cycles)
+
+    def size_of(self, manifest: Manifest) -> tuple[int, int]:
+        """Width and height of its frame, pixels."""
+        return self.size or whole_frame(int(manifest.config["array"]["rows"]))
+
+    def check(self, manifest: Manifest) -> None:
+        """See `Workload`."""
+        check_size(self.size_of(manifest), manifest)
+
+    def run(self, column: OneColumn, recorded: GeneratedDesign, folder: Path, progress: Progress) -> Mapping[str, Any]:
+        """See `Workload`."""
+        manifest = column.design.manifest
+        size = self.size_of(manifest)
+        with progress.step("packing the scene"):
+            prepared = DeviceScene.of(self.scene, manifest, self.mesh)
+            registers = prepared.registers(size)
+        program = build_simulator(recorded, progress)
+        job, _ = write_job(folder, manifest, prepared.image, [registers])
+        with progress.step("recording a frame"):
+            done = processes.run([program, job], cwd=folder)
+        if done.returncode != 0:
+            raise RuntimeError(f"the simulated hardware failed (status {done.returncode}): {done.stderr[-300:]}")
+        return {"mesh": self.mesh.name, "triangles": len(self.mesh.faces), "size": list(size)}
+
+    def window(self, recordings: Mapping[str, Recording]) -> Window:
+        """From the first input position to the last output pixel.
+
+        Raises:
+            UserError: No pixel has left, or no in-box ray is traced.
+        """
+        paths = recordings["PathUnit"]
+        positions, pixels = paths.fires(_POSITIONS), paths.fires(_PIXELS)
+        if True not in positions or True not in pixels:
+            raise UserError("the recorded frame has no pixel: use more --cycles, or a larger --size")
+        begin, end = positions.index(True), len(pixels) - pixels[::-1].index(True)
+        counts = {
+            "pixels": sum(pixels[begin:end]),
+            "rays": sum(positions[begin:end]) + sum(paths.of(_SHADOW)[begin:end]),
+            "rays_in_box": sum(recordings["PathHits"].fires(_COLUMN_RAYS)[begin:end]),
+            "hits": sum(paths.of(_HITS)[begin:end]),
+        }
+        return window_of(recordings, begin, end, counts)
 
 
-def frame_of(recordings: Mapping[str, Recording]) -> Frame:
-    """The cycles from the first input position to the last output pixel, and the rays in them.
-
-    Args:
-        recordings: The recordings of all modules of `REPLAYED`.
-
-    Raises:
-        UserError: No pixel has left, or no in-box ray is traced.
-    """
-    unit, paths = (recordings[module] for module in REPLAYED[:2])
-    positions, pixels = paths.fires(_POSITIONS), paths.fires(_PIXELS)
-    if True not in positions or True not in pixels:
-        raise UserError("the recorded frame has no pixel: use more --cycles, or a larger --size")
-    begin, end = positions.index(True), len(pixels) - pixels[::-1].index(True)
-    traced = sum(unit.of(_IN_BOX)[begin:end])
-    if not traced:
-        raise UserError("the recorded traversal unit traces no ray: use more --cycles, or a larger --size")
-    in_box = sum(recordings["PathHits"].fires(_COLUMN_RAYS)[begin:end])
-    shadow = sum(paths.of(_SHADOW)[begin:end])
-    counts = {
-        "pixels": sum(pixels[begin:end]),
-        "rays": sum(positions[begin:end]) + shadow,
-        "rays_in_box": in_box,
-        "hits": sum(paths.of(_HITS)[begin:end]),
-    }
-    names = (port.name for port in recordings[TRIANGLES].inputs)
-    served = sum(re.fullmatch(r"io_rows_\d+_candidate_valid", name) is not None for name in names)
-    of_group = sum(sum(recordings["RayBus"].of(f"io_units_{row}_valid")[begin:end]) for row in range(served))
-    shares = dict.fromkeys(REPLAYED, traced / in_box) | {REPLAYED[0]: 1.0, TRIANGLES: traced / of_group}
-    return Frame(begin, end, counts, traced, shares, traced / in_box)
+def whole_frame(rows: int) -> tuple[int, int]:
+    """A frame size at which each traversal unit of a column with `rows` units works for about ten thousand cycles."""
+    width = 4 * round(6 * rows**0.5)
+    return width, width * 3 // 4

@@ -30,7 +30,7 @@ from colonnade_lab.ppa.power.recording import CLOCK, RESET, START, Port, Recordi
 #: Cycles of reset before the recorded ones.
 RESET_CYCLES = 8
 
-#: The replay has this many idle cycles between reset and frame, plus the recorded idle cycles modulo this number. So
+#: The replay has this many idle cycles between reset and start, plus the recorded idle cycles modulo this number. So
 #: free-running counters whose period divides it have the recorded values.
 IDLE_PERIOD = 240
 
@@ -137,7 +137,7 @@ def _of(words: Sequence[list[str]], kind: str) -> Iterator[list[str]]:
 
 
 def _prelude(recording: Recording) -> list[int]:
-    """Inputs of reset and idle cycles before the frame, with the frame registers of the frame."""
+    """Inputs of reset and idle cycles before the start, with the registers of the work."""
     idle = recording.cycles[0][0] & ~_bit(recording.inputs, START)
     reset = _bit(recording.inputs, RESET)
     idle_cycles = IDLE_PERIOD + recording.idle_cycles % IDLE_PERIOD

@@ -1,7 +1,7 @@
-"""The power report of a row that renders a frame: gates, activity and memories.
+"""The power report of a row that renders a frame or answers a batch of rays: gates, activity and memories.
 
-With a path unit it is the power of a traversal unit and its share of the modules that follow its paths: its in-box rays
-over those of the column.
+It is the power of a traversal unit and its share of the modules that work for it: its in-box rays over those of the
+column.
 """
 
 from __future__ import annotations
@@ -18,14 +18,16 @@ from colonnade.design.generator import GeneratedDesign
 from colonnade_lab.ppa.library import energies
 from colonnade_lab.ppa.netlist import memories
 from colonnade_lab.ppa.netlist.activity import Activity
-from colonnade_lab.ppa.netlist.hierarchy import LEVELS, REPLAYED, Hierarchy
+from colonnade_lab.ppa.netlist.hierarchy import LEVELS, Hierarchy
 from colonnade_lab.ppa.netlist.mapped import Netlist
 from colonnade_lab.ppa.netlist.synthesis import Technology
 from colonnade_lab.ppa.power.activity import NO_POWER, power_of
-from colonnade_lab.ppa.power.frame import Frame, frame_of
-from colonnade_lab.ppa.power.recording import Recording, Stimulus, record
+from colonnade_lab.ppa.power.record import record
+from colonnade_lab.ppa.power.recording import Recording
 from colonnade_lab.ppa.power.replay import replay
 from colonnade_lab.ppa.power.sums import KINDS, Sum
+from colonnade_lab.ppa.power.window import Window
+from colonnade_lab.ppa.power.workload import Workload
 from colonnade_lab.ppa.timing import opensta
 from colonnade_lab.ppa.timing.delays import net_timing
 from colonnade_lab.ppa.timing.static import Analysis
@@ -40,11 +42,11 @@ class Operation:
 
     Attributes:
         megahertz: Clock frequency, MHz.
-        stimulus: The workload.
+        workloads: A frame, or batches of rays.
     """
 
     megahertz: float
-    stimulus: Stimulus
+    workloads: Sequence[Workload]
 
 
 def measure_power(
@@ -54,10 +56,11 @@ def measure_power(
     hierarchy: Hierarchy,
     netlists: Mapping[str, Any],
     tech: Technology,
-    operation: Operation,
+    workload: Workload,
+    megahertz: float,
     progress: Progress = QUIET,
 ) -> dict[str, Any]:
-    """The ``power`` section of a report, with the power of each unit in ``units``.
+    """The power of a workload in a report, with that of each unit in ``units``.
 
     Args:
         design: The design with black-box memories.
@@ -66,34 +69,34 @@ def measure_power(
         hierarchy: The hierarchy of the design.
         netlists: All modules in Yosys's JSON.
         tech: The technology, with a library.
-        operation: Clock and workload.
+        workload: What the hardware does.
+        megahertz: Clock frequency, MHz.
         progress: Shows the steps.
     """
     assert tech.library is not None
-    ports = {module: netlists[module]["ports"] for module in REPLAYED}
-    recordings = record(config, overrides, ports, operation.stimulus, progress)
-    frame = frame_of(recordings)
+    ports = {module: netlists[module]["ports"] for module in workload.modules}
+    recordings = record(config, overrides, ports, workload, progress)
+    window = workload.window(recordings)
     with progress.step("reading the gate netlists"):
-        gates = {module: Netlist(netlists, module, tech.library) for module in REPLAYED}
+        gates = {module: Netlist(netlists, module, tech.library) for module in workload.modules}
         used = {instance.cell.name for netlist in gates.values() for instance in netlist.instances}
         cells = energies.load(tech.sources, used)
-    megahertz = operation.megahertz
     scale = node_scale(tech.library.nand2.area, cells.voltage)
-    found = Sum(frame, megahertz, scale)
-    found.records = _record_power(recordings[REPLAYED[0]], frame, design.manifest.record_bits, megahertz)
+    found = Sum(window, megahertz, scale)
+    found.records = _record_power(recordings[LEVELS[0].top], window, design.manifest.record_bits, megahertz)
     second: dict[str, float] | None = None
     for module, netlist in gates.items():
         with progress.step(f"measuring {module}"):
             analysis = Analysis(netlist, tech.library)
             timing = net_timing(analysis, netlist.size)
-            recording = replace(recordings[module], cycles=recordings[module].cycles[: frame.end])
-            activity = replay(netlist, hierarchy, timing.delays, recording, frame.begin, progress)
+            recording = replace(recordings[module], cycles=recordings[module].cycles[: window.end])
+            activity = replay(netlist, hierarchy, timing.delays, recording, window.begin, progress)
             powers = {
                 kind: power_of(netlist, cells, timing, changes, activity.cycles, megahertz)
                 for kind, changes in zip(KINDS, (activity.settled, activity.changes), strict=True)
             }
             found.add(module, powers, memory_power(netlist, hierarchy, activity, megahertz))
-            if opensta.reads_activities() and module == REPLAYED[0]:
+            if opensta.reads_activities() and module == LEVELS[0].top:
                 own = sum(powers["glitch_aware"].values(), NO_POWER)
                 other = opensta.power(netlist, tech.sources, activity, analysis.slew, megahertz)
                 second = None if other is None else {"ours": own.dynamic + own.leakage, "opensta": other}
@@ -101,8 +104,8 @@ def measure_power(
         "of": LEVELS[0].name,
         "clock_mhz": megahertz,
         "volts": cells.voltage,
-        "scene": recordings[REPLAYED[0]].scene,
-        "window": {"cycles": frame.cycles, **frame.counts, "rays_traced": frame.traced},
+        "scene": recordings[LEVELS[0].top].scene,
+        "window": {"cycles": window.cycles, **window.counts, "rays_traced": window.traced},
         "memories_mw": found.kinds(),
         "memory_pj_per_bit": memories.SRAM[memories.CHIP_NODE].pj_per_bit,
         "scale_to_28nm": scale,
@@ -133,11 +136,11 @@ def memory_power(
     return found
 
 
-def _record_power(recording: Recording, frame: Frame, record_bits: int, megahertz: float) -> float:
+def _record_power(recording: Recording, window: Window, record_bits: int, megahertz: float) -> float:
     """Power of the records that the column reads for a row, mW."""
     valid = [port.name for port in recording.inputs if re.fullmatch(r"io_broadcasts(_\d+)?_valid", port.name)]
-    reads = sum(sum(recording.of(name)[frame.begin : frame.end]) for name in valid)
-    return _memory_milliwatts(reads * record_bits * frame.records_share, frame.cycles, megahertz)
+    reads = sum(sum(recording.of(name)[window.begin : window.end]) for name in valid)
+    return _memory_milliwatts(reads * record_bits * window.records_share, window.cycles, megahertz)
 
 
 def _memory_milliwatts(bits: float, cycles: int, megahertz: float) -> float:

@@ -6,14 +6,14 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
-from colonnade_lab.ppa.netlist.hierarchy import LEVELS, PATHS, TRACE
+from colonnade_lab.ppa.netlist.hierarchy import LEVELS, PATHS, QUERIES, TRACE
 from colonnade_lab.ppa.power.activity import NO_POWER, Power
-from colonnade_lab.ppa.power.frame import Frame
+from colonnade_lab.ppa.power.window import Window
 
 #: The two power figures: from cycles in which a net has changed, and from all its transitions.
 KINDS = ("zero_delay", "glitch_aware")
 
-_UNITS = frozenset({*PATHS, *TRACE, "TriangleUnit"})
+_UNITS = frozenset({*PATHS, *QUERIES, *TRACE, "TriangleUnit"})
 
 
 class Sum:
@@ -23,9 +23,9 @@ class Sum:
         records: Power of the reads of records for the row, mW.
     """
 
-    def __init__(self, frame: Frame, megahertz: float, scale: float) -> None:
+    def __init__(self, window: Window, megahertz: float, scale: float) -> None:
         self.records = 0.0
-        self._frame, self._megahertz, self._scale = frame, megahertz, scale
+        self._window, self._megahertz, self._scale = window, megahertz, scale
         self._gates: dict[str, dict[str, Power]] = {kind: {} for kind in KINDS}
         self._memories: dict[tuple[str, str], float] = defaultdict(float)
 
@@ -39,7 +39,7 @@ class Sum:
             gates: Power by kind and by owner.
             memories_mw: Power of memories by owner and memory, mW.
         """
-        part = self._frame.shares[module]
+        part = self._window.shares[module]
         for kind, powers in gates.items():
             for unit, power in by_unit(powers, module).items():
                 self._gates[kind][unit] = self._gates[kind].get(unit, NO_POWER) + power * part
@@ -69,7 +69,7 @@ class Sum:
             memory = sum(milliwatts for (of, _), milliwatts in self._memories.items() if of == unit)
             facts = self._facts(power, memory)
             scaled = {
-                kind: self._energy(powers[unit].dynamic * self._scale + facts["memory_mw"], self._frame.traced)
+                kind: self._energy(powers[unit].dynamic * self._scale + facts["memory_mw"], self._window.traced)
                 for kind, powers in self._gates.items()
             }
             found[unit] = facts | {"power_mw": facts.pop("total_mw"), "energy_per_ray_nj_at_28nm": scaled}
@@ -82,7 +82,7 @@ class Sum:
                 "unit": unit,
                 "memory": memory,
                 "power_mw": milliwatts,
-                "energy_per_ray_nj": self._energy(milliwatts, self._frame.traced),
+                "energy_per_ray_nj": self._energy(milliwatts, self._window.traced),
             }
             for (unit, memory), milliwatts in sorted(self._memories.items(), key=lambda item: (-item[1], item[0]))
         ]
@@ -94,13 +94,13 @@ class Sum:
     def _energies(self, milliwatts: float) -> dict[str, float | None]:
         """Energy per in-box ray and per ray, nJ."""
         return {
-            "energy_per_ray_nj": self._energy(milliwatts, self._frame.traced),
-            "energy_per_any_ray_nj": self._energy(milliwatts, self._frame.rays),
+            "energy_per_ray_nj": self._energy(milliwatts, self._window.traced),
+            "energy_per_any_ray_nj": self._energy(milliwatts, self._window.rays),
         }
 
     def _energy(self, milliwatts: float, rays: float) -> float | None:
         # mW × µs = nJ
-        return milliwatts * self._frame.cycles / self._megahertz / rays if rays else None
+        return milliwatts * self._window.cycles / self._megahertz / rays if rays else None
 
 
 def by_unit(powers: Mapping[str, Power], module: str) -> dict[str, Power]:

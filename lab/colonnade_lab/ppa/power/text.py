@@ -11,21 +11,22 @@ from colonnade_lab.ppa.power.report import VOLTAGE_28NM
 #: Titles of the two power figures, by key.
 KINDS = {"zero_delay": "without glitches", "glitch_aware": "with glitches"}
 
-#: What the figures leave out, without and with a path unit.
+#: What the figures leave out.
 OUTSIDE = (
-    "The path unit counts with this unit's share of the in-box rays; other units of column and array are not included."
+    "Units of the column that work for several rows count with this row's share of the in-box rays; other units of "
+    "column and array are not included."
 )
 
 
-def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
-    """Power of a row and of its units, energy per ray, and the method."""
-    power = report["power"]
+def power_lines(power: Mapping[str, Any], units: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """Power of a row and of its units, energy per ray, and the method, of a workload."""
     window, scene = power["window"], power["scene"]
     yield ""
-    width, height = scene["size"]
+    size = scene.get("size")
+    what = f"{size[0]}×{size[1]}, {window['pixels']:,} pixels" if size else f"batch of {scene['kind']}"
     yield (
         f"power of a row at {power['clock_mhz']:g} MHz and {power['volts']:g} V: {scene['mesh']}, "
-        f"{width}×{height}, {window['cycles']:,} cycles, {window['pixels']:,} pixels, {window['rays']:,} rays, "
+        f"{what}, {window['cycles']:,} cycles, {window['rays']:,} rays, "
         f"{window['rays_in_box']:,} in-box rays, {window['hits']:,} hits in the column, "
         f"whose row 0 traces {window['rays_traced']:,} of them"
     )
@@ -48,7 +49,7 @@ def power_lines(report: Mapping[str, Any]) -> Iterator[str]:
         f"{memories['records']:.4f} mW for its share of the column memory"
     )
     yield f"  by unit, with glitches, and energy per in-box ray at {CHIP_NODE} without and with glitches:"
-    for name, unit in report["units"].items():
+    for name, unit in units.items():
         if "power_mw" in unit:
             energies = (unit["energy_per_ray_nj_at_28nm"][kind] for kind in KINDS)
             without, glitches = (f"{1e3 * energy:.1f}" for energy in energies)

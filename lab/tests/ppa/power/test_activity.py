@@ -12,15 +12,18 @@ from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from small_gates import cell, small_library, top
 
+from colonnade_lab.evaluation.ray_bench import KINDS
 from colonnade_lab.ppa.library import energies
 from colonnade_lab.ppa.library.cells import Library
 from colonnade_lab.ppa.netlist.activity import Activity
 from colonnade_lab.ppa.netlist.mapped import Netlist
 from colonnade_lab.ppa.power.activity import Power, power_of
-from colonnade_lab.ppa.power.frame import Frame
-from colonnade_lab.ppa.power.recording import Stimulus, require_recordable
+from colonnade_lab.ppa.power.batch import BatchWorkload
+from colonnade_lab.ppa.power.frame import FrameWorkload
+from colonnade_lab.ppa.power.record import require_recordable
 from colonnade_lab.ppa.power.report import node_scale
 from colonnade_lab.ppa.power.sums import Sum, by_unit
+from colonnade_lab.ppa.power.window import Window
 from colonnade_lab.ppa.timing import opensta
 from colonnade_lab.ppa.timing.delays import NetTiming
 
@@ -91,8 +94,8 @@ def test_a_path_unit_counts_with_the_rays_of_its_row() -> None:
     """The energies of all units add up to that of a ray, with each part of a column counted once."""
     counts = {"pixels": 40, "rays": 60, "rays_in_box": 50, "hits": 20}
     shares = {"TraversalUnit": 1.0, "PathUnit": 0.2, "PathHits": 0.2}
-    frame = Frame(10, 110, counts, traced=10, shares=shares, records_share=0.2)
-    found = Sum(frame, megahertz=200, scale=3)
+    window = Window(10, 110, counts, traced=10, shares=shares, records_share=0.2)
+    found = Sum(window, megahertz=200, scale=3)
     for module, owners in (("TraversalUnit", ("BoxUnit", "")), ("PathUnit", ("RtController", "")), ("PathHits", ("",))):
         powers = dict.fromkeys(owners, Power(0.5, 2.0, 0.25))
         still = dict.fromkeys(owners, Power(0.5, 1.0, 0.25))
@@ -120,14 +123,18 @@ def test_a_path_unit_counts_with_the_rays_of_its_row() -> None:
 
 def test_the_workload_is_checked_before_synthesis(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     manifest = manifest_for("tiny").manifest
-    assert require_recordable(Stimulus.of_benchmark("cube", None, 10), manifest) == (24, 18)
+    whole = FrameWorkload.of_benchmark("cube", None, 10)
+    require_recordable(whole, manifest)
+    assert whole.size_of(manifest) == (24, 18)
+    with pytest.raises(UserError, match="answers no batches"):
+        require_recordable(BatchWorkload(whole.mesh, KINDS[0], 64, 10), manifest)
     with pytest.raises(UserError, match="no mesh"):
-        require_recordable(Stimulus.of_benchmark("no-such-mesh", None, 10), manifest)
+        require_recordable(FrameWorkload.of_benchmark("no-such-mesh", None, 10), manifest)
     with pytest.raises(UserError, match="9999"):
-        require_recordable(Stimulus.of_benchmark("cube", (9999, 10), 10), manifest)
+        require_recordable(FrameWorkload.of_benchmark("cube", (9999, 10), 10), manifest)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(UserError, match="no verilator found, which power"):
-        require_recordable(Stimulus.of_benchmark("cube", None, 10), manifest)
+        require_recordable(FrameWorkload.of_benchmark("cube", None, 10), manifest)
 
 
 def test_scaling_is_by_length_and_voltage() -> None:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
+from colonnade.common.errors import UserError
 
-from colonnade_lab.ppa.netlist.hierarchy import PATH_MODULES, REPLAYED, TRIANGLES
-from colonnade_lab.ppa.power.frame import frame_of
-from colonnade_lab.ppa.power.recording import Recording, Stimulus, record
+from colonnade_lab.evaluation.ray_bench import KINDS
+from colonnade_lab.ppa.netlist.hierarchy import TRIANGLES
+from colonnade_lab.ppa.power.batch import BatchWorkload
+from colonnade_lab.ppa.power.frame import PATH_MODULES, FrameWorkload
+from colonnade_lab.ppa.power.record import record
+from colonnade_lab.ppa.power.recording import Recording
 
 UNIT = "TraversalUnit"
 
@@ -35,6 +40,10 @@ PORTS = {
 }
 
 
+def workload(cycles: int) -> FrameWorkload:
+    return FrameWorkload.of_benchmark("cube", (24, 18), cycles)
+
+
 def recorded(cycles: int) -> dict[str, Recording]:
     overrides = (
         "array.rows=3",
@@ -43,13 +52,13 @@ def recorded(cycles: int) -> dict[str, Recording]:
         "units.shadeInterval=3",
         "units.triangleRows=2",
     )
-    return record("tiny", overrides, PORTS, Stimulus.of_benchmark("cube", (24, 18), cycles))
+    return record("tiny", overrides, PORTS, workload(cycles))
 
 
 @pytest.mark.verilator
 def test_recordings_are_of_one_unit_and_its_paths_from_the_first_to_the_last_cycle() -> None:
     whole = recorded(900)
-    assert set(whole) == set(REPLAYED)
+    assert set(whole) == set(FrameWorkload.modules)
     assert all(len(recording.cycles) == 900 for recording in whole.values())
     unit = whole[UNIT]
     assert [cycle for cycle, start in enumerate(unit.of("io_start")) if start] == [0]
@@ -60,7 +69,7 @@ def test_recordings_are_of_one_unit_and_its_paths_from_the_first_to_the_last_cyc
     # The unit of row 0, in the same cycles as the column
     assert unit.of("io_rays_valid") == whole["RayBus"].of("io_units_0_valid")
     assert whole["PathHits"].fires("io_rays") == whole["RayBus"].fires("io_rays")
-    frame = frame_of(whole)
+    frame = workload(900).window(whole)
     assert 0 < frame.counts["hits"] < frame.counts["pixels"] <= 24 * 18
     share = frame.traced / frame.counts["rays_in_box"]
     assert 0.2 < share < 0.5
@@ -70,3 +79,38 @@ def test_recordings_are_of_one_unit_and_its_paths_from_the_first_to_the_last_cyc
     shared = dict.fromkeys(PATH_MODULES, share) | {TRIANGLES: frame.traced / of_group}
     assert frame.shares == {UNIT: 1.0} | shared
     assert share < shared[TRIANGLES] < 1
+
+
+RAY_PORTS = {
+    UNIT: PORTS[UNIT],
+    "RayQueries": ports(
+        ("io_runs_valid", "io_rays_ready", "io_results_valid", "io_results_bits_hasHit"),
+        ("io_runs_ready", "io_rays_valid"),
+    )
+    | {
+        "io_runs_bits_count": {"direction": "input", "bits": [0] * 7},
+        "io_resolved": {"direction": "output", "bits": [0, 1]},
+    },
+    "RayBus": PORTS["RayBus"],
+    "ResultBus": PORTS["ResultBus"],
+    TRIANGLES: PORTS[TRIANGLES],
+}
+
+
+@pytest.mark.verilator
+def test_a_batch_is_recorded_from_its_first_run_to_the_end_of_the_last_one() -> None:
+    overrides = ("array.rows=2", "units.triangleRows=2", "units.pathContexts=64")
+    mesh = FrameWorkload.of_benchmark("torus", None, 0).mesh
+    batch = BatchWorkload(mesh, KINDS[4], 192, 20_000)
+    whole = record("traversal", overrides, RAY_PORTS, batch)
+    window, queries = batch.window(whole), whole["RayQueries"]
+    assert whole[UNIT].scene == {"mesh": mesh.name, "triangles": len(mesh.faces), "kind": KINDS[4], "rays": 192}
+    assert window.counts["rays"] == 192
+    assert queries.fires("io_runs").index(True) == window.begin
+    assert queries.of("io_resolved")[window.end - 1] == 1 and not any(queries.of("io_resolved")[window.end :])
+    # Each ray that enters the box has a result, and the units of two rows trace them
+    assert window.counts["rays_in_box"] == sum(queries.of("io_results_valid"))
+    assert 0 < window.counts["hits"] < window.counts["rays_in_box"] <= 192
+    assert 0 < window.traced < window.counts["rays_in_box"]
+    with pytest.raises(UserError, match="has not ended"):
+        batch.window({name: replace(each, cycles=each.cycles[: window.end - 1]) for name, each in whole.items()})
