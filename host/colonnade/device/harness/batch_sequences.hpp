@@ -62,7 +62,7 @@ private:
         std::array<std::uint8_t, 64> words{};
         std::copy(batch.descriptor.begin(), batch.descriptor.end(), words.begin());
         const std::uint64_t place = at(rays_) + slot * rayBytes_;
-        const unsigned wrong = isHostile ? 1u << pick(6) | 1u << pick(6) : 0;
+        const unsigned wrong = isHostile ? 1u << pick(6) | 1u << pick(6) | 1u << pick(6) : 0;
         std::uint64_t rays = place, hits = at(hits_) + slot * hitBytes_, done = at(tags_) + 4 * slot;
         std::uint32_t count, mode;
         std::memcpy(&count, &words[16], 4);
@@ -133,7 +133,7 @@ private:
 
     /// Runs as many batches as the ring takes, and checks all bytes of the memory.
     void run(bool hasErrors) {
-        const std::vector<Expected> batches = fill(8);
+        const std::vector<Expected> batches = fill(std::array<unsigned, 3>{2, 10, 100}[pick(3)]);
         std::vector<std::uint8_t> after = slaves_.memory;
         std::vector<bool> isOpen(after.size());
         submit(slots_ - 1);
