@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from colonnade.common.arguments import checked
 from colonnade.common.errors import UserError
@@ -14,20 +12,12 @@ from colonnade.design.generator import GeneratedDesign
 from colonnade.device.shell_base import Shell
 from colonnade.device.transport import Transport
 from colonnade.rays.device import RayBackend
+from colonnade.rays.recorded import RayRecords
 from colonnade.scene_image.dram_image import PAGE_BYTES
-from colonnade.scene_image.file import LoadSection
 
 #: The ring has 2^SIZE_LOG slots, of which all but one take batches; tags lie behind it.
 _SIZE_LOG, _BATCH_BYTES, _TAG_BYTES = 4, 64, 4
 _WORDS = {"rays": 0, "hits": 8, "done": 48}
-
-
-@dataclass(frozen=True)
-class RayRecords:
-    """What a device for rays loads."""
-
-    records: NDArray[np.uint8]
-    attributes: tuple[LoadSection, ...] = ()
 
 
 class RayShell(Shell, RayBackend):

@@ -6,7 +6,7 @@ The work is a frame, or of a device for rays a batch.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,9 +22,8 @@ from colonnade.device.shell_build import build_shell_simulator
 from colonnade.device.verilator import run_program
 from colonnade.mesh.load import load_mesh
 from colonnade.rays import Scene, Sensor
-from colonnade.rays.device import RayBackend
+from colonnade.rays.recorded import RecordedRays
 from colonnade.rays.scene import ALL_MASKS, FAN, OCCLUDED, SENSOR
-from colonnade.rays.shell import RayRecords
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.device_image import device_image
@@ -145,27 +144,11 @@ def _write_frame(
     return image, values, [f"framebuffer {_FRAMEBUFFER} framebuffer {stride}"]
 
 
-class _Asked(RayBackend):
-    """Keeps what a device is asked, and answers nothing."""
-
-    def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
-        """See `RayBackend`."""
-        self.values, self.records = dict(values), np.frombuffer(records, np.uint8).reshape(count, -1)
-
-    def submit(self, batch: bytes, rays: bytes, size: int) -> tuple[int, bytes]:
-        """See `RayBackend`."""
-        self.batch, self.rays = batch, rays
-        return int.from_bytes(batch[44:48], "little"), bytes(size)
-
-    def _word(self, address: int) -> int:
-        return 0
-
-
 def _write_batches(
     folder: Path, manifest: Manifest, address: Callable[[str], int]
 ) -> tuple[Loads, dict[str, int], list[str]]:
     """Batches of rays: the image of their scene, its registers, and lines of the job."""
-    mesh, asked = load_mesh(_MESH), _Asked(manifest.registers)
+    mesh, asked = load_mesh(_MESH), RecordedRays()
     design = json.dumps(manifest.config)
     (folder / "design.json").write_text(design)
     of_design = mesh.vertices, mesh.faces, str(folder / "design.json")
@@ -186,10 +169,11 @@ def _write_batches(
             sensor = Sensor(tuple(origin), tuple(-origin - 0.5), (0.02, 0, 0.01), (0, 0.3, 0), 64, 2)
             records, count = np.frombuffer(sensor.record(), np.uint8), 128 if mode & 3 == OCCLUDED else 64
         hits = [scene.submit(records, count, mode | form, origin) for scene in scenes][1]
-        parts = {"batch": asked.batch, "rays": asked.rays, "hits": hits.tobytes()}
-        for part, content in parts.items():
+        batch, of_batch, _ = asked.batches[-1]
+        for part, content in {"batch": batch, "rays": of_batch, "hits": hits.tobytes()}.items():
             (folder / f"{part}{number}").write_bytes(content)
         lines.append(f"batch batch{number} rays{number} hits{number}")
     values = {name: 0 for name, each in manifest.registers.items() if each.access == "rw" and name != "rays.tail"}
     ring = {"ring.base": _WINDOW + _RING, "ring.sizeLog": _RING_LOG}
-    return RayRecords(asked.records), values | asked.values | ring, lines
+    assert asked.records is not None
+    return asked.records, values | asked.values | ring, lines
