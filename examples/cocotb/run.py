@@ -1,7 +1,8 @@
-"""Runs bench.py in Icarus Verilog or Verilator.
+"""Runs bench.py, or another bench of this folder, in Icarus Verilog or Verilator.
 
-DESIGN is a folder of `colonnade generate --axi BYTES`; IMAGE and FRAME come from `colonnade pack`; OUTPUT receives
-lines of XRGB8888. With a folder of backdoor.py nothing is loaded through the bus.
+DESIGN is a folder of `colonnade generate --axi BYTES`. For bench, IMAGE and INPUT, a frame file, come from `colonnade
+pack`, and OUTPUT receives lines of XRGB8888; with a folder of backdoor.py nothing is loaded through the bus. For
+rays_bench, IMAGE and INPUT, batches, come from examples/rays/batches.py, and OUTPUT receives tags and hits.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from cocotb_tools.runner import get_runner
 
 #: The top with AXI4 ports.
 AXI4 = Path(__file__).resolve().parents[1] / "axi4"
+#: The benches, and the variable that has their INPUT.
+BENCHES = {"bench": "FRAME", "rays_bench": "BATCHES"}
 #: The oldest Verilator of cocotb 2.
 MINIMUM_VERILATOR = (5, 36)
 
@@ -63,12 +66,13 @@ def main(arguments: argparse.Namespace) -> None:
         log_file=build.with_suffix(".log"),
         always=True,
     )
-    files = {"DESIGN": design, "IMAGE": arguments.image, "FRAME": arguments.frame, "OUTPUT": arguments.output}
+    files = {"DESIGN": design, "IMAGE": arguments.image, "OUTPUT": arguments.output}
+    files[BENCHES[arguments.bench]] = arguments.input
     files |= {} if arguments.scene is None else {"SCENE": arguments.scene}
     sys.path.insert(0, str(Path(__file__).parent))
     results = runner.test(
         hdl_toplevel=top,
-        test_module="bench",
+        test_module=arguments.bench,
         build_dir=build,
         plusargs=[] if backdoor is None else [f"+backdoor={backdoor}"],
         extra_env={
@@ -90,8 +94,9 @@ def path(text: str) -> Path:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("simulator", choices=["icarus", "verilator"])
-    for name in ("design", "image", "frame", "output"):
+    for name in ("design", "image", "input", "output"):
         parser.add_argument(name, type=path, metavar=name.upper())
+    parser.add_argument("--bench", choices=BENCHES, default="bench")
     parser.add_argument("--backdoor", type=path, metavar="DIR", help="folder of backdoor.py")
     parser.add_argument("--axi4", action="store_true", help="through the top of examples/axi4")
     parser.add_argument(

@@ -1,25 +1,23 @@
-"""A SoC in LiteX's simulator: VexRiscv, main memory, console, Colonnade. Its program renders an orbit (docs/soc.md).
+"""A SoC in LiteX's simulator: VexRiscv, main memory, console, Colonnade, and a program (docs/soc.md).
 
-Usage: simulation.py DESIGN REGISTERS IMAGE VIEW OUTPUT CONSOLE [SCENE]
+Usage: simulation.py PROGRAM DESIGN REGISTERS OUTPUT CONSOLE NAME=FILE …
 
-DESIGN and REGISTERS are folders of ``colonnade generate --axi 4`` and ``colonnade registers``, IMAGE and VIEW files of
-``colonnade pack``, and SCENE its DRAM image if the design has a cache. OUTPUT receives the build, gateware/memory.hex,
-and layout.json, which says where things are in it.
-CONSOLE is a file for what the SoC prints.
+PROGRAM is frames or rays. DESIGN and REGISTERS are folders of ``colonnade generate --axi`` and ``colonnade registers``.
+Each FILE is put into the main memory. OUTPUT receives the build, gateware/memory.hex, and layout.json, which says where
+things are in it. CONSOLE is a file for what the SoC prints.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import struct
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-import view_places
 from colonnade_litex import Colonnade
+from layouts import MAIN_RAM, MAIN_RAM_BYTES, PROGRAM_BYTES, PROGRAMS, UNWRITTEN, memory_layout
 from litex.build.generic_platform import Pins, Subsignal
 from litex.build.io import CRG
 from litex.build.sim import SimPlatform
@@ -33,16 +31,8 @@ from migen import ClockSignal, Instance, Module
 HERE = Path(__file__).resolve().parent
 FREQUENCY = 1_000_000
 REGISTERS = 0x9000_0000
-MAIN_RAM = 0x4000_0000
-MAIN_RAM_BYTES = 1 << 21
-PAGE = 4096
 #: Of host time, for the simulation.
 SECONDS = 3600
-#: The program is at the beginning of the memory; then come files, records and framebuffers, with a page between.
-PROGRAM_BYTES = 1 << 17
-#: Frames of the orbit, an eighth of a turn each, and what the program records of one.
-FRAMES = 8
-RECORD_BYTES = 1 << 13
 
 _UART = ("source_valid", "source_ready", "sink_valid", "sink_ready")
 _IO = [
@@ -83,13 +73,20 @@ class SoC(SoCCore):  # type: ignore[misc]
 
 
 class ProgramBuilder(Builder):  # type: ignore[misc]
-    """Also compiles the program, and puts it and its files into the main memory."""
+    """Also compiles a program, and puts it and its files into the main memory."""
 
     def __init__(
-        self, soc: SoC, registers: Path, layout: dict[str, int], files: dict[str, bytes], output: Path
+        self,
+        soc: SoC,
+        program: str,
+        registers: Path,
+        layout: dict[str, int],
+        files: dict[str, bytes],
+        output: Path,
     ) -> None:
         Builder.__init__(self, soc, output_dir=str(output))
-        self.registers, self.layout, self.files, self.output = registers, layout, files, output
+        self.program, self.registers, self.layout, self.files = program, registers, layout, files
+        self.output = output
 
     def _initialize_rom_software(self) -> None:
         Builder._initialize_rom_software(self)
@@ -98,11 +95,12 @@ class ProgramBuilder(Builder):  # type: ignore[misc]
         defines = [f"#define {name.upper()} {value:#x}u\n" for name, value in self.layout.items()]
         (folder / "layout.h").write_text("".join(defines))
         variables = [f"BUILD_DIR={self.output}", f"DESIGN={self.registers}", f"PROGRAM={HERE / 'program'}"]
+        variables.append(f"MAIN={self.program}")
         subprocess.run(["make", "-C", folder, "-f", HERE / "program" / "Makefile", *variables], check=True)
         program = (folder / "program.bin").read_bytes()
         if len(program) > PROGRAM_BYTES:
             raise SystemExit(f"the program has {len(program)} bytes, there is room for {PROGRAM_BYTES}")
-        memory = bytearray(b"\xa5" * MAIN_RAM_BYTES)
+        memory = bytearray([UNWRITTEN] * MAIN_RAM_BYTES)
         memory[: len(program)] = program
         for name, content in self.files.items():
             start = self.layout[name] - MAIN_RAM
@@ -112,32 +110,16 @@ class ProgramBuilder(Builder):  # type: ignore[misc]
         self.soc.init_ram("main_ram", contents=words)
 
 
-def memory_layout(files: dict[str, bytes]) -> dict[str, int]:
-    """Addresses and sizes; every part has an untouched page behind it."""
-    width, height = struct.unpack_from("<2I", files["view"], 4 * view_places.WIDTH)
-    stride = -(-width // 16) * 16 * 4
-    layout = {"frames": FRAMES, "width": width, "height": height, "stride": stride}
-    layout |= {"record_bytes": RECORD_BYTES, "frame_bytes": stride * height}
-    place = MAIN_RAM + PROGRAM_BYTES
-    sizes = {name: len(file) for name, file in files.items()}
-    for name, size in {**sizes, "records": FRAMES * RECORD_BYTES, "framebuffers": FRAMES * stride * height}.items():
-        layout |= {name: place, f"{name}_bytes": size}
-        place += -(-size // PAGE) * PAGE + PAGE
-    if place > MAIN_RAM + MAIN_RAM_BYTES:
-        raise SystemExit(f"files and framebuffers need {place - MAIN_RAM} bytes, the memory has {MAIN_RAM_BYTES}")
-    return layout
-
-
 def main() -> None:
     """Build, simulate."""
-    if len(sys.argv) not in (7, 8):
+    if len(sys.argv) < 6 or sys.argv[1] not in PROGRAMS:
         raise SystemExit(__doc__)
-    design, registers, image, view, output, console, *scene = (Path(argument).resolve() for argument in sys.argv[1:])
-    names = {"view": view, "image": image} | dict(zip(("scene",), scene, strict=False))
-    files = {name: file.read_bytes() for name, file in names.items()}
-    layout = memory_layout(files)
+    program, *arguments = sys.argv[1:]
+    design, registers, output, console = (Path(argument).resolve() for argument in arguments[:4])
+    files = {name: Path(file).read_bytes() for name, _, file in (each.partition("=") for each in arguments[4:])}
+    layout = memory_layout(program, files)
     output.mkdir(parents=True, exist_ok=True)
-    (output / "layout.json").write_text(json.dumps({"main_ram": MAIN_RAM, **layout}, indent=1) + "\n")
+    (output / "layout.json").write_text(json.dumps(layout, indent=1) + "\n")
     gateware = output / "gateware"
     (gateware / "memory.hex").unlink(missing_ok=True)
     # LiteX's makefiles call python3 and expect LiteX there
@@ -147,7 +129,7 @@ def main() -> None:
     configuration = SimConfig()
     configuration.add_clocker("sys_clk", freq_hz=FREQUENCY)
     configuration.add_module("serial2console", "serial")
-    builder = ProgramBuilder(SoC(design), registers, layout, files, output)
+    builder = ProgramBuilder(SoC(design), program, registers, layout, files, output)
     builder.build(sim_config=configuration, run=False, opt_level="O3")
     subprocess.run(["bash", "build_sim.sh"], cwd=gateware, check=True)
     with console.open("wb") as stream:

@@ -1,6 +1,6 @@
 """Compares the memory of the simulated SoC with the bit-exact model, byte by byte, and writes the frames as a PNG.
 
-Usage: compare.py DESIGN SCENE VIEW OUTPUT CONSOLE PICTURE
+Usage: compare_frames.py DESIGN SCENE VIEW OUTPUT CONSOLE PICTURE
 
 SCENE and VIEW come from ``colonnade pack``, OUTPUT and CONSOLE from simulation.py; PICTURE is written. The exit status
 is 1 if a byte differs, of the frames, of the registers that the processor computed, of the files, or of what lies
@@ -9,13 +9,9 @@ between, if the camera left its orbit, or if the processor saw other frames.
 
 from __future__ import annotations
 
-import json
-import re
 import struct
 import sys
-import zlib
 from pathlib import Path
-from typing import Any, NoReturn
 
 import numpy as np
 import view_places
@@ -26,43 +22,16 @@ from colonnade.registers.target_view import TargetView
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.file import SceneImage
+from memory import Memory, fail, require_seen, seen
 from PIL import Image
 
 XRGB8888 = 0
-UNWRITTEN = 0xA5
 #: The program's ``struct record``: camera, light, number of words, and then the words.
 RECORD = struct.Struct("<3q9i4x4q2I 3q3I4xQ I")
 METRE, ONE = 1 << 32, 1 << 30
 #: Of the orbit's poses, in parts of the distance, and of 1.
 TOLERANCE = 2.0**-26
 FRAMES_IN_A_ROW = 4
-
-
-def fail(why: str) -> NoReturn:
-    """End with status 1."""
-    raise SystemExit(f"soc: {why}")
-
-
-class Memory:
-    """The main memory behind the program, at the end of the simulation."""
-
-    def __init__(self, output: Path) -> None:
-        self.layout: dict[str, int] = json.loads((output / "layout.json").read_text())
-        words = (output / "gateware" / "memory.hex").read_text().split()
-        values = [int(word, 16) for word in words if not word.startswith(("@", "//"))]
-        self._bytes = np.array(values, dtype="<u4").view(np.uint8)
-        self._explained = np.zeros(len(self._bytes), dtype=bool)
-        self._explained[: self.layout["view"] - self.layout["main_ram"]] = True
-
-    def take(self, address: int, size: int) -> Any:
-        """Bytes that may have been written."""
-        place = slice(address - self.layout["main_ram"], address - self.layout["main_ram"] + size)
-        self._explained[place] = True
-        return self._bytes[place]
-
-    def written_elsewhere(self) -> int:
-        """How many bytes have changed that were never taken."""
-        return int(np.count_nonzero((self._bytes != UNWRITTEN) & ~self._explained))
 
 
 def record(memory: Memory, index: int) -> tuple[list[int], list[tuple[int, int]]]:
@@ -95,13 +64,11 @@ def main() -> None:
     files = {"view": view, "image": device_image(image, manifest)}
     if "scene" in layout:
         files["scene"] = dram_image(image, manifest)
-    for name, content in files.items():
-        if memory.take(layout[name], layout[f"{name}_bytes"]).tobytes() != content:
-            fail(f"the {name} in memory has changed")
+    memory.require_files(files)
 
     target = TargetView(view, manifest)
     centre = list(struct.unpack_from("<3q", view, 4 * view_places.OBJECT))
-    seen = dict(re.findall(rb"frame (\d+): crc32 ([0-9a-f]{8})", console.read_bytes()))
+    crcs = dict(seen(console, r"frame (\d+): crc32 ([0-9a-f]{8})"))
     start = [*struct.unpack_from("<3q9i4q2I", view, 4 * view_places.CAMERA)]
     start += struct.unpack_from("<3q3IQ", view, 4 * view_places.LIGHT)
     different, frames = 0, []
@@ -114,12 +81,10 @@ def main() -> None:
             fail(f"the processor has computed other registers of frame {index} than the host")
         expected = framebuffer_bytes(render_model(manifest, image, target.accept(words)), XRGB8888)
         lines = memory.take(layout["framebuffers"] + index * layout["frame_bytes"], layout["frame_bytes"])
-        if int(seen.get(str(index).encode(), b"0"), 16) != zlib.crc32(lines.tobytes()):
-            fail(f"the processor does not see frame {index} as it is in memory")
+        require_seen(f"frame {index}", lines, crcs.get(str(index).encode(), b"0"))
         frames.append(lines.reshape(layout["height"], layout["stride"])[:, : 4 * layout["width"]])
         different += int(np.count_nonzero(frames[-1] != expected))
-    if memory.written_elsewhere():
-        fail(f"{memory.written_elsewhere()} bytes outside the framebuffers were written")
+    memory.require_untouched("framebuffers")
 
     pixels = [frame.reshape(layout["height"], layout["width"], 4)[:, :, 2::-1] for frame in frames]
     rows = [np.hstack(pixels[at : at + FRAMES_IN_A_ROW]) for at in range(0, len(pixels), FRAMES_IN_A_ROW)]
