@@ -57,9 +57,18 @@ class Axi4Pins(idBits: Int, addressBits: Int, dataBytes: Int, hasAttributes: Boo
   *
   * @param masterBytes
   *   `--axi` of the design
+  * @param deviceIdBits
+  *   of the design's memory port
   */
-class ColonnadeAxi4(slaveIdBits: Int = 4, masterIdBits: Int = 8, masterBytes: Int = 8)
-    extends BlackBox(Map("SLAVE_ID" -> slaveIdBits, "MASTER_ID" -> masterIdBits, "MASTER_BYTES" -> masterBytes)) {
+class ColonnadeAxi4(slaveIdBits: Int = 4, masterIdBits: Int = 8, masterBytes: Int = 8, deviceIdBits: Int = 1)
+    extends BlackBox(
+      Map(
+        "SLAVE_ID"     -> slaveIdBits,
+        "MASTER_ID"    -> masterIdBits,
+        "MASTER_BYTES" -> masterBytes,
+        "DEVICE_ID"    -> deviceIdBits
+      )
+    ) {
   override def desiredName = "colonnade_axi4"
 
   val io = IO(new Bundle {

@@ -4,7 +4,8 @@
 module colonnade_axi4 #(
     parameter int SLAVE_ID = 4,
     parameter int MASTER_ID = 8,
-    parameter int MASTER_BYTES = 8  // of the design: --axi
+    parameter int MASTER_BYTES = 8, // of the design: --axi
+    parameter int DEVICE_ID = 1     // of the design: bits of m_axi_arid of ColonnadeAxi, more than 1 for rays only
 `ifdef COLONNADE_SCENE
     ,
     parameter int SCENE_ID = 2,     // of the design: 1 with one or two banks of records, 2 with four
@@ -58,7 +59,7 @@ module colonnade_axi4 #(
     input  logic [8*SCENE_BYTES-1:0] m_axi_scene_rdata
 `endif
 );
-  // Bursts are refused, and the device has one id, whose answers come in order.
+  // Bursts are refused. Ids of the memory's answers are those of the device.
   wire unused = &{1'b0, s_axi_awburst, s_axi_arburst, m_axi_bid, m_axi_rid};
 
   logic [15:0] awaddr, araddr;
@@ -77,7 +78,7 @@ module colonnade_axi4 #(
   );
 
   // The memory is normal, non-cacheable, bufferable.
-  logic awid, arid;
+  logic [DEVICE_ID-1:0] awid, arid;
   assign m_axi_awid = MASTER_ID'(awid);
   assign m_axi_arid = MASTER_ID'(arid);
   assign {m_axi_awlock, m_axi_arlock} = '0;
@@ -99,7 +100,8 @@ module colonnade_axi4 #(
       .s_axil_bresp(bresp), .s_axil_bvalid(bvalid), .s_axil_bready(bready),
       .s_axil_araddr(araddr), .s_axil_arprot(3'b010), .s_axil_arvalid(arvalid), .s_axil_arready(arready),
       .s_axil_rdata(rdata), .s_axil_rresp(rresp), .s_axil_rvalid(rvalid), .s_axil_rready(rready),
-      .m_axi_awid(awid), .m_axi_arid(arid), .m_axi_bid(m_axi_bid[0]), .m_axi_rid(m_axi_rid[0]),
+      .m_axi_awid(awid), .m_axi_arid(arid), .m_axi_bid(m_axi_bid[DEVICE_ID-1:0]),
+      .m_axi_rid(m_axi_rid[DEVICE_ID-1:0]),
 `ifdef COLONNADE_SCENE
       .m_axi_scene_arid(scene_arid), .m_axi_scene_rid(m_axi_scene_rid[SCENE_ID-1:0]),
 `endif

@@ -44,10 +44,14 @@ def main(arguments: argparse.Namespace) -> None:
     sources = [design / line for line in (design / "filelist.f").read_text().split()]
     sources += sorted(AXI4.glob("*.sv")) if arguments.axi4 else []
     sources += [] if backdoor is None else [backdoor / "backdoor.sv"]
-    memory = json.loads((design / "manifest.json").read_text())["config"]["columnBvhMemory"]
+    config = json.loads((design / "manifest.json").read_text())["config"]
+    memory = config["columnBvhMemory"]
     cache, defines, parameters = memory["cache"], {}, {}
     if arguments.axi4:
-        parameters = {"MASTER_BYTES": json.loads((design / "shell.json").read_text())["busBytes"]}
+        # A device for rays has an id for each column, and one for its batches
+        identifiers = int(config["array"]["columns"]).bit_length() if config["frame"].get("rays") else 1
+        bus_bytes = json.loads((design / "shell.json").read_text())["busBytes"]
+        parameters = {"MASTER_BYTES": bus_bytes, "DEVICE_ID": identifiers}
     if arguments.axi4 and cache is not None:
         defines = {"COLONNADE_SCENE": 1}
         parameters |= {"SCENE_ID": 2 if memory["banks"] == 4 else 1, "SCENE_BYTES": cache["busBytes"]}

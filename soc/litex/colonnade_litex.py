@@ -84,6 +84,7 @@ class Colonnade(LiteXModule):  # type: ignore[misc]
         """
         soc.bus.add_slave(name, self.registers, SoCRegion(origin=origin, size=REGISTER_BYTES, cached=False))
         if masters_on_bus:
+            # LiteX's converter holds the id of a beat for one cycle; a device for rays takes each beat at once
             soc.bus.add_master(name=name, master=self.memory)
             if self.scene is not None:
                 soc.bus.add_master(name=f"{name}_scene", master=self.scene)

@@ -28,17 +28,19 @@ def main() -> None:
     found, expected = memory.region("results"), np.fromfile(files["results"], dtype=np.uint8)
     memory.require_untouched("ring and the results")
 
-    batches = seen(console, r"batch \d+: .* tag ([0-9a-f]{8}), (\d+) cycles")
+    batches = seen(console, r"batch \d+: .* tag ([0-9a-f]{8}), (\d+) cycles(, queued)?")
     crcs = seen(console, r"results: crc32 ([0-9a-f]{8})")
     if len(batches) != memory.layout["batch_count"] or len(crcs) != 1:
         fail(f"the program has ended {len(batches)} of {memory.layout['batch_count']} batches")
+    if not any(queued for _, _, queued in batches):
+        fail("no batch was queued while another ran")
     require_seen("the results", found, crcs[0])
     different = int(np.count_nonzero(found != expected))
-    failed = sum(int(tag, 16) >= FAILED for tag, _ in batches)
-    cycles = sorted(int(count) for _, count in batches)
+    failed = sum(int(tag, 16) >= FAILED for tag, _, _ in batches)
+    cycles = sorted(int(count) for _, count, _ in batches)
     print(
         f"soc: {different} of {len(expected)} bytes of the results of {len(batches)} batches differ from the model's;"
-        f" {failed} batches failed as they should; {cycles[failed]:,} to {cycles[-1]:,} cycles a batch"
+        f" {failed} of these failed, as intended; {cycles[failed]:,} to {cycles[-1]:,} cycles a batch"
     )
     raise SystemExit(1 if different else 0)
 

@@ -48,13 +48,13 @@ class Memory:
         """Fail unless the files are as they were put there."""
         for name, content in files.items():
             if self.region(name).tobytes() != content:
-                fail(f"the {name} in memory has changed")
+                fail(f"the file {name} has changed in memory")
 
     def require_untouched(self, regions: str) -> None:
         """Fail if a byte has changed that was never taken."""
         count = int(np.count_nonzero((self._bytes != layouts.UNWRITTEN) & ~self._explained))
         if count:
-            fail(f"{count} bytes outside the {regions} were written")
+            fail(f"{count} {'byte' if count == 1 else 'bytes'} outside the {regions} changed")
 
 
 def require_seen(name: str, content: Any, crc32: bytes) -> None:

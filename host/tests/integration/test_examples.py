@@ -1,4 +1,4 @@
-"""The cocotb bench of ``examples/`` as a user runs it: its frames are the model's, loaded through the bus or not.
+"""The cocotb benches of ``examples/`` as a user runs them: their frames and hits are the model's.
 
 The bench in C++ is run by ``docs/start/soc.md``.
 """
@@ -39,13 +39,26 @@ def output(design: GeneratedDesign, tmp_path_factory: pytest.TempPathFactory) ->
     return folder
 
 
-def run_example(output: Path, **settings: str) -> str:
-    """What `make -C examples cocotb` prints."""
+#: Of a device for rays with two columns, whose ids and arbiters are those of any number.
+COLUMNS = "tiny --set array.columns=2 --set frame.rays=true --set units.rayInterval=1 --set units.pathContexts=64"
+needs_icarus = pytest.mark.skipif(shutil.which("iverilog") is None, reason="no iverilog: apt-get install iverilog")
+
+
+@pytest.fixture
+def new_verilator(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that cocotb takes, on PATH."""
+    program = EXAMPLES.parent / "tools" / "verilator-environment"
+    folder = subprocess.run([program], check=True, capture_output=True, text=True).stdout.strip()
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+
+
+def run_example(output: Path, target: str = "cocotb", **settings: str) -> str:
+    """What `make -C examples` prints for a target."""
     command = [
         "make",
         "-C",
         EXAMPLES,
-        "cocotb",
+        target,
         f"OUT={output}",
         *(f"{name}={value}" for name, value in settings.items()),
     ]
@@ -54,7 +67,7 @@ def run_example(output: Path, **settings: str) -> str:
     return done.stdout
 
 
-@pytest.mark.skipif(shutil.which("iverilog") is None, reason="no iverilog: apt-get install iverilog")
+@needs_icarus
 def test_the_frame_of_an_example_is_that_of_the_model(output: Path) -> None:
     """Through the top with AXI4 ports, and by the backdoor; bytes behind the last pixel of a line are unknown.
 
@@ -67,16 +80,35 @@ def test_the_frame_of_an_example_is_that_of_the_model(output: Path) -> None:
         assert "0 of 384 pixels differ from model.png" in printed
 
 
+@needs_icarus
+def test_the_hits_of_an_example_are_those_of_the_model(tmp_path: Path) -> None:
+    """Also behind the top with AXI4 ports. A byte of the results that differs fails."""
+    for axi4 in ("", "1"):
+        printed = run_example(tmp_path, "cocotb-rays", CONFIG=COLUMNS, AXI4=axi4)
+        assert "batches: 9 of 9" in printed
+        assert "0 of 6912 bytes of tags and hits differ from scene.results" in printed
+    results = tmp_path / "rays" / "cocotb.results"
+    content = bytearray(results.read_bytes())
+    content[-65] ^= 1
+    results.write_bytes(content)
+    compare = [sys.executable, EXAMPLES / "rays" / "compare.py", results, results.with_name("scene.results")]
+    done = subprocess.run(compare, capture_output=True, text=True)
+    assert done.returncode == 1 and done.stdout.startswith("1 of 6912 bytes")
+
+
 @pytest.mark.matrix
+@pytest.mark.usefixtures("new_verilator")
+def test_hits_of_a_scene_in_dram_in_verilator(tmp_path: Path) -> None:
+    config = f"{COLUMNS} --set 'columnBvhMemory.cache={json.dumps(CACHE)}'"
+    settings = {"SIMULATOR": "verilator", "CONFIG": config, "DRAM": "1", "RAYS": "640"}
+    assert " 0 of " in " " + run_example(tmp_path, "cocotb-rays", **settings).splitlines()[-2]
+
+
+@pytest.mark.matrix
+@pytest.mark.usefixtures("new_verilator")
 @pytest.mark.parametrize("cache", [False, True])
-def test_a_frame_through_the_axi4_top_in_verilator(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cache: bool
-) -> None:
+def test_a_frame_through_the_axi4_top_in_verilator(tmp_path: Path, cache: bool) -> None:
     """Also of a design whose scene is in DRAM, through the second master."""
-    tools = subprocess.run(
-        [EXAMPLES.parent / "tools" / "verilator-environment"], check=True, capture_output=True, text=True
-    )
-    monkeypatch.setenv("PATH", f"{tools.stdout.strip()}:{os.environ['PATH']}")
     config = f"tiny --set 'columnBvhMemory.cache={json.dumps(CACHE)}'" if cache else "tiny"
     settings = {"SIMULATOR": "verilator", "AXI4": "1", "MESH": "torus", "SIZE": "32x24"}
     printed = run_example(tmp_path, CONFIG=config, DRAM="1" if cache else "", **settings)
