@@ -119,6 +119,10 @@ struct colonnade_rays_scene;
  * `backend` NULL: the model. The device is NULL if there is no memory, and otherwise has the error. */
 int colonnade_rays_open(const char *design, const struct colonnade_rays_backend *backend,
                         struct colonnade_rays_device **device);
+/* Opens the device that the environment names (simulated.cpp). COLONNADE_RAYS_DESIGN is a file with the design.
+ * COLONNADE_RAYS_DEVICE is one with a simulated device: a line "program PATH", then lines "register NAME ADDRESS BITS
+ * SIGNED ACCESS"; without it the model answers. A failure prints a line on stderr; the device is then NULL. */
+int colonnade_rays_open_environment(struct colonnade_rays_device **device);
 /* Closes a device, after its scenes. */
 void colonnade_rays_close(struct colonnade_rays_device *device);
 /* Text of the last call that failed, until the next call. */

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "binding.hpp"
+#include "rays/batch_bytes.hpp"
 #include "rays/design.hpp"
+#include "rays/device_registers.hpp"
 #include "rays/traffic.hpp"
 
 using namespace nanobind::literals;
@@ -23,17 +25,6 @@ template <class T> using Threes = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_c
 template <class T> using Column = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 const colonnade_rays_ray* raysOf(const Eights<double>& rays) { return reinterpret_cast<const colonnade_rays_ray*>(rays.data()); }
-
-std::size_t rayBytes(const colonnade_rays_batch& batch) {
-    if (batch.mode & COLONNADE_RAYS_SENSOR) return sizeof(colonnade_rays_sensor);
-    return batch.count * std::size_t{batch.mode & COLONNADE_RAYS_FAN ? 16u : 32u};
-}
-
-std::size_t responseBytes(const colonnade_rays_batch& batch) {
-    const std::size_t count = batch.count;
-    const std::uint32_t response = batch.mode & COLONNADE_RAYS_RESPONSE;
-    return response == COLONNADE_RAYS_HITS ? 16 * count : response == COLONNADE_RAYS_RANGES ? 8 * count : (count + 63) / 64 * 8;
-}
 
 /// A device in Python as a backend: `colonnade.rays.device.RayDevice`. Its errors wait for the end of the library's call.
 class PythonDevice {
@@ -66,24 +57,14 @@ private:
     }
 
     int load(const colonnade_rays_image& image) {
-        nb::dict values;
-        const char* const axes[] = {"x", "y", "z"};
-        const auto name = [&](const char* group, int a) { return std::string(group) + "." + axes[a]; };
-        for (int a = 0; a < 3; ++a) {
-            values[name("bounds.low", a).c_str()] = image.bounds_low[a];
-            values[name("bounds.high", a).c_str()] = image.bounds_high[a];
-            values[name("placement.base", a).c_str()] = image.base[a];
-        }
-        values["placement.mantissa"] = image.scale_mantissa;
-        values["placement.exponent"] = image.scale_exponent;
-        values["scene.recordCount"] = image.record_count;
-        device_.attr("load")(values, nb::bytes(image.records, image.record_count * image.record_bytes), image.record_count);
+        device_.attr("load")(rays::registersOf(image), nb::bytes(image.records, image.record_count * image.record_bytes), image.record_count);
         return COLONNADE_RAYS_OK;
     }
 
     int submit(const colonnade_rays_batch& batch) {
         const auto* const rays = reinterpret_cast<const char*>(batch.rays);
-        const nb::tuple found = nb::cast<nb::tuple>(device_.attr("submit")(nb::bytes(&batch, sizeof batch), nb::bytes(rays, rayBytes(batch)), responseBytes(batch)));
+        const nb::tuple found =
+            nb::cast<nb::tuple>(device_.attr("submit")(nb::bytes(&batch, sizeof batch), nb::bytes(rays, rays::rayBytes(batch)), rays::responseBytes(batch)));
         const auto hits = nb::cast<nb::bytes>(found[1]);
         std::memcpy(reinterpret_cast<void*>(batch.hits), hits.data(), hits.size());
         const auto tag = nb::cast<std::uint32_t>(found[0]);
@@ -93,9 +74,7 @@ private:
     }
 
     int read(colonnade_rays_sums& sums) {
-        const nb::object counters = device_.attr("counters")();
-        const auto of = [&](const char* name) { return nb::cast<std::uint64_t>(counters[name]); };
-        sums = {of("rays"), of("raysRefused"), of("raysInBox"), of("nodeReads"), of("boxTests"), of("triangleTests"), of("deepestStack")};
+        sums = rays::sumsOf(nb::cast<rays::RegisterValues>(device_.attr("counters")()));
         return COLONNADE_RAYS_OK;
     }
 
@@ -205,8 +184,8 @@ public:
         colonnade_rays_batch batch{};
         batch.count = count;
         batch.mode = mode;
-        const std::size_t bytes = responseBytes(batch);
-        if (rays.size() != rayBytes(batch)) throw std::invalid_argument("rays of this form have other records");
+        const std::size_t bytes = rays::responseBytes(batch);
+        if (rays.size() != rays::rayBytes(batch)) throw std::invalid_argument("rays of this form have other records");
         std::vector<Line> records(rays.size() / 64 + 1), responses(bytes / 64 + 1);
         if (rays.size() != 0) std::memcpy(records.data()->bytes, rays.data(), rays.size());
         std::uint32_t done = 0;

@@ -13,6 +13,7 @@ void bind_mesh(nb::module_& module);
 void bind_model(nb::module_& module);
 void bind_packer(nb::module_& module);
 void bind_rays(nb::module_& module);
+void bind_simulation(nb::module_& module);
 void bind_surroundings(nb::module_& module);
 void bind_view(nb::module_& module);
 
@@ -28,6 +29,7 @@ NB_MODULE(_core, module) {
     bind_model(module);
     bind_packer(module);
     bind_rays(module);
+    bind_simulation(module);
     bind_surroundings(module);
     bind_view(module);
 }

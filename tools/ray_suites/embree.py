@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from colonnade.common.errors import UserError
@@ -49,8 +49,8 @@ def build(run: Callable[..., str], checkout: Path, folder: Path, library: Callab
     return folder / "embree_verify"
 
 
-def verify(program: Path, design: Path) -> dict[str, tuple[int, int]]:
-    """Tests that pass, and all, by name."""
+def verify(program: Path, variables: Mapping[str, str]) -> dict[str, tuple[int, int]]:
+    """Tests that pass, and all, by name; `variables` are the program's environment."""
     found = {}
     for pattern, intensity in TESTS.items():
         name = pattern.replace(r"\..*", ".").replace(".*", "").replace("\\", "").rstrip(".")
@@ -58,7 +58,7 @@ def verify(program: Path, design: Path) -> dict[str, tuple[int, int]]:
         options += ["--run", rf"SSE2\.{pattern}"]
         done = subprocess.run(
             [program, *options],
-            env={"COLONNADE_RAYS_DESIGN": str(design)},
+            env=variables,
             cwd=program.parent,
             text=True,
             capture_output=True,

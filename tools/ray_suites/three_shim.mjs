@@ -1,13 +1,12 @@
 // three-mesh-bvh whose ray casts the library of rays answers. It finds the faces that a ray meets; distance, point and uv of a
 // face are of three-mesh-bvh's own `intersectTri`.
 import koffi from "koffi";
-import { readFileSync } from "node:fs";
 import * as bvh from "bvh-source";
 import { intersectTri } from "bvh-source/src/utils/ThreeRayIntersectUtilities.js";
 
 const library = koffi.load(process.env.COLONNADE_RAYS_LIBRARY);
 const declared = (text) => library.func(text);
-const open = declared("int colonnade_rays_open(const char *design, void *backend, _Out_ void **device)");
+const open = declared("int colonnade_rays_open_environment(_Out_ void **device)");
 const error = declared("const char *colonnade_rays_error(void *device)");
 const newScene = declared("int colonnade_rays_scene_new(void *device, _Out_ void **scene)");
 const add = declared("int colonnade_rays_mesh_add(void *scene, const double *v, size_t nv, const uint32_t *f, size_t nf, _Out_ uint32_t *mesh)");
@@ -18,7 +17,9 @@ const all = declared(
 
 const HIT_BYTES = 40, FACE_OFFSET = 28, ALL_MASKS = 0xff000000, CAPACITY = 4096;
 export const counts = { rays: 0, faces: 0 };
-let device;
+const opened = [null];
+if (open(opened)) throw new Error("the library of rays has no device");
+const [device] = opened;
 
 function checked(status) {
   if (status) throw new Error(error(device));
@@ -26,9 +27,7 @@ function checked(status) {
 
 function made(call, ...inputs) {
   const out = [null];
-  const status = call(...inputs, out);
-  if (call === open) device = out[0];
-  checked(status);
+  checked(call(...inputs, out));
   return out[0];
 }
 
@@ -40,8 +39,7 @@ function sceneOf(tree) {
   const vertices = new Float64Array(position.count * 3), faces = new Uint32Array(triangles.length * 3);
   for (let i = 0; i < position.count; i++) vertices.set([position.getX(i), position.getY(i), position.getZ(i)], 3 * i);
   triangles.forEach((triangle, i) => faces.set([0, 1, 2].map((k) => index.getX(3 * triangle + k)), 3 * i));
-  const text = readFileSync(process.env.COLONNADE_RAYS_DESIGN, "utf8");
-  const scene = made(newScene, device ?? made(open, text, null));
+  const scene = made(newScene, device);
   made(add, scene, vertices, position.count, faces, triangles.length);
   checked(commit(scene));
   tree.colonnade = { scene, triangles };

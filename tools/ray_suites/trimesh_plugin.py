@@ -9,7 +9,7 @@ import trimesh.ray.ray_triangle
 from colonnade.rays import RayMeshIntersector
 
 _BACKEND = os.environ.get("COLONNADE_RAYS_BACKEND", "model")
-_CONFIG = "edge" if _BACKEND == "model" else "traversal"
+_CONFIG = os.environ.get("COLONNADE_RAYS_CONFIG", "edge")
 _OVERRIDES = tuple(os.environ.get("COLONNADE_RAYS_OVERRIDES", "").split())
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import os
 import subprocess
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
 
 from colonnade.common import processes
@@ -20,20 +19,9 @@ from colonnade.design.manifest import Register
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import HUGE_PAGES
 
-#: Where the simulator has rays, hits and the tag of a batch.
-_RAYS, _HITS, _TAG = 1 << 32, 2 << 32, 64
-
 
 class RayBackend(ABC):
-    """A device that answers the batches of a `Scene`.
-
-    Args:
-        registers: Those of its design.
-    """
-
-    def __init__(self, registers: Mapping[str, Register]) -> None:
-        self._registers = registers
-        self._before: dict[str, int] = {}
+    """A device that answers the batches of a `Scene`."""
 
     @abstractmethod
     def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
@@ -43,19 +31,9 @@ class RayBackend(ABC):
     def submit(self, batch: bytes, rays: bytes, size: int) -> tuple[int, bytes]:
         """Run a batch, whose addresses are the device's; its tag, and `size` bytes of its hits."""
 
+    @abstractmethod
     def counters(self) -> dict[str, int]:
         """Sums since the device was made, of cycles too, by the names of the registers."""
-        sums = {}
-        for name, register in self._registers.items():
-            kind, _, counter = name.partition(".")
-            if kind == "counters":
-                value = register.decode([self._word(register.address + word) for word in range(register.words)])
-                before = self._before.get(counter, 0)
-                sums[counter] = max(value, before) if counter == "deepestStack" else value + before
-        return sums
-
-    @abstractmethod
-    def _word(self, address: int) -> int: ...
 
 
 class RayDevice(RayBackend):
@@ -83,11 +61,9 @@ class RayDevice(RayBackend):
         design: GeneratedDesign | None = None,
         folder: Path | None = None,
     ) -> None:
-        design = design or design_for(config, overrides, progress)
-        if not design.manifest.config["frame"]["rays"]:
-            raise UserError("the design traces no rays of applications: choose one with frame.rays, such as traversal")
-        super().__init__(design.manifest.registers)
-        program = build_simulator(design, progress)
+        from colonnade import _core
+
+        program, registers = _simulator(design or design_for(config, overrides, progress), progress)
         with ExitStack() as stack:
             process = stack.enter_context(
                 processes.started(
@@ -99,45 +75,45 @@ class RayDevice(RayBackend):
                     stderr=subprocess.PIPE,
                 )
             )
-            assert isinstance(process.stdin, io.TextIOWrapper) and isinstance(process.stdout, io.TextIOWrapper)
+            streams = process.stdin, process.stdout, process.stderr
+            assert process.stdin is not None
             stack.callback(process.stdin.close)
-            self._commands, self._answers, self._errors = process.stdin.buffer, process.stdout.buffer, process.stderr
+            self._simulation = _core.RaySimulation(registers, *(each.fileno() for each in streams if each is not None))
             self.close = weakref.finalize(self, stack.pop_all().close)
 
     def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
         """See `RayBackend`."""
-        self._before = self.counters()
-        self._send(f"load {count} {len(records) // count}", records)
-        written = dict.fromkeys((name for name, each in self._registers.items() if each.access == "rw"), 0)
-        commands = {name: 1 for name in ("control.invalidate", "control.start") if name in self._registers}
-        for name, value in {**written, **values, **commands}.items():
-            for address, word in self._registers[name].encode(value):
-                self._send(f"write {address} {word}")
+        self._simulation.load(values, records, count)
 
     def submit(self, batch: bytes, rays: bytes, size: int) -> tuple[int, bytes]:
         """See `RayBackend`."""
-        words = [(_RAYS, 0), (_HITS, 8), (_TAG, 48)]
-        for address, at in words:
-            batch = batch[:at] + address.to_bytes(8, "little") + batch[at + 8 :]
-        self._send(f"batch {self._registers['rays.tail'].address} {len(rays)} {size}", batch + rays)
-        tag = int(self._line())
-        return tag, self._answers.read(size)
+        tag, hits = self._simulation.submit(batch, rays, size)
+        return tag, hits
 
-    def _word(self, address: int) -> int:
-        self._send(f"read {address}")
-        return int(self._line())
+    def counters(self) -> dict[str, int]:
+        """See `RayBackend`."""
+        sums: dict[str, int] = self._simulation.counters()
+        return sums
 
-    def _send(self, command: str, data: bytes = b"") -> None:
-        try:
-            self._commands.write(f"{command}\n".encode() + data)
-        except (BrokenPipeError, ValueError):
-            self._fail()
 
-    def _line(self) -> bytes:
-        with suppress(BrokenPipeError):
-            self._commands.flush()
-        return self._answers.readline() or self._fail()
+def device_text(config: str, overrides: Overrides = (), progress: Progress = QUIET) -> str:
+    """The content of a file `COLONNADE_RAYS_DEVICE` for the library in C: a simulated device, which is built.
 
-    def _fail(self) -> bytes:
-        assert self._errors is not None
-        raise RuntimeError(f"the simulated hardware failed: {self._errors.read().strip()}")
+    Raises:
+        UserError: As of `RayDevice`.
+    """
+    program, registers = _simulator(design_for(config, overrides, progress), progress)
+    return f"program {program}\n{registers}"
+
+
+def registers_text(registers: Mapping[str, Register]) -> str:
+    """Registers for the library in C, one a line."""
+    lines = (f"register {name} {r.address} {r.width} {int(r.signed)} {r.access}\n" for name, r in registers.items())
+    return "".join(lines)
+
+
+def _simulator(design: GeneratedDesign, progress: Progress) -> tuple[Path, str]:
+    """The simulator of a design, and its registers."""
+    if not design.manifest.config["frame"]["rays"]:
+        raise UserError("the design traces no rays of applications: choose one with frame.rays, such as traversal")
+    return build_simulator(design, progress), registers_text(design.manifest.registers)

@@ -37,9 +37,6 @@ class RecordedRays(RayBackend):
     records: RayRecords | None = None
     batches: list[tuple[bytes, bytes, int]] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        super().__init__({})
-
     def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
         """See `RayBackend`."""
         self.values, self.records = dict(values), RayRecords(np.frombuffer(records, np.uint8).reshape(count, -1))
@@ -49,5 +46,6 @@ class RecordedRays(RayBackend):
         self.batches.append((batch, rays, size))
         return int.from_bytes(batch[TAG], "little"), bytes(size)
 
-    def _word(self, address: int) -> int:
-        return 0
+    def counters(self) -> dict[str, int]:
+        """See `RayBackend`. A device that does nothing counts nothing."""
+        return {}

@@ -11,7 +11,7 @@ from colonnade.common.errors import UserError
 from colonnade.design.generator import GeneratedDesign
 from colonnade.device.shell_base import Shell
 from colonnade.device.transport import Transport
-from colonnade.rays.device import RayBackend
+from colonnade.rays.device import RayBackend, registers_text
 from colonnade.rays.recorded import RayRecords
 from colonnade.scene_image.dram_image import PAGE_BYTES
 
@@ -37,8 +37,10 @@ class RayShell(Shell, RayBackend):
 
     @checked
     def __init__(self, transport: Transport, design: GeneratedDesign) -> None:
+        from colonnade import _core
+
         Shell.__init__(self, transport, design)
-        RayBackend.__init__(self, design.manifest.registers)
+        self._registers = _core.RayRegisters(registers_text(design.manifest.registers))
         if not self._design.numbers["rays_tail"]:
             transport.close()
             self._check("noRays")
@@ -46,7 +48,7 @@ class RayShell(Shell, RayBackend):
 
     def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
         """See `RayBackend`."""
-        self._before = self.counters()
+        self._registers.keep_sums(self._word)
         self._ring = self._loaded(RayRecords(np.frombuffer(records, np.uint8).reshape(count, -1)))
         self._require_memory("the ring of batches", self._ring, PAGE_BYTES)
         low, high, base = (
@@ -85,6 +87,11 @@ class RayShell(Shell, RayBackend):
             (int.from_bytes(self.transport.fetch(done, _TAG_BYTES), "little"), self.transport.fetch(hits, size))
             for done, hits, size in slots
         ]
+
+    def counters(self) -> dict[str, int]:
+        """See `RayBackend`."""
+        sums: dict[str, int] = self._registers.sums(self._word)
+        return sums
 
     def _word(self, address: int) -> int:
         return self.transport.read32(self._table.device.base + 4 * address)

@@ -1,9 +1,6 @@
-// The calls of Embree 4 for triangles: a shared library in place of libembree4. COLONNADE_RAYS_DESIGN names the design's file. Other
-// geometries, instances and motion are refused.
-#include <cstdio>
-#include <cstdlib>
-#include <fstream>
-#include <iterator>
+// The calls of Embree 4 for triangles: a shared library in place of libembree4, on the device that the environment names. Other geometries,
+// instances and motion are refused.
+#include <memory>
 #include <string>
 
 #include "embree.hpp"
@@ -31,15 +28,8 @@ template <class Call> void eachOf(const int* valid, char* packet, int width, boo
 extern "C" {
 
 void* rtcNewDevice(const char*) {
-    const char* const name = std::getenv("COLONNADE_RAYS_DESIGN");
-    std::ifstream file(name ? name : "");
-    const std::string design((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    auto* const device = new Device;
-    if (colonnade_rays_open(design.c_str(), nullptr, &device->rays) == COLONNADE_RAYS_OK) return device;
-    std::fprintf(stderr, "colonnade: error: COLONNADE_RAYS_DESIGN: %s\n", colonnade_rays_error(device->rays));
-    colonnade_rays_close(device->rays);
-    delete device;
-    return nullptr;
+    auto device = std::make_unique<Device>();
+    return colonnade_rays_open_environment(&device->rays) == COLONNADE_RAYS_OK ? device.release() : nullptr;
 }
 void rtcRetainDevice(void* handle) { ++device(handle).references; }
 void rtcReleaseDevice(void* handle) {

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import ctypes
-import subprocess
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from exact_rays import mesh_of, rays_of
+from rays_library import compiled_library
 
 from colonnade.design.generator import manifest_for
-from colonnade.design.toolchain import project_root
 from colonnade.rays.scene import design_text
 
 pytestmark = pytest.mark.matrix
@@ -97,12 +96,8 @@ def queries_of(rays: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ctypes.CDLL]:
-    root, folder = project_root(), tmp_path_factory.mktemp("embree")
-    flags = "-std=gnu++17 -O1 -ffp-contract=off -fPIC -shared -pthread -Wall -Wextra -Werror".split()
-    sources = [root / "host/cpp/rays" / name for name in ("rays.cpp", "embree.cpp")]
-    output = folder / "libembree4.so.4"
-    command = ["g++", *flags, f"-I{root / 'host/cpp'}", f"-I{root / 'driver/include'}", *sources, "-o", output]
-    subprocess.run(command, check=True)
+    folder = tmp_path_factory.mktemp("embree")
+    output = compiled_library(folder)
     (folder / "design").write_text(design_text(manifest_for("edge", ()).manifest))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("COLONNADE_RAYS_DESIGN", str(folder / "design"))
