@@ -120,8 +120,8 @@ struct colonnade_rays_scene;
 int colonnade_rays_open(const char *design, const struct colonnade_rays_backend *backend,
                         struct colonnade_rays_device **device);
 /* Opens the device that the environment names (simulated.cpp). COLONNADE_RAYS_DESIGN is a file with the design.
- * COLONNADE_RAYS_DEVICE is one with a simulated device: a line "program PATH", then lines "register NAME ADDRESS BITS
- * SIGNED ACCESS"; without it the model answers. A failure prints a line on stderr; the device is then NULL. */
+ * COLONNADE_RAYS_DEVICE is one with a simulated device: lines "program PATH" and "argument WORD", then "register NAME
+ * ADDRESS BITS SIGNED ACCESS"; without it the model answers. A failure prints a line on stderr, and `*device` is NULL. */
 int colonnade_rays_open_environment(struct colonnade_rays_device **device);
 /* Closes a device, after its scenes. */
 void colonnade_rays_close(struct colonnade_rays_device *device);

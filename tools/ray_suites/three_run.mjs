@@ -1,4 +1,5 @@
-// Runs a test file of three-mesh-bvh, whose random numbers begin alike each time: node three_run.mjs FILE
+// Runs a test file of three-mesh-bvh, whose random numbers begin alike each time: node three_run.mjs FILE EVERY
+// EVERY: of each group of tests the first one runs, and each EVERYth after it.
 import { isDeepStrictEqual } from "node:util";
 import { counts } from "three-mesh-bvh";
 
@@ -8,6 +9,7 @@ Math.random = () => {
   return Number(seed >> 11n) / 2 ** 53;
 };
 
+const [file, every] = process.argv.slice(2);
 const results = { passed: 0, failed: [] }, names = [];
 let before = [], tests = [];
 
@@ -24,7 +26,7 @@ globalThis.describe = (name, call) => {
   const [prepare, cases] = [before, tests];
   [before, tests] = [[], []];
   for (const each of prepare) each();
-  for (const [test, run] of cases) {
+  for (const [test, run] of cases.filter((_, i) => i % Number(every) === 0)) {
     try {
       run();
       results.passed++;
@@ -35,5 +37,5 @@ globalThis.describe = (name, call) => {
   names.pop();
 };
 
-await import(process.argv[2]);
+await import(file);
 console.log(JSON.stringify({ ...results, ...counts }));

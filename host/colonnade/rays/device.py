@@ -96,14 +96,14 @@ class RayDevice(RayBackend):
         return sums
 
 
-def device_text(config: str, overrides: Overrides = (), progress: Progress = QUIET) -> str:
-    """The content of a file `COLONNADE_RAYS_DEVICE` for the library in C: a simulated device, which is built.
+def device_text(config: str, overrides: Overrides = (), options: Sequence[str] = (), progress: Progress = QUIET) -> str:
+    """The content of a file `COLONNADE_RAYS_DEVICE` for the library in C; arguments are those of `RayDevice`.
 
     Raises:
         UserError: As of `RayDevice`.
     """
     program, registers = _simulator(design_for(config, overrides, progress), progress)
-    return f"program {program}\n{registers}"
+    return "\n".join([f"program {program}", *(f"argument {each}" for each in options), registers])
 
 
 def registers_text(registers: Mapping[str, Register]) -> str:

@@ -24,8 +24,9 @@ public:
         }
         query(rays, count, mode | COLONNADE_RAYS_HITS, [&](std::size_t i, const colonnade_rays_response& response, double t) {
             if (response.id >= COLONNADE_RAYS_OUT_OF_RANGE) return;
+            const std::size_t face = faceOf(response);
             const auto [u, v] = scene_.weightsOf(response);
-            hits[i] = hitOf(i, faceOf(response), {std::clamp(t, rays[i].tnear, rays[i].tfar), u, v, 0, (response.id & COLONNADE_RAYS_BACK_SIDE) != 0});
+            hits[i] = hitOf(i, face, {std::clamp(t, rays[i].tnear, rays[i].tfar), u, v, 0, (response.id & COLONNADE_RAYS_BACK_SIDE) != 0});
         });
     }
 
@@ -174,7 +175,11 @@ private:
         if (status != COLONNADE_RAYS_OK) throw Failure(status, "the device met an illegal record, or its stack overflowed: the hits are not valid");
     }
 
-    std::size_t faceOf(const colonnade_rays_response& response) const { return scene_.faceOfId(response.id & ~(COLONNADE_RAYS_BACK_SIDE | COLONNADE_RAYS_NON_OPAQUE)); }
+    std::size_t faceOf(const colonnade_rays_response& response) const {
+        const std::size_t face = scene_.faceOfId(response.id & ~(COLONNADE_RAYS_BACK_SIDE | COLONNADE_RAYS_NON_OPAQUE));
+        if (face == ~std::size_t{0}) throw Failure(COLONNADE_RAYS_DEVICE, "the device met a triangle that the scene does not have");
+        return face;
+    }
 
     AppHit hitOf(std::size_t ray, std::size_t face, const PlaneHit& hit) const {
         const std::uint32_t flags = (hit.backSide ? COLONNADE_RAYS_BACK_SIDE : 0) | (scene_.isOpaque(face) ? 0 : COLONNADE_RAYS_NON_OPAQUE);

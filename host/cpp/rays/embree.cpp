@@ -10,17 +10,21 @@ using namespace colonnade::rays::embree;
 namespace {
 
 /// Runs a call on the active rays of a packet, whose fields are arrays of `width`: those of a ray, and with `hasHit` of a hit.
-template <class Call> void eachOf(const int* valid, char* packet, int width, bool hasHit, const Call& call) {
+template <class Call> void ofPacket(const int* valid, char* packet, int width, bool hasHit, const Call& call) {
+    const std::size_t words = hasHit ? 20 : 12;
+    RTCRayHit queries[packetRays]{};
+    int lanes[packetRays];
+    std::size_t count = 0;
+    const auto at = [&](int lane, std::size_t word) { return packet + (word * static_cast<std::size_t>(width) + static_cast<std::size_t>(lane)) * 4; };
+    const auto bytes = [&](std::size_t i) { return reinterpret_cast<char*>(&queries[i]); };
     for (int lane = 0; lane < width; ++lane) {
         if (valid[lane] == 0) continue;
-        RTCRayHit one{};
-        const std::size_t words = hasHit ? 20 : 12;
-        const auto at = [&](std::size_t word) { return packet + (word * static_cast<std::size_t>(width) + static_cast<std::size_t>(lane)) * 4; };
-        auto* const bytes = reinterpret_cast<char*>(&one);
-        for (std::size_t word = 0; word < words; ++word) std::memcpy(bytes + 4 * word, at(word), 4);
-        call(one);
-        for (std::size_t word = 0; word < words; ++word) std::memcpy(at(word), bytes + 4 * word, 4);
+        for (std::size_t word = 0; word < words; ++word) std::memcpy(bytes(count) + 4 * word, at(lane, word), 4);
+        lanes[count++] = lane;
     }
+    call(queries, count);
+    for (std::size_t i = 0; i < count; ++i)
+        for (std::size_t word = 0; word < words; ++word) std::memcpy(at(lanes[i], word), bytes(i) + 4 * word, 4);
 }
 
 } // namespace
@@ -172,14 +176,18 @@ void rtcGetSceneLinearBounds(void* handle, float* bounds) {
     std::memcpy(bounds + 8, bounds, 8 * sizeof(float));
 }
 
-void rtcIntersect1(void* handle, RTCRayHit* query, const QueryArguments* arguments) { intersect(scene(handle), *query, arguments); }
-void rtcOccluded1(void* handle, RTCRay* query, const QueryArguments* arguments) { occlude(scene(handle), *query, arguments); }
+void rtcIntersect1(void* handle, RTCRayHit* query, const QueryArguments* arguments) { intersect(scene(handle), query, 1, arguments); }
+void rtcOccluded1(void* handle, RTCRay* ray, const QueryArguments* arguments) {
+    RTCRayHit query{*ray, {}};
+    occlude(scene(handle), &query, 1, arguments);
+    *ray = query.ray;
+}
 #define PACKET(WIDTH) \
     void rtcIntersect##WIDTH(const int* valid, void* handle, char* packet, const QueryArguments* arguments) { \
-        eachOf(valid, packet, WIDTH, true, [&](RTCRayHit& one) { intersect(scene(handle), one, arguments); }); \
+        ofPacket(valid, packet, WIDTH, true, [&](RTCRayHit* queries, std::size_t count) { intersect(scene(handle), queries, count, arguments); }); \
     } \
     void rtcOccluded##WIDTH(const int* valid, void* handle, char* packet, const QueryArguments* arguments) { \
-        eachOf(valid, packet, WIDTH, false, [&](RTCRayHit& one) { occlude(scene(handle), one.ray, arguments); }); \
+        ofPacket(valid, packet, WIDTH, false, [&](RTCRayHit* queries, std::size_t count) { occlude(scene(handle), queries, count, arguments); }); \
     }
 PACKET(4)
 PACKET(8)

@@ -1,5 +1,6 @@
 // Embree's devices, scenes and queries for triangles, on colonnade_rays.h. Structures are those of Embree 4's documented binary interface.
 #pragma once
+#include <algorithm>
 #include <cstring>
 #include <limits>
 #include <map>
@@ -15,6 +16,8 @@ enum BufferType { indexBuffer = 0, vertexBuffer = 1 };
 /// Formats of the two buffers: three 32-bit words.
 constexpr int formats[] = {0x5003, 0x9003};
 constexpr unsigned invokeArgumentFilter = 1 << 1;
+/// Rays of the largest packet.
+constexpr std::size_t packetRays = 16;
 
 struct Device {
     int references = 1;
@@ -165,33 +168,61 @@ inline bool takeFiltered(Scene& scene, RTCRayHit& query, bool isOcclusion, const
     return false;
 }
 
-inline void intersect(Scene& scene, RTCRayHit& query, const QueryArguments* arguments) {
-    if (!isActive(query.ray)) return;
-    if (scene.hasFilters(arguments)) {
-        takeFiltered(scene, query, false, arguments);
-        return;
+/// Calls `trace` with the active rays of a packet that follow each other and have the same mask: rays, their queries, count and mode.
+template <class Trace> void eachBatch(RTCRayHit* queries, std::size_t count, const Trace& trace) {
+    for (std::size_t next = 0; next < count;) {
+        colonnade_rays_ray rays[packetRays];
+        RTCRayHit* of[packetRays];
+        std::size_t active = 0;
+        unsigned mode = 0;
+        for (; next < count; ++next) {
+            const RTCRay& ray = queries[next].ray;
+            if (!isActive(ray)) continue;
+            if (active != 0 && modeOf(ray) != mode) break;
+            mode = modeOf(ray);
+            rays[active] = rayOf(ray);
+            of[active++] = &queries[next];
+        }
+        if (active != 0) trace(rays, of, active, mode);
     }
-    const colonnade_rays_ray ray = rayOf(query.ray);
-    colonnade_rays_hit hit{0, 0, 0, UINT32_MAX, UINT32_MAX, 0, 0};
-    {
-        const std::lock_guard lock(scene.device->calls);
-        scene.device->check(colonnade_rays_closest(scene.rays, &ray, 1, modeOf(query.ray), &hit));
-    }
-    if (hit.face != UINT32_MAX) take(scene, hit, query);
 }
 
-inline void occlude(Scene& scene, RTCRay& query, const QueryArguments* arguments) {
-    if (!isActive(query)) return;
-    std::uint8_t isOccluded = 0;
-    if (scene.hasFilters(arguments)) {
-        RTCRayHit candidate{query, {}};
-        isOccluded = takeFiltered(scene, candidate, true, arguments);
-    } else {
-        const colonnade_rays_ray ray = rayOf(query);
-        const std::lock_guard lock(scene.device->calls);
-        scene.device->check(colonnade_rays_occluded(scene.rays, &ray, 1, modeOf(query), &isOccluded));
+/// The closest hits of a packet, at most `packetRays` rays.
+inline void intersect(Scene& scene, RTCRayHit* queries, std::size_t count, const QueryArguments* arguments) {
+    const bool hasFilters = scene.hasFilters(arguments);
+    for (std::size_t i = 0; hasFilters && i < count; ++i)
+        if (isActive(queries[i].ray)) takeFiltered(scene, queries[i], false, arguments);
+    if (hasFilters) return;
+    eachBatch(queries, count, [&](const colonnade_rays_ray* rays, RTCRayHit* const* of, std::size_t active, unsigned mode) {
+        colonnade_rays_hit hits[packetRays];
+        std::fill_n(hits, active, colonnade_rays_hit{0, 0, 0, UINT32_MAX, UINT32_MAX, 0, 0});
+        {
+            const std::lock_guard lock(scene.device->calls);
+            scene.device->check(colonnade_rays_closest(scene.rays, rays, active, mode, hits));
+        }
+        for (std::size_t i = 0; i < active; ++i)
+            if (hits[i].face != UINT32_MAX) take(scene, hits[i], *of[i]);
+    });
+}
+
+/// Which rays of a packet, at most `packetRays`, hit anything: their tfar becomes negative infinity.
+inline void occlude(Scene& scene, RTCRayHit* queries, std::size_t count, const QueryArguments* arguments) {
+    const auto end = [](RTCRayHit& query) { query.ray.tfar = -std::numeric_limits<float>::infinity(); };
+    const bool hasFilters = scene.hasFilters(arguments);
+    for (std::size_t i = 0; hasFilters && i < count; ++i) {
+        RTCRayHit candidate = queries[i];
+        if (isActive(candidate.ray) && takeFiltered(scene, candidate, true, arguments)) end(queries[i]);
     }
-    if (isOccluded) query.tfar = -std::numeric_limits<float>::infinity();
+    if (hasFilters) return;
+    eachBatch(queries, count, [&](const colonnade_rays_ray* rays, RTCRayHit* const* of, std::size_t active, unsigned mode) {
+        std::uint8_t isOccluded[packetRays] = {};
+        {
+            const std::lock_guard lock(scene.device->calls);
+            scene.device->check(colonnade_rays_occluded(scene.rays, rays, active, mode, isOccluded));
+        }
+        for (std::size_t i = 0; i < active; ++i)
+            if (isOccluded[i]) end(*of[i]);
+    });
 }
 
 } // namespace colonnade::rays::embree

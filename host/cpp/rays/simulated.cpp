@@ -35,7 +35,8 @@ void report(const char* variable, const char* text) { std::fprintf(stderr, "colo
 /// A program with pipes for its standard streams. It ends with its input.
 class Program {
 public:
-    explicit Program(const std::string& path) {
+    /// `words`: its path and its arguments.
+    explicit Program(const std::vector<std::string>& words) {
         posix_spawn_file_actions_t actions;
         posix_spawn_file_actions_init(&actions);
         int error = 0;
@@ -43,13 +44,15 @@ public:
             error = pipe2(pipes_[stream], O_CLOEXEC) == 0 ? 0 : errno;
             if (error == 0) posix_spawn_file_actions_adddup2(&actions, theirs(stream), stream);
         }
-        char* const arguments[] = {const_cast<char*>(path.c_str()), nullptr};
-        if (error == 0) error = posix_spawn(&process_, path.c_str(), &actions, nullptr, arguments, environ);
+        std::vector<char*> arguments;
+        for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+        arguments.push_back(nullptr);
+        if (error == 0) error = posix_spawn(&process_, arguments[0], &actions, nullptr, arguments.data(), environ);
         posix_spawn_file_actions_destroy(&actions);
         for (int stream = 0; stream < 3; ++stream) shut(theirs(stream));
         if (error == 0) return;
         closeStreams();
-        throw std::system_error(error, std::generic_category(), path);
+        throw std::system_error(error, std::generic_category(), words[0]);
     }
     ~Program() {
         closeStreams();
@@ -75,10 +78,27 @@ private:
     pid_t process_ = -1;
 };
 
-/// The simulated device as a backend. `text`: a line "program PATH", and its registers.
+/// What a file says of a simulated device: the words that start its program, and lines of its registers.
+struct Description {
+    std::vector<std::string> words;
+    std::string registers;
+
+    explicit Description(const std::string& text) {
+        std::istringstream lines(text);
+        for (std::string line; std::getline(lines, line);) {
+            const std::string prefix = words.empty() ? "program " : "argument ";
+            if (line.rfind(prefix, 0) == 0) words.push_back(line.substr(prefix.size()));
+            else if (words.empty()) throw std::invalid_argument("its first line names no program");
+            else registers += line + '\n';
+        }
+        if (words.empty()) throw std::invalid_argument("it is empty");
+    }
+};
+
+/// The simulated device as a backend.
 class SimulatedDevice {
 public:
-    explicit SimulatedDevice(const std::string& text) : program_(pathOf(text)), simulation_(text.substr(text.find('\n') + 1), program_.streams()) {}
+    explicit SimulatedDevice(const Description& description) : program_(description.words), simulation_(description.registers, program_.streams()) {}
 
     colonnade_rays_backend backend() {
         return {this,
@@ -90,12 +110,6 @@ public:
     }
 
 private:
-    static std::string pathOf(const std::string& text) {
-        const std::string kind = "program ";
-        if (text.rfind(kind, 0) != 0) throw std::invalid_argument("its first line names no program");
-        return text.substr(kind.size(), text.find('\n') - kind.size());
-    }
-
     /// The status of a call; prints the first failure.
     template <class Call> static int call(void* self, const Call& of) {
         auto& device = *static_cast<SimulatedDevice*>(self);
@@ -135,7 +149,7 @@ int colonnade_rays_open_environment(colonnade_rays_device** device) {
         colonnade_rays_backend backend{};
         if (std::getenv(deviceName)) {
             variable = deviceName;
-            simulated = std::make_unique<SimulatedDevice>(contentOf(variable));
+            simulated = std::make_unique<SimulatedDevice>(Description(contentOf(variable)));
             backend = simulated->backend();
         }
         const int status = colonnade_rays_open(design.c_str(), simulated ? &backend : nullptr, device);

@@ -130,6 +130,28 @@ def test_a_filter_refuses_hits_and_those_behind_them_count(library: ctypes.CDLL)
     assert embree.hits(down, "rtcOccluded1")["tfar"].tolist() == [np.inf, np.inf]
 
 
+def test_a_packet_has_the_hits_of_its_rays(library: ctypes.CDLL) -> None:
+    """Rays of two masks, in any order, and such without an interval."""
+    embree, random = Embree(library), np.random.default_rng(3)
+    above = SQUARE[0] + np.float32([0, 0, 1])
+    for mask, vertices in ((1, SQUARE[0]), (2, above)):
+        embree.call("rtcSetGeometryMask", embree.add(vertices, SQUARE[1]), mask)
+    embree.call("rtcCommitScene", embree.scene)
+    queries = queries_of(rays_of(random.uniform(-0.2, 1.2, (160, 3)) * [1, 1, 0] + [0, 0, 3], [[0, 0, -1]] * 160))
+    queries["mask"] = random.choice([1, 2, 3], 160)
+    queries["tfar"][::7] = -1
+    for one, packet in (("rtcIntersect1", "rtcIntersect16"), ("rtcOccluded1", "rtcOccluded16")):
+        wanted, words = queries.copy(), queries.copy().view(np.uint32).reshape(-1, 16, 20)
+        for i in range(len(wanted)):
+            embree.call(one, embree.scene, wanted[i : i + 1].ctypes.data, None)
+        for i in range(len(words)):
+            lanes = np.ascontiguousarray(words[i].T)
+            embree.call(packet, np.full(16, -1, np.int32).ctypes.data, embree.scene, lanes.ctypes.data, None)
+            words[i] = lanes.T
+        assert words.tobytes() == wanted.tobytes()
+        assert len(set(wanted["tfar"].tolist())) == (4 if one == "rtcIntersect1" else 3)
+
+
 def test_rays_of_several_threads_have_their_own_hits(library: ctypes.CDLL) -> None:
     """Rays along vertices: which faces are neighbours is found out at the first of them."""
     vertices, faces = mesh_of("sphere:5")

@@ -58,7 +58,7 @@ def test_hits_and_counters_of_the_device_are_those_of_the_model(
     rays = outside_rays(vertices, 300, seed=6)
     model = Scene(vertices, faces, *DESIGN)
     wanted, is_occluded = model.closest(rays), model.occluded(rays)
-    for name, value in environment(tmp_path, device_text(*DESIGN)).items():
+    for name, value in environment(tmp_path, device_text(*DESIGN, ("--dram", "7", "--random", "20"))).items():
         monkeypatch.setenv(name, value)
     calls, device, scene, mesh = ctypes.CDLL(str(library)), ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_uint32()
     corners, triangles = np.ascontiguousarray(vertices), faces.astype(np.uint32)
@@ -99,9 +99,10 @@ def test_hits_and_counters_of_the_device_are_those_of_the_model(
         ("program {}\n{registers}", ["0", "7 7"], "rays: the simulated hardware failed: harness: no power"),
         ("program {}.none\n", ["1"], "COLONNADE_RAYS_DEVICE: {}.none: No such file or directory"),
         ("register a 0 1 0 rw\n", ["1"], "COLONNADE_RAYS_DEVICE: its first line names no program"),
+        ("", ["1"], "COLONNADE_RAYS_DEVICE: it is empty"),
         ("program {}\nregister a\n", ["1"], "COLONNADE_RAYS_DEVICE: this line is no register: register a"),
     ),
-    ids=("model", "no register", "program that fails", "no program", "no program line", "half a register"),
+    ids=("model", "no register", "program that fails", "no program", "no program line", "nothing", "half a register"),
 )
 def test_a_failure_is_one_line(
     library: Path, tmp_path: Path, device: str | None, statuses: list[str], error: str
@@ -110,7 +111,7 @@ def test_a_failure_is_one_line(
     program.write_text("#!/bin/sh\necho 'harness: no power' >&2\nexit 3\n")
     program.chmod(0o755)
     registers = registers_text(manifest_for(*DESIGN).manifest.registers)
-    variables = environment(tmp_path, device and device.format(program, registers=registers))
+    variables = environment(tmp_path, None if device is None else device.format(program, registers=registers))
     done = subprocess.run(
         [sys.executable, "-c", _COMMITS, library], env=variables, capture_output=True, text=True, check=True
     )

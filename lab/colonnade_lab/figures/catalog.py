@@ -271,7 +271,12 @@ def catalog() -> dict[str, Entry]:
         _verify("equality", "small", "--no-reference", "--size", "320x240"),
         Entry("fpga", "fpga", {"": ("tools/soc-fpga",)}, report="out/fpga/report.json"),
         Entry("simulators", "small", {"": ("tools/simulators", f"--json={REPORT}")}),
-        Entry("ray-suites", "edge", {"": ("tools/ray-suites", "--json", REPORT)}, **_alone("rays")),
+        Entry(
+            "ray-suites",
+            "traversal",
+            {each: ("tools/ray-suites", "--backend", each, "--json", REPORT) for each in ("model", "rtl")},
+            sources=("rays",),
+        ),
         Entry(
             "ray-rates", "edge", _colonnade("rays", "--config", "edge", "--mesh", "armadillo"), sources=("rays", "tree")
         ),

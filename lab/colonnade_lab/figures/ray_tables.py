@@ -13,17 +13,20 @@ _TITLES = {
     "trimesh": "trimesh `test_ray.py`, `test_ray_upstream.py`, by ",
     "three-mesh-bvh": "three-mesh-bvh `RandomRaycasts`: every hit of every ray equal as floats",
     "embree": "Embree `embree_verify`: ",
+    "libigl": "libigl `tests/include/igl/embree`: ",
 }
 
 
 def suites(data: Data) -> str:
-    """Tests of other projects: how many pass, by bits of a coordinate."""
+    """Tests of other projects: how many pass on the model and on the device, by bits of a coordinate."""
     rows: dict[str, list[str]] = {}
-    for each in data.result("ray-suites")["suites"]:
-        title = _TITLES[each["suite"]] + (each["test"] and f"`{each['test']}`")
-        row = rows.setdefault(title, [title, f"`{each['revision'][:10]}`", f"{each['tests']:,}"])
-        row.append(f"{each['passed']:,}")
-    return markdown(["suite", "commit", "tests", "pass at 16 bits", "at 24 bits"], list(rows.values()))
+    for part in ("model", "rtl"):
+        for each in data.result("ray-suites")[part]["suites"]:
+            title = _TITLES[each["suite"]] + (each["test"] and f"`{each['test']}`")
+            row = rows.setdefault(title, [title, f"`{each['revision'][:10]}`", f"{each['tests']:,}"])
+            row.append(f"{each['passed']:,}" + f" of {each['tests']:,}" * (part == "rtl"))
+    titles = ["suite", "commit", "tests", "pass at 16 bits", "at 24 bits", "on the device, 16 bits", "24 bits"]
+    return markdown(titles, list(rows.values()))
 
 
 def rates(data: Data) -> str:

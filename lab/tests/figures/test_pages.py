@@ -245,11 +245,15 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "scenes": [{"scene": "a", "rate": 9.0, "processor": 0.05, "reload": 0.1, "start": 1.0, "rest": 2.0}],
         },
         "ray-suites": {
-            "suites": [
-                {"suite": suite, "test": "a", "revision": "0123456789ab", "passed": passed, "tests": 1000}
-                for suite in ("trimesh", "embree")
-                for passed in (999, 1000)
-            ]
+            part: {
+                "suites": [
+                    {"suite": suite, "test": "a", "revision": "0123456789ab", "passed": count - 1, "tests": count}
+                    | ({"passed": count} if width == 24 else {})
+                    for suite in ("trimesh", "embree")
+                    for width in (16, 24)
+                ]
+            }
+            for part, count in (("model", 1000), ("rtl", 100))
         },
         "ray-device": {
             "rays": 1000,
@@ -371,7 +375,9 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     row = "|SLIC|16,384|56.2|30.0 dB, 1.5°|40.00, 0.0100|40.00, 0.0100|12.50|2.0|"
     assert row in table(docs, "paper-maps")
     assert re.search(r"\|all \d+\|57.0\|", table(docs, "measuring"))
-    assert "|Embree `embree_verify`: `a`|`0123456789`|1,000|999|1,000|" in table(docs, "ray-suites")
+    assert "|Embree `embree_verify`: `a`|`0123456789`|1,000|999|1,000|99 of 100|100 of 100|" in table(
+        docs, "ray-suites"
+    )
     assert "|near|900, 901|2,000|1|2.0|1.0|50|" in table(docs, "ray-rates")
     assert "|near|900, –|2,000|–|" in table(docs, "ray-rates")
     assert re.search(r"\|near\|2.0\|1.0\|3.50\|700\|\d+\|1.50, 1.50\|", table(docs, "ray-device"))
