@@ -15,21 +15,18 @@ from __future__ import annotations
 import argparse
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from colonnade.common.processes import tool
 from colonnade.design.generator import manifest_for
-from colonnade.design.manifest import Manifest
 from colonnade.mesh.geometry import primitives
 from colonnade.rays import Scene, Sensor
-from colonnade.rays.device import RayBackend
+from colonnade.rays.recorded import RecordedRays
 from colonnade.rays.scene import ALL_MASKS, CULL_BACK, FAN, OCCLUDED, RANGES, SENSOR
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.dram_image import dram_image
-from colonnade.scene_image.file import LoadSection
 from numpy.typing import NDArray
 
 #: Registers of a scene, in the order of the header.
@@ -49,40 +46,6 @@ FORMS = ("rays, hits", "fan, hits", "misaligned", "sensor, ranges", "rays, occlu
 FORMS += ("outside", "rays, ranges", "fan, occlusion", "sensor, hits")
 
 
-@dataclass
-class Records:
-    """Records of a scene, as images take them."""
-
-    records: NDArray[np.uint8]
-    attributes: tuple[LoadSection, ...] = ()
-
-
-@dataclass
-class Recorder(RayBackend):
-    """A backend that keeps what a device would get."""
-
-    manifest: Manifest
-    placement: tuple[int, ...] = ()
-    records: Records | None = None
-    batches: list[tuple[bytes, bytes, int]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        RayBackend.__init__(self, self.manifest.registers)
-
-    def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
-        """See `RayBackend`."""
-        self.placement = tuple(values[name] for name in REGISTERS)
-        self.records = Records(np.frombuffer(records, np.uint8).reshape(count, -1))
-
-    def submit(self, batch: bytes, rays: bytes, size: int) -> tuple[int, bytes]:
-        """See `RayBackend`. There are no hits."""
-        self.batches.append((batch, rays, size))
-        return BATCH.unpack(batch)[9], bytes(size)
-
-    def _word(self, address: int) -> int:
-        return 0
-
-
 def rays_of(vertices: NDArray[np.float64], count: int) -> NDArray[np.float32]:
     """Rays [count, 8] from a sphere around the vertices to places among them."""
     random = np.random.default_rng(3)
@@ -97,7 +60,14 @@ def rays_of(vertices: NDArray[np.float64], count: int) -> NDArray[np.float32]:
 def submissions(rays: NDArray[np.float32]) -> dict[str, tuple[Any, ...]]:
     """Arguments of `Scene.submit`, by form. Most numbers of rays fill no whole line of hits."""
     count, masks = len(rays), ALL_MASKS << 24
-    sensor = Sensor((0.2, 0.3, 4), (-1.6, 1.2, -4), (0.05, 0, 0), (0, -0.6, 0), 64, max(1, count // 64))
+    sensor = Sensor(
+        (0.2, 0.3, 4),
+        (-1.6, 1.2, -4),
+        (0.05, 0, 0),
+        (0, -0.6, 0),
+        64,
+        max(1, count // 64),
+    )
     start, fan = rays[0, :3], rays[:, 4:].copy()
     fan[:, :3] += rays[:, :3] - start
     flat = (sensor.record(), 64 * sensor.height)
@@ -123,7 +93,10 @@ def lines(size: int) -> int:
 def placed(batches: list[tuple[bytes, bytes, int]], hits: Mapping[str, bytes]) -> tuple[bytes, bytes]:
     """Batches with their addresses and their rays, behind the header; tags and hits as the device leaves them."""
     descriptors, data, tags, results = b"", b"", b"", b""
-    first_rays, first_hits = HEADER.size + BATCH.size * len(FORMS), lines(4 * len(FORMS))
+    first_rays, first_hits = (
+        HEADER.size + BATCH.size * len(FORMS),
+        lines(4 * len(FORMS)),
+    )
     for number, (name, (batch, rays, size)) in enumerate(zip(FORMS, batches, strict=True)):
         fields = list(BATCH.unpack(batch))
         fields[0], fields[1] = first_rays + len(data), first_hits + len(results)
@@ -154,7 +127,7 @@ def main() -> None:
     design = (options.config, tuple(options.overrides))
     manifest = manifest_for(*design).manifest
     vertices, faces = primitives.torus(16)
-    recorder = Recorder(manifest)
+    recorder = RecordedRays()
     model, recorded = (Scene(vertices, faces, *design, backend=backend) for backend in ("model", recorder))
 
     calls = submissions(rays_of(vertices, options.rays))
@@ -167,7 +140,12 @@ def main() -> None:
     numbers = len(FORMS), len(results), int.from_bytes(4 * UNWRITTEN, "little")
     files = {
         "image": device_image(recorder.records, manifest),
-        "batches": HEADER.pack(*recorder.placement, len(recorder.records.records), *numbers) + batches,
+        "batches": HEADER.pack(
+            *(recorder.values[name] for name in REGISTERS),
+            len(recorder.records.records),
+            *numbers,
+        )
+        + batches,
         "results": results,
     }
     if manifest.config["columnBvhMemory"]["cache"]:
