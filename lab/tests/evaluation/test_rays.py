@@ -25,7 +25,8 @@ def test_a_design_without_caches_has_no_traffic() -> None:
     assert [each.dram_bytes for each in measured(load_mesh("cube"), "small", (), 10)] == [None] * len(KINDS)
 
 
-#: Designs for rays: one traversal unit, and two columns of two rows whose scene is in DRAM, of 16 bits and of 24.
+#: Designs for rays beside the preset: one traversal unit, and two columns of two rows whose scene is in DRAM, of 16
+#: bits and of 24.
 _TINY = ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=256")
 _SMALL = ("array.rows=2", "array.columns=2", "units.triangleRows=2")
 _EXACT = ("geometry.vertexBits=24", "geometry.triangleBits=32")
@@ -34,8 +35,8 @@ _EXACT = ("geometry.vertexBits=24", "geometry.triangleBits=32")
 @pytest.mark.matrix
 @pytest.mark.parametrize(
     ("config", "overrides"),
-    (("tiny", _TINY), ("traversal", _SMALL), ("traversal", (*_SMALL, *_EXACT))),
-    ids=("tiny", "small", "24 bits"),
+    (("tiny", _TINY), ("traversal", _SMALL), ("traversal", (*_SMALL, *_EXACT)), ("traversal", ())),
+    ids=("tiny", "small", "24 bits", "traversal"),
 )
 def test_the_device_gives_the_hits_of_the_model_in_a_million_rays(config: str, overrides: tuple[str, ...]) -> None:
     mesh = load_mesh("bunny")
