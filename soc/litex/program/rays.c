@@ -70,9 +70,8 @@ int main(void) {
     for (uint32_t i = 0; i < BATCH_COUNT; ++i) {
         /* A batch that was queued begins at the end of the one before */
         const bool is_queued = i > 0 && (int32_t)(ends[i - 1] - starts[i]) > 0;
-        printf("colonnade: batch %u: %u rays, mode %08x, tag %08x, %u cycles%s\n", (unsigned)i, (unsigned)file->batches[i].count,
-               (unsigned)file->batches[i].mode, (unsigned)tag_of(i), (unsigned)(ends[i] - (is_queued ? ends[i - 1] : starts[i])),
-               is_queued ? ", queued" : "");
+        printf("colonnade: batch %u: %u rays, mode %08x, tag %08x, %u cycles%s\n", (unsigned)i, (unsigned)file->batches[i].count, (unsigned)file->batches[i].mode,
+               (unsigned)tag_of(i), (unsigned)(ends[i] - (is_queued ? ends[i - 1] : starts[i])), is_queued ? ", queued" : "");
     }
     printf("colonnade: results: crc32 %08x\n", (unsigned)crc32((const unsigned char *)RESULTS, RESULTS_BYTES));
     soc_end("end", COLONNADE_OK);
