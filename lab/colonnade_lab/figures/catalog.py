@@ -271,10 +271,11 @@ def catalog() -> dict[str, Entry]:
         _verify("equality", "small", "--no-reference", "--size", "320x240"),
         Entry("fpga", "fpga", {"": ("tools/soc-fpga",)}, report="out/fpga/report.json"),
         Entry("simulators", "small", {"": ("tools/simulators", f"--json={REPORT}")}),
+        Entry("ray-suites", "edge", {"": ("tools/ray-suites", "--json", REPORT)}, **_alone("rays")),
         Entry(
-            "ray-suites",
+            "ray-suites-device",
             "traversal",
-            {each: ("tools/ray-suites", "--backend", each, "--json", REPORT) for each in ("model", "rtl")},
+            {"": ("tools/ray-suites", "--backend", "rtl", "--json", REPORT)},
             sources=("rays",),
         ),
         Entry(

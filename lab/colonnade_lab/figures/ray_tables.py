@@ -19,14 +19,18 @@ _TITLES = {
 
 def suites(data: Data) -> str:
     """Tests of other projects: how many pass on the model and on the device, by bits of a coordinate."""
-    rows: dict[str, list[str]] = {}
-    for part in ("model", "rtl"):
-        for each in data.result("ray-suites")[part]["suites"]:
+    heads: dict[str, list[str]] = {}
+    passed: dict[tuple[str, str, int], str] = {}
+    device = data.get("ray-suites-device")
+    tests = {"model": data.result("ray-suites")["suites"], "device": device["result"]["suites"] if device else ()}
+    for answering, found in tests.items():
+        for each in found:
             title = _TITLES[each["suite"]] + (each["test"] and f"`{each['test']}`")
-            row = rows.setdefault(title, [title, f"`{each['revision'][:10]}`", f"{each['tests']:,}"])
-            row.append(f"{each['passed']:,}" + f" of {each['tests']:,}" * (part == "rtl"))
-    titles = ["suite", "commit", "tests", "pass at 16 bits", "at 24 bits", "on the device, 16 bits", "24 bits"]
-    return markdown(titles, list(rows.values()))
+            heads.setdefault(title, [title, f"`{each['revision'][:10]}`"])
+            passed[title, answering, each["vertexBits"]] = f"{each['passed']:,} of {each['tests']:,}"
+    columns = [(answering, bits) for answering in tests for bits in (16, 24)]
+    rows = [[*head, *(passed.get((title, *column), "–") for column in columns)] for title, head in heads.items()]
+    return markdown(["suite", "commit", "model, 16 bits", "24 bits", "device, 16 bits", "24 bits"], rows)
 
 
 def rates(data: Data) -> str:
