@@ -6,22 +6,11 @@
 #include <string.h>
 #include <system.h>
 
-#include "colonnade_batches.h"
+#include "batches_file.h"
 #include "layout.h"
 #include "soc.h"
 
-/* Addresses of rays count from the file, those of hits and tags from the results. */
-struct file {
-    int32_t bounds_low[3], bounds_high[3];
-    uint32_t scale_mantissa;
-    int32_t scale_exponent;
-    int64_t base[3];
-    uint32_t record_count, batch_count, result_bytes, unwritten, reserved[14];
-    struct colonnade_rays_batch batches[];
-};
-_Static_assert(sizeof(struct file) == 128, "the header is that of examples/rays/batches.py");
-
-static const struct file *const file = (const struct file *)BATCHES;
+static const struct batches_file *const file = (const struct batches_file *)BATCHES;
 static struct colonnade device;
 static struct colonnade_ring ring;
 static uint32_t submitted, ended;
@@ -39,14 +28,12 @@ static void take_ends(void) {
 
 static void wait_for_batch(void) { soc_check("wait", colonnade_wait(&device, COLONNADE_BATCH_DONE, ATTEMPTS)); }
 
-static void submit(struct colonnade_rays_batch batch) {
+static void submit(uint32_t number) {
+    const struct colonnade_rays_batch batch = batches_at(file, number, BATCHES, RESULTS);
     uint64_t slot;
     enum colonnade_error error;
     while (take_ends(), error = colonnade_next_batch(&ring, &slot), error == COLONNADE_BUSY) wait_for_batch();
     soc_check("next batch", error);
-    batch.rays += BATCHES;
-    batch.hits += RESULTS;
-    batch.done += RESULTS;
     memcpy((void *)(uintptr_t)slot, &batch, sizeof batch);
     starts[submitted++] = soc_now();
     soc_check("submit", colonnade_submit(&ring));
@@ -56,15 +43,11 @@ int main(void) {
     soc_begin(&device);
     printf("colonnade: found, capabilities %03x\n", (unsigned)device.capabilities);
     soc_check("set scene", colonnade_set_scene(&device, SCENE));
-    struct colonnade_rays_image image = {.record_count = file->record_count, .scale_mantissa = file->scale_mantissa, .scale_exponent = file->scale_exponent};
-    memcpy(image.bounds_low, file->bounds_low, sizeof image.bounds_low);
-    memcpy(image.bounds_high, file->bounds_high, sizeof image.bounds_high);
-    memcpy(image.base, file->base, sizeof image.base);
-    soc_check("set rays", colonnade_set_rays(&device, &image));
+    soc_check("set rays", batches_set_rays(&device, file));
     const struct colonnade_window window = {BATCHES, RESULTS + RESULTS_BYTES};
     soc_check("open ring", colonnade_open_ring(&ring, &device, RING, RING_LOG, &window));
 
-    for (uint32_t i = 0; i < BATCH_COUNT; ++i) submit(file->batches[i]);
+    for (uint32_t i = 0; i < BATCH_COUNT; ++i) submit(i);
     while (take_ends(), ended < BATCH_COUNT) wait_for_batch();
     soc_check("wait for all", colonnade_wait_batches(&ring, ATTEMPTS));
     for (uint32_t i = 0; i < BATCH_COUNT; ++i) {
