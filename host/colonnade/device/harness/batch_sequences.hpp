@@ -13,7 +13,7 @@ public:
     }
 
 private:
-    // Behind 4 KB of the window that wrong batches may name come the ring, tags, other memory of this kind, and places of the rays and the
+    // Behind 4 KB of the window that wrong batches may name come the ring, tags, other memory of this kind, and memory of the rays and the
     // hits of each batch. Further 4 KB follow.
     static constexpr std::uint64_t ring_ = 0x1000, tags_ = 0x1800, scratch_ = 0x1c00, rays_ = 0x2000, rayBytes_ = 0x1000, hits_ = 0x22000, hitBytes_ = 0x800;
     static constexpr unsigned ringLog_ = 5, slots_ = 1u << ringLog_, rounds_ = 30;
@@ -27,7 +27,7 @@ private:
         bool hasTag = false, mayFail = false, fails = false;
     };
 
-    std::uint64_t at(std::uint64_t place) const { return job_.windowBegin + place; }
+    std::uint64_t at(std::uint64_t offset) const { return job_.windowBegin + offset; }
     std::uint32_t wordAt(std::uint64_t address) const {
         std::uint32_t value;
         std::memcpy(&value, &slaves_.memory[address], sizeof value);
@@ -61,9 +61,9 @@ private:
     Expected put(const SequenceJob::Batch& batch, unsigned slot, bool isHostile) {
         std::array<std::uint8_t, 64> words{};
         std::copy(batch.descriptor.begin(), batch.descriptor.end(), words.begin());
-        const std::uint64_t place = at(rays_) + slot * rayBytes_;
+        const std::uint64_t own = at(rays_) + slot * rayBytes_;
         const unsigned wrong = isHostile ? 1u << pick(6) | 1u << pick(6) | 1u << pick(6) : 0;
-        std::uint64_t rays = place, hits = at(hits_) + slot * hitBytes_, done = at(tags_) + 4 * slot;
+        std::uint64_t rays = own, hits = at(hits_) + slot * hitBytes_, done = at(tags_) + 4 * slot;
         std::uint32_t count, mode;
         std::memcpy(&count, &words[16], 4);
         std::memcpy(&mode, &words[20], 4);
@@ -81,7 +81,7 @@ private:
         std::memcpy(&words[20], &mode, 4);
         std::memcpy(&words[44], &tag, 4);
         std::memcpy(&words[48], &done, 8);
-        store(place, batch.rays);
+        store(own, batch.rays);
         std::copy(words.begin(), words.end(), slaves_.memory.begin() + static_cast<std::ptrdiff_t>(at(ring_ + 64 * slot)));
         return expected(batch, wrong, rays, hits, done, count, mode, tag);
     }
