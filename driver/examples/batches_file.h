@@ -28,7 +28,8 @@ static inline enum colonnade_error batches_set_rays(struct colonnade *device, co
 }
 
 /* A batch with addresses on the bus, where file and results begin at those. */
-static inline struct colonnade_rays_batch batches_at(const struct batches_file *file, uint32_t number, uint64_t begin, uint64_t results) {
+static inline struct colonnade_rays_batch batches_at(const struct batches_file *file, uint32_t number, uint64_t begin,
+                                                     uint64_t results) {
     struct colonnade_rays_batch batch = file->batches[number];
     batch.rays += begin;
     batch.hits += results;

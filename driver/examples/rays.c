@@ -28,7 +28,8 @@ int main(int argc, char **argv) {
         target_check(argv[5], colonnade_set_scene(&device, target.base));
     }
     const struct batches_file *const file = (const struct batches_file *)(target.memory + at);
-    const uint64_t begin = target.base + at, ring_begin = begin + pages(target_read(argv[3], target.memory + at, target.size - at));
+    const uint64_t begin = target.base + at,
+                   ring_begin = begin + pages(target_read(argv[3], target.memory + at, target.size - at));
     const uint64_t results = ring_begin + PAGE, end = results + file->result_bytes;
     if (end > target.base + target.size) target_fail(argv[3], "the memory is too small for the results");
     target_check(argv[3], batches_set_rays(&device, file));

@@ -52,8 +52,9 @@ private:
     /// An address that a batch should not have: beyond the window or the addresses, at an end, misaligned.
     std::uint64_t anyAddress() {
         const std::uint64_t far = std::uint64_t{1} << (40 + pick(24));
-        const std::array<std::uint64_t, 9> some{slaves_.random(), slaves_.random() >> 24, job_.windowBegin - 64, job_.windowEnd, job_.windowEnd - 64,
-                                                at(scratch_),     at(scratch_) + far,     job_.image.address,    0};
+        const std::array<std::uint64_t, 9> some{slaves_.random(),   slaves_.random() >> 24, job_.windowBegin - 64,
+                                                job_.windowEnd,     job_.windowEnd - 64,    at(scratch_),
+                                                at(scratch_) + far, job_.image.address,     0};
         return some[pick(some.size())] + (pick(4) == 0 ? 1u << pick(6) : 0);
     }
 
@@ -90,9 +91,7 @@ private:
     Expected expected(const SequenceJob::Batch& batch, unsigned wrong, std::uint64_t rays, std::uint64_t hits, std::uint64_t done, std::uint32_t count,
                       std::uint32_t mode, std::uint32_t tag) const {
         constexpr std::uint64_t reach = std::uint64_t{1} << 40;
-        const auto fits = [this](std::uint64_t first, std::uint64_t bytes) {
-            return first >= job_.windowBegin && first + (bytes + 63) / 64 * 64 <= job_.windowEnd;
-        };
+        const auto fits = [this](std::uint64_t first, std::uint64_t bytes) { return first >= job_.windowBegin && first + (bytes + 63) / 64 * 64 <= job_.windowEnd; };
         const bool isSensor = mode >> 5 & 1, isFan = mode >> 4 & 1;
         const unsigned response = mode & 3;
         const bool hasPlace = rays % 64 == 0 && hits % 64 == 0 && done % 4 == 0 && (rays | hits | done) < reach;
@@ -126,8 +125,7 @@ private:
     /// As many batches as the ring takes, one of `hostility` of which is right.
     std::vector<Expected> fill(unsigned hostility) {
         std::vector<Expected> found;
-        for (unsigned i = 0; i + 1 < slots_; ++i)
-            found.push_back(put(job_.batches[pick(job_.batches.size())], (tail_ + i) % slots_, pick(hostility) != 0));
+        for (unsigned i = 0; i + 1 < slots_; ++i) found.push_back(put(job_.batches[pick(job_.batches.size())], (tail_ + i) % slots_, pick(hostility) != 0));
         return found;
     }
 

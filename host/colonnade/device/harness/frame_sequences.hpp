@@ -5,21 +5,20 @@
 class FrameSequences final : public Sequences {
 public:
     FrameSequences(const SequenceJob& job, unsigned busBytes, std::size_t memoryBytes) : Sequences(job, busBytes, memoryBytes) {
-        kinds_ = {
-            {"errors of the memory", [this] { errorsOfTheMemory(); }},
-            {"a silent channel", [this] { silentChannel(); }},
-            {"soft resets", [this] { softResets(); }},
-            {"hard resets", [this] { hardResets(); }},
-            {"commands during a load", [this] { commandsDuringLoad(); }},
-            {"queued frames", [this] { queuedFrames(); }},
-            {"illegal commands", [this] { illegalCommands(); }},
-            {"illegal accesses", [this] { illegalAccesses(); }},
-            {"any accesses", [this] { anyAccesses(); }},
-            {"a narrow window", [this] { narrowWindow(); }},
-            {"ends of the addresses", [this] { endsOfTheAddresses(); }},
-            {"a misaligned framebuffer", [this] { misalignedFramebuffer(); }},
-            {"a damaged image", [this] { damagedImage(); }},
-            {"noisy registers", [this] { noisyRegisters(); }}};
+        kinds_ = {{"errors of the memory", [this] { errorsOfTheMemory(); }},
+                  {"a silent channel", [this] { silentChannel(); }},
+                  {"soft resets", [this] { softResets(); }},
+                  {"hard resets", [this] { hardResets(); }},
+                  {"commands during a load", [this] { commandsDuringLoad(); }},
+                  {"queued frames", [this] { queuedFrames(); }},
+                  {"illegal commands", [this] { illegalCommands(); }},
+                  {"illegal accesses", [this] { illegalAccesses(); }},
+                  {"any accesses", [this] { anyAccesses(); }},
+                  {"a narrow window", [this] { narrowWindow(); }},
+                  {"ends of the addresses", [this] { endsOfTheAddresses(); }},
+                  {"a misaligned framebuffer", [this] { misalignedFramebuffer(); }},
+                  {"a damaged image", [this] { damagedImage(); }},
+                  {"noisy registers", [this] { noisyRegisters(); }}};
     }
 
 private:
