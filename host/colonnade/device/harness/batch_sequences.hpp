@@ -13,9 +13,9 @@ public:
     }
 
 private:
-    // Behind 4 KB of the window that wrong batches may name come the ring, tags, other memory of this kind, and memory of the rays and the
-    // hits of each batch. Further 4 KB follow.
-    static constexpr std::uint64_t ring_ = 0x1000, tags_ = 0x1800, scratch_ = 0x1c00, rays_ = 0x2000, rayBytes_ = 0x1000, hits_ = 0x22000, hitBytes_ = 0x800;
+    // Behind 4 KB of the window that wrong batches may name come the ring, tags, and memory of the rays and the hits of each batch. Further
+    // 4 KB follow.
+    static constexpr std::uint64_t ring_ = 0x1000, tags_ = 0x1800, scratch_ = 0x400, rays_ = 0x2000, rayBytes_ = 0x1000, hits_ = 0x22000, hitBytes_ = 0x800;
     static constexpr unsigned ringLog_ = 5, slots_ = 1u << ringLog_, rounds_ = 30;
     static constexpr std::uint32_t errorBit_ = 1u << 31, maxCount_ = 1u << 24;
 
