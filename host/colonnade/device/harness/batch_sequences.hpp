@@ -38,7 +38,7 @@ private:
     }
 
     /// All registers, after a load or a reset.
-    void begin() {
+    void setAll() {
         write("rays.windowBase", job_.windowBegin);
         write("rays.windowEnd", job_.windowEnd);
         setDevice();
@@ -172,7 +172,7 @@ private:
     bool isShared(std::uint64_t tagAt) const { return tagAt < at(tags_) || tagAt >= at(tags_) + 4 * slots_; }
 
     bool isRight() override {
-        begin();
+        setAll();
         const SequenceJob::Batch& batch = job_.batches[pick(job_.batches.size())];
         write("interrupt.status", 7);
         write("interrupt.enable", 1);
@@ -191,10 +191,17 @@ private:
         return isSame && errors == 0;
     }
 
-    void prepare() {
+    void prepare() override {
         load();
-        begin();
+        setAll();
     }
+
+    void begin() override {
+        fill(8);
+        submit(slots_ - 1);
+    }
+
+    void count() override { batches_ += read(job_.head); }
 
     // The kinds of abuse
 
@@ -207,30 +214,18 @@ private:
     void softResets() {
         prepare();
         for (unsigned i = 0; i < rounds_; ++i) {
-            fill(8);
-            submit(slots_ - 1);
+            begin();
             bench_->cycles(pick(pick(2) != 0 ? 200 : 4000));
-            batches_ += read(job_.head);
+            count();
             if (pick(3) == 0) {
                 write("control", reset_);
                 bench_->cycles(pick(30));
             }
             softReset();
             restore();
-            begin();
+            setAll();
             run(false);
         }
-    }
-
-    /// A reset at any cycle, also in a soft reset.
-    void hardResets() {
-        prepare();
-        fill(4);
-        submit(slots_ - 1);
-        bench_->cycles(pick(pick(2) != 0 ? 200 : 4000));
-        batches_ += read(job_.head);
-        if (pick(3) == 0) write("control", reset_);
-        bench_->hardReset(1 + static_cast<unsigned>(pick(4)));
     }
 
     /// SLVERR and DECERR on any beat of batches.
@@ -240,20 +235,6 @@ private:
         for (unsigned i = 0; i < rounds_; ++i) run(true);
         slaves_.behaviour.errorsPer1000 = 0;
         run(false);
-    }
-
-    /// A channel that does not move for a while, also during a soft reset; the registers answer all the while.
-    void silentChannel() {
-        prepare();
-        fill(8);
-        slaves_.behaviour.silent = static_cast<Silent>(1 + pick(silentChannels));
-        slaves_.behaviour.silentUntil = report_.cycle + 3000 + pick(10000);
-        submit(slots_ - 1);
-        bench_->cycles(pick(600));
-        expect(read("identity") == 0x434C4E44, "registers do not answer while the memory is silent");
-        if (pick(2) != 0) softReset();
-        awaitIdle("a silent memory that answers again does not end it");
-        batches_ += slots_ - 1;
     }
 
     unsigned tail_ = 0;

@@ -32,7 +32,7 @@ private:
         bench_->write(address("photo.enabled"), 0); // refused by a shell without maps
     }
 
-    void prepare() {
+    void prepare() override {
         load();
         set();
     }
@@ -62,7 +62,7 @@ private:
         return errors == 0 && framebufferIsRight();
     }
 
-    void begin() { write("control", pick(2) != 0 ? start_ : load_); }
+    void begin() override { write("control", pick(2) != 0 ? start_ : load_); }
 
     // The kinds of abuse
 
@@ -75,18 +75,6 @@ private:
         render();
     }
 
-    /// A channel that does not move for a while, also during a soft reset; the registers answer all the while.
-    void silentChannel() {
-        prepare();
-        slaves_.behaviour.silent = static_cast<Silent>(1 + pick(silentChannels));
-        slaves_.behaviour.silentUntil = report_.cycle + 3000 + pick(10000);
-        begin();
-        bench_->cycles(pick(600));
-        expect(read("identity") == 0x434C4E44, "registers do not answer while the memory is silent");
-        if (pick(2) != 0) softReset();
-        awaitIdle("a silent memory that answers again does not end it");
-    }
-
     /// A soft reset at any cycle, also in a soft reset.
     void softResets() {
         prepare();
@@ -97,15 +85,6 @@ private:
             bench_->cycles(pick(30));
         }
         softReset();
-    }
-
-    /// A reset at any cycle, also in a soft reset.
-    void hardResets() {
-        prepare();
-        begin();
-        bench_->cycles(pick(pick(2) != 0 ? 200 : 4000));
-        if (pick(3) == 0) write("control", reset_);
-        bench_->hardReset(1 + pick(4));
     }
 
     /// Commands and settings of an image during a load, which cannot end meanwhile.

@@ -141,6 +141,12 @@ public:
 protected:
     /// Legal work after the abuse and a load; whether its result is the model's.
     virtual bool isRight() = 0;
+    /// Loads the scene and sets the registers.
+    virtual void prepare() = 0;
+    /// Begins work that some abuse interrupts.
+    virtual void begin() = 0;
+    /// Counts work that has ended.
+    virtual void count() {}
 
     static constexpr unsigned start_ = 1, load_ = 2, reset_ = 4, okay_ = 0, refused_ = 2;
     static constexpr unsigned running_ = 1, queued_ = 2, loading_ = 4;
@@ -226,6 +232,34 @@ protected:
     void silence(Silent channel) {
         slaves_.behaviour.silent = channel;
         slaves_.behaviour.silentUntil = ~std::uint64_t{0};
+    }
+
+    // Kinds of abuse that all shells have
+
+    /// A channel that does not move for a while, also during a soft reset; the registers answer all the while.
+    void silentChannel() {
+        prepare();
+        slaves_.behaviour.silent = static_cast<Silent>(1 + pick(silentChannels));
+        slaves_.behaviour.silentUntil = report_.cycle + 3000 + pick(10000);
+        begin();
+        bench_->cycles(pick(600));
+        expect(read("identity") == 0x434C4E44, "registers do not answer while the memory is silent");
+        if (pick(2) != 0) {
+            count();
+            softReset();
+        }
+        awaitIdle("a silent memory that answers again does not end it");
+        count();
+    }
+
+    /// A reset at any cycle, also in a soft reset.
+    void hardResets() {
+        prepare();
+        begin();
+        bench_->cycles(pick(pick(2) != 0 ? 200 : 4000));
+        count();
+        if (pick(3) == 0) write("control", reset_);
+        bench_->hardReset(1 + static_cast<unsigned>(pick(4)));
     }
 
     const SequenceJob& job_;
