@@ -10,7 +10,6 @@ from typing import Any
 
 from cocotb import start_soon
 from cocotb.clock import Clock
-from cocotb.handle import HierarchyObject
 from cocotb.triggers import ClockCycles, RisingEdge
 from cocotb.utils import get_sim_time
 from cocotbext.axi import AxiBus, AxiLiteBus, AxiLiteMaster, AxiMaster, AxiRam, AxiRamRead, AxiReadBus
@@ -47,15 +46,6 @@ def memory_of(dut: Any) -> AxiRam:
         AxiRamRead(scene, dut.clock, dut.reset, size=MEMORY, mem=memory.mem)
         scene.r.rid.value = 0
     return memory
-
-
-def settle_arbiters(scope: Any) -> None:
-    """Choose a state for Chisel's round-robin arbiters, which have no reset. Unknown, it leaves the device unknown."""
-    for handle in scope:
-        if isinstance(handle, HierarchyObject):
-            settle_arbiters(handle)
-        elif handle._name.endswith("lastGrant"):
-            handle.value = 0
 
 
 def cycles_since(begin: float) -> int:
@@ -120,7 +110,6 @@ class Device:
 
     async def reset(self) -> None:
         """Reset the device, and find it."""
-        settle_arbiters(self.dut)
         self.dut.reset.value = 1
         await ClockCycles(self.dut.clock, 10)
         self.dut.reset.value = 0

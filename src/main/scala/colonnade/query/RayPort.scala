@@ -1,9 +1,9 @@
 package colonnade.query
 
 import chisel3._
-import chisel3.util.{log2Ceil, Mux1H, OHToUInt, RRArbiter}
+import chisel3.util.{log2Ceil, Mux1H, OHToUInt}
 import colonnade.axi.{AxiAddress, AxiReadPort, AxiWritePort}
-import colonnade.common.RoundRobin
+import colonnade.common.{Merger, RoundRobin}
 import colonnade.formats.RayBatch
 
 final class RayPortIO(count: Int) extends Bundle {
@@ -22,12 +22,12 @@ final class RayPort(count: Int) extends Module {
   private val ids = RayPort.idBits(count)
 
   // Reads
-  private val addresses = Module(new RRArbiter(new AxiAddress(ids), count)).io
-  for (((to, from), index) <- addresses.in.zip(io.reads).zipWithIndex) {
+  private val addresses = Module(new Merger(new AxiAddress(ids), count)).io
+  for (((to, from), index) <- addresses.givers.zip(io.reads).zipWithIndex) {
     to :<>= from.ar
     to.bits.id := index.U
   }
-  io.read.ar :<>= addresses.out
+  io.read.ar :<>= addresses.items
   for ((port, index) <- io.reads.zipWithIndex) {
     port.r.valid := io.read.r.valid && io.read.r.bits.id === index.U
     port.r.bits  := io.read.r.bits

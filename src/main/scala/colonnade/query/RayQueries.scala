@@ -1,9 +1,9 @@
 package colonnade.query
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Queue, RRArbiter, Valid}
+import chisel3.util.{log2Ceil, Decoupled, Queue, Valid}
 import colonnade.axi.{AxiReadPort, AxiWritePort}
-import colonnade.common.{ContextTable, Dispatcher}
+import colonnade.common.{ContextTable, Dispatcher, Merger}
 import colonnade.config.PathConfig
 import colonnade.formats.{Bounds, RayBatch, RayPlacement, RaySensor}
 import colonnade.ray.{PreparedRay, RaySetup}
@@ -64,23 +64,23 @@ final class RayQueries(config: PathConfig) extends Module {
   // Convert them, and prepare them
   private val lanes     = Seq.fill(RayQueries.lanes(config))(Module(new RayConverter(config)).io)
   private val dispatch  = Module(new Dispatcher(new BatchRay(config), lanes.size)).io
-  private val converted = Module(new RRArbiter(new ConvertedRay(config), lanes.size)).io
+  private val converted = Module(new Merger(new ConvertedRay(config), lanes.size)).io
   private val setup     = Module(RaySetup(config)).io
   private val scales    = ContextTable(config, new RayScale)
   dispatch.items.valid := reader.rays.valid && ring.next.valid
   dispatch.items.bits  := reader.rays.bits
   reader.rays.ready    := dispatch.items.ready && ring.next.valid
-  for (((lane, taker), result) <- lanes.zip(dispatch.takers).zip(converted.in)) {
+  for (((lane, taker), result) <- lanes.zip(dispatch.takers).zip(converted.givers)) {
     lane.placement := io.placement
     lane.rays :<>= taker
     result :<>= lane.converted
   }
-  setup.bounds        := io.bounds
-  setup.request.valid := converted.out.valid
-  setup.request.bits  := converted.out.bits.request
-  converted.out.ready := setup.request.ready
-  io.refuses          := setup.request.fire && converted.out.bits.isRefused
-  when(setup.request.fire) { scales.write(setup.request.bits.context, converted.out.bits.scale) }
+  setup.bounds          := io.bounds
+  setup.request.valid   := converted.items.valid
+  setup.request.bits    := converted.items.bits.request
+  converted.items.ready := setup.request.ready
+  io.refuses            := setup.request.fire && converted.items.bits.isRefused
+  when(setup.request.fire) { scales.write(setup.request.bits.context, converted.items.bits.scale) }
 
   // Trace them; those that miss the box end here
   private val prepared = setup.ray.bits
