@@ -1,7 +1,7 @@
 """Digests of what figures are measured on: the Verilog of configurations, and sources of the host.
 
-A digest is the SHA-256 of texts without comments, imports and white space that no meaning depends on, in any order: a
-renamed file is the same text.
+A digest is the SHA-256 of texts without comments, imports, places of assertions and white space that no meaning depends
+on, in any order: a renamed file is the same text.
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ _PYTHON = re.compile(
     r'("(?:\\.|[^"\\\n])+")|#[^\n]*|^[ \t]*""".*?"""|^[ \t]*(?:from \S+ )?import (?:\([^)]*\)|[^\n]*)', re.S | re.M
 )
 
+_PLACE = re.compile(r"\bat \w+\.scala:\d+")
+
 
 def digest_of(files: Iterable[Path]) -> str:
     """The digest of files of C++, SystemVerilog or Python."""
@@ -47,7 +49,7 @@ def _normal(file: Path) -> str:
     if is_python:
         # Indentation has a meaning
         return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
-    return re.sub(r" ?([^\w ]) ?", r"\1", " ".join(text.split()))
+    return re.sub(r" ?([^\w ]) ?", r"\1", " ".join(_PLACE.sub("", text).split()))
 
 
 def digests_of(entry: Entry) -> dict[str, str | None]:

@@ -168,6 +168,12 @@ def test_figures_of_other_sources_are_refused(docs: Path, monkeypatch: pytest.Mo
             'module A (input [3:0] a,b);$error("a // c");',
         ),
         (
+            "sv",
+            'module A;$error("failed\\n    at A.scala:77 assert");',
+            'module A;$error("failed\\n    at A.scala:8 assert");',
+            'module A;$error("failed\\n    at A.scala:8 assume");',
+        ),
+        (
             "py",
             'from a import (\n    b,\n)\nimport c\n\ndef f():\n    """Text."""\n    return "# 1"  # why\n',
             'from c import b\ndef f():\n    """Other\n\n    text."""\n    # why\n    return "# 1"\n',

@@ -23,9 +23,9 @@ object ProgramGraphs {
 
   /** Text by file name. */
   def apply(config: PathConfig): Map[String, String] = Map(
-    "shader-geometry.dot"   -> graph("shader geometry", new ShaderGeometry(PathConfig(config)))(_.program),
-    "bounce.dot"            -> graph("bounce", new BounceUnit(PathConfig(config)))(_.program),
-    "environment-march.dot" -> graph("environment march", new EnvironmentMarch(PathConfig(config)))(_.program)
+    "shader-geometry.dot"   -> graph("shader geometry", new ShaderGeometry(config))(_.program),
+    "bounce.dot"            -> graph("bounce", new BounceUnit(config))(_.program),
+    "environment-march.dot" -> graph("environment march", new EnvironmentMarch(config))(_.program)
   )
 
   private def graph[M <: Module](name: String, module: => M)(program: M => Microprogram[_]): String = {

@@ -2,21 +2,17 @@ package colonnade.config
 
 import chisel3.util.log2Ceil
 
-import scala.language.implicitConversions
-
-/** What a part of a column is built for: the device, and how many rays the part has in flight, one per context. A part's
-  * configuration stands for the device's wherever contexts do not matter.
+/** What a part of a column is built for: the device, and how many rays the part has in flight, one per context. A module
+  * that no context concerns takes the device's configuration.
   */
 sealed abstract class PartConfig {
   def device: ColonnadeConfig
   def contexts: Int
 
+  final def numbers: NumberFormats = device.numbers
+
   /** With so many contexts a choice among them takes a cycle of its own. */
   final def isLarge: Boolean = contexts > ArrayConfig.maxContexts
-}
-
-object PartConfig {
-  implicit def toDevice(part: PartConfig): ColonnadeConfig = part.device
 }
 
 /** The path unit of a column, and the units that serve it: one context per pixel in flight. */

@@ -8,7 +8,7 @@ import colonnade.numbers.{Divider, Normalise, Rounding}
 
 /** The way to a directly seen point: distance · 2^exponent times the ray's direction. */
 final class DirectDistance(config: PathConfig) extends Bundle {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
 
   val isHit    = Bool() // the map shows something there, in front of the camera
   val exponent = SInt(formats.shiftBits.W)
@@ -23,15 +23,16 @@ final class DirectDepthIO(config: PathConfig) extends Bundle {
   val rate  = Flipped(Decoupled(new DirectRate(config)))
   val plane = Flipped(Decoupled(new Plane))
 
-  val albedo, normal = Decoupled(new MapPixel(AttributeLayout.of(config))) // the pixel's albedo and normal are needed
-  val distance       = Decoupled(new DirectDistance(config))               // in the order of the pixels
+  val albedo, normal =
+    Decoupled(new MapPixel(AttributeLayout.of(config.device))) // the pixel's albedo and normal are needed
+  val distance = Decoupled(new DirectDistance(config)) // in the order of the pixels
 }
 
 /** The distance of a directly seen point, from the plane of its pixel: 1 / (w · rate). A pixel every four cycles, by one
   * multiplier for the plane, one for w · rate, and three dividers that take turns.
   */
 final class DirectDepth(config: PathConfig) extends Module {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
   import DirectView.latch
   import formats._
 

@@ -9,7 +9,7 @@ import colonnade.ray.RayFormats
 
 /** A pixel on its way through the [[DirectView]]. */
 final class DirectPixel(config: PathConfig) extends Bundle {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
 
   val request     = new EnvironmentRequest(config)
   val dir         = Vec(3, SInt((formats.f + 1).W)) // scaled to f bits
@@ -33,7 +33,7 @@ final class DirectPointIO(config: PathConfig) extends Bundle {
   * multiplier for the position and three for the normal.
   */
 final class DirectPoint(config: PathConfig) extends Module {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
   import DirectView.latch
   import formats._
 

@@ -8,15 +8,15 @@ import colonnade.numbers.{Normalise, Rounding}
 
 /** Where a directly seen pixel lies in the map. */
 final class DirectPlace(config: PathConfig) extends Bundle {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
 
-  val u, v  = SInt(formats.originBits.W)               // from the map's centre, in map units
-  val pixel = new MapPixel(AttributeLayout.of(config)) // the map's pixel
+  val u, v  = SInt(formats.originBits.W)                      // from the map's centre, in map units
+  val pixel = new MapPixel(AttributeLayout.of(config.device)) // the map's pixel
 }
 
 /** How fast a pixel's ray goes away from the camera: mantissa · 2^(exponent - f). */
 final class DirectRate(config: PathConfig) extends Bundle {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
 
   val mantissa   = UInt(formats.f.W)
   val exponent   = UInt(formats.exponentBits.W)
@@ -24,7 +24,7 @@ final class DirectRate(config: PathConfig) extends Bundle {
 }
 
 final class DirectProjectionIO(config: PathConfig) extends Bundle {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
 
   val view = Input(new EnvironmentView(config.numbers))
 
@@ -46,7 +46,7 @@ final class DirectProjectionIO(config: PathConfig) extends Bundle {
   * One multiplier for the two coordinates of the pixel, one for the three products of the depth.
   */
 final class DirectProjection(config: PathConfig) extends Module {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
   import DirectView.latch
   import formats._
 

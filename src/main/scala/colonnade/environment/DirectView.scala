@@ -13,9 +13,9 @@ final class DirectViewIO(config: PathConfig) extends Bundle {
   val order   = Flipped(Valid(new MarchOrder(config)))
   val isReady = Output(Bool())
 
-  val answer    = Decoupled(new MarchAnswer(config))            // in the order of the orders; offered until it is taken
-  val maps      = new AttributePort(AttributeLayout.of(config)) // several requests may be in flight in each channel
-  val isIllegal = Output(Bool())                                // a response is illegal
+  val answer = Decoupled(new MarchAnswer(config)) // in the order of the orders; offered until it is taken
+  val maps = new AttributePort(AttributeLayout.of(config.device)) // several requests may be in flight in each channel
+  val isIllegal = Output(Bool()) // a response is illegal
 }
 
 /** Finds the points of the environment that the camera sees directly: a pixel every four cycles, equal to what
@@ -36,7 +36,7 @@ final class DirectView(config: PathConfig) extends Module {
   private val projection = Module(new DirectProjection(config)).io
   private val depth      = Module(new DirectDepth(config)).io
   private val point      = Module(new DirectPoint(config)).io
-  private val layout     = AttributeLayout.of(config)
+  private val layout     = AttributeLayout.of(config.device)
   private val maps       = io.maps
 
   /** A queue of pixels, with its input. */

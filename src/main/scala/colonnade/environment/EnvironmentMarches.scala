@@ -7,7 +7,7 @@ import colonnade.formats.EnvironmentView
 
 /** Events of a column's marches in one cycle; names as in `Counters`. */
 final class MarchSums(config: PathConfig) extends Bundle {
-  private def perMarch = UInt(log2Ceil(config.units.marches + 1).W)
+  private def perMarch = UInt(log2Ceil(config.device.units.marches + 1).W)
 
   val marchSteps      = perMarch
   val busyEnvironment = perMarch
@@ -19,7 +19,7 @@ final class EnvironmentMarchesIO(config: PathConfig) extends Bundle {
   val paths = Flipped(new MarchPort(config))
 
   /** One for each march; the last one for the pipeline of directly seen pixels. */
-  val maps   = Vec(config.mapRequesters, new AttributePort(AttributeLayout.of(config)))
+  val maps   = Vec(config.device.mapRequesters, new AttributePort(AttributeLayout.of(config.device)))
   val events = Output(new MarchSums(config))
 }
 
@@ -32,11 +32,11 @@ final class EnvironmentMarchesIO(config: PathConfig) extends Bundle {
 final class EnvironmentMarches(config: PathConfig) extends Module {
   val io = IO(new EnvironmentMarchesIO(config))
 
-  private val marches = Seq.fill(config.units.marches)(Module(new MarchSlot(config)).io)
+  private val marches = Seq.fill(config.device.units.marches)(Module(new MarchSlot(config)).io)
   private val direct  = Module(new DirectView(config)).io
 
   // Requests: the order of one that is accepted comes in the next cycle
-  private val isAwaited = RegInit(VecInit.fill(config.units.marches)(false.B))
+  private val isAwaited = RegInit(VecInit.fill(config.device.units.marches)(false.B))
   private val isFree    = VecInit(marches.zip(isAwaited).map { case (march, awaited) => march.isEmpty && !awaited })
   private val hasDirect = RegNext(io.paths.direct.fire, false.B)
   io.paths.direct.ready := direct.isReady && !hasDirect

@@ -57,7 +57,7 @@ final class MarchDatapathIO(formats: MarchFormats) extends Bundle {
   * A product can be added one step after its factors, and the sum can be used one step later.
   */
 final class MarchDatapath(config: PathConfig) extends Module {
-  private val formats = new MarchFormats(config)
+  private val formats = new MarchFormats(config.device)
   import formats._
 
   val io = IO(new MarchDatapathIO(formats))

@@ -7,7 +7,7 @@ import colonnade.numbers.Rounding
 
 /** The program of the march, the registers of its ray, and the operations that its steps have of the datapath. */
 final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
-  val formats = new MarchFormats(config)
+  val formats = new MarchFormats(config.device)
   import formats._
 
   val program = new Microprogram[MarchLabel](StepEncoding.OneHot)

@@ -13,8 +13,8 @@ final class EnvironmentRay(config: PathConfig) extends Bundle {
   private val numbers = config.numbers
 
   val origin = Vec3(new Fixed(new RayFormats(numbers).scene)) // grid steps
-  val dir    = Vec3(SInt((new MarchFormats(config).f + 1).W))
-  val pixel  = new PixelPosition(config)                      // the pixel of a ray from the camera
+  val dir    = Vec3(SInt((new MarchFormats(config.device).f + 1).W))
+  val pixel  = new PixelPosition(config.device)               // the pixel of a ray from the camera
 }
 
 /** A ray to march. */
@@ -38,8 +38,8 @@ object HitKind extends ChiselEnum {
 
 /** The point of the environment that a ray hits. Fields that do not belong to its kind are 0. */
 final class MarchResult(config: PathConfig) extends Bundle {
-  private val formats = new MarchFormats(config)
-  private val layout  = AttributeLayout.of(config)
+  private val formats = new MarchFormats(config.device)
+  private val layout  = AttributeLayout.of(config.device)
 
   val context = Context(config)
   val kind    = HitKind()
@@ -78,7 +78,7 @@ final class MarchEvents extends Bundle {
 }
 
 final class EnvironmentMarchIO(config: PathConfig) extends Bundle {
-  private val layout = AttributeLayout.of(config)
+  private val layout = AttributeLayout.of(config.device)
 
   val view    = Input(new EnvironmentView(config.numbers)) // constant while a ray is marched
   val request = Flipped(Decoupled(new MarchRequest(config)))

@@ -10,7 +10,7 @@ final class MarchSlotIO(config: PathConfig) extends Bundle {
   val order   = Flipped(Valid(new MarchOrder(config)))     // only in a cycle after one with `isEmpty`
   val isEmpty = Output(Bool())                             // no order is held
   val answer  = Decoupled(new MarchAnswer(config))
-  val maps    = new AttributePort(AttributeLayout.of(config))
+  val maps    = new AttributePort(AttributeLayout.of(config.device))
   val events  = Output(new MarchEvents)
 }
 

@@ -35,7 +35,7 @@ final class ObjectRay(config: PathConfig) extends Bundle {
 
 final class InstanceTransformIO(config: PathConfig) extends Bundle {
   val visit    = Flipped(Decoupled(new InstanceVisit(config)))
-  val instance = Input(new ObjectInstance(config)) // while a visit is in the unit
+  val instance = Input(new ObjectInstance(config.device)) // while a visit is in the unit
   val ray      = Decoupled(new ObjectRay(config))
 }
 

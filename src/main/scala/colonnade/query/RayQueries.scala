@@ -173,7 +173,7 @@ object RayQueries {
   private val offsetBits = log2Ceil((Run.tileRows - 1) * 16 * RayBatch.maxCount + 1)
 
   /** Converters of rays: enough for a ray of each traversal unit every 15 cycles. */
-  def lanes(config: PathConfig): Int = (2 * config.array.rows / 5).max(2)
+  def lanes(config: PathConfig): Int = (2 * config.device.array.rows / 5).max(2)
 }
 
 final private class RayEntryPoint(config: PathConfig) extends Bundle {

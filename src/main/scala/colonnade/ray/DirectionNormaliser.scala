@@ -40,7 +40,7 @@ final class PermutedRay(config: PathConfig) extends Bundle {
   /** Largest t in grid steps; it saturates above the sum of an entry distance and the largest t of the grid. */
   val tMax = UInt((numbers.sceneBits + 1).W)
 
-  val limits = Option.when(config.frame.rays)(new RayLimits(numbers))
+  val limits = Option.when(config.device.frame.rays)(new RayLimits(numbers))
 }
 
 final class DirectionNormaliserIO(config: PathConfig) extends Bundle {
@@ -60,7 +60,7 @@ final class DirectionNormaliser(config: PathConfig) extends Module {
   private val numbers = config.numbers
 
   // The steps. With extra slices the leading zeros of a magnitude are counted in a cycle of their own
-  private val delay   = TimingSlice.extra(config).cycles
+  private val delay   = TimingSlice.extra(config.device).cycles
   private val idle    = 0.U(3.W)
   private val first   = (1 + delay).U(3.W)
   private val last    = (3 + delay).U(3.W)

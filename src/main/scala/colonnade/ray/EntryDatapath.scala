@@ -74,7 +74,7 @@ final class EntryDatapath(config: PathConfig) extends Module {
   private val shearSlice   =
     MuxLookup(command.slice, sliceOf(slices - 1))((0 until slices - 1).map(i => i.U -> sliceOf(i)))
   private val multiplier = Mux(command.multipliesShear, shearSlice, onSide(reciprocal, command.multiplySide).zext)
-  private val operand    = TimingSlice.extra(config)
+  private val operand    = TimingSlice.extra(config.device)
   private val carries    = operand(operand(command.multipliesShear && command.slice =/= 0.U))
   // An entry times a slice is one bit shorter than productBits; the carried part, shorter by a slice, adds no bit.
   product := Rounding.narrow(

@@ -24,7 +24,7 @@ final class RayEntryIO(config: PathConfig) extends Bundle {
 final class RayEntry(config: PathConfig) extends Module {
   val io = IO(new RayEntryIO(config))
 
-  private val control  = Module(new EntryControl(EntryDatapath.slices(config), TimingSlice.extra(config)))
+  private val control  = Module(new EntryControl(EntryDatapath.slices(config), TimingSlice.extra(config.device)))
   private val datapath = Module(new EntryDatapath(config))
 
   control.io.rayValid       := io.ray.valid

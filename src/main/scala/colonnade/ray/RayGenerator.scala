@@ -14,8 +14,8 @@ final class RayPosition(config: PathConfig) extends Bundle {
   val y       = UInt(config.numbers.coordinateBits.W)
 
   /** [[colonnade.formats.UnitPosition]]'s. */
-  val meetsObject  = if (config.hasEnvironment) Some(Bool()) else None
-  val inObjectTile = if (config.hasEnvironment) Some(Bool()) else None
+  val meetsObject  = if (config.device.hasEnvironment) Some(Bool()) else None
+  val inObjectTile = if (config.device.hasEnvironment) Some(Bool()) else None
 }
 
 /** The frame registers that define a primary ray. */
@@ -45,7 +45,7 @@ final class RayGenerator(config: PathConfig) extends Module {
 
   private val numbers = config.numbers
   private val scene   = new RayFormats(numbers).scene
-  private val levels  = log2Ceil(config.frame.tileSize)
+  private val levels  = log2Ceil(config.device.frame.tileSize)
 
   // Control: a pixel waits in front for its direction; the back offers its ray
   private val inFront  = RegInit(false.B)

@@ -23,6 +23,6 @@ object RaySetup {
 
   /** The smallest unit that takes a ray every `units.rayInterval` cycles. */
   def apply(config: PathConfig): RaySetup =
-    if (config.units.rayInterval >= UnitsConfig.sequentialRayInterval) new SequentialRaySetup(config)
+    if (config.device.units.rayInterval >= UnitsConfig.sequentialRayInterval) new SequentialRaySetup(config)
     else new RaySetupPipeline(config)
 }

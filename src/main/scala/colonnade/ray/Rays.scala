@@ -40,7 +40,7 @@ final class RayRequest(config: PathConfig) extends Bundle {
   val isShadow = Bool()
   val origin   = Vec3(new Fixed(new RayFormats(numbers).scene))
   val dir      = Vec3(SInt(numbers.directionBits.W))
-  val limits   = Option.when(config.frame.rays)(new RayLimits(numbers))
+  val limits   = Option.when(config.device.frame.rays)(new RayLimits(numbers))
 }
 
 /** What an application's ray does not hit: triangles seen from the front or the back, and those that are not opaque. */
@@ -138,10 +138,10 @@ final class PreparedRay(config: PartConfig) extends Bundle {
   val ray      = new TracedRay(numbers)
   val tEntry   = new Fixed(formats.entry)
   val tMax     = new Fixed(formats.grid) // hits with t < `tMax` count; never negative
-  val limits   = Option.when(config.frame.rays)(new EntryLimits(numbers))
+  val limits   = Option.when(config.device.frame.rays)(new EntryLimits(numbers))
 
   /** The root of its object's tree; ray set-up does not know it. */
-  val root = Option.when(config.frame.hasInstances)(UInt(RecordFormats.addressBits(config).W))
+  val root = Option.when(config.device.frame.hasInstances)(UInt(RecordFormats.addressBits(config.device).W))
 }
 
 object PermutedFrame {

@@ -14,12 +14,12 @@ final class AngleStageIO(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(numbers)
 
   val phase     = Input(ModuloSchedule.phase())
-  val lights    = Input(Vec(config.frame.lights, new Light(numbers)))
+  val lights    = Input(Vec(config.device.frame.lights, new Light(numbers)))
   val unitShift = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
 
   /** In cycles 5 to 7 and 17: the light's number. */
-  val light        = Input(UInt(log2Ceil(config.frame.lights.max(2)).W))
-  val lightFalloff = Input(UInt(log2Ceil(config.frame.lights.max(2)).W))
+  val light        = Input(UInt(log2Ceil(config.device.frame.lights.max(2)).W))
+  val lightFalloff = Input(UInt(log2Ceil(config.device.frame.lights.max(2)).W))
 
   val origin = Input(SInt(ShaderFormats.originBits(config).W)) // from cycle 6 on
   val normal = Input(SInt(formats.narrowBits.W))               // from `AngleCycles.normal` on
@@ -33,7 +33,7 @@ final class AngleStageIO(config: PathConfig) extends Bundle {
 
 /** Cycles of [[AngleStage]]. */
 final class AngleCycles(config: PathConfig) {
-  val normal:  Int = Lobe(config).fold(7)(_ => LobeAxisStage.axis0)
+  val normal:  Int = Lobe(config.device).fold(7)(_ => LobeAxisStage.axis0)
   val dot:     Int = normal.max(12)
   val square:  Int = dot + 4
   val angle:   Int = dot + 5
@@ -54,7 +54,7 @@ final class AngleStage(config: PathConfig) extends Module {
   private val schedule = new ModuloSchedule(io.phase)
   import schedule._
 
-  private def entry(light: UInt): Light = io.lights(if (config.frame.lights == 1) 0.U else light)
+  private def entry(light: UInt): Light = io.lights(if (config.device.frame.lights == 1) 0.U else light)
 
   // The vector to the light
   private val position = latch(xyz(5)) {

@@ -13,7 +13,7 @@ final class BounceHit(config: PathConfig) extends Bundle {
   val backSide = Bool()
 
   /** The normal is that of a microfacet. */
-  val isRough = Lobe(config).map(_ => Bool())
+  val isRough = Lobe(config.device).map(_ => Bool())
 }
 
 /** Components of vectors that are known early: the geometric normal, turned against the ray, and the ray's direction. */
@@ -32,7 +32,7 @@ final class BouncePoint(config: PathConfig) extends Bundle {
 }
 
 final class BounceQueueIO(config: PathConfig) extends Bundle {
-  val materials = Input(Vec(config.frame.materials, new Material(config)))
+  val materials = Input(Vec(config.device.frame.materials, new Material(config.device)))
 
   // Each only while there is space
   val hit        = Flipped(Valid(new BounceHit(config)))
@@ -41,7 +41,7 @@ final class BounceQueueIO(config: PathConfig) extends Bundle {
   val albedo     = Flipped(new AlbedoSources(config))
 
   /** The normals of microfacets, of the rough ones of the hits. */
-  val facet = Lobe(config).map(_ => Flipped(Valid(Vec(3, SInt((ScatterStage.facetBits + 1).W)))))
+  val facet = Lobe(config.device).map(_ => Flipped(Valid(Vec(3, SInt((ScatterStage.facetBits + 1).W)))))
 
   // To and from bounce units, which may answer in any order
   val request = Decoupled(new BounceRequest(config))
@@ -53,7 +53,7 @@ final class BounceQueueIO(config: PathConfig) extends Bundle {
 final private class BounceSurface(config: PathConfig) extends Bundle {
   val material = MaterialIndex(config)
   val backSide = Bool()
-  val albedo   = Option.when(config.geometry.cornerColours)(Rgb(FrameRegisters.colour))
+  val albedo   = Option.when(config.device.geometry.cornerColours)(Rgb(FrameRegisters.colour))
   val origin   = Vec(3, SInt(new ShaderFormats(config.numbers).pointBits.W)) // of a reflection
 }
 

@@ -11,7 +11,7 @@ import colonnade.numbers.{Fixed, FoldedDivider, FoldedSquareRoot, Normalise, Rou
 final class BrightnessStageIO(config: PathConfig) extends Bundle {
   private val numbers                                  = config.numbers
   private val formats                                  = new ShaderFormats(numbers)
-  private def rough[T <: Data](field: => T): Option[T] = Lobe(config).map(_ => Input(field))
+  private def rough[T <: Data](field: => T): Option[T] = Lobe(config.device).map(_ => Input(field))
 
   val phase = Input(ModuloSchedule.phase())
 
@@ -43,7 +43,7 @@ final class BrightnessCycles(config: PathConfig) {
   val quotient:        Int = root + division
   val falloffQuotient: Int = falloff + division
   val cosine:          Int = quotient + 1
-  val brightness:      Int = cosine + Lobe(config).fold(0)(_ => LobeStage.latency)
+  val brightness:      Int = cosine + Lobe(config.device).fold(0)(_ => LobeStage.latency)
   val colour:          Int = brightness + interval + 1
   val direct:          Int = colour + 3
 }

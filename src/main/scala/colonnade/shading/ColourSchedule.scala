@@ -12,7 +12,7 @@ import colonnade.config.PathConfig
 final private[shading] class ColourSchedule(config: PathConfig, operation: ColourOperation, lightsOn: UInt) {
   val isIssuing = RegInit(false.B)
   val channel   = Reg(UInt(2.W))
-  val light     = Reg(UInt(log2Ceil(config.frame.lights.max(2)).W))
+  val light     = Reg(UInt(log2Ceil(config.device.frame.lights.max(2)).W))
   val ofSurface = Reg(Bool())
 
   private val changesPath = operation.isBounce || operation.end.gathers
@@ -50,7 +50,7 @@ final private[shading] class ColourSchedule(config: PathConfig, operation: Colou
   }
 
   /** An entry by light, of this slot. */
-  def ofLight[T <: Data](entries: Vec[T]): T = if (config.frame.lights == 1) entries.head else entries(light)
+  def ofLight[T <: Data](entries: Vec[T]): T = if (config.device.frame.lights == 1) entries.head else entries(light)
 
   private def isLast(light: UInt): Bool = !ofSurface || light +& 1.U >= lightsOn // off, it adds nothing
 }

@@ -12,12 +12,12 @@ final private[shading] class ColourOperation(config: PathConfig) extends Bundle 
   val isStraight = Bool()       // the path's throughput is 1, its radiance 0
   val end        = new ShownEnd // of the path, or of the Fresnel reflection
   val goesBack   = Bool()
-  val occlusions = Vec(config.frame.lights, Occlusion())
+  val occlusions = Vec(config.device.frame.lights, Occlusion())
   val needsRatio = Bool()
 
   /** What the path lets through at a bounce, and the weight of the Fresnel reflection. */
-  val tint    = Option.when(config.frame.hasBounces)(Vec(3, FrameRegisters.weight))
-  val fresnel = Option.when(config.frame.hasBounces)(FrameRegisters.weight)
+  val tint    = Option.when(config.device.frame.hasBounces)(Vec(3, FrameRegisters.weight))
+  val fresnel = Option.when(config.device.frame.hasBounces)(FrameRegisters.weight)
 }
 
 /** What a slot of [[ColourUnit]] computes in a channel; the table of factors and terms is there. */
@@ -45,7 +45,7 @@ final private[shading] class ColourSlot(config: PathConfig) extends Bundle {
   /** The path's radiance and throughput; the light that the surface adds. */
   val radiance = UInt(NumberFormats.colourBits.W)
   val weight   = UInt((NumberFormats.lightFraction + 1).W)
-  val emission = Option.when(config.frame.emission)(UInt(NumberFormats.colourBits.W))
+  val emission = Option.when(config.device.frame.emission)(UInt(NumberFormats.colourBits.W))
 
   def isIn(pass: ColourPass.Type): Bool = this.pass === pass
 }

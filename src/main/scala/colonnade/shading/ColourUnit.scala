@@ -10,9 +10,9 @@ import colonnade.numbers.{Fixed, Rounding}
 final class ColourUnitIO(config: PathConfig) extends Bundle {
   val ambient    = Input(Rgb(FrameRegisters.intensity))
   val background = Input(Rgb(FrameRegisters.colour))
-  val shading    = Input(new Shading(config))
+  val shading    = Input(new Shading(config.device))
   val surface    = Flipped(Valid(new LitSurface(config))) // the surface at which a context's path ends; remembered
-  val bounce     = if (config.frame.hasBounces) Some(Flipped(Decoupled(new BounceUpdate(config)))) else None
+  val bounce     = if (config.device.frame.hasBounces) Some(Flipped(Decoupled(new BounceUpdate(config)))) else None
   val end        = Flipped(Decoupled(new PathTermination(config)))
   val colour     = Valid(new PathColour(config))
 
@@ -38,8 +38,8 @@ final class ColourUnitIO(config: PathConfig) extends Bundle {
   * @note colour = radiance + throughput · (emission + albedo · (ambient + the direct light of all lights · transmittance))
   */
 final class ColourUnit(config: PathConfig) extends Module {
-  private val lights     = config.frame.lights
-  private val hasBounces = config.frame.hasBounces
+  private val lights     = config.device.frame.lights
+  private val hasBounces = config.device.frame.hasBounces
   private val fraction   = NumberFormats.lightFraction
   private val colourBits = NumberFormats.colourBits
   private val sumBits    = NumberFormats.lightBits + log2Ceil(lights + 1)
@@ -55,7 +55,7 @@ final class ColourUnit(config: PathConfig) extends Module {
   private val next      = Reg(new ColourOperation(config))
   private val operation = Reg(new ColourOperation(config))
   private val schedule  = new ColourSchedule(config, operation, io.shading.lights)
-  private val ratios    = Option.when(config.hasEnvironment)(Module(new ShadowRatios(config, sumBits)).io)
+  private val ratios    = Option.when(config.device.hasEnvironment)(Module(new ShadowRatios(config, sumBits)).io)
 
   /** A path of the slots enters the table; one of a context will. */
   private val isWriting  = Wire(Bool())
@@ -305,8 +305,8 @@ final class ColourUnit(config: PathConfig) extends Module {
 /** The surface at which a path ends. */
 final private class TerminalSurface(config: PathConfig) extends Bundle {
   val albedo      = Rgb(FrameRegisters.colour)
-  val directLight = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
-  val emission    = if (config.frame.emission) Some(Rgb(FrameRegisters.colour)) else None
+  val directLight = Vec(config.device.frame.lights, Rgb(FrameRegisters.intensity))
+  val emission    = if (config.device.frame.emission) Some(Rgb(FrameRegisters.colour)) else None
 }
 
 /** A path after its bounces so far. */

@@ -68,7 +68,7 @@ final class GeometryDatapathIO(config: PathConfig) extends Bundle {
   val control       = Input(new GeometryControl(formats))
   val request       = Input(new ShadeRequest(config))
   val isEnvironment = Input(Bool()) // load `environment` instead of `request`
-  val environment   = if (config.hasEnvironment) Some(Input(new EnvironmentSurface(config))) else None
+  val environment   = if (config.device.hasEnvironment) Some(Input(new EnvironmentSurface(config))) else None
   val isFlat        = Input(Bool()) // shade with the geometric normal
   val light         = Input(new Light(numbers))
   val offset        = Input(UInt((numbers.gridBits - 2).W))

@@ -34,7 +34,7 @@ final class GeometryDatapath(config: PathConfig) extends Module {
   private val backSide        = Reg(Bool())
   private val context         = Reg(chiselTypeOf(io.request.context))
   private val material        = Reg(MaterialIndex(config))
-  private val isEnvironment   = if (config.hasEnvironment) Reg(Bool()) else WireInit(false.B)
+  private val isEnvironment   = if (config.device.hasEnvironment) Reg(Bool()) else WireInit(false.B)
 
   private val shifted      = Reg(SInt(formats.vectorBits.W))
   private val measured     = Reg(UInt((formats.vectorBits - 1).W))

@@ -14,19 +14,19 @@ final class SurfaceLabel(config: PathConfig) extends Bundle {
   val material = MaterialIndex(config)
 
   /** Of a point of the environment, which has no material. */
-  val environment = if (config.hasEnvironment) Some(Valid(Rgb(FrameRegisters.colour))) else None
+  val environment = if (config.device.hasEnvironment) Some(Valid(Rgb(FrameRegisters.colour))) else None
 }
 
 /** A light on a surface, without shadows. */
 final class LightOnSurface(config: PathConfig) extends Bundle {
-  val light          = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val light          = UInt(log2Ceil(config.device.frame.lights.max(2)).W)
   val isLast         = Bool()
   val direct         = Rgb(FrameRegisters.intensity)
   val needsShadowRay = Bool()
 }
 
 final class LitAssemblerIO(config: PathConfig) extends Bundle {
-  val materials = Input(Vec(config.frame.materials, new Material(config)))
+  val materials = Input(Vec(config.device.frame.materials, new Material(config.device)))
 
   // For each surface a label and its origin's components; for each light its share. All only while there is space
   val label  = Flipped(Valid(new SurfaceLabel(config)))
@@ -81,11 +81,11 @@ final class LitAssembler(config: PathConfig, places: Int) extends Module {
     lit.directLight     := 0.U.asTypeOf(direct)
     lit.needsShadowRays := 0.U.asTypeOf(needs)
   }
-  for (index <- 0 until config.frame.lights) when(light.light === index.U) {
+  for (index <- 0 until config.device.frame.lights) when(light.light === index.U) {
     lit.directLight(index)     := light.direct
     lit.needsShadowRays(index) := light.needsShadowRay
   }
-  if (config.frame.lights > 1) when(lights.out.fire) {
+  if (config.device.frame.lights > 1) when(lights.out.fire) {
     direct := lit.directLight
     needs  := lit.needsShadowRays
   }

@@ -8,8 +8,8 @@ import colonnade.formats.{FrameRegisters, Material, Rgb}
 
 /** Albedos that do not come from the material: by hit the interpolated colour, by textured hit the texel. */
 final class AlbedoSources(config: PathConfig) extends Bundle {
-  val colour = Option.when(config.geometry.cornerColours)(Valid(Rgb(FrameRegisters.colour)))
-  val texel  = config.geometry.texture.map(_ => Valid(Rgb(FrameRegisters.colour)))
+  val colour = Option.when(config.device.geometry.cornerColours)(Valid(Rgb(FrameRegisters.colour)))
+  val texel  = config.device.geometry.texture.map(_ => Valid(Rgb(FrameRegisters.colour)))
 }
 
 /** The albedo of the first of the hits whose sources are queued; a part of the module that has the queue of hits.
@@ -48,7 +48,7 @@ final private[shading] class ObjectAlbedo(
 
 /** A hit with a texture. */
 final class TexturedHit(config: PathConfig) extends Bundle {
-  val position = new TexelPosition(TextureLayout.of(config))
+  val position = new TexelPosition(TextureLayout.of(config.device))
   val isBounce = Bool() // its material is a mirror or glass
 }
 

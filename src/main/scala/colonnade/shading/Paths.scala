@@ -23,9 +23,9 @@ object PathEnd extends ChiselEnum {
 
   /** Whether a device has such ends. */
   private[shading] def has(config: PathConfig, end: Type): Boolean =
-    if (end == directView) config.hasEnvironment
-    else if (end == gathered) config.gathersInRoom
-    else config.frame.gather || (end != cube && end != gathers)
+    if (end == directView) config.device.hasEnvironment
+    else if (end == gathered) config.device.gathersInRoom
+    else config.device.frame.gather || (end != cube && end != gathers)
 
   /** Whether a path ends so. False in a device that has no such ends. */
   def is(config: PathConfig, path: Type, end: Type): Bool = if (has(config, end)) path === end else false.B
@@ -51,8 +51,8 @@ private[shading] object ShownEnd {
 final class PathTermination(config: PathConfig) extends Bundle {
   val context    = Context(config)
   val end        = PathEnd()
-  val isStraight = Option.when(config.frame.hasBounces)(Bool()) // the path's throughput is 1, its radiance 0
-  val occlusions = Vec(config.frame.lights, Occlusion())        // by light: the shadow rays' outcomes
+  val isStraight = Option.when(config.device.frame.hasBounces)(Bool()) // the path's throughput is 1, its radiance 0
+  val occlusions = Vec(config.device.frame.lights, Occlusion())        // by light: the shadow rays' outcomes
 
   val isScattered = Bool() // the path has gathered: it sees no lights in the cube
   val goesBack    = Bool() // the ray is that of a point of the environment, which is lit by the path's colour
@@ -80,5 +80,5 @@ final class PathColour(config: PathConfig) extends Bundle {
   val colour  = Rgb(FrameRegisters.colour)
 
   /** Of a directly visible surface of the environment: its shadow ratio. */
-  val ratio = if (config.hasEnvironment) Some(Rgb(FrameRegisters.weight)) else None
+  val ratio = if (config.device.hasEnvironment) Some(Rgb(FrameRegisters.weight)) else None
 }

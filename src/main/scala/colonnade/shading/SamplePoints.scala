@@ -21,7 +21,7 @@ final class SamplePort(config: PathConfig) extends Bundle {
 /** A context and its pixel. */
 final class PixelOfContext(config: PathConfig) extends Bundle {
   val context = Context(config)
-  val pixel   = new PixelPosition(config)
+  val pixel   = new PixelPosition(config.device)
 }
 
 final class SamplePointsIO(config: PathConfig) extends Bundle {

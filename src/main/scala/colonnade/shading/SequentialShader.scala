@@ -25,12 +25,12 @@ final class SequentialShader(config: PathConfig) extends Shader(config) {
   private val cosine     = Module(new CosineUnit(config.numbers))
   private val direct     = Module(new DirectUnit(config))
   private val multiplier =
-    Module(new ShaderMultiplier(formats, config.geometry.cornerColours, ShaderMultiplier.latency(config)))
+    Module(new ShaderMultiplier(formats, config.device.geometry.cornerColours, ShaderMultiplier.latency(config)))
 
   // Geometry
   private val point    = geometry.io.result
   private val surface  = point.bits.surface
-  private val material = Wire(new Material(config))
+  private val material = Wire(new Material(config.device))
   material := ShadingPipeline.material(config, io.materials, surface.material)
   private val isBounce = material.kind.map(_ =/= MaterialKind.diffuse && !surface.isEnvironment).getOrElse(false.B)
   geometry.io.request <> io.request

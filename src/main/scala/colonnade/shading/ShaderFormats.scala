@@ -45,7 +45,7 @@ object ShaderFormats {
   /** Bits of a shadow ray's origin, signed: on the object or on the environment. */
   def originBits(config: PathConfig): Int = {
     val ofObject = new ShaderFormats(config.numbers).pointBits
-    if (config.hasEnvironment) config.numbers.sceneBits.max(ofObject) else ofObject
+    if (config.device.hasEnvironment) config.numbers.sceneBits.max(ofObject) else ofObject
   }
 }
 
@@ -97,7 +97,7 @@ final class ShadingPoint(config: PathConfig) extends Bundle {
   private val formats = new ShaderFormats(config.numbers)
 
   /** The light's number, and whether it is the hit's last light. */
-  val light  = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val light  = UInt(log2Ceil(config.device.frame.lights.max(2)).W)
   val isLast = Bool()
 
   /** Between the shading normal and the vector to the light. */

@@ -13,14 +13,14 @@ final class ShaderGeometryIO(config: PathConfig) extends Bundle {
   val request = Flipped(Decoupled(new ShadeRequest(config)))
 
   /** Points of the environment; taken when there is no request. */
-  val environment = if (config.hasEnvironment) Some(Flipped(Decoupled(new EnvironmentSurface(config)))) else None
+  val environment = if (config.device.hasEnvironment) Some(Flipped(Decoupled(new EnvironmentSurface(config)))) else None
 
   val readyNext = Output(Bool()) // `request` is ready in the next cycle
-  val lights    = Input(Vec(config.frame.lights, new Light(numbers)))
-  val shading   = Input(new Shading(config))
+  val lights    = Input(Vec(config.device.frame.lights, new Light(numbers)))
+  val shading   = Input(new Shading(config.device))
 
   /** Results of the current hit: one per light, at least one. */
-  val lightCount = Input(UInt(NumberFormats.bitLength(config.frame.lights).W))
+  val lightCount = Input(UInt(NumberFormats.bitLength(config.device.frame.lights).W))
   val unitShift  = Input(UInt(NumberFormats.bitLength(numbers.sceneBits).W))
 
   /** To the multiplier, whose product comes in the next cycle. */
@@ -51,7 +51,7 @@ final class ShaderGeometry(config: PathConfig) extends Module {
 
   /** Shade with the geometric normal: the registers say so, or the smooth normal is zero. */
   private val isFlat        = Reg(Bool())
-  private val light         = Reg(UInt(log2Ceil(config.frame.lights.max(2)).W))
+  private val light         = Reg(UInt(log2Ceil(config.device.frame.lights.max(2)).W))
   private val isLast        = light +& 1.U >= io.lightCount
   private val isEnvironment = io.environment.map(_.fire).getOrElse(false.B)
   private val takes         = io.request.fire || isEnvironment
@@ -84,7 +84,7 @@ final class ShaderGeometry(config: PathConfig) extends Module {
   datapath.io.isEnvironment        := isEnvironment
   datapath.io.environment.zip(io.environment).foreach { case (to, environment) => to := environment.bits }
   datapath.io.isFlat    := isFlat
-  datapath.io.light     := io.lights(if (config.frame.lights == 1) 0.U else light)
+  datapath.io.light     := io.lights(if (config.device.frame.lights == 1) 0.U else light)
   datapath.io.offset    := io.shading.offset
   datapath.io.unitShift := io.unitShift
   datapath.io.product   := io.product

@@ -36,5 +36,5 @@ object ShaderMultiplier {
 
   /** Cycles from operands to the product. An extra slice registers the operands; corner colours do not wait for it. */
   def latency(config: PathConfig): Int =
-    if (config.geometry.cornerColours) 1 else 1 + TimingSlice.extra(config).cycles
+    if (config.device.geometry.cornerColours) 1 else 1 + TimingSlice.extra(config.device).cycles
 }

@@ -13,7 +13,7 @@ final class ShadeRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
   val ray     = new TriangleRay(config.numbers)
   val hit     = new HitPoint(config)
-  val face    = new Face(config)
+  val face    = new Face(config.device)
 }
 
 /** A point of the environment, to be lit like a diffuse surface. */
@@ -32,11 +32,12 @@ final class LitSurface(config: PathConfig) extends Bundle {
   val origin  = Vec3(new Fixed(new RayFormats(config.numbers).scene))
 
   /** By light; 0 from a light that is off. */
-  val directLight     = Vec(config.frame.lights, Rgb(FrameRegisters.intensity))
-  val needsShadowRays = Vec(config.frame.lights, Bool())
+  val directLight     = Vec(config.device.frame.lights, Rgb(FrameRegisters.intensity))
+  val needsShadowRays = Vec(config.device.frame.lights, Bool())
 
-  val emission = Option.when(config.frame.emission)(Rgb(FrameRegisters.colour)) // the light that the surface adds
-  val scatter  = Option.when(config.frame.gather)(ScatterStage.dir)             // of the ray that gathers light there
+  val emission =
+    Option.when(config.device.frame.emission)(Rgb(FrameRegisters.colour)) // the light that the surface adds
+  val scatter = Option.when(config.device.frame.gather)(ScatterStage.dir) // of the ray that gathers light there
 
   val isOfEnvironment = Bool()
 }
@@ -48,5 +49,5 @@ final class BouncedRay(config: PathConfig) extends Bundle {
   val isTinted = Bool() // the path is tinted by the albedo
 
   /** Where there may be an environment: the origin of the Fresnel reflection, off the surface on the ray's side. */
-  val fresnelOrigin = Option.when(config.hasEnvironment)(bounce.origin.cloneType)
+  val fresnelOrigin = Option.when(config.device.hasEnvironment)(bounce.origin.cloneType)
 }

@@ -31,12 +31,12 @@ final class ShadingHit(config: PathConfig) extends Bundle {
   val normals         = Vec(3, Vec3(SInt(NumberFormats.normalBits.W)))
   val geometricNormal = Vec3(SInt(NumberFormats.normalBits.W))
 
-  val colours = Option.when(config.geometry.cornerColours)(Vec(3, Rgb(FrameRegisters.colour))) // by corner
+  val colours = Option.when(config.device.geometry.cornerColours)(Vec(3, Rgb(FrameRegisters.colour))) // by corner
 }
 
 /** What the end of the [[ShadingPipeline]] has to know of a light on a hit. */
 final class LightSlot(config: PathConfig) extends Bundle {
-  val light   = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val light   = UInt(log2Ceil(config.device.frame.lights.max(2)).W)
   val isLast  = Bool()
   val shadows = Bool() // a shadow ray is needed if the surface faces the light
   val isOn    = Bool() // the light is on
@@ -50,5 +50,5 @@ final class RoughSurface(config: PathConfig) extends Bundle {
 
 /** The number of a material, truncated to the bits that the table needs. */
 object MaterialIndex {
-  def apply(config: PathConfig): UInt = UInt(log2Ceil(config.frame.materials.max(2)).W)
+  def apply(config: PathConfig): UInt = UInt(log2Ceil(config.device.frame.materials.max(2)).W)
 }

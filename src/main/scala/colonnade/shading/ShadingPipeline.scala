@@ -34,7 +34,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
   private val shadows  = Reg(Bool())
   private val isHeld   = RegInit(false.B)
   private val isActive = RegInit(false.B) // a light on the hit has just entered
-  private val light    = Reg(UInt(log2Ceil(config.frame.lights.max(2)).W))
+  private val light    = Reg(UInt(log2Ceil(config.device.frame.lights.max(2)).W))
   private val isLast   = hit.isBounce || light +& 1.U >= io.shading.lights
   private val isFree   = !isHeld || (isActive && isLast)
 
@@ -257,7 +257,7 @@ final class ShadingPipeline(config: PathConfig) extends Shader(config) {
     }
     corners.colour
   }
-  for ((port, layout) <- io.texture.zip(config.geometry.texture)) {
+  for ((port, layout) <- io.texture.zip(config.device.geometry.texture)) {
     val texels     = Module(new TexelReader(config, 2 * queued)).io
     val isTextured =
       carry(latch(2)(material(config, io.materials, hit.material).hasTexture.get && !hit.isEnvironment), 8).at(8)
@@ -314,7 +314,7 @@ object ShadingPipeline {
 
   /** The entry of a material's number, truncated to the bits that the table needs; beyond the table it means entry 0. */
   private[colonnade] def material[T <: Data](config: PathConfig, table: Vec[T], number: UInt): T = {
-    val indexBits = log2Ceil(config.frame.materials)
+    val indexBits = log2Ceil(config.device.frame.materials)
     val entries   = table.padTo(1 << indexBits, table.head)
     if (indexBits == 0) entries.head else VecInit(entries)(number(indexBits - 1, 0))
   }

@@ -11,14 +11,14 @@ import colonnade.ray.{RayFormats, RayRequest}
 /** A context and a light to trace a shadow ray to. */
 final class ShadowRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
-  val light   = UInt(log2Ceil(config.frame.lights.max(2)).W)
+  val light   = UInt(log2Ceil(config.device.frame.lights.max(2)).W)
 
   /** The ray is the one that gathers light at the surface instead. */
   val isGathered = Bool()
 }
 
 final class ShadowRaysIO(config: PathConfig) extends Bundle {
-  val lights    = Input(Vec(config.frame.lights, new Light(config.numbers)))
+  val lights    = Input(Vec(config.device.frame.lights, new Light(config.numbers)))
   val unitShift = Input(UInt(NumberFormats.bitLength(config.numbers.sceneBits).W))
 
   /** The surface at which a context's shadow rays start; remembered. */
@@ -65,7 +65,7 @@ final class ShadowRays(config: PathConfig) extends Module {
 
   // Its ray
   private val ray   = Reg(chiselTypeOf(io.ray.bits))
-  private val light = if (config.frame.lights == 1) io.lights.head else io.lights(request.light)
+  private val light = if (config.device.frame.lights == 1) io.lights.head else io.lights(request.light)
   when(moves) {
     ray.context  := request.context
     ray.isShadow := !request.isGathered

@@ -19,7 +19,7 @@ final class Texel extends Bundle {
 
 /** A path unit's port to the textures. Responses come in the order of the requests and cannot be stalled. */
 final class TexturePort(config: PathConfig) extends Bundle {
-  val req  = Decoupled(new TexelPosition(TextureLayout.of(config)))
+  val req  = Decoupled(new TexelPosition(TextureLayout.of(config.device)))
   val resp = Flipped(Valid(new Texel))
 }
 
@@ -43,7 +43,7 @@ final class TextureLookupIO(config: PathConfig) extends Bundle {
 final class TextureLookup(config: PathConfig) extends Module {
   val io = IO(new TextureLookupIO(config))
 
-  private val layout      = TextureLayout.of(config)
+  private val layout      = TextureLayout.of(config.device)
   private val response    = io.port.resp
   private val isRequested = RegInit(true.B)
   private val isDone      = RegInit(false.B)

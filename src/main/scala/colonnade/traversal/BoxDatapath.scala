@@ -21,7 +21,7 @@ final class NodeDistance(config: TraversalConfig) extends Bundle {
   private val numbers = config.numbers
 
   val toOrigin = SInt(numbers.boxDistanceBits.W)
-  val exponent = UInt(RecordFormats.exponentBits(config).W)
+  val exponent = UInt(RecordFormats.exponentBits(config.device).W)
 
   /** Combinational; rounds down. `t` is at most that of the node's last z' plane. */
   def units(t: SInt): UInt = {
@@ -81,7 +81,7 @@ class BoxDatapath(config: TraversalConfig, lanes: Int) extends Module {
   )
 
   // Add the node's terms, and shift to the node's t
-  private val slice        = TimingSlice.extra(config)
+  private val slice        = TimingSlice.extra(config.device)
   private val intersection = BoxDatapath.latency(config) - 1
   private val shiftRight   = terms.shiftRight.map(slice(_, isValid(2)))
   private val shifts       = shiftRight.map(
@@ -137,5 +137,5 @@ class BoxDatapath(config: TraversalConfig, lanes: Int) extends Module {
 object BoxDatapath {
 
   /** Cycles from operands to intervals. An extra slice registers the sums before they are shifted. */
-  def latency(config: TraversalConfig): Int = 4 + TimingSlice.extra(config).cycles
+  def latency(config: TraversalConfig): Int = 4 + TimingSlice.extra(config.device).cycles
 }

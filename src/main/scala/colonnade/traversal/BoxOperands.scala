@@ -19,7 +19,7 @@ final class NodeOperands(config: TraversalConfig) extends Bundle {
   val corner = Vec(3, SInt((numbers.vertexBits + 2).W))
 
   /** Log2 of the unit of a child's planes. */
-  val exponent = Vec(3, UInt(RecordFormats.exponentBits(config).W))
+  val exponent = Vec(3, UInt(RecordFormats.exponentBits(config.device).W))
 
   /** The computed digits of the reciprocals, without the low bits, which ray set-up leaves at 0. */
   val reciprocal = Vec(2, UInt((numbers.reciprocalDigits + 1).W))
@@ -34,14 +34,14 @@ final class NodeOperands(config: TraversalConfig) extends Bundle {
 /** A child's planes, counted along the ray from the first plane of the node's range: the ray crosses `nearPlanes` first. */
 final class ChildPlanes(config: TraversalConfig) extends Bundle {
   val isOccupied = Bool()
-  val nearPlanes = Vec(3, UInt(config.geometry.boxBits.W))
-  val farPlanes  = Vec(3, UInt(config.geometry.boxBits.W))
+  val nearPlanes = Vec(3, UInt(config.device.geometry.boxBits.W))
+  val farPlanes  = Vec(3, UInt(config.device.geometry.boxBits.W))
 }
 
 /** A child as its record stores it, in the object's frame. */
 final class StoredChild(config: TraversalConfig) extends Bundle {
   val isOccupied = Bool()
-  val box        = new ChildBox(config.geometry.boxBits)
+  val box        = new ChildBox(config.device.geometry.boxBits)
 }
 
 /** Converts a record and a ray to operands: selections, and one subtraction per axis. */

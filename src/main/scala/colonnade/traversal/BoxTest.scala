@@ -11,7 +11,7 @@ import colonnade.ray.{BoxRay, RayFormats}
 /** The record of a node or of a leaf's triangles. */
 final class NodeRef(config: TraversalConfig) extends Bundle {
   val isLeaf  = Bool()
-  val address = UInt(RecordFormats.addressBits(config).W)
+  val address = UInt(RecordFormats.addressBits(config.device).W)
 }
 
 /** A child whose box a ray enters, and the entry distance in units. */
@@ -23,7 +23,7 @@ final class EnteredChild(config: TraversalConfig) extends Bundle {
 /** One ray to test against one node; `tMax` is the largest entry distance that may still hold a hit, see [[TMaxUnits]]. */
 final class BoxCandidate(config: TraversalConfig) extends Bundle {
   val context = Context(config)
-  val node    = new RecordFormats(config).node
+  val node    = new RecordFormats(config.device).node
   val ray     = new BoxRay(config.numbers)
   val tMax    = new Fixed(new RayFormats(config.numbers).units)
 }

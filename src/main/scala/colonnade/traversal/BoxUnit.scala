@@ -12,7 +12,7 @@ final class BoxUnitIO(config: TraversalConfig) extends Bundle {
   val in        = Flipped(Decoupled(new BoxCandidate(config)))
   val readyNext = Output(Bool()) // `in` will be ready in the next cycle
   val out       = Decoupled(new BoxResult(config))
-  val scene     = Input(new SceneMap(config))
+  val scene     = Input(new SceneMap(config.device))
   val busy      = Output(Bool()) // the datapath accepts children in this cycle
 }
 
@@ -29,7 +29,7 @@ final class BoxUnitIO(config: TraversalConfig) extends Bundle {
   */
 class BoxUnit(config: TraversalConfig) extends Module {
   private val arity = NodeRecord.most
-  private val lanes = config.units.boxLanes
+  private val lanes = config.device.units.boxLanes
   private val beats = arity / lanes
 
   private val latency = BoxDatapath.latency(config)
@@ -53,7 +53,7 @@ class BoxUnit(config: TraversalConfig) extends Module {
   io.in.ready := inFlight =/= queueDepth.U && !follows
   // With extra slices a result that leaves makes room a cycle later
   private val mayEnter =
-    if (config.units.extraSlices) inFlight +& io.in.fire < queueDepth.U else nextInFlight =/= queueDepth.U
+    if (config.device.units.extraSlices) inFlight +& io.in.fire < queueDepth.U else nextInFlight =/= queueDepth.U
   io.readyNext  := nextBeat === 0.U && mayEnter
   tags.in.valid := io.in.fire
   tags.in.bits  := NodeTag(config, io.in.bits)
@@ -100,7 +100,7 @@ private[traversal] final class NodeTag(config: TraversalConfig) extends Bundle {
   val context = Context(config)
   val nodes   = UInt(NodeRecord.countBits.W)
   val count   = UInt(NodeRecord.countBits.W)
-  val first   = UInt(RecordFormats.addressBits(config).W)
+  val first   = UInt(RecordFormats.addressBits(config.device).W)
 
   def result(order: ChildOrder, scene: SceneMap): BoxResult = {
     val result = Wire(new BoxResult(config))

@@ -12,14 +12,14 @@ import colonnade.formats.{RecordFormats, SceneMap}
   */
 final class LinearScan(config: TraversalConfig) extends Module {
   val io = IO(new Bundle {
-    val scene  = Input(new SceneMap(config))
+    val scene  = Input(new SceneMap(config.device))
     val start  = Flipped(Valid(Context(config)))
     val resume = Flipped(Decoupled(Context(config)))
     val steps  = Decoupled(new TraversalStep(config))
   })
 
   /** By context: the number of records passed. */
-  private val visited = Reg(Vec(config.contexts, UInt(RecordFormats.idBits(config).W)))
+  private val visited = Reg(Vec(config.contexts, UInt(RecordFormats.idBits(config.device).W)))
 
   private val isNext  = RegInit(false.B)
   private val context = Reg(Context(config))

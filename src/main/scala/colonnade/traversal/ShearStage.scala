@@ -14,7 +14,7 @@ final class ShearStageIO(config: PartConfig) extends Bundle {
   val slot     = Input(new TriangleSlot)
 
   /** The vertex of `slot` and its ray. */
-  val vertex = Flipped(Valid(Vec3(UInt(config.geometry.vertexBits.W))))
+  val vertex = Flipped(Valid(Vec3(UInt(config.device.geometry.vertexBits.W))))
   val ray    = Input(new TriangleRay(config.numbers))
 
   /** The slot two slots later, with x and y of its vertex relative to the ray. */

@@ -39,18 +39,18 @@ private[traversal] final class PendingOperation(config: TraversalConfig) extends
 
 /** The number of entries on a stack. */
 private[traversal] object StackLevel {
-  def apply(config: TraversalConfig): UInt = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
+  def apply(config: TraversalConfig): UInt = UInt(log2Ceil(config.device.columnBvhMemory.stackDepth + 1).W)
 }
 
 /** The address of an entry; the stacks of all contexts share one memory. */
 private[traversal] object StackAddress {
   def apply(config: TraversalConfig): UInt = UInt(log2Ceil(size(config)).W)
 
-  def size(config: TraversalConfig): Int = config.contexts * config.columnBvhMemory.stackDepth
+  def size(config: TraversalConfig): Int = config.contexts * config.device.columnBvhMemory.stackDepth
 
   /** The address of the entry above `level` others. It is invalid for the level of a full stack. */
   def apply(config: TraversalConfig, context: UInt, level: UInt): UInt = {
-    val stackDepth = config.columnBvhMemory.stackDepth
+    val stackDepth = config.device.columnBvhMemory.stackDepth
     val bits       = apply(config).getWidth
     val address    =
       if (isPow2(stackDepth)) Cat(context, 0.U(log2Ceil(stackDepth).W)) + level

@@ -51,13 +51,13 @@ final class TraversalStackIO(config: TraversalConfig) extends Bundle {
 class TraversalStack(config: TraversalConfig) extends Module {
   private val arity      = NodeRecord.most
   private val contexts   = config.contexts
-  private val stackDepth = config.columnBvhMemory.stackDepth
+  private val stackDepth = config.device.columnBvhMemory.stackDepth
 
   val io = IO(new TraversalStackIO(config))
 
   private val entries   = SyncReadMem(StackAddress.size(config), UInt(new StackEntry(config).getWidth.W))
   private val levels    = RegInit(VecInit.fill(contexts)(0.U.asTypeOf(StackLevel(config))))
-  private val slice     = TimingSlice.extra(config)
+  private val slice     = TimingSlice.extra(config.device)
   private val stepQueue =
     Module(new Queue(new TraversalStep(config), TraversalStack.stepQueueDepth, flow = !slice.isEnabled))
 

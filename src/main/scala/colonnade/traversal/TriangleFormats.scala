@@ -75,13 +75,13 @@ final class TriangleSlot extends Bundle {
 /** Identifies a round's triangle, or its pair of triangles. */
 final class TriangleTag(config: PartConfig) extends Bundle {
   val context = Context(config)
-  val id      = UInt(RecordFormats.idBits(config).W) // of the first triangle
+  val id      = UInt(RecordFormats.idBits(config.device).W) // of the first triangle
 
   /** The round tests a pair, whose second triangle has the next id; the material transmits light. */
   val isPair         = Bool()
   val isTransmissive = Bool()
   val isNegative     = Bool() // the ray's direction, on its dominant axis
-  val isMasked       = Option.when(config.frame.rays)(Bool())
+  val isMasked       = Option.when(config.device.frame.rays)(Bool())
 }
 
 /** Depths of the vertices along the ray's dominant axis. */
@@ -98,7 +98,7 @@ final class CrossedTriangle(config: PartConfig) extends Bundle {
 
   val magnitudes = Vec(3, UInt(formats.edgeBits.W))
   val depths     = new TriangleDepths(formats)
-  val id         = UInt(RecordFormats.idBits(config).W)
+  val id         = UInt(RecordFormats.idBits(config.device).W)
   val backSide   = Bool()
 }
 
@@ -111,7 +111,7 @@ final class WeightedTriangle(config: PartConfig) extends Bundle {
   /** Sum of the weights; its highest or second highest bit is set. */
   val sum      = UInt(formats.weightBits.W)
   val depths   = new TriangleDepths(formats)
-  val id       = UInt(RecordFormats.idBits(config).W)
+  val id       = UInt(RecordFormats.idBits(config.device).W)
   val backSide = Bool()
 }
 
@@ -132,7 +132,7 @@ final class DistanceTerms(config: PartConfig) extends Bundle {
   val first      = new Fixed(formats.grid)
   val isNegative = Bool()
   val shiftRight = UInt(formats.shiftBits.W)
-  val id         = UInt(RecordFormats.idBits(config).W)
+  val id         = UInt(RecordFormats.idBits(config.device).W)
   val weights    = Vec(3, new Fixed(new RayFormats(config.numbers).weight))
   val backSide   = Bool()
 }

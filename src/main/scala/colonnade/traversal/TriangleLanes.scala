@@ -13,7 +13,7 @@ final class TriangleLanesIO(config: PartConfig) extends Bundle {
   val result = Decoupled(new TriangleResult(config))
 
   /** Lanes that accept a triangle's vertices. */
-  val busy = Output(UInt(log2Ceil(config.units.triangleLanes + 1).W))
+  val busy = Output(UInt(log2Ceil(config.device.units.triangleLanes + 1).W))
 }
 
 /** `units.triangleLanes` parallel [[TriangleUnit]]s with round-robin dispatch and round-robin collection of results.
@@ -22,7 +22,7 @@ final class TriangleLanesIO(config: PartConfig) extends Bundle {
 final class TriangleLanes(config: PartConfig) extends Module {
   val io = IO(new TriangleLanesIO(config))
 
-  private val lanes    = Seq.fill(config.units.triangleLanes)(Module(new TriangleUnit(config)).io)
+  private val lanes    = Seq.fill(config.device.units.triangleLanes)(Module(new TriangleUnit(config)).io)
   private val dispatch = Module(new Dispatcher(new TriangleCandidate(config), lanes.size))
   private val results  = Module(new RRArbiter(new TriangleResult(config), lanes.size))
 

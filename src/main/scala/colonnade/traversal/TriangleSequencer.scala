@@ -13,7 +13,7 @@ final class TriangleSequencerIO(config: PartConfig) extends Bundle {
   val slot      = Output(new TriangleSlot)
 
   /** The vertex of `slot`, to be loaded in this cycle even if the pipeline stalls. */
-  val vertex = Valid(Vec3(UInt(config.geometry.vertexBits.W)))
+  val vertex = Valid(Vec3(UInt(config.device.geometry.vertexBits.W)))
   val ray    = Output(new TriangleRay(config.numbers))
 
   /** The current round; valid with the vertex of its last slot. */
@@ -32,7 +32,7 @@ final class TriangleSequencer(config: PartConfig) extends Module {
   import TriangleStep._
 
   private val candidate = Reg(new TriangleCandidate(config))
-  private val leaf      = new Leaf(config.geometry, candidate.record)
+  private val leaf      = new Leaf(config.device.geometry, candidate.record)
   private val hasRecord = RegInit(false.B) // the candidate has vertices to issue
 
   // Slots
@@ -60,7 +60,7 @@ final class TriangleSequencer(config: PartConfig) extends Module {
   private val isOpen = RegNext(io.readyNext, false.B)
   io.candidate.ready := isOpen
   // With extra slices after the last vertex: then no path leads from the pipeline to the record fetch
-  private val ends = if (config.units.extraSlices) issues else step === gap && io.advances
+  private val ends = if (config.device.units.extraSlices) issues else step === gap && io.advances
   io.readyNext := ends || (!hasRecord && !isOpen)
 
   io.slot.step    := step

@@ -10,12 +10,12 @@ import colonnade.ray.{RayFormats, TriangleRay}
 /** One ray to test against the triangles of one record. */
 final class TriangleCandidate(config: PartConfig) extends Bundle {
   val context = Context(config)
-  val address = UInt(RecordFormats.addressBits(config).W)
-  val record  = UInt(LeafRecord.recordBits(config.geometry).W)
+  val address = UInt(RecordFormats.addressBits(config.device).W)
+  val record  = UInt(LeafRecord.recordBits(config.device.geometry).W)
   val ray     = new TriangleRay(config.numbers)
 
   /** The ray's mask leaves the record's triangles out. */
-  val isMasked = Option.when(config.frame.rays)(Bool())
+  val isMasked = Option.when(config.device.frame.rays)(Bool())
 }
 
 /** Where a ray intersects a triangle. */
@@ -31,7 +31,7 @@ sealed class HitPoint(config: PartConfig) extends Bundle {
 
 /** The intersection of a ray with a triangle. */
 final class TriangleHit(config: PartConfig) extends HitPoint(config) {
-  val id = UInt(RecordFormats.idBits(config).W) // packed triangle id
+  val id = UInt(RecordFormats.idBits(config.device).W) // packed triangle id
 
   def point: HitPoint = {
     val point = Wire(new HitPoint(config))

@@ -9,23 +9,23 @@ import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMa
 /** A hit whose attributes are wanted. */
 final class AttributeRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
-  val id      = UInt(RecordFormats.idBits(config).W) // packed triangle id
+  val id      = UInt(RecordFormats.idBits(config.device).W) // packed triangle id
 }
 
 /** A record of a hit: its leaf, or the companion. */
 final class AttributeResponse(config: PathConfig) extends Bundle {
   val hit       = new AttributeRequest(config)
   val isColours = Bool()
-  val record    = new RecordFormats(config).record
+  val record    = new RecordFormats(config.device).record
 }
 
 final class AttributeFetchIO(config: PathConfig) extends Bundle {
 
   /** Invalidates all record buffers. */
   val start      = Input(Bool())
-  val scene      = Input(new SceneMap(config))
-  val requests   = Decoupled(new RecordRequest(config))
-  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+  val scene      = Input(new SceneMap(config.device))
+  val requests   = Decoupled(new RecordRequest(config.device))
+  val broadcasts = Flipped(Vec(config.device.columnBvhMemory.banks, Valid(new RecordBroadcast(config.device))))
 
   /** Never refused; at most one of a context at a time. */
   val hits = Flipped(Valid(new AttributeRequest(config)))
@@ -39,7 +39,7 @@ final class AttributeFetchIO(config: PathConfig) extends Bundle {
 
   /** A context whose address is illegal. */
   val error  = Output(Valid(Context(config)))
-  val events = Output(new FetchEvents(AttributeFetch.slotConfig(config)))
+  val events = Output(new FetchEvents(AttributeFetch.slotConfig(config.device)))
 }
 
 /** Fetches the records of hits for a path unit: a leaf, or the leaf, its companion and the leaf again, which a buffer or
@@ -51,7 +51,7 @@ final class AttributeFetchIO(config: PathConfig) extends Bundle {
 final class AttributeFetch(config: PathConfig, most: Int = AttributeFetch.slots) extends Module {
   val io = IO(new AttributeFetchIO(config))
 
-  private val slotConfig = AttributeFetch.slotConfig(config, most)
+  private val slotConfig = AttributeFetch.slotConfig(config.device, most)
   private val slots      = slotConfig.contexts
   private val fetch      = Module(new RecordFetch(slotConfig)).io
   private val isUsed     = RegInit(VecInit.fill(slots)(false.B))
@@ -59,7 +59,7 @@ final class AttributeFetch(config: PathConfig, most: Int = AttributeFetch.slots)
   private val hasColours = io.scene.hasColours.map(_ => Reg(Vec(slots, Bool())))
 
   fetch.start      := io.start
-  fetch.row        := config.array.rows.U
+  fetch.row        := config.device.array.rows.U
   fetch.scene      := io.scene
   fetch.broadcasts := io.broadcasts
   fetch.readyNext  := VecInit(false.B, io.readyNext, hasColours.isDefined.B)

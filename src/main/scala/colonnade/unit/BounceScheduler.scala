@@ -33,11 +33,11 @@ final class LeavingRays(config: PathConfig) extends Bundle {
 }
 
 final class BounceSchedulerIO(config: PathConfig) extends Bundle {
-  val shading = Input(new Shading(config))
+  val shading = Input(new Shading(config.device))
   val start   = Flipped(Valid(Context(config))) // a context gets a new pixel
 
   /** The path of `in`. */
-  val path = Gather(config).map(_ => Input(new BouncingPath))
+  val path = Gather(config.device).map(_ => Input(new BouncingPath))
 
   /** From the shader; to the colour unit and to ray set-up. */
   val in     = Flipped(Decoupled(new BouncedRay(config)))
@@ -46,7 +46,7 @@ final class BounceSchedulerIO(config: PathConfig) extends Bundle {
 
   val bounced      = Valid(new Bounced(config)) // a bounce that is issued
   val isRefraction = Output(Bool())
-  val environment  = if (config.hasEnvironment) Some(new DeferredBounceIO(config)) else None
+  val environment  = if (config.device.hasEnvironment) Some(new DeferredBounceIO(config)) else None
   val leaves       = new LeavingRays(config)
 }
 
@@ -160,7 +160,7 @@ final class BounceScheduler(config: PathConfig) extends Module {
 final private class PendingBounce(config: PathConfig) extends Bundle {
   private val (update, result) = (new BounceUpdate(config), new BounceResult(config))
 
-  val isFirst      = Gather(config).map(_ => Bool())
+  val isFirst      = Gather(config.device).map(_ => Bool())
   val albedo       = update.albedo.cloneType
   val isTinted     = Bool()
   val fresnel      = update.fresnel.cloneType

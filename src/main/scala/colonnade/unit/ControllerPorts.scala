@@ -38,7 +38,7 @@ final class Shaded(config: PathConfig) extends Bundle {
   val context = Context(config)
 
   /** By light, for a surface that ends the path. */
-  val needsShadowRays = Vec(config.frame.lights, Bool())
+  val needsShadowRays = Vec(config.device.frame.lights, Bool())
   val isOfEnvironment = Bool()
 }
 
@@ -151,7 +151,7 @@ final class RtControllerIO(config: PathConfig) extends Bundle {
   val trace       = Flipped(new TraceControl(config))
   val shaded      = Flipped(Valid(new Shaded(config)))
   val bounced     = Flipped(Valid(new Bounced(config)))
-  val environment = if (config.hasEnvironment) Some(new EnvironmentControl(config)) else None
+  val environment = if (config.device.hasEnvironment) Some(new EnvironmentControl(config)) else None
 
   /** A hit whose attributes have an illegal address: the path ends in the background. */
   val fetchFailed = Flipped(Valid(Context(config)))
@@ -163,10 +163,10 @@ final class RtControllerIO(config: PathConfig) extends Bundle {
   val accumulated = Flipped(Valid(Context(config)))
   val continued   = Flipped(Valid(new ContinuedPath(config))) // the light of a surface is added, and its path goes on
   val pixel       = Flipped(new PixelControl(config))
-  val gather      = Gather(config).map(_ => new GatherControl(config))
+  val gather      = Gather(config.device).map(_ => new GatherControl(config))
 
   /** Numbers of contexts that are idle, in ray set-up, and waiting for the environment march or in it. */
   val idleCount        = contextCount
   val raySetupCount    = contextCount
-  val environmentCount = if (config.hasEnvironment) Some(contextCount) else None
+  val environmentCount = if (config.device.hasEnvironment) Some(contextCount) else None
 }

@@ -15,10 +15,10 @@ final class EnvironmentPortIO(config: PathConfig) extends Bundle {
 
   /** Primary rays, their pixels, and whether they may hit the object; those that may. */
   val primary     = Flipped(Decoupled(new RayRequest(config)))
-  val pixel       = Input(new PixelPosition(config))
+  val pixel       = Input(new PixelPosition(config.device))
   val meetsObject = Input(Bool())
   val objectRays  = Decoupled(new RayRequest(config))
-  val bounces     = if (config.frame.hasBounces) Some(Flipped(new DeferredBounceIO(config))) else None
+  val bounces     = if (config.device.frame.hasBounces) Some(Flipped(new DeferredBounceIO(config))) else None
 
   /** In the cycle after an occlusion test's `control.req`: the distance of its hit. */
   val hitDistance = Input(HitDistance(config))
@@ -68,7 +68,7 @@ final class EnvironmentPort(config: PathConfig) extends Module {
   private val bounceRay = io.bounces.map(_.ray)
   private val isBounce  = bounceRay.map(_.valid).getOrElse(false.B)
   private val ray       = bounceRay.fold(primary)(bounce => Mux(bounce.valid, bounce.bits, primary))
-  private val dir       = Normalise.together(ray.dir.axes, new MarchFormats(config).f)
+  private val dir       = Normalise.together(ray.dir.axes, new MarchFormats(config.device).f)
   private val isStored  = io.bounces.map(bounces => isBounce && bounces.marches).getOrElse(false.B)
   stage.ray.valid           := io.view.enabled && (isStored || io.primary.fire)
   stage.ray.bits.context    := ray.context

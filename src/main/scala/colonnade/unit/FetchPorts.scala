@@ -16,15 +16,15 @@ object RecordKind extends ChiselEnum {
 final class FetchRequest(config: PartConfig) extends Bundle {
   val context = Context(config)
   val kind    = RecordKind()
-  val address = UInt(RecordFormats.idBits(config).W)
+  val address = UInt(RecordFormats.idBits(config.device).W)
 }
 
 /** A record, and the context that requested it. */
 final class FetchResponse(config: PartConfig) extends Bundle {
   val context = Context(config)
   val kind    = RecordKind()
-  val address = UInt(RecordFormats.addressBits(config).W)
-  val record  = new RecordFormats(config).record
+  val address = UInt(RecordFormats.addressBits(config.device).W)
+  val record  = new RecordFormats(config.device).record
 }
 
 /** A request whose address lies outside the section of its kind; it gets no record. */
@@ -36,8 +36,8 @@ final class FetchError(config: PartConfig) extends Bundle {
 /** A node, and the ray to test against its children. */
 final class NodeCandidate(config: PartConfig) extends Bundle {
   val context = Context(config)
-  val address = UInt(RecordFormats.addressBits(config).W)
-  val node    = new NodeRecord(config)
+  val address = UInt(RecordFormats.addressBits(config.device).W)
+  val node    = new NodeRecord(config.device)
   val ray     = new BoxRay(config.numbers)
 }
 
@@ -56,13 +56,13 @@ final class RecordFetchIO(config: PartConfig) extends Bundle {
 
   /** Invalidates all buffers: the memory may have changed. */
   val start = Input(Bool())
-  val row   = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
-  val scene = Input(new SceneMap(config))
+  val row   = Input(UInt(log2Ceil(config.device.recordRequesters.max(2)).W))
+  val scene = Input(new SceneMap(config.device))
 
   /** A context has at most one request outstanding. */
   val fetches    = Flipped(Vec(RecordFetch.ports, Valid(new FetchRequest(config))))
-  val requests   = Decoupled(new RecordRequest(config))
-  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+  val requests   = Decoupled(new RecordRequest(config.device))
+  val broadcasts = Flipped(Vec(config.device.columnBvhMemory.banks, Valid(new RecordBroadcast(config.device))))
 
   /** By [[RecordKind]]: the unit accepts a record in the next cycle. It must keep to this. */
   val readyNext = Input(Vec(RecordKind.all.size, Bool()))

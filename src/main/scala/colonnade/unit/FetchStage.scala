@@ -13,10 +13,10 @@ final class FetchStageIO(config: TraversalConfig) extends Bundle {
 
   /** Invalidates all record buffers. */
   val start      = Input(Bool())
-  val row        = Input(UInt(log2Ceil(config.recordRequesters.max(2)).W))
-  val scene      = Input(new SceneMap(config))
-  val requests   = Decoupled(new RecordRequest(config))
-  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+  val row        = Input(UInt(log2Ceil(config.device.recordRequesters.max(2)).W))
+  val scene      = Input(new SceneMap(config.device))
+  val requests   = Decoupled(new RecordRequest(config.device))
+  val broadcasts = Flipped(Vec(config.device.columnBvhMemory.banks, Valid(new RecordBroadcast(config.device))))
 
   /** A ray whose trace starts. */
   val ray     = Flipped(Valid(new PreparedRay(config)))
@@ -42,7 +42,7 @@ final class FetchStageIO(config: TraversalConfig) extends Bundle {
   * registered address, and no combinational path connects the units that accept records.
   */
 final class FetchStage(config: TraversalConfig) extends Module {
-  private val formats = new RecordFormats(config)
+  private val formats = new RecordFormats(config.device)
 
   val io = IO(new FetchStageIO(config))
 
@@ -53,7 +53,8 @@ final class FetchStage(config: TraversalConfig) extends Module {
   recordFetch.io.broadcasts := io.broadcasts
   recordFetch.io.fetches    := io.fetches :+ 0.U.asTypeOf(io.fetches.head)
   recordFetch.io.readyNext  := VecInit(io.nodesReadyNext, io.trianglesReadyNext, false.B)
-  io.requests :<>= TimingSlice.extra(config).queue(recordFetch.io.requests) // in a queue requests are not withdrawn
+  // In a queue requests are not withdrawn
+  io.requests :<>= TimingSlice.extra(config.device).queue(recordFetch.io.requests)
   io.waitsForTriangles := recordFetch.io.waitsForTriangles
 
   private val rays = new RayTable(config)

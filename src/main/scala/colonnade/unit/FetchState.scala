@@ -12,20 +12,20 @@ private[unit] object BufferState extends ChiselEnum {
 /** The registers of a record buffer of [[RecordFetch]]. */
 private[unit] final class RecordBuffer(config: PartConfig) {
   val state   = RegInit(BufferState.empty)
-  val address = Reg(UInt(RecordFormats.addressBits(config).W))
-  val record  = Reg(new RecordFormats(config).record)
+  val address = Reg(UInt(RecordFormats.addressBits(config.device).W))
+  val record  = Reg(new RecordFormats(config.device).record)
 
   /** With a cache: stays reserved when the record comes later. */
-  val isPinned = Option.when(config.columnBvhMemory.cache.nonEmpty)(Reg(Bool()))
+  val isPinned = Option.when(config.device.columnBvhMemory.cache.nonEmpty)(Reg(Bool()))
 }
 
 /** The registers of a context's fetch in [[RecordFetch]]. */
 private[unit] final class ContextFetch(config: PartConfig) {
-  private val buffers  = config.columnBvhMemory.recordBuffers
-  private val hasCache = config.columnBvhMemory.cache.nonEmpty
+  private val buffers  = config.device.columnBvhMemory.recordBuffers
+  private val hasCache = config.device.columnBvhMemory.cache.nonEmpty
 
   val kind      = Reg(RecordKind())
-  val address   = Reg(UInt(RecordFormats.addressBits(config).W))
+  val address   = Reg(UInt(RecordFormats.addressBits(config.device).W))
   val isPending = RegInit(false.B) // the context waits for the record
   val isIllegal = RegInit(false.B) // the fetch waits to report its error and takes no record, whatever the buffers hold
   val hasRecord = RegInit(false.B) // `buffer` has the record

@@ -36,9 +36,9 @@ final private class GatheringPaths(config: PathConfig, io: GatherControl) extend
   private val count       = new FlagTable(config, UInt(Gather.countBits.W))
 
   /** With an environment: the surface is of it; what the shadow rays of a point met, while its gathered rays are traced. */
-  private val ofEnvironment = Option.when(config.hasEnvironment)(new FlagTable(config, Bool()))
-  private val results       = Vec(config.frame.lights, UInt(Occlusion.getWidth.W))
-  private val kept          = Option.when(config.hasEnvironment)(new FlagTable(config, UInt(results.getWidth.W)))
+  private val ofEnvironment = Option.when(config.device.hasEnvironment)(new FlagTable(config, Bool()))
+  private val results       = Vec(config.device.frame.lights, UInt(Occlusion.getWidth.W))
+  private val kept          = Option.when(config.device.hasEnvironment)(new FlagTable(config, UInt(results.getWidth.W)))
 
   // In the cycle after its request, the rays that a path has gathered
   private val sampled = Choice(RegEnable(io.sample, io.sample.valid), io.sample)

@@ -43,20 +43,20 @@ final class HitTable(config: TraversalConfig) extends Module {
   val io = IO(new HitTableIO(config))
 
   private val closestT           = Reg(Vec(contexts, new Fixed(formats.grid)))
-  private val ids                = Reg(Vec(contexts, UInt(RecordFormats.idBits(config).W)))
+  private val ids                = Reg(Vec(contexts, UInt(RecordFormats.idBits(config.device).W)))
   private val hasHit             = Reg(Vec(contexts, Bool()))
   private val hasTransmissiveHit = Reg(Vec(contexts, Bool())) // the shadow ray has hit a transmissive triangle
   private val details            = ContextTable(config, new HitDetails(config))
 
   // Compare the result with the closest hit so far
-  private val compared       = TimingSlice.extra(config)
+  private val compared       = TimingSlice.extra(config.device)
   private val context        = io.result.bits.context
   private val hit            = io.result.bits.hit
   private val best           = closestT(context)
   private val hadHit         = compared(hasHit(context))
   private val isTied         = compared(hit.t.integer === best.integer) && hadHit && compared(hit.id < ids(context))
   private val isCloser       = io.result.bits.isHit && (compared(hit.t < best) || (isTied && !io.isShadow))
-  private val isTransmissive = io.isShadow && io.result.bits.isTransmissive && config.frame.hasBounces.B
+  private val isTransmissive = io.isShadow && io.result.bits.isTransmissive && config.device.frame.hasBounces.B
   io.hasHitNow := hadHit || (isCloser && !isTransmissive)
   when(io.result.valid && isCloser) {
     when(isTransmissive)(hasTransmissiveHit(context) := true.B).otherwise(hasHit(context) := true.B)
@@ -97,7 +97,7 @@ final class HitTable(config: TraversalConfig) extends Module {
 private final class HitDetails(config: TraversalConfig) extends Bundle {
   val weights  = Vec(3, new Fixed(new RayFormats(config.numbers).weight))
   val backSide = Bool()
-  val isClear  = Option.when(config.frame.rays)(Bool())
+  val isClear  = Option.when(config.device.frame.rays)(Bool())
 }
 
 /** A read port of the [[HitTable]], seen from the reader. */
@@ -108,5 +108,5 @@ final class HitReader(config: TraversalConfig) extends Bundle {
   val hasHit    = Input(Bool())
   val occlusion = Input(Occlusion())
   val hit       = Input(new TriangleHit(config))
-  val isClear   = Option.when(config.frame.rays)(Input(Bool()))
+  val isClear   = Option.when(config.device.frame.rays)(Input(Bool()))
 }

@@ -9,7 +9,7 @@ import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleHit
 
 final class InstanceResultsIO(config: PathConfig) extends Bundle {
-  val count = Input(UInt(NumberFormats.bitLength(config.frame.instances).W))
+  val count = Input(UInt(NumberFormats.bitLength(config.device.frame.instances).W))
 
   /** A ray goes to the traversal units, or misses an object's cube. */
   val visited = Flipped(Valid(new VisitedRay(config)))

@@ -26,7 +26,7 @@ final class VisitedRay(config: PathConfig) extends Bundle {
 }
 
 final class InstanceVisitsIO(config: PathConfig) extends Bundle {
-  val instances = Input(Vec(config.frame.instances, new ObjectInstance(config)))
+  val instances = Input(Vec(config.device.frame.instances, new ObjectInstance(config.device)))
 
   /** Rays of the world, for their first instance; contexts for another one. */
   val rays  = Flipped(Decoupled(new PreparedRay(config)))

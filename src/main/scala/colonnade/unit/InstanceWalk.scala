@@ -7,8 +7,8 @@ import colonnade.formats.{ObjectInstance, SceneMap}
 import colonnade.ray.PreparedRay
 
 final class InstanceWalkIO(config: PathConfig) extends Bundle {
-  val scene     = Input(new SceneMap(config))
-  val instances = Input(Vec(config.frame.instances, new ObjectInstance(config)))
+  val scene     = Input(new SceneMap(config.device))
+  val instances = Input(Vec(config.device.frame.instances, new ObjectInstance(config.device)))
 
   /** Rays of the world that enter the box of all objects; what they have met. */
   val rays    = Flipped(Decoupled(new PreparedRay(config)))

@@ -17,17 +17,17 @@ final class IntersectorEvents(config: TraversalConfig) extends Bundle {
   val boxTests          = UInt(log2Ceil(NodeRecord.most + 1).W)
   val triangleTests     = Bool()
   val busyBoxUnit       = Bool()
-  val busyTriangleUnit  = UInt(log2Ceil(config.units.triangleLanes + 1).W)
+  val busyTriangleUnit  = UInt(log2Ceil(config.device.units.triangleLanes + 1).W)
   val contextsBox       = contextCount
   val contextsTriangles = contextCount
-  val deepestStack      = UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W)
+  val deepestStack      = UInt(log2Ceil(config.device.columnBvhMemory.stackDepth + 1).W)
   val stackOverflow     = Bool()
   val illegalRecord     = Bool()
 }
 
 final class IntersectorIO(config: TraversalConfig) extends Bundle {
   val start = Input(Bool()) // a frame starts
-  val scene = Input(new SceneMap(config))
+  val scene = Input(new SceneMap(config.device))
 
   /** A ray that enters the object's box, for an idle context; by context: its ray is a shadow ray. */
   val rays     = Flipped(Valid(new PreparedRay(config)))
@@ -83,7 +83,7 @@ final class Intersector(config: TraversalConfig) extends Module {
 
   // Test triangles: a result terminates an occluded shadow ray, or the ray resumes after its record.
   // The termination is registered, so that no path leads from the triangle units through the hit table to the results
-  private val slice      = TimingSlice.extra(config)
+  private val slice      = TimingSlice.extra(config.device)
   private val result     = if (slice.isEnabled) compared(slice.queue(triangles.result)) else triangles.result
   private val isShadow   = slice(io.isShadow(result.bits.context))
   private val isOccluded = isShadow && hitTable.io.hasHitNow
@@ -91,7 +91,7 @@ final class Intersector(config: TraversalConfig) extends Module {
   triangles.candidate :<>= io.triangles
   hitTable.io.result.valid := result.fire
   hitTable.io.result.bits  := result.bits
-  if (config.frame.rays) {
+  if (config.device.frame.rays) {
     val limits = Module(new HitLimits(config)).io
     limits.rays                   := io.rays
     limits.result                 := result.bits

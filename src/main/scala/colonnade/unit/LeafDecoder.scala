@@ -13,12 +13,12 @@ import colonnade.shading.{GeometricNormalStage, OctahedralDecoder}
 final class HitLeaf(config: PathConfig) extends Bundle {
   val context  = Context(config)
   val isSecond = Bool() // the hit is on the leaf's second triangle
-  val record   = UInt(LeafRecord.recordBits(config.geometry).W)
+  val record   = UInt(LeafRecord.recordBits(config.device.geometry).W)
 }
 
 /** The attributes of a hit; as in [[colonnade.formats.Face]], without colours. */
 final class HitFace(config: PathConfig) extends Bundle {
-  private val face = new Face(config)
+  private val face = new Face(config.device)
 
   val context         = Context(config)
   val normals         = face.normals.cloneType
@@ -63,10 +63,10 @@ final class LeafDecoder(config: PathConfig) extends Module {
 
   // Its triangle
   private val now      = hit.at(xyz(entry + 1))
-  private val leaf     = new Leaf(config.geometry, now.record)
+  private val leaf     = new Leaf(config.device.geometry, now.record)
   private val vertices = Leaf.corners.map { case (second, first) => Mux(now.isSecond, second.U(2.W), first.U(2.W)) }
 
-  private val geometric = Module(new GeometricNormalStage(config.geometry)).io
+  private val geometric = Module(new GeometricNormalStage(config.device.geometry)).io
   geometric.phase    := phase
   geometric.vertices := VecInit(vertices.map(leaf.vertex))
 

@@ -28,8 +28,8 @@ final class PathEvents(config: PathConfig) extends Bundle {
   val idleContexts        = contexts
   val contextsRaySetup    = contexts
   val contextsShading     = contexts
-  val raysEnvironment     = Option.when(config.hasEnvironment)(Bool())
-  val contextsEnvironment = Option.when(config.hasEnvironment)(contexts)
+  val raysEnvironment     = Option.when(config.device.hasEnvironment)(Bool())
+  val contextsEnvironment = Option.when(config.device.hasEnvironment)(contexts)
   val raysGather          = Bool()
   val illegalRecord       = Bool() // an illegal texel
 }

@@ -12,7 +12,7 @@ import colonnade.traversal.HitPoint
 
 /** What the resolution of a hit needs. */
 private final class ClosestHit(config: PathConfig) extends Bundle {
-  val id = UInt(RecordFormats.idBits(config).W) // packed triangle id
+  val id = UInt(RecordFormats.idBits(config.device).W) // packed triangle id
 
   /** From where the ray enters the box, along its dominant axis. */
   val t = new Fixed(new RayFormats(config.numbers).grid)
@@ -20,7 +20,7 @@ private final class ClosestHit(config: PathConfig) extends Bundle {
 
 final class PathHitsIO(config: PathConfig) extends Bundle {
   val start = Input(Bool())
-  val scene = Input(new SceneMap(config))
+  val scene = Input(new SceneMap(config.device))
   val trace = Flipped(new TracePort(config)) // to the path unit
 
   /** Rays that enter the object's box, to the traversal units; what they have met. */
@@ -28,15 +28,17 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
   val results = Flipped(Valid(new TraceResult(config)))
 
   /** To the column's records, for attributes. */
-  val requests   = Decoupled(new RecordRequest(config))
-  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
-  val events     = Output(new FetchEvents(AttributeFetch.slotConfig(config)))
+  val requests   = Decoupled(new RecordRequest(config.device))
+  val broadcasts = Flipped(Vec(config.device.columnBvhMemory.banks, Valid(new RecordBroadcast(config.device))))
+  val events     = Output(new FetchEvents(AttributeFetch.slotConfig(config.device)))
 
   /** Objects with transforms of their own. */
-  val instances = Option.when(config.frame.hasInstances)(Input(Vec(config.frame.instances, new ObjectInstance(config))))
+  val instances = Option.when(config.device.frame.hasInstances) {
+    Input(Vec(config.device.frame.instances, new ObjectInstance(config.device)))
+  }
 
   /** By material: its colour depends on the companion of a leaf. */
-  val wantsColours = scene.hasColours.map(_ => Input(Vec(config.frame.materials, Bool())))
+  val wantsColours = scene.hasColours.map(_ => Input(Vec(config.device.frame.materials, Bool())))
 }
 
 /** Stands between a path unit and the traversal units that trace its rays: forwards rays, keeps the hit of each context,
@@ -148,7 +150,7 @@ final class PathHits(config: PathConfig) extends Module {
   trace.hits.bits.face.material        := face.material
   for (colours <- trace.hits.bits.face.colours) {
     val table   = ContextTable(paths, chiselTypeOf(colours))
-    val ofLeaf  = new RecordFormats(config).asColours(record.record).colours
+    val ofLeaf  = new RecordFormats(config.device).asColours(record.record).colours
     val corners = Leaf.corners.map { case (second, first) => Mux(record.hit.id(0), ofLeaf(second), ofLeaf(first)) }
     when(attributes.response.valid && record.isColours)(table.write(record.hit.context, VecInit(corners)))
     colours := table.read(granted.bits, granted.valid)
@@ -174,7 +176,7 @@ final class PathHits(config: PathConfig) extends Module {
 
   /** The material of the face of a leaf, in the scene. */
   private def materialOf(leaf: UInt, context: UInt): UInt = {
-    val material = new Leaf(config.geometry, leaf).material
+    val material = new Leaf(config.device.geometry, leaf).material
     io.instances.zip(instanceOf).fold(material) { case (instances, table) =>
       Mux(io.scene.instances.get =/= 0.U, material + instances(table(context)).materialBase, material)
     }

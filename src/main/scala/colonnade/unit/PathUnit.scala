@@ -12,17 +12,17 @@ import colonnade.shading.{ColourUnit, CubePort, LightCube, LitSurface, SamplePoi
 
 /** `registers` is constant while a frame runs. */
 final class PathUnitIO(config: PathConfig) extends Bundle {
-  val registers = Input(new FrameRegisters(config))
-  val positions = Flipped(Decoupled(new UnitPosition(config)))
-  val pixels    = Decoupled(new Pixel(config))
+  val registers = Input(new FrameRegisters(config.device))
+  val positions = Flipped(Decoupled(new UnitPosition(config.device)))
+  val pixels    = Decoupled(new Pixel(config.device))
   val trace     = new TracePort(config)
 
   /** To the marches of the environment, and to the textures. */
-  val marches = Option.when(config.hasEnvironment)(new MarchPort(config))
-  val texture = config.geometry.texture.map(_ => new TexturePort(config))
+  val marches = Option.when(config.device.hasEnvironment)(new MarchPort(config))
+  val texture = config.device.geometry.texture.map(_ => new TexturePort(config))
 
   /** To the light cube. */
-  val cube = CubePort(config)
+  val cube = CubePort(config.device)
 
   /** A pixel of a tile of the environment leaves; no pixel is in flight. */
   val environmentLeaves = Output(Bool())
@@ -44,8 +44,8 @@ final class PathUnit(config: PathConfig) extends Module {
   private val shadowRays  = Module(new ShadowRays(config)).io
   private val colourUnit  = Module(new ColourUnit(config)).io
   private val assembler   = Module(new PixelAssembler(config)).io
-  private val bounces     = Option.when(config.frame.hasBounces)(Module(new BounceScheduler(config)).io)
-  private val environment = Option.when(config.hasEnvironment)(Module(new EnvironmentPort(config)).io)
+  private val bounces     = Option.when(config.device.frame.hasBounces)(Module(new BounceScheduler(config)).io)
+  private val environment = Option.when(config.device.hasEnvironment)(Module(new EnvironmentPort(config)).io)
 
   // A gathered ray waits where a ray may leave that is not traced: the light cube accepts one in a cycle
   private val isGathered  = shadowRays.ray.valid && !shadowRays.ray.bits.isShadow
@@ -61,8 +61,8 @@ final class PathUnit(config: PathConfig) extends Module {
   private val raySources    = Seq(surfaceRays) ++ bounces.map(_.ray) :+ tracedPrimary
   private val rayArbiter    = Module(new Arbiter(new RayRequest(config), raySources.size)).io
   rayArbiter.in.zip(raySources).foreach { case (in, rays) => in :<>= rays }
-  raySetup.request :<>= TimingSlice.queue(rayArbiter.out)       // no path leads from ray set-up to the tiles
-  trace.rays :<>= TimingSlice.extra(config).queue(raySetup.ray) // nor from the traversal units to it
+  raySetup.request :<>= TimingSlice.queue(rayArbiter.out)              // no path leads from ray set-up to the tiles
+  trace.rays :<>= TimingSlice.extra(config.device).queue(raySetup.ray) // nor from the traversal units to it
 
   // Shading: a lit surface ends its path, after a shadow ray to each light; a mirror or glass continues it
   private val lit = Wire(Valid(new LitSurface(config)))

@@ -14,7 +14,7 @@ final class PixelAssemblerIO(config: PathConfig) extends Bundle {
   val surfaceHit = Flipped(Valid(new SurfaceHit(config)))
   val colour     = Flipped(Valid(new PathColour(config)))
   val control    = new PixelControl(config)
-  val pixels     = Decoupled(new Pixel(config))
+  val pixels     = Decoupled(new Pixel(config.device))
 
   /** The pixel of a context that retires is of a tile of the environment; no pixel waits here. */
   val environmentLeaves = Output(Bool())
@@ -27,7 +27,7 @@ final class PixelAssemblerIO(config: PathConfig) extends Bundle {
 final class PixelAssembler(config: PathConfig) extends Module {
   val io = IO(new PixelAssemblerIO(config))
 
-  private val pixels   = ContextTable(config, new UnitPosition(config))
+  private val pixels   = ContextTable(config, new UnitPosition(config.device))
   private val colours  = ContextTable(config, new PixelColour(config))
   private val isObject = Reg(Vec(config.contexts, Bool()))
   when(io.allocated.valid) {
@@ -48,8 +48,8 @@ final class PixelAssembler(config: PathConfig) extends Module {
 
   // Retire a context
   private val done     = io.control.done
-  private val finished = Wire(Decoupled(new Pixel(config)))
-  private val queue    = Module(new Queue(new Pixel(config), queueDepth))
+  private val finished = Wire(Decoupled(new Pixel(config.device)))
+  private val queue    = Module(new Queue(new Pixel(config.device), queueDepth))
   private val retires  = done.valid && queue.io.count +& finished.valid < queueDepth.U
   io.control.retire := retires
   queue.io.enq :<>= finished
@@ -71,20 +71,20 @@ final class PixelAssembler(config: PathConfig) extends Module {
 
   // The primary ray's hit
   for (hit <- finished.bits.hit; distance <- io.surfaceHit.bits.distance) {
-    val hits = ContextTable(config, new PixelHit(config))
+    val hits = ContextTable(config, new PixelHit(config.device))
     when(isPrimaryHit) {
-      val primary = Wire(new PixelHit(config))
+      val primary = Wire(new PixelHit(config.device))
       primary.triangle     := io.surfaceHit.bits.id
       primary.distance.raw := distance
       hits.write(io.surfaceHit.bits.context, primary)
     }
     val read = hits.read(done.bits, retires)
-    hit := Mux(finished.bits.isObject, read, 0.U.asTypeOf(new PixelHit(config)))
+    hit := Mux(finished.bits.isObject, read, 0.U.asTypeOf(new PixelHit(config.device)))
   }
 }
 
 /** The colour of a pixel, and of the environment that the camera sees directly the shadow ratio. */
 final private class PixelColour(config: PathConfig) extends Bundle {
   val colour = Rgb(FrameRegisters.colour)
-  val ratio  = Option.when(config.hasEnvironment)(Rgb(FrameRegisters.weight))
+  val ratio  = Option.when(config.device.hasEnvironment)(Rgb(FrameRegisters.weight))
 }

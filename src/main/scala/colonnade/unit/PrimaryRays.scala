@@ -10,12 +10,12 @@ import colonnade.ray.{CameraRegisters, RayGenerator, RayRequest}
 /** A context that gets a pixel. */
 final class AllocatedPixel(config: PathConfig) extends Bundle {
   val context = Context(config)
-  val pixel   = new UnitPosition(config)
+  val pixel   = new UnitPosition(config.device)
 }
 
 final class PrimaryRaysIO(config: PathConfig) extends Bundle {
   val camera    = Input(new CameraRegisters(config))
-  val positions = Flipped(Decoupled(new UnitPosition(config)))
+  val positions = Flipped(Decoupled(new UnitPosition(config.device)))
 
   val control = new AllocationControl(config)
 
@@ -25,7 +25,7 @@ final class PrimaryRaysIO(config: PathConfig) extends Bundle {
   val ray       = Decoupled(new RayRequest(config))
 
   /** The pixel of `ray`, and whether the ray may hit the object. */
-  val pixel       = Output(new PixelPosition(config))
+  val pixel       = Output(new PixelPosition(config.device))
   val meetsObject = Output(Bool())
 }
 

@@ -15,9 +15,9 @@ import colonnade.config.PartConfig
 final class RecordFetch(config: PartConfig) extends Module {
   val io = IO(new RecordFetchIO(config))
 
-  private val slice    = TimingSlice.extra(config)
-  private val snooping = config.columnBvhMemory.snooping.B
-  private val buffers  = Seq.fill(config.columnBvhMemory.recordBuffers)(new RecordBuffer(config))
+  private val slice    = TimingSlice.extra(config.device)
+  private val snooping = config.device.columnBvhMemory.snooping.B
+  private val buffers  = Seq.fill(config.device.columnBvhMemory.recordBuffers)(new RecordBuffer(config))
   private val fetches  = Seq.fill(config.contexts)(new ContextFetch(config))
 
   // What a fetch finds in the buffers, and in full ones: by context and buffer

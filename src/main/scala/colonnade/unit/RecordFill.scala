@@ -26,8 +26,8 @@ private[unit] final class RecordFill(
     lookup:       RecordLookupIO,
     isAvailable:  Seq[Bool]
 ) {
-  private val slice    = TimingSlice.extra(config)
-  private val snooping = config.columnBvhMemory.snooping.B
+  private val slice    = TimingSlice.extra(config.device)
+  private val snooping = config.device.columnBvhMemory.snooping.B
 
   private val isHit = hits.map(_.reduce(_ || _))
 
@@ -37,9 +37,9 @@ private[unit] final class RecordFill(
     * can have it.
     */
   def brings(address: UInt): Seq[Bool] = {
-    val banks     = incoming.indices.map(Banks.isIn(config, address, _))
-    val inBank    = Mux1H(banks, incoming.map(broadcast => Banks.addressIn(config, broadcast.bits.address)))
-    val isAddress = inBank === Banks.addressIn(config, address)
+    val banks     = incoming.indices.map(Banks.isIn(config.device, address, _))
+    val inBank    = Mux1H(banks, incoming.map(broadcast => Banks.addressIn(config.device, broadcast.bits.address)))
+    val isAddress = inBank === Banks.addressIn(config.device, address)
     banks.map(isBank => slice(isBank && isAddress))
   }
 

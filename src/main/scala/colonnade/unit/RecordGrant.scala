@@ -9,7 +9,7 @@ import colonnade.config.PartConfig
 final class RecordGrantee(config: PartConfig) extends Bundle {
   val context = Context(config)
   val kind    = RecordKind()
-  val buffer  = Vec(config.columnBvhMemory.recordBuffers, Bool())
+  val buffer  = Vec(config.device.columnBvhMemory.recordBuffers, Bool())
 }
 
 final class RecordGrantIO(config: PartConfig) extends Bundle {
@@ -18,7 +18,7 @@ final class RecordGrantIO(config: PartConfig) extends Bundle {
   /** By context: its record is there; the kind; and the buffer that holds it, one-hot. */
   val isReady = Input(Vec(contexts, Bool()))
   val kinds   = Input(Vec(contexts, RecordKind()))
-  val holders = Input(Vec(contexts, Vec(config.columnBvhMemory.recordBuffers, Bool())))
+  val holders = Input(Vec(contexts, Vec(config.device.columnBvhMemory.recordBuffers, Bool())))
 
   /** By kind: its unit accepts a record in the next cycle. */
   val readyNext = Input(Vec(RecordKind.all.size, Bool()))

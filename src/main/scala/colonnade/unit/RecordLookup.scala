@@ -8,12 +8,12 @@ import colonnade.formats.RecordFormats
 
 final class RecordLookupIO(config: PartConfig) extends Bundle {
   private val contexts = config.contexts
-  private val buffers  = config.columnBvhMemory.recordBuffers
+  private val buffers  = config.device.columnBvhMemory.recordBuffers
 
   val fetches = Flipped(Vec(RecordFetch.ports, Valid(new FetchRequest(config))))
 
   /** By buffer: its address, and whether it takes another one in this cycle. */
-  val addresses = Input(Vec(buffers, UInt(RecordFormats.addressBits(config).W)))
+  val addresses = Input(Vec(buffers, UInt(RecordFormats.addressBits(config.device).W)))
   val isWritten = Input(Vec(buffers, Bool()))
 
   /** By context and buffer, in one cycle after a fetch: the buffer has its address. */
@@ -35,7 +35,7 @@ final class RecordLookupIO(config: PartConfig) extends Bundle {
 final class RecordLookup(config: PartConfig) extends Module {
   val io = IO(new RecordLookupIO(config))
 
-  private val slice = TimingSlice.extra(config)
+  private val slice = TimingSlice.extra(config.device)
 
   // By context and port
   private val comesFrom = Seq.tabulate(config.contexts) { context =>

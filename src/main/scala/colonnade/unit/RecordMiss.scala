@@ -24,8 +24,8 @@ private[unit] final class RecordMiss(
     fill:        RecordFill,
     isAvailable: Seq[Bool]
 ) {
-  private val slice    = TimingSlice.extra(config)
-  private val snooping = config.columnBvhMemory.snooping.B
+  private val slice    = TimingSlice.extra(config.device)
+  private val snooping = config.device.columnBvhMemory.snooping.B
 
   // Choose a context
   private val isExpected = fetches.zip(matches).map { case (fetch, matches) =>

@@ -57,7 +57,7 @@ final class RtController(config: PathConfig) extends Module {
     isShadow(free.bits)   := false.B
     isStraight(free.bits) := true.B
     hasColour(free.bits)  := false.B
-    if (config.hasEnvironment) {
+    if (config.device.hasEnvironment) {
       isFresnelReflection(free.bits) := false.B
       isDirectView(free.bits)        := false.B
       mayBeHidden(free.bits)         := hasOcclusion
@@ -85,7 +85,7 @@ final class RtController(config: PathConfig) extends Module {
   private val afterHit   = Mux(hasVisible, ContextState.shading, afterTrace)
   private val lightsLeft = shadows.end(ended.now.valid && isShadow(resolved), ended, io.trace.occlusion)
   move(ended.now.valid, resolved, Mux(isShadow(resolved), afterLights(resolved, lightsLeft), afterHit))
-  if (config.hasEnvironment) when(ended.now.valid) {
+  if (config.device.hasEnvironment) when(ended.now.valid) {
     mayBeHidden(resolved)     := false.B
     isOcclusionTest(resolved) := !isShadow(resolved) && io.trace.hasHit && mayBeHidden(resolved)
   }
@@ -102,7 +102,7 @@ final class RtController(config: PathConfig) extends Module {
   move(io.bounced.valid, bounced, Mux(io.bounced.bits.isTraced, ContextState.raySetup, untraced))
   when(io.bounced.valid) {
     isStraight(bounced) := false.B
-    if (config.hasEnvironment)
+    if (config.device.hasEnvironment)
       mayBeHidden(bounced) := hasOcclusion && !io.bounced.bits.isInside && !gather.hasGathered(bounced)
   }
   move(io.fetchFailed.valid, io.fetchFailed.bits, ContextState.accumulatePending)
@@ -126,7 +126,7 @@ final class RtController(config: PathConfig) extends Module {
   when(leaves) { isShadow(leaving) := !isGathered }
   io.shadow.bits.isGathered := isGathered
   gather.issue(leaves && isGathered, next, shadows.occlusions(next))
-  if (config.hasEnvironment) when(leaves && isGathered) { mayBeHidden(leaving) := false.B }
+  if (config.device.hasEnvironment) when(leaves && isGathered) { mayBeHidden(leaving) := false.B }
   for (gathering <- io.gather) {
     gathering.bouncedPath.isStraight  := isStraight(gathering.bounced)
     gathering.bouncedPath.isScattered := gather.hasGathered(gathering.bounced)
@@ -268,7 +268,7 @@ final class RtController(config: PathConfig) extends Module {
 
   /** A flag of each context, that is false without an environment. */
   private def ifEnvironment: Vec[Bool] =
-    if (config.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
+    if (config.device.hasEnvironment) Reg(Vec(contexts, Bool())) else VecInit.fill(contexts)(false.B)
 
   private def isAt(wanted: ContextState.Type): Seq[Bool] = state.map(_ === wanted)
 
@@ -276,7 +276,7 @@ final class RtController(config: PathConfig) extends Module {
     * cycle early.
     */
   private def choose(claims: Seq[Bool], isServed: => Bool): Choice =
-    if (isLarge || config.units.extraSlices) First.registered(claims, isServed) else Choice(First(claims))
+    if (isLarge || config.device.units.extraSlices) First.registered(claims, isServed) else Choice(First(claims))
 
   /** Of many contexts, the number is that of the cycle before. */
   private def count(claims: Seq[Bool], atReset: Int = 0): UInt = {

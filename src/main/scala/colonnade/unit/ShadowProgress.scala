@@ -11,7 +11,7 @@ import colonnade.shading.Occlusion
   * Nothing is reset: the results of lights that need no shadow ray are ignored.
   */
 private[unit] final class ShadowProgress(config: PathConfig) {
-  private val lights = config.frame.lights
+  private val lights = config.device.frame.lights
 
   private val needs   = new FlagTable(config, UInt(lights.W))
   private val current = new FlagTable(config, UInt(log2Ceil(lights.max(2)).W))

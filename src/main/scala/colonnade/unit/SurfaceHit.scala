@@ -12,11 +12,11 @@ import colonnade.ray.RayFormats
 final class SurfaceHit(config: PathConfig) extends Bundle {
   val context   = Context(config)
   val isPrimary = Bool()
-  val id        = UInt(RecordFormats.idBits(config).W) // packed triangle id
+  val id        = UInt(RecordFormats.idBits(config.device).W) // packed triangle id
   val t         = new Fixed(new RayFormats(config.numbers).grid)
 
   /** From the ray's origin along its dominant axis. */
-  val distance = Option.when(config.frame.hits || config.hasEnvironment)(HitDistance(config))
+  val distance = Option.when(config.device.frame.hits || config.device.hasEnvironment)(HitDistance(config))
 }
 
 object SurfaceHit {

@@ -36,7 +36,7 @@ final class TraceResult(config: PathConfig) extends Bundle {
   val hit       = new TriangleHit(config)
 
   /** The hit triangle is not opaque. */
-  val isClear = Option.when(config.frame.rays)(Bool())
+  val isClear = Option.when(config.device.frame.rays)(Bool())
 
   /** The hit object; traversal units do not know it. */
   val instance = InstanceNumber(config)
@@ -45,5 +45,5 @@ final class TraceResult(config: PathConfig) extends Bundle {
 /** The number of an instance, in designs that have them. */
 object InstanceNumber {
   def apply(config: PartConfig): Option[UInt] =
-    Option.when(config.frame.hasInstances)(UInt(log2Ceil(config.frame.instances).W))
+    Option.when(config.device.frame.hasInstances)(UInt(log2Ceil(config.device.frame.instances).W))
 }

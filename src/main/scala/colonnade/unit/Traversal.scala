@@ -10,7 +10,7 @@ import colonnade.traversal.{BoxUnit, LinearScan, NodeRef, TMaxReader, TraversalS
 
 final class TraversalIO(config: TraversalConfig) extends Bundle {
   val clear = Input(Bool()) // resets `deepest`
-  val scene = Input(new SceneMap(config))
+  val scene = Input(new SceneMap(config.device))
 
   /** A ray enters the object's box; its first record is [[Traversal.root]]. */
   val start = Flipped(Valid(Context(config)))
@@ -27,7 +27,7 @@ final class TraversalIO(config: TraversalConfig) extends Bundle {
   /** For the counters. */
   val boxTests = Output(UInt(log2Ceil(NodeRecord.most + 1).W))
   val busy     = Output(Bool())
-  val deepest  = Output(UInt(log2Ceil(config.columnBvhMemory.stackDepth + 1).W))
+  val deepest  = Output(UInt(log2Ceil(config.device.columnBvhMemory.stackDepth + 1).W))
   val overflow = Output(Bool())
 
   val illegal = Output(Bool()) // a node was illegal and treated as empty
@@ -38,7 +38,7 @@ final class Traversal(config: TraversalConfig) extends Module {
   val io             = IO(new TraversalIO(config))
   private val resume = Queue(io.resume, config.contexts) // contexts are tokens, so this queue never overflows
 
-  if (config.geometry.bvh) {
+  if (config.device.geometry.bvh) {
     val boxUnit = Module(new BoxUnit(config))
     val stack   = Module(new TraversalStack(config))
     val isLegal = io.nodes.bits.node.isLegal(io.nodes.bits.address)
@@ -92,8 +92,8 @@ object Traversal {
   /** The first record of a ray: the root node of the scene or of its object, or without a BVH the first leaf. */
   def root(config: TraversalConfig, ray: PreparedRay, scene: SceneMap): NodeRef = {
     val root = Wire(new NodeRef(config))
-    root.isLeaf  := (!config.geometry.bvh).B
-    root.address := (if (config.geometry.bvh) ray.root.getOrElse(scene.root) else 0.U)
+    root.isLeaf  := (!config.device.geometry.bvh).B
+    root.address := (if (config.device.geometry.bvh) ray.root.getOrElse(scene.root) else 0.U)
     root
   }
 }

@@ -17,11 +17,11 @@ final class TraversalEvents(config: TraversalConfig) extends Bundle {
 
 /** `scene` is constant while a frame runs; `start` precedes the first ray. */
 final class TraversalUnitIO(config: TraversalConfig) extends Bundle {
-  val row        = Input(UInt(log2Ceil(config.recordRequesters).W))
-  val scene      = Input(new SceneMap(config))
+  val row        = Input(UInt(log2Ceil(config.device.recordRequesters).W))
+  val scene      = Input(new SceneMap(config.device))
   val start      = Input(Bool())
-  val requests   = Decoupled(new RecordRequest(config))
-  val broadcasts = Flipped(Vec(config.columnBvhMemory.banks, Valid(new RecordBroadcast(config))))
+  val requests   = Decoupled(new RecordRequest(config.device))
+  val broadcasts = Flipped(Vec(config.device.columnBvhMemory.banks, Valid(new RecordBroadcast(config.device))))
 
   /** A ray that enters the object's box, with the context of its path; only in a cycle with `isFree`. */
   val rays   = Flipped(Valid(new PreparedRay(PathConfig(config.device))))

@@ -14,7 +14,7 @@ final class WorldFacesIO(config: PathConfig) extends Bundle {
   val mayComeNext = Output(Bool())
 
   /** That of the face that comes, or is in the unit; none: the face is in the axes of the world. */
-  val instance     = Input(new ObjectInstance(config))
+  val instance     = Input(new ObjectInstance(config.device))
   val hasInstances = Input(Bool())
 
   /** A face is accepted in the next cycle; the context that gets its face then. */

@@ -15,7 +15,7 @@ import scala.util.Random
 /** A ray with its instance. */
 private final class TransformInput(config: PathConfig) extends Bundle {
   val visit    = new InstanceVisit(config)
-  val instance = new ObjectInstance(config)
+  val instance = new ObjectInstance(config.device)
 }
 
 private class InstanceTransformHarness(config: ColonnadeConfig)

@@ -26,7 +26,7 @@ class InstanceResultsProof(config: PathConfig, limit: Int) extends Module {
   val ends    = IO(Input(Bool()))
   val result  = IO(Input(chiselTypeOf(dut.objectResults.bits)))
   dut.count := count
-  assume(count =/= 0.U && count <= config.frame.instances.U && count === RegNext(count, count))
+  assume(count =/= 0.U && count <= config.device.frame.instances.U && count === RegNext(count, count))
   assume(result.occlusion.isValid)
 
   // What the contexts do, as the rest of the walk sees it
