@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from colonnade.common import notes
 from colonnade.common.errors import UserError
+from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.maps.encoders import Encoder
 from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.registers.instances import instance_registers
+from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.header import ImageHeader, Instance, TreeStatistics
 from colonnade.scene_image.joined_images import joined_records
-from colonnade.scene_image.packer import pack
+from colonnade.scene_image.packer import pack, pack_geometry, surface_colours, texture_count
+from colonnade.scene_image.textures import with_textures
 from colonnade.scene_image.world import world_bounds, world_frame
 
 
@@ -31,15 +34,20 @@ def pack_objects(
 ) -> SceneImage:
     """Pack a mesh, or the objects of a joined mesh as instances if the design and its tables can hold them so.
 
-    Objects of equal records share them. One mesh holds, and a note says: more objects than `frame.instances`,
-    animations, textures, and objects too small for a transform. Arguments and errors are those of `pack`.
+    Objects of equal records share them, if they bend alike. One mesh holds, and a note says: more objects than
+    `frame.instances`, and objects too small for a transform. Arguments and errors are those of `pack`.
     """
     if mesh.objects and (limit := int(manifest.config["frame"].get("instances", 0))):
         try:
-            _check(mesh, limit)
-            parts = _parts(mesh, materials)
-            own = [pack(part, manifest, part.materials, headroom, encoder, children) for part in parts]
-            return _joined(own, mesh, manifest)
+            if len(mesh.objects) > limit:
+                raise _OneMesh(f"they are {len(mesh.objects)}, frame.instances is {limit}")
+            colours, atlas = surface_colours(mesh, manifest, materials, headroom)
+            parts = zip(_parts(mesh, materials), _faces_of(mesh), strict=True)
+            own = [
+                pack_geometry(part, manifest, part.materials, None if colours is None else colours[faces], children)
+                for part, faces in parts
+            ]
+            return with_textures(_joined(own, mesh, manifest), atlas, texture_count(materials), manifest, encoder)
         except _OneMesh as reason:
             notes.tell(f"the objects are packed as one mesh: {reason}")
     return pack(mesh, manifest, materials, headroom, encoder, children)
@@ -52,18 +60,18 @@ def placed_image(image: SceneImage, mesh: Mesh, manifest: Manifest) -> SceneImag
         UserError: An object is too small for the scene.
     """
     pairs = zip(image.header.instances, mesh.objects, strict=True)
-    instances = [
-        replace(one, transform=tuple(tuple(row) for row in placed.transform.tolist())) for one, placed in pairs
-    ]
+    instances = [replace(one, transform=_rows(placed.transform)) for one, placed in pairs]
     return replace(image, header=_placed(image.header, instances, mesh, manifest))
+
+
+def _rows(matrix: Floats) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(row) for row in matrix.tolist())
 
 
 def _parts(mesh: Mesh, materials: Sequence[MeshMaterial]) -> list[Mesh]:
     """The objects in their own spaces, each with the materials of its faces alone."""
     parts: list[Mesh] = []
-    first = 0
-    for one in mesh.objects:
-        own = np.s_[first : first + len(one.faces)]
+    for one, own in zip(mesh.objects, _faces_of(mesh), strict=True):
         used, index = np.unique(mesh.face_materials[own], return_inverse=True)
         parts.append(
             replace(
@@ -74,43 +82,40 @@ def _parts(mesh: Mesh, materials: Sequence[MeshMaterial]) -> list[Mesh]:
                 materials=tuple(materials[number] for number in used),
                 face_materials=index.astype(np.uint8),
                 source_faces=mesh.source_faces[own],
-                corner_colours=None if mesh.corner_colours is None else mesh.corner_colours[own],
-                corner_uvs=None if mesh.corner_uvs is None else mesh.corner_uvs[own],
+                corner_colours=None,
+                corner_uvs=None,
                 name=mesh.parts[len(parts)].name,
                 parts=(),
                 objects=(),
+                clip=one.clip,
+                clip_corners=one.clip_corners,
             )
         )
-        first += len(one.faces)
     return parts
+
+
+def _faces_of(mesh: Mesh) -> list[slice]:
+    """The faces of each object."""
+    ends = np.cumsum([len(one.faces) for one in mesh.objects]).tolist()
+    return [slice(end - len(one.faces), end) for one, end in zip(mesh.objects, ends, strict=True)]
 
 
 class _OneMesh(Exception):
     """Why one mesh holds the objects."""
 
 
-def _check(mesh: Mesh, limit: int) -> None:
-    """Refuse objects that are no instances of a design with so many."""
-    if len(mesh.objects) > limit:
-        raise _OneMesh(f"they are {len(mesh.objects)}, frame.instances is {limit}")
-    if mesh.clip or mesh.textures:
-        raise _OneMesh("an instance is neither animated nor textured")
-
-
 def _joined(own: Sequence[SceneImage], mesh: Mesh, manifest: Manifest) -> SceneImage:
     """The image of all objects.
 
     Raises:
-        _OneMesh: They need more materials, only some have colours, or one is too small.
+        _OneMesh: They need more materials, or one is too small.
     """
-    keys = [image.records.tobytes() for image in own]
+    keys = [_key(image) for image in own]
     tables = list(dict.fromkeys(image.header.materials for image in own))
     bases = dict(zip(tables, np.cumsum([0, *map(len, tables)]).tolist(), strict=False))
     count, limit = sum(map(len, tables)), int(manifest.config["frame"]["materials"])
     if count > limit:
         raise _OneMesh(f"they have {count} materials, frame.materials is {limit}")
-    if len({image.header.has_colours for image in own}) > 1:
-        raise _OneMesh("only some have corner colours")
     images = [own[keys.index(key)] for key in dict.fromkeys(keys)]
     records, roots = joined_records(images, manifest)
     root_of = dict(zip(dict.fromkeys(keys), roots, strict=True))
@@ -136,8 +141,45 @@ def _joined(own: Sequence[SceneImage], mesh: Mesh, manifest: Manifest) -> SceneI
     except UserError as error:
         raise _OneMesh(str(error)) from None
     return replace(
-        images[0], header=header, records=records, source_faces=np.concatenate([one.source_faces for one in images])
+        images[0],
+        header=header,
+        records=records,
+        source_faces=np.concatenate([one.source_faces for one in images]),
+        moves=None if mesh.clip is None else MovingInstances(tuple(images), mesh, manifest, mesh.clip.duration),
     )
+
+
+def _key(image: SceneImage) -> tuple[bytes, bytes]:
+    """What objects share that have it in common: records, and what bends them."""
+    return image.records.tobytes(), image.moves.file if isinstance(image.moves, Bending) else b""
+
+
+@dataclass(frozen=True)
+class MovingInstances:
+    """Instances that move by their transforms, those with an animation by their own records, too.
+
+    Attributes:
+        images: The meshes, each once.
+        mesh: The joined mesh.
+        manifest: The design's manifest.
+        seconds: How long they move; an animation that is shorter stays at its end.
+    """
+
+    images: tuple[SceneImage, ...]
+    mesh: Mesh
+    manifest: Manifest
+    seconds: float
+
+    def posed(self, image: SceneImage, progress: float) -> SceneImage:
+        """See `Moves`."""
+        time, records = progress * self.seconds, image.records
+        if any(one.moves is not None for one in self.images):
+            bent = [one.posed(min(1.0, time / one.moves.seconds) if one.moves else 0.0) for one in self.images]
+            records, _ = joined_records(bent, self.manifest)
+        pairs = zip(image.header.instances, self.mesh.objects, strict=True)
+        instances = [replace(one, transform=_rows(placed.transform_at(time))) for one, placed in pairs]
+        header = _placed(image.header, instances, self.mesh, self.manifest)
+        return replace(image, records=records, header=header)
 
 
 def _placed(header: ImageHeader, instances: Sequence[Instance], mesh: Mesh, manifest: Manifest) -> ImageHeader:

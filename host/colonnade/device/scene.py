@@ -29,6 +29,7 @@ from colonnade.scene.model import Camera, Scene, Transform
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.passes import frame_passes
 from colonnade.scene.view import View, make_view, place, rendered_materials
+from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.device_image import device_image, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.environment import with_environment
@@ -120,7 +121,7 @@ class DeviceScene:
             held = None if maps is None else maps.image
             cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.unseen, lit.second, True)
             image = with_cube(image, cube)
-        mesh = replace(mesh, materials=materials)
+        mesh = replace(mesh, materials=materials).posed(scene.motion_progress)
         return cls(lit.scene, manifest, image, maps, photo, lit.unseen, lit.strength, lit.second, mesh)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
@@ -144,7 +145,7 @@ class DeviceScene:
         return replace(self, scene=scene, image=image, maps=maps, photo=room.photo, strength=strength)
 
     def lit_at(self, pose: Scene, relit: bool = False) -> DeviceScene:
-        """The scene with the light cube of a pose of its motion, and the records of its clip; itself without both.
+        """The scene at a pose of its motion: its light cube, the records of its clip, the places of its instances.
 
         Args:
             pose: As `Scene.at` gives it.
@@ -153,7 +154,8 @@ class DeviceScene:
         held = None if self.maps is None else self.maps.image
         cube = scene_cube(pose, self.image.header.extent, self.environment, held, relit, self.unseen, self.second)
         image = self.image.posed(pose.motion_progress)
-        return replace(self, image=image if cube is None else with_cube(image, cube))
+        mesh = None if self.mesh is None else self.mesh.posed(pose.motion_progress)
+        return replace(self, image=image if cube is None else with_cube(image, cube), mesh=mesh)
 
     def seen_by(self, camera: EnvironmentCamera, photo: NDArray[np.uint8] | None) -> DeviceScene:
         """The scene from another camera: object, lights and maps stay in the world, primary rays march.
@@ -186,8 +188,11 @@ class DeviceScene:
             relit: As in `of`.
 
         Raises:
-            UserError: There is no such object, the objects are packed as one mesh, or one is too small for the scene.
+            UserError: There is no such object, the objects are packed as one mesh or have motions of their own, or one
+                is too small for the scene.
         """
+        if self.scene.is_animated:
+            raise UserError("an object has one place: leave out object.motion and mesh.animation of all objects")
         if not self.image.header.instances or self.mesh is None:
             raise UserError(
                 "an object moves alone if it is an instance: raise frame.instances to the number of objects"
@@ -254,9 +259,11 @@ class DeviceScene:
         Raises:
             UserError: The scene has neither an animation nor a motion of an object.
         """
-        if self.image.bending is None:
+        if self.image.moves is None:
             raise UserError("a clip file has what moves, and the scene has none: give mesh.animation or object.motion")
-        return self.image.bending.file
+        if not isinstance(self.image.moves, Bending):
+            raise UserError("a clip file is of one mesh, and the objects are instances: set frame.instances to 0")
+        return self.image.moves.file
 
     def dram_image(self) -> bytes:
         """The records as a design with a cache reads them from DRAM.

@@ -58,10 +58,11 @@ def device_frames(
     seconds = {"pack": time.perf_counter() - begun, "build": None}
     results = rendered(request, frames, registers, progress)
     # Each has a light cube, or records, of its own
-    if (scene.paths.gather or prepared.image.bending is not None) and len(poses) > 1:
+    if (scene.paths.gather or prepared.image.moves is not None) and len(poses) > 1:
         results = itertools.chain.from_iterable(
-            rendered(request, [replace(frame, prepared=prepared.lit_at(pose, relit))], [values], progress)
-            for frame, pose, values in zip(frames, poses, registers, strict=True)
+            rendered(request, [one], [[one.registers(each) for each in one.passes]], progress)
+            for frame, pose in zip(frames, poses, strict=True)
+            for one in [replace(frame, prepared=prepared.lit_at(pose, relit))]
         )
     for pose, result in zip(poses, results, strict=True):
         report = replace(result.report, share=pose.motion_progress, seconds=seconds | dict(result.report.seconds))

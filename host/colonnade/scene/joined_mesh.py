@@ -97,7 +97,8 @@ def _joined(scene: Scene, meshes: list[Mesh], poses: list[Pose], environment: En
     first_vertices = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     first_faces = np.cumsum([0, *(mesh.source_count for mesh in meshes)])
     index = [np.array([materials.index(material) for material in mesh.materials]) for mesh in meshes]
-    clip, clip_corners = _joined_clip(meshes, _places(scene, meshes, poses, environment))
+    places = _places(scene, meshes, poses, environment)
+    clip, clip_corners = _joined_clip(meshes, places)
     return Mesh(
         vertices=np.concatenate([pose.to_world(mesh.vertices) for mesh, pose in zip(meshes, poses, strict=True)]),
         faces=np.concatenate(
@@ -126,8 +127,16 @@ def _joined(scene: Scene, meshes: list[Mesh], poses: list[Pose], environment: En
             for mesh, pose, first in zip(meshes, poses, first_faces[:-1], strict=True)
         ),
         objects=tuple(
-            PlacedMesh(mesh.vertices, mesh.faces, mesh.corner_normals, pose.matrix)
-            for mesh, pose in zip(meshes, poses, strict=True)
+            PlacedMesh(
+                mesh.vertices,
+                mesh.faces,
+                mesh.corner_normals,
+                pose.matrix,
+                place if place.tracks else None,
+                mesh.clip,
+                mesh.clip_corners,
+            )
+            for mesh, pose, place in zip(meshes, poses, places, strict=True)
         ),
         clip=clip,
         clip_corners=clip_corners,

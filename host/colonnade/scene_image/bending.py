@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common import notes
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest, field_places
 from colonnade.scene_image.clip_file import ClipTree, clip_file
 from colonnade.scene_image.grid_clip import GridClip
+
+if TYPE_CHECKING:
+    from colonnade.scene_image.file import SceneImage
 
 Records = npt.NDArray[np.uint8]
 
@@ -51,6 +55,20 @@ class Bending:
         from colonnade import _core
 
         return _core.TargetMesh(self.format_words, self.file)
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the clip."""
+        return self.duration / (1 << 16)
+
+    def posed(self, image: SceneImage, progress: float) -> SceneImage:
+        """The image with the records of a part of the clip, 0.0 to 1.0; a line tells of lost normals."""
+        records, flat = self.records(image.records, progress)
+        if flat:
+            notes.tell(
+                f"mesh {image.header.mesh}: {flat:,} pairs of triangles are stretched so far that they are shaded flat"
+            )
+        return replace(image, records=records)
 
     def vertices(self, pose: npt.NDArray[np.int32]) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int16]]:
         """Positions, vertex units, int32 [v, 3], and codes of normals, int16 [v, 2], of a pose."""

@@ -10,20 +10,18 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from colonnade.common import notes
 from colonnade.common.atomic_files import check_folder, check_writable, made_folder, replacing
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import exists, is_folder, parse_json, read_input
 from colonnade.common.limits import MAX_HEADER_BYTES, MAX_IMAGE_BYTES
 from colonnade.design.manifest import Manifest
-from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.header import ImageHeader
 from colonnade.scene_image.header_checks import check_header
 
@@ -58,6 +56,17 @@ class Loads(Protocol):
         """See `SceneImage`."""
 
 
+class Moves(Protocol):
+    """What moves the mesh of an image."""
+
+    @property
+    def seconds(self) -> float:
+        """How long it moves."""
+
+    def posed(self, image: SceneImage, progress: float) -> SceneImage:
+        """The image, of any pose, at a part of the motion, 0.0 to 1.0."""
+
+
 @dataclass(frozen=True)
 class SceneImage:
     """The content of a scene image file.
@@ -67,25 +76,18 @@ class SceneImage:
         records: uint8 [record_count, record_bits / 8], little-endian.
         source_faces: int32 [2 · record_count], index in the mesh file of each packed id's face; −1 without one.
         attributes: A room's maps, textures and light cube in the order of `ImageHeader.memories`.
-        bending: What bends the mesh, which files do not have; None: nothing.
+        moves: What moves the mesh, which files do not have; None: nothing.
     """
 
     header: ImageHeader
     records: npt.NDArray[np.uint8]
     source_faces: npt.NDArray[np.int32]
     attributes: tuple[LoadSection, ...] = ()
-    bending: Bending | None = None
+    moves: Moves | None = None
 
     def posed(self, progress: float) -> SceneImage:
-        """The image at a part of its clip, 0.0 to 1.0; itself if nothing bends. A line tells of lost normals."""
-        if self.bending is None:
-            return self
-        records, flat = self.bending.records(self.records, progress)
-        if flat:
-            notes.tell(
-                f"mesh {self.header.mesh}: {flat:,} pairs of triangles are stretched so far that they are shaded flat"
-            )
-        return replace(self, records=records)
+        """The image at a part of its clip, 0.0 to 1.0; itself if nothing moves. A line tells of lost normals."""
+        return self if self.moves is None else self.moves.posed(self, progress)
 
     def save(self, path: str | Path) -> Path:
         """Write the file atomically; returns its path.

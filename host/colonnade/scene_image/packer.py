@@ -91,6 +91,36 @@ def pack(
         UserError: The mesh does not fit, or has corner colours or textures that the design lacks; the message names the
             setting.
     """
+    materials = mesh.materials if materials is None else tuple(materials)
+    colours, atlas = surface_colours(mesh, manifest, materials, headroom)
+    image = pack_geometry(mesh, manifest, materials, colours, children)
+    return with_textures(image, atlas, texture_count(materials), manifest, encoder)
+
+
+def surface_colours(
+    mesh: Mesh, manifest: Manifest, materials: Sequence[MeshMaterial], headroom: float
+) -> tuple[npt.NDArray[np.int64] | None, Atlas | None]:
+    """The colours of a mesh's corners as records hold them, int64 [faces, 3, 3], and its atlas; None without any.
+
+    Arguments and errors are those of `pack`.
+    """
+    atlas = _atlas(mesh, manifest, materials, headroom)
+    return _corner_colours(mesh, manifest, materials, headroom, atlas), atlas
+
+
+def texture_count(materials: Sequence[MeshMaterial]) -> int:
+    """Number of the textures of materials."""
+    return len({material.texture for material in materials} - {None})
+
+
+def pack_geometry(
+    mesh: Mesh,
+    manifest: Manifest,
+    materials: Sequence[MeshMaterial],
+    colours: npt.NDArray[np.int64] | None,
+    children: int = 4,
+) -> SceneImage:
+    """Pack a mesh without its textures; `colours` are those of `surface_colours`, the rest as in `pack`."""
     from colonnade import _core
 
     bits = int(manifest.config["geometry"]["vertexBits"])
@@ -101,11 +131,8 @@ def pack(
         vertices, normals = at_rest(clip, manifest)
         quantised = QuantisedMesh(vertices, clip.corners, np.arange(len(clip.corners)), clip.frame)
         corner_normals = normals[clip.corners]
-    materials = mesh.materials if materials is None else tuple(materials)
     entries, index = table_entries(materials)
     is_glass = np.array([material.kind == "glass" or material.coverage < 0.5 for material in materials])
-    atlas = _atlas(mesh, manifest, materials, headroom)
-    colours = _corner_colours(mesh, manifest, materials, headroom, atlas)
     packing: Any = _core.Packing(
         quantised.vertices,
         quantised.faces,
@@ -141,8 +168,7 @@ def pack(
         leaves = np.where(corners < 0, -1, clip.corners.reshape(-1)[corners])
         bending = Bending.of(clip, manifest, sections["record_count"], tree.depth, leaves, colours is not None)
     sources = np.where(faces < 0, -1, mesh.source_faces[quantised.mesh_faces[faces]])
-    image = SceneImage(header, packing.records(), sources.astype(np.int32), bending=bending)
-    return with_textures(image, atlas, len({material.texture for material in materials} - {None}), manifest, encoder)
+    return SceneImage(header, packing.records(), sources.astype(np.int32), moves=bending)
 
 
 def record_format(manifest: Manifest) -> dict[str, int]:

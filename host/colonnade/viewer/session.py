@@ -351,8 +351,8 @@ class Session:
 
 def _seconds(scene: DeviceScene) -> float:
     """Duration of a scene's motion: that of its animation, if it has one."""
-    bending = scene.image.bending
-    return bending.duration / (1 << 16) if scene.scene.has_animation and bending is not None else MOTION_SECONDS
+    moves = scene.image.moves
+    return moves.seconds if scene.scene.has_animation and moves is not None else MOTION_SECONDS
 
 
 def _moved(camera: Camera, to: ViewCamera) -> Camera:

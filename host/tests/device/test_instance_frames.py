@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from equal_frames import HELD, assert_equal
+from equal_frames import HELD, assert_equal, equal_frames
 from instance_worlds import World, transform
 
 from colonnade.design.generator import design_for
 from colonnade.device.bit_exact import model_frame
+from colonnade.device.scene import DeviceScene
 from colonnade.device.verilator import Stalls, render_rtl
+from colonnade.scene.model import Material, MeshSource, SceneObject, Transform
+from colonnade.scene.parser import load_scene
 
+LIVE = Path(__file__).parents[3] / "scenes" / "live.toml"
 KINDS = ("rigid", "scaled", "mirrored", "sheared")
 
 
@@ -38,3 +44,24 @@ def test_frames_of_instances_are_those_of_the_model(count: int, overrides: Seque
     stalls = Stalls(percent=20, seed=count, memory_percent=30)
     for frame, registers in zip(render_rtl(design, world.image, frames, stalls).frames, frames, strict=True):
         assert_equal(frame, model_frame(world.model, registers))
+
+
+@pytest.mark.matrix
+def test_sixteen_instances_in_a_room_are_those_of_the_model() -> None:
+    """They move, one bends, and gathered light, mirrors and glass meet them."""
+    design, size = design_for("small", ("frame.instances=16",)), (64, 48)
+    scene = load_scene(LIVE).with_samples(1)
+    kinds = (Material(kind="mirror"), Material(albedo=(0.7, 0.6, 0.2)), Material(kind="glass"))
+    beads = [
+        SceneObject(
+            mesh=MeshSource("sphere:80"), material=kinds[i % 3], transform=Transform((0.0, 9.0 * i, 0.0), 0.06, place)
+        )
+        for i, place in enumerate((-0.6 + 0.15 * i, 0.1 + 0.1 * (i % 4), 0.3) for i in range(12))
+    ]
+    prepared = DeviceScene.of(replace(scene, objects=(*scene.objects, *beads)), design.manifest, size=size)
+    assert len(prepared.image.header.instances) == 16
+    for share in (0.0, 0.4):
+        pose = prepared.scene.at(share)
+        moved = prepared.lit_at(pose)
+        (frame,) = equal_frames(design, moved.image, [moved.registers(size, pose)], Stalls())
+        assert frame.is_object.mean() > 0.05

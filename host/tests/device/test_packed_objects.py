@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from animated_documents import arm
+from textured_files import FOUR
 
 from colonnade.common import notes
 from colonnade.common.errors import UserError
@@ -16,10 +18,13 @@ from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
+from colonnade.mesh.materials.texture import Texture
 from colonnade.quality.image_metrics import psnr
 from colonnade.registers.instances import MATRIX_BITS, NORMAL_FRACTION
 from colonnade.render.hit_faces import hit_faces
 from colonnade.scene.model import Camera, Material, MeshSource, ObjectKey, Scene, SceneObject, Transform
+from colonnade.scene.object_mesh import object_mesh
+from colonnade.scene.object_pose import rotation_about
 from colonnade.scene_image.file import SceneImage
 
 SIZE = (120, 90)
@@ -47,8 +52,12 @@ def scene(*objects: SceneObject) -> Scene:
 
 def joined(described: Scene, manifest: Manifest) -> DeviceScene:
     """The objects as one mesh: the design has fewer instances."""
-    config = {**manifest.config, "frame": {**manifest.config["frame"], "instances": 0}}
-    return DeviceScene.of(described, replace(manifest, config=config))
+    return DeviceScene.of(described, _without(manifest))
+
+
+def _without(manifest: Manifest) -> Manifest:
+    """The design with fewer instances than objects."""
+    return replace(manifest, config={**manifest.config, "frame": {**manifest.config["frame"], "instances": 0}})
 
 
 def picture(prepared: DeviceScene, manifest: Manifest) -> Floats:
@@ -134,19 +143,62 @@ def test_more_objects_than_instances_are_one_mesh_by_a_note(manifest: Manifest) 
         DeviceScene.of(scene(*OBJECTS), manifest).with_transform(4, Transform())
 
 
-@pytest.mark.parametrize(
-    ("second", "reason"),
-    [
-        (replace(OBJECTS[1], transform=Transform(scale=1e-6)), "object 2 is too small for the scene"),
-        (replace(OBJECTS[1], motion=(ObjectKey(turn=90.0),)), "an instance is neither animated"),
-    ],
-)
-def test_objects_that_no_transform_holds_are_one_mesh_by_a_note(
-    second: SceneObject, reason: str, manifest: Manifest
-) -> None:
-    prepared, lines = with_notes(scene(OBJECTS[0], second), manifest)
+def test_objects_that_no_transform_holds_are_one_mesh_by_a_note(manifest: Manifest) -> None:
+    prepared, lines = with_notes(scene(OBJECTS[0], replace(OBJECTS[1], transform=Transform(scale=1e-6))), manifest)
     assert not prepared.image.header.instances
-    assert [reason in line for line in lines if "one mesh" in line] == [True]
+    assert ["object 2 is too small for the scene" in line for line in lines if "one mesh" in line] == [True]
+
+
+def test_instances_move_and_bend_as_the_objects_of_one_mesh(tmp_path: Path, manifest: Manifest) -> None:
+    file = arm().write(tmp_path / "arm.gltf")
+    keys = (ObjectKey(0.5, turn=40.0, translate=(0.2, 0.3, 0.0)), ObjectKey(rotate=(20.0, 0.0, 60.0)))
+    bent = SceneObject(
+        mesh=MeshSource(path=file, animation="bend"),
+        material=RED,
+        transform=Transform((0.0, 20.0, 0.0), 0.5, (0.2, -1.2, 0.6)),
+    )
+    described = scene(OBJECTS[0], replace(OBJECTS[1], motion=keys), bent)
+    instances, one = DeviceScene.of(described, manifest), joined(described, manifest)
+    assert len(instances.image.header.instances) == 3
+    still = instances.image
+    for progress in (0.0, 0.3, 0.5, 1.0):
+        pose = described.at(progress)
+        found, expected = (picture(each.lit_at(pose), manifest) for each in (instances, one))
+        assert psnr(expected, found) >= 38.0
+        assert (instances.lit_at(pose).image.records != still.records).any() == (progress > 0)
+    # A pose does not depend on the one before
+    again = instances.lit_at(described.at(1.0)).lit_at(described.at(0.3))
+    assert again.registers(SIZE) == instances.lit_at(described.at(0.3)).registers(SIZE)
+    np.testing.assert_array_equal(again.image.records, instances.lit_at(described.at(0.3)).image.records)
+    with pytest.raises(UserError, match=r"leave out object\.motion"):
+        instances.with_transform(1, Transform())
+    with pytest.raises(UserError, match="a clip file is of one mesh"):
+        instances.clip_file()
+
+
+def test_normals_of_a_mesh_turn_with_its_pose() -> None:
+    motion = (ObjectKey(turn=90.0),)
+    mesh = object_mesh(scene(replace(OBJECTS[1], motion=motion), OBJECTS[0]))
+    turned = mesh.posed(1.0)
+    faces = len(mesh.objects[0].faces)
+    about = rotation_about((0.0, 1.0, 0.0), 90.0)
+    np.testing.assert_allclose(turned.corner_normals[:faces], mesh.corner_normals[:faces] @ about.T, atol=1e-6)
+    np.testing.assert_allclose(turned.corner_normals[faces:], mesh.corner_normals[faces:], atol=1e-6)
+    assert turned.posed(0.0).vertices == pytest.approx(mesh.posed(0.0).vertices)
+
+
+def test_instances_may_have_textures_and_colours() -> None:
+    manifest = manifest_for("small", ("frame.instances=4",)).manifest
+    described = scene(*OBJECTS)
+    mesh = object_mesh(described)
+    uvs = mesh.vertices[mesh.faces][..., :2]
+    texture = Texture("four", FOUR)
+    materials = (replace(mesh.materials[0], texture=0, albedo=(1.0, 1.0, 1.0)), *mesh.materials[1:])
+    mesh = replace(mesh, textures=(texture,), corner_uvs=uvs, materials=materials)
+    images = [DeviceScene.of(described, each, mesh) for each in (manifest, _without(manifest))]
+    assert len(images[0].image.header.instances) == 3
+    found, expected = (picture(each, manifest) for each in images)
+    assert psnr(expected, found) >= 36.0
 
 
 def test_an_image_file_keeps_its_instances(tmp_path: Path, manifest: Manifest) -> None:

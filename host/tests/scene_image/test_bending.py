@@ -57,21 +57,21 @@ def clip(mesh: Mesh, manifest: Manifest) -> GridClip:
 
 
 def test_the_rest_pose_has_the_records_of_the_packer(image: SceneImage, clip: GridClip) -> None:
-    assert image.bending is not None
+    assert isinstance(image.moves, Bending)
     records = image.posed(0.5).records.copy()
     assert not np.array_equal(records, image.records)
-    vertices = image.bending.vertices(clip.rest.astype(np.int32))
-    image.bending._target.refit(*vertices, records.view(np.uint32), 0)
+    vertices = image.moves.vertices(clip.rest.astype(np.int32))
+    image.moves._target.refit(*vertices, records.view(np.uint32), 0)
     np.testing.assert_array_equal(records, image.records)
 
 
 def test_each_face_has_its_vertices_in_every_pose(
     image: SceneImage, mesh: Mesh, manifest: Manifest, clip: GridClip
 ) -> None:
-    assert image.bending is not None
+    assert isinstance(image.moves, Bending)
     in_order = Bending.of(clip, manifest, 2, 1, np.array([[0, 0, 0, -1]]), False)
     for progress in (0.0, 0.3, 0.7, 1.0):
-        pose = image.bending._target.pose(round(progress * image.bending.duration))
+        pose = image.moves._target.pose(round(progress * image.moves.duration))
         positions, _ = in_order.vertices(pose)
         ids, leaves = leaves_of(image.posed(progress), manifest)
         faces = {int(source): face for face, source in enumerate(mesh.source_faces)}

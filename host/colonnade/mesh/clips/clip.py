@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +44,21 @@ class Nodes:
     translations: Floats
     rotations: Floats
     scales: Floats
+
+    def moved(self, tracks: Sequence[Track], time: float, before: bool = False) -> Floats:
+        """The transforms to the parents at a time, seconds, or just before it, float64 [n, 4, 4]."""
+        parts = {
+            "translation": self.translations.copy(),
+            "rotation": self.rotations.copy(),
+            "scale": self.scales.copy(),
+        }
+        own = [track for track in tracks if track.path != "weights"]
+        for track in own:
+            parts[track.path][track.node] = track.at(time, before)
+        matrices, nodes = self.matrices.copy(), sorted({track.node for track in own})
+        matrices[nodes, :3, :3] = rotations(parts["rotation"][nodes]) * parts["scale"][nodes][:, None, :]
+        matrices[nodes, :3, 3] = parts["translation"][nodes]
+        return matrices
 
     def to_scene(self, matrices: Floats) -> Floats:
         """The transforms of all nodes to the scene, float64 [n, 4, 4], from those to their parents."""
@@ -125,28 +141,12 @@ class Clip:
 
     def pose(self, time: float, before: bool = False) -> Pose:
         """The pose at a time, seconds, or just before it, if it jumps there."""
-        nodes = self.nodes
-        parts = {
-            "translation": nodes.translations.copy(),
-            "rotation": nodes.rotations.copy(),
-            "scale": nodes.scales.copy(),
-        }
         weights = self.morphs.weights.copy()
         for track in self.tracks:
-            value = track.at(time, before)
             if track.path == "weights":
                 own = self.morphs.nodes == track.node
-                weights[own] = value[self.morphs.places[own]]
-            else:
-                parts[track.path][track.node] = value
-        matrices, moved = (
-            nodes.matrices.copy(),
-            sorted({track.node for track in self.tracks if track.path != "weights"}),
-        )
-        turned = rotations(parts["rotation"][moved]) * parts["scale"][moved][:, None, :]
-        matrices[moved, :3, :3] = turned
-        matrices[moved, :3, 3] = parts["translation"][moved]
-        return self._pose(matrices, weights)
+                weights[own] = track.at(time, before)[self.morphs.places[own]]
+        return self._pose(self.nodes.moved(self.tracks, time, before), weights)
 
     def _pose(self, matrices: Floats, weights: Floats) -> Pose:
         to_scene = self.nodes.to_scene(matrices)

@@ -44,6 +44,10 @@ class Place:
             tracks,
         )
 
+    def at(self, time: float) -> Floats:
+        """From the clip to the scene of all at a time, seconds, float64 [4, 4]."""
+        return np.asarray(self.nodes.to_scene(self.nodes.moved(self.tracks, time))[-1])
+
 
 def still_clip(vertices: Floats) -> Clip:
     """A clip of vertices, float64 [v, 3], that do not move."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
+from colonnade.common.vectors import unit_vectors
 from colonnade.mesh.clips.clip import Clip
+from colonnade.mesh.clips.joined import Place
 from colonnade.mesh.clips.keys import baked
 from colonnade.mesh.geometry import primitives
 from colonnade.mesh.geometry.topology import Faces
@@ -66,13 +68,22 @@ class PlacedMesh:
         vertices: float64 [n, 3].
         faces: int32 [m, 3].
         corner_normals: float64 [m, 3, 3].
-        transform: From there to the joined mesh, float64 [4, 4]: a rotation, a scale and a translation.
+        transform: From there to the joined mesh at rest, float64 [4, 4]: a rotation, a scale and a translation.
+        place: Where it moves; None: it keeps its transform.
+        clip, clip_corners: As those of a mesh.
     """
 
     vertices: Floats
     faces: Faces
     corner_normals: Floats
     transform: Floats
+    place: Place | None = None
+    clip: Clip | None = None
+    clip_corners: Indices | None = None
+
+    def transform_at(self, time: float) -> Floats:
+        """Its transform at a time, seconds."""
+        return self.transform if self.place is None else self.place.at(time)
 
 
 @dataclass(frozen=True)
@@ -132,3 +143,23 @@ class Mesh:
             height = fixed_order.product(self.vertices, direction)
             outermost |= {int(height.argmax()), int(height.argmin())}
         return Extent(self.vertices.min(axis=0), self.vertices.max(axis=0), self.vertices[sorted(outermost)])
+
+    def posed(self, progress: float) -> Mesh:
+        """The mesh at a part of its clip, 0.0 to 1.0, its normals turned with their faces; itself if nothing moves."""
+        if self.clip is None:
+            return self
+        pose = self.clip.pose(progress * self.clip.duration)
+        faces = self.faces if self.clip_corners is None else self.clip_corners.astype(np.int32)
+        vertices = self.clip.vertices(pose.matrices, pose.weights)
+        rest = self.clip.rest()
+        before, after = _axes(self.clip.vertices(rest.matrices, rest.weights)[faces]), _axes(vertices[faces])
+        turned = unit_vectors(np.einsum("nik,nlk->nli", after @ np.linalg.pinv(before), self.corner_normals))
+        return replace(self, vertices=vertices, faces=faces, corner_normals=turned)
+
+
+def _axes(corners: Floats) -> Floats:
+    """Two edges of faces, float64 [n, 3, 3], and their normals of about that length, as columns."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normals = np.cross(first, second)
+    normals /= np.sqrt(np.linalg.norm(normals, axis=1)).clip(min=1e-300)[:, None]
+    return np.stack([first, second, normals], axis=2)
