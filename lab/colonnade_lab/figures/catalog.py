@@ -288,6 +288,7 @@ def catalog() -> dict[str, Entry]:
         _study("ablation"),
         _study("features", "ASAP7"),
         _study("scaling"),
+        _study("instances"),
         _study("bvh-tests"),
         _study("bvh-costs", "ASAP7"),
         _study("bvh-cycles"),
