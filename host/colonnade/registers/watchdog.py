@@ -26,6 +26,9 @@ TRIANGLES = 2
 #: A design without a tree visits all records.
 TREE_VISITS = 128
 
+#: From a ray in the world to one in an instance and back, if all other contexts go first.
+INSTANCE_CYCLES = 100
+
 #: A read from DRAM, behind those of all other requesters.
 DRAM_CYCLES = 2000
 
@@ -48,6 +51,8 @@ def watchdog_cycles(registers: Mapping[str, int], header: ImageHeader, manifest:
     memory = manifest.config["columnBvhMemory"]
     fetch = rows + (DRAM_CYCLES if memory["cache"] else int(memory["readLatency"])) + NODE_CYCLES
     walk = nodes * fetch + leaves * (fetch + TRIANGLE_CYCLES * TRIANGLES)
+    if header.instances:
+        walk = len(header.instances) * (walk + INSTANCE_CYCLES)
     lights = registers["shading.lights"] if registers["shading.shadows"] else 0
     is_shiny = any(value != 0 for name, value in registers.items() if name.endswith(".kind"))
     bounces = registers["shading.bounces"] if is_shiny else 0

@@ -176,6 +176,14 @@ def test_instances_move_and_bend_as_the_objects_of_one_mesh(tmp_path: Path, mani
         instances.clip_file()
 
 
+def test_the_watchdog_waits_for_each_instance(manifest: Manifest) -> None:
+    one, three = (
+        DeviceScene.of(scene(*OBJECTS[:1], *[OBJECTS[0]] * more), manifest).registers(SIZE)["frame.watchdogCycles"]
+        for more in (1, 2)
+    )
+    assert three > 1.3 * one
+
+
 def test_normals_of_a_mesh_turn_with_its_pose() -> None:
     motion = (ObjectKey(turn=90.0),)
     mesh = object_mesh(scene(replace(OBJECTS[1], motion=motion), OBJECTS[0]))

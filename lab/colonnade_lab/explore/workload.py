@@ -29,7 +29,8 @@ def frames_of(file: StudyFile) -> list[Frame]:
     found: list[Frame] = []
     for name in workload.scenes:
         try:
-            scene = exposed(load_scene(file.path.parent / name))
+            # Jobs run in folders of their own
+            scene = exposed(load_scene((file.path.parent / name).resolve()))
             samples = scene.frame.samples or 1
             if scene.blurs or samples > 1:
                 key = "frame.samples" if samples > 1 else scene.blurs[0]

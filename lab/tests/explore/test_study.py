@@ -147,6 +147,14 @@ def test_scenes_of_several_objects_are_frames_of_their_own(tmp_path: Path) -> No
         Plan(study(tmp_path, alone.replace("[workload]", '[workload]\nmeshes = ["cube"]')), {})
 
 
+def test_a_scene_has_its_files_in_the_folder_of_any_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "object.toml").write_text('mesh.name = "cube"\nbackground.room = "room"\n')
+    (tmp_path / "room").mkdir()
+    monkeypatch.chdir(tmp_path)
+    (frame,) = Plan(study(Path(), STUDY), {}).frames
+    assert frame.scene.background.room == tmp_path / "room"
+
+
 def test_each_mesh_is_reduced_to_each_number_of_triangles(tmp_path: Path) -> None:
     (tmp_path / "object.toml").write_text('mesh.name = "cube"\n')
     both = STUDY.replace('["cube"]', '["cube", "torus"]')
