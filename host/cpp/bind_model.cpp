@@ -53,13 +53,14 @@ public:
         const auto size = static_cast<std::size_t>(width), count = static_cast<std::size_t>(last - first);
         std::uint16_t *colour, *ratio;
         bool* isObject;
-        std::int64_t* triangle;
+        std::int64_t *triangle, *instance;
         double* distance;
         nb::dict result;
         result["colour"] = makeArray<std::uint16_t>({count, size, 3}, colour);
         result["ratio"] = makeArray<std::uint16_t>({count, size, 3}, ratio);
         result["is_object"] = makeArray<bool>({count, size}, isObject);
         result["triangle"] = makeArray<std::int64_t>({count, size}, triangle);
+        result["instance"] = makeArray<std::int64_t>({count, size}, instance);
         result["distance"] = makeArray<double>({count, size}, distance);
         const double step = std::ldexp(1.0, -numbers_.gridFraction);
         nb::gil_scoped_release release;
@@ -73,6 +74,7 @@ public:
                 }
                 isObject[i] = pixel.isObject;
                 triangle[i] = pixel.isObject ? static_cast<std::int64_t>(pixel.triangle) : -1;
+                instance[i] = pixel.isObject ? pixel.instance : -1;
                 distance[i] = static_cast<double>(pixel.distance) * step;
             }
         return result;
@@ -206,7 +208,7 @@ void bind_model(nb::module_& module) {
         .def("start", &Model::start, "registers"_a, "Starts a frame: loads the registers (name -> value); clears counters and errors.")
         .def(
             "rows", &Model::rows, "first"_a, "last"_a,
-            "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, distance float64 in vertex units.")
+            "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, instance int64 or -1, distance float64 in vertex units.")
         .def("trace", &Model::trace, "origins"_a, "directions"_a,
              "Packed ids of the closest hits, int64 [n], -1 for a miss. Origins and directions: int64 [n, 3], grid steps.")
         .def(

@@ -38,6 +38,7 @@ def assert_equal(rtl: Frame, model: Frame) -> None:
     np.testing.assert_array_equal(rtl.colour, model.colour)
     np.testing.assert_array_equal(rtl.ratio, model.ratio)
     np.testing.assert_array_equal(rtl.triangle, model.triangle)
+    np.testing.assert_array_equal(rtl.instance, model.instance)
     np.testing.assert_array_equal(rtl.distance, model.distance)
     assert {name: rtl.counters[name] for name in model.counters} == model.counters
 

@@ -99,6 +99,7 @@ def model_frame(
         colour=pixels["colour"],
         is_object=pixels["is_object"],
         triangle=pixels["triangle"],
+        instance=pixels["instance"],
         distance=pixels["distance"],
         counters=model.counters(),
         errors=[name for name, is_set in model.errors().items() if is_set],

@@ -19,6 +19,7 @@ PIXEL = np.dtype(
         ("is_object", "u1"),
         ("is_seen", "u1"),
         ("triangle", "<u4"),
+        ("instance", "<u4"),
         ("distance", "<f8"),
     ]
 )
@@ -75,6 +76,7 @@ def read_frame(
         colour=np.ascontiguousarray(pixels["colour"]),
         is_object=is_object,
         triangle=np.where(is_object, pixels["triangle"].astype(np.int64), -1),
+        instance=np.where(is_object, pixels["instance"].astype(np.int64), -1),
         distance=pixels["distance"] * 2.0 ** -manifest.numbers["gridFraction"],
         counters={name.removeprefix("counters."): n for name, n in values.items() if name.startswith("counters.")},
         errors=[name.removeprefix("errors.") for name, bit in values.items() if name.startswith("errors.") and bit],

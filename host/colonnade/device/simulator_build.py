@@ -183,6 +183,8 @@ def ports_header(manifest: Manifest, sources: Sequence[Path]) -> str:
     # These port names end with their number format
     if match := re.search(r"io_pixels_0_bits_hit_distance_(\w+)", top):
         header += f"#define HIT_DISTANCE(column) top_.io_pixels_##column##_bits_hit_distance_{match.group(1)}\n"
+    if "io_pixels_0_bits_hit_instance" in top:
+        header += "#define HAS_INSTANCES\n"
     if match := re.search(r"io_pixels_0_bits_ratio_r_(\w+)", top):
         port = f"top_.io_pixels_##column##_bits_ratio_##channel##_{match.group(1)}"
         header += f"#define RATIO(column, channel) {port}\n"

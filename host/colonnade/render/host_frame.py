@@ -95,7 +95,7 @@ class HostFrame:
         return RenderResult(
             image=self.image(sums),
             object_mask=frame.is_object,
-            hit_triangles=self._faces(frame),
+            hit_triangles=hit_faces(self.prepared.image, frame),
             t=self._hits(frame)[0],
             report=report,
             sums=sums,
@@ -114,7 +114,7 @@ class HostFrame:
 
         depth, position = self._hits(passes.frame)
         shows_object, mesh = ~np.isnan(depth), self.prepared.mesh
-        points = None if mesh is None else HitPoints.of(mesh, self._faces(passes.frame), position)
+        points = None if mesh is None else HitPoints.of(mesh, hit_faces(self.prepared.image, passes.frame), position)
         normals = None if points is None or self.prepared.scene.material.flat else points.normals()
         camera = Camera.of(self.prepared.view(self.size, self.passes[0]))
 
@@ -180,11 +180,6 @@ class HostFrame:
         guide = Guide.of(points[y[:, None], x], mask)
         found = self._without_noise("room", ratio, passes.ratio_variance(), guide, camera, prepared.scene.is_still)
         return replace(sums, ratio=np.rint(found * count * sums.unshadowed).astype(sums.ratio.dtype))
-
-    def _faces(self, frame: Frame) -> npt.NDArray[np.int64]:
-        """The faces of the mesh's file in the first pass, -1 for a miss, int64 [height, width]."""
-        packed = np.where(frame.is_object, frame.triangle, -1).astype(np.int64)
-        return hit_faces(self.prepared.image, self.prepared.mesh, packed, self._hits(frame)[1])
 
     def _hits(self, frame: Frame) -> tuple[Floats, Floats]:
         """Depth and position of the first pass, NaN for a miss, mesh units, float64 [height, width] and with [3]."""

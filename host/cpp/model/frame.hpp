@@ -4,13 +4,14 @@
 
 namespace colonnade {
 
-/// One pixel of the stream. `triangle` (packed id) and `distance` (t from the camera, grid steps) are for object pixels. `ratio` is for pixels of
-/// the environment: light with the object over light without it, 12 fraction bits.
+/// One pixel of the stream. `triangle` (packed id), `instance` and `distance` (t from the camera, grid steps) are for object pixels. `ratio` is for
+/// pixels of the environment: light with the object over light without it, 12 fraction bits.
 struct Pixel {
     Colour colour, ratio;
-    bool isObject;
-    std::uint32_t triangle;
-    Wide distance;
+    bool isObject = false;
+    std::uint32_t triangle = 0;
+    int instance = 0;
+    Wide distance = 0;
 };
 
 /// The closest hit of a ray: packed id and instance, -1 for a miss; distance along the dominant axis; where rays from there begin, grid steps;
@@ -70,7 +71,7 @@ public:
 
     Pixel render(std::int64_t x, std::int64_t y) {
         const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
-        Pixel pixel{frame_.lighting.background, {one, one, one}, false, 0, 0};
+        Pixel pixel{frame_.lighting.background, {one, one, one}};
         ++counters.raysPrimary;
         const RayRequest request = primaryRay(x, y);
         if (!frame_.maySeeObject(x, y)) return directView(pixel, x, y, request);
@@ -87,6 +88,7 @@ public:
         ++counters.hits;
         pixel.isObject = true;
         pixel.triangle = static_cast<std::uint32_t>(hit.id);
+        pixel.instance = hit.instance;
         pixel.distance = distance;
         pixel.colour = follow(path, ray, hit, pixelPoint(x, y));
         return pixel;

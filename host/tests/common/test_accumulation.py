@@ -20,6 +20,7 @@ def random_frame(seed: int, room: bool = True) -> Frame:
         colour=random.integers(0, 4096, (*shape, 3)).astype(np.uint16),
         is_object=random.random(shape) < 0.5,
         triangle=np.zeros(shape, dtype=np.int64),
+        instance=np.zeros(shape, dtype=np.int64),
         distance=np.zeros(shape),
         counters={"cycles": int(random.integers(1000)), "deepestStack": int(random.integers(48))},
         errors=["watchdog"] if seed % 5 == 4 else [],

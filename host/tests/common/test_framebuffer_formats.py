@@ -21,8 +21,8 @@ def frame() -> Frame:
     random = np.random.default_rng(5)
     colour = random.integers(0, 4096, (*SHAPE, 3)).astype(np.uint16)
     ratio = np.repeat(random.integers(0, 2 * UNSHADOWED, (SHAPE[0], 1, 3)), SHAPE[1], axis=1).astype(np.uint16)
-    empty = np.zeros(SHAPE)
-    return Frame(colour, random.random(SHAPE) < 0.2, empty.astype(np.int64), empty, {}, [], ratio)
+    empty, none = np.zeros(SHAPE), np.zeros(SHAPE, np.int64)
+    return Frame(colour, random.random(SHAPE) < 0.2, none, none, empty, {}, [], ratio)
 
 
 @pytest.fixture(scope="module")

@@ -114,7 +114,7 @@ def test_faces_are_those_of_the_object_that_is_hit(manifest: Manifest) -> None:
     rays = view.direction + x * view.step_x + y * view.step_y
     depth = frame.distance / (prepared.image.header.frame.scale * np.abs(rays).max(axis=2))
     positions = view.origin + depth[..., None] * rays
-    faces = hit_faces(prepared.image, mesh, np.where(frame.is_object, frame.triangle, -1), positions)
+    faces = hit_faces(prepared.image, frame)
     assert ((faces >= 0) == frame.is_object).all()
     starts = [part.first_face for part in mesh.parts]
     for number, transform in enumerate(one.transform for one in OBJECTS):

@@ -31,7 +31,7 @@
 
 #include "array.hpp"
 // EACH_COLUMN(DO): DO(column) for each column. If the design has them: HIT_DISTANCE(column) of the hit,
-// RATIO(column, channel), the shadow ratio, and MEMORY_BANKS, the number of banks of all columns.
+// HAS_INSTANCES, RATIO(column, channel), the shadow ratio, and MEMORY_BANKS, the number of banks of all columns.
 #include "ports.hpp"
 #include "dram.hpp"
 
@@ -41,7 +41,7 @@ namespace {
 struct PixelBytes {
     std::uint16_t colour[3], ratio[3];
     std::uint8_t isObject, isSeen;
-    std::uint32_t triangle;
+    std::uint32_t triangle, instance;
     double distance;
 };
 #pragma pack(pop)
@@ -269,9 +269,15 @@ private:
 #ifdef HIT_DISTANCE
 #define TAKE_HIT(column) \
     pixel.triangle = top_.io_pixels_##column##_bits_hit_triangle; \
-    pixel.distance = numberOf(HIT_DISTANCE(column));
+    pixel.distance = numberOf(HIT_DISTANCE(column)); \
+    TAKE_INSTANCE(column)
 #else
 #define TAKE_HIT(column)
+#endif
+#ifdef HAS_INSTANCES
+#define TAKE_INSTANCE(column) pixel.instance = top_.io_pixels_##column##_bits_hit_instance;
+#else
+#define TAKE_INSTANCE(column)
 #endif
         EACH_COLUMN(TAKE)
 #undef TAKE

@@ -25,6 +25,7 @@ def differences(simulated: SimulatedFrame, model: Frame) -> list[str]:
         "colours": (rtl.colour != model.colour).any(axis=2),
         "objects": rtl.is_object != model.is_object,
         "triangles": rtl.triangle != model.triangle,
+        "instances": rtl.instance != model.instance,
         "distances": (rtl.distance != model.distance) & model.is_object,
     }
     if rtl.ratio is not None and model.ratio is not None:

@@ -1,6 +1,7 @@
 package colonnade.formats
 
 import chisel3._
+import chisel3.util.log2Ceil
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 
 /** An object with a transform of its own; docs/numbers.md, section 10. */
@@ -31,4 +32,10 @@ object ObjectInstance {
 
   /** Low bits of a direction in the object's axes that a ray request has no place for. */
   def directionDrop(numbers: NumberFormats): Int = (matrixBits + numbers.gridBits - numbers.directionBits).max(0)
+}
+
+/** The number of an instance, in designs that have them. */
+object InstanceNumber {
+  def apply(config: ColonnadeConfig): Option[UInt] =
+    Option.when(config.frame.hasInstances)(UInt(log2Ceil(config.frame.instances).W))
 }

@@ -13,6 +13,9 @@ final class PixelHit(config: ColonnadeConfig) extends Bundle {
 
   /** Distance from the camera along the ray's dominant axis, in grid steps: the entry distance plus t. */
   val distance = new Fixed(FixedPointFormat.unsigned(config.numbers.sceneBits + 1, config.numbers.gridFraction))
+
+  /** The object, where `scene.instances` are on. */
+  val instance = InstanceNumber(config)
 }
 
 /** A finished pixel. */

@@ -4,6 +4,7 @@ import chisel3._
 import chisel3.util.{RegEnable, Valid}
 import colonnade.common.ContextTable
 import colonnade.config.{NumberFormats, PathConfig}
+import colonnade.formats.InstanceNumber
 import colonnade.instance.WorldDistance
 import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleHit
@@ -112,6 +113,6 @@ final class InstanceResults(config: PathConfig) extends Module {
 final private class NearestHit(config: PathConfig) extends Bundle {
   val hasHit    = Bool()
   val occlusion = Occlusion()
-  val instance  = InstanceNumber(config).get
+  val instance  = InstanceNumber(config.device).get
   val hit       = new TriangleHit(config)
 }

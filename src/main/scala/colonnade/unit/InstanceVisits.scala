@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.{Decoupled, Pipe, Queue, RegEnable, Valid}
 import colonnade.common.{Context, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.formats.ObjectInstance
+import colonnade.formats.{InstanceNumber, ObjectInstance}
 import colonnade.instance.{InstanceTransform, ObjectScale}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.{PreparedRay, RayFormats, SequentialRaySetup, TriangleRay}
@@ -12,7 +12,7 @@ import colonnade.ray.{PreparedRay, RayFormats, SequentialRaySetup, TriangleRay}
 /** A context whose ray is to be traced in an instance; hits before `tMax` count, along the ray of the world. */
 final class InstanceStep(config: PathConfig) extends Bundle {
   val context  = Context(config)
-  val instance = InstanceNumber(config).get
+  val instance = InstanceNumber(config.device).get
   val tMax     = new Fixed(new RayFormats(config.numbers).grid)
 }
 

@@ -115,6 +115,7 @@ final class PathHits(config: PathConfig) extends Module {
     when(writes) { entries.write(ray.context, ray.tEntry.natural) }
     measured := SurfaceHit.distance(config, entries.read(readHit, reads), hit.t)
   }
+  for ((number, table) <- trace.surfaceHit.bits.instance.zip(instanceOf)) number := table(context)
   assert(!(shades && distance.valid), "one hit is read in a cycle")
 
   // Its attributes

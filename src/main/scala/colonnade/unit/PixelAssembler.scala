@@ -74,8 +74,9 @@ final class PixelAssembler(config: PathConfig) extends Module {
     val hits = ContextTable(config, new PixelHit(config.device))
     when(isPrimaryHit) {
       val primary = Wire(new PixelHit(config.device))
-      primary.triangle     := io.surfaceHit.bits.id
-      primary.distance.raw := distance
+      primary.triangle                                                         := io.surfaceHit.bits.id
+      primary.distance.raw                                                     := distance
+      for ((to, from) <- primary.instance.zip(io.surfaceHit.bits.instance)) to := from
       hits.write(io.surfaceHit.bits.context, primary)
     }
     val read = hits.read(done.bits, retires)

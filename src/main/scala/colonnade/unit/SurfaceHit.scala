@@ -4,7 +4,7 @@ import chisel3._
 import colonnade.common.Context
 import colonnade.config.PathConfig
 import colonnade.environment.HitDistance
-import colonnade.formats.RecordFormats
+import colonnade.formats.{InstanceNumber, RecordFormats}
 import colonnade.numbers.{Fixed, Rounding}
 import colonnade.ray.RayFormats
 
@@ -14,6 +14,8 @@ final class SurfaceHit(config: PathConfig) extends Bundle {
   val isPrimary = Bool()
   val id        = UInt(RecordFormats.idBits(config.device).W) // packed triangle id
   val t         = new Fixed(new RayFormats(config.numbers).grid)
+
+  val instance = InstanceNumber(config.device)
 
   /** From the ray's origin along its dominant axis. */
   val distance = Option.when(config.device.frame.hits || config.device.hasEnvironment)(HitDistance(config))

@@ -1,9 +1,10 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{log2Ceil, Decoupled, Valid}
+import chisel3.util.{Decoupled, Valid}
 import colonnade.common.Context
-import colonnade.config.{PartConfig, PathConfig}
+import colonnade.config.PathConfig
+import colonnade.formats.InstanceNumber
 import colonnade.ray.PreparedRay
 import colonnade.shading.{Occlusion, ShadeRequest}
 import colonnade.traversal.TriangleHit
@@ -39,11 +40,5 @@ final class TraceResult(config: PathConfig) extends Bundle {
   val isClear = Option.when(config.device.frame.rays)(Bool())
 
   /** The hit object; traversal units do not know it. */
-  val instance = InstanceNumber(config)
-}
-
-/** The number of an instance, in designs that have them. */
-object InstanceNumber {
-  def apply(config: PartConfig): Option[UInt] =
-    Option.when(config.device.frame.hasInstances)(UInt(log2Ceil(config.device.frame.instances).W))
+  val instance = InstanceNumber(config.device)
 }
