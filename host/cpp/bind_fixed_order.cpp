@@ -26,6 +26,8 @@ FOR_WIDE_VECTORS_TOO void multiply(const double* a, const double* b, double* out
     fixed_order::product(a, b, out, rows, inner, columns);
 }
 
+FOR_WIDE_VECTORS_TOO void powers(const double* x, double y, double* out, std::size_t count) { fixed_order::power(x, y, out, count); }
+
 template <class T> Pixels<T> product(const Matrices<T>& a, const Matrices<T>& b) {
     const std::size_t count = a.shape(0), rows = a.shape(1), inner = a.shape(2), columns = b.shape(2);
     if (b.shape(0) != count || b.shape(1) != inner) throw std::invalid_argument("the shapes of the matrices do not fit");
@@ -46,6 +48,14 @@ template <class Function> Pixels<double> eachOf(const Numbers& values, Function 
     return result;
 }
 
+Pixels<double> power(const Numbers& x, double y) {
+    double* out;
+    auto result = makeArray({x.shape(0)}, out);
+    nb::gil_scoped_release release;
+    powers(x.data(), y, out, x.shape(0));
+    return result;
+}
+
 Pixels<double> arctan2(const Numbers& y, const Numbers& x) {
     if (x.shape(0) != y.shape(0)) throw std::invalid_argument("the numbers of coordinates differ");
     double* out;
@@ -61,7 +71,7 @@ void bind_fixed_order(nb::module_& module) {
     module.def("product", &product<double>, "a"_a, "b"_a);
     module.def("log", [](const Numbers& x) { return eachOf(x, fixed_order::log); }, "x"_a);
     module.def("exp", [](const Numbers& x) { return eachOf(x, fixed_order::exp); }, "x"_a);
-    module.def("power", [](const Numbers& x, double y) { return eachOf(x, [y](double value) { return fixed_order::power(value, y); }); }, "x"_a, "y"_a);
+    module.def("power", &power, "x"_a, "y"_a);
     module.def("arccos", [](const Numbers& x) { return eachOf(x, fixed_order::arccos); }, "x"_a);
     module.def(
         "cosine", [](const Numbers& x, int quarters) { return eachOf(x, [quarters](double value) { return fixed_order::cosine(value, quarters); }); }, "x"_a,
