@@ -65,6 +65,8 @@ USERS_LIGHTS = (
     *("around-1", "exposed-1", "panorama-1", "around-1-maps", "panorama-1-maps"),
     *("photo-1", "photo-1-maps", "lights-1"),
 )
+#: Those that leave the gathered rays to the command, by what is known.
+DEFAULT_LIGHTS = {"panorama": "around-default", "photo alone": "photo-default"}
 
 
 def write_scenes(
@@ -72,8 +74,8 @@ def write_scenes(
 ) -> dict[str, Path]:
     """Write a room's folder, its objects as glTF files, and a scene for each frame; returns the scenes.
 
-    ``light`` is one of `LIGHTS`, or of `USERS_LIGHTS`; ``lights`` are the room's, as the objects see them. The folder
-    of a user's room has neither albedo nor normals, unless ``light`` names maps.
+    ``light`` is one of `LIGHTS`, `USERS_LIGHTS` or `DEFAULT_LIGHTS`; ``lights`` are the room's, as the objects see
+    them. The folder of a user's room has neither albedo nor normals, unless ``light`` names maps.
     """
     known, gather, *maps = light.split("-")
     write_room(folder / name, environment)
@@ -97,7 +99,8 @@ def write_scenes(
             lines += [f"panorama = {json.dumps(str(panorama))}"]
             lines += [] if room.is_users and known == "around" else ["panorama_exposure = 1.0"]
         width, height = room.frame
-        lines += ["", "[paths]", f"gather = {gather}", "", "[frame]", f"width = {width}", f"height = {height}"]
+        lines += [] if gather == "default" else ["", "[paths]", f"gather = {gather}"]
+        lines += ["", "[frame]", f"width = {width}", f"height = {height}"]
         scenes[frame] = folder / f"{name}-{frame}.toml"
         scenes[frame].write_text("\n".join(lines) + "\n", encoding="utf-8")
     return scenes
