@@ -11,9 +11,10 @@
 
 namespace colonnade::fixed_order {
 
-/// Product of matrices: out [rows, columns] = a [rows, inner] · b [inner, columns], all row-major. Each element is summed
-/// by ascending inner index. Elements of a block are summed side by side, which does not change any sum.
-template <class T> inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows, std::size_t inner, std::size_t columns) {
+/// Product of matrices: out [rows, columns] = a [rows, inner] · b [inner, columns], all row-major, or a transposed. Each
+/// element is summed by ascending inner index. Elements of a block are summed side by side, which does not change any sum.
+template <class T>
+inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows, std::size_t inner, std::size_t columns, bool isTransposed) {
     constexpr std::size_t lanes = 32 / sizeof(T), down = 4, across = 2 * lanes;
     typedef T Lanes __attribute__((vector_size(32)));
     const auto load = [](const T* from) __attribute__((always_inline)) {
@@ -21,26 +22,31 @@ template <class T> inline __attribute__((always_inline)) void product(const T* a
         std::memcpy(&values, from, sizeof values);
         return values;
     };
-    const std::size_t wholeRows = rows - rows % down, wholeColumns = columns - columns % across;
-    for (std::size_t column = 0; column < wholeColumns; column += across)
-        for (std::size_t row = 0; row < wholeRows; row += down) {
+    const std::size_t wholeColumns = columns - columns % across, rowStep = isTransposed ? 1 : inner, step = isTransposed ? rows : 1;
+    for (std::size_t row = 0; row < rows; row += down) {
+        // A block beyond the last row sums that one again
+        const std::size_t height = std::min(down, rows - row);
+        const T* left[down];
+        for (std::size_t i = 0; i < down; ++i) left[i] = a + (row + std::min(i, height - 1)) * rowStep;
+        for (std::size_t column = 0; column < wholeColumns; column += across) {
             Lanes sums[down][2] = {};
             for (std::size_t k = 0; k < inner; ++k) {
-                const Lanes left = load(b + k * columns + column), right = load(b + k * columns + column + lanes);
+                const Lanes first = load(b + k * columns + column), second = load(b + k * columns + column + lanes);
                 for (std::size_t i = 0; i < down; ++i) {
-                    const T factor = a[(row + i) * inner + k];
-                    sums[i][0] += factor * left;
-                    sums[i][1] += factor * right;
+                    const T factor = left[i][k * step];
+                    sums[i][0] += factor * first;
+                    sums[i][1] += factor * second;
                 }
             }
-            for (std::size_t i = 0; i < down; ++i) std::memcpy(out + (row + i) * columns + column, sums[i], sizeof sums[i]);
+            for (std::size_t i = 0; i < height; ++i) std::memcpy(out + (row + i) * columns + column, sums[i], sizeof sums[i]);
         }
-    for (std::size_t row = 0; row < rows; ++row)
-        for (std::size_t column = row < wholeRows ? wholeColumns : 0; column < columns; ++column) {
-            T sum = 0;
-            for (std::size_t k = 0; k < inner; ++k) sum += a[row * inner + k] * b[k * columns + column];
-            out[row * columns + column] = sum;
+        for (std::size_t column = wholeColumns; column < columns; ++column) {
+            T sums[down] = {};
+            for (std::size_t k = 0; k < inner; ++k)
+                for (std::size_t i = 0; i < down; ++i) sums[i] += left[i][k * step] * b[k * columns + column];
+            for (std::size_t i = 0; i < height; ++i) out[(row + i) * columns + column] = sums[i];
         }
+    }
 }
 
 /// Natural logarithm of a positive number; relative error below 2^-50.

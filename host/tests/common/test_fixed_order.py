@@ -30,6 +30,8 @@ def test_products_are_summed_by_ascending_index(rows: int, inner: int, columns: 
     found = fixed_order.product(a, b)
     assert found.dtype == kind
     np.testing.assert_array_equal(found, expected)
+    # A transpose has other memory
+    np.testing.assert_array_equal(fixed_order.product(np.ascontiguousarray(a.T).T, b), expected)
 
 
 def test_products_of_stacks_and_vectors() -> None:
