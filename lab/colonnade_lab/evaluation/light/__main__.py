@@ -19,7 +19,7 @@ def main() -> None:
     """Run the part that the first argument names."""
     part, *arguments = sys.argv[1:]
     parts = {"job": _job, "store": _store, "frames": _frames, "assets": _assets, "asset": _asset}
-    parts["defaults"] = _defaults
+    parts |= {"defaults": _defaults, "shots": _shots}
     parts[part](arguments)
 
 
@@ -84,6 +84,14 @@ def _defaults(arguments: list[str]) -> None:
     if "--json" in arguments:
         found = {name: asdict(result) for name, result in results.items()}
         write_json(Path(arguments[arguments.index("--json") + 1]), {"config": columns.CONFIG, "frames": found})
+
+
+def _shots(arguments: list[str]) -> None:
+    """FOLDER: write the scenes of varied objects in rooms, and print their files."""
+    from colonnade_lab.evaluation.light.shots import write_shots
+
+    with made_folder(Path(arguments[0])):
+        print("\n".join(map(str, write_shots(Path(arguments[0])))))
 
 
 def _assets(arguments: list[str]) -> None:

@@ -21,6 +21,7 @@ from colonnade.environment.model import Environment
 from colonnade.environment.panorama_file import read_radiance
 from colonnade.mesh.files.glb import Glb
 from colonnade.mesh.load import load_mesh
+from colonnade.scene.model import Transform
 from numpy.typing import NDArray
 
 from colonnade_lab.evaluation.light.rooms import GLASSES, METALS, KnownRoom, PointLight, Thing
@@ -88,9 +89,7 @@ def write_scenes(
         for index, thing in enumerate(things):
             file = f"{name}-{frame}{index}.glb"
             write_glb(folder / file, thing)
-            pose = pose_of(thing)
-            transform = f"rotate = {_row(pose.rotate)}, scale = {pose.scale:.8f}, translate = {_row(pose.translate)}"
-            lines += ["[[object]]", f'mesh = {{path = "{file}"}}', f"transform = {{{transform}}}", ""]
+            lines += ["[[object]]", f'mesh = {{path = "{file}"}}', f"transform = {transform_table(pose_of(thing))}", ""]
         if known in ("lights", "panorama"):
             lines += _lights(name, lights)
         lines += ["[background]", f'room = "{name}"', *([] if room.is_users else ['shadows = "photo"'])]
@@ -116,6 +115,11 @@ def _lights(name: str, lights: Sequence[PointLight]) -> list[str]:
     weights = np.sin((np.arange(len(around)) + 0.5) / len(around) * np.pi)
     ambient = (around.mean(axis=1) * weights[:, None]).sum(axis=0) / weights.sum()
     return [*lines, "[ambient]", f"colour = {_row(ambient)}", ""]
+
+
+def transform_table(pose: Transform) -> str:
+    """The table of a transform in a scene."""
+    return f"{{rotate = {_row(pose.rotate)}, scale = {pose.scale:.8f}, translate = {_row(pose.translate)}}}"
 
 
 def _row(values: Sequence[float] | Floats) -> str:
