@@ -167,16 +167,16 @@ def _blurred(values: Floats, mask: NDArray[np.bool_]) -> Floats:
     return np.asarray(total / np.maximum(count, 1))
 
 
-def _without_points(colour: Floats, mask: NDArray[np.bool_], most: Floats | None = None) -> Floats:
-    """Colours no further from their neighbours than these are from each other; changed by ``most`` at most."""
+def _without_points(colour: Floats, mask: NDArray[np.bool_], max_change: Floats | None = None) -> Floats:
+    """Colours no further from their neighbours than these are from each other; changed by ``max_change`` at most."""
     light = colour @ LUMINANCE
     count, first, second = _sums(light[..., None], mask)
     others = np.maximum(count - 1, 1)
     mean = (first[..., 0] - light) / others
     deviation = np.sqrt(((second[..., 0] - light**2) / others - mean**2).clip(min=0.0))
     usual = light.clip(mean - _POINT * deviation, mean + _POINT * deviation)
-    if most is not None:
-        usual = usual.clip(light - most, light + most)
+    if max_change is not None:
+        usual = usual.clip(light - max_change, light + max_change)
     darker, lighter = colour * (usual / np.maximum(light, 1e-9))[..., None], colour + (usual - light)[..., None]
     return np.where(mask[..., None], np.where((usual > light)[..., None], lighter, darker), colour)
 
