@@ -6,13 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 
 namespace colonnade::fixed_order {
 
-/// Product of matrices: out [rows, columns] = a [rows, inner] · b [inner, columns], all row-major. Each element is summed
-/// by ascending inner index. Elements of a block are summed side by side, which does not change any sum.
-template <class T> inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows, std::size_t inner, std::size_t columns) {
+/// Product of matrices: out [rows, columns] = a [rows, inner] · b [inner, columns], all row-major, or a transposed. Each
+/// element is summed by ascending inner index. Elements of a block are summed side by side, which does not change any sum.
+template <class T>
+inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows, std::size_t inner, std::size_t columns, bool isTransposed) {
     constexpr std::size_t lanes = 32 / sizeof(T), down = 4, across = 2 * lanes;
     typedef T Lanes __attribute__((vector_size(32)));
     const auto load = [](const T* from) __attribute__((always_inline)) {
@@ -20,26 +22,31 @@ template <class T> inline __attribute__((always_inline)) void product(const T* a
         std::memcpy(&values, from, sizeof values);
         return values;
     };
-    const std::size_t wholeRows = rows - rows % down, wholeColumns = columns - columns % across;
-    for (std::size_t column = 0; column < wholeColumns; column += across)
-        for (std::size_t row = 0; row < wholeRows; row += down) {
+    const std::size_t wholeColumns = columns - columns % across, rowStep = isTransposed ? 1 : inner, step = isTransposed ? rows : 1;
+    for (std::size_t row = 0; row < rows; row += down) {
+        // A block beyond the last row sums that one again
+        const std::size_t height = std::min(down, rows - row);
+        const T* left[down];
+        for (std::size_t i = 0; i < down; ++i) left[i] = a + (row + std::min(i, height - 1)) * rowStep;
+        for (std::size_t column = 0; column < wholeColumns; column += across) {
             Lanes sums[down][2] = {};
             for (std::size_t k = 0; k < inner; ++k) {
-                const Lanes left = load(b + k * columns + column), right = load(b + k * columns + column + lanes);
+                const Lanes first = load(b + k * columns + column), second = load(b + k * columns + column + lanes);
                 for (std::size_t i = 0; i < down; ++i) {
-                    const T factor = a[(row + i) * inner + k];
-                    sums[i][0] += factor * left;
-                    sums[i][1] += factor * right;
+                    const T factor = left[i][k * step];
+                    sums[i][0] += factor * first;
+                    sums[i][1] += factor * second;
                 }
             }
-            for (std::size_t i = 0; i < down; ++i) std::memcpy(out + (row + i) * columns + column, sums[i], sizeof sums[i]);
+            for (std::size_t i = 0; i < height; ++i) std::memcpy(out + (row + i) * columns + column, sums[i], sizeof sums[i]);
         }
-    for (std::size_t row = 0; row < rows; ++row)
-        for (std::size_t column = row < wholeRows ? wholeColumns : 0; column < columns; ++column) {
-            T sum = 0;
-            for (std::size_t k = 0; k < inner; ++k) sum += a[row * inner + k] * b[k * columns + column];
-            out[row * columns + column] = sum;
+        for (std::size_t column = wholeColumns; column < columns; ++column) {
+            T sums[down] = {};
+            for (std::size_t k = 0; k < inner; ++k)
+                for (std::size_t i = 0; i < down; ++i) sums[i] += left[i][k * step] * b[k * columns + column];
+            for (std::size_t i = 0; i < height; ++i) out[(row + i) * columns + column] = sums[i];
         }
+    }
 }
 
 /// Natural logarithm of a positive number; relative error below 2^-50.
@@ -71,6 +78,60 @@ inline double exp(double x) {
 
 /// x to the power y for x >= 0; relative error below 2^-45 for results from 2^-64 to 2^64.
 inline double power(double x, double y) { return x > 0 ? exp(y * log(x)) : (y == 0 ? 1 : 0); }
+
+/// `power` of each number, with the same bits: the steps of a block are taken side by side.
+inline __attribute__((always_inline)) void power(const double* x, double y, double* out, std::size_t count) {
+    constexpr std::size_t block = 16;
+    std::size_t done = 0;
+    for (; done + block <= count; done += block) {
+        double exponent[block], s[block], square[block], series[block], whole[block], rest[block];
+        bool isPlain = true;
+        for (std::size_t i = 0; i < block; ++i) isPlain &= x[done + i] >= 2.2250738585072014e-308 && x[done + i] <= 1.7976931348623157e308;
+        if (!isPlain) {
+            for (std::size_t i = 0; i < block; ++i) out[done + i] = power(x[done + i], y);
+            continue;
+        }
+        for (std::size_t i = 0; i < block; ++i) {
+            std::uint64_t bits;
+            std::memcpy(&bits, x + done + i, sizeof bits);
+            int twos = static_cast<int>(bits >> 52) - 1022;
+            bits = (bits & 0xfffffffffffffu) | (std::uint64_t{1022} << 52);
+            double mantissa;
+            std::memcpy(&mantissa, &bits, sizeof mantissa);
+            if (mantissa < 0.70710678118654752) {
+                mantissa *= 2;
+                twos -= 1;
+            }
+            exponent[i] = twos;
+            s[i] = (mantissa - 1) / (mantissa + 1);
+            square[i] = s[i] * s[i];
+            series[i] = 0;
+        }
+        for (int term = 23; term >= 1; term -= 2)
+            for (std::size_t i = 0; i < block; ++i) series[i] = series[i] * square[i] + 1.0 / term;
+        for (std::size_t i = 0; i < block; ++i) {
+            const double value = y * (exponent[i] * 0.69314718055994531 + 2 * s[i] * series[i]);
+            isPlain &= value > -700 && value < 700;
+            whole[i] = std::floor(value * 1.4426950408889634 + 0.5);
+            rest[i] = (value - whole[i] * 0.693147180369123816490) - whole[i] * 1.90821492927058770002e-10;
+            series[i] = 1;
+        }
+        for (int term = 15; term >= 1; --term)
+            for (std::size_t i = 0; i < block; ++i) series[i] = series[i] * rest[i] / term + 1;
+        for (std::size_t i = 0; i < block; ++i) {
+            if (!isPlain) {
+                out[done + i] = power(x[done + i], y);
+                continue;
+            }
+            // No result leaves the normal numbers
+            const std::uint64_t bits = static_cast<std::uint64_t>(static_cast<std::int64_t>(whole[i]) + 1023) << 52;
+            double scale;
+            std::memcpy(&scale, &bits, sizeof scale);
+            out[done + i] = series[i] * scale;
+        }
+    }
+    for (; done < count; ++done) out[done] = power(x[done], y);
+}
 
 /// Angle of the vector (x, y), -pi to pi; error below 2^-50.
 inline double arctan2(double y, double x) {

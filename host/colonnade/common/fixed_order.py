@@ -41,7 +41,9 @@ def product(a: NDArray[Number], b: NDArray[Number]) -> NDArray[Number]:
         each = np.broadcast_to(matrices, stacks + matrices.shape[-2:])
         return np.ascontiguousarray(each).reshape(math.prod(stacks), *matrices.shape[-2:])
 
-    result: NDArray[Number] = _core.product(stack(a), stack(b))
+    # The transpose of a matrix need not be copied
+    is_transposed = a.ndim == 2 and not stacks and a.T.flags.c_contiguous
+    result: NDArray[Number] = _core.product(stack(a.T if is_transposed else a), stack(b), is_transposed)
     return result.reshape(*stacks, a.shape[-2], b.shape[-1])
 
 

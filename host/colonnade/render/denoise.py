@@ -25,7 +25,7 @@ _COLOUR = 3.0
 _PLANE, _SHADED_PLANE = 0.1, 0.4
 #: Side of the square over which a single sample's variance is estimated, pixels.
 _WINDOW = 7
-#: A single sample is a point if it is so many standard deviations off its neighbours; levels that spread it.
+#: A pixel is a point if it is so many standard deviations off its neighbours; levels that spread it.
 _POINT, _POINT_LEVELS = 1.5, 3
 
 
@@ -82,14 +82,19 @@ class Noisy:
     variance: Floats
 
     @staticmethod
-    def of(colour: Floats, variance: Floats | None, guide: Guide) -> Noisy:
-        """Means of samples; without a variance, single samples: points are spread, and neighbours have the variance."""
-        if variance is not None:
+    def of(colour: Floats, variance: Floats | None, guide: Guide, are_few: bool = False) -> Noisy:
+        """Means of samples; without a variance, single samples: points are spread, and neighbours have the variance.
+
+        If there ``are_few``, points of the mean are spread as far as its samples differ.
+        """
+        if variance is not None and not are_few:
             return Noisy(colour, variance)
-        usual = _without_points(colour, guide.mask)
+        usual = _without_points(colour, guide.mask, None if variance is None else np.sqrt(variance))
         points = colour - usual
         for level in range(_POINT_LEVELS):
             points, _ = _filtered(points, None, guide, 1 << level)
+        if variance is not None:
+            return Noisy(usual + points, variance)
         _, deviation = moments((usual @ LUMINANCE)[..., None], guide.mask)
         return Noisy(usual + points, deviation[..., 0] ** 2)
 
@@ -162,14 +167,16 @@ def _blurred(values: Floats, mask: NDArray[np.bool_]) -> Floats:
     return np.asarray(total / np.maximum(count, 1))
 
 
-def _without_points(colour: Floats, mask: NDArray[np.bool_]) -> Floats:
-    """Colours no further from their neighbours than these are from each other."""
+def _without_points(colour: Floats, mask: NDArray[np.bool_], max_change: Floats | None = None) -> Floats:
+    """Colours no further from their neighbours than these are from each other; changed by ``max_change`` at most."""
     light = colour @ LUMINANCE
     count, first, second = _sums(light[..., None], mask)
     others = np.maximum(count - 1, 1)
     mean = (first[..., 0] - light) / others
     deviation = np.sqrt(((second[..., 0] - light**2) / others - mean**2).clip(min=0.0))
     usual = light.clip(mean - _POINT * deviation, mean + _POINT * deviation)
+    if max_change is not None:
+        usual = usual.clip(light - max_change, light + max_change)
     darker, lighter = colour * (usual / np.maximum(light, 1e-9))[..., None], colour + (usual - light)[..., None]
     return np.where(mask[..., None], np.where((usual > light)[..., None], lighter, darker), colour)
 

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 #: The least albedo by which the light of a single sample is known.
 _DARK = 0.02
+#: Fewer samples do not tell a point by their variance.
+_ENOUGH = 4
 
 
 @dataclass(frozen=True)
@@ -132,20 +134,29 @@ class HostFrame:
                 # Of several samples the first one's albedo is not the mean
                 light = albedo.clip(min=_DARK) if sums.samples == 1 else np.ones_like(albedo)
                 variance = layer.object_variance()
-                found = light * self._without_noise(name, colours / light, variance, guide, camera)
+                found = light * self._without_noise(
+                    name, colours / light, variance, guide, camera, are_few=sums.samples < _ENOUGH
+                )
             return replace(sums, objects=found * sums.white * count)
 
         sums = self._with_smooth_shadow(filtered("surface", passes), passes)
         return sums.with_layers(filtered(*layer) for layer in passes.layers.items())
 
     def _without_noise(
-        self, name: str, colours: Floats, variance: Floats | None, guide: Guide, camera: Camera, is_still: bool = True
+        self,
+        name: str,
+        colours: Floats,
+        variance: Floats | None,
+        guide: Guide,
+        camera: Camera,
+        is_still: bool = True,
+        are_few: bool = False,
     ) -> Floats:
         """Colours without noise: blended with those of the frames before, and filtered; of what is still or moves."""
         from colonnade.render.denoise import Noisy, denoised
         from colonnade.render.history import FRAMES, MOVING_FRAMES
 
-        noisy = Noisy.of(colours, variance, guide)
+        noisy = Noisy.of(colours, variance, guide, are_few)
         if self.history is not None:
             noisy = self.history.blended(name, noisy, guide, camera, FRAMES if is_still else MOVING_FRAMES)
         return denoised(noisy, guide)

@@ -30,6 +30,8 @@ def test_products_are_summed_by_ascending_index(rows: int, inner: int, columns: 
     found = fixed_order.product(a, b)
     assert found.dtype == kind
     np.testing.assert_array_equal(found, expected)
+    # A transpose has other memory
+    np.testing.assert_array_equal(fixed_order.product(np.ascontiguousarray(a.T).T, b), expected)
 
 
 def test_products_of_stacks_and_vectors() -> None:
@@ -75,6 +77,23 @@ def test_elementary_functions(ours, exact, low: float, high: float) -> None:  # 
     x = np.concatenate([np.linspace(low, high, 4001), np.geomspace(max(low, 1e-9), high, 1001)])
     expected = np.array([exact(value) for value in x.tolist()])
     np.testing.assert_allclose(ours(x), expected, rtol=2.0**-45, atol=2.0**-49)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    count=st.integers(1, 70),
+    spread=st.sampled_from([0.0, 1.0, 300.0, 1074.0]),
+    exponent=st.sampled_from([1 / 2.4, 2.4, -3.0, 0.0, 300.0]),
+)
+def test_powers_of_a_block_are_those_of_each_number(seed: int, count: int, spread: float, exponent: float) -> None:
+    """To the bit, whatever else the block holds."""
+    generator = np.random.default_rng(seed)
+    x = generator.random(count) * 2.0 ** generator.uniform(-spread, min(spread, 1023.0), count)
+    odd = generator.random(count) < 0.02
+    x[odd] = generator.choice([0.0, 5e-324, math.inf], int(odd.sum()))
+    found = fixed_order.power(x, exponent)
+    each = [fixed_order.power(x[index : index + 1], exponent)[0] for index in range(count)]
+    np.testing.assert_array_equal(found.view(np.int64), np.array(each).view(np.int64))
 
 
 def test_quarters_of_a_circle() -> None:

@@ -90,6 +90,19 @@ def test_no_point_stays_of_a_single_sample_that_is_far_off(value: float) -> None
     assert np.abs(found - 1)[guide.mask].max() < 0.12, "the point is spread, whether light or dark"
 
 
+def test_points_of_few_samples_are_spread_as_far_as_these_differ() -> None:
+    """One of two samples was bright at a point; a dot of a texture is in both."""
+    guide, picture, variance = wall(), noisy(np.full((HEIGHT, WIDTH, 3), 1.0), 0.01), np.full((HEIGHT, WIDTH), 1e-4)
+    (point, dot) = (20, 20), (20, 40)
+    picture[point], picture[dot], variance[point] = 3.0, 3.0, 2.0**2
+    found = Noisy.of(picture, variance, guide, are_few=True)
+    assert abs(found.colour[point][0] - 1.0) < 0.4 and found.colour[dot][0] > 2.9
+    np.testing.assert_array_equal(found.variance, variance)
+    np.testing.assert_array_equal(Noisy.of(picture, variance, guide).colour, picture)
+    # A light that a point brings is not lost
+    assert found.colour.sum() == pytest.approx(picture.sum(), rel=2e-3)
+
+
 def test_a_pattern_without_noise_stays() -> None:
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     pattern = ((x // 3 + y // 3) % 2 * 0.6 + 0.2)[..., None] * np.ones(3)

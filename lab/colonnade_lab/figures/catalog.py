@@ -259,6 +259,7 @@ def catalog() -> dict[str, Entry]:
         _gather(),
         _light(),
         Entry("light-users", "small", {"frames": ("tools/light", "frames", *USERS_ROOMS, "--json", REPORT)}),
+        Entry("light-defaults", "small", {"": ("tools/light", "defaults", "--json", REPORT)}),
         Entry("assets", "small", {"": ("tools/light", "samples", "--json", REPORT)}),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),

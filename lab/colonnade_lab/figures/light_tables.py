@@ -137,6 +137,21 @@ def choices(data: Data) -> str:
     return markdown([title, "relit", "mirror", "rays that are right"], rows)
 
 
+def defaults(data: Data) -> str:
+    """PSNR of the objects in users' rooms by the default command and by other settings, and the most that it loses."""
+    frames = data.result("light-defaults")["frames"]
+    groups: dict[str, list[Mapping[str, float]]] = {}
+    for name, own in frames.items():
+        known, _, where = name.partition(": ")
+        groups.setdefault(f"{known}, {where.rpartition('-')[2]}", []).append(own["objects"])
+    rows = []
+    for title, rooms in groups.items():
+        means = [f"{_mean([room[setting] for room in rooms]):.1f}" for setting in rooms[0]]
+        rows.append([title, *means, f"{max(max(room.values()) - room['default'] for room in rooms):.1f}"])
+    settings = list(next(iter(groups.values()))[0])
+    return markdown(["mean of the rooms, dB", *settings, "default below the best, at most"], rows)
+
+
 def _mean(values: list[float]) -> float:
     return sum(values) / len(values)
 
@@ -144,6 +159,7 @@ def _mean(values: list[float]) -> float:
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "light-users": lambda data: quality(data, USERS),
     "light-users-materials": users_materials,
+    "light-defaults": defaults,
     "light-quality": quality,
     "light-materials": materials,
     "light-mirrors": mirrors,

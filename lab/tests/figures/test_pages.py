@@ -180,6 +180,12 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
         "light-users": {
             "frames": {"frames": {"r-rough": compared("matt", "metal"), "r-clear": compared("mirror", "glass")}}
         },
+        "light-defaults": {
+            "frames": {
+                f"photo alone: {room}-clear": {"objects": {"default": 20.0, "no filter": other}, "things": {}}
+                for room, other in (("r", 19.0), ("q", 20.5))
+            }
+        },
         "room-lights": {
             "fits": {"r": {"ambient": 15.0, "lights": 20.0, "walls": None, "lamps": 20.0}},
             "choices": {"r: default lights": {"relit": 20.0, "mirror_device": 25.0, "mirror_right": 26.0}},
@@ -376,7 +382,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "|**array**, MGE|4.00|3.00|2.00|+100.0|+50.0|+5.7|" in table(docs, "bvh-costs")
     row = "|SLIC|16,384|56.2|30.0 dB, 1.5°|40.00, 0.0100|40.00, 0.0100|12.50|2.0|"
     assert row in table(docs, "paper-maps")
-    assert re.search(r"\|all \d+\|58.5\|", table(docs, "measuring"))
+    assert re.search(r"\|all \d+\|60.0\|", table(docs, "measuring"))
     counts = "999 of 1,000|1,000 of 1,000|99 of 100|100 of 100"
     assert f"|Embree `embree_verify`: `a`|`0123456789`|{counts}|" in table(docs, "ray-suites")
     assert "`a`|`0123456789`|–|–|99 of 100|100 of 100|" in table(docs, "ray-suites")
@@ -404,6 +410,7 @@ def test_figures_are_those_of_the_data(docs: Path) -> None:
     assert "|rays of Colonnade|1.2°, 3.0°|" in table(docs, "light-mirrors")
     users = table(docs, "light-users-materials")
     assert "|matt: photo alone|27.0, 0.75|" in users and "|glass: photo alone|27.0|" in users
+    assert "|photo alone, clear|20.0|19.8|0.5|" in table(docs, "light-defaults")
     # A million rays of 2 nJ a pass
     assert "|1, 1|50,000|1,000,000|4,000|2.00|" in table(docs, "light-cost")
     assert "|16, 2|60,000|1,100,000|167|44.00|" in table(docs, "light-cost")

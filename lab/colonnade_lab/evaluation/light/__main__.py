@@ -12,13 +12,15 @@ from colonnade.common.errors import UserError
 from colonnade.common.processes import tool
 
 from colonnade_lab.evaluation.light.rooms import ROOMS
-from colonnade_lab.evaluation.light.user_rooms import known_room
+from colonnade_lab.evaluation.light.user_rooms import REPORT, known_room
 
 
 def main() -> None:
     """Run the part that the first argument names."""
     part, *arguments = sys.argv[1:]
-    {"job": _job, "store": _store, "frames": _frames, "assets": _assets, "asset": _asset}[part](arguments)
+    parts = {"job": _job, "store": _store, "frames": _frames, "assets": _assets, "asset": _asset}
+    parts |= {"defaults": _defaults, "shots": _shots}
+    parts[part](arguments)
 
 
 def _job(arguments: list[str]) -> None:
@@ -62,6 +64,34 @@ def _frames(arguments: list[str]) -> None:
     if "--json" in arguments:
         found = {name: asdict(result) for name, result in results.items()}
         write_json(Path(arguments[arguments.index("--json") + 1]), {"config": columns.CONFIG, "frames": found})
+
+
+def _defaults(arguments: list[str]) -> None:
+    """FOLDER [ROOM…] [--json FILE]: compare the default command with other settings in users' rooms, or in all."""
+    from colonnade_lab.evaluation.light import columns, defaults, report
+
+    options = arguments.index("--json") if "--json" in arguments else len(arguments)
+    folder, names = Path(arguments[0]), tuple(arguments[1:options]) or tuple(REPORT)
+    for name in names:
+        if name not in REPORT:
+            raise UserError(f"{name} is not a user's room: choose from {', '.join(REPORT)}")
+    with made_folder(folder):
+        results: dict[str, defaults.DefaultResult] = {}
+        for name, result, pictures in defaults.measure_defaults(folder, names, progress.for_terminal()):
+            results[name] = result
+            report.write_frames(folder / name.replace(": ", "-").replace(" ", "-"), pictures)
+    print(defaults.table(results))
+    if "--json" in arguments:
+        found = {name: asdict(result) for name, result in results.items()}
+        write_json(Path(arguments[arguments.index("--json") + 1]), {"config": columns.CONFIG, "frames": found})
+
+
+def _shots(arguments: list[str]) -> None:
+    """FOLDER: write the scenes of varied objects in rooms, and print their files."""
+    from colonnade_lab.evaluation.light.shots import write_shots
+
+    with made_folder(Path(arguments[0])):
+        print("\n".join(map(str, write_shots(Path(arguments[0])))))
 
 
 def _assets(arguments: list[str]) -> None:

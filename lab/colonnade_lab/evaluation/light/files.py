@@ -21,6 +21,7 @@ from colonnade.environment.model import Environment
 from colonnade.environment.panorama_file import read_radiance
 from colonnade.mesh.files.glb import Glb
 from colonnade.mesh.load import load_mesh
+from colonnade.scene.model import Transform
 from numpy.typing import NDArray
 
 from colonnade_lab.evaluation.light.rooms import GLASSES, METALS, KnownRoom, PointLight, Thing
@@ -65,6 +66,8 @@ USERS_LIGHTS = (
     *("around-1", "exposed-1", "panorama-1", "around-1-maps", "panorama-1-maps"),
     *("photo-1", "photo-1-maps", "lights-1"),
 )
+#: Those that leave the gathered rays to the command, by what is known.
+DEFAULT_LIGHTS = {"panorama": "around-default", "photo alone": "photo-default"}
 
 
 def write_scenes(
@@ -72,8 +75,8 @@ def write_scenes(
 ) -> dict[str, Path]:
     """Write a room's folder, its objects as glTF files, and a scene for each frame; returns the scenes.
 
-    ``light`` is one of `LIGHTS`, or of `USERS_LIGHTS`; ``lights`` are the room's, as the objects see them. The folder
-    of a user's room has neither albedo nor normals, unless ``light`` names maps.
+    ``light`` is one of `LIGHTS`, `USERS_LIGHTS` or `DEFAULT_LIGHTS`; ``lights`` are the room's, as the objects see
+    them. The folder of a user's room has neither albedo nor normals, unless ``light`` names maps.
     """
     known, gather, *maps = light.split("-")
     write_room(folder / name, environment)
@@ -86,9 +89,7 @@ def write_scenes(
         for index, thing in enumerate(things):
             file = f"{name}-{frame}{index}.glb"
             write_glb(folder / file, thing)
-            pose = pose_of(thing)
-            transform = f"rotate = {_row(pose.rotate)}, scale = {pose.scale:.8f}, translate = {_row(pose.translate)}"
-            lines += ["[[object]]", f'mesh = {{path = "{file}"}}', f"transform = {{{transform}}}", ""]
+            lines += ["[[object]]", f'mesh = {{path = "{file}"}}', f"transform = {transform_table(pose_of(thing))}", ""]
         if known in ("lights", "panorama"):
             lines += _lights(name, lights)
         lines += ["[background]", f'room = "{name}"', *([] if room.is_users else ['shadows = "photo"'])]
@@ -97,7 +98,8 @@ def write_scenes(
             lines += [f"panorama = {json.dumps(str(panorama))}"]
             lines += [] if room.is_users and known == "around" else ["panorama_exposure = 1.0"]
         width, height = room.frame
-        lines += ["", "[paths]", f"gather = {gather}", "", "[frame]", f"width = {width}", f"height = {height}"]
+        lines += [] if gather == "default" else ["", "[paths]", f"gather = {gather}"]
+        lines += ["", "[frame]", f"width = {width}", f"height = {height}"]
         scenes[frame] = folder / f"{name}-{frame}.toml"
         scenes[frame].write_text("\n".join(lines) + "\n", encoding="utf-8")
     return scenes
@@ -113,6 +115,11 @@ def _lights(name: str, lights: Sequence[PointLight]) -> list[str]:
     weights = np.sin((np.arange(len(around)) + 0.5) / len(around) * np.pi)
     ambient = (around.mean(axis=1) * weights[:, None]).sum(axis=0) / weights.sum()
     return [*lines, "[ambient]", f"colour = {_row(ambient)}", ""]
+
+
+def transform_table(pose: Transform) -> str:
+    """The table of a transform in a scene."""
+    return f"{{rotate = {_row(pose.rotate)}, scale = {pose.scale:.8f}, translate = {_row(pose.translate)}}}"
 
 
 def _row(values: Sequence[float] | Floats) -> str:

@@ -161,7 +161,11 @@ class ProbeFrame:
         for down in steps:
             for across in steps:
                 total += self._sample(float(across), float(down))[0]
-        return total / _SAMPLES**2, self._sample(0.0, 0.0, owners_only=True)[1]
+        return total / _SAMPLES**2, self.owners()
+
+    def owners(self) -> NDArray[np.int64]:
+        """Each pixel's object in its middle, or -1, int64 [height, width]."""
+        return self._sample(0.0, 0.0, owners_only=True)[1]
 
     def _sample(self, across: float, down: float, owners_only: bool = False) -> tuple[Floats, NDArray[np.int64]]:
         width, height = self._size

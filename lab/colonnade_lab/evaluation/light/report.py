@@ -39,17 +39,22 @@ def table(results: Mapping[str, FrameResult]) -> str:
 
 def write_pictures(folder: Path, name: str, pictures: Mapping[str, NDArray[np.uint8]]) -> Strip:
     """Write the pictures of a frame, sRGB, as PNG files; returns those side by side, around the objects."""
-    from PIL import Image
-
-    (folder / name).mkdir(exist_ok=True)
-    for title, picture in pictures.items():
-        with replacing(folder / name / f"{title.replace(', ', '-').replace(' ', '-')}.png") as stream:
-            Image.fromarray(picture).save(stream, "PNG")
+    write_frames(folder / name, pictures)
     changed = np.abs(pictures["truth"].astype(int) - pictures["no object"]).max(axis=2) > 40
     rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
     box = tuple(slice(max(0, int(span[0]) - _MARGIN), int(span[-1]) + _MARGIN) for span in (rows, columns))
     titles = SIDE_BY_SIDE if set(SIDE_BY_SIDE) <= set(pictures) else USERS_SIDE_BY_SIDE
     return np.concatenate([pictures[title][box] for title in titles], axis=1)
+
+
+def write_frames(folder: Path, pictures: Mapping[str, NDArray[np.uint8]]) -> None:
+    """Write pictures, sRGB, uint8 [height, width, 3], by their titles as PNG files of a folder, which is made."""
+    from PIL import Image
+
+    folder.mkdir(exist_ok=True)
+    for title, picture in pictures.items():
+        with replacing(folder / f"{title.replace(', ', '-').replace(' ', '-')}.png") as stream:
+            Image.fromarray(picture).save(stream, "PNG")
 
 
 def write_strips(file: Path, strips: Sequence[Strip]) -> None:
