@@ -49,85 +49,89 @@ inline __attribute__((always_inline)) void product(const T* a, const T* b, T* ou
     }
 }
 
-/// Natural logarithm of a positive number; relative error below 2^-50.
-inline double log(double x) {
-    int exponent;
-    double mantissa = std::frexp(x, &exponent);
-    if (mantissa < 0.70710678118654752) {
-        mantissa *= 2;
-        exponent -= 1;
+/// Whether x is positive, finite, and has a whole mantissa.
+inline bool isNormal(double x) { return x >= 2.2250738585072014e-308 && x <= 1.7976931348623157e308; }
+
+/// Natural logarithms of normal numbers, side by side; relative error below 2^-50.
+template <std::size_t count> inline __attribute__((always_inline)) void logs(const double* x, double* out) {
+    double exponent[count], s[count], square[count], series[count];
+    for (std::size_t i = 0; i < count; ++i) {
+        std::uint64_t bits;
+        std::memcpy(&bits, x + i, sizeof bits);
+        int twos = static_cast<int>(bits >> 52) - 1022;
+        bits = (bits & 0xfffffffffffffu) | (std::uint64_t{1022} << 52);
+        double mantissa;
+        std::memcpy(&mantissa, &bits, sizeof mantissa);
+        if (mantissa < 0.70710678118654752) {
+            mantissa *= 2;
+            twos -= 1;
+        }
+        // log m = 2 artanh s
+        exponent[i] = twos;
+        s[i] = (mantissa - 1) / (mantissa + 1);
+        square[i] = s[i] * s[i];
+        series[i] = 0;
     }
-    // log m = 2 artanh s
-    const double s = (mantissa - 1) / (mantissa + 1), square = s * s;
-    double series = 0;
-    for (int power = 23; power >= 1; power -= 2) series = series * square + 1.0 / power;
-    return exponent * 0.69314718055994531 + 2 * s * series;
+    for (int power = 23; power >= 1; power -= 2)
+        for (std::size_t i = 0; i < count; ++i) series[i] = series[i] * square[i] + 1.0 / power;
+    for (std::size_t i = 0; i < count; ++i) out[i] = exponent[i] * 0.69314718055994531 + 2 * s[i] * series[i];
+}
+
+/// Exponentials, side by side, as a number near 1 and an exponent of 2; relative error below 2^-48 for |x| < 64.
+template <std::size_t count> inline __attribute__((always_inline)) void exps(const double* x, double* near, double* twos) {
+    double rest[count];
+    for (std::size_t i = 0; i < count; ++i) {
+        twos[i] = std::floor(x[i] * 1.4426950408889634 + 0.5);
+        // ln 2 in two parts, so that the product with a small integer is exact
+        rest[i] = (x[i] - twos[i] * 0.693147180369123816490) - twos[i] * 1.90821492927058770002e-10;
+        near[i] = 1;
+    }
+    for (int term = 15; term >= 1; --term)
+        for (std::size_t i = 0; i < count; ++i) near[i] = near[i] * rest[i] / term + 1;
+}
+
+/// Natural logarithm of a positive number; relative error below 2^-50 for normal ones.
+inline double log(double x) {
+    if (!(x > 0)) return -HUGE_VAL;
+    if (!isNormal(x)) return x < 1 ? log(x * 18014398509481984.0) - 54 * 0.69314718055994531 : HUGE_VAL;
+    double result;
+    logs<1>(&x, &result);
+    return result;
 }
 
 /// Exponential; relative error below 2^-48 for |x| < 64.
 inline double exp(double x) {
     if (!(x > -745)) return 0;
     if (x > 709) return HUGE_VAL;
-    const double whole = std::floor(x * 1.4426950408889634 + 0.5);
-    // ln 2 in two parts, so that the product with a small integer is exact
-    const double rest = (x - whole * 0.693147180369123816490) - whole * 1.90821492927058770002e-10;
-    double series = 1;
-    for (int term = 15; term >= 1; --term) series = series * rest / term + 1;
-    return std::ldexp(series, static_cast<int>(whole));
+    double near, twos;
+    exps<1>(&x, &near, &twos);
+    return std::ldexp(near, static_cast<int>(twos));
 }
 
 /// x to the power y for x >= 0; relative error below 2^-45 for results from 2^-64 to 2^64.
 inline double power(double x, double y) { return x > 0 ? exp(y * log(x)) : (y == 0 ? 1 : 0); }
 
-/// `power` of each number, with the same bits: the steps of a block are taken side by side.
+/// `power` of each number, with the same bits: those of a block side by side.
 inline __attribute__((always_inline)) void power(const double* x, double y, double* out, std::size_t count) {
     constexpr std::size_t block = 16;
     std::size_t done = 0;
     for (; done + block <= count; done += block) {
-        double exponent[block], s[block], square[block], series[block], whole[block], rest[block];
+        double product[block], near[block], twos[block];
         bool isPlain = true;
-        for (std::size_t i = 0; i < block; ++i) isPlain &= x[done + i] >= 2.2250738585072014e-308 && x[done + i] <= 1.7976931348623157e308;
-        if (!isPlain) {
-            for (std::size_t i = 0; i < block; ++i) out[done + i] = power(x[done + i], y);
-            continue;
-        }
-        for (std::size_t i = 0; i < block; ++i) {
-            std::uint64_t bits;
-            std::memcpy(&bits, x + done + i, sizeof bits);
-            int twos = static_cast<int>(bits >> 52) - 1022;
-            bits = (bits & 0xfffffffffffffu) | (std::uint64_t{1022} << 52);
-            double mantissa;
-            std::memcpy(&mantissa, &bits, sizeof mantissa);
-            if (mantissa < 0.70710678118654752) {
-                mantissa *= 2;
-                twos -= 1;
+        for (std::size_t i = 0; i < block; ++i) isPlain &= isNormal(x[done + i]);
+        if (isPlain) {
+            logs<block>(x + done, product);
+            for (std::size_t i = 0; i < block; ++i) {
+                product[i] *= y;
+                isPlain &= product[i] > -700 && product[i] < 700; // no result leaves the normal numbers
             }
-            exponent[i] = twos;
-            s[i] = (mantissa - 1) / (mantissa + 1);
-            square[i] = s[i] * s[i];
-            series[i] = 0;
         }
-        for (int term = 23; term >= 1; term -= 2)
-            for (std::size_t i = 0; i < block; ++i) series[i] = series[i] * square[i] + 1.0 / term;
+        if (isPlain) exps<block>(product, near, twos);
         for (std::size_t i = 0; i < block; ++i) {
-            const double value = y * (exponent[i] * 0.69314718055994531 + 2 * s[i] * series[i]);
-            isPlain &= value > -700 && value < 700;
-            whole[i] = std::floor(value * 1.4426950408889634 + 0.5);
-            rest[i] = (value - whole[i] * 0.693147180369123816490) - whole[i] * 1.90821492927058770002e-10;
-            series[i] = 1;
-        }
-        for (int term = 15; term >= 1; --term)
-            for (std::size_t i = 0; i < block; ++i) series[i] = series[i] * rest[i] / term + 1;
-        for (std::size_t i = 0; i < block; ++i) {
-            if (!isPlain) {
-                out[done + i] = power(x[done + i], y);
-                continue;
-            }
-            // No result leaves the normal numbers
-            const std::uint64_t bits = static_cast<std::uint64_t>(static_cast<std::int64_t>(whole[i]) + 1023) << 52;
+            const std::uint64_t bits = isPlain ? static_cast<std::uint64_t>(static_cast<std::int64_t>(twos[i]) + 1023) << 52 : 0;
             double scale;
             std::memcpy(&scale, &bits, sizeof scale);
-            out[done + i] = series[i] * scale;
+            out[done + i] = isPlain ? near[i] * scale : power(x[done + i], y);
         }
     }
     for (; done < count; ++done) out[done] = power(x[done], y);
