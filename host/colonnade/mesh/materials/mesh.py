@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
-from colonnade.common.vectors import unit_vectors
+from colonnade.common.vectors import cofactors, unit_vectors
 from colonnade.mesh.clips.clip import Clip
 from colonnade.mesh.clips.joined import Place
 from colonnade.mesh.clips.keys import baked
@@ -153,8 +153,10 @@ class Mesh:
         vertices = self.clip.vertices(pose.matrices, pose.weights)
         rest = self.clip.rest()
         before, after = _axes(self.clip.vertices(rest.matrices, rest.weights)[faces]), _axes(vertices[faces])
-        turned = unit_vectors(np.einsum("nik,nlk->nli", after @ np.linalg.pinv(before), self.corner_normals))
-        return replace(self, vertices=vertices, faces=faces, corner_normals=turned)
+        # From the axes at rest to those of the pose, times a determinant above 0
+        turns = fixed_order.product(cofactors(before), after.transpose(0, 2, 1))
+        normals = unit_vectors(fixed_order.product(self.corner_normals, turns))
+        return replace(self, vertices=vertices, faces=faces, corner_normals=normals)
 
 
 def _axes(corners: Floats) -> Floats:
