@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -50,14 +50,18 @@ def compile_modules(model: Path, rays: Path) -> None:
     OBJECTS.mkdir(parents=True, exist_ok=True)
     _compile_module(model, SOURCES, HEADERS, {"colonnade_view_size"})
     header = DRIVER / "include" / "colonnade_rays.h"
-    _compile_module(rays, [("c++", RAYS, (*PLAIN, *RAY_OPTIONS))], [header], {"colonnade_refusal"})
+    # A page has no environment
+    lacks = {"colonnade_rays_open_environment"}
+    _compile_module(rays, [("c++", RAYS, (*PLAIN, *RAY_OPTIONS))], [header], {"colonnade_refusal"}, lacks)
 
 
-def _compile_module(output: Path, sources: Iterable[Source], headers: Iterable[Path], others: set[str]) -> None:
+def _compile_module(
+    output: Path, sources: Iterable[Source], headers: Iterable[Path], others: set[str], lacks: Collection[str] = ()
+) -> None:
     with ThreadPoolExecutor() as pool:
         objects = list(pool.map(lambda source: _compile(*source), sources))
     names = {name for header in headers for name in re.findall(r"\b(colonnade_\w+)\(", header.read_text("utf-8"))}
-    exports = [f"-Wl,--export={name}" for name in sorted(names | others | {"malloc", "free"})]
+    exports = [f"-Wl,--export={name}" for name in sorted((names | others | {"malloc", "free"}) - {*lacks})]
     zig("c++", *TARGET, "-mexec-model=reactor", "-s", *map(str, objects), *exports, "-o", str(output))
 
 
