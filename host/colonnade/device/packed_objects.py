@@ -53,14 +53,14 @@ def pack_objects(
     return pack(mesh, manifest, materials, headroom, encoder, children)
 
 
-def placed_image(image: SceneImage, mesh: Mesh, manifest: Manifest) -> SceneImage:
-    """An image of instances with the transforms of a joined mesh of the same objects; the records stay.
+def placed_image(image: SceneImage, mesh: Mesh, manifest: Manifest, time: float = 0.0) -> SceneImage:
+    """An image of instances with the transforms of a joined mesh of the same objects at a time; the records stay.
 
     Raises:
         UserError: An object is too small for the scene.
     """
     pairs = zip(image.header.instances, mesh.objects, strict=True)
-    instances = [replace(one, transform=_rows(placed.transform)) for one, placed in pairs]
+    instances = [replace(one, transform=_rows(placed.transform_at(time))) for one, placed in pairs]
     return replace(image, header=_placed(image.header, instances, mesh, manifest))
 
 
@@ -172,14 +172,11 @@ class MovingInstances:
 
     def posed(self, image: SceneImage, progress: float) -> SceneImage:
         """See `Moves`."""
-        time, records = progress * self.seconds, image.records
+        time = progress * self.seconds
         if any(one.moves is not None for one in self.images):
             bent = [one.posed(min(1.0, time / one.moves.seconds) if one.moves else 0.0) for one in self.images]
-            records, _ = joined_records(bent, self.manifest)
-        pairs = zip(image.header.instances, self.mesh.objects, strict=True)
-        instances = [replace(one, transform=_rows(placed.transform_at(time))) for one, placed in pairs]
-        header = _placed(image.header, instances, self.mesh, self.manifest)
-        return replace(image, records=records, header=header)
+            image = replace(image, records=joined_records(bent, self.manifest)[0])
+        return placed_image(image, self.mesh, self.manifest, time)
 
 
 def _placed(header: ImageHeader, instances: Sequence[Instance], mesh: Mesh, manifest: Manifest) -> ImageHeader:

@@ -56,12 +56,12 @@ def device_frames(
         if note is not None:
             notes.tell(note)
     seconds = {"pack": time.perf_counter() - begun, "build": None}
-    results = rendered(request, frames, registers, progress)
-    # Each has a light cube, or records, of its own
+    results, has_places = rendered(request, frames, registers, progress), bool(prepared.image.header.instances)
+    # Each has a light cube, or records, of its own, and instances their places in the registers
     if (scene.paths.gather or prepared.image.moves is not None) and len(poses) > 1:
         results = itertools.chain.from_iterable(
-            rendered(request, [one], [[one.registers(each) for each in one.passes]], progress)
-            for frame, pose in zip(frames, poses, strict=True)
+            rendered(request, [one], [[*map(one.registers, one.passes)] if has_places else values], progress)
+            for frame, pose, values in zip(frames, poses, registers, strict=True)
             for one in [replace(frame, prepared=prepared.lit_at(pose, relit))]
         )
     for pose, result in zip(poses, results, strict=True):
