@@ -325,6 +325,7 @@ int main() try {
         else if (kind == "image") batches.load(query, words, rays::Model(numbers, directionBits, scene.layouts()));
         else if (kind == "batch") batches.reply(query);
         else if (kind == "instanceray") replyInstanceRay(query, numbers);
+        else if (kind == "instancebox") replyInstanceBox(query, numbers);
         else if (kind == "instanceface") replyInstanceFace(query, numbers);
         else if (kind == "bounce") replyBounce(query, numbers);
         else if (kind == "cornernormal") replyCornerNormal(query, numbers);

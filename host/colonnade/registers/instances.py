@@ -17,6 +17,7 @@ from colonnade.scene_image.world import world_bounds
 AXES = "xyz"
 MATRIX_BITS = 25
 NORMAL_FRACTION = 14
+CELL_BITS = 7
 #: Roundings between world and object, in steps of each: of the ray's origin, its direction and the way back.
 OBJECT_STEPS, WORLD_STEPS = 6, 8
 
@@ -40,7 +41,20 @@ def instance_registers(instances: Sequence[Instance], world: ObjectFrame, number
         placed, least = _placed(number, instance, world, numbers)
         registers |= {f"instances[{number}].{name}": value for name, value in placed.items()}
         offset = max(offset, least)
+        box, (first, last) = f"instances[{number}].box", _box(instance, 2 * least, world, numbers)
+        for a, axis in enumerate(AXES):
+            registers |= {f"{box}.low.{axis}": first[a], f"{box}.high.{axis}": last[a]}
     return registers | {"shading.offset": offset}
+
+
+def _box(instance: Instance, margin: int, world: ObjectFrame, numbers: Mapping[str, int]) -> list[list[int]]:
+    """The cells of the world that hold an instance, low and high; ``margin``, grid steps, is for roundings of rays."""
+    units = (instance.corners - world.offset) * world.scale
+    around = margin * 2.0 ** -numbers["gridFraction"]
+    cells = 2.0 ** (CELL_BITS - numbers["vertexBits"])
+    low, high = (units.min(axis=0) - around) * cells, (units.max(axis=0) + around) * cells
+    last = (1 << CELL_BITS) - 1
+    return [np.clip(np.floor(side), 0, last).astype(int).tolist() for side in (low, high)]
 
 
 def _placed(

@@ -98,6 +98,7 @@ struct Frame {
             instance.origin = vector(name + "origin");
             instance.root = static_cast<std::size_t>(take(name + "root"));
             instance.materialBase = static_cast<int>(take(name + "materialBase"));
+            instance.box = {vector(name + "box.low"), vector(name + "box.high")};
             for (int row = 0; row < 3; ++row) {
                 instance.matrix[row] = vector(name + "matrix[" + std::to_string(row) + "]");
                 instance.normal[row] = vector(name + "normal[" + std::to_string(row) + "]");

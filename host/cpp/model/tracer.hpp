@@ -92,6 +92,7 @@ private:
     /// The nearest hit of a ray of the world: the least (t, instance, id), t along that ray.
     Hit nearestOfInstances(const Ray& world, Hit best) {
         for (std::size_t i = 0; i < frame_.instances.size(); ++i) {
+            if (!instances::mayEnter(world, world.tMax, frame_.instances[i].box, numbers_)) continue;
             const ObjectRay object = instances::toObject(world, best.t, frame_.instances[i], numbers_);
             const Ray ray = prepareRay(object.request, instances::cube(numbers_), numbers_);
             if (!ray.enters) continue;
@@ -108,6 +109,7 @@ private:
     Occlusion occlusionByInstances(const Ray& world) {
         Occlusion occlusion = Occlusion::none;
         for (std::size_t i = 0; i < frame_.instances.size() && occlusion != Occlusion::opaque; ++i) {
+            if (!instances::mayEnter(world, world.tMax, frame_.instances[i].box, numbers_)) continue;
             const ObjectRay object = instances::toObject(world, world.tMax, frame_.instances[i], numbers_);
             const Ray ray = prepareRay(object.request, instances::cube(numbers_), numbers_);
             if (ray.enters) occlusion = std::max(occlusion, search(ray, nullptr, true, i).occlusion);

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,6 +62,27 @@ def test_hits_are_those_of_the_placed_meshes(kind: str, config: str) -> None:
     same = both & (hits["instance"] == expected)
     unit = 2.0 ** world.numbers["gridFraction"]
     assert np.quantile(np.abs(hits["distance"] - least)[same], 0.99) < 4 * unit
+
+
+@pytest.mark.parametrize("config", ["small", "16b16s32d"])
+@pytest.mark.parametrize("kind", ["rigid", "scaled", "mirrored", "sheared"])
+def test_a_ray_visits_each_instance_that_it_hits(kind: str, config: str) -> None:
+    """Against boxes that hold the whole world, and boxes of a cell."""
+    random = np.random.default_rng(len(kind))
+    world = World(manifest_of(config), [transform(random, kind, 3.0) for _ in range(16)])
+    starts, ways = world.rays(random, 100_000)
+    hits = world.nearest(starts, ways)
+
+    def within(last: int) -> dict[str, Any]:
+        ends = {"low": 0, "high": last}
+        boxes = {f"instances[{i}].box.{end}.{axis}": ends[end] for i in range(16) for end in ends for axis in "xyz"}
+        world.model.start(world.registers | boxes)
+        return world.nearest(starts, ways)
+
+    every = within(127)
+    for name in ("triangle", "instance", "distance"):
+        np.testing.assert_array_equal(hits[name], every[name])
+    assert (within(0)["triangle"] >= 0).sum() < 0.1 * (hits["triangle"] >= 0).sum()
 
 
 def own_hits(kind: str, config: str, share: float) -> tuple[int, int]:

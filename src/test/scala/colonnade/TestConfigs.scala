@@ -122,6 +122,9 @@ object TestConfigs {
     )
   )
 
+  def withInstances(config: ColonnadeConfig, count: Int): ColonnadeConfig =
+    config.copy(frame = config.frame.copy(instances = count))
+
   def withExtraSlices(config: ColonnadeConfig): ColonnadeConfig =
     config.copy(units = config.units.copy(extraSlices = true))
 

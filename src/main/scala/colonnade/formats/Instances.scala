@@ -22,6 +22,18 @@ final class ObjectInstance(config: ColonnadeConfig) extends Bundle {
 
   /** Added to the materials of the object's faces. */
   val materialBase = UInt(RecordFormats.materialBits.W)
+
+  val box = new ObjectBox
+}
+
+/** The object's box in the world: inclusive, in cells of 2^-[[ObjectBox.cellBits]] of the cube's edge. */
+final class ObjectBox extends Bundle {
+  val low  = Vec3(UInt(ObjectBox.cellBits.W))
+  val high = Vec3(UInt(ObjectBox.cellBits.W))
+}
+
+object ObjectBox {
+  val cellBits: Int = 7
 }
 
 object ObjectInstance {

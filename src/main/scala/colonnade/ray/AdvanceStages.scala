@@ -1,9 +1,10 @@
 package colonnade.ray
 
 import chisel3._
-import chisel3.util.Cat
+import chisel3.util.{Cat, Valid}
 import colonnade.common.Context
 import colonnade.config.PathConfig
+import colonnade.formats.InstanceNumber
 import colonnade.numbers.{Fixed, Normalise, Rounding}
 
 /** A ray in its own frame that waits for its entry into the object's box. */
@@ -17,6 +18,7 @@ final class AdvancingRay(config: PathConfig) extends Bundle {
   val origin      = Vec(3, new Fixed(formats.scene))
   val tMax        = UInt((config.numbers.sceneBits + 1).W)
   val limits      = Option.when(config.device.frame.rays)(new RayLimits(config.numbers))
+  val visit       = InstanceNumber(config.device).map(Valid(_))
 }
 
 final class AdvanceStagesIO(config: PathConfig) extends Bundle {
@@ -82,6 +84,7 @@ final class AdvanceStages(config: PathConfig) extends Module {
 
   private val prepared = Wire(new PreparedRay(config))
   prepared.root.foreach(_ := DontCare)
+  prepared.visit.zip(io.ray.visit).foreach { case (to, from) => to := from }
   prepared.context         := io.ray.context
   prepared.isShadow        := io.ray.isShadow
   prepared.enters          := io.enters

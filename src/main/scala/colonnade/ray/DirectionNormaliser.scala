@@ -1,9 +1,10 @@
 package colonnade.ray
 
 import chisel3._
-import chisel3.util.{Decoupled, RegEnable, ShiftRegister}
+import chisel3.util.{Decoupled, RegEnable, ShiftRegister, Valid}
 import colonnade.common.{Context, TimingSlice}
 import colonnade.config.{NumberFormats, PathConfig}
+import colonnade.formats.InstanceNumber
 import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
 
 /** Mantissas of a direction in the ray's own frame, from which the quotients are computed. */
@@ -23,6 +24,14 @@ final class DirectionInfo(config: PathConfig) extends Bundle {
   /** Bits by which x' and y' are shorter than the dominant component; components that are 0. */
   val exponent = Vec(2, UInt(Normalise.exponentBits(config.numbers.directionBits).W))
   val isZero   = Vec(3, Bool())
+
+  val visit = InstanceNumber(config.device).map(Valid(_))
+
+  /** Takes over the instance of a visit. */
+  def ofVisit(from: Valid[VisitLimit]): Unit = for (to <- visit) {
+    to.valid := from.valid
+    to.bits  := from.bits.instance
+  }
 
   /** Whether x' and y' are so short that the largest reciprocal stands for theirs. */
   def isTiny: Seq[Bool] = isZero.take(2).zip(exponent).map { case (zero, by) =>
@@ -149,6 +158,11 @@ final class DirectionNormaliser(config: PathConfig) extends Module {
   io.ray.bits.origin := origin
   private val unlimited = ((BigInt(1) << (numbers.sceneBits + 1)) - 1).U
   io.ray.bits.tMax := Mux(isShadow, Rounding.saturate(largest, numbers.sceneBits + 1), unlimited)
+  for (visit <- io.request.bits.visit) {
+    val held = RegEnable(visit, io.request.fire)
+    info.ofVisit(held)
+    when(held.valid) { io.ray.bits.tMax := held.bits.tMax }
+  }
 
   private def shift[T <: Data](queue: Vec[T], last: T): Unit = {
     queue.zip(queue.tail).foreach { case (to, from) => to := from }

@@ -58,6 +58,12 @@ final class DirectionStages(config: PathConfig) extends Module {
     io.ray.tMax := limits.tMax
   }
 
+  for (visit <- request.visit) {
+    val held = RegEnable(visit, io.loads(0))
+    info.ofVisit(held)
+    when(held.valid) { io.ray.tMax := held.bits.tMax }
+  }
+
   io.mantissas.minor.zip(Seq(minor0, minor1)).foreach { case (to, from) =>
     to := RegEnable(from.mantissa, io.loads(1))
   }

@@ -56,11 +56,9 @@ final class EntryDatapath(config: PathConfig) extends Module {
   private val planeAxis  = Mux(command.crossesSide, 1.U +& command.crossingSide, 0.U) +& ray.orientation.axis
   private val isNegative =
     Mux(command.crossesSide, onSide(ray.orientation.negative, command.crossingSide), ray.orientation.negative(2))
-  private val plane = Mux(
-    isNegative === command.crossesFar,
-    onAxis(io.bounds.low.axes, planeAxis),
-    onAxis(io.bounds.high.axes, planeAxis)
-  )
+  private val box   = PreparedRay.box(numbers, io.bounds, ray.visit)
+  private val plane =
+    Mux(isNegative === command.crossesFar, onAxis(box.low.axes, planeAxis), onAxis(box.high.axes, planeAxis))
   private val boxPad   = (BigInt(1) << numbers.boxPadLog).U
   private val pad      = Mux(command.crossesSide, boxPad +& (tNear >> numbers.vertexBits), boxPad).zext
   private val forward  = Mux(isNegative, unitOrigin, plane.zext) -& Mux(isNegative, plane.zext, unitOrigin)
@@ -158,6 +156,7 @@ final class EntryDatapath(config: PathConfig) extends Module {
   io.enters := tNear.zext <= tFar && !ray.isZero(2)
   private val output = io.output
   output.root.foreach(_ := DontCare)
+  output.visit.zip(ray.visit).foreach { case (to, from) => to := from }
   output.context         := ray.context
   output.isShadow        := ray.isShadow
   output.enters          := io.enters

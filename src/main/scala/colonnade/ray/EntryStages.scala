@@ -53,8 +53,9 @@ final class EntryStages(config: PathConfig) extends Module {
     load(Rounding.narrow(units, distanceBits), stages.unitOrigins)
   }
   private val pad        = (BigInt(1) << numbers.boxPadLog).U
-  private val lows       = PermutedFrame(io.bounds.low, axis).map(_.zext -& pad.zext)
-  private val highs      = PermutedFrame(io.bounds.high, axis).map(_.zext +& pad.zext)
+  private val box        = PreparedRay.box(numbers, io.bounds, info.visit.map(load(_, stages.unitOrigins)))
+  private val lows       = PermutedFrame(box.low, axis).map(_.zext -& pad.zext)
+  private val highs      = PermutedFrame(box.high, axis).map(_.zext +& pad.zext)
   private val widthBits  = NumberFormats.bitLength((1L << numbers.vertexBits) + (2L << numbers.boxPadLog)) + 1
   private val widths     = highs.zip(lows).map { case (high, low) => Rounding.narrow(high -& low, widthBits) }
   private val nears      = planeDistances(lows, highs)

@@ -91,6 +91,7 @@ final class RayGenerator(config: PathConfig) extends Module {
   io.pixel             := pixel
   io.ray.bits.context  := pixel.context
   io.ray.bits.isShadow := false.B
+  io.ray.bits.leadsThroughWorld()
   (0 until 3).foreach { axis =>
     io.ray.bits.origin.axes(axis) := Fixed(scene, origin(axis))
     io.ray.bits.dir.axes(axis)    := direction(axis)

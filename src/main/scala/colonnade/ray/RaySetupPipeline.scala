@@ -77,6 +77,7 @@ final class RaySetupPipeline(config: PathConfig) extends RaySetup(config) {
   advancing.origin      := fetched.origin
   advancing.tMax        := fetched.tMax
   advancing.limits.zip(fetched.limits).foreach { case (to, from) => to := from }
+  advancing.visit.zip(fetched.info.visit).foreach { case (to, from) => to := from }
   advancing.exponent.zip(fetched.info.exponent).zip(fetched.info.isTiny).foreach { case ((to, from), tiny) =>
     to := Mux(tiny, numbers.reciprocalFraction.U, from)
   }

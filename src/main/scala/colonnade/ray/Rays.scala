@@ -1,9 +1,10 @@
 package colonnade.ray
 
 import chisel3._
+import chisel3.util.Valid
 import colonnade.common.Context
 import colonnade.config.{NumberFormats, PartConfig, PathConfig}
-import colonnade.formats.{RecordFormats, Vec3}
+import colonnade.formats.{Bounds, InstanceNumber, RecordFormats, Vec3}
 import colonnade.numbers.{Fixed, FixedPointFormat, Rounding}
 
 /** Number formats of a ray (docs/numbers.md). */
@@ -41,6 +42,16 @@ final class RayRequest(config: PathConfig) extends Bundle {
   val origin   = Vec3(new Fixed(new RayFormats(numbers).scene))
   val dir      = Vec3(SInt(numbers.directionBits.W))
   val limits   = Option.when(config.device.frame.rays)(new RayLimits(numbers))
+  val visit    = Option.when(config.device.frame.hasInstances)(Valid(new VisitLimit(config)))
+
+  /** Marks a ray of the world. */
+  def leadsThroughWorld(): Unit = visit.foreach(_ := 0.U.asTypeOf(Valid(new VisitLimit(config))))
+}
+
+/** Of a ray in the axes of an instance: hits at t < tMax count, grid steps. */
+final class VisitLimit(config: PathConfig) extends Bundle {
+  val instance = InstanceNumber(config.device).get
+  val tMax     = UInt((config.numbers.sceneBits + 1).W)
 }
 
 /** What an application's ray does not hit: triangles seen from the front or the back, and those that are not opaque. */
@@ -140,8 +151,22 @@ final class PreparedRay(config: PartConfig) extends Bundle {
   val tMax     = new Fixed(formats.grid) // hits with t < `tMax` count; never negative
   val limits   = Option.when(config.device.frame.rays)(new EntryLimits(numbers))
 
+  /** The instance in whose axes the ray is; none: in those of the world. */
+  val visit = InstanceNumber(config.device).map(Valid(_))
+
   /** The root of its object's tree; ray set-up does not know it. */
   val root = Option.when(config.device.frame.hasInstances)(UInt(RecordFormats.addressBits(config.device).W))
+}
+
+object PreparedRay {
+
+  /** The box that a ray enters: that of all objects, in the axes of an instance the object's whole cube. */
+  def box(numbers: NumberFormats, bounds: Bounds, visit: Option[Valid[UInt]]): Bounds = visit.fold(bounds) { visit =>
+    val cube = Wire(new Bounds(numbers))
+    cube.low.axes.foreach(_ := 0.U)
+    cube.high.axes.foreach(_ := ((BigInt(1) << numbers.vertexBits) - 1).U)
+    Mux(visit.valid, cube, bounds)
+  }
 }
 
 object PermutedFrame {

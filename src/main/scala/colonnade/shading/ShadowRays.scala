@@ -81,4 +81,5 @@ final class ShadowRays(config: PathConfig) extends Module {
   when(moves) { hasRay := true.B }.elsewhen(io.ray.ready) { hasRay := false.B }
   io.ray.valid := hasRay
   io.ray.bits  := ray
+  io.ray.bits.leadsThroughWorld()
 }

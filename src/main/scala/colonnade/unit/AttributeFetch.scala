@@ -4,12 +4,14 @@ import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Context, First, ReservedQueue, TimingSlice}
 import colonnade.config.{AttributeFetchConfig, ColonnadeConfig, PathConfig}
-import colonnade.formats.{RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.formats.{InstanceNumber, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 
 /** A hit whose attributes are wanted. */
 final class AttributeRequest(config: PathConfig) extends Bundle {
   val context = Context(config)
   val id      = UInt(RecordFormats.idBits(config.device).W) // packed triangle id
+
+  val instance = InstanceNumber(config.device)
 }
 
 /** A record of a hit: its leaf, or the companion. */

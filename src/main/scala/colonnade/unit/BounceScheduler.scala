@@ -148,6 +148,7 @@ final class BounceScheduler(config: PathConfig) extends Module {
 
   private def rayOf(context: UInt, origin: Vec3[SInt], dir: Vec3[SInt]): RayRequest = {
     val ray = Wire(new RayRequest(config))
+    ray.leadsThroughWorld()
     ray.context                                             := context
     ray.isShadow                                            := false.B
     for ((to, from) <- ray.origin.axes.zip(origin.axes)) to := Fixed(to.format, from)

@@ -1,118 +1,117 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.{RegEnable, Valid}
-import colonnade.common.ContextTable
-import colonnade.config.{NumberFormats, PathConfig}
-import colonnade.formats.InstanceNumber
-import colonnade.instance.WorldDistance
+import chisel3.util.{Decoupled, OHToUInt, Valid}
+import colonnade.common.{Context, ContextTable, DelayLine}
+import colonnade.config.PathConfig
+import colonnade.instance.{ObjectScale, WorldDistance}
+import colonnade.numbers.Fixed
+import colonnade.ray.RayFormats
 import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleHit
 
+/** Where a context's ray enters the cube of an object. */
+final class VisitEntry(config: PathConfig) extends Bundle {
+  val context = Context(config)
+  val tEntry  = new Fixed(new RayFormats(config.numbers).entry)
+}
+
 final class InstanceResultsIO(config: PathConfig) extends Bundle {
-  val count = Input(UInt(NumberFormats.bitLength(config.device.frame.instances).W))
 
-  /** A ray goes to the traversal units, or misses an object's cube. */
-  val visited = Flipped(Valid(new VisitedRay(config)))
+  /** What contexts wait for; one without an instance that is left ends by `ends`, too. */
+  val steps   = Flipped(Valid(new InstanceStep(config)))
+  val scales  = Flipped(Valid(new VisitScale(config)))
+  val entries = Flipped(Valid(new VisitEntry(config)))
 
-  /** From the traversal units. */
+  /** What rays meet in objects, from the traversal units; rays that meet nothing without a way to them. */
   val objectResults = Flipped(Valid(new TraceResult(config)))
+  val misses        = Vec(2, Flipped(Decoupled(Context(config))))
 
-  /** The next instance of a ray, or what it has met in all of them. */
+  /** The next instance of a ray, or all that it has met; a nearer hit at any time. */
   val again   = Valid(new InstanceStep(config))
   val results = Valid(new TraceResult(config))
 }
 
-/** Compares the hits of a ray in one instance after the other: the nearest one stays, of equal ones the first. A visit
-  * lasts four cycles, with a hit to measure some 20.
+/** Compares the hits of a ray in one instance after the other: the nearest one stays, of equal ones the first. A result a
+  * cycle, of the traversal units before those of rays that miss.
   */
 final class InstanceResults(config: PathConfig) extends Module {
-  private object State extends ChiselEnum { val idle, loading, measuring, leaving = Value }
-  import State._
+  private val numbers = config.numbers
+  private val latency = WorldDistance.latency(numbers) + 1
 
   val io = IO(new InstanceResultsIO(config))
 
-  // Contexts to resolve
-  private val visits  = ContextTable(config, new VisitedRay(config))
-  private val found   = ContextTable(config, new TraceResult(config))
-  private val nearest = ContextTable(config, new NearestHit(config))
-  private val waiting = new WaitingContexts(config)
-  private val visited = io.visited.bits
-  when(io.visited.valid) { visits.write(visited.visit.context, visited) }
-  when(io.objectResults.valid) { found.write(io.objectResults.bits.context, io.objectResults.bits) }
-  waiting.enter(io.visited.valid && !visited.enters, visited.visit.context)
-  waiting.enter(io.objectResults.valid, io.objectResults.bits.context)
+  private val steps   = ContextTable(config, new RayProgress(config))
+  private val scales  = ContextTable(config, new ObjectScale(numbers))
+  private val entries = ContextTable(config, new Fixed(new RayFormats(numbers).entry))
+  when(io.steps.valid) { steps.write(io.steps.bits.context, io.steps.bits.progress) }
+  when(io.scales.valid) { scales.write(io.scales.bits.context, io.scales.bits.scale) }
+  when(io.entries.valid) { entries.write(io.entries.bits.context, io.entries.bits.tEntry) }
 
-  // One of them, and what is known of it
-  private val state     = RegInit(idle)
-  private val starts    = state === idle && waiting.next.valid
-  private val context   = waiting.next.bits
-  private val isLoading = state === loading
-  private val readRay   = visits.read(context, starts)
-  private val readBest  = nearest.read(context, starts)
-  private val ray       = RegEnable(readRay, isLoading)
-  private val visit     = RegEnable(readRay.visit, isLoading)
-  private val result    = RegEnable(found.read(context, starts), isLoading)
-  private val best      = Reg(new NearestHit(config))
-  waiting.take(starts)
-  when(isLoading) {
-    best := readBest
-    when(readRay.visit.instance === 0.U) {
-      best.hasHit    := false.B
-      best.occlusion := Occlusion.none
-    }
-  }
+  // A result, or a miss in its place
+  private val ofObject = io.objectResults.bits
+  private val result   = Wire(new VisitResult)
+  private val comes    = io.objectResults.valid || io.misses.map(_.valid).reduce(_ || _)
+  result.context     := ofObject.context
+  result.hasHit      := ofObject.hasHit && io.objectResults.valid
+  result.occlusion   := Mux(io.objectResults.valid, ofObject.occlusion, Occlusion.none)
+  result.hit         := ofObject.hit
+  io.misses(0).ready := !io.objectResults.valid
+  io.misses(1).ready := !io.objectResults.valid && !io.misses(0).valid
+  when(!io.objectResults.valid) { result.context := Mux(io.misses(0).valid, io.misses(0).bits, io.misses(1).bits) }
 
-  // Its distance along the ray of the world
-  private val isMeasuring = state === measuring
-  private val isMeasured  = isMeasuring && ray.enters && !ray.isShadow && result.hasHit
-  private val isIssued    = RegInit(false.B)
-  private val distance    = Module(new WorldDistance(config)).io
-  distance.distance.valid       := isMeasured && !isIssued
-  distance.distance.bits.tEntry := ray.tEntry
-  distance.distance.bits.t      := result.hit.t
-  distance.distance.bits.scale  := ray.scale
-  distance.t.ready              := true.B
-  when(distance.distance.fire) { isIssued := true.B }
-  when(distance.t.valid) {
-    isIssued := false.B
-    when(distance.t.bits < visit.tMax) {
-      visit.tMax    := distance.t.bits
-      best.hasHit   := true.B
-      best.hit      := result.hit
-      best.hit.t    := distance.t.bits
-      best.instance := visit.instance
-    }
-  }
-  when(isMeasuring && ray.enters && ray.isShadow && result.occlusion.asUInt > best.occlusion.asUInt) {
-    best.occlusion := result.occlusion
-  }
-  when(starts) { state := loading }
-  when(isLoading) { state := measuring }
-  when(isMeasuring && (!isMeasured || distance.t.valid)) { state := leaving }
-  when(state === leaving) { state := idle }
+  // Its distance along the ray of the world; the rest of it comes out then
+  private val distance = Module(new WorldDistance(config)).io
+  private val line     = Module(new DelayLine(new VisitResult, latency - 1)).io
+  private val measured = comes && result.hasHit
+  private val arrives  = Seq.iterate(comes, latency + 1)(RegNext(_, false.B))
+  distance.distance.valid       := RegNext(measured, false.B)
+  distance.distance.bits.tEntry := entries.read(result.context, measured)
+  distance.distance.bits.scale  := scales.read(result.context, measured)
+  distance.distance.bits.t      := RegNext(result.hit.t)
+  line.moves                    := true.B
+  line.writes                   := comes
+  line.in                       := result
+  line.reads                    := arrives(latency - 2)
 
-  // The next visit, or the result
-  private val isLast = (visit.instance +& 1.U) === io.count || best.occlusion === Occlusion.opaque
-  private val goesOn = state === leaving && !isLast
-  when(goesOn) { nearest.write(visit.context, best) }
-  io.again.valid            := goesOn
-  io.again.bits.context     := visit.context
-  io.again.bits.instance    := visit.instance + 1.U
-  io.again.bits.tMax        := visit.tMax
-  io.results.valid          := state === leaving && isLast
-  io.results.bits.context   := visit.context
-  io.results.bits.hasHit    := best.hasHit
-  io.results.bits.occlusion := best.occlusion
-  io.results.bits.hit       := best.hit
+  // The nearest hit so far
+  private val found     = RegNext(line.out)
+  private val step      = steps.read(line.out.context, arrives(latency - 1))
+  private val isNearer  = found.hasHit && !step.isShadow && distance.t.bits.integer < step.tMax.integer
+  private val isDarker  = step.isShadow && found.occlusion.asUInt > step.occlusion.asUInt
+  private val occlusion = Mux(isDarker, found.occlusion, step.occlusion)
+  private val left      = step.left & ~step.next
+  private val isLast    = left === 0.U || occlusion === Occlusion.opaque
+  private val nearest   = Wire(new InstanceStep(config))
+  nearest.context   := found.context
+  nearest.isShadow  := step.isShadow
+  nearest.left      := left
+  nearest.tMax      := Mux(isNearer, distance.t.bits, step.tMax)
+  nearest.hasHit    := step.hasHit || isNearer
+  nearest.occlusion := occlusion
+
+  private val isResolved = arrives(latency)
+  private val resolved   = RegNext(nearest)
+  io.again.valid            := RegNext(isResolved && !isLast, false.B)
+  io.again.bits             := resolved
+  io.results.valid          := RegNext(isResolved, false.B)
+  io.results.bits.context   := resolved.context
+  io.results.bits.hasHit    := resolved.hasHit
+  io.results.bits.occlusion := resolved.occlusion
+  io.results.bits.hit       := RegNext(found.hit)
+  io.results.bits.hit.t     := resolved.tMax
   io.results.bits.isClear.foreach(_ := DontCare)
-  io.results.bits.instance.foreach(_ := best.instance)
-}
+  for (visit <- io.results.bits.visit) {
+    visit.instance := RegNext(OHToUInt(step.next))
+    visit.isNearer := RegNext(isNearer)
+    visit.isLast   := RegNext(isLast)
+  }
 
-/** The nearest hit of a ray so far, with t along the ray of the world; what a shadow ray has met. */
-final private class NearestHit(config: PathConfig) extends Bundle {
-  val hasHit    = Bool()
-  val occlusion = Occlusion()
-  val instance  = InstanceNumber(config.device).get
-  val hit       = new TriangleHit(config)
+  /** What a ray has met in an object, along the ray there. */
+  private final class VisitResult extends Bundle {
+    val context   = Context(config)
+    val hasHit    = Bool()
+    val occlusion = Occlusion()
+    val hit       = new TriangleHit(config)
+  }
 }

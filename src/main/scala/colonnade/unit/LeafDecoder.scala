@@ -5,7 +5,7 @@ import chisel3.util.{log2Ceil, Queue, Valid}
 import colonnade.common.{Context, ModuloSchedule, ReservedQueue}
 import colonnade.common.ModuloSchedule.{interval, xyz}
 import colonnade.config.PathConfig
-import colonnade.formats.{Face, Leaf, LeafRecord, Vec3}
+import colonnade.formats.{Face, InstanceNumber, Leaf, LeafRecord, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.shading.{GeometricNormalStage, OctahedralDecoder}
 
@@ -14,6 +14,7 @@ final class HitLeaf(config: PathConfig) extends Bundle {
   val context  = Context(config)
   val isSecond = Bool() // the hit is on the leaf's second triangle
   val record   = UInt(LeafRecord.recordBits(config.device.geometry).W)
+  val instance = InstanceNumber(config.device)
 }
 
 /** The attributes of a hit; as in [[colonnade.formats.Face]], without colours. */
@@ -24,6 +25,7 @@ final class HitFace(config: PathConfig) extends Bundle {
   val normals         = face.normals.cloneType
   val geometricNormal = face.geometricNormal.cloneType
   val material        = face.material.cloneType
+  val instance        = InstanceNumber(config.device)
 }
 
 final class LeafDecoderIO(config: PathConfig) extends Bundle {
@@ -83,6 +85,7 @@ final class LeafDecoder(config: PathConfig) extends Module {
   private val out                             = Wire(new HitFace(config))
   out.context := carried(now.context)
   out.material := carried(leaf.material)
+  out.instance.zip(now.instance).foreach { case (to, from) => to := carried(from) }
   connect(out.geometricNormal, normal)
   for ((to, from) <- out.normals.zip(collected(corner.normal)))
     connect(to, from.axes.zip(normal).map { case (smooth, flat) => Mux(isFlat, flat, smooth) })

@@ -4,9 +4,9 @@ import chisel3._
 import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.common.{Choice, ContextTable}
 import colonnade.config.PathConfig
-import colonnade.formats.{Leaf, ObjectInstance, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
+import colonnade.formats.{InstanceNumber, Leaf, ObjectInstance, RecordBroadcast, RecordFormats, RecordRequest, SceneMap}
 import colonnade.numbers.Fixed
-import colonnade.ray.{PreparedRay, RayFormats, TriangleRay}
+import colonnade.ray.{PreparedRay, RayFormats, RayRequest, TriangleRay}
 import colonnade.shading.{Occlusion, ShadingPipeline}
 import colonnade.traversal.HitPoint
 
@@ -16,6 +16,8 @@ private final class ClosestHit(config: PathConfig) extends Bundle {
 
   /** From where the ray enters the box, along its dominant axis. */
   val t = new Fixed(new RayFormats(config.numbers).grid)
+
+  val instance = InstanceNumber(config.device)
 }
 
 final class PathHitsIO(config: PathConfig) extends Bundle {
@@ -23,9 +25,12 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
   val scene = Input(new SceneMap(config.device))
   val trace = Flipped(new TracePort(config)) // to the path unit
 
-  /** Rays that enter the object's box, to the traversal units; what they have met. */
+  /** Rays that enter the object's box, to the traversal units; what they have met. With instances also rays in the axes of
+    * objects, between ray set-up and an [[InstanceWalk]].
+    */
   val rays    = Decoupled(new PreparedRay(config))
   val results = Flipped(Valid(new TraceResult(config)))
+  val visits  = Option.when(config.device.frame.hasInstances)(Flipped(Decoupled(new RayRequest(config))))
 
   /** To the column's records, for attributes. */
   val requests   = Decoupled(new RecordRequest(config.device))
@@ -53,49 +58,47 @@ final class PathHits(config: PathConfig) extends Module {
   private val control = trace.control
 
   // Forward a ray, or end its trace at once if it misses the object's box
-  private val ray = trace.rays.bits
-  io.rays.valid         := trace.rays.valid && ray.enters
+  private val ray     = trace.rays.bits
+  private val goesOn  = ray.visit.fold(ray.enters)(ray.enters || _.valid)
+  private val isWorld = ray.visit.fold(true.B)(!_.valid)
+  io.rays.valid         := trace.rays.valid && goesOn
   io.rays.bits          := ray
-  trace.rays.ready      := !ray.enters || io.rays.ready
-  control.entered.valid := io.rays.fire
+  trace.rays.ready      := !goesOn || io.rays.ready
+  control.entered.valid := io.rays.fire && isWorld
   control.entered.bits  := ray.context
-  private val misses = trace.rays.valid && !ray.enters
+  private val misses = trace.rays.valid && !goesOn
+  trace.visits.zip(io.visits).foreach { case (to, from) => to :<>= from }
 
   // Results. Rays that miss the box have a table of their own, so that each table has one writer
   private val result   = io.results.bits
+  private val ends     = io.results.valid && result.visit.fold(true.B)(_.isLast)
+  private def isHit    = io.results.valid && result.visit.fold(result.hasHit)(_.isNearer)
   private val query    = Choice(control.query, control.queryNext)
   private val entered  = new FlagTable(paths, Bool())
   private val outcomes = new FlagTable(paths, UInt((1 + Occlusion.getWidth).W))
   private val outcome  = Mux(entered.read(query).asBool, outcomes.read(query), false.B ## Occlusion.none.asUInt)
-  entered.write(trace.rays.fire, ray.context, ray.enters)
-  outcomes.write(io.results.valid, result.context, result.hasHit ## result.occlusion.asUInt)
+  entered.write(trace.rays.fire && isWorld, ray.context, ray.enters)
+  outcomes.write(ends, result.context, result.hasHit ## result.occlusion.asUInt)
   control.hasHit          := outcome.head(1).asBool
   control.occlusion       := Occlusion.safe(outcome.tail(1))._1
   control.missesBox.valid := misses
   control.missesBox.bits  := ray.context
-  control.hasResult.valid := io.results.valid
+  control.hasResult.valid := ends
   control.hasResult.bits  := result.context
 
   // Tables: what the resolution of a hit reads, and what its shading reads
   private val closest = ContextTable(paths, new ClosestHit(config))
   private val hits    = ContextTable(paths, new HitPoint(config))
   private val rays    = ContextTable(paths, new TriangleRay(config.numbers))
-  private val writes  = io.rays.fire && !ray.isShadow // nobody shades what a shadow ray hits
+  private val writes  = io.rays.fire && isWorld && !ray.isShadow // nobody shades what a shadow ray hits
   when(writes) { rays.write(ray.context, ray.ray.forTriangles) }
-  when(io.results.valid && result.hasHit) {
+  when(isHit) {
     val entry = Wire(new ClosestHit(config))
-    entry.id := result.hit.id
-    entry.t  := result.hit.t
+    entry.id                                                 := result.hit.id
+    entry.t                                                  := result.hit.t
+    for ((to, visit) <- entry.instance.zip(result.visit)) to := visit.instance
     closest.write(result.context, entry)
     hits.write(result.context, result.hit.point)
-  }
-
-  // The instance that each context hits. A shadow ray replaces it: the shader sends it after it has accepted the hit that
-  // casts the ray
-  private val instanceOf = result.instance.map { number =>
-    val table = Reg(Vec(paths.contexts, chiselTypeOf(number)))
-    when(io.results.valid) { table(result.context) := number }
-    table
   }
 
   // A hit with a surface to shade, or whose distance is measured
@@ -110,12 +113,12 @@ final class PathHits(config: PathConfig) extends Module {
   trace.surfaceHit.bits.isPrimary := RegNext(control.isPrimary)
   trace.surfaceHit.bits.id        := hit.id
   trace.surfaceHit.bits.t         := hit.t
+  trace.surfaceHit.bits.instance.zip(hit.instance).foreach { case (to, from) => to := from }
   for (measured <- trace.surfaceHit.bits.distance) {
     val entries = ContextTable(paths, UInt(config.numbers.entryBits.W))
     when(writes) { entries.write(ray.context, ray.tEntry.natural) }
     measured := SurfaceHit.distance(config, entries.read(readHit, reads), hit.t)
   }
-  for ((number, table) <- trace.surfaceHit.bits.instance.zip(instanceOf)) number := table(context)
   assert(!(shades && distance.valid), "one hit is read in a cycle")
 
   // Its attributes
@@ -128,9 +131,10 @@ final class PathHits(config: PathConfig) extends Module {
   attributes.hits.valid        := trace.surfaceHit.valid
   attributes.hits.bits.context := context
   attributes.hits.bits.id      := hit.id
-  attributes.readyNext         := decoder.readyNext
-  attributes.wantsColours      := io.wantsColours.fold(false.B)(
-    ShadingPipeline.material(config, _, materialOf(record.record, record.hit.context))
+  attributes.hits.bits.instance.zip(hit.instance).foreach { case (to, from) => to := from }
+  attributes.readyNext    := decoder.readyNext
+  attributes.wantsColours := io.wantsColours.fold(false.B)(
+    ShadingPipeline.material(config, _, materialOf(record))
   )
   trace.attributeError := attributes.error
   io.events            := attributes.events
@@ -139,6 +143,7 @@ final class PathHits(config: PathConfig) extends Module {
   decoder.leaf.bits.context  := record.hit.context
   decoder.leaf.bits.isSecond := record.hit.id(0)
   decoder.leaf.bits.record   := record.record
+  decoder.leaf.bits.instance.zip(record.hit.instance).foreach { case (to, from) => to := from }
   // Faces: in the axes of their leaves, or with instances in those of the world
   private val (granted, offered) = io.instances.fold(facesOfLeaves)(facesInWorld)
   private val face               = offered.bits
@@ -168,7 +173,7 @@ final class PathHits(config: PathConfig) extends Module {
   private def facesInWorld(instances: Vec[ObjectInstance]): (Valid[UInt], Valid[HitFace]) = {
     val faces = Module(new WorldFaces(config)).io
     faces.objectFace    := decoder.face
-    faces.instance      := instances(instanceOf.get(faces.context))
+    faces.instances     := instances
     faces.hasInstances  := io.scene.instances.get =/= 0.U
     faces.mayTakeNext   := trace.hitsReadyNext
     decoder.mayTakeNext := faces.mayComeNext
@@ -176,10 +181,10 @@ final class PathHits(config: PathConfig) extends Module {
   }
 
   /** The material of the face of a leaf, in the scene. */
-  private def materialOf(leaf: UInt, context: UInt): UInt = {
-    val material = new Leaf(config.device.geometry, leaf).material
-    io.instances.zip(instanceOf).fold(material) { case (instances, table) =>
-      Mux(io.scene.instances.get =/= 0.U, material + instances(table(context)).materialBase, material)
+  private def materialOf(response: AttributeResponse): UInt = {
+    val material = new Leaf(config.device.geometry, response.record).material
+    io.instances.zip(response.hit.instance).fold(material) { case (instances, number) =>
+      Mux(io.scene.instances.get =/= 0.U, material + instances(number).materialBase, material)
     }
   }
 }

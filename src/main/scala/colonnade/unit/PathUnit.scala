@@ -58,7 +58,7 @@ final class PathUnit(config: PathConfig) extends Module {
   // From a position to a prepared ray; rays whose pixels are closer to their end have priority
   primaryRays.positions :<>= io.positions
   private val tracedPrimary = environment.map(_.objectRays).getOrElse(primaryRays.ray)
-  private val raySources    = Seq(surfaceRays) ++ bounces.map(_.ray) :+ tracedPrimary
+  private val raySources    = trace.visits.toSeq ++ Seq(surfaceRays) ++ bounces.map(_.ray) :+ tracedPrimary
   private val rayArbiter    = Module(new Arbiter(new RayRequest(config), raySources.size)).io
   rayArbiter.in.zip(raySources).foreach { case (in, rays) => in :<>= rays }
   raySetup.request :<>= TimingSlice.queue(rayArbiter.out)              // no path leads from ray set-up to the tiles

@@ -5,13 +5,17 @@ import chisel3.util.{Decoupled, Valid}
 import colonnade.common.Context
 import colonnade.config.PathConfig
 import colonnade.formats.InstanceNumber
-import colonnade.ray.PreparedRay
+import colonnade.ray.{PreparedRay, RayRequest}
 import colonnade.shading.{Occlusion, ShadeRequest}
 import colonnade.traversal.TriangleHit
 
 /** From rays to hits with their attributes, seen from the unit that follows the paths. */
 final class TracePort(config: PathConfig) extends Bundle {
-  val rays    = Decoupled(new PreparedRay(config))
+  val rays = Decoupled(new PreparedRay(config))
+
+  /** Rays in the axes of instances, to be prepared: they come back by `rays`. */
+  val visits = Option.when(config.device.frame.hasInstances)(Flipped(Decoupled(new RayRequest(config))))
+
   val control = Flipped(new TraceControl(config))
 
   /** The hit of the ray that has a surface to shade, a cycle after it is resolved. After `control.readsDistance`, the
@@ -39,6 +43,14 @@ final class TraceResult(config: PathConfig) extends Bundle {
   /** The hit triangle is not opaque. */
   val isClear = Option.when(config.device.frame.rays)(Bool())
 
-  /** The hit object; traversal units do not know it. */
-  val instance = InstanceNumber(config.device)
+  val visit = Option.when(config.device.frame.hasInstances)(new VisitOutcome(config))
+}
+
+/** What a result tells of an instance; traversal units do not know it. */
+final class VisitOutcome(config: PathConfig) extends Bundle {
+  val instance = InstanceNumber(config.device).get
+
+  /** The hit is the nearest one so far; the ray has met all that it meets. */
+  val isNearer = Bool()
+  val isLast   = Bool()
 }

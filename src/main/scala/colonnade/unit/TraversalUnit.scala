@@ -105,7 +105,7 @@ final class TraversalUnit(config: TraversalConfig) extends Module {
   result.bits.occlusion             := intersector.outcome.occlusion
   result.bits.hit                   := intersector.outcome.hit
   result.bits.isClear.zip(intersector.outcome.isClear).foreach { case (to, from) => to := from }
-  result.bits.instance.foreach(_ := DontCare)
+  result.bits.visit.foreach(_ := DontCare)
   queue.io.enq :<>= result
   io.results :<>= queue.io.deq
 

@@ -58,8 +58,19 @@ final class InstanceStimulus(config: ColonnadeConfig, random: Random) {
     Seq.fill(2)(if (random.nextInt(5) == 0) one * (random.nextInt(3) - 1) else below(2 * one + 1) - one)
   )
 
+  /** A box in cells, low and high: any one, in a quarter of cases a flat one. */
+  def box(): (Seq[BigInt], Seq[BigInt]) = {
+    val (some, other) = (Seq.fill(3)(BigInt(7, random)), Seq.fill(3)(BigInt(7, random)))
+    val low           = some.zip(other).map { case (a, b) => a.min(b) }
+    (low, if (random.nextInt(4) == 0) low else some.zip(other).map { case (a, b) => a.max(b) })
+  }
+
   /** Of a number of bits, from few to all. */
   def distance(): BigInt = BigInt(random.nextInt(grid), random)
+
+  def rayInside(): WorldRay = ray().copy(origin = Seq.fill(3)(below(cube)))
+
+  val farthest: BigInt = (BigInt(1) << (grid - 1)) - 1
 
   /** Any numbers: from mirrors to shears, near to and far from the ray. */
   def transform(): Transform =
@@ -112,14 +123,14 @@ final class InstanceStimulus(config: ColonnadeConfig, random: Random) {
 
 object InstanceStimulus {
 
+  /** The box of an object that fills the world. */
+  val wholeCube: (Seq[BigInt], Seq[BigInt]) = (Seq.fill(3)(BigInt(0)), Seq.fill(3)(BigInt(127)))
+
   /** The presets' formats, the narrowest and the widest, with instances. */
   val formats: Seq[ColonnadeConfig] =
     Seq(
       TestConfigs.tiny,
       TestConfigs.withPrecision(16, 16, 32),
       TestConfigs.withPrecision(64, 64, 64)
-    ).map(withInstances(_, 3))
-
-  def withInstances(config: ColonnadeConfig, count: Int): ColonnadeConfig =
-    config.copy(frame = config.frame.copy(instances = count))
+    ).map(TestConfigs.withInstances(_, 3))
 }

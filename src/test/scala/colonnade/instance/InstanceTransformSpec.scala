@@ -22,13 +22,14 @@ private class InstanceTransformHarness(config: ColonnadeConfig)
     extends PackedUnit(new TransformInput(config), new ObjectRay(config)) {
   private val transform = Module(new InstanceTransform(config)).io
   private val input     = in.bits.asTypeOf(new TransformInput(config))
-  transform.visit.valid := in.valid
+  transform.visit.valid := in.fire
   transform.visit.bits  := input.visit
-  in.ready              := transform.visit.ready
-  transform.instance    := RegEnable(input.instance, in.fire)
-  out.valid             := transform.ray.valid
-  out.bits              := transform.ray.bits.asUInt
-  transform.ray.ready   := out.ready
+  in.ready              := RegNext(transform.readyNext, false.B)
+  for ((instance, number) <- transform.instances.zipWithIndex)
+    instance          := RegEnable(input.instance, in.fire && input.visit.instance === number.U)
+  out.valid           := transform.ray.valid
+  out.bits            := transform.ray.bits.asUInt
+  transform.ray.ready := out.ready
 }
 
 /** Rays in the axes of objects equal the model's, bit for bit. */
@@ -45,7 +46,8 @@ class InstanceTransformSpec extends AnyFlatSpec with ChiselScalatestTester with 
         val output   = new Packed(new ObjectRay(config))
         val payloads = cases.zipWithIndex.map { case (each, i) =>
           input.pack(each.ray.fields("visit.ray") ++ each.transform.fields("instance") ++
-            Map("visit.context" -> BigInt(i % 5), "visit.isShadow" -> BigInt(i % 2), "visit.tMax" -> each.tMax))
+            Map("visit.context" -> BigInt(i % 5), "visit.isShadow" -> BigInt(i % 2), "visit.tMax" -> each.tMax) +
+            ("visit.instance" -> BigInt(i % 3)))
         }
         val (rays, _) = PackedStreams.run(dut, payloads, 0.5, 0.4, random)
         for ((((bits, each), expected), i) <- rays.zip(cases).zip(stimulus.answers(cases)).zipWithIndex)
@@ -53,12 +55,18 @@ class InstanceTransformSpec extends AnyFlatSpec with ChiselScalatestTester with 
             val ray = output.unpack(bits)
             Seq("x", "y", "z").map(axis => ray(s"request.origin.$axis")) shouldBe expected.origin
             Seq("x", "y", "z").map(axis => ray(s"request.dir.$axis")) shouldBe expected.dir
-            Seq("limit", "scale.length.mantissa", "scale.length.exponent", "scale.shift").map(ray(_)) shouldBe
+            Seq(
+              "request.visit.bits.tMax",
+              "scale.length.mantissa",
+              "scale.length.exponent",
+              "scale.shift"
+            ).map(ray(_)) shouldBe
               Seq(expected.limit, expected.mantissa, expected.exponent, BigInt(each.transform.shift))
-            Seq("request.context", "request.isShadow").map(ray(_)) shouldBe Seq(BigInt(i % 5), BigInt(i % 2))
+            Seq("context", "isShadow", "visit.valid", "visit.bits.instance").map(name => ray(s"request.$name")) shouldBe
+              Seq(i % 5, i % 2, 1, i % 3).map(BigInt(_))
           }
         val interval = PackedStreams.run(dut, payloads)._2 / payloads.size
         info(s"$interval cycles a ray")
-        interval should be <= 30
+        interval should be <= 3
       }
 }

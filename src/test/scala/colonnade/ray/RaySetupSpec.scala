@@ -48,6 +48,21 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
         }
     }
 
+    it should s"prepare rays in the axes of instances among those of the world, interval $interval" in {
+      val config = TestConfigs.withInstances(withInterval(narrowTests, interval), 3)
+      test(new RaySetupHarness(config)).withAnnotations(Simulation.verilator) { setup =>
+        val random        = new Random(4)
+        val stimulus      = new SetupStimulus(config, random)
+        val of            = stimulus.all(raysPerBox = 40)
+        val (cube, world) = (of.head, of.last)
+        val visits = cube.copy(requests = cube.requests.map(_.copy(isShadow = false, visit = Some(random.nextInt(3)))))
+        val mixed  = random.shuffle(Seq(visits, world).flatMap(each => each.requests.zip(each.answers(config))))
+        val (requests, answers) = mixed.unzip
+        answers.count(_.head == 1) should be > 30
+        run(setup, world.copy(requests = requests), answers, random, Rates(2, 3))
+      }
+    }
+
     val limits = Seq(TestConfigs.tiny -> interval.min(16)) ++ Seq(slowest -> interval).filter(_ => interval > 1)
     for ((formats, limit) <- limits)
       it should s"accept a ray every $limit cycles, ${nameOf(formats, interval)}, and lose none" in {
@@ -111,6 +126,10 @@ class RaySetupSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
     ray.context.peekInt() shouldBe request.context
     ray.isShadow.peekBoolean() shouldBe request.isShadow
     ray.enters.peekInt() shouldBe answer.head
+    for (visit <- ray.visit) {
+      visit.valid.peekBoolean() shouldBe request.visit.nonEmpty
+      request.visit.foreach(visit.bits.expect(_))
+    }
     if (answer.head == 1) {
       val traced  = ray.ray
       val units   = boxes.origin.zip(boxes.roundsUp).map { case (below, up) => raw(below) + up.peekInt() }
@@ -163,5 +182,10 @@ object RaySetupSpec {
     port.isShadow.poke(request.isShadow)
     port.origin.axes.zip(request.origin).foreach { case (to, from) => to.raw.asInstanceOf[SInt].poke(from) }
     port.dir.axes.zip(request.dir).foreach { case (to, from) => to.poke(from) }
+    for (visit <- port.visit) {
+      visit.valid.poke(request.visit.nonEmpty)
+      visit.bits.instance.poke(request.visit.getOrElse(0))
+      visit.bits.tMax.poke((BigInt(1) << visit.bits.tMax.getWidth) - 1)
+    }
   }
 }

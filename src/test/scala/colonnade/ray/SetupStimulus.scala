@@ -5,8 +5,14 @@ import colonnade.config.ColonnadeConfig
 
 import scala.util.Random
 
-/** A ray to prepare. */
-final case class SetupRequest(context: Int, isShadow: Boolean, origin: Seq[BigInt], dir: Seq[BigInt])
+/** A ray to prepare, of the world or in the axes of an instance. */
+final case class SetupRequest(
+    context:  Int,
+    isShadow: Boolean,
+    origin:   Seq[BigInt],
+    dir:      Seq[BigInt],
+    visit:    Option[Int] = None
+)
 
 /** An object's box with rays for it, random and directed. */
 final case class SetupCase(low: Seq[BigInt], high: Seq[BigInt], requests: Seq[SetupRequest]) {

@@ -7,9 +7,9 @@ import colonnade.TestParts._
 import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.formats.ObjectInstance
 import colonnade.instance.{InstanceCase, InstanceStimulus, WorldRay}
-import colonnade.ray.PreparedRay
+import colonnade.ray.{PreparedRay, RaySetup}
 import colonnade.shading.Occlusion
-import colonnade.{Packed, Proofs, Simulation, TestConfigs}
+import colonnade.{Model, Packed, Proofs, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -18,7 +18,8 @@ import scala.util.Random
 
 /** Payloads as integers. */
 private class InstanceWalkHarness(config: ColonnadeConfig) extends Module {
-  private val walk = Module(new InstanceWalk(config)).io
+  private val walk  = Module(new InstanceWalk(config)).io
+  private val setup = Module(RaySetup(config)).io
 
   val count         = IO(Input(chiselTypeOf(walk.scene.instances.get)))
   val root          = IO(Input(chiselTypeOf(walk.scene.root)))
@@ -32,33 +33,40 @@ private class InstanceWalkHarness(config: ColonnadeConfig) extends Module {
   walk.scene.root          := root
   walk.scene.instances.get := count
   walk.instances           := instances.asTypeOf(walk.instances)
-  walk.rays.valid          := rays.valid
-  walk.rays.bits           := rays.bits.asTypeOf(walk.rays.bits)
-  rays.ready               := walk.rays.ready
-  objectRays.valid         := walk.objectRays.valid
-  objectRays.bits          := walk.objectRays.bits.asUInt
-  walk.objectRays.ready    := objectRays.ready
-  walk.objectResults       := objectResults
-  results.valid            := walk.results.valid
-  results.bits             := walk.results.bits.asUInt
+
+  // Rays in the axes of objects come back by ray set-up, before those of the world
+  setup.request :<>= walk.requests
+  setup.bounds    := 0.U.asTypeOf(setup.bounds)
+  walk.rays.valid := setup.ray.valid || rays.valid
+  walk.rays.bits  := rays.bits.asTypeOf(walk.rays.bits)
+  walk.rays.bits.visit.foreach(_.valid := false.B)
+  when(setup.ray.valid) { walk.rays.bits := setup.ray.bits }
+  setup.ray.ready       := walk.rays.ready
+  rays.ready            := walk.rays.ready && !setup.ray.valid
+  objectRays.valid      := walk.objectRays.valid
+  objectRays.bits       := walk.objectRays.bits.asUInt
+  walk.objectRays.ready := objectRays.ready
+  walk.objectResults    := objectResults
+  results.valid         := walk.results.valid
+  results.bits          := walk.results.bits.asUInt
 }
 
-/** However traversal units accept rays and return results: each ray is traced in one instance after the other, ends once,
-  * and has the nearest hit, of equal ones that of the first instance; a shadow ray ends at an opaque triangle.
+/** However traversal units accept rays and return results: each ray is traced in the instances whose boxes it enters, one
+  * after the other, ends once, and has the nearest hit, of equal ones that of the first instance; a shadow ray ends at an opaque triangle.
   */
 class InstanceWalkSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers with Proofs {
   behavior of "InstanceWalk"
 
-  private val config = InstanceStimulus.withInstances(TestConfigs.tiny, 3)
+  private val config = TestConfigs.withInstances(TestConfigs.tiny, 3)
 
   it should "trace rays in three, two and one instances, and forward them without any" in
     test(new InstanceWalkHarness(config)).withAnnotations(Simulation.verilator) { dut =>
-      for ((instances, rays) <- Seq(3 -> 50, 0 -> 20, 2 -> 20, 1 -> 20))
+      for ((instances, rays) <- Seq(3 -> 50, 0 -> 20, 2 -> 30, 1 -> 20))
         withClue(s"$instances instances: ")(new InstanceWalkDriver(dut, config, instances).run(rays))
     }
 
   it should "resolve each visit once, for any hits, and results in any order" in {
-    val narrow = InstanceStimulus.withInstances(TestConfigs.withPrecision(16, 16, 16), 3)
+    val narrow = TestConfigs.withInstances(TestConfigs.withPrecision(16, 16, 16), 3)
     prove(20)(
       new InstanceResultsProof(
         narrow.copy(
@@ -78,8 +86,10 @@ private class InstanceWalkDriver(dut: InstanceWalkHarness, config: ColonnadeConf
   private val stimulus = new InstanceStimulus(config, random)
   private val rayBits  = new Packed(new PreparedRay(PathConfig(config)))
   private val hitBits  = new Packed(new TraceResult(config))
-  private val middle   = stimulus.ray()
+  private val middle   = stimulus.rayInside()
   private val objects  = Seq.fill(config.frame.instances)(stimulus.through(middle))
+  private val boxes    =
+    Seq.tabulate(config.frame.instances)(i => if (i == 2) stimulus.box() else InstanceStimulus.wholeCube)
 
   /** A ray on its way; `expected` is what it is next seen as at the traversal units, or at the end. */
   private final class Trace(val context: Int, ray: WorldRay, tMax: BigInt, isShadow: Boolean) {
@@ -91,6 +101,11 @@ private class InstanceWalkDriver(dut: InstanceWalkHarness, config: ColonnadeConf
     var result                    = Map.empty[String, BigInt]
     var expected                  = Map.empty[String, BigInt]
     var isOver                    = false
+    private var nearest           = Map.empty[String, BigInt]
+    private val enters            = {
+      val requests = boxes.map { case (low, high) => (ray.numbers :+ tMax) ++ low ++ high }
+      Model.answers(config, requests, "instancebox").map(_.head == 1)
+    }
 
     val payload: Map[String, BigInt] = ray.fields("ray") ++
       Map("context" -> BigInt(context), "isShadow" -> bit(isShadow), "tMax" -> tMax, "tEntry" -> entry)
@@ -101,7 +116,10 @@ private class InstanceWalkDriver(dut: InstanceWalkHarness, config: ColonnadeConf
         result = anyResult(stimulus.distance())
         expected = Map("root" -> BigInt(77), "tMax" -> tMax, "tEntry" -> entry)
       } else if (instance == instances || occlusion == 2) finish()
-      else {
+      else if (!enters(instance)) {
+        instance += 1
+        follow()
+      } else {
         val beyond   = stimulus.distance()
         val inObject = stimulus.answers(Seq(InstanceCase(ray, limit, objects(instance), beyond))).head
         inObject.entry match {
@@ -134,21 +152,35 @@ private class InstanceWalkDriver(dut: InstanceWalkHarness, config: ColonnadeConf
         follow()
       }
 
+    /** Results before the last one name nearer hits. */
+    def seen(found: Map[String, BigInt]): Unit =
+      if (found("visit.isNearer") == 1) nearest = found.filter { case (name, _) => name.startsWith("hit.") } +
+        ("instance" -> found("visit.instance"))
+
     private def finish(): Unit = {
       isOver = true
-      expected = Map("hasHit" -> best.getOrElse("hasHit", BigInt(0)), "occlusion" -> BigInt(occlusion)) ++
-        (if (best.get("hasHit").contains(BigInt(1))) best.filter(_._1 != "occlusion") else Nil)
+      expected =
+        if (isShadow) Map("occlusion" -> BigInt(occlusion)) else Map("hasHit" -> best.getOrElse("hasHit", BigInt(0)))
     }
 
-    private def anyResult(t: BigInt): Map[String, BigInt] = Map(
-      "context"        -> BigInt(context),
-      "hasHit"         -> bit(!isShadow && random.nextInt(4) > 0),
-      "occlusion"      -> BigInt(if (isShadow) random.nextInt(5).min(2) else 0),
-      "hit.t"          -> t,
-      "hit.id"         -> BigInt(8, random),
-      "hit.weights[1]" -> BigInt(9, random),
-      "hit.backSide"   -> BigInt(1, random)
-    )
+    /** The nearest hit is the one that was seen. */
+    def check(): Unit =
+      if (expected.get("hasHit").contains(BigInt(1))) for ((name, value) <- best if nearest.contains(name))
+        (name -> nearest(name)) shouldBe (name -> value)
+
+    /** A ray that hits has met an opaque triangle, as far as traversal units know. */
+    private def anyResult(t: BigInt): Map[String, BigInt] = {
+      val occlusion = if (isShadow) random.nextInt(5).min(2) else 2 * random.nextInt(4).min(1)
+      Map(
+        "context"        -> BigInt(context),
+        "hasHit"         -> bit(occlusion == 2),
+        "occlusion"      -> BigInt(occlusion),
+        "hit.t"          -> t,
+        "hit.id"         -> BigInt(8, random),
+        "hit.weights[1]" -> BigInt(9, random),
+        "hit.backSide"   -> BigInt(1, random)
+      )
+    }
   }
 
   def run(rays: Int): Unit = {
@@ -158,7 +190,9 @@ private class InstanceWalkDriver(dut: InstanceWalkHarness, config: ColonnadeConf
     var (started, done, visits, hits, idle) = (0, 0, 0, 0, 0)
     val all                                 = new Packed(Vec(config.frame.instances, new ObjectInstance(config)))
     dut.instances.poke(all.pack(objects.zipWithIndex.map { case (each, i) =>
-      each.fields(s"[$i]") + (s"[$i].root" -> rootOf(i))
+      each.fields(s"[$i]") + (s"[$i].root" -> rootOf(i)) ++
+        boxes(i)._1.zip("xyz").map { case (value, axis) => s"[$i].box.low.$axis" -> value } ++
+        boxes(i)._2.zip("xyz").map { case (value, axis) => s"[$i].box.high.$axis" -> value }
     }.reduce(_ ++ _)))
     dut.count.poke(instances)
     dut.root.poke(77)
@@ -169,7 +203,7 @@ private class InstanceWalkDriver(dut: InstanceWalkHarness, config: ColonnadeConf
       val free = (0 until config.units.pathContexts).filterNot(context => traces.contains(context))
       if (offer.isEmpty && started < rays && free.nonEmpty && random.nextInt(3) == 0) {
         val ray  = if (random.nextInt(3) == 0) stimulus.ray() else middle
-        val tMax = if (random.nextBoolean()) stimulus.distance() else (BigInt(1) << (numbers.gridBits - 1)) - 1
+        val tMax = if (random.nextBoolean()) stimulus.distance() else stimulus.farthest
         offer = Some(new Trace(free(random.nextInt(free.size)), ray, tMax, random.nextInt(3) == 0))
         started += 1
       }
@@ -195,9 +229,12 @@ private class InstanceWalkDriver(dut: InstanceWalkHarness, config: ColonnadeConf
         visits += 1
         idle = 0
       }
-      if (dut.results.valid.peekBoolean()) {
-        val trace = expect(traces, hitBits.unpack(dut.results.bits.peekInt()), isOver = true)
-        hits += trace.expected("hasHit").toInt
+      val result = Option.when(dut.results.valid.peekBoolean())(hitBits.unpack(dut.results.bits.peekInt()))
+      for (found <- result) traces(found("context").toInt).seen(found)
+      for (found <- result if found("visit.isLast") == 1) {
+        val trace = expect(traces, found, isOver = true)
+        trace.check()
+        hits += trace.expected.getOrElse("hasHit", BigInt(0)).toInt
         traces -= trace.context
         done += 1
         idle = 0

@@ -2,7 +2,6 @@ package colonnade.unit
 
 import chiseltest._
 import colonnade.TestParts._
-import colonnade.instance.InstanceStimulus
 import colonnade.{Model, OneSimulation, RandomPorts, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
@@ -14,7 +13,7 @@ import scala.util.Random
 class WorldFacesSpec extends AnyFlatSpec with OneSimulation with Matchers {
   behavior of "WorldFaces"
 
-  private val config = InstanceStimulus.withInstances(TestConfigs.tiny, 2)
+  private val config = TestConfigs.withInstances(TestConfigs.tiny, 2)
 
   inOneSimulation(new WorldFaces(config))(
     "transform faces"                 -> transform(few = 1, hasInstances = true),
@@ -40,8 +39,10 @@ class WorldFacesSpec extends AnyFlatSpec with OneSimulation with Matchers {
       val material = RandomPorts.randomise(io.objectFace.bits.material, random)
       val context  = RandomPorts.randomise(io.objectFace.bits.context, random).head
       if (comes) {
-        val matrix  = RandomPorts.randomise(io.instance.normal, random)
-        val base    = RandomPorts.randomise(io.instance.materialBase, random)
+        val number = random.nextInt(io.instances.size)
+        val matrix = RandomPorts.randomise(io.instances(number).normal, random)
+        val base   = RandomPorts.randomise(io.instances(number).materialBase, random)
+        io.objectFace.bits.instance.get.poke(number)
         val request = normals ++ material ++ matrix ++ base
         val inWorld = Model.answers(config, Seq(request), "instanceface").head
         waiting.enqueue(context -> (if (hasInstances) inWorld else normals ++ material))
