@@ -40,7 +40,7 @@ final class InstanceFilter(config: PathConfig) extends Module {
 
   val io = IO(new InstanceFilterIO(config))
 
-  // Three stages, from planes to products and the mask. All hold while the last group of a ray is not taken
+  // Stages hold while the last group of a ray is not taken
   private val moves   = !io.entered.valid || io.entered.ready
   private val isHeld  = RegInit(false.B)
   private val group   = RegInit(0.U(log2Ceil(groups.max(2)).W))
@@ -50,10 +50,10 @@ final class InstanceFilter(config: PathConfig) extends Module {
   when(io.ray.ready) { isHeld := io.ray.valid }
   when(moves && isHeld) { group := Mux(isLast, 0.U, group + 1.U) }
 
-  /** A value a stage later. */
+  /** A value of a stage in the next one. */
   private def next[T <: Data](value: T): T = RegEnable(value, moves)
 
-  // The ray in cells
+  // Stage 0: the ray in cells
   private val ray    = io.ray.bits.ray
   private val common = Wire(new RayInFilter)
   private val limit  = (io.ray.bits.tMax.integer.asUInt >> dropBits) +& 1.U
@@ -65,14 +65,14 @@ final class InstanceFilter(config: PathConfig) extends Module {
     val steep = (shear.integer >> (numbers.shearFraction - slopeBits)).asUInt(slopeBits, 0)
     to := Mux(shear.integer < 0.S, ~steep, steep)
   }
-  private val held     = RegEnable(common, accepts)
+  private val ray0     = RegEnable(common, accepts)
   private val axis     = RegEnable(ray.orientation.axis, accepts)
   private val negative =
     RegEnable(VecInit(ray.shear.map(_.integer < 0.S).toSeq :+ ray.orientation.negative(2)), accepts)
   private val origin = RegEnable(VecInit(ray.origin.map(each => (each.integer >> dropBits).asSInt)), accepts)
 
-  // Distances to the near and the far plane along each axis, rounded outwards
-  private val first = next(held)
+  // Stage 1: distances to the near and the far plane along each axis, rounded outwards
+  private val ray1  = next(ray0)
   private val boxes = Seq.tabulate(lanes) { lane =>
     val boxes  = Seq.tabulate(groups)(each => io.boxes((lanes * each + lane).min(instances - 1)))
     val box    = if (groups == 1) boxes.head else VecInit(boxes)(group)
@@ -88,14 +88,14 @@ final class InstanceFilter(config: PathConfig) extends Module {
     (next(isOn), planes)
   }
 
-  // What the ray moves sideways from its entry and to its exit along z'
-  private val second = next(first)
+  // Stage 2: what the ray moves sideways up to its entry and to its exit along z'
+  private val ray2   = next(ray1)
   private val passes = boxes.map { case (isOn, planes) =>
     val (near, far) = planes.last
-    val isBefore    = near > first.limit.zext
+    val isBefore    = near > ray1.limit.zext
     val entry       = Mux(near < 0.S, 0.U, near.asUInt(moveBits - 1, 0))
-    val exit        = Mux(far > first.limit.zext, first.limit, far.asUInt(moveBits - 1, 0))
-    val sides       = first.slopes.zip(planes).map { case (slope, (near, far)) =>
+    val exit        = Mux(far > ray1.limit.zext, ray1.limit, far.asUInt(moveBits - 1, 0))
+    val sides       = ray1.slopes.zip(planes).map { case (slope, (near, far)) =>
       val least = (entry * slope) >> slopeBits
       val most  = (exit * (slope +& 1.U)) >> slopeBits
       (next(least), next(most), next(near), next(far))
@@ -109,21 +109,21 @@ final class InstanceFilter(config: PathConfig) extends Module {
       _ && _
     )
   }
-  private val holds = RegInit(VecInit(false.B, false.B))
-  private val isEnd = next(next(isLast))
-  private val isOf  = next(next(group))
+  private val holds   = RegInit(VecInit(false.B, false.B))
+  private val isLast2 = next(next(isLast))
+  private val group2  = next(next(group))
   when(moves) {
     holds(0) := isHeld
     holds(1) := holds(0)
   }
   private val before = RegInit(0.U(instances.W))
   private val bits   = VecInit(meets).asUInt
-  private val mask   = before | Cat((0 until groups).reverse.map(each => Mux(isOf === each.U, bits, 0.U(lanes.W))))
-  when(moves && holds(1)) { before := Mux(isEnd, 0.U, mask) }
-  io.entered.valid         := holds(1) && isEnd
-  io.entered.bits.context  := second.context
-  io.entered.bits.isShadow := second.isShadow
-  io.entered.bits.tMax     := second.tMax
+  private val mask   = before | Cat((0 until groups).reverse.map(each => Mux(group2 === each.U, bits, 0.U(lanes.W))))
+  when(moves && holds(1)) { before := Mux(isLast2, 0.U, mask) }
+  io.entered.valid         := holds(1) && isLast2
+  io.entered.bits.context  := ray2.context
+  io.entered.bits.isShadow := ray2.isShadow
+  io.entered.bits.tMax     := ray2.tMax
   io.entered.bits.mask     := mask
 
   /** What stages need of a ray. */
