@@ -1,4 +1,4 @@
-"""The tables of ``docs/explore.md``: energy and area, vertex bits and contexts."""
+"""Tables of studies: energy and area, vertex bits and contexts, instances."""
 
 from __future__ import annotations
 
@@ -33,11 +33,23 @@ def trade(name: str, data: Data) -> str:
     return markdown([*titles, "kGE·cycle/ray", f"energy × area ÷ rate, to `{study['baseline']}`"], rows)
 
 
+def instances(data: Data) -> str:
+    """Cycles of `edge` for objects as one mesh and as instances."""
+    one, many = (point["workloads"] for point in data.result("instances")["points"])
+    rows = []
+    for scene in one:
+        before, after = one[scene]["cycles"], many[scene]["cycles"]
+        rows.append([f"`{scene}`", f"{before:,}", f"{after:,}", f"{100 * (after / before - 1):+.1f} %"])
+    return markdown(["objects", "cycles, one mesh", "instances", "more"], rows)
+
+
 def number(value: float | None, form: str, scale: float = 1.0) -> str:
     """The scaled value as text; a dash without one."""
     return "–" if value is None else format(value * scale, form)
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {
-    name: partial(trade, name) for name in ("energy-area", "vertices-contexts")
+    "energy-area": partial(trade, "energy-area"),
+    "vertices-contexts": partial(trade, "vertices-contexts"),
+    "instances": instances,
 }
