@@ -12,6 +12,7 @@
 #include "mesh/atlas.hpp"
 #include "mesh/baking.hpp"
 #include "mesh/cleaning.hpp"
+#include "mesh/emission.hpp"
 #include "mesh/roughness.hpp"
 #include "mesh/swatches.hpp"
 #include "packer/records.hpp"
@@ -196,6 +197,15 @@ nb::tuple metalOf(const Texture& map, const Positions& uvs, double metallic, dou
     return result;
 }
 
+auto emissionOf(const Texture& map, const Positions& uvs, const Column<double>& areas, const Column<double>& linear) {
+    if (areas.shape(0) < uvs.shape(0) || linear.shape(0) < 256) throw std::invalid_argument("a face has no area");
+    double* found;
+    auto result = makeArray({uvs.shape(0), 3}, found);
+    const std::vector<mesh::Rgb> colours = mesh::emissionOf(pictureOf(map), uvs.data(), areas.data(), uvs.shape(0), linear.data());
+    std::memcpy(found, colours.data(), colours.size() * sizeof colours[0]);
+    return result;
+}
+
 nb::tuple cutAlpha(const CornerRows<double>& corners, const Positions& uvs, const Rows<double>& alphas, const std::optional<Texture>& texture,
                    const std::optional<nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>>& alpha, const Column<double>& linear, double factor,
                    double cutoff, std::optional<double> paneFactor, double smallest, std::int64_t budget) {
@@ -325,5 +335,6 @@ void bind_packer(nb::module_& module) {
     module.def("swatches", &swatches, "texture"_a, "uvs"_a, "linear"_a, "Which faces show one colour, and the linear colours of their corners.");
     module.def("baked", &baked, "vertices"_a, "faces"_a, "normals"_a, "maps"_a, "index"_a, "uvs"_a, "tangents"_a, "budget"_a);
     module.def("metal_of", &metalOf, "map"_a, "uvs"_a, "metallic"_a, "roughness"_a);
+    module.def("emission_of", &emissionOf, "map"_a, "uvs"_a, "areas"_a, "linear"_a);
     module.def("merged_values", &mesh::mergedValues, "values"_a, "weights"_a, "kinds"_a, "count"_a);
 }

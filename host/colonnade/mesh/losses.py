@@ -35,7 +35,7 @@ MAPS = {
     ),
     "specularGlossinessTexture": Loss.of("specular-glossiness map", "not shown", "the surface is diffuse"),
     "occlusionTexture": Loss.of("occlusion map", "not shown", "ambient light reaches all surfaces"),
-    "emissiveTexture": Loss.of("emission map", "not shown", "the surface emits its mean"),
+    "emissiveTexture": Loss.of("emission map", "averaged", "a face emits one of four colours"),
 }
 TEXTURE_OBJ = Loss.of("texture map", "not shown", "only map_Kd is")
 NO_PICTURES = Loss.of("picture of a texture", "missing", "surfaces have their base colour", "pictures of textures")

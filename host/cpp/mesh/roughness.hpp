@@ -14,17 +14,10 @@ struct FaceMetal {
 
 /// `uvs`: positions of the corners in a metallic-roughness map, two each; `factors` of metallic and roughness.
 inline FaceMetal metalOf(const Picture<std::uint8_t>& map, const double* uvs, const double* factors) {
-    constexpr int points = 4, steps = 16;
-    double sums[3]{}, count = 0;
-    for (int i = 0; i < points; ++i)
-        for (int j = 0; i + j < points; ++j, ++count) {
-            const double a = (i + 1.0 / 3) / points, b = (j + 1.0 / 3) / points, c = 1 - a - b;
-            const double at[] = {a * uvs[0] + b * uvs[2] + c * uvs[4], a * uvs[1] + b * uvs[3] + c * uvs[5]};
-            double codes[3];
-            map.sample(at, [](std::uint8_t code) { return static_cast<double>(code); }, codes);
-            for (int channel = 0; channel < 3; ++channel) sums[channel] += codes[channel];
-        }
-    const double metallic = sums[2] / count / 255, roughness = sums[1] / count / 255;
+    constexpr int steps = 16;
+    double codes[3];
+    map.mean(uvs, [](std::uint8_t code) { return static_cast<double>(code); }, codes);
+    const double metallic = codes[2] / 255, roughness = codes[1] / 255;
     return {metallic * factors[0] >= 0.5, std::rint(steps * std::clamp(roughness * factors[1], 0.0, 1.0)) / steps};
 }
 

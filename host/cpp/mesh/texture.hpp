@@ -63,6 +63,21 @@ template <class Pixel> struct Picture {
                 for (std::int64_t channel = 0; channel < channels; ++channel) out[channel] += weight * valueOf(pixel[channel]);
             }
     }
+
+    /// The mean on a face with positions of its corners, of ten points.
+    template <class Value> void mean(const double* uvs, Value valueOf, double* out) const {
+        constexpr int points = 4;
+        double value[4], count = 0;
+        std::fill(out, out + channels, 0.0);
+        for (int i = 0; i < points; ++i)
+            for (int j = 0; i + j < points; ++j, ++count) {
+                const double a = (i + 1.0 / 3) / points, b = (j + 1.0 / 3) / points, c = 1 - a - b;
+                const double at[] = {a * uvs[0] + b * uvs[2] + c * uvs[4], a * uvs[1] + b * uvs[3] + c * uvs[5]};
+                sample(at, valueOf, value);
+                for (std::int64_t channel = 0; channel < channels; ++channel) out[channel] += value[channel];
+            }
+        for (std::int64_t channel = 0; channel < channels; ++channel) out[channel] /= count;
+    }
 };
 
 } // namespace colonnade::mesh

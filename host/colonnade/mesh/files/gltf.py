@@ -6,7 +6,7 @@ leaves out.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,13 +23,15 @@ from colonnade.mesh.files.gltf_checks import DRACO, INSTANCING, READ_EXTENSIONS
 from colonnade.mesh.files.gltf_clip import ClipReader
 from colonnade.mesh.files.gltf_document import COMPRESSION, GltfDocument
 from colonnade.mesh.files.gltf_draco import DracoPrimitives, PrimitiveArrays
+from colonnade.mesh.files.gltf_emission import emission_of
 from colonnade.mesh.files.gltf_metal import metal_of, of_map
 from colonnade.mesh.files.gltf_nodes import mesh_nodes
 from colonnade.mesh.files.gltf_relief import relief_of
-from colonnade.mesh.files.gltf_textures import GltfTextures
+from colonnade.mesh.files.gltf_textures import GltfTextures, TextureUse
 from colonnade.mesh.files.resolver import References
 from colonnade.mesh.losses import Losses, extension_loss
 from colonnade.mesh.materials.materials import (
+    DARK,
     PLAIN,
     MeshMaterial,
     Vector,
@@ -76,13 +78,15 @@ def read_gltf(
         material = document.entry("materials", index)
         losses.update(gltf_losses(material))
         losses.update((extension_loss(name), 1) for name in unused_extensions(material))
-        found[index] = replace(found[index], emission=textures.emission(index, found[index].emission))
+        if textures.emission_of(index) is not None:
+            found[index] = replace(found[index], emission=DARK)
     _count_other(document, losses, clip is not None)
     textures.reader.count_losses()
     if not parts:
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     surface = joined([part.surface for part in parts])
     surface = surface if clip is None else clip.surface(surface)
+    parts = _with_emission(parts, materials, textures)
     materials, face_materials = _materials_of(tuple(found), parts, textures)
     areas = surface_areas(surface.vertices, surface.faces, face_materials, len(materials))
     materials, _ = merged_roughness(materials, areas, max(_MAPPED_MATERIALS, len(found)))
@@ -109,11 +113,28 @@ class _Part:
         surface: Its triangles, in the scene's space.
         material: Its number in the file.
         metal: Faces that are metal by a map, bool [m], and their roughness, float64 [m]; None without a map.
+        emission_uvs: Positions of the corners in an emission map, float64 [m, 3, 2]; None without them.
+        emission: Of faces by a map, linear, float64 [m, 3]; None without a map.
     """
 
     surface: RawSurface
     material: int
     metal: tuple[NDArray[np.bool_], Floats] | None = None
+    emission_uvs: Floats | None = None
+    emission: Floats | None = None
+
+    def numbers(self, material: MeshMaterial, number: int, number_of: Callable[[MeshMaterial], int]) -> Indices:
+        """The material of each face: that of a number, or what its maps make of it, int64 [m]."""
+        metal = self.metal if material.kind == "diffuse" else None
+        columns = [*(() if metal is None else metal), *(() if self.emission is None else self.emission.T)]
+        if not columns:
+            return np.full(len(self.surface.faces), number)
+        kinds, places = np.unique(np.column_stack(columns), axis=0, return_inverse=True)
+        found = []
+        for values in kinds.tolist():
+            own = material if self.emission is None else replace(material, emission=tuple(values[-3:]))
+            found.append(number_of(own if metal is None else of_map(own, bool(values[0]), values[1])))
+        return np.array(found)[places.reshape(-1)]
 
     @property
     def has_one_colour(self) -> bool:
@@ -153,6 +174,29 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
     return parts
 
 
+def _with_emission(parts: list[_Part], materials: tuple[MeshMaterial, ...], textures: GltfTextures) -> list[_Part]:
+    """The parts with what their faces emit by the emission maps of their materials."""
+    found = list(parts)
+    for number in {part.material for part in parts} - {len(materials) - 1}:
+        use, factor = textures.emission_of(number), np.array(materials[number].emission)
+        own = [i for i, part in enumerate(parts) if part.material == number]
+        if use is None or not factor.any():
+            continue
+        texture, mapped = textures.reader.textures[use.texture], [i for i in own if parts[i].emission_uvs is not None]
+        for i in own:
+            found[i] = replace(parts[i], emission=np.tile(texture.mean * factor, (len(parts[i].surface.faces), 1)))
+        if mapped:
+            emission = factor * emission_of(
+                texture,
+                np.concatenate([parts[i].emission_uvs for i in mapped]),  # type: ignore[misc]
+                np.concatenate([parts[i].surface.vertices[parts[i].surface.faces] for i in mapped]),
+            )
+            ends = np.cumsum([len(parts[i].surface.faces) for i in mapped])[:-1]
+            for i, colours in zip(mapped, np.split(emission, ends), strict=True):
+                found[i] = replace(parts[i], emission=colours)
+    return found
+
+
 def _materials_of(
     materials: tuple[MeshMaterial, ...], parts: list[_Part], textures: GltfTextures
 ) -> tuple[tuple[MeshMaterial, ...], Indices]:
@@ -172,12 +216,7 @@ def _materials_of(
         if use is not None:
             material = replace(material, texture=use.texture)
             number = number_of(material)
-        own = np.full(len(part.surface.faces), number)
-        if part.metal is not None and material.kind == "diffuse":
-            kinds, places = np.unique(np.column_stack(part.metal), axis=0, return_inverse=True)
-            numbered = [number_of(of_map(material, bool(is_metal), float(roughness))) for is_metal, roughness in kinds]
-            own = np.array(numbered)[places.reshape(-1)]
-        numbers.append(own)
+        numbers.append(part.numbers(material, number, number_of))
     return tuple(found), np.concatenate(numbers)
 
 
@@ -291,13 +330,20 @@ def _primitive(
         alphas=None if alphas is None else alphas[faces],
         relief=relief_of(relief, attribute, faces, linear, losses),
     )
-    metal = textures.metal_of(int(material)) if material != default else None
-    places = None if metal is None else attribute(metal.coordinates, 2)
-    if metal is None or places is None or not (np.abs(places) <= MAX_UV).all():
-        return _Part(surface, int(material))
-    factors = metal_factors(document.entry("materials", material))
-    texture = textures.reader.textures[metal.texture]
-    return _Part(surface, int(material), metal_of(texture, metal.uvs(places)[faces], factors))
+
+    def positions_in(use: TextureUse | None) -> Floats | None:
+        places = None if use is None else attribute(use.coordinates, 2)
+        known = use is not None and places is not None and bool((np.abs(places) <= MAX_UV).all())
+        return use.uvs(places)[faces] if known and use is not None and places is not None else None
+
+    part = _Part(surface, int(material))
+    if material == default:
+        return part
+    metal, emission = textures.metal_of(int(material)), textures.emission_of(int(material))
+    if metal is not None and (at := positions_in(metal)) is not None:
+        factors = metal_factors(document.entry("materials", material))
+        part = replace(part, metal=metal_of(textures.reader.textures[metal.texture], at, factors))
+    return replace(part, emission_uvs=positions_in(emission))
 
 
 def _corners(document: GltfDocument, arrays: PrimitiveArrays, count: int) -> Indices:

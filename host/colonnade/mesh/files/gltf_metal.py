@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common.types import Floats
-from colonnade.mesh.materials.materials import MIRROR_ROUGHNESS, MeshMaterial, coat_roughness
+from colonnade.mesh.materials.materials import DARK, MIRROR_ROUGHNESS, MeshMaterial, coat_roughness
 from colonnade.mesh.materials.texture import Texture
 
 
@@ -30,5 +30,5 @@ def of_map(material: MeshMaterial, is_metal: bool, roughness: float) -> MeshMate
     """The metal beside a diffuse material, or this one with the coat of a roughness."""
     if not is_metal:
         return replace(material, roughness=coat_roughness(roughness))
-    emission = material.emission if roughness > MIRROR_ROUGHNESS else (0.0, 0.0, 0.0)
+    emission = material.emission if roughness > MIRROR_ROUGHNESS else DARK
     return replace(material, kind="mirror", roughness=roughness, emission=emission)

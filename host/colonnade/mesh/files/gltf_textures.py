@@ -16,7 +16,7 @@ from colonnade.mesh import losses as lost
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.files.resolver import References
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.materials.materials import Vector, gltf_surface, normal_scale
+from colonnade.mesh.materials.materials import gltf_surface, normal_scale
 from colonnade.mesh.materials.relief import NormalMap
 from colonnade.mesh.materials.texture import Wrap
 from colonnade.mesh.materials.texture_reader import TextureReader
@@ -54,6 +54,7 @@ class GltfTextures:
         self._document, self._references, self._losses = document, references, losses
         self._uses: dict[int, TextureUse | None] = {}
         self._metals: dict[int, TextureUse | None] = {}
+        self._emissions: dict[int, TextureUse | None] = {}
         self._normals: dict[int, tuple[TextureUse, NormalMap] | None] = {}
         self._read: dict[tuple[int, Wrap, Wrap, bool], int | None] = {}
         self.reader = TextureReader(losses)
@@ -84,6 +85,12 @@ class GltfTextures:
             self._metals[number] = self._use(surface.get("metallicRoughnessTexture"))
         return self._metals[number]
 
+    def emission_of(self, number: int) -> TextureUse | None:
+        """As `use_of`, of the emission map of a material."""
+        if number not in self._emissions:
+            self._emissions[number] = self._use(self._document.entry("materials", number).get("emissiveTexture"))
+        return self._emissions[number]
+
     def normals_of(self, number: int) -> tuple[TextureUse, NormalMap] | None:
         """As `use_of`, of the normal map of a material."""
         if number not in self._normals:
@@ -101,17 +108,6 @@ class GltfTextures:
         transform = info.get("extensions", {}).get("KHR_texture_transform", {})
         coordinates = f"TEXCOORD_{transform.get('texCoord', info.get('texCoord', 0))}"
         return None if index is None else TextureUse(index, coordinates, self._matrix(transform))
-
-    def emission(self, number: int, factor: Vector) -> Vector:
-        """The emission of a material: the mean of its texture times a factor."""
-        info = self._document.entry("materials", number).get("emissiveTexture")
-        if not isinstance(info, Mapping) or not any(factor):
-            return factor
-        index = self._index_of(info)
-        if index is None:
-            return factor
-        red, green, blue = (self.reader.textures[index].mean * factor).tolist()
-        return red, green, blue
 
     def _index_of(self, info: Mapping[str, Any]) -> int | None:
         """The index in `TextureReader.textures` of a reference to a texture; None if there is no picture."""

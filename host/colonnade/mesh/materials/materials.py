@@ -66,7 +66,7 @@ LAYERS: tuple[Layer, ...] = get_args(Layer)
 #: mark: what a mirror brings is at most 1, and glass reflects so little of the mark that all of it counts.
 MARKS: Mapping[Layer, float] = {"highlight": 1.0, "glass highlight": 16.0}
 #: No emission.
-_DARK = (0.0, 0.0, 0.0)
+DARK = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ def in_layer(material: MeshMaterial, layer: Layer) -> MeshMaterial:
         red, green, blue = (value * microfacet_albedo(material.roughness) for value in material.albedo)
         material = replace(material, kind="mirror" if is_sharp else ROUGH_METAL, albedo=(red, green, blue))
         if layer == "highlight" and is_sharp and material.roughness >= HIGHLIGHT_ROUGHNESS:
-            return replace(material, kind=ROUGH_METAL, emission=_DARK)
+            return replace(material, kind=ROUGH_METAL, emission=DARK)
     if layer == "surface":
         return replace(material, roughness=0.0) if material.kind == "diffuse" else material
     is_coated = layer == "coat" and material.kind == "diffuse" and material.roughness > 0
@@ -235,7 +235,7 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
         red, green, blue = (1.0 - share + share * value for value in colour)
         return MeshMaterial("glass", (red, green, blue), _ior(ior), roughness=_share(roughness), clear_coat=coat)
     if metallic >= 0.5:
-        emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else _DARK
+        emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else DARK
         found = MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
     else:
         gloss = coat_roughness(roughness)
@@ -255,8 +255,8 @@ def _gltf_alpha(material: Mapping[str, Any], surface: Mapping[str, Any]) -> Alph
 def _gltf_emission(material: Mapping[str, Any]) -> Vector:
     extension = material.get("extensions", {}).get("KHR_materials_emissive_strength", {})
     strength = _number(extension.get("emissiveStrength"), 1.0)
-    red, green, blue = (max(0.0, strength) * value for value in _colour(material.get("emissiveFactor"), _DARK))
-    return _colour((red, green, blue), _DARK)
+    red, green, blue = (max(0.0, strength) * value for value in _colour(material.get("emissiveFactor"), DARK))
+    return _colour((red, green, blue), DARK)
 
 
 def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
@@ -273,9 +273,9 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
     is_metal = first("pm", 0.0) >= 0.5 or model in (3.0, 5.0)
     if is_metal:
         roughness = _share(first("pr", 0.0))
-        emission = _colour(entries.get("ke"), _DARK) if roughness > MIRROR_ROUGHNESS else _DARK
+        emission = _colour(entries.get("ke"), DARK) if roughness > MIRROR_ROUGHNESS else DARK
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=roughness)
-    emission = _colour(entries.get("ke"), _DARK)
+    emission = _colour(entries.get("ke"), DARK)
     return MeshMaterial("diffuse", colour, emission=emission, alpha=alpha, roughness=coat_roughness(first("pr", 1.0)))
 
 
@@ -300,7 +300,7 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     surface, extensions = gltf_surface(material), material.get("extensions", {})
     maps = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
     found = [(lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in _READ_TEXTURES]
-    if any(_colour(material.get("emissiveFactor"), _DARK)) and not _is_lit(from_gltf(material)):
+    if any(_colour(material.get("emissiveFactor"), DARK)) and not _is_lit(from_gltf(material)):
         found.append((lost.EMISSION, 1))
     transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
     metallic = _number(surface.get("metallicFactor"), 1.0)
@@ -324,7 +324,7 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         or key in ("bump", "disp", "decal", "refl", "norm")
     ]
     found = [(lost.TEXTURE_OBJ, len(maps))]
-    if any(_colour(entries.get("ke"), _DARK)) and not _is_lit(from_mtl(entries)):
+    if any(_colour(entries.get("ke"), DARK)) and not _is_lit(from_mtl(entries)):
         found.append((lost.EMISSION, 1))
     opacity = _opacity(entries)
     if 0.0 < opacity < 1.0 and "tf" not in entries:
