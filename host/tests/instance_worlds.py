@@ -45,7 +45,7 @@ class World:
     def __init__(
         self, manifest: Manifest, transforms: Sequence[Floats], meshes: Sequence[str] = MESHES, size: int = 64
     ) -> None:
-        self.numbers = manifest.numbers
+        self.manifest, self.numbers = manifest, manifest.numbers
         self.meshes = [load_mesh(name) for name in meshes]
         images = [pack(mesh, manifest) for mesh in self.meshes]
         records, self.roots = joined_records(images, manifest)
@@ -67,7 +67,7 @@ class World:
     def renumber(self, order: Sequence[int]) -> None:
         self.order = np.array(order)
         instances = [self.instances[i] for i in order]
-        self.registers = self.base | instance_registers(instances, self.frame, self.numbers)
+        self.registers = self.base | instance_registers(instances, self.frame, self.manifest)
         self.model.start(self.registers)
 
     @property

@@ -14,14 +14,14 @@ from colonnade.design.manifest import Manifest
 from colonnade.maps.encoders import Encoder
 from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.mesh.materials.mesh import Mesh
-from colonnade.registers.instances import instance_registers
+from colonnade.registers.instances import AXES, instance_registers
 from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.header import ImageHeader, Instance, TreeStatistics
 from colonnade.scene_image.joined_images import joined_records
 from colonnade.scene_image.packer import pack, pack_geometry, surface_colours, texture_count
 from colonnade.scene_image.textures import with_textures
-from colonnade.scene_image.world import world_bounds, world_frame
+from colonnade.scene_image.world import world_frame
 
 
 def pack_objects(
@@ -182,13 +182,13 @@ class MovingInstances:
 def _placed(header: ImageHeader, instances: Sequence[Instance], mesh: Mesh, manifest: Manifest) -> ImageHeader:
     """The header of instances in the world that holds them."""
     frame = world_frame(instances, manifest.numbers)
-    instance_registers(instances, frame, manifest.numbers)
-    low, high = world_bounds(instances, frame, manifest.numbers)
+    registers = instance_registers(instances, frame, manifest)
+    low, high = ([registers[f"bounds.{side}.{axis}"] for axis in AXES] for side in ("low", "high"))
     return replace(
         header,
         frame=frame,
-        bounds_low=low,
-        bounds_high=high,
+        bounds_low=(low[0], low[1], low[2]),
+        bounds_high=(high[0], high[1], high[2]),
         extent=mesh.extent,
         parts=mesh.parts,
         instances=tuple(instances),
