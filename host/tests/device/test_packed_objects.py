@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from animated_documents import arm
 from textured_files import FOUR
 
+from colonnade import _core
 from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
@@ -20,6 +22,7 @@ from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.materials.texture import Texture
 from colonnade.quality.image_metrics import psnr
+from colonnade.registers.instances import instance_registers
 from colonnade.render.hit_faces import hit_faces
 from colonnade.scene.model import Camera, Material, MeshSource, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene.object_mesh import object_mesh
@@ -166,8 +169,57 @@ def test_instances_move_and_bend_as_the_objects_of_one_mesh(tmp_path: Path, mani
     np.testing.assert_array_equal(again.image.records, instances.lit_at(described.at(0.3)).image.records)
     with pytest.raises(UserError, match=r"leave out object\.motion"):
         instances.with_transform(1, Transform())
-    with pytest.raises(UserError, match="a clip file is of one mesh"):
-        instances.clip_file()
+
+
+def test_registers_of_a_motion_are_those_of_the_target(tmp_path: Path, manifest: Manifest) -> None:
+    """Word by word: of the clip file, whose times are those of the host."""
+    keys = (ObjectKey(0.5, turn=40.0, translate=(0.2, 0.3, 0.0)), ObjectKey(rotate=(20.0, 0.0, 60.0)))
+    bent = replace(OBJECTS[2], mesh=MeshSource(path=arm().write(tmp_path / "arm.gltf"), animation="bend"))
+    prepared = DeviceScene.of(scene(OBJECTS[0], replace(OBJECTS[1], motion=keys), bent), manifest)
+    target, seconds = target_motion(prepared.clip_file(), manifest), prepared.image.moves.seconds  # type: ignore[union-attr]
+    known: dict[int, int] = {}
+    before = -1
+    edge = float(np.ptp(np.concatenate([one.corners for one in prepared.image.header.instances]), axis=0).max())
+    for progress in np.linspace(0.0, 1.0, 21).tolist():
+        time = round(progress * seconds * 2**16)
+        known |= pairs_of(target.writes(time, before))
+        before = time
+        header = prepared.lit_at(prepared.scene.at(progress)).image.header
+        assert header.frame == prepared.image.header.frame
+        assert prepared.mesh is not None
+        for one, placed in zip(header.instances, prepared.mesh.objects, strict=True):
+            exact = placed.transform_at(progress * seconds)
+            corners = one.box @ exact[:3, :3].T + exact[:3, 3]
+            assert np.abs(one.corners - corners).max() < 2.0**-12 * edge
+        registers = instance_registers(header.instances, header.frame, manifest)
+        del registers["scene.instances"]
+        words = [pair for name, value in registers.items() for pair in manifest.registers[name].encode(value)]
+        assert known == dict(words)
+        assert header.bounds_low == tuple(registers[f"bounds.low.{axis}"] for axis in "xyz")
+    still = target.writes(before, before)
+    assert still == b""
+    ((root, duration),) = target.meshes()
+    assert root == header.instances[2].root and duration == round(seconds * 2**16)
+
+
+def test_a_clip_file_leaves_the_offset_of_the_scene(manifest: Manifest) -> None:
+    moving = scene(OBJECTS[0], replace(OBJECTS[1], motion=(ObjectKey(turn=90.0),)))
+    files = [
+        DeviceScene.of(one, manifest).clip_file()
+        for one in (moving, replace(moving, light=replace(moving.light, shadow_offset=0.01)))
+    ]
+    offset = manifest.registers["shading.offset"].address
+    assert [offset in pairs_of(target_motion(file, manifest).writes(0)) for file in files] == [True, False]
+
+
+def target_motion(file: bytes, manifest: Manifest) -> Any:
+    registers = [one for one in manifest.registers.values() if one.access == "rw"]
+    end = max(one.address + one.words for one in registers)
+    return _core.TargetMotion(manifest.format_words, min(one.address for one in registers), end, file)
+
+
+def pairs_of(writes: bytes) -> dict[int, int]:
+    return {int(address): int(word) for address, word in np.frombuffer(writes, "<u4").reshape(-1, 2)}
 
 
 def test_the_watchdog_waits_for_each_instance(manifest: Manifest) -> None:

@@ -103,8 +103,8 @@ def test_batches_take_the_places_of_their_ring_in_turn() -> None:
 
 @pytest.mark.parametrize(
     "names",
-    [("fuzz", "shell"), ("fuzz_view",), ("fuzz_mesh",)],
-    ids=["driver", "registers from poses", "meshes that bend"],
+    [("fuzz", "shell"), ("fuzz_view",), ("fuzz_mesh",), ("fuzz_motion",)],
+    ids=["driver", "registers from poses", "meshes that bend", "objects that move"],
 )
 def test_random_inputs_of_the_fuzzers_break_nothing(names: tuple[str, ...]) -> None:
     """Also without libFuzzer: calls in any order, view files of legal and extreme numbers, tiles of any size."""

@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from instance_worlds import transform
+from instance_worlds import FRAME, instance, transform
 
 from colonnade import _core
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.generator import manifest_for
 from colonnade.registers.instances import POSITION_FRACTION, instance_registers, transform_values
-from colonnade.scene_image.header import Instance, ObjectFrame
 
 #: Bits of vertices, fraction bits of grids, bits of the scene: of three precisions and two extreme designs.
 NUMBERS = [(16, 5, 32), (16, 13, 40), (16, -3, 24), (24, 37, 72), (10, 3, 24)]
@@ -158,16 +157,6 @@ def test_words_are_in_the_order_of_the_register_map(config: str) -> None:
         for one in own:
             name = one.name.removeprefix(prefix).split(".")[0].split("[")[0]
             assert name == "root" or one.width == WIDTHS.get(name, manifest.numbers["gridBits"])
-
-
-FRAME = ObjectFrame(65000.0, (-0.5, -0.5, -0.5))
-
-
-def instance(linear: Floats, place: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Instance:
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = linear, place
-    rows = tuple(tuple(row) for row in matrix.tolist())
-    return Instance(FRAME, (0, 20000, 30000), (65000, 40000, 31000), 2000, rows, 7, 3)
 
 
 @pytest.mark.parametrize(
