@@ -53,6 +53,8 @@ public:
         check(colonnade_view_set_object(&view_, &pose));
     }
 
+    void setBounds(const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high) { check(colonnade_view_set_bounds(&view_, low.data(), high.data())); }
+
     void setLight(std::uint32_t index, const Position& position, const std::array<std::uint32_t, 3>& colour, std::uint64_t reach) {
         colonnade_light light{{}, {}, reach};
         std::copy(position.begin(), position.end(), light.position);
@@ -92,6 +94,7 @@ void bind_view(nb::module_& module) {
         .def(nb::init<const std::array<std::uint32_t, 8>&, std::uint32_t, std::uint32_t, const nb::bytes&>(), "format_hash"_a, "first"_a, "end"_a, "file"_a)
         .def("set_camera", &TargetView::setCamera, "position"_a, "rotation"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a)
         .def("set_object", &TargetView::setObject, "position"_a, "rotation"_a)
+        .def("set_bounds", &TargetView::setBounds, "low"_a, "high"_a)
         .def("set_light", &TargetView::setLight, "index"_a, "position"_a, "colour"_a, "reach"_a)
         .def("set_sample", &TargetView::setSample, "index"_a, "count"_a)
         .def("frame", &TargetView::frame)
