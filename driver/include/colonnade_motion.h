@@ -7,6 +7,7 @@
 
 #include "colonnade_instances.h"
 #include "colonnade_mesh.h"
+#include "colonnade_view.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -37,6 +38,11 @@ enum colonnade_error colonnade_motion_mesh(const struct colonnade_motion *motion
 
 /* The transforms of all objects at a time, 2^-16 s; the motion repeats. */
 void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t time, struct colonnade_transform *transforms);
+
+/* Moves an object by a program's own pose: turns it about `pivot`, then shifts it, in the axes and the metres of the view's
+ * world, 2^-30 and 2^-32 m. */
+enum colonnade_error colonnade_motion_move(const struct colonnade_view *view, const struct colonnade_pose *move,
+                                           const int64_t pivot[3], struct colonnade_transform *transform);
 
 /* The registers of all objects: `transforms`, also those of the program's own, give `instances`. */
 enum colonnade_error colonnade_motion_find(const struct colonnade_motion *motion, const struct colonnade_transform *transforms,

@@ -2,11 +2,11 @@
 /* Clip files of instances: docs/driver.md. */
 #include "colonnade_motion.h"
 
-#include "colonnade_integers.h"
 #include "colonnade_mesh_parts.h"
+#include "colonnade_view_parts.h"
 
 enum { VERSION = 1, HEADER_WORDS = 12, FIXED_WORDS = HEADER_WORDS + 13, OBJECT_WORDS = 11, CLIP_WORDS = 2 };
-enum { POSITION_BITS = 20, BOX_WORDS = 6 };
+enum { POSITION_BITS = 20, BOX_WORDS = 6, LIMIT = 1 << 16 };
 
 static struct colonnade_keys keys_of(const struct colonnade_motion *motion) {
     const uint32_t numbers = MATRIX_WORDS * motion->objects;
@@ -119,6 +119,56 @@ void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t
         }
         transforms[i].exponent = colonnade_signed_word(motion->object_words, (size_t)OBJECT_WORDS * i + 10);
     }
+}
+
+/* A row or column of three numbers by a vector of up to 2^61, to nearest. */
+static int64_t turned(const int32_t factors[3], const int64_t vector[3]) {
+    int64_t high = 0, low = 0;
+    for (int i = 0; i < 3; ++i) {
+        high += factors[i] * (vector[i] >> 31);
+        low += factors[i] * (vector[i] & INT32_MAX);
+    }
+    return 2 * high + colonnade_nearest(low, COLONNADE_ROTATION_BITS);
+}
+
+enum colonnade_error colonnade_motion_move(const struct colonnade_view *view, const struct colonnade_pose *move,
+                                           const int64_t pivot[3], struct colonnade_transform *transform) {
+    const int down = view->scene.grid_fraction - POSITION_BITS + 16;
+    int64_t from[3], to[3], linear[3][3];
+    int32_t rows[3][3];
+    if (!colonnade_is_pose(move) || !colonnade_is_place(pivot)) return COLONNADE_BAD_POSE;
+    if (!colonnade_is_within(transform->exponent, -LIMIT, LIMIT)) return COLONNADE_OUTSIDE;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (colonnade_magnitude(transform->position[axis]) >> 50 != 0) return COLONNADE_OUTSIDE;
+        to[axis] = pivot[axis] + move->position[axis];
+    }
+    if (!colonnade_find_on_grid(view, pivot, from) || !colonnade_find_on_grid(view, to, to)) return COLONNADE_TOO_FAR;
+    /* The rotation in the axes of the grid */
+    for (int b = 0; b < 3; ++b) {
+        int64_t column[3], half[3];
+        for (int row = 0; row < 3; ++row) column[row] = view->object.rotation[row][b];
+        for (int row = 0; row < 3; ++row) half[row] = turned(move->rotation[row], column);
+        for (int a = 0; a < 3; ++a) {
+            const int32_t axis[3] = {view->object.rotation[0][a], view->object.rotation[1][a], view->object.rotation[2][a]};
+            rows[a][b] = (int32_t)turned(axis, half);
+        }
+    }
+    for (int axis = 0; axis < 3; ++axis) from[axis] = transform->position[axis] - colonnade_nearest(from[axis], down);
+    int length = 0;
+    for (int a = 0; a < 3; ++a) {
+        for (int b = 0; b < 3; ++b) {
+            const int64_t column[3] = {transform->linear[0][b], transform->linear[1][b], transform->linear[2][b]};
+            linear[a][b] = turned(rows[a], column);
+        }
+        if (colonnade_block_length(linear[a]) > length) length = colonnade_block_length(linear[a]);
+    }
+    const int more = length > 30 ? length - 30 : 0;
+    for (int a = 0; a < 3; ++a) {
+        for (int b = 0; b < 3; ++b) transform->linear[a][b] = (int32_t)colonnade_nearest(linear[a][b], more);
+        transform->position[a] = turned(rows[a], from) + colonnade_nearest(to[a], down);
+    }
+    transform->exponent += more;
+    return COLONNADE_OK;
 }
 
 enum colonnade_error colonnade_motion_find(const struct colonnade_motion *motion, const struct colonnade_transform *transforms,

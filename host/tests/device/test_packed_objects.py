@@ -22,7 +22,7 @@ from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.materials.texture import Texture
 from colonnade.quality.image_metrics import psnr
-from colonnade.registers.instances import instance_registers
+from colonnade.registers.instances import instance_registers, transform_values, unit_transform
 from colonnade.render.hit_faces import hit_faces
 from colonnade.scene.model import Camera, Material, MeshSource, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene.object_mesh import object_mesh
@@ -200,6 +200,50 @@ def test_registers_of_a_motion_are_those_of_the_target(tmp_path: Path, manifest:
     assert still == b""
     ((root, duration),) = target.meshes()
     assert root == header.instances[2].root and duration == round(seconds * 2**16)
+
+
+def test_a_program_moves_an_object_by_a_pose_in_metres(manifest: Manifest) -> None:
+    """Also where the scene itself is turned in the view's world."""
+    prepared, random = DeviceScene.of(scene(*OBJECTS), manifest), np.random.default_rng(4)
+    header = prepared.image.header
+    registers = [one for one in manifest.registers.values() if one.access == "rw"]
+    end = max(one.address + one.words for one in registers)
+    first = min(one.address for one in registers)
+    view = _core.TargetView(manifest.format_words, first, end, prepared.view_file(SIZE))
+
+    def rotation() -> tuple[Floats, list[int]]:
+        matrix, _ = np.linalg.qr(random.normal(size=(3, 3)))
+        matrix *= np.sign(np.linalg.det(matrix))
+        return matrix, np.rint(matrix * 2.0**30).astype(int).ravel().tolist()
+
+    def fixed(vector: Floats) -> list[int]:
+        return np.rint(vector * 2.0**32).astype(int).tolist()
+
+    for one in header.instances * 10:
+        (own, own_words), (turn, turn_words) = rotation(), rotation()
+        own_place, shift, pivot = random.uniform(-1, 1, size=(3, 3))
+        view.set_object(fixed(own_place), own_words)
+        linear, exponent, place = transform_values(one, header.frame)
+        twice = [2 * value for value in linear], exponent - 1, place  # with all bits
+        linear, exponent, place = view.move(fixed(shift), turn_words, fixed(pivot), *twice)
+        world, move = np.eye(4), np.eye(4)
+        world[:3, :3], world[:3, 3] = own, own_place
+        move[:3, :3], move[:3, 3] = turn, pivot + shift - turn @ pivot
+        moved = np.linalg.inv(world) @ move @ world @ np.array(one.transform)
+        expected = unit_transform(replace(one, transform=tuple(map(tuple, moved))), header.frame)
+        found = np.ldexp(np.array(linear, float).reshape(3, 3), exponent)
+        assert np.abs(found - expected[0]).max() < 2.0**-26
+        assert np.abs(np.ldexp(np.array(place, float), -20) - expected[1]).max() < 2.0**-8
+    values = transform_values(header.instances[0], header.frame)
+    for wrong, error in (
+        ((fixed(shift), [0] * 9, fixed(pivot), *values), "badPose"),
+        ((fixed(shift), turn_words, [1 << 61, 0, 0], *values), "badPose"),
+        ((fixed(shift * 1e6), turn_words, fixed(pivot), *values), "tooFar"),
+        ((fixed(shift), turn_words, fixed(pivot), values[0], values[1], [1 << 60, 0, 0]), "outside"),
+        ((fixed(shift), turn_words, fixed(pivot), values[0], 1 << 30, values[2]), "outside"),
+    ):
+        with pytest.raises(ValueError, match=error):
+            view.move(*wrong)
 
 
 def test_a_clip_file_leaves_the_offset_of_the_scene(manifest: Manifest) -> None:
