@@ -20,13 +20,22 @@ uint32_t target_stride(uint32_t width) {
     return (width + tile - 1) / tile * tile * 4;
 }
 
-uint32_t target_render(struct target *target, struct colonnade *device, const struct colonnade_frame *frame) {
+uint32_t target_start(struct target *target, struct colonnade *device, const struct colonnade_frame *frame) {
     const uint32_t stride = target_stride(frame->width);
     const uint64_t base = target->base;
     const struct colonnade_framebuffer framebuffer = {base, stride, COLONNADE_XRGB8888, {base, base + target->size}};
     colonnade_acknowledge(device, COLONNADE_FRAME_DONE | COLONNADE_ERROR);
     target_check("start", colonnade_start(device, &framebuffer));
+    return stride;
+}
+
+void target_finish(struct colonnade *device) {
     target_check("frame", colonnade_wait(device, COLONNADE_FRAME_DONE, ATTEMPTS));
     target_check("frame", colonnade_result(device));
+}
+
+uint32_t target_render(struct target *target, struct colonnade *device, const struct colonnade_frame *frame) {
+    const uint32_t stride = target_start(target, device, frame);
+    target_finish(device);
     return stride;
 }

@@ -33,6 +33,12 @@ void target_load(struct target *target, struct colonnade *device, const char *na
 /* Bytes of a line of a frame: whole tile rows. */
 uint32_t target_stride(uint32_t width);
 
+/* Starts the frame that is set, of the same size as `frame`, as target_render does; the bytes of a line. */
+uint32_t target_start(struct target *target, struct colonnade *device, const struct colonnade_frame *frame);
+
+/* Waits until it is there. */
+void target_finish(struct colonnade *device);
+
 /* Renders the frame that is set to the start of the memory, which the image leaves to it; the bytes of a line. */
 uint32_t target_render(struct target *target, struct colonnade *device, const struct colonnade_frame *frame);
 

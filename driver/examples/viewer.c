@@ -5,8 +5,9 @@
  *                                                q ends
  *        viewer /dev/uio0 IMAGE VIEW --keys KEYS a frame for the view and one after each key
  *        viewer /dev/uio0 IMAGE VIEW --turn N    N frames around the object
+ *        viewer /dev/uio0 IMAGE VIEW --play N CLIP    N frames of objects that move
  *
- * It prints frames a second. IMAGE and VIEW come from `colonnade pack`; colonnade_design.h from `colonnade registers`. */
+ * It prints frames a second. IMAGE, VIEW and CLIP come from `colonnade pack`; colonnade_design.h from `colonnade registers`. */
 #define _POSIX_C_SOURCE 200809L
 
 #include <inttypes.h>
@@ -19,6 +20,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "colonnade_motion.h"
 #include "colonnade_view.h"
 #include "target.h"
 
@@ -136,13 +138,73 @@ static void render(struct target *target, struct colonnade *device, struct colon
     speed->cycles += colonnade_counter(device, COLONNADE_COUNTER_CYCLES);
 }
 
+/* Objects that move, and the instances of a frame and of the one before. */
+struct play {
+    struct colonnade_motion motion;
+    struct colonnade_instance instances[2][COLONNADE_INSTANCES];
+};
+
+/* Finds the registers of a frame: those of the view, then those of instances. */
+static void find_frames(struct colonnade_view *view, struct play *play, uint32_t number, uint32_t count,
+                        struct colonnade_frame frames[2]) {
+    static uint8_t writes[8 * WRITES], moves[8 * COLONNADE_MOTION_WRITES];
+    const struct colonnade_motion *motion = &play->motion;
+    struct colonnade_transform transforms[COLONNADE_INSTANCES];
+    struct colonnade_instance *now = play->instances[number % 2];
+    const struct colonnade_instance *before = number == 0 ? NULL : play->instances[(number + 1) % 2];
+    colonnade_motion_transforms(motion, (uint32_t)((uint64_t)motion->duration * number / count), transforms);
+    target_check("motion", colonnade_motion_find(motion, transforms, now));
+    const struct colonnade_shared shared = colonnade_find_shared(now, motion->objects);
+    target_check("view", colonnade_view_set_bounds(view, shared.low, shared.high));
+    target_check("view", colonnade_view_frame(view, writes, WRITES, &frames[0]));
+    frames[1] = frames[0];
+    frames[1].writes = moves;
+    frames[1].count = colonnade_motion_writes(motion, now, before, moves);
+}
+
+/* Renders frames of a motion: registers are found and written while the last frame runs. */
+static void play_all(struct target *target, struct colonnade *device, struct colonnade_view *view, struct play *play,
+                     uint32_t count, struct speed *speed) {
+    const double begin = seconds();
+    bool is_running = false;
+    for (uint32_t number = 0; number < count && !is_ended; ++number) {
+        struct colonnade_frame frames[2];
+        find_frames(view, play, number, count, frames);
+        for (int part = 0; part < 2; ++part) {
+            enum colonnade_error error = colonnade_set_frame(device, &frames[part]);
+            if (error == COLONNADE_BUSY && is_running) { /* the shell has no space for so many writes */
+                target_finish(device);
+                is_running = false;
+                error = colonnade_set_frame(device, &frames[part]);
+            }
+            target_check("frame", error);
+        }
+        colonnade_view_accept(view);
+        if (is_running) target_finish(device);
+        if (number > 0) speed->cycles += colonnade_counter(device, COLONNADE_COUNTER_CYCLES);
+        target_start(target, device, &frames[0]);
+        is_running = true;
+        speed->frames += 1;
+    }
+    if (is_running) target_finish(device);
+    speed->cycles += colonnade_counter(device, COLONNADE_COUNTER_CYCLES);
+    speed->seconds = seconds() - begin;
+}
+
 int main(int argc, char **argv) {
-    static uint8_t file[FILE_BYTES];
+    static uint8_t file[FILE_BYTES], clip[FILE_BYTES];
+    static struct play play;
     static struct colonnade_view view;
     const bool has_keys = argc == 6 && strcmp(argv[4], "--keys") == 0, turns = argc == 6 && strcmp(argv[4], "--turn") == 0;
-    if (argc != 4 && !has_keys && !turns) target_fail("usage", "viewer /dev/uio0 IMAGE VIEW [--keys KEYS | --turn FRAMES]");
-    const long around = turns ? strtol(argv[5], NULL, 10) : 0;
-    if (turns && (around < 1 || around > 1000000)) target_fail("--turn", "is a number of frames, 1 to 1000000");
+    const bool plays = argc == 7 && strcmp(argv[4], "--play") == 0;
+    if (argc != 4 && !has_keys && !turns && !plays)
+        target_fail("usage", "viewer /dev/uio0 IMAGE VIEW [--keys KEYS | --turn FRAMES | --play FRAMES CLIP]");
+    const long count = turns || plays ? strtol(argv[5], NULL, 10) : 0;
+    if ((turns || plays) && (count < 1 || count > 1000000)) target_fail(argv[4], "has a number of frames, 1 to 1000000");
+    if (plays)
+        target_check(argv[6],
+                     colonnade_motion_open(&play.motion, &colonnade_design, clip, target_read(argv[6], clip, sizeof clip)));
+    if (plays && play.motion.clips != 0) target_fail(argv[6], "has meshes that bend, which this program does not");
     target_check(argv[3], colonnade_view_open(&view, &colonnade_design, file, target_read(argv[3], file, sizeof file)));
     struct target target;
     struct colonnade device;
@@ -159,11 +221,12 @@ int main(int argc, char **argv) {
     struct orbit orbit = {0, 0, 1};
     struct speed speed = {0, 0, 0};
     if (argc == 4) open_terminal();
-    render(&target, &device, &view, &speed);
-    for (long number = 1; !is_ended; ++number) {
-        if (turns && number >= around) break;
+    if (plays) play_all(&target, &device, &view, &play, (uint32_t)count, &speed);
+    else render(&target, &device, &view, &speed);
+    for (long number = 1; !is_ended && !plays; ++number) {
+        if (turns && number >= count) break;
         const char key = turns ? 0 : has_keys ? argv[5][number - 1] : next_key();
-        if (turns) orbit.azimuth = 360.0 * (double)number / (double)around;
+        if (turns) orbit.azimuth = 360.0 * (double)number / (double)count;
         else if (key == 'q' || key == 0) break;
         else if (!move(&orbit, key)) continue;
         const struct colonnade_camera camera = orbiting(&view, &start, &orbit);

@@ -47,13 +47,16 @@ enum colonnade_error {
     COLONNADE_NO_SAMPLE,  /* no such number of passes, or no such pass */
     /* Of colonnade_mesh.h */
     COLONNADE_NOT_A_CLIP,    /* no clip file, or one of another version, or numbers that no design has */
-    COLONNADE_OUTSIDE,       /* a vertex leaves the object's grid */
+    COLONNADE_OUTSIDE,       /* a vertex leaves the object's grid, or an object the world's cube */
     COLONNADE_OTHER_RECORDS, /* the records are not those of the clip */
     COLONNADE_TOO_DEEP,      /* a plan needs more boxes than the unit holds */
     /* Of colonnade_batches.h */
     COLONNADE_NO_RAYS, /* the design traces no rays of applications */
     /* Of colonnade_refit_start, in colonnade_mesh.h */
-    COLONNADE_NO_REFIT /* the shell has no unit that refits */
+    COLONNADE_NO_REFIT, /* the shell has no unit that refits */
+    /* Of colonnade_instances.h */
+    COLONNADE_FLAT,     /* an object's transform scales an axis to nothing */
+    COLONNADE_TOO_SMALL /* an object is too small for the world */
 };
 
 /* Bits of `interrupt.status` and `interrupt.enable`. A device for rays ends batches in place of frames. */

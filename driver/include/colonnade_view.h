@@ -108,6 +108,8 @@ enum colonnade_error colonnade_rotation(int32_t rotation[3][3], const int32_t qu
 enum colonnade_error colonnade_view_set_camera(struct colonnade_view *view, const struct colonnade_camera *camera);
 /* Where the object is, 2^-32 m; until the first call it is where the file has it. */
 enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, const struct colonnade_pose *object);
+/* The bounds of what moves within the object's cube, vertex units; until the first call they are the file's. */
+enum colonnade_error colonnade_view_set_bounds(struct colonnade_view *view, const int32_t low[3], const int32_t high[3]);
 /* Light `index` of the scene, 0 to its count - 1; until the first call it is that of the file. */
 enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index, const struct colonnade_light *light);
 

@@ -226,10 +226,11 @@ uint64_t colonnade_counter(struct colonnade *device, uint32_t index) {
 
 const char *colonnade_error_name(enum colonnade_error error) {
     static const char *const names[] = {
-        "ok",         "noDevice",    "unknownVersion", "otherFormat", "notAnImage",   "notAFrame", "truncated",   "tooLarge",
-        "misaligned", "badRegister", "badFormat",      "noFrame",     "busy",         "timeout",   "busResponse", "badSection",
-        "badLength",  "noPhoto",     "frameInvalid",   "noScene",     "notAView",     "badPose",   "badLens",     "tooFar",
-        "noLight",    "noSample",    "notAClip",       "outside",     "otherRecords", "tooDeep",   "noRays",      "noRefit",
+        "ok",           "noDevice",   "unknownVersion", "otherFormat", "notAnImage",   "notAFrame", "truncated",
+        "tooLarge",     "misaligned", "badRegister",    "badFormat",   "noFrame",      "busy",      "timeout",
+        "busResponse",  "badSection", "badLength",      "noPhoto",     "frameInvalid", "noScene",   "notAView",
+        "badPose",      "badLens",    "tooFar",         "noLight",     "noSample",     "notAClip",  "outside",
+        "otherRecords", "tooDeep",    "noRays",         "noRefit",     "flat",         "tooSmall",
     };
     return (size_t)error < sizeof names / sizeof *names ? names[error] : "unknown";
 }

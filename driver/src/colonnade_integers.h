@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Arithmetic of colonnade_view. */
+/* Arithmetic of colonnade_view, colonnade_mesh and colonnade_instances. */
 #ifndef COLONNADE_INTEGERS_H
 #define COLONNADE_INTEGERS_H
 
@@ -130,6 +130,11 @@ static inline bool colonnade_include(struct colonnade_extent *extent, const int6
     }
     extent->is_empty = false;
     return true;
+}
+
+/* A value of a register of `width` bits. */
+static inline uint32_t colonnade_bits(int64_t value, int width) {
+    return (uint32_t)value & (width < 32 ? ((uint32_t)1 << width) - 1 : UINT32_MAX);
 }
 
 static inline bool colonnade_is_within(int64_t value, int64_t low, int64_t high) { return low <= value && value <= high; }

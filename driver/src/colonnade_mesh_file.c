@@ -99,19 +99,18 @@ static bool are_changes(const struct colonnade_mesh *mesh) {
     return true;
 }
 
-/* Times ascend from 0 on to the duration; matrices and weights are small enough for what is computed. */
-static bool are_keys(const struct colonnade_mesh *mesh) {
-    const size_t numbers = colonnade_mesh_pose_words(mesh), matrices = (size_t)MATRIX_WORDS * mesh->bones;
+bool colonnade_are_keys(const struct colonnade_keys *keys) {
     uint32_t last = 0;
-    for (size_t key = 0; key < mesh->keys; ++key) {
-        const uint8_t *at = mesh->key_words + 4 * (1 + numbers) * key;
+    for (size_t key = 0; key < keys->count; ++key) {
+        const uint8_t *at = keys->words + 4 * (1 + (size_t)keys->numbers) * key;
         if (colonnade_word(at, 0) < last || (key == 0 && colonnade_word(at, 0) != 0)) return false;
         last = colonnade_word(at, 0);
-        for (size_t i = 0; i < numbers; ++i)
-            if (colonnade_magnitude(colonnade_signed_word(at, 1 + i)) >> (i < matrices ? MATRIX_BITS : TARGET_BITS) != 0)
+        for (size_t i = 0; i < keys->numbers; ++i)
+            if (colonnade_magnitude(colonnade_signed_word(at, 1 + i)) >> (i < keys->of_matrices ? MATRIX_BITS : TARGET_BITS) !=
+                0)
                 return false;
     }
-    return last == mesh->duration;
+    return last == keys->duration;
 }
 
 enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const struct colonnade_design *design, const void *data,
@@ -131,7 +130,10 @@ enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const stru
     found.leaf_words = words + 4 * leaves;
     found.change_words = words + 4 * changes;
     found.key_words = words + 4 * keys;
-    if (!are_vertices(&found) || !are_leaves(&found) || !are_changes(&found) || !are_keys(&found)) return COLONNADE_NOT_A_CLIP;
+    const struct colonnade_keys all = {found.key_words, found.keys, colonnade_mesh_pose_words(&found),
+                                       MATRIX_WORDS * found.bones, found.duration};
+    if (!are_vertices(&found) || !are_leaves(&found) || !are_changes(&found) || !colonnade_are_keys(&all))
+        return COLONNADE_NOT_A_CLIP;
     *mesh = found;
     return COLONNADE_OK;
 }

@@ -42,6 +42,17 @@ enum field {
 
 _Static_assert(FIELD_IS_CLEAR + 1 == COLONNADE_MESH_FIELDS, "each field has its place");
 
+/* Poses over time: of each key its time, 2^-16 s, and numbers, matrices first. */
+struct colonnade_keys {
+    const uint8_t *words;
+    uint32_t count, numbers, of_matrices, duration;
+};
+
+/* Whether times ascend from 0 on to the duration, and numbers are small enough for what is computed. */
+bool colonnade_are_keys(const struct colonnade_keys *keys);
+/* The numbers at a time, 2^-16 s; keys repeat. */
+void colonnade_find_pose(const struct colonnade_keys *keys, uint32_t time, int32_t *pose);
+
 /* A walk over the tree of a copy. Children of a node are beside each other, nodes first; subtrees follow depth first. */
 struct colonnade_mesh_walk {
     const struct colonnade_mesh *mesh;

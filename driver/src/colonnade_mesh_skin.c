@@ -7,24 +7,27 @@ enum { OCTAHEDRAL_ONE = (1 << (OCTAHEDRAL_BITS - 1)) - 1 };
 
 uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh) { return MATRIX_WORDS * mesh->bones + mesh->targets; }
 
-void colonnade_mesh_pose(const struct colonnade_mesh *mesh, uint32_t time, int32_t *pose) {
-    const size_t words = colonnade_mesh_pose_words(mesh), stride = 4 * (1 + words);
-    const uint8_t *before = mesh->key_words;
-    uint32_t low = 0, high = mesh->keys;
-    if (time > mesh->duration) time %= mesh->duration != 0 ? mesh->duration : 1;
+void colonnade_find_pose(const struct colonnade_keys *keys, uint32_t time, int32_t *pose) {
+    const size_t stride = 4 * (1 + (size_t)keys->numbers);
+    uint32_t low = 0, high = keys->count;
+    if (time > keys->duration) time %= keys->duration != 0 ? keys->duration : 1;
     while (high - low > 1) { /* the last key up to the time */
         const uint32_t middle = low + (high - low) / 2;
-        if (colonnade_word(mesh->key_words + stride * middle, 0) <= time) low = middle;
+        if (colonnade_word(keys->words + stride * middle, 0) <= time) low = middle;
         else high = middle;
     }
-    before += stride * low;
-    const uint8_t *after = high < mesh->keys ? before + stride : before;
+    const uint8_t *before = keys->words + stride * low, *after = high < keys->count ? before + stride : before;
     const uint32_t start = colonnade_word(before, 0), span = colonnade_word(after, 0) - start;
     const int64_t part = span == 0 ? 0 : (int64_t)(((uint64_t)(time - start) << 16) / span);
-    for (size_t i = 0; i < words; ++i) {
+    for (size_t i = 0; i < keys->numbers; ++i) {
         const int64_t from = colonnade_signed_word(before, 1 + i), to = colonnade_signed_word(after, 1 + i);
         pose[i] = (int32_t)(from + colonnade_nearest((to - from) * part, 16));
     }
+}
+
+void colonnade_mesh_pose(const struct colonnade_mesh *mesh, uint32_t time, int32_t *pose) {
+    const struct colonnade_keys keys = {mesh->key_words, mesh->keys, colonnade_mesh_pose_words(mesh), 0, mesh->duration};
+    colonnade_find_pose(&keys, time, pose);
 }
 
 /* A vertex where it is bound: position and normal. */

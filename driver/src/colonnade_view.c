@@ -172,13 +172,6 @@ uint32_t colonnade_view_most_writes(const struct colonnade_view *view) {
     return most;
 }
 
-static void write_word(uint8_t *bytes, uint32_t value) {
-    bytes[0] = (uint8_t)value;
-    bytes[1] = (uint8_t)(value >> 8);
-    bytes[2] = (uint8_t)(value >> 16);
-    bytes[3] = (uint8_t)(value >> 24);
-}
-
 enum colonnade_error colonnade_view_frame(struct colonnade_view *view, uint8_t *writes, uint32_t capacity,
                                           struct colonnade_frame *frame) {
     if (capacity < colonnade_view_most_writes(view)) return COLONNADE_TOO_LARGE;
@@ -198,8 +191,8 @@ enum colonnade_error colonnade_view_frame(struct colonnade_view *view, uint8_t *
         for (uint32_t word = 0; word < block.count; ++word) {
             const uint32_t value = words[block.place + word];
             if (is_known && value == accepted[block.place + word]) continue;
-            write_word(to, block.address + word);
-            write_word(to + 4, value);
+            colonnade_write_word(to, block.address + word);
+            colonnade_write_word(to + 4, value);
             to += 8;
         }
     }

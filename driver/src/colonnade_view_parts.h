@@ -36,11 +36,6 @@ struct colonnade_work {
 /* The words of the frame in work. */
 static inline uint32_t *colonnade_computed(struct colonnade_view *view) { return view->words[!view->accepted]; }
 
-/* A value of a register of `width` bits. */
-static inline uint32_t colonnade_bits(int64_t value, int width) {
-    return (uint32_t)value & (width < 32 ? ((uint32_t)1 << width) - 1 : UINT32_MAX);
-}
-
 /* Words of a register of `mac_bits` and those below. */
 static inline uint32_t colonnade_mac_words(const struct colonnade_view_scene *scene) {
     return scene->more_mac_bits > 0 ? 2 : 1;

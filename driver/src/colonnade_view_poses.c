@@ -81,6 +81,14 @@ enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, cons
     return COLONNADE_OK;
 }
 
+enum colonnade_error colonnade_view_set_bounds(struct colonnade_view *view, const int32_t low[3], const int32_t high[3]) {
+    const int64_t most = ((int64_t)1 << view->scene.vertex_bits) - 1;
+    for (int axis = 0; axis < 3; ++axis)
+        if (!colonnade_is_within(low[axis], 0, high[axis]) || high[axis] > most) return COLONNADE_OUTSIDE;
+    for (int axis = 0; axis < 3; ++axis) view->scene.low[axis] = low[axis], view->scene.high[axis] = high[axis];
+    return COLONNADE_OK;
+}
+
 enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index,
                                               const struct colonnade_light *light) {
     if (index >= view->scene.lights) return COLONNADE_NO_LIGHT;

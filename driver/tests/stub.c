@@ -396,9 +396,9 @@ static void test_events(struct shell *shell, struct colonnade *device) {
 
 static void test_names(struct shell *shell, struct colonnade *device) {
     (void)shell, (void)device;
-    for (int error = COLONNADE_OK; error <= COLONNADE_NO_REFIT; ++error)
+    for (int error = COLONNADE_OK; error <= COLONNADE_TOO_SMALL; ++error)
         CHECK(strcmp(colonnade_error_name((enum colonnade_error)error), "unknown") != 0);
-    CHECK(strcmp(colonnade_error_name((enum colonnade_error)(COLONNADE_NO_REFIT + 1)), "unknown") == 0);
+    CHECK(strcmp(colonnade_error_name((enum colonnade_error)(COLONNADE_TOO_SMALL + 1)), "unknown") == 0);
     uint32_t word = 3;
     colonnade_mmio_write(&word, 0, 4);
     CHECK(colonnade_mmio_read(&word, 0) == 4);

@@ -1,6 +1,6 @@
 /* Frames of random poses from the view file in view_table.h: prints a hash of all writes. */
 #include "bare.h"
-#include "colonnade_view.h"
+#include "colonnade_motion.h"
 #include "view_table.h"
 
 static uint32_t state = 0x2545F491u;
@@ -38,6 +38,22 @@ static struct colonnade_pose make_pose(int bits) {
 
 static void check(enum colonnade_error error) { add((uint32_t)error); }
 
+/* An object anywhere, moved anyhow. */
+static void move(const struct colonnade_view *view) {
+    const struct colonnade_pose pose = make_pose(34), pivot = make_pose(34);
+    struct colonnade_transform transform = {{{0}}, -(int32_t)(next() % 64), {0}};
+    for (int i = 0; i < 9; ++i) transform.linear[i / 3][i % 3] = (int32_t)next();
+    for (int axis = 0; axis < 3; ++axis) {
+        transform.position[axis] = (int64_t)next() << 18;
+        if (next() % 2 != 0) transform.position[axis] *= -1;
+    }
+    check(colonnade_motion_move(view, &pose, pivot.position, &transform));
+    for (int i = 0; i < 9; ++i) add((uint32_t)transform.linear[i / 3][i % 3]);
+    for (int axis = 0; axis < 3; ++axis)
+        add((uint32_t)transform.position[axis]), add((uint32_t)(transform.position[axis] >> 32));
+    add((uint32_t)transform.exponent);
+}
+
 static uint8_t writes[8 * 4096];
 
 static void run(struct colonnade_view *view) {
@@ -52,6 +68,7 @@ static void run(struct colonnade_view *view) {
         check(colonnade_view_set_object(view, &object));
         check(colonnade_view_set_camera(view, &camera));
         if (i % 16 == 15) check(colonnade_view_set_sample(view, next() % 16, 16));
+        if (i % 16 == 15) move(view);
         for (uint32_t light = 0; light < view->scene.lights; ++light) {
             struct colonnade_light value = {{0}, {next() >> 14, next() >> 14, next() >> 14}, next()};
             const struct colonnade_pose place = make_pose(34);

@@ -2,13 +2,14 @@
 // Without the model's headers: its namespace has the name of the driver's structure.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/tuple.h>
 
 #include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "colonnade_view.h"
+#include "colonnade_motion.h"
 
 namespace nb = nanobind;
 using namespace nanobind::literals;
@@ -53,6 +54,19 @@ public:
         check(colonnade_view_set_object(&view_, &pose));
     }
 
+    void setBounds(const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high) { check(colonnade_view_set_bounds(&view_, low.data(), high.data())); }
+
+    auto move(const Position& shift, const Rotation& rotation, const Position& pivot, const Rotation& linear, std::int32_t exponent, const Position& position) const {
+        const colonnade_pose pose = poseOf(shift, rotation), from = poseOf(position, linear);
+        colonnade_transform transform{{}, exponent, {}};
+        std::copy(&from.rotation[0][0], &from.rotation[0][0] + 9, &transform.linear[0][0]);
+        std::copy(from.position, from.position + 3, transform.position);
+        check(colonnade_motion_move(&view_, &pose, pivot.data(), &transform));
+        Rotation moved;
+        std::copy(&transform.linear[0][0], &transform.linear[0][0] + 9, moved.begin());
+        return std::make_tuple(moved, transform.exponent, Position{transform.position[0], transform.position[1], transform.position[2]});
+    }
+
     void setLight(std::uint32_t index, const Position& position, const std::array<std::uint32_t, 3>& colour, std::uint64_t reach) {
         colonnade_light light{{}, {}, reach};
         std::copy(position.begin(), position.end(), light.position);
@@ -92,6 +106,8 @@ void bind_view(nb::module_& module) {
         .def(nb::init<const std::array<std::uint32_t, 8>&, std::uint32_t, std::uint32_t, const nb::bytes&>(), "format_hash"_a, "first"_a, "end"_a, "file"_a)
         .def("set_camera", &TargetView::setCamera, "position"_a, "rotation"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a)
         .def("set_object", &TargetView::setObject, "position"_a, "rotation"_a)
+        .def("set_bounds", &TargetView::setBounds, "low"_a, "high"_a)
+        .def("move", &TargetView::move, "shift"_a, "rotation"_a, "pivot"_a, "linear"_a, "exponent"_a, "position"_a)
         .def("set_light", &TargetView::setLight, "index"_a, "position"_a, "colour"_a, "reach"_a)
         .def("set_sample", &TargetView::setSample, "index"_a, "count"_a)
         .def("frame", &TargetView::frame)

@@ -7,6 +7,7 @@ void bind_environment(nb::module_& module);
 void bind_bvh(nb::module_& module);
 void bind_driver(nb::module_& module);
 void bind_fixed_order(nb::module_& module);
+void bind_instances(nb::module_& module);
 void bind_leaf(nb::module_& module);
 void bind_live(nb::module_& module);
 void bind_mesh(nb::module_& module);
@@ -23,6 +24,7 @@ NB_MODULE(_core, module) {
     bind_bvh(module);
     bind_driver(module);
     bind_fixed_order(module);
+    bind_instances(module);
     bind_leaf(module);
     bind_live(module);
     bind_mesh(module);

@@ -15,13 +15,14 @@ from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.instances import instance_registers
 from colonnade.scene.model import MeshSource, Scene
-from colonnade.scene_image.header import Instance
+from colonnade.scene_image.header import Instance, ObjectFrame
 from colonnade.scene_image.joined_images import joined_records
 from colonnade.scene_image.packer import pack
 from colonnade.scene_image.world import world_frame
 
 Floats = NDArray[np.float64]
 MESHES = ("sphere:2", "torus", "cube")
+FRAME = ObjectFrame(65000.0, (-0.5, -0.5, -0.5))
 
 
 def transform(random: np.random.Generator, kind: str = "rigid", spread: float = 2.0) -> Floats:
@@ -39,13 +40,21 @@ def transform(random: np.random.Generator, kind: str = "rigid", spread: float = 
     return matrix
 
 
+def instance(linear: Floats, place: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Instance:
+    """A mesh of that frame, with another transform."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = linear, place
+    rows = tuple(tuple(row) for row in matrix.tolist())
+    return Instance(FRAME, (0, 20000, 30000), (65000, 40000, 31000), 2000, rows, 7, 3)
+
+
 class World:
     """The model with a scene of instances of the meshes in turn, each packed once. The camera sees the world's cube."""
 
     def __init__(
         self, manifest: Manifest, transforms: Sequence[Floats], meshes: Sequence[str] = MESHES, size: int = 64
     ) -> None:
-        self.numbers = manifest.numbers
+        self.manifest, self.numbers = manifest, manifest.numbers
         self.meshes = [load_mesh(name) for name in meshes]
         images = [pack(mesh, manifest) for mesh in self.meshes]
         records, self.roots = joined_records(images, manifest)
@@ -67,7 +76,7 @@ class World:
     def renumber(self, order: Sequence[int]) -> None:
         self.order = np.array(order)
         instances = [self.instances[i] for i in order]
-        self.registers = self.base | instance_registers(instances, self.frame, self.numbers)
+        self.registers = self.base | instance_registers(instances, self.frame, self.manifest)
         self.model.start(self.registers)
 
     @property

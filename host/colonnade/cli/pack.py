@@ -52,7 +52,9 @@ from colonnade.maps.encoders import Encoder
     "--photo-file", type=FILE, metavar="FILE", help="Also write the photo behind the object, for the AXI4 shell."
 )
 @click.option("--view-file", type=FILE, metavar="FILE", help="Also write what a processor needs to move the object.")
-@click.option("--clip-file", type=FILE, metavar="FILE", help="Also write what a processor needs to bend the mesh.")
+@click.option(
+    "--clip-file", type=FILE, metavar="FILE", help="Also write what a processor needs to bend or move meshes."
+)
 @size_option("Frame size of --frame-file, --photo-file and --view-file, e.g. 640x480.  [default: that of the scene]")
 @strict_option
 @json_option

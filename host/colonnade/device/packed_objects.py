@@ -12,16 +12,22 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.maps.encoders import Encoder
+from colonnade.mesh.clips.joined import Place, joined_clip, still_clip
+from colonnade.mesh.clips.keys import Keys, keys_of
 from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.mesh.materials.mesh import Mesh
-from colonnade.registers.instances import instance_registers
+from colonnade.registers.instances import AXES, instance_registers
+from colonnade.registers.motion_file import Motion, TargetMotion
 from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.file import SceneImage
-from colonnade.scene_image.header import ImageHeader, Instance, TreeStatistics
+from colonnade.scene_image.header import ImageHeader, Instance, ObjectFrame, TreeStatistics
 from colonnade.scene_image.joined_images import joined_records
 from colonnade.scene_image.packer import pack, pack_geometry, surface_colours, texture_count
 from colonnade.scene_image.textures import with_textures
-from colonnade.scene_image.world import world_bounds, world_frame
+from colonnade.scene_image.world import world_frame
+
+#: Share of the longest edge of the scene at rest by which interpolated transforms may miss a motion.
+_TOLERANCE = 2.0**-12
 
 
 def pack_objects(
@@ -53,15 +59,16 @@ def pack_objects(
     return pack(mesh, manifest, materials, headroom, encoder, children)
 
 
-def placed_image(image: SceneImage, mesh: Mesh, manifest: Manifest, time: float = 0.0) -> SceneImage:
-    """An image of instances with the transforms of a joined mesh of the same objects at a time; the records stay.
+def placed_image(image: SceneImage, mesh: Mesh, manifest: Manifest) -> SceneImage:
+    """An image of instances with the transforms of a joined mesh of the same objects; the records stay.
 
     Raises:
         UserError: An object is too small for the scene.
     """
     pairs = zip(image.header.instances, mesh.objects, strict=True)
-    instances = [replace(one, transform=_rows(placed.transform_at(time))) for one, placed in pairs]
-    return replace(image, header=_placed(image.header, instances, mesh, manifest))
+    instances = [replace(one, transform=_rows(placed.transform)) for one, placed in pairs]
+    header = replace(image.header, extent=mesh.extent, parts=mesh.parts)
+    return replace(image, header=_placed(header, instances, world_frame(instances, manifest.numbers), manifest))
 
 
 def _rows(matrix: Floats) -> tuple[tuple[float, ...], ...]:
@@ -135,9 +142,14 @@ def _joined(own: Sequence[SceneImage], mesh: Mesh, manifest: Manifest) -> SceneI
         largest_triangle=max(one.largest_triangle for one in headers),
         materials=tuple(material for table in tables for material in table),
         tree=_tree([one.tree for one in headers if one.tree is not None]),
+        extent=mesh.extent,
+        parts=mesh.parts,
     )
+    moves = None
     try:
-        header = _placed(header, instances, mesh, manifest)
+        header = _placed(header, instances, world_frame(instances, manifest.numbers), manifest)
+        if mesh.clip is not None:
+            moves = MovingInstances.of(tuple(images), roots, instances, mesh, manifest)
     except UserError as error:
         raise _OneMesh(str(error)) from None
     return replace(
@@ -145,7 +157,7 @@ def _joined(own: Sequence[SceneImage], mesh: Mesh, manifest: Manifest) -> SceneI
         header=header,
         records=records,
         source_faces=np.concatenate([one.source_faces for one in images]),
-        moves=None if mesh.clip is None else MovingInstances(tuple(images), mesh, manifest, mesh.clip.duration),
+        moves=moves,
     )
 
 
@@ -160,37 +172,73 @@ class MovingInstances:
 
     Attributes:
         images: The meshes, each once.
-        mesh: The joined mesh.
-        manifest: The design's manifest.
-        seconds: How long they move; an animation that is shorter stays at its end.
+        target: What moves them, in a world that holds the whole motion.
     """
 
     images: tuple[SceneImage, ...]
-    mesh: Mesh
-    manifest: Manifest
-    seconds: float
+    target: TargetMotion
+
+    @classmethod
+    def of(
+        cls,
+        images: tuple[SceneImage, ...],
+        roots: Sequence[int],
+        instances: Sequence[Instance],
+        mesh: Mesh,
+        manifest: Manifest,
+    ) -> MovingInstances:
+        """Those of a joined mesh.
+
+        Raises:
+            UserError: An object is too small for the scene of all poses.
+        """
+        keys = _motion_keys(instances, mesh)
+        clips = [
+            (root, image.moves.file)
+            for root, image in zip(roots, images, strict=True)
+            if isinstance(image.moves, Bending)
+        ]
+        motion = Motion(tuple(instances), keys, instances[0].frame, tuple(clips))
+        poses = [motion.at_key(key) for key in range(len(keys.times))]
+        motion = replace(motion, world=world_frame([one for pose in poses for one in pose], manifest.numbers))
+        for pose in poses:
+            instance_registers(pose, motion.world, manifest)
+        return cls(images, TargetMotion(motion, manifest))
+
+    @property
+    def seconds(self) -> float:
+        """How long they move; an animation that is shorter stays at its end."""
+        return self.target.seconds
 
     def posed(self, image: SceneImage, progress: float) -> SceneImage:
         """See `Moves`."""
-        time = progress * self.seconds
+        time, target = progress * self.seconds, self.target
         if any(one.moves is not None for one in self.images):
             bent = [one.posed(min(1.0, time / one.moves.seconds) if one.moves else 0.0) for one in self.images]
-            image = replace(image, records=joined_records(bent, self.manifest)[0])
-        return placed_image(image, self.mesh, self.manifest, time)
+            image = replace(image, records=joined_records(bent, target.manifest)[0])
+        header = _placed(image.header, target.instances(progress), target.motion.world, target.manifest)
+        return replace(image, header=header)
 
 
-def _placed(header: ImageHeader, instances: Sequence[Instance], mesh: Mesh, manifest: Manifest) -> ImageHeader:
-    """The header of instances in the world that holds them."""
-    frame = world_frame(instances, manifest.numbers)
-    instance_registers(instances, frame, manifest.numbers)
-    low, high = world_bounds(instances, frame, manifest.numbers)
+def _motion_keys(instances: Sequence[Instance], mesh: Mesh) -> Keys:
+    """The transforms of the objects of a joined mesh over the time of its clip: those of their boxes."""
+    assert mesh.clip is not None
+    boxes = [still_clip(one.box) for one in instances]
+    places = [one.place or Place.of([one.transform]) for one in mesh.objects]
+    clip = replace(joined_clip(boxes, places), duration=mesh.clip.duration)
+    rest = np.concatenate([one.corners for one in instances])
+    return keys_of(clip, _TOLERANCE * float(np.ptp(rest, axis=0).max()))
+
+
+def _placed(header: ImageHeader, instances: Sequence[Instance], frame: ObjectFrame, manifest: Manifest) -> ImageHeader:
+    """The header of instances in a world."""
+    registers = instance_registers(instances, frame, manifest)
+    low, high = ([registers[f"bounds.{side}.{axis}"] for axis in AXES] for side in ("low", "high"))
     return replace(
         header,
         frame=frame,
-        bounds_low=low,
-        bounds_high=high,
-        extent=mesh.extent,
-        parts=mesh.parts,
+        bounds_low=(low[0], low[1], low[2]),
+        bounds_high=(high[0], high[1], high[2]),
         instances=tuple(instances),
     )
 

@@ -16,7 +16,7 @@ from colonnade.common.image_io import resized_photo
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.device.gathered_light import scene_cube, with_cube
-from colonnade.device.packed_objects import pack_objects, placed_image
+from colonnade.device.packed_objects import MovingInstances, pack_objects, placed_image
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import frame_registers
@@ -254,16 +254,18 @@ class DeviceScene:
 
     @checked
     def clip_file(self) -> bytes:
-        """What bends the mesh on a target (docs/driver.md, "Meshes that bend").
+        """What bends the mesh, or moves instances, on a target (docs/driver.md).
 
         Raises:
             UserError: The scene has neither an animation nor a motion of an object.
         """
         if self.image.moves is None:
             raise UserError("a clip file has what moves, and the scene has none: give mesh.animation or object.motion")
-        if not isinstance(self.image.moves, Bending):
-            raise UserError("a clip file is of one mesh, and the objects are instances: set frame.instances to 0")
-        return self.image.moves.file
+        if isinstance(self.image.moves, Bending):
+            return self.image.moves.file
+        assert isinstance(self.image.moves, MovingInstances)
+        motion = self.image.moves.target.motion
+        return motion.file(self.manifest, sets_offset=self.scene.light.shadow_offset is None)
 
     def dram_image(self) -> bytes:
         """The records as a design with a cache reads them from DRAM.

@@ -14,7 +14,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.registers.environment import environment_registers
 from colonnade.registers.instances import instance_registers
-from colonnade.registers.shading import check_surfaces, largest_offset, surface_registers
+from colonnade.registers.shading import check_surfaces, surface_registers
 from colonnade.registers.target_view import TargetView
 from colonnade.registers.view_file import still_file
 from colonnade.registers.watchdog import watchdog_cycles
@@ -78,9 +78,9 @@ def registers_of(
     registers |= _scene(header, manifest)
     registers |= surface_registers(view, header, manifest)
     if header.instances:
-        placed = instance_registers(header.instances, header.frame, manifest.numbers)
+        placed = instance_registers(header.instances, header.frame, manifest)
         offset = placed["shading.offset"] if view.shadow_offset is None else registers["shading.offset"]
-        registers |= placed | {"shading.offset": min(offset, largest_offset(manifest.numbers))}
+        registers |= placed | {"shading.offset": offset}
     if environment is not None:
         registers |= environment_registers(view, environment, header, manifest, relit)
     try:

@@ -1,4 +1,4 @@
-"""The registers of a scene of instances (docs/numbers.md, section 10)."""
+"""The registers of a scene of instances, as a target computes them: ``driver/src/colonnade_instances.c``."""
 
 from __future__ import annotations
 
@@ -9,81 +9,81 @@ import numpy as np
 
 from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
-from colonnade.common.vectors import cofactors
+from colonnade.common.types import Floats
+from colonnade.design.manifest import Manifest
 from colonnade.registers.surface_offset import surface_offset
 from colonnade.scene_image.header import Instance, ObjectFrame
-from colonnade.scene_image.world import world_bounds
 
 AXES = "xyz"
-MATRIX_BITS = 25
-NORMAL_FRACTION = 14
-CELL_BITS = 7
-#: Roundings between world and object, in steps of each: of the ray's origin, its direction and the way back.
-OBJECT_STEPS, WORLD_STEPS = 6, 8
+#: Bits of the linear part of a transform, fraction bits of its position.
+LINEAR_BITS, POSITION_FRACTION = 30, 20
+#: Number formats of a target's world.
+NUMBERS = ("vertexBits", "gridFraction", "sceneBits")
+_REFUSALS = {
+    "flat": "object {} is flat: its transform must not scale an axis to nothing",
+    "tooSmall": "object {} is too small for the scene: make it larger, or the scene smaller",
+    "outside": "object {} is stretched too far for the scene: scale its axes more alike",
+}
 
 
-def instance_registers(instances: Sequence[Instance], world: ObjectFrame, numbers: Mapping[str, int]) -> dict[str, int]:
+def instance_registers(instances: Sequence[Instance], world: ObjectFrame, manifest: Manifest) -> dict[str, int]:
     """The registers of instances, of the box that they share, and the offset from their surfaces.
 
     Args:
         instances: In the order of their numbers.
         world: Frame of the world, which camera and lights are in, too.
-        numbers: The manifest's number formats.
+        manifest: That of a design with instances.
 
     Raises:
-        UserError: An instance is flat, or too small for the world.
+        UserError: An instance is flat, too small for the world, or stretched beyond its range.
     """
-    low, high = world_bounds(instances, world, numbers)
-    registers, offset = {"scene.instances": len(instances)}, 0
+    from colonnade import _core
+
+    numbers = manifest.numbers
+    target = _core.TargetInstances(*(numbers[name] for name in NUMBERS))
+    registers = {"scene.instances": len(instances)}
+    for number, instance in enumerate(instances):
+        try:
+            words = target.add(*object_values(instance, numbers), *transform_values(instance, world))
+        except ValueError as error:
+            raise UserError(_REFUSALS[str(error)].format(number + 1)) from None
+        own = [manifest.registers[name] for name in instance_names(manifest, number)]
+        for register in own:
+            place = register.address - own[0].address
+            registers[register.name] = register.decode(words[place : place + register.words])
+    low, high, registers["shading.offset"] = target.shared()
     for a, axis in enumerate(AXES):
         registers |= {f"bounds.low.{axis}": low[a], f"bounds.high.{axis}": high[a]}
-    for number, instance in enumerate(instances):
-        placed, least = _placed(number, instance, world, numbers)
-        registers |= {f"instances[{number}].{name}": value for name, value in placed.items()}
-        offset = max(offset, least)
-        box, (first, last) = f"instances[{number}].box", _box(instance, 2 * least, world, numbers)
-        for a, axis in enumerate(AXES):
-            registers |= {f"{box}.low.{axis}": first[a], f"{box}.high.{axis}": last[a]}
-    return registers | {"shading.offset": offset}
+    return registers
 
 
-def _box(instance: Instance, margin: int, world: ObjectFrame, numbers: Mapping[str, int]) -> list[list[int]]:
-    """The cells of the world that hold an instance, low and high; ``margin``, grid steps, is for roundings of rays."""
-    units = (instance.corners - world.offset) * world.scale
-    around = margin * 2.0 ** -numbers["gridFraction"]
-    cells = 2.0 ** (CELL_BITS - numbers["vertexBits"])
-    low, high = (units.min(axis=0) - around) * cells, (units.max(axis=0) + around) * cells
-    last = (1 << CELL_BITS) - 1
-    return [np.clip(np.floor(side), 0, last).astype(int).tolist() for side in (low, high)]
+def instance_names(manifest: Manifest, number: int) -> list[str]:
+    """The registers of an instance, in the order of their addresses."""
+    return [name for name in manifest.registers if name.startswith(f"instances[{number}].")]
 
 
-def _placed(
-    number: int, instance: Instance, world: ObjectFrame, numbers: Mapping[str, int]
-) -> tuple[dict[str, int], int]:
-    """Registers of an instance, and the least offset from its surface, grid steps of the world."""
-    transform = np.array(instance.transform)
-    frame, linear = instance.frame, transform[:3, :3]
-    largest, _, least = fixed_order.stretches(linear)
-    if not least > 1e-4 * largest:
-        raise UserError(f"object {number + 1} is flat: its transform must not scale an axis to nothing")
-    turning = cofactors(linear)
-    inverse = turning.T / fixed_order.dot(linear[:, 0], turning[:, 0])
-    matrix = frame.scale / world.scale * inverse
-    shift = MATRIX_BITS - 1 - math.frexp(np.abs(matrix).max())[1]
-    # A ray starts in the reach of the world's cube, and must do so in the object's scene
-    reach = 1.5 * np.sqrt(3) * (1 << numbers["vertexBits"]) * frame.scale / world.scale / least
-    if not (1 <= shift < 64 and reach * 2.0 ** numbers["gridFraction"] < 1 << (numbers["sceneBits"] - 1)):
-        raise UserError(f"object {number + 1} is too small for the scene: make it larger, or the scene smaller")
-    limit = (1 << (MATRIX_BITS - 1)) - 1
-    steps = world.scale * 2.0 ** numbers["gridFraction"]
-    corner = (fixed_order.product(linear, np.array(frame.offset)) + transform[:3, 3] - np.array(world.offset)) * steps
-    normal = inverse.T * least
-    registers = {"shift": shift, "root": instance.root, "materialBase": instance.material_base}
-    for a, axis in enumerate(AXES):
-        registers[f"origin.{axis}"] = int(np.rint(corner[a]))
-        for b, column in enumerate(AXES):
-            registers[f"matrix[{a}].{column}"] = int(np.clip(np.rint(np.ldexp(matrix[a, b], shift)), -limit, limit))
-            registers[f"normal[{a}].{column}"] = int(np.rint(np.ldexp(normal[a, b], NORMAL_FRACTION)))
-    own = surface_offset(numbers, instance.largest_triangle) + OBJECT_STEPS
-    offset = (own * largest * world.scale / frame.scale + WORLD_STEPS) * largest / least
-    return registers, math.ceil(offset)
+def object_values(
+    instance: Instance, numbers: Mapping[str, int]
+) -> tuple[tuple[int, int, int], tuple[int, int, int], int, int, int]:
+    """`struct colonnade_object` of an instance: low, high, offset, root and material base."""
+    offset = surface_offset(numbers, instance.largest_triangle)
+    return instance.bounds_low, instance.bounds_high, offset, instance.root, instance.material_base
+
+
+def transform_values(instance: Instance, world: ObjectFrame) -> tuple[list[int], int, list[int]]:
+    """`struct colonnade_transform` of an instance: linear part row by row, its exponent, and position."""
+    linear, position = unit_transform(instance, world)
+    exponent = math.frexp(np.abs(linear).max())[1] - LINEAR_BITS
+    position = np.clip(position, -(2.0**40), 2.0**40)
+    return (
+        np.rint(np.ldexp(linear, -exponent)).astype(np.int64).ravel().tolist(),
+        exponent,
+        np.rint(np.ldexp(position, POSITION_FRACTION)).astype(np.int64).tolist(),
+    )
+
+
+def unit_transform(instance: Instance, world: ObjectFrame) -> tuple[Floats, Floats]:
+    """From vertex units of an instance to those of the world: the linear part and the place of (0, 0, 0)."""
+    transform, frame = np.array(instance.transform), instance.frame
+    corner = fixed_order.product(transform[:3, :3], np.array(frame.offset)) + transform[:3, 3]
+    return world.scale / frame.scale * transform[:3, :3], (corner - np.array(world.offset)) * world.scale

@@ -39,6 +39,10 @@ class TargetView:
         """Move the camera: as `set_object`, then fx, fy, cx, cy, 2^-32 pixels, and width and height."""
         self._view.set_camera(position, rotation, *lens, *size)
 
+    def set_bounds(self, low: Position, high: Position) -> None:
+        """Change the bounds of what moves within the object's cube: vertex units."""
+        self._view.set_bounds(low, high)
+
     def set_light(self, index: int, position: Position, colour: Position, reach: int = 0) -> None:
         """Change a light: 2^-32 m; linear colour, 2^-16; its reach, 2^-32 m, 0 for a constant intensity."""
         self._view.set_light(index, position, colour, reach)

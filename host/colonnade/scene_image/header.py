@@ -76,12 +76,17 @@ class Instance:
         return Instance(*box, rows, root, material_base)
 
     @property
-    def corners(self) -> Floats:
-        """The corners of the mesh's box in the world, float64 [8, 3]."""
-        low, high, matrix = self.bounds_low, self.bounds_high, np.array(self.transform)
+    def box(self) -> Floats:
+        """The corners of the mesh's box, float64 [8, 3]."""
+        low, high = self.bounds_low, self.bounds_high
         units = np.array([[(low, high)[i >> a & 1][a] for a in range(3)] for i in range(8)], float)
-        own = units / self.frame.scale + np.array(self.frame.offset)
-        return np.asarray(fixed_order.product(own, matrix[:3, :3].T) + matrix[:3, 3])
+        return np.asarray(units / self.frame.scale + np.array(self.frame.offset))
+
+    @property
+    def corners(self) -> Floats:
+        """The same in the world."""
+        matrix = np.array(self.transform)
+        return np.asarray(fixed_order.product(self.box, matrix[:3, :3].T) + matrix[:3, 3])
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,17 +9,13 @@ import pytest
 from exact_rays import truth
 from instance_worlds import World, transform
 
-from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import load_scene
-from colonnade.registers.instances import instance_registers
-
-SMALL = Manifest.from_dict(json.loads((Path(__file__).parents[3] / "configs" / "golden" / "small.json").read_text()))
 
 
 def manifest_of(config: str) -> Manifest:
-    return SMALL if config == "small" else manifest_for(config, ()).manifest
+    return manifest_for(config, ("frame.instances=16",)).manifest
 
 
 @pytest.mark.parametrize("count", [2, 8, 16])
@@ -30,7 +23,7 @@ def test_the_order_of_instances_changes_no_hit(count: int) -> None:
     """333,336 rays, each in three orders of the instances; of equal distances one may name another triangle."""
     random = np.random.default_rng(count)
     kinds = ("rigid", "scaled", "mirrored", "sheared")
-    world = World(SMALL, [transform(random, kinds[i % 4], 1.5) for i in range(count)])
+    world = World(manifest_of("small"), [transform(random, kinds[i % 4], 1.5) for i in range(count)])
     starts, ways = world.rays(random, 1_000_000 // 9 + 1)
     first = world.nearest(starts, ways)
     assert 0.2 < (first["triangle"] >= 0).mean() < 1
@@ -127,7 +120,7 @@ def test_the_offset_is_needed() -> None:
 def test_a_shadow_ray_meets_what_a_nearest_ray_meets_before_the_light() -> None:
     """Objects that touch: frames lit from the side are the same in every order of instances."""
     random = np.random.default_rng(3)
-    world = World(SMALL, [transform(random, "rigid", 0.4) for _ in range(4)])
+    world = World(manifest_of("small"), [transform(random, "rigid", 0.4) for _ in range(4)])
     frames = []
     for order in ((0, 1, 2, 3), (3, 1, 0, 2)):
         world.renumber(order)
@@ -137,7 +130,7 @@ def test_a_shadow_ray_meets_what_a_nearest_ray_meets_before_the_light() -> None:
 
 
 def test_without_instances_the_registers_of_instances_change_nothing() -> None:
-    world = World(SMALL, [np.eye(4)], ("sphere:2",))
+    world = World(manifest_of("small"), [np.eye(4)], ("sphere:2",))
     load_scene(world.model, world.images[0])
     world.model.start(world.base)
     before = world.model.rows(0, 64)
@@ -145,15 +138,3 @@ def test_without_instances_the_registers_of_instances_change_nothing() -> None:
     after = world.model.rows(0, 64)
     for name in before:
         np.testing.assert_array_equal(before[name], after[name])
-
-
-@pytest.mark.parametrize(
-    ("scale", "message"), [((1, 1, 0), "object 1 is flat"), ((1e-3, 1e-3, 1e-3), "object 1 is too small")]
-)
-def test_transforms_out_of_range_are_refused(scale: tuple[float, float, float], message: str) -> None:
-    world = World(SMALL, [np.eye(4)])
-    matrix = np.diag([*scale, 1.0])
-    with pytest.raises(UserError, match=message):
-        instance_registers(
-            [replace(world.instances[0], transform=tuple(map(tuple, matrix)))], world.frame, world.numbers
-        )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from animated_documents import arm
 from textured_files import FOUR
 
+from colonnade import _core
 from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
@@ -20,7 +22,7 @@ from colonnade.device.bit_exact import render_model
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.materials.texture import Texture
 from colonnade.quality.image_metrics import psnr
-from colonnade.registers.instances import MATRIX_BITS, NORMAL_FRACTION
+from colonnade.registers.instances import instance_registers, transform_values, unit_transform
 from colonnade.render.hit_faces import hit_faces
 from colonnade.scene.model import Camera, Material, MeshSource, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene.object_mesh import object_mesh
@@ -64,11 +66,6 @@ def picture(prepared: DeviceScene, manifest: Manifest) -> Floats:
     frame = render_model(manifest, prepared.image, prepared.registers(SIZE))
     assert frame.is_object.mean() > 0.05 and not frame.errors
     return encode_srgb(frame.colour / 4095.0)
-
-
-def test_registers_of_instances_are_as_wide_as_the_design_says(manifest: Manifest) -> None:
-    assert manifest.registers["instances[0].matrix[0].x"].width == MATRIX_BITS
-    assert manifest.registers["instances[0].normal[0].x"].width == NORMAL_FRACTION + 2
 
 
 @pytest.mark.parametrize("count", [2, 3])
@@ -172,8 +169,101 @@ def test_instances_move_and_bend_as_the_objects_of_one_mesh(tmp_path: Path, mani
     np.testing.assert_array_equal(again.image.records, instances.lit_at(described.at(0.3)).image.records)
     with pytest.raises(UserError, match=r"leave out object\.motion"):
         instances.with_transform(1, Transform())
-    with pytest.raises(UserError, match="a clip file is of one mesh"):
-        instances.clip_file()
+
+
+def test_registers_of_a_motion_are_those_of_the_target(tmp_path: Path, manifest: Manifest) -> None:
+    """Word by word: of the clip file, whose times are those of the host."""
+    keys = (ObjectKey(0.5, turn=40.0, translate=(0.2, 0.3, 0.0)), ObjectKey(rotate=(20.0, 0.0, 60.0)))
+    bent = replace(OBJECTS[2], mesh=MeshSource(path=arm().write(tmp_path / "arm.gltf"), animation="bend"))
+    prepared = DeviceScene.of(scene(OBJECTS[0], replace(OBJECTS[1], motion=keys), bent), manifest)
+    target, seconds = target_motion(prepared.clip_file(), manifest), prepared.image.moves.seconds  # type: ignore[union-attr]
+    known: dict[int, int] = {}
+    before = -1
+    edge = float(np.ptp(np.concatenate([one.corners for one in prepared.image.header.instances]), axis=0).max())
+    for progress in np.linspace(0.0, 1.0, 21).tolist():
+        time = round(progress * seconds * 2**16)
+        known |= pairs_of(target.writes(time, before))
+        before = time
+        header = prepared.lit_at(prepared.scene.at(progress)).image.header
+        assert header.frame == prepared.image.header.frame
+        assert prepared.mesh is not None
+        for one, placed in zip(header.instances, prepared.mesh.objects, strict=True):
+            exact = placed.transform_at(progress * seconds)
+            corners = one.box @ exact[:3, :3].T + exact[:3, 3]
+            assert np.abs(one.corners - corners).max() < 2.0**-12 * edge
+        registers = instance_registers(header.instances, header.frame, manifest)
+        del registers["scene.instances"]
+        words = [pair for name, value in registers.items() for pair in manifest.registers[name].encode(value)]
+        assert known == dict(words)
+        assert header.bounds_low == tuple(registers[f"bounds.low.{axis}"] for axis in "xyz")
+    still = target.writes(before, before)
+    assert still == b""
+    ((root, duration),) = target.meshes()
+    assert root == header.instances[2].root and duration == round(seconds * 2**16)
+
+
+def test_a_program_moves_an_object_by_a_pose_in_metres(manifest: Manifest) -> None:
+    """Also where the scene itself is turned in the view's world."""
+    prepared, random = DeviceScene.of(scene(*OBJECTS), manifest), np.random.default_rng(4)
+    header = prepared.image.header
+    registers = [one for one in manifest.registers.values() if one.access == "rw"]
+    end = max(one.address + one.words for one in registers)
+    first = min(one.address for one in registers)
+    view = _core.TargetView(manifest.format_words, first, end, prepared.view_file(SIZE))
+
+    def rotation() -> tuple[Floats, list[int]]:
+        matrix, _ = np.linalg.qr(random.normal(size=(3, 3)))
+        matrix *= np.sign(np.linalg.det(matrix))
+        return matrix, np.rint(matrix * 2.0**30).astype(int).ravel().tolist()
+
+    def fixed(vector: Floats) -> list[int]:
+        return np.rint(vector * 2.0**32).astype(int).tolist()
+
+    for one in header.instances * 10:
+        (own, own_words), (turn, turn_words) = rotation(), rotation()
+        own_place, shift, pivot = random.uniform(-1, 1, size=(3, 3))
+        view.set_object(fixed(own_place), own_words)
+        linear, exponent, place = transform_values(one, header.frame)
+        twice = [2 * value for value in linear], exponent - 1, place  # with all bits
+        linear, exponent, place = view.move(fixed(shift), turn_words, fixed(pivot), *twice)
+        world, move = np.eye(4), np.eye(4)
+        world[:3, :3], world[:3, 3] = own, own_place
+        move[:3, :3], move[:3, 3] = turn, pivot + shift - turn @ pivot
+        moved = np.linalg.inv(world) @ move @ world @ np.array(one.transform)
+        expected = unit_transform(replace(one, transform=tuple(map(tuple, moved))), header.frame)
+        found = np.ldexp(np.array(linear, float).reshape(3, 3), exponent)
+        assert np.abs(found - expected[0]).max() < 2.0**-26
+        assert np.abs(np.ldexp(np.array(place, float), -20) - expected[1]).max() < 2.0**-8
+    values = transform_values(header.instances[0], header.frame)
+    for wrong, error in (
+        ((fixed(shift), [0] * 9, fixed(pivot), *values), "badPose"),
+        ((fixed(shift), turn_words, [1 << 61, 0, 0], *values), "badPose"),
+        ((fixed(shift * 1e6), turn_words, fixed(pivot), *values), "tooFar"),
+        ((fixed(shift), turn_words, fixed(pivot), values[0], values[1], [1 << 60, 0, 0]), "outside"),
+        ((fixed(shift), turn_words, fixed(pivot), values[0], 1 << 30, values[2]), "outside"),
+    ):
+        with pytest.raises(ValueError, match=error):
+            view.move(*wrong)
+
+
+def test_a_clip_file_leaves_the_offset_of_the_scene(manifest: Manifest) -> None:
+    moving = scene(OBJECTS[0], replace(OBJECTS[1], motion=(ObjectKey(turn=90.0),)))
+    files = [
+        DeviceScene.of(one, manifest).clip_file()
+        for one in (moving, replace(moving, light=replace(moving.light, shadow_offset=0.01)))
+    ]
+    offset = manifest.registers["shading.offset"].address
+    assert [offset in pairs_of(target_motion(file, manifest).writes(0)) for file in files] == [True, False]
+
+
+def target_motion(file: bytes, manifest: Manifest) -> Any:
+    registers = [one for one in manifest.registers.values() if one.access == "rw"]
+    end = max(one.address + one.words for one in registers)
+    return _core.TargetMotion(manifest.format_words, min(one.address for one in registers), end, file)
+
+
+def pairs_of(writes: bytes) -> dict[int, int]:
+    return {int(address): int(word) for address, word in np.frombuffer(writes, "<u4").reshape(-1, 2)}
 
 
 def test_the_watchdog_waits_for_each_instance(manifest: Manifest) -> None:

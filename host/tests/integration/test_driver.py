@@ -35,6 +35,7 @@ from colonnade.maps.live import LiveEncoder, LiveFrame
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
+from colonnade.registers.instances import instance_registers
 from colonnade.registers.target_view import TargetView
 from colonnade.registers.view_words import camera_values, position_values
 from colonnade.render.sequence_frames import sequence_scenes
@@ -103,8 +104,8 @@ def test_batches_take_the_places_of_their_ring_in_turn() -> None:
 
 @pytest.mark.parametrize(
     "names",
-    [("fuzz", "shell"), ("fuzz_view",), ("fuzz_mesh",)],
-    ids=["driver", "registers from poses", "meshes that bend"],
+    [("fuzz", "shell"), ("fuzz_view",), ("fuzz_mesh",), ("fuzz_motion",)],
+    ids=["driver", "registers from poses", "meshes that bend", "objects that move"],
 )
 def test_random_inputs_of_the_fuzzers_break_nothing(names: tuple[str, ...]) -> None:
     """Also without libFuzzer: calls in any order, view files of legal and extreme numbers, tiles of any size."""
@@ -260,6 +261,46 @@ def test_the_viewer_renders_the_orbit_of_its_keys(tmp_path: Path, design: Genera
     lines = memory[PAGE : PAGE + stride * size[1]].reshape(size[1], stride)[:, : expected.shape[1]]
     np.testing.assert_array_equal(lines, expected)
     assert len(np.unique(lines)) > 20
+
+
+MOVING_SCENE = """
+camera.position = [1.5, 2.0, 5.0]
+
+[[object]]
+mesh.name = "torus"
+motion = {turn = 90.0, translate = [0.3, 0.2, 0.0]}
+
+[[object]]
+mesh.name = "cube"
+transform = {scale = 0.4, translate = [0.9, 0.5, 0.6]}
+motion = {rotate = [50.0, 0.0, 20.0], translate = [-0.5, 0.4, 0.0]}
+"""
+
+
+def test_the_viewer_plays_objects_that_move(tmp_path: Path) -> None:
+    """Its last frame is the model's: registers are written while the frame before runs."""
+    size, count = (24, 16), 4
+    design = shell_design_for("tiny", ("array.columns=2", "frame.instances=2"), bus_bytes=16)
+    manifest = design.manifest
+    (tmp_path / "scene.toml").write_text(MOVING_SCENE)
+    scene = DeviceScene.of(load_scene(tmp_path / "scene.toml"), manifest)
+    assert len(scene.image.header.instances) == 2 and scene.image.moves is not None
+    files = {"image": scene.device_image(), "view": scene.view_file(size), "clip": scene.clip_file()}
+    memory, (line,) = run_driver(
+        tmp_path, design, files, "interrupt", "image", "view", "--play", str(count), "clip", program="viewer"
+    )
+    assert line[:4] == [str(count), "frames", "of", "24x16,"]
+    header = scene.image.posed((count - 1) / count).header
+    target = TargetView(files["view"], manifest)
+    first = target.registers()
+    target.set_bounds(header.bounds_low, header.bounds_high)
+    registers = target.registers() | instance_registers(header.instances, header.frame, manifest)
+    expected = framebuffer_bytes(render_model(manifest, scene.image, registers), 0)
+    stride = -(-size[0] // (tile := int(manifest.config["frame"]["tileSize"]))) * tile * 4
+    lines = memory[PAGE : PAGE + stride * size[1]].reshape(size[1], stride)[:, : expected.shape[1]]
+    np.testing.assert_array_equal(lines, expected)
+    before = framebuffer_bytes(render_model(manifest, scene.image, first), 0)
+    assert (before != expected).mean() > 0.05
 
 
 ROOM_SCENE = """

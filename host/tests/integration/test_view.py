@@ -22,9 +22,9 @@ ROOT = toolchain.project_root()
 
 FRAMES, COUNTED = 2000, 10
 DEVICE_BASE = 0x8000
-#: Functions of the library, of one object, two lights and the camera; without those of the test.
+#: Functions of the library, of one object, two lights and the camera; signed divisions are those of the test.
 LIBRARY = re.compile(
-    r"colonnade_|find_|is_pose|is_place|set_|check_camera|write_word|compute|clip|__u?divdi3|memcpy|memset"
+    r"colonnade_|find_|is_pose|is_place|set_|check_camera|write_word|compute|clip|__udivdi3|memcpy|memset"
 )
 MAX_INSTRUCTIONS = 15000
 
