@@ -12,6 +12,7 @@ export class Corners {
     this.materials = [];
     this.uvs = [];
     this.metalUvs = [];
+    this.emissiveUvs = [];
     /** Of each face: the number of its normal map, positions in it and tangents of its corners; or null. */
     this.reliefs = [];
     this.alphas = [];
@@ -21,8 +22,8 @@ export class Corners {
     this.notes = new Set();
   }
 
-  /** `material`: a number; `uvs`, `metalUvs`: positions in its textures; null for none, as of normals and colours, of `relief` and of `alphas`. */
-  add(vertices, normals, colours, material = 0, uvs = null, metalUvs = null, relief = null, alphas = null) {
+  /** `material`: a number; `uvs`, `metalUvs`, `emissiveUvs`: positions in its textures; null for none, as of normals and colours, of `relief` and of `alphas`. */
+  add(vertices, normals, colours, material = 0, uvs = null, metalUvs = null, emissiveUvs = null, relief = null, alphas = null) {
     for (let i = 1; i + 1 < vertices.length; ++i) {
       this.materials.push(material);
       this.reliefs.push(relief);
@@ -34,6 +35,7 @@ export class Corners {
         this.colours.push(...(colours?.[corner] ?? [1, 1, 1]));
         this.uvs.push(...(uvs?.[corner] ?? [0, 0]));
         this.metalUvs.push(...(metalUvs?.[corner] ?? [0, 0]));
+        this.emissiveUvs.push(...(emissiveUvs?.[corner] ?? [0, 0]));
       }
     }
     if (this.faces.length > 3 * MOST_TRIANGLES) throw new Error(`the mesh has more than ${MOST_TRIANGLES.toLocaleString("en")} triangles: the command line reads larger ones`);
@@ -59,6 +61,7 @@ export class Corners {
       materialOf: Int32Array.from(this.materials),
       uvs: Float64Array.from(this.uvs),
       metalUvs: Float64Array.from(this.metalUvs),
+      emissiveUvs: Float64Array.from(this.emissiveUvs),
       relief: this.reliefs.some(Boolean) ? this.relief() : null,
       notes: [...this.notes],
     };

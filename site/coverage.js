@@ -1,7 +1,7 @@
-// Prepares the faces of a file as the host does: metal by its maps, then without what alpha hides (host/colonnade/mesh/materials/
+// Prepares the faces of a file as the host does: metal and emission by maps, then without what alpha hides (host/colonnade/mesh/materials/
 // coverage.py), then swatches at the corners of faces (swatches.py).
 
-import { MIRROR_ROUGHNESS } from "./surfaces.js";
+import { areasOf, MIRROR_ROUGHNESS } from "./surfaces.js";
 
 /** As host/colonnade/mesh/geometry/topology.py: faces of a mesh that is split, and edges that are not, as part of the mesh. */
 const [MOST_SPLIT_FACES, SMALLEST_SPLIT] = [49152, 1 / 400];
@@ -21,29 +21,37 @@ const facesOf = (mesh, number) => [...mesh.materialOf.keys()].filter((face) => m
 /** The mesh of a file with materials, prepared for surfacesOf; another one is left. */
 export function prepared(library, mesh) {
   if (!mesh.materials) return mesh;
-  const found = swatched(library, withoutAlpha(library, withMetal(library, mesh)));
+  const found = swatched(library, withoutAlpha(library, withMaps(library, mesh)));
   return { ...found, notes: [...new Set(found.notes)] };
 }
 
-/** The mesh with the materials of metallic-roughness maps. */
-function withMetal(library, mesh) {
-  const { materials, metalUvs, textures } = mesh;
+/** The mesh with the materials that metallic-roughness and emission maps make of its faces, numbered as the host does. */
+function withMaps(library, mesh) {
+  const { materials, metalUvs, emissiveUvs, textures } = mesh;
   const found = [...materials];
-  const numbers = new Map();
   const materialOf = Int32Array.from(mesh.materialOf);
+  const areas = areasOf(mesh);
   materials.forEach((material, number) => {
-    if (!material.metal || material.kind !== "diffuse") return;
+    const hasMetal = material.metal && material.kind === "diffuse";
+    const emits = material.emissive && !material.emitsMean && material.emission.some(Boolean);
+    if (!hasMetal && !emits) return;
     const own = facesOf(mesh, number);
-    const { isMetal, roughness } = library.metal(textures[material.metal.texture], valuesOf(metalUvs, own, 6), material.factors);
-    // By roughness, as the host numbers them
-    [...own.keys()].sort((a, b) => roughness[a] - roughness[b]).forEach((i) => {
-      if (!isMetal[i]) return;
-      const face = own[i];
-      const key = [number, roughness[i]].join();
-      const emission = roughness[i] > MIRROR_ROUGHNESS ? material.emission : [0, 0, 0];
-      if (!numbers.has(key)) numbers.set(key, found.push({ ...material, kind: "mirror", roughness: roughness[i], emission }) - 1);
-      materialOf[face] = numbers.get(key);
-    });
+    const metal = hasMetal && library.metal(textures[material.metal.texture], valuesOf(metalUvs, own, 6), material.factors);
+    const shares = emits && library.emission(textures[material.emissive.texture], valuesOf(emissiveUvs, own, 6), valuesOf(areas, own, 1));
+    const emissionOf = (i) => (shares ? material.emission.map((value, channel) => value * shares[3 * i + channel]) : material.emission);
+    if (emits) found[number] = { ...material, emissive: null, emission: [0, 0, 0] };
+    const rows = own.map((_, i) => [...(metal ? [metal.isMetal[i], metal.roughness[i]] : []), ...(shares ? emissionOf(i) : [])]);
+    const order = [...own.keys()].sort((a, b) => rows[a].map((value, column) => value - rows[b][column]).find(Boolean) ?? 0);
+    const numbers = new Map();
+    for (const i of order) {
+      const isMetal = Boolean(metal?.isMetal[i]);
+      const isDark = isMetal && metal.roughness[i] <= MIRROR_ROUGHNESS;
+      const emission = isDark ? [0, 0, 0] : emissionOf(i);
+      if (!isMetal && !emission.some((value, channel) => value !== found[number].emission[channel])) continue;
+      const key = [isMetal && metal.roughness[i], ...emission].join();
+      if (!numbers.has(key)) numbers.set(key, found.push({ ...found[number], emission, ...(isMetal ? { kind: "mirror", roughness: metal.roughness[i] } : {}) }) - 1);
+      materialOf[own[i]] = numbers.get(key);
+    }
   });
   return { ...mesh, materials: found, materialOf };
 }

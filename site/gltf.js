@@ -113,8 +113,8 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
     if (found?.some((uv) => !uv.every((value) => Math.abs(value) <= MOST_UV))) throw document.error(`a primitive has texture coordinates beyond ${grouped(MOST_UV)}, or not finite: export it again`);
     return found;
   };
-  const { base, metal, relief, alpha } = materials.materials[material];
-  const [uvs, metalUvs] = [positionsIn(base), positionsIn(metal)];
+  const { base, metal, emissive, relief, alpha } = materials.materials[material];
+  const [uvs, metalUvs, emissiveUvs] = [base, metal, emissive].map(positionsIn);
   const reliefUvs = relief && attribute(relief.coordinates, 2);
   if (relief && !reliefUvs) corners.notes.add("faces with a normal map are smooth: they have no texture coordinates of the map");
   if (base && !uvs) corners.notes.add("faces without texture coordinates show no texture");
@@ -129,12 +129,14 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
   const tangentOf = (vertex) => (tangentAt ? [...transform(matrix, tangentAt(vertex), 0), side * Math.sign(tangentAt(vertex)[3])] : [0, 0, 0, 0]);
   const reliefOf = (face) => ({ map: relief.map, uvs: face.map((vertex) => relief.place(reliefUvs(vertex))), tangents: face.map(tangentOf) });
   // A face without positions has its plain colour, a textured one none of its vertices
-  const number = (base && !uvs) || (metal && !metalUvs) ? materials.without(material, !uvs, !metalUvs) : material;
+  const missing = [base && !uvs, metal && !metalUvs, emissive && !emissiveUvs];
+  const number = missing.some(Boolean) ? materials.without(material, ...missing) : material;
   const colourOf = (vertex) => [...own(vertex).subarray(0, 3)].map((value) => Math.max(0, Math.min(1, value)));
   const alphas = alpha && own?.(0).length === 4 && Array.from({ length: count }, (_, vertex) => Math.max(0, Math.min(1, own(vertex)[3])));
   for (const face of trianglesOf(indices.values, mode)) {
     if (isMirrored) face.reverse();
-    corners.add(face.map((vertex) => first + vertex), normalAt && face.map(normalOf), own && !uvs && face.map(colourOf), number, uvs && face.map((vertex) => uvs[vertex]), metalUvs && face.map((vertex) => metalUvs[vertex]), reliefUvs && reliefOf(face), alphas && face.map((vertex) => alphas[vertex]));
+    const [inBase, inMetal, inEmissive] = [uvs, metalUvs, emissiveUvs].map((all) => all && face.map((vertex) => all[vertex]));
+    corners.add(face.map((vertex) => first + vertex), normalAt && face.map(normalOf), own && !uvs && face.map(colourOf), number, inBase, inMetal, inEmissive, reliefUvs && reliefOf(face), alphas && face.map((vertex) => alphas[vertex]));
   }
 }
 

@@ -37,8 +37,8 @@ export class GltfMaterials {
   }
 
   /** The number of a material without the textures for which a primitive has no positions. */
-  without(number, base, metal) {
-    const found = { ...this.materials[number], ...(base ? { base: null } : {}), ...(metal ? { metal: null } : {}) };
+  without(number, base, metal, emissive) {
+    const found = { ...this.materials[number], ...(base ? { base: null } : {}), ...(metal ? { metal: null } : {}), ...(emissive ? { emitsMean: true } : {}) };
     return this.materials.push(found) - 1;
   }
 

@@ -145,6 +145,17 @@ export class Library {
     );
   }
 
+  /** What faces emit by a map, three values each; `uvs` of their corners in it. */
+  emission(texture, uvs, areas) {
+    const count = areas.length;
+    return this.withArrays([texture.pixels, uvs, areas, new Float64Array(3 * count)], (pixels, u, a, found) =>
+      this.withArrays([Int32Array.from(textureWords(texture, pixels))], (map) => {
+        this.check(this.wasm.colonnade_model_emission(map, u, a, count, found));
+        return new Float64Array(this.wasm.memory.buffer, found, 3 * count).slice();
+      }),
+    );
+  }
+
   /**
    * What of the faces of a material its alpha shows: `kinds`, the `owners` and `weights` of pieces, `panes`, and the pixels of
    * the texture, `filled` (colonnade_cut). `corners`, `uvs` and `alphas` are of the faces, `values` and `budget` as there.

@@ -75,7 +75,7 @@ function rendered(material, gathers, hasBounces) {
 const entryOf = ({ kind, roughness, ior, albedo, emission, coverage, isTextured, isCorner }) => ({ kind, roughness, ior, albedo, emission, coverage, hasColours: isCorner && !isTextured, hasTexture: isTextured });
 
 /** The areas of faces. */
-function areasOf({ vertices, faces }) {
+export function areasOf({ vertices, faces }) {
   const at = (corner, axis) => vertices[3 * faces[corner] + axis];
   return Float64Array.from({ length: faces.length / 3 }, (_, face) => {
     const [a, b] = [1, 2].map((corner) => [0, 1, 2].map((axis) => at(3 * face + corner, axis) - at(3 * face, axis)));

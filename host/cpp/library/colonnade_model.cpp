@@ -9,6 +9,7 @@
 #include "mesh/atlas.hpp"
 #include "mesh/baking.hpp"
 #include "mesh/cleaning.hpp"
+#include "mesh/emission.hpp"
 #include "mesh/roughness.hpp"
 #include "mesh/swatches.hpp"
 #include "model/frame.hpp"
@@ -399,6 +400,12 @@ const char* colonnade_model_metal(const colonnade_texture* map, const double* uv
         isMetal[i] = face.isMetal;
         roughness[i] = face.roughness;
     }
+    return nullptr;
+}
+
+const char* colonnade_model_emission(const colonnade_texture* map, const double* uvs, const double* areas, std::uint32_t count, double* colours) {
+    const std::vector<mesh::Rgb> found = mesh::emissionOf(pictureOf(*map), uvs, areas, count, linearCodes().data());
+    std::memcpy(colours, found.data(), found.size() * sizeof found[0]);
     return nullptr;
 }
 

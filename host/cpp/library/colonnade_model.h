@@ -133,6 +133,9 @@ const char *colonnade_model_swatches(const struct colonnade_texture *texture, co
  * the factors of metallic and roughness. */
 const char *colonnade_model_metal(const struct colonnade_texture *map, const double *uvs, uint32_t count, const double *factors, uint8_t *is_metal, double *roughness);
 
+/* What so many faces emit by an emission map, linear, at most four colours: `uvs` of the corners, and the faces' areas. */
+const char *colonnade_model_emission(const struct colonnade_texture *map, const double *uvs, const double *areas, uint32_t count, double *colours);
+
 /* Merges the nearest of values of equal kinds until so many are left, by their weights; `merged` has the new value of each. */
 const char *colonnade_model_merge(const double *values, const double *weights, const int32_t *kinds, uint32_t count, uint32_t left, double *merged);
 

@@ -28,8 +28,8 @@ pytestmark = NEEDS_MODULE
 KINDS = {"rough metal": "metal"}
 
 
-def textured_sheet(folder: Path) -> Path:
-    """A bent sheet with a picture and a normal map, half of it metal of several roughnesses, and one with colours."""
+def textured_sheet(folder: Path, glows: bool = False) -> Path:
+    """A bent sheet with a picture and a normal map, half of it metal or aglow by a map, and one with colours."""
     steps = 12
     random = np.random.default_rng(5)
     base = random.integers(0, 256, (96, 64, 3)).astype(np.uint8)
@@ -89,6 +89,11 @@ def textured_sheet(folder: Path) -> Path:
         ],
         "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
     }
+    if glows:
+        surface = document["materials"][0]
+        emissive = surface["pbrMetallicRoughness"].pop("metallicRoughnessTexture")
+        surface["pbrMetallicRoughness"]["metallicFactor"] = 0.0
+        surface |= {"emissiveTexture": emissive, "emissiveFactor": [1.0, 0.4, 0.7]}
     (folder / "sheet.gltf").write_text(json.dumps(document))
     return folder / "sheet.gltf"
 
@@ -132,6 +137,17 @@ def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: floa
     for section in image.attributes:
         assert (tmp_path / section.memory).read_bytes() == section.words.tobytes(), section.memory
     assert (tmp_path / "records.bin").read_bytes() == image.records.tobytes()
+
+
+def test_a_sheet_glows_as_by_the_host(tmp_path: Path) -> None:
+    (tmp_path / "file").mkdir()
+    file = textured_sheet(tmp_path / "file", glows=True)
+    found = beside_host(tmp_path, file)
+    mesh = load_mesh(file, corner_colours=True)
+    used = {mesh.materials[number].emission for number in np.unique(mesh.face_materials)}
+    entries = np.array(sorted(one["emission"] for one in found["entries"]))
+    assert len(used) > 3
+    np.testing.assert_allclose(np.unique(entries, axis=0), np.array(sorted(used)), atol=1e-12)
 
 
 def same_picture(folder: Path, file: Path, size: tuple[int, int] = (160, 120)) -> dict[str, Any]:
