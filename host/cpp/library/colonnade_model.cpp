@@ -373,7 +373,7 @@ const char* colonnade_model_rest(const colonnade_clip* from, const std::int32_t*
     std::vector<mesh::Corners> rotated(normals ? faceCount : 0);
     if (normals) std::memcpy(rotated.data(), normals, faceCount * sizeof(mesh::Corners));
     const mesh::RestSurface found = mesh::restSurface(clipOf(*from), copied<mesh::Face>(faces, faceCount), rotated);
-    if (!found.isFinite) return "a transform of its rest pose is not finite, or too large: export it again";
+    if (!found.isFinite) return "the mesh: a transform of its rest pose is not finite, or too large: export it again";
     if (normals) std::memcpy(normals, rotated.data(), faceCount * sizeof(mesh::Corners));
     std::memcpy(vertices, found.vertices.data(), found.vertices.size() * sizeof(mesh::Vector));
     std::copy(found.isMirrored.begin(), found.isMirrored.end(), isMirrored);
