@@ -21,8 +21,22 @@ const facesOf = (mesh, number) => [...mesh.materialOf.keys()].filter((face) => m
 /** The mesh of a file with materials, prepared for surfacesOf; another one is left. */
 export function prepared(library, mesh) {
   if (!mesh.materials) return mesh;
-  const found = swatched(library, withoutAlpha(library, withMaps(library, mesh)));
+  const rest = mesh.clip ? atRest(library, mesh) : mesh;
+  const found = swatched(library, withoutAlpha(library, withMaps(library, rest)));
   return { ...found, notes: [...new Set(found.notes)] };
+}
+
+/** A mesh whose vertices are where its clip binds them, in its rest pose. */
+function atRest(library, mesh) {
+  const { vertices, normals, isMirrored } = library.rest(mesh);
+  /** Values of corners, so many each, backwards on mirrored faces. */
+  const ordered = (values, width) =>
+    values?.map((value, at) => {
+      const [corner, part] = [Math.floor(at / width), at % width];
+      return isMirrored[Math.floor(corner / 3)] ? values[width * (3 * Math.floor(corner / 3) + 2 - (corner % 3)) + part] : value;
+    });
+  const widths = { faces: 1, normals: 3, colours: 3, alphas: 1, uvs: 2, metalUvs: 2, emissiveUvs: 2 };
+  return { ...mesh, vertices, ...Object.fromEntries(Object.entries(widths).map(([name, width]) => [name, ordered(name === "normals" ? normals : mesh[name], width)])) };
 }
 
 /** The mesh with the materials that metallic-roughness and emission maps make of its faces, numbered as the host does. */
@@ -60,6 +74,7 @@ function withMaps(library, mesh) {
 function withoutAlpha(library, mesh) {
   if (!mesh.materials.some(({ alpha }) => alpha)) return mesh;
   const materials = mesh.materials.map((material) => ({ ...material, alpha: null }));
+  if (mesh.clip) return { ...mesh, materials, notes: [...mesh.notes, "partly transparent materials of an animated mesh are opaque: alpha cuts only what does not bend"] };
   const textures = [...mesh.textures];
   const notes = [...mesh.notes];
   const whole = [];

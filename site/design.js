@@ -1,5 +1,8 @@
 // A design as its manifest describes it: the lines that colonnade_model_open reads, and writes of registers.
 
+/** The hash of a design's formats. */
+export const hashWords = ({ formatHash }) => Array.from({ length: 8 }, (_, i) => parseInt(formatHash.slice(8 * i, 8 * i + 8), 16));
+
 /** The lines of host/cpp/library/colonnade_model.h for a manifest. */
 export function designLines(manifest) {
   const { geometry, columnBvhMemory } = manifest.config;
@@ -9,6 +12,7 @@ export function designLines(manifest) {
     stackDepth: columnBvhMemory.stackDepth,
     recordBits: manifest.records.bits,
     depth: manifest.memories.columnBvh.depth,
+    ...Object.fromEntries(hashWords(manifest).map((word, i) => [`formatHash${i}`, word])),
   };
   const lines = Object.entries(numbers).map(([name, value]) => `number ${name} ${value}`);
   for (const [record, fields] of Object.entries(manifest.records.layouts))

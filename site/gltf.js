@@ -3,6 +3,7 @@
 
 import { Corners } from "./corners.js";
 import { DRACO, INSTANCING, READ_EXTENSIONS } from "./gltfchecks.js";
+import { ClipReader, EYE, animationNames, firstAnimation } from "./gltfclip.js";
 import { COMPRESSION, GltfDocument, grouped } from "./gltfdocument.js";
 import { GltfMaterials } from "./gltfmaterials.js";
 
@@ -15,10 +16,14 @@ const [POINTS, TRIANGLES, FAN] = [0, 4, 6];
 const OF_COPIES = { TRANSLATION: [0, 0, 0], ROTATION: [0, 0, 0, 1], SCALE: [1, 1, 1] };
 const MOST_COPIES = 1 << 16;
 
-/** A mesh, as of readMesh; `files` has the other dropped files by name. */
-export function readGltf(bytes, name, files) {
+/**
+ * A mesh, as of readMesh; `files` has the other dropped files by name. `chosen` is the number of the animation that
+ * moves it, null for none, the first that can unless given. Vertices of a mesh with a clip are where they are bound, until they are at rest (coverage.js).
+ */
+export function readGltf(bytes, name, files, chosen) {
   const document = new GltfDocument(bytes, name, files);
   const { json } = document;
+  const animation = chosen === undefined ? firstAnimation(json) : chosen;
   for (const extension of json.extensionsRequired ?? []) {
     if (COMPRESSION.includes(extension)) throw document.compressed(extension);
     if (!READ_EXTENSIONS.includes(extension)) throw document.error(`it requires the glTF extension ${extension}, which is not supported: export it without`);
@@ -27,20 +32,26 @@ export function readGltf(bytes, name, files) {
   const materials = new GltfMaterials(document, corners.notes);
   const vertices = [];
   const left = { "point primitive": 0, "line primitive": 0 };
-  for (const { node, matrix } of nodesOf(document))
-    for (const primitive of document.entry("meshes", node.mesh).primitives ?? []) addPrimitive(document, primitive, matrix, { corners, materials, vertices, left });
+  const animations = animationNames(json);
+  const clip = animation !== null ? new ClipReader(document, animation, corners.notes) : null;
+  for (const { index, node, matrix } of nodesOf(document, clip && corners.notes))
+    for (const primitive of document.entry("meshes", node.mesh).primitives ?? []) {
+      const before = vertices.length / 3;
+      if (addPrimitive(document, primitive, clip ? EYE : matrix, { corners, materials, vertices, left, isBent: Boolean(clip) })) clip?.add(index, primitive, vertices.length / 3 - before);
+    }
   for (const [noun, count] of Object.entries(left)) if (count > 0) corners.notes.add(`${grouped(count)} ${noun}${count > 1 ? "s are" : " is"} not shown: only faces are rendered`);
-  if (json.animations || json.skins) corners.notes.add("animations and skins are left out");
+  if (!clip && (animations.length > 0 || json.skins)) corners.notes.add("animations and skins are left out");
   const mesh = corners.mesh(vertices);
-  return { ...mesh, relief: mesh.relief && { ...mesh.relief, maps: materials.maps }, materials: materials.materials, textures: materials.textures };
+  const moved = clip && mesh.faces.length > 0 ? clip.clip(mesh.vertices, (node, index) => partsOf(document, node, index), (node, index) => matrixOf(document, node, index)) : null;
+  return { ...mesh, animations, animation, clip: moved, relief: mesh.relief && { ...mesh.relief, maps: materials.maps }, materials: materials.materials, textures: materials.textures };
 }
 
-/** The nodes with a mesh of the default scene, and their transforms to the scene. */
-function* nodesOf(document) {
+/** The nodes with a mesh of the default scene, and their transforms to the scene; with `notes`, which take the loss, none of its copies. */
+function* nodesOf(document, notes) {
   const { scenes = [], nodes = [], scene = 0 } = document.json;
   const children = new Set(nodes.flatMap((node) => node.children ?? []));
   const roots = scenes.length > 0 ? (document.entry("scenes", scene).nodes ?? []) : [...nodes.keys()].filter((index) => !children.has(index));
-  const pending = roots.map((index) => ({ index, parent: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1] })).reverse();
+  const pending = roots.map((index) => ({ index, parent: EYE })).reverse();
   while (pending.length > 0) {
     const { index, parent } = pending.pop();
     const node = document.entry("nodes", index);
@@ -50,7 +61,9 @@ function* nodesOf(document) {
     };
     const matrix = finite(multiply(parent, matrixOf(document, node, index)));
     for (const child of [...(node.children ?? [])].reverse()) pending.push({ index: child, parent: matrix });
-    if (node.mesh !== undefined) for (const copy of copiesOf(document, node, index)) yield { node, matrix: copy ? finite(multiply(matrix, copy)) : matrix };
+    const copies = node.mesh === undefined ? [] : copiesOf(document, node, index);
+    if (notes && copies.length > 1) notes.add("copies of an animated mesh are not shown: its node has one");
+    for (const copy of notes ? copies.slice(0, 1).map(() => null) : copies) yield { index, node, matrix: copy ? finite(multiply(matrix, copy)) : matrix };
   }
 }
 
@@ -69,7 +82,7 @@ function copiesOf(document, node, index) {
     const width = OF_COPIES[name].length;
     return given[name] ? [...given[name].values.subarray(width * copy, width * (copy + 1))] : OF_COPIES[name];
   };
-  return Array.from({ length: count }, (_, copy) => composed(part("TRANSLATION", copy), part("ROTATION", copy), part("SCALE", copy)));
+  return Array.from({ length: count }, (_, copy) => composed(part("TRANSLATION", copy), unit(part("ROTATION", copy)), part("SCALE", copy)));
 }
 
 /** The triangles of a primitive's corners. */
@@ -79,9 +92,13 @@ function trianglesOf(indices, mode) {
   return Array.from({ length: Math.max(0, indices.length - 2) }, (_, i) => corner(i).map((at) => indices[at]));
 }
 
-function addPrimitive(document, primitive, matrix, { corners, materials, vertices, left }) {
+/** Adds the triangles of a primitive; false if it has none. */
+function addPrimitive(document, primitive, matrix, { corners, materials, vertices, left, isBent }) {
   const { mode = TRIANGLES, attributes = {}, extensions = {} } = primitive;
-  if (mode < TRIANGLES) return void ++left[mode === POINTS ? "point primitive" : "line primitive"];
+  if (mode < TRIANGLES) {
+    ++left[mode === POINTS ? "point primitive" : "line primitive"];
+    return false;
+  }
   if (mode > FAN) throw document.error(`a primitive has the unknown mode ${mode}`);
   for (const name of COMPRESSION)
     if (name in extensions && document.entry("accessors", attributes.POSITION).bufferView === undefined) throw document.compressed(name);
@@ -113,7 +130,9 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
     if (found?.some((uv) => !uv.every((value) => Math.abs(value) <= MOST_UV))) throw document.error(`a primitive has texture coordinates beyond ${grouped(MOST_UV)}, or not finite: export it again`);
     return found;
   };
-  const { base, metal, emissive, relief, alpha } = materials.materials[material];
+  const { base, metal, emissive, relief: ownRelief, alpha } = materials.materials[material];
+  const relief = isBent ? null : ownRelief;
+  if (isBent && ownRelief) corners.notes.add("normal maps of an animated mesh are not shown: its smooth normals are");
   const [uvs, metalUvs, emissiveUvs] = [base, metal, emissive].map(positionsIn);
   const reliefUvs = relief && attribute(relief.coordinates, 2);
   if (relief && !reliefUvs) corners.notes.add("faces with a normal map are smooth: they have no texture coordinates of the map");
@@ -138,25 +157,39 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
     const [inBase, inMetal, inEmissive] = [uvs, metalUvs, emissiveUvs].map((all) => all && face.map((vertex) => all[vertex]));
     corners.add(face.map((vertex) => first + vertex), normalAt && face.map(normalOf), own && !uvs && face.map(colourOf), number, inBase, inMetal, inEmissive, reliefUvs && reliefOf(face), alphas && face.map((vertex) => alphas[vertex]));
   }
+  return true;
 }
 
 // Matrices: 16 numbers, column by column
 
-/** A node's transform to its parent. */
-function matrixOf(document, node, index) {
-  const part = (name, otherwise) => {
-    const values = node[name] === undefined ? otherwise : node[name];
-    if (!Array.isArray(values) || values.length !== otherwise.length || !values.every((value) => typeof value === "number")) throw document.error(`the transform of node ${index} is not valid: export it again`);
-    return values;
-  };
-  if (node.matrix !== undefined) return part("matrix", Array(16).fill(0));
-  return composed(part("translation", [0, 0, 0]), part("rotation", [0, 0, 0, 1]), part("scale", [1, 1, 1]));
+/** Numbers of a node, or those that stand for them. */
+function numbersOf(document, node, index, name, otherwise) {
+  const values = node[name] === undefined ? otherwise : node[name];
+  if (!Array.isArray(values) || values.length !== otherwise.length || !values.every((value) => typeof value === "number")) throw document.error(`the transform of node ${index} is not valid: export it again`);
+  return values;
 }
 
-/** The transform of a rotation, a quaternion of any length, after a scale and before a translation. */
-function composed(translation, rotation, scale) {
+/** The parts of a node's transform to its parent. */
+function partsOf(document, node, index) {
+  const part = (name, otherwise) => numbersOf(document, node, index, name, otherwise);
+  return { translation: part("translation", [0, 0, 0]), rotation: unit(part("rotation", [0, 0, 0, 1])), scale: part("scale", [1, 1, 1]) };
+}
+
+/** A node's transform to its parent. */
+function matrixOf(document, node, index) {
+  if (node.matrix !== undefined) return numbersOf(document, node, index, "matrix", EYE);
+  const { translation, rotation, scale } = partsOf(document, node, index);
+  return composed(translation, rotation, scale);
+}
+
+/** A quaternion scaled to length 1. */
+function unit(rotation) {
   const length = Math.hypot(...rotation) || 1;
-  const [x, y, z, w] = rotation.map((value) => value / length);
+  return rotation.map((value) => value / length);
+}
+
+/** The transform of a rotation, a unit quaternion, after a scale and before a translation. */
+function composed(translation, [x, y, z, w], scale) {
   const columns = [
     [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
     [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],

@@ -11,13 +11,13 @@ export const READ_EXTENSIONS = [
 ];
 const [MOST_ELEMENTS, MOST_LEVELS, MOST_DIGITS] = [100_000_000, 64, 40];
 
-const LISTS = ["nodes", "meshes", "accessors", "bufferViews", "buffers", "materials", "scenes", "textures", "images", "samplers"];
+const LISTS = ["nodes", "meshes", "accessors", "bufferViews", "buffers", "materials", "scenes", "textures", "images", "samplers", "animations", "skins"];
 const words = (text) => new Set(text.split(" "));
 /** Keys at any depth whose values are whole numbers from 0 on, texts, objects, and lists of these. */
-const WHOLE = words("mesh material bufferView buffer source sampler index texCoord byteOffset byteLength byteStride componentType mode skin wrapS wrapT magFilter minFilter");
+const WHOLE = words("mesh material bufferView buffer source sampler index texCoord byteOffset byteLength byteStride componentType mode skin wrapS wrapT magFilter minFilter node input output inverseBindMatrices");
 const TEXT = words("uri mimeType alphaMode");
 const OBJECT = words("attributes extensions pbrMetallicRoughness sparse values baseColorTexture metallicRoughnessTexture normalTexture occlusionTexture emissiveTexture");
-const [OBJECTS, WHOLES] = [words("primitives targets"), words("nodes children")];
+const [OBJECTS, WHOLES] = [words("primitives targets channels samplers"), words("nodes children joints")];
 
 const isWhole = (value) => Number.isSafeInteger(value) && value >= 0;
 const isObject = (value) => typeof value === "object" && value !== null && !Array.isArray(value);

@@ -11,7 +11,7 @@ const COMPONENTS = new Map([
   [5125, { size: 4, read: "getUint32", most: 2 ** 32 - 1 }],
   [5126, { size: 4, read: "getFloat32", most: null }],
 ]);
-const WIDTHS = new Map([["SCALAR", 1], ["VEC2", 2], ["VEC3", 3], ["VEC4", 4]]);
+const WIDTHS = new Map([["SCALAR", 1], ["VEC2", 2], ["VEC3", 3], ["VEC4", 4], ["MAT4", 16]]);
 
 /** Extensions that compress the mesh, and are not supported. */
 export const COMPRESSION = ["EXT_meshopt_compression", "KHR_meshopt_compression"];

@@ -1,11 +1,11 @@
 // The packer, the model and colonnade_view in WebAssembly (host/cpp/library, driver/src).
 
-import { designLines, registerWrites } from "./design.js";
+import { designLines, hashWords, registerWrites } from "./design.js";
 
 const PACKED = [
   "triangles", "recordCount", "nodes", "leaves", "hasColours", "lowX", "lowY", "lowZ", "highX", "highY",
   "highZ", "shadingOffset", "treeDepth", "stackBound", "dropped", "flipped", "replaced", "reversed",
-  "smoothed",
+  "smoothed", "duration",
 ];
 /** Those of the register map that do not depend on time. */
 const COUNTERS = [
@@ -89,9 +89,9 @@ export class Library {
     return new TextDecoder().decode(this.bytes.slice(pointer, end));
   }
 
-  /** `mesh`: what an error about the mesh is of. */
-  check(pointer, mesh = "the mesh") {
-    if (pointer !== 0) throw new Error(this.text(pointer).replace(/^the mesh/, () => mesh));
+  /** `mesh`: what an error about the mesh is of, `animation` its name. */
+  check(pointer, mesh = "the mesh", animation = "") {
+    if (pointer !== 0) throw new Error(this.text(pointer).replace(/^the mesh(: its animation)?/, (_, its) => (its ? `${mesh}${its} ${animation}` : mesh)));
   }
 
   /** Calls `use` with the addresses of copies of typed arrays; 0 for null. */
@@ -121,15 +121,43 @@ export class Library {
    * before. `surfaces` and `surfaceOf`, of each face, are those of surfacesOf (surfaces.js).
    */
   pack(mesh, { surfaces, surfaceOf } = { surfaces: [plainSurface(mesh)], surfaceOf: new Int32Array(mesh.faces.length / 3) }) {
-    const { name, vertices, faces, normals = null, colours = null, uvs = null, textures = [], relief = null } = mesh;
+    const { name, vertices, faces, normals = null, colours = null, uvs = null, textures = [], relief = null, clip = null } = mesh;
     const used = textures.map((texture) => (texture.pixels ? texture : BLANK));
     const reliefs = [relief && mapBytes(relief.maps), relief?.mapOf ?? null, relief?.uvs ?? null, relief?.tangents ?? null];
     return this.withArrays([vertices, faces, normals, colours, uvs, surfaceOf, surfaceBytes(surfaces), new Int32Array(PACKED.length), ...reliefs, ...used.map(({ pixels }) => pixels)], (v, f, n, c, u, of, s, out, maps, mapOf, mapUvs, tangents, ...pixels) =>
       this.withArrays([Int32Array.from(used.flatMap((texture, i) => textureWords(texture, pixels[i])))], (t) => {
-        const given = Uint32Array.of(v, vertices.length / 3, f, faces.length / 3, n, c, u, of, s, t, used.length, maps, relief?.maps.length ?? 0, mapOf, mapUvs, tangents);
-        this.withArrays([given], (pointer) => this.check(this.wasm.colonnade_model_pack(pointer, out), name && `mesh ${name}`));
+        const given = (moved) => Uint32Array.of(v, vertices.length / 3, f, faces.length / 3, n, c, u, of, s, t, used.length, maps, relief?.maps.length ?? 0, mapOf, mapUvs, tangents, moved);
+        this.withClip(clip, (moved) => this.withArrays([given(moved)], (pointer) => this.check(this.wasm.colonnade_model_pack(pointer, out), name && `mesh ${name}`, clip?.name)));
         const values = new Int32Array(this.wasm.memory.buffer, out, PACKED.length);
         return Object.fromEntries(PACKED.map((name, index) => [name, values[index]]));
+      }),
+    );
+  }
+
+  /** Calls `use` with the address of a clip (gltfclip.js); 0 for null. */
+  withClip(clip, use) {
+    if (!clip) return use(0);
+    const { nodes, tracks, bones, vertices, targets, changes } = clip;
+    const groups = [nodes, bones, vertices, targets, changes];
+    return this.withArrays([...groups.flat(), ...tracks.flatMap(({ times, values }) => [times, values])], (...pointers) => {
+      const words = tracks.flatMap(({ node, path, interpolation, times, values }, i) => [node, path, interpolation, times.length, values.length, ...pointers.slice(groups.flat().length + 2 * i).slice(0, 2)]);
+      return this.withArrays([Int32Array.from(words)], (ofTracks) => {
+        const taken = (group) => pointers.splice(0, group.length);
+        const counts = [nodes[0].length, bones[0].length, vertices[1].length / 4, targets[0].length, changes[0].length];
+        const [ofNodes, ...others] = groups.map((group, i) => [counts[i], ...taken(group)]);
+        return this.withArrays([Uint32Array.of(...ofNodes, tracks.length, ofTracks, ...others.flat())], use);
+      });
+    });
+  }
+
+  /** The vertices of a mesh in the rest pose of its clip, the normals of its corners there, or null, and which faces are mirrored. */
+  rest({ name, clip, faces, normals }) {
+    const [vertexCount, faceCount] = [clip.vertices[0].length, faces.length / 3];
+    return this.withClip(clip, (moved) =>
+      this.withArrays([faces, normals, new Float64Array(vertexCount), new Uint8Array(faceCount)], (f, n, v, is) => {
+        this.check(this.wasm.colonnade_model_rest(moved, f, faceCount, n, v, is), `mesh ${name}`);
+        const copy = (Values, from, count) => new Values(this.wasm.memory.buffer, from, count).slice();
+        return { vertices: copy(Float64Array, v, vertexCount), normals: normals && copy(Float64Array, n, 9 * faceCount), isMirrored: copy(Uint8Array, is, faceCount) };
       }),
     );
   }
@@ -213,10 +241,29 @@ export class Library {
     return this.bytes.slice(start, start + (packed.recordCount * this.manifest.records.bits) / 8);
   }
 
-  /** Gives the model records that another one has packed. */
-  load(records) {
+  /** The clip file of the packed mesh, copied; empty if nothing moves. */
+  clipFile() {
+    return this.withArrays([new Uint32Array(1)], (size) => {
+      const start = this.wasm.colonnade_model_clip(size);
+      return this.bytes.slice(start, start + new DataView(this.wasm.memory.buffer).getUint32(size, true));
+    });
+  }
+
+  /** Gives the model records that another one has packed, and their clip file. */
+  load(records, clip) {
     const count = records.length / (this.manifest.records.bits / 8);
-    this.withArrays([records], (pointer) => this.check(this.wasm.colonnade_model_load(pointer, count)));
+    this.withArrays([records, clip], (pointer, file) => {
+      this.check(this.wasm.colonnade_model_load(pointer, count));
+      this.check(this.wasm.colonnade_model_load_clip(file, clip.length));
+    });
+  }
+
+  /** Bends the records to a time of their clip, 2^-16 s. Returns how many pairs of triangles are shaded flat, since they are too stretched. */
+  pose(time) {
+    return this.withArrays([new Uint32Array(1)], (flat) => {
+      this.check(this.wasm.colonnade_model_pose(time, flat));
+      return new DataView(this.wasm.memory.buffer).getUint32(flat, true);
+    });
   }
 
   /** Gives the model memories of a room, its maps or light cube: {memory, words, bytes}, words as a Uint8Array, of so many bytes each. */
@@ -324,7 +371,7 @@ export class Library {
     if (!file) throw new Error("this design has no such view");
     const registers = this.manifest.registers.fields.filter((field) => field.access === "rw");
     const design = new Uint32Array(64);
-    for (let i = 0; i < 8; ++i) design[i] = parseInt(this.manifest.formatHash.slice(8 * i, 8 * i + 8), 16);
+    design.set(hashWords(this.manifest));
     design[8] = 0x8000 + 4 * Math.max(...registers.map((field) => field.address + field.words));
     design[9] = 0x8000 + 4 * Math.min(...registers.map((field) => field.address));
     if (this.view !== 0) for (const pointer of [this.view, this.file]) this.wasm.free(pointer);

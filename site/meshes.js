@@ -4,22 +4,25 @@
 import { Corners } from "./corners.js";
 import { readGltf } from "./gltf.js";
 
-/** A mesh: Float64Array vertices, Int32Array faces, normals and colours of the corners (Float64Array or null), notes. */
-export function readMesh(name, bytes, files = new Map()) {
+/**
+ * A mesh: Float64Array vertices, Int32Array faces, normals and colours of the corners (Float64Array or null), notes; of a glTF file the
+ * names of its animations, and the number and the clip of one of them, null for none; the first, unless `animation` is given.
+ */
+export function readMesh(name, bytes, files = new Map(), animation = undefined) {
   const suffix = name.toLowerCase().split(".").pop();
   const reader = new Map(Object.entries({ obj: readObj, ply: readPly, glb: readGltf, gltf: readGltf })).get(suffix);
   if (!reader) throw new Error(`${name}: only OBJ, PLY, glTF and GLB are read here; the command line reads more`);
   if (bytes.length === 0) throw new Error(`mesh file ${name} is empty`);
   let mesh;
   try {
-    mesh = reader(bytes, name, files);
+    mesh = reader(bytes, name, files, animation);
   } catch (error) {
     // What the language throws on wrong offsets, lengths and fields
     const isDamaged = [RangeError, TypeError, SyntaxError].some((kind) => error instanceof kind);
     throw isDamaged ? new Error(`${name} is damaged, or no ${suffix.toUpperCase()} file`) : error;
   }
   if (mesh.faces.length === 0) throw new Error(`mesh ${name} has no faces: ${mesh.notes.join("; ") || "it holds no polygons"}`);
-  return { name, ...mesh };
+  return { name, animations: [], animation: null, clip: null, ...mesh };
 }
 
 const linear = (value) => (value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4);

@@ -7,6 +7,7 @@ import { notesOf } from "./notes.js";
 import { listen } from "./orbit.js";
 import { element, listDesigns, showCosts } from "./panels.js";
 import { Picture } from "./picture.js";
+import { Player, listAnimations } from "./player.js";
 import { Queue } from "./queue.js";
 import { RayPanel } from "./raypanel.js";
 import { Renderer, bytesOf, unpack } from "./renderer.js";
@@ -37,7 +38,8 @@ function roomOf() {
   return hasRoom(room, state.design) ? room : null;
 }
 
-const scene = () => ({ state, mesh: page.mesh, manifest, packed });
+const player = new Player(() => picture?.update());
+const scene = () => ({ state, mesh: page.mesh, manifest, packed, time: player.time });
 const ray = new RayPanel(page, () => ({ renderer, picture, scene: scene(), room: roomOf() }));
 
 function fail(text) {
@@ -112,7 +114,7 @@ async function restore() {
   const { replaced } = renderer;
   await openDesign();
   if (page.file) {
-    await renderer.read(page.file.name, page.file.bytes, page.file.files);
+    await renderer.read(page.file);
     await pack();
   }
   restored = replaced;
@@ -126,20 +128,24 @@ function failWhenIdle(error) {
   });
 }
 
-/** Reads and packs a file; if it cannot be, the mesh stays what it was. */
-async function readFile(name, bytes, files) {
+/** Reads and packs a file, with one of its animations, the first unless given; if it cannot be, the mesh stays what it was. */
+async function readFile(name, bytes, files, animation = undefined) {
   const [{ mesh }, { material }] = [page, state];
+  const file = { name, bytes, files, animation };
   try {
-    page.mesh = await renderer.read(name, bytes, files);
-    if (page.mesh.hasMaterials) state.material = "file";
+    page.mesh = await renderer.read(file);
+    if (page.mesh.hasMaterials && page.file?.bytes !== bytes) state.material = "file";
     await pack();
   } catch (error) {
     page.mesh = mesh;
     state.material = material;
     throw error;
+  } finally {
+    listAnimations(page.mesh?.animations ?? [], page.mesh?.animation);
   }
-  page.file = { name, bytes, files };
+  page.file = { ...file, animation: page.mesh.animation };
   state.mesh = name;
+  player.open(packed.duration);
   linkNotes = [];
   ray.forget();
 }
@@ -221,7 +227,8 @@ function moved() {
 }
 
 form.addEventListener("input", ({ target }) => {
-  if (target.name === "drag") return;
+  if (target.name === "drag" || target.id === "moment") return;
+  if (target.name === "animation") return void queue.add("Reading the animation", () => readFile(page.file.name, page.file.bytes, page.file.files, target.value === "" ? null : Number(target.value)));
   if (target.name === "degrees" || target.name === "step") return void queue.add("Making the maps", () => openRoom(roomOf().files.found, roomOf().files.files));
   if (target.name in data.sliders) {
     state.design = data.sliders[target.name][target.value].design;
@@ -295,6 +302,7 @@ listen(stage, {
     const x = Math.floor(((event.clientX - box.left) / box.width) * width);
     const y = Math.floor(((event.clientY - box.top) / box.height) * height);
     if (x < 0 || y < 0 || x >= width || y >= height) return;
+    player.pause();
     state.follow = followText({ x, y, width, height, orbit: state }, roomOf() && !isAtMaps(state));
     keepLink();
     follow();
@@ -318,6 +326,13 @@ element("rtl-start").onclick = () => panel.render();
 
 // Start
 
+/** After a frame. */
+function drawn() {
+  ray.draw();
+  player.show();
+  if (!player.isPlaying) showNotes();
+}
+
 async function start() {
   const texts = JSON.parse(element("data").textContent);
   const [code, json, teapot] = await Promise.all([texts.module, texts.data, texts.teapot].map(unpack));
@@ -330,8 +345,8 @@ async function start() {
   listDesigns(data);
   element("about").textContent = `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
   renderer = page.renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));
-  const now = () => ({ scene: scene(), room: roomOf(), samples: data.samples, isReady: Boolean(packed) && !queue.isBusy && isWhole() });
-  picture = new Picture({ renderer, page, now, drawn: () => ray.draw(), fail: failWhenIdle });
+  const now = () => ({ scene: scene(), room: roomOf(), samples: data.samples, isPlaying: player.isPlaying, isReady: Boolean(packed) && !queue.isBusy && isWhole() });
+  picture = new Picture({ renderer, page, now, drawn, fail: failWhenIdle });
   state = linkedState();
   const { mesh, follow: followed } = state;
   if (mesh !== DEFAULTS.mesh) linkNotes.push(`the link is of ${mesh}, which a link does not hold: drop the file; this is the teapot`);

@@ -4,10 +4,12 @@ import { element, showFigures } from "./panels.js";
 import { passesOf, viewOf } from "./view.js";
 
 const COARSE = 4;
+/** Frames of an animation become coarser above so many milliseconds, and finer below. */
+const [SLOW, FAST] = [150, 35];
 
 /**
- * `now()` gives what is to be shown: the scene (view.js), its room or null, `samples` of passes (viewOf), and `isReady`: design, room
- * and mesh are those of the state. `page` has what tests read. `drawn()` is called after each frame, `fail(error)` for errors.
+ * `now()` gives what is to be shown: the scene (view.js), its room or null, `samples` of passes (viewOf), `isPlaying`: the mesh moves, and `isReady`:
+ * design, room and mesh are those of the state. `page` has what tests read. `drawn()` is called after each frame, `fail(error)` for errors.
  */
 export class Picture {
   renderer; page; now; drawn; fail;
@@ -18,6 +20,7 @@ export class Picture {
     this.context = element("picture").getContext("2d");
     this.canvas = this.context.canvas;
     this.isChanged = this.isRunning = false;
+    this.coarseness = COARSE; // of an animation's frames, of pixels
   }
 
   /** The picture's box on the stage, in its pixels: in a room it has the room's proportions. */
@@ -47,24 +50,38 @@ export class Picture {
     return width >= 8 && height >= 8 && width <= maxWidth && height <= maxHeight;
   }
 
-  /** Renders until the picture is that of the state: coarse at once, then whole, band by band, then the sums of passes. */
+  /** Renders until the picture is that of the state: coarse at once, then whole, band by band, then the sums of passes; of an animation frames that are coarse if whole ones are slow. */
   async update() {
     if (!this.now().isReady) return;
     this.isChanged = true;
-    if (this.isRunning) return void this.renderer.stop();
+    if (this.isRunning) return void (this.now().isPlaying || this.renderer.stop());
     this.isRunning = true;
     try {
       while (this.isChanged && this.now().isReady) {
         this.isChanged = false;
-        const { room, scene } = this.now();
+        const { room, scene, isPlaying } = this.now();
         const { pixel } = scene.state;
-        if ((await this.render(room ? COARSE : COARSE * pixel, true)) && (await this.render(pixel, false))) await this.rest();
+        if (isPlaying) await this.play(room ? COARSE : COARSE * pixel, pixel);
+        else if ((await this.render(room ? COARSE : COARSE * pixel, true)) && (await this.render(pixel, false))) await this.rest();
       }
     } catch (error) {
       this.fail(error);
     } finally {
       this.isRunning = false;
     }
+  }
+
+  /** Renders a frame of an animation, and asks for another one. */
+  async play(coarse, pixel) {
+    const size = Math.max(pixel, Math.min(coarse, pixel * this.coarseness));
+    const begin = performance.now();
+    await this.render(size, true);
+    this.page.playTime = performance.now() - begin;
+    if (this.page.playTime > SLOW && size < coarse) this.coarseness *= 2;
+    else if (this.page.playTime < FAST && size > pixel) this.coarseness /= 2;
+    document.body.dataset.played = this.page.played = (this.page.played ?? 0) + 1;
+    await new Promise(requestAnimationFrame); // none comes while the page is hidden
+    this.isChanged = true;
   }
 
   /** Whether the frame that is next is still wanted. */
@@ -118,6 +135,7 @@ export class Picture {
       page.first ??= performance.now();
     } else {
       page.picture = whole;
+      this.now().scene.packed.flatPairs = frame.flatPairs;
       showFigures({ width, height, workers: renderer.workers.length, packed: this.now().scene.packed, packTime: page.packTime }, frame);
       page.samples = 0;
       element("samples").textContent = "one sample a pixel";

@@ -86,15 +86,16 @@ export class Renderer {
     return this.askAll("open", design);
   }
 
-  read(name, bytes, files) {
-    return this.ask(this.workers[0], "read", { name, bytes, files });
+  /** `file`: name, bytes, other dropped files by name, and the number of its animation (worker.js). */
+  read(file) {
+    return this.ask(this.workers[0], "read", file);
   }
 
   /** Packs in the first worker, and loads the others. */
   async pack(surface) {
     const [first, ...others] = this.workers;
-    const { packed, records, textures, milliseconds } = await this.ask(first, "pack", surface);
-    await Promise.all(others.map((worker) => this.ask(worker, "load", { records, textures })));
+    const { packed, records, clip, textures, milliseconds } = await this.ask(first, "pack", surface);
+    await Promise.all(others.map((worker) => this.ask(worker, "load", { records, clip, textures })));
     return { packed, milliseconds };
   }
 
@@ -106,7 +107,7 @@ export class Renderer {
     const counters = {};
     for (const { counters: own } of answers)
       for (const [name, value] of Object.entries(own)) counters[name] = name === "deepestStack" ? Math.max(counters[name] ?? 0, value) : (counters[name] ?? 0) + value;
-    return { counters, milliseconds: Math.max(...answers.map(({ milliseconds }) => milliseconds)) };
+    return { counters, flatPairs: answers[0].flatPairs, milliseconds: Math.max(...answers.map(({ milliseconds }) => milliseconds)) };
   }
 
   stop() {

@@ -1,5 +1,5 @@
 // Views: what a frame of the state is, from the open mesh and its packed form for a design. `scene` has state, mesh,
-// manifest and packed.
+// manifest, packed, and the time of the mesh's animation.
 
 import { CUBE, START, cameraOf, isAtMaps, lightOf, onDisc, poseOf, roomCamera } from "./camera.js";
 import { decode } from "./photo.js";
@@ -132,10 +132,11 @@ export function viewOf(scene, room, width, height, orbit, sample = null, samples
       lights: room.light.lamps.map((lamp, index) => ({ ...lamp, position: onDisc(lamp, room.object.position, points[index]) })),
       registers: { ...registers, ...window },
       sample,
+      time: scene.time,
       exposure: room.light.exposure,
       inPhoto,
     };
   }
   const light = { position: lightOf(cameraOf(START, width, height), LIGHT), colour: [0.9, 0.9, 0.9].map((value) => value * scene.state.light) };
-  return { file: "plain", camera: cameraOf(orbit, width, height), lights: [light], registers, sample, exposure: 1 };
+  return { file: "plain", camera: cameraOf(orbit, width, height), lights: [light], registers, sample, time: scene.time, exposure: 1 };
 }

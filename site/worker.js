@@ -26,6 +26,8 @@ export function serve(scope) {
   let radiance;
   let lit;
   let current;
+  let posed; // the time of the clip that the records show
+  let flatPairs = 0;
   let sums;
   let frame = 0;
   // Lets other messages in; timers would wait 4 ms
@@ -48,12 +50,13 @@ export function serve(scope) {
       lit = null;
       return {};
     },
-    async read({ name, bytes, files }) {
-      const found = readMesh(name, bytes, files);
+    /** `animation`: the number of that which moves the mesh, or null; unless given the first. */
+    async read({ name, bytes, files, animation }) {
+      const found = readMesh(name, bytes, files, animation);
       await decodePictures(found);
       read = prepared(library, found);
-      const { vertices, faces, colours, materials, notes } = read;
-      return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, hasMaterials: Boolean(materials), notes };
+      const { vertices, faces, colours, materials, animations, animation: own, notes } = read;
+      return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, hasMaterials: Boolean(materials), animations, animation: own, notes };
     },
     /** `material`: "file", of the mesh's own materials, or one for all of it; `gathers` and `headroom` are those of frames. */
     pack({ material, gathers, headroom }) {
@@ -65,11 +68,13 @@ export function serve(scope) {
       const surfaces = own ?? { surfaces: [plainSurface(mesh, material === "glass", 1 / headroom)], surfaceOf: new Int32Array(mesh.faces.length / 3) };
       const packed = { ...library.pack(mesh, surfaces), entries: own?.entries ?? null, notes: own?.notes ?? [] };
       raw = mesh;
-      return { packed, records: library.records(packed), textures: library.textureMemories(), milliseconds: performance.now() - begin };
+      posed = null;
+      return { packed, records: library.records(packed), clip: library.clipFile(), textures: library.textureMemories(), milliseconds: performance.now() - begin };
     },
-    load({ records, textures }) {
-      library.load(records);
+    load({ records, clip, textures }) {
+      library.load(records, clip);
       library.loadMemories(textures);
+      posed = null;
       return {};
     },
     /** Encodes the room of a photo and its depth, for the maps of a design (room.js). */
@@ -108,7 +113,7 @@ export function serve(scope) {
         const pixels = sums.shown(first * camera.width, last * camera.width);
         post({ first, last, pixels, ...(sample ? {} : rows) });
       }
-      return { counters: library.counters(), milliseconds: performance.now() - begin };
+      return { counters: library.counters(), flatPairs, milliseconds: performance.now() - begin };
     },
     stop() {
       ++frame;
@@ -141,7 +146,7 @@ export function serve(scope) {
 
   /** A view: the name of its file, and what replaces the file's poses and registers. */
   function start(view) {
-    const { file, camera, object, lights, registers, sample } = view;
+    const { file, camera, object, lights, registers, sample, time } = view;
     // A room's view that has moved its camera does not go back to that of the maps
     const isOther = opened?.file !== file || (camera.isOfMaps && !opened.isOfMaps);
     current = opened = null; // until all is well
@@ -154,6 +159,8 @@ export function serve(scope) {
       lit = String(object.rotation);
     }
     lights.forEach((light, index) => library.setLight(index, light));
+    if (posed !== time) flatPairs = library.pose(time);
+    posed = time;
     library.setSample(sample ?? { index: 0, count: 1 });
     library.start(library.frame(registers));
     current = view;

@@ -5,6 +5,7 @@ namespace nb = nanobind;
 
 void bind_environment(nb::module_& module);
 void bind_bvh(nb::module_& module);
+void bind_clip(nb::module_& module);
 void bind_driver(nb::module_& module);
 void bind_fixed_order(nb::module_& module);
 void bind_instances(nb::module_& module);
@@ -22,6 +23,7 @@ NB_MODULE(_core, module) {
     module.doc() = "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, rays, registers and meshes as a target computes them.";
     bind_environment(module);
     bind_bvh(module);
+    bind_clip(module);
     bind_driver(module);
     bind_fixed_order(module);
     bind_instances(module);

@@ -123,6 +123,93 @@ def arm() -> Document:
     return document
 
 
+#: Places in the document of `arm`, a value that they get, and words of the error.
+HOSTILE: list[tuple[tuple[Any, ...], Any, str]] = [
+    (("animations", 0, "channels", 0, "sampler"), 9, "uses sampler 9, which does not exist"),
+    (("animations", 0, "channels", 0, "target", "node"), 99, r"nodes\[99\] is used, but does not exist"),
+    (
+        ("animations", 0, "channels", 1),
+        {"sampler": 0, "target": {"node": 2, "path": "rotation"}},
+        "moves the same property of a node twice",
+    ),
+    (("animations", 0, "channels"), [], "moves no node and no morph target"),
+    (("animations", 0, "channels"), 3, r"animations\[0\].channels is not a list of objects"),
+    (("animations", 0, "samplers", 0, "interpolation"), "EASE", "has an unknown interpolation"),
+    (("animations", 0, "samplers", 0, "input"), 0, "ascend|numbers for"),
+    (("animations", 0, "samplers", 0, "output"), 0, "numbers for 3 keys of a rotation"),
+    (
+        ("nodes", 2),
+        {"matrix": [1.0] * 16},
+        "moves node 2, which has a matrix",
+    ),
+    (("nodes", 4, "skin"), 7, r"skins\[7\] is used, but does not exist"),
+    (("skins", 0, "joints"), [1, 2], "a vertex has joint 2, its skin has 2"),
+    (("skins", 0, "joints"), [1, 2, "a"], "joints is not a list of whole numbers"),
+    (("skins", 0, "inverseBindMatrices"), 0, "inverse bind matrices that are not valid"),
+    (("nodes", 6, "weights"), ["a", 0], "a weight of node 6 is not a finite number"),
+    (("nodes", 1, "scale"), [1e300, 1e300, 1e300], "the transform of node 1 is not finite, or too large"),
+    (("meshes", 2, "primitives", 0, "targets", 0, "POSITION"), 0, "a morph target has POSITION that are not valid"),
+    (("meshes", 0, "primitives", 0, "attributes", "JOINTS_0"), 0, "joints or weights that are not valid"),
+]
+
+
+def changed(places: tuple[Any, ...], to: Any) -> Document:
+    """The document of `arm` with another value."""
+    document = arm()
+    value: Any = document.json
+    for place in places[:-1]:
+        value = value[place]
+    value[places[-1]] = to
+    return document
+
+
+def swaying(seed: int) -> Document:
+    """A strip on a chain of five joints with ten morph targets, all of them random."""
+    random = np.random.default_rng(seed)
+    document = Document(scene=0, scenes=[{"nodes": [0, 6]}])
+    points, faces = grid(6, 20)
+    points = points + 0.02 * random.normal(size=points.shape)
+    weights = random.random((len(points), 4))
+    attributes = {
+        "POSITION": document.add(points),
+        "NORMAL": document.add(random.normal(size=points.shape)),
+        "JOINTS_0": document.add(random.integers(0, 5, (len(points), 4)), "u1"),
+        "WEIGHTS_0": document.add(weights / weights.sum(axis=1, keepdims=True)),
+    }
+    targets = [
+        {
+            "POSITION": document.add(0.2 * random.normal(size=points.shape) * (random.random((len(points), 1)) < 0.4)),
+            "NORMAL": document.add(0.1 * random.normal(size=points.shape)),
+        }
+        for _ in range(10)
+    ]
+    primitive = {"attributes": attributes, "indices": document.add(faces.ravel(), "u2"), "targets": targets}
+    document.json["meshes"] = [{"primitives": [primitive], "weights": random.random(10).tolist()}]
+    inverses = np.tile(np.eye(4), (5, 1, 1))
+    inverses[:, 3, :3] = 0.2 * random.normal(size=(5, 3))  # by columns
+    matrices = document.add(inverses.reshape(5, 16))
+    document.json["skins"] = [{"joints": [1, 2, 3, 4, 5], "inverseBindMatrices": matrices}]
+
+    def rotation() -> list[float]:
+        x, y, z = random.normal(size=3).tolist()
+        return turn((x, y, z), float(80 * random.normal()))
+
+    chain = [{"children": [node], "translation": random.normal(size=3).tolist()} for node in range(1, 6)]
+    document.json["nodes"] = [node | {"rotation": rotation()} for node in chain] + [{}, {"mesh": 0, "skin": 0}]
+    channels: list[tuple[int, str, str, Any, Any]] = []
+    for node in range(1, 6):
+        times = np.cumsum(random.random(int(random.integers(2, 9))) + 0.05)
+        channels.append((node, "rotation", "LINEAR", times, [rotation() for _ in times]))
+    document.animate(
+        "sway",
+        *channels,
+        (0, "translation", "CUBICSPLINE", [0.1, 0.9, 1.7], random.normal(size=(9, 3))),
+        (5, "scale", "STEP", [0.3, 0.7], [[1, 1, 1], [2, 1, 0.5]]),
+        (6, "weights", "CUBICSPLINE", [0.0, 1.0], random.normal(size=60)),
+    )
+    return document
+
+
 def _sandwich(q: list[float], p: list[float]) -> list[float]:
     """A point turned by a quaternion: p + 2 u × (u × p + w p)."""
     u, w = q[:3], q[3]

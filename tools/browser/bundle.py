@@ -14,11 +14,11 @@ SITE = ROOT / "site"
 #: Modules after those that they import.
 WORKER = (
     *("design", "library", "corners", "gltfchecks", "gltfdocument", "photo", "surfaces", "coverage", "gltfmaterials"),
-    *("gltf", "meshes", "sums", "depth", "encoder", "room", "rtl", "worker"),
+    *("gltfclip", "gltf", "meshes", "sums", "depth", "encoder", "room", "rtl", "worker"),
 )
 PAGE = (
     *("camera", "design", "photo", "surfaces", "roomview", "path", "panels", "orbit", "queue", "renderer", "state"),
-    *("moves", "recording", "view", "notes", "picture", "raypanel", "files", "visitor", "rtlpanel", "page"),
+    *("moves", "recording", "view", "notes", "picture", "player", "raypanel", "files", "visitor", "rtlpanel", "page"),
 )
 
 _IMPORT = re.compile(r'^import [^;]*? from "\./(\w+)\.js";\n', re.MULTILINE)

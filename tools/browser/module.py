@@ -25,8 +25,10 @@ SOURCES: tuple[Source, ...] = (
     ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{DRIVER / 'include'}")),
     ("c++", LIBRARY / "colonnade_environment.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")),
     *(("c++", LIVE / f"{name}.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")) for name in ("live", "kernels")),
-    *(("cc", file, ("-std=c11", f"-I{DRIVER / 'include'}")) for file in sorted((DRIVER / "src").glob("colonnade_*.c"))),
-    ("cc", LIBRARY / "colonnade_view_size.c", ("-std=c11", f"-I{DRIVER / 'include'}")),
+    *(
+        ("cc", file, ("-std=c11", f"-I{DRIVER / 'include'}"))
+        for file in sorted([*(DRIVER / "src").glob("colonnade_*.c"), *LIBRARY.glob("colonnade_*.c")])
+    ),
 )
 HEADERS = (
     LIBRARY / "colonnade_model.h",

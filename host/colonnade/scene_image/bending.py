@@ -45,10 +45,8 @@ class Bending:
         deltas, addresses = places["nearPair"]["body.deltas[0].x"][1], node["first"][1]
         numbers = (int(geometry["vertexBits"]), deltas, int(geometry["boxBits"]), addresses, 2 if colours else 1)
         words = tuple(int(word) for word in manifest.format_words)
-        clip, leaves = _in_order_of_use(clip, leaves)
-        return cls(
-            clip_file(clip, ClipTree(numbers, records, depth, leaves), places, words), words, int(clip.times[-1])
-        )
+        tree = ClipTree(numbers, records, depth, leaves)
+        return cls(clip_file(clip, tree, places, words, is_ordered=True), words, int(clip.times[-1]))
 
     @cached_property
     def _target(self) -> Any:
@@ -88,27 +86,11 @@ class Bending:
         return records, flat
 
 
-def _in_order_of_use(clip: GridClip, leaves: npt.NDArray[np.int64]) -> tuple[GridClip, npt.NDArray[np.int64]]:
-    """Vertices as leaves need them first: those of a leaf are near each other in memory."""
-    used, count = leaves[leaves >= 0], len(clip.vertices)
-    first = np.full(count, len(used))
-    np.minimum.at(first, used, np.arange(len(used)))
-    order = np.argsort(first, kind="stable")
-    numbers = np.full(count + 1, -1)  # the last one is the fourth vertex of a triangle
-    numbers[order] = np.arange(count)
-    changes = np.column_stack([numbers[clip.changes[:, 0]], clip.changes[:, 1:]])
-    changes = changes[np.argsort(changes[:, 0], kind="stable")]
-    corners = numbers[clip.corners].astype(np.int32)
-    return replace(clip, corners=corners, vertices=clip.vertices[order], changes=changes), numbers[leaves]
-
-
 def at_rest(clip: GridClip, manifest: Manifest) -> tuple[npt.NDArray[np.int32], Floats]:
     """The vertices of the rest pose, vertex units, int32 [v, 3], and their normals, float64 [v, 3]."""
+    from colonnade import _core
+
     nothing = np.array([[0, 0, 0, -1]])
     bending = Bending.of(clip, manifest, 2, 1, nothing, False)
     positions, codes = bending.vertices(clip.rest.astype(np.int32))
-    u, v = codes.astype(np.float64).T
-    one = 1023.0
-    z = one - np.abs(u) - np.abs(v)
-    x, y = (np.where(z < 0, np.copysign(one - np.abs(b), a), a) for a, b in ((u, v), (v, u)))
-    return positions, np.stack([x, y, z], axis=1)
+    return positions, np.asarray(_core.directions(codes))

@@ -4,6 +4,7 @@
 #include <memory>
 #include <sstream>
 
+#include "colonnade_clip.h"
 #include "live/vector_map.hpp"
 #include "mesh/alpha_cut.hpp"
 #include "mesh/atlas.hpp"
@@ -13,6 +14,7 @@
 #include "mesh/roughness.hpp"
 #include "mesh/swatches.hpp"
 #include "model/frame.hpp"
+#include "packer/clip_file.hpp"
 #include "packer/records.hpp"
 #include "packer/surface_offset.hpp"
 #include "srgb.hpp"
@@ -79,7 +81,7 @@ struct Library {
     std::map<std::string, std::vector<std::uint8_t>> textureWords;
     std::unique_ptr<Device> device;
     std::unique_ptr<Packed> packed;
-    std::vector<std::uint8_t> records;
+    std::vector<std::uint8_t> records, clipFile;
     std::string error;
     std::array<double, 11> counters;
     std::vector<RayStep> steps;
@@ -191,9 +193,113 @@ const char* checkFit(const packer::Sections& sections, const bvh::Bvh& tree) {
     return nullptr;
 }
 
-void describe(colonnade_packed& packed, std::uint32_t faceCount) {
+/// Values of C, in the types of C++.
+template <class To, class From> std::vector<To> copied(const From* from, std::uint32_t count) {
+    std::vector<To> values(count);
+    if constexpr (std::is_arithmetic_v<To>) std::copy(from, from + count, values.begin());
+    else
+        for (std::uint32_t i = 0; i < count; ++i) std::copy(from + values[i].size() * i, from + values[i].size() * (i + 1), values[i].begin());
+    return values;
+}
+
+mesh::Clip clipOf(const colonnade_clip& from) {
+    mesh::Clip clip;
+    clip.nodes = {copied<std::int64_t>(from.parents, from.node_count),       copied<std::int64_t>(from.order, from.node_count),
+                  copied<mesh::Matrix>(from.matrices, from.node_count),      copied<mesh::Vector>(from.translations, from.node_count),
+                  copied<mesh::Quaternion>(from.rotations, from.node_count), copied<mesh::Vector>(from.scales, from.node_count)};
+    for (std::uint32_t i = 0; i < from.track_count; ++i) {
+        const colonnade_track& track = from.tracks[i];
+        clip.tracks.push_back({track.node, static_cast<mesh::Path>(track.path), static_cast<mesh::Interpolation>(track.interpolation),
+                               copied<double>(track.times, track.key_count), copied<double>(track.values, track.value_count)});
+        clip.duration = std::max(clip.duration, clip.tracks.back().times.back());
+    }
+    clip.joints = copied<std::int64_t>(from.joints, from.bone_count);
+    clip.inverses = copied<mesh::Matrix>(from.inverses, from.bone_count);
+    clip.positions = copied<mesh::Vector>(from.positions, from.vertex_count);
+    clip.bones = copied<std::array<std::int64_t, mesh::influences>>(from.bones, from.vertex_count);
+    clip.shares = copied<std::array<double, mesh::influences>>(from.weights, from.vertex_count);
+    clip.morphs = {copied<std::int64_t>(from.target_nodes, from.target_count),    copied<std::int64_t>(from.target_places, from.target_count),
+                   copied<double>(from.target_weights, from.target_count),        copied<std::int64_t>(from.change_targets, from.change_count),
+                   copied<std::int64_t>(from.change_vertices, from.change_count), copied<mesh::Vector>(from.changed_positions, from.change_count),
+                   copied<mesh::Vector>(from.changed_normals, from.change_count)};
+    return clip;
+}
+
+std::array<std::uint32_t, 8> formatHash() {
+    std::array<std::uint32_t, 8> words;
+    for (std::size_t i = 0; i < words.size(); ++i) words[i] = static_cast<std::uint32_t>(lookUp(library->numbers, "formatHash" + std::to_string(i)));
+    return words;
+}
+
+const char* openClip() {
+    const std::vector<std::uint8_t>& file = library->clipFile;
+    const bool isGood = file.empty() || colonnade_clip_open(formatHash().data(), file.data(), static_cast<std::uint32_t>(file.size())) == 0;
+    return isGood ? nullptr : "the clip of the mesh is not one of this design";
+}
+
+/// The file of a clip whose records have these leaves.
+std::vector<std::uint8_t> fileOf(packer::GridClip clip, std::vector<packer::ClipLeaf> leaves, std::size_t records, std::size_t depth, bool hasColours) {
+    const std::map<std::string, Layout>& layouts = library->format.layouts;
+    packer::orderByUse(clip, leaves);
+    const int deltaBits = layouts.at("nearPair").at("body.deltas[0].x").width, addressBits = layouts.at("node").at("first").width;
+    return packer::clipFile(clip, {library->format.vertexBits, deltaBits, library->format.boxBits, addressBits, hasColours ? 2 : 1, records, depth, leaves}, layouts,
+                            formatHash());
+}
+
+/// Puts a clean mesh, whose clip this is, in its rest pose on the grid of all poses; an error, or none.
+std::string bend(const colonnade_mesh& given, Packed& next, packer::GridClip& grid) {
+    if (!library->format.bvh) return "the mesh is animated, which needs a tree: this design has none";
+    const mesh::Clip clip = clipOf(*given.clip);
+    mesh::CleanMesh& clean = next.clean;
+    std::vector<mesh::Face> corners;
+    for (const Part& part : next.parts) {
+        mesh::Face face;
+        std::memcpy(&face, given.faces + 3 * part.source, sizeof face);
+        if (part.isReversed) std::reverse(face.begin(), face.end());
+        corners.push_back(face);
+    }
+    const mesh::BakedClip baked = mesh::BakedClip::of(clip);
+    grid = packer::GridClipMaker({clip, clean.vertices, clean.faces, clean.normals.normals, corners}, baked, library->format.vertexBits).make();
+    if (!grid.error.empty()) return "the mesh: its animation " + grid.error;
+    const std::vector<std::uint8_t> file = fileOf(grid, {{0, 0, 0, -1}}, 2, 1, false);
+    std::vector<std::int32_t> rest(grid.rest.begin(), grid.rest.end());
+    next.quantised = {std::vector<packer::Units>(grid.vertices.size()), grid.corners, std::vector<std::int64_t>(grid.corners.size()), grid.scale, grid.offset};
+    std::iota(next.quantised.meshFaces.begin(), next.quantised.meshFaces.end(), 0);
+    std::vector<std::array<std::int16_t, 2>> codes(grid.vertices.size());
+    const bool fits =
+        colonnade_clip_open(formatHash().data(), file.data(), static_cast<std::uint32_t>(file.size())) == 0 &&
+        colonnade_clip_skin(rest.data(), reinterpret_cast<std::int32_t (*)[3]>(next.quantised.vertices.data()), reinterpret_cast<std::int16_t (*)[2]>(codes.data())) == 0;
+    openClip(); // of the mesh before, which stays if this one does not fit
+    if (!fits) return "the mesh: its animation does not fit this design";
+    for (std::size_t face = 0; face < grid.corners.size(); ++face)
+        for (int corner = 0; corner < 3; ++corner) {
+            const auto& code = codes[static_cast<std::size_t>(grid.corners[face][corner])];
+            clean.normals.normals[face][corner] = packer::directionOf(code[0], code[1]);
+        }
+    return "";
+}
+
+/// The clip file of packed records.
+std::vector<std::uint8_t> packedClip(const packer::GridClip& grid, const Packed& packed, bool hasColours) {
+    std::vector<packer::ClipLeaf> leaves;
+    const std::vector<std::int64_t> corners = packed.packer->leafCorners();
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+        if (i % 4 == 0) leaves.emplace_back();
+        leaves.back()[i % 4] = corners[i] < 0 ? -1 : grid.corners[static_cast<std::size_t>(corners[i] / 3)][static_cast<std::size_t>(corners[i] % 3)];
+    }
+    return fileOf(grid, std::move(leaves), packed.packer->sections().recordCount, packed.tree.tree.depth, hasColours);
+}
+
+void describe(colonnade_packed& packed, std::uint32_t faceCount, const packer::GridClip* grid) {
     const Packed& from = *library->packed;
-    const packer::Sections& sections = from.packer->sections();
+    packer::Sections sections = from.packer->sections();
+    packed.duration = grid ? static_cast<std::int32_t>(grid->times.back()) : 0;
+    if (grid) { // of all poses
+        std::copy(grid->low.begin(), grid->low.end(), sections.boundsLow.begin());
+        std::copy(grid->high.begin(), grid->high.end(), sections.boundsHigh.begin());
+        sections.largestTriangle = 0;
+        for (int axis = 0; axis < 3; ++axis) sections.largestTriangle = std::max(sections.largestTriangle, grid->high[axis] - grid->low[axis]);
+    }
     packed.triangles = static_cast<std::int32_t>(from.tree.order.size());
     packed.record_count = static_cast<std::int32_t>(sections.recordCount);
     packed.nodes = static_cast<std::int32_t>(sections.nodes);
@@ -262,6 +368,18 @@ const char* colonnade_model_open(const char* design) {
     return nullptr;
 }
 
+const char* colonnade_model_rest(const colonnade_clip* from, const std::int32_t* faces, std::uint32_t faceCount, double* normals, double* vertices,
+                                 std::uint8_t* isMirrored) {
+    std::vector<mesh::Corners> rotated(normals ? faceCount : 0);
+    if (normals) std::memcpy(rotated.data(), normals, faceCount * sizeof(mesh::Corners));
+    const mesh::RestSurface found = mesh::restSurface(clipOf(*from), copied<mesh::Face>(faces, faceCount), rotated);
+    if (!found.isFinite) return "the mesh: a transform of its rest pose is not finite, or too large: export it again";
+    if (normals) std::memcpy(normals, rotated.data(), faceCount * sizeof(mesh::Corners));
+    std::memcpy(vertices, found.vertices.data(), found.vertices.size() * sizeof(mesh::Vector));
+    std::copy(found.isMirrored.begin(), found.isMirrored.end(), isMirrored);
+    return nullptr;
+}
+
 const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* packed) {
     const colonnade_mesh& given = *from;
     mesh::RawMesh raw;
@@ -279,7 +397,11 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
     const mesh::CleanMesh& clean = next->clean;
     for (std::size_t i = 0; i < clean.faces.size(); ++i) next->parts.push_back({clean.sources[i], clean.winding.reversed[i] != 0, {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}});
     if (given.map_count > 0) bakeMaps(given, *next);
-    next->quantised = packer::quantise(clean.vertices.data(), clean.vertices.size(), clean.faces.data(), clean.faces.size(), library->format.vertexBits);
+    packer::GridClip grid;
+    library->format.bends = given.clip != nullptr;
+    if (given.clip) {
+        if (const std::string error = bend(given, *next, grid); !error.empty()) return refuse(error);
+    } else next->quantised = packer::quantise(clean.vertices.data(), clean.vertices.size(), clean.faces.data(), clean.faces.size(), library->format.vertexBits);
     if (next->quantised.faces.empty()) return "no triangle keeps an area in this design's vertex units";
     std::vector<std::uint8_t> materials, isClear;
     std::vector<mesh::Triangle> uvs(clean.faces.size());
@@ -310,14 +432,30 @@ const char* colonnade_model_pack(const colonnade_mesh* from, colonnade_packed* p
     next->packer = std::make_unique<packer::RecordPacker>(next->quantised, attributes, next->tree, library->format);
     if (const char* error = checkFit(next->packer->sections(), next->tree)) return error;
     library->records = next->packer->records();
+    library->clipFile = given.clip ? packedClip(grid, *next, !codes.empty()) : std::vector<std::uint8_t>();
     library->packed = std::move(next);
-    describe(*packed, given.face_count);
+    describe(*packed, given.face_count, given.clip ? &grid : nullptr);
+    if (const char* error = openClip()) return error;
     library->device->load(library->records.data(), library->packed->packer->sections().recordCount, library->format.recordBytes());
     return nullptr;
 }
 
 const char* colonnade_model_load(const std::uint8_t* records, std::uint32_t count) {
     library->device->load(records, count, library->format.recordBytes());
+    library->records.assign(records, records + count * library->format.recordBytes());
+    return nullptr;
+}
+
+const char* colonnade_model_load_clip(const std::uint8_t* file, std::uint32_t bytes) {
+    library->clipFile.assign(file, file + bytes);
+    return openClip();
+}
+
+const char* colonnade_model_pose(std::uint32_t time, std::uint32_t* flatPairs) {
+    *flatPairs = 0;
+    if (library->clipFile.empty()) return nullptr;
+    if (colonnade_clip_refit(time, reinterpret_cast<std::uint32_t*>(library->records.data()), flatPairs) != 0) return "a pose of the mesh leaves its grid";
+    library->device->load(library->records.data(), library->records.size() / library->format.recordBytes(), library->format.recordBytes());
     return nullptr;
 }
 
@@ -464,6 +602,11 @@ const char* colonnade_model_merge(const double* values, const double* weights, c
 const std::uint8_t* colonnade_model_texture(const char* memory) { return library->textureWords[memory].data(); }
 
 const std::uint8_t* colonnade_model_records(void) { return library->records.data(); }
+
+const std::uint8_t* colonnade_model_clip(std::uint32_t* bytes) {
+    *bytes = static_cast<std::uint32_t>(library->clipFile.size());
+    return library->clipFile.data();
+}
 
 const double* colonnade_model_counters(void) {
     const Counters& from = library->device->counters;

@@ -30,10 +30,43 @@ struct colonnade_normal_map {
     float scale;
 };
 
+/* Values of a node over time. `path`: 0 translation, 1 rotation, 2 scale, 3 weights of morph targets. `interpolation`: 0 steps,
+ * 1 lines, 2 cubic splines, of which each key has three values. Times are seconds; keys ascend. */
+struct colonnade_track {
+    int32_t node, path, interpolation;
+    uint32_t key_count, value_count;
+    const double *times, *values;
+};
+
+/* What moves the vertices of a mesh. Of nodes: parents, −1 for none, and themselves, each after its parent; matrices to the
+ * parents at rest, row by row, and their parts. Of bones: node, and matrix from where vertices are bound. Of vertices: where they
+ * are bound, four bones and their weights, the largest first. Of morph targets: node, place among its weights, weight at rest. Of
+ * their changes, by ascending vertex: target, vertex, what is added. */
+struct colonnade_clip {
+    uint32_t node_count;
+    const int32_t *parents, *order;
+    const double *matrices, *translations, *rotations, *scales;
+    uint32_t track_count;
+    const struct colonnade_track *tracks;
+    uint32_t bone_count;
+    const int32_t *joints;
+    const double *inverses;
+    uint32_t vertex_count;
+    const double *positions;
+    const int32_t *bones;
+    const double *weights;
+    uint32_t target_count;
+    const int32_t *target_nodes, *target_places;
+    const double *target_weights;
+    uint32_t change_count;
+    const int32_t *change_targets, *change_vertices;
+    const double *changed_positions, *changed_normals;
+};
+
 /* `normals`: three for each face, of any length, 0 for none; or NULL. `colours`: linear red, green, blue at the corners, 0 to
  * 1; or NULL. `uvs`: two at each corner; NULL without textures. `surface_of`: of each face. With `map_count`, of each face: the number of
  * its normal map, -1 for none; at each corner two positions in it, and a tangent of the file, 0 for none, with the sign of the
- * bitangent. */
+ * bitangent. `clip`: what moves the vertices, which are in its rest pose, or NULL. */
 struct colonnade_mesh {
     const double *vertices;
     uint32_t vertex_count;
@@ -48,6 +81,7 @@ struct colonnade_mesh {
     uint32_t map_count;
     const int32_t *map_of;
     const double *map_uvs, *tangents;
+    const struct colonnade_clip *clip;
 };
 
 /* A mesh as it is packed: numbers of records, bounds in vertex units. */
@@ -61,6 +95,7 @@ struct colonnade_packed {
     int32_t replaced; /* corners whose normal pointed to the back of their face, or that had none */
     int32_t reversed; /* closed parts that did not point outward, and do now */
     int32_t smoothed; /* degrees in the root mean square that corner normals differ from normal maps; 0 below 3 */
+    int32_t duration; /* of its clip, 2^-16 s; 0 without one */
 };
 
 /* The faces of a material with alpha: positions, places in the texture and alpha of their corners. */
@@ -92,7 +127,7 @@ struct colonnade_step {
     double values[9];  /* vertex units: origin and direction, low and high, vertices; of a hit, t in grid steps */
 };
 
-/* Every call but the last four returns NULL, or a text that says what is wrong. */
+/* Every call but the last five returns NULL, or a text that says what is wrong. */
 
 /* Opens a design, by lines of words from its manifest:
  *   number NAME VALUE                             numbers; stackDepth, bvh, recordBits, depth
@@ -104,11 +139,21 @@ struct colonnade_step {
  *   textureSize, textureMap                       the same of the texture memory */
 const char *colonnade_model_open(const char *design);
 
+/* The vertices of a clip in its rest pose, and whether each of so many faces is mirrored there: its corners go backwards. `normals`, of
+ * the corners of faces, follow them; or NULL. */
+const char *colonnade_model_rest(const struct colonnade_clip *clip, const int32_t *faces, uint32_t face_count, double *normals, double *vertices, uint8_t *is_mirrored);
+
 /* Cleans and packs a mesh, and loads it, with the atlas of its textures, into the model. */
 const char *colonnade_model_pack(const struct colonnade_mesh *mesh, struct colonnade_packed *packed);
 
 /* Loads records in place of a packed mesh. */
 const char *colonnade_model_load(const uint8_t *records, uint32_t count);
+
+/* Loads the clip file of these records; of 0 bytes: nothing moves. */
+const char *colonnade_model_load_clip(const uint8_t *file, uint32_t bytes);
+
+/* Writes a pose into the records, of a time in 2^-16 s. Answers how many pairs are too stretched for the normals of their corners. */
+const char *colonnade_model_pose(uint32_t time, uint32_t *flat_pairs);
 
 /* Loads one of the memories of a room's maps or of textures, or the light cube, by its name in the manifest: `count` words of `bytes` bytes. */
 const char *colonnade_model_load_memory(const char *memory, const uint8_t *words, uint32_t count, uint32_t bytes);
@@ -142,8 +187,9 @@ const char *colonnade_model_merge(const double *values, const double *weights, c
 /* The words of a memory of textures for the packed mesh, each of whole bytes, low byte first. */
 const uint8_t *colonnade_model_texture(const char *memory);
 
-/* The records of the packed mesh. */
+/* The records, and the clip file of the packed mesh: its bytes. */
 const uint8_t *colonnade_model_records(void);
+const uint8_t *colonnade_model_clip(uint32_t *bytes);
 
 /* Counters of the frame that the model has: primary, shadow, reflected, refracted, gathered and in-box rays, nodes read, boxes
  * tested, triangles tested, hits, deepest stack. */

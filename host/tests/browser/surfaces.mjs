@@ -15,7 +15,7 @@ const read = (name) => Uint8Array.from(readFileSync(name));
 const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
 const library = await Library.from(readFileSync(job.module));
 library.open(job.manifest);
-const found = readMesh(job.file, read(job.path), new Map(job.files.map((name) => [name, read(`${job.beside}/${name}`)])));
+const found = readMesh(job.file, read(job.path), new Map(job.files.map((name) => [name, read(`${job.beside}/${name}`)])), null);
 let number = -1;
 await decodePictures(found, async (bytes) => {
   ++number;

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from animated_documents import arm, turn
 from built_page import FILE, NEEDS_PAGE, OBJ, ROOT, Tab, cube_of
 from PIL import Image
 from playwright.sync_api import Browser, BrowserContext, Page, expect
@@ -48,16 +49,22 @@ def registers_of(picture: dict[str, Any], manifest: Manifest) -> dict[str, int]:
 
 
 def host_frame(
-    picture: dict[str, Any], mesh: Mesh, design: str, is_in_room: bool = False, light: LightCube | None = None
+    picture: dict[str, Any],
+    mesh: Mesh,
+    design: str,
+    is_in_room: bool = False,
+    light: LightCube | None = None,
+    progress: float = 0.0,
 ) -> Any:
     """The host's frame of the registers that the page wrote; those of the mesh are the host's.
 
     Args:
         light: Around the object, in its axes, of a room whose light is gathered.
+        progress: Of the clip of a mesh that has one.
     """
     manifest = Manifest.load(ROOT / "configs" / "golden" / f"{design}.json")
     registers = registers_of(picture, manifest)
-    image = pack(mesh, manifest)
+    image = pack(mesh, manifest).posed(progress)
     own = frame_registers(load_scene(ROOT / "scenes" / "object.toml"), image.header, manifest, 64, 48)
     of_mesh = [name for name in own if name.startswith(("bounds.", "scene.")) or name == "shading.offset"]
     assert len(of_mesh) == 10 and {name: registers[name] for name in of_mesh} == {name: own[name] for name in of_mesh}
@@ -375,6 +382,49 @@ def test_changes_that_come_faster_than_pictures(context: BrowserContext) -> None
     assert page.evaluate("errors") == []
     frame = host_frame(tab.picture(), load_mesh("teapot"), "lean", is_in_room=True, light=light_around(page))
     np.testing.assert_array_equal(np.reshape(tab.picture()["colours"], frame.colour.shape), frame.colour)
+    assert tab.is_quiet()
+
+
+def test_an_animated_file_plays_and_equals_the_host(context: BrowserContext, tmp_path: Path) -> None:
+    document = arm()
+    document.animate("spin", (5, "rotation", "LINEAR", [0.0, 3.0], [turn((0, 1, 0), 0), turn((0, 1, 0), 120)]))
+    path = document.write(tmp_path / "arm.gltf")
+    tab = Tab(context, "#pixel=2")
+    page = tab.page
+    expect(page.locator("#animations")).to_be_hidden()
+    tab.drop("arm.gltf", path.read_text())
+    expect(page.locator("#play")).to_have_text("Pause")
+    shots = set()
+    for _ in range(3):
+        before, end = int(page.evaluate("colonnade.played ?? 0")), time.monotonic() + 30
+        while page.evaluate("colonnade.played ?? 0") < before + 3:
+            assert time.monotonic() < end, "it does not play"
+        shots.add(page.evaluate("document.getElementById('picture').toDataURL()"))
+    assert len(shots) == 3
+    with tab.another_frame():
+        page.click("#play")
+    expect(page.locator("#play")).to_have_text("Play")
+    seen = []
+    for animation, seconds in (("bend", 1.0), ("bend", 1.0), ("spin", 3.0)):
+        if animation == "spin":
+            page.select_option("select[name=animation]", label="spin")
+            expect(page.locator("#play")).to_have_text("Pause")
+        with tab.another_frame():
+            page.fill("#moment", "370" if seen else page.input_value("#moment"))
+        at = page.evaluate("colonnade.picture.view.time")
+        mesh = load_mesh(path, animation=animation)
+        picture = tab.picture()
+        frame = host_frame(picture, mesh, "small", progress=at / (seconds * 2**16))
+        assert frame.is_object.sum() > 100
+        np.testing.assert_array_equal(np.reshape(picture["colours"], frame.colour.shape), frame.colour)
+        np.testing.assert_array_equal(np.reshape(picture["triangles"], frame.triangle.shape), frame.triangle)
+        seen.append((animation, at, str(picture["triangles"])))
+    assert seen[1][1] == round(0.37 * 2**16) and seen[2][1] == round(1.11 * 2**16)
+    assert len({triangles for _, _, triangles in seen}) >= 2 and seen[1][2] != seen[2][2]
+    with tab.another_frame():
+        page.select_option("select[name=animation]", label="none")
+    expect(page.locator("#play")).to_be_hidden()
+    expect(page.locator("#notes")).to_contain_text("animations and skins are left out")
     assert tab.is_quiet()
 
 

@@ -14,10 +14,10 @@ from c_programs import SANITIZERS
 from leaves import leaves_of
 from target_programs import build
 
+from colonnade import _core
 from colonnade.design import toolchain
 from colonnade.design.manifest import Manifest, field_places
 from colonnade.mesh.load import load_mesh
-from colonnade.scene_image.clip_file import field_lows
 from colonnade.scene_image.packer import pack
 
 VERTEX_BITS, ROOT = 16, 3
@@ -40,7 +40,7 @@ class Built:
 
 
 def built(program: Path, triangles: Any, materials: Any, *poses: Any) -> Built:
-    numbers = [VERTEX_BITS, delta_bits(VERTEX_BITS), BOX_BITS, ADDRESS_BITS, *field_lows(PLACES)]
+    numbers = [VERTEX_BITS, delta_bits(VERTEX_BITS), BOX_BITS, ADDRESS_BITS, *_core.field_lows(PLACES)]
     numbers += [len(poses[0]), len(triangles), len(poses)]
     rows = [np.array(numbers), np.column_stack([triangles, materials]).reshape(-1)]
     rows += [np.column_stack([pose, np.zeros((len(pose), 2), dtype=np.int64)]).reshape(-1) for pose in poses]

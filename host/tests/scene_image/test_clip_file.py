@@ -11,7 +11,6 @@ from animated_documents import arm
 from bent_trees import delta_bits, get, pairs, random_tree, read_leaf, swept, walk
 
 from colonnade import _core
-from colonnade.mesh.clips.keys import TOLERANCE
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene_image.clip_file import clip_file
@@ -66,7 +65,7 @@ def test_skinned_vertices_are_those_of_floats(mesh: Mesh, clip: GridClip, bent: 
     positions, _ = bent.at(time)
     pose = mesh.clip.pose(time)
     exact = (mesh.clip.vertices(pose.matrices, pose.weights) - np.array(clip.frame.offset)) * clip.frame.scale
-    tolerance = mesh.extent.edge * TOLERANCE * clip.frame.scale + 2
+    tolerance = mesh.extent.edge * _core.CLIP_TOLERANCE * clip.frame.scale + 2
     assert np.abs(positions[clip.corners] - exact[mesh.clip_corners]).max() <= tolerance
     assert (positions.min(axis=0) >= clip.low).all() and (positions.max(axis=0) <= clip.high).all()
 

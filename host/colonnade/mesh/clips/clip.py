@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from colonnade.common import fixed_order
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh.clips.tracks import Track
 
@@ -44,29 +44,6 @@ class Nodes:
     translations: Floats
     rotations: Floats
     scales: Floats
-
-    def moved(self, tracks: Sequence[Track], time: float, before: bool = False) -> Floats:
-        """The transforms to the parents at a time, seconds, or just before it, float64 [n, 4, 4]."""
-        parts = {
-            "translation": self.translations.copy(),
-            "rotation": self.rotations.copy(),
-            "scale": self.scales.copy(),
-        }
-        own = [track for track in tracks if track.path != "weights"]
-        for track in own:
-            parts[track.path][track.node] = track.at(time, before)
-        matrices, nodes = self.matrices.copy(), sorted({track.node for track in own})
-        matrices[nodes, :3, :3] = rotations(parts["rotation"][nodes]) * parts["scale"][nodes][:, None, :]
-        matrices[nodes, :3, 3] = parts["translation"][nodes]
-        return matrices
-
-    def to_scene(self, matrices: Floats) -> Floats:
-        """The transforms of all nodes to the scene, float64 [n, 4, 4], from those to their parents."""
-        result = matrices.copy()
-        for node in self.order:
-            if self.parents[node] >= 0:
-                result[node] = fixed_order.product(result[self.parents[node]], matrices[node])
-        return result
 
 
 @dataclass(frozen=True)
@@ -135,43 +112,46 @@ class Clip:
     weights: Floats
     morphs: Morphs
 
+    @cached_property
+    def compiled(self) -> Any:
+        """The clip as ``cpp/mesh/clip.hpp`` evaluates it, here and in the browser tab."""
+        from colonnade import _core
+
+        nodes, morphs = self.nodes, self.morphs
+
+        def numbers(values: Sequence[int] | Indices) -> Indices:
+            return np.ascontiguousarray(values, dtype=np.int64)
+
+        return _core.Clip(
+            self.duration,
+            numbers(nodes.parents),
+            numbers(nodes.order),
+            *(
+                np.ascontiguousarray(part)
+                for part in (nodes.matrices, nodes.translations, nodes.rotations, nodes.scales)
+            ),
+            [track.numbers for track in self.tracks],
+            numbers(self.joints),
+            np.ascontiguousarray(self.inverses),
+            np.ascontiguousarray(self.positions),
+            numbers(self.bones),
+            np.ascontiguousarray(self.weights),
+            (
+                *map(numbers, (morphs.nodes, morphs.places)),
+                morphs.weights,
+                *map(numbers, (morphs.targets, morphs.vertices)),
+                *map(np.ascontiguousarray, (morphs.positions, morphs.normals)),
+            ),
+        )
+
     def rest(self) -> Pose:
         """The pose in which no track moves."""
-        return self._pose(self.nodes.matrices, self.morphs.weights)
+        return Pose(*self.compiled.rest())
 
     def pose(self, time: float, before: bool = False) -> Pose:
         """The pose at a time, seconds, or just before it, if it jumps there."""
-        weights = self.morphs.weights.copy()
-        for track in self.tracks:
-            if track.path == "weights":
-                own = self.morphs.nodes == track.node
-                weights[own] = track.at(time, before)[self.morphs.places[own]]
-        return self._pose(self.nodes.moved(self.tracks, time, before), weights)
-
-    def _pose(self, matrices: Floats, weights: Floats) -> Pose:
-        to_scene = self.nodes.to_scene(matrices)
-        return Pose(fixed_order.product(to_scene[self.joints], self.inverses)[:, :3], weights)
-
-    def bound(self, weights: Floats) -> Floats:
-        """The vertices where they are bound, with morph targets of these weights, float64 [v, 3]."""
-        morphs = self.morphs
-        if not len(morphs.targets):
-            return self.positions
-        added = morphs.positions * weights[morphs.targets][:, None]
-        count = len(self.positions)
-        sums = [np.bincount(morphs.vertices, added[:, axis], minlength=count) for axis in range(3)]
-        return self.positions + np.stack(sums, axis=1)
-
-    def blended(self, matrices: Floats) -> Floats:
-        """The matrix of each vertex, float64 [v, 3, 4], by those of bones."""
-        result = self.weights[:, 0, None, None] * matrices[self.bones[:, 0]]
-        for influence in range(1, INFLUENCES):
-            shared: npt.NDArray[np.int64] = np.flatnonzero(self.weights[:, influence])
-            weights = self.weights[shared, influence, None, None]
-            result[shared] += weights * matrices[self.bones[shared, influence]]
-        return result
+        return Pose(*self.compiled.pose(time, before))
 
     def vertices(self, matrices: Floats, weights: Floats) -> Floats:
         """The vertices in the scene, float64 [v, 3], by matrices of bones and weights of morph targets."""
-        blended = self.blended(matrices)
-        return np.asarray(fixed_order.dot(blended[:, :, :3], self.bound(weights)[:, None, :]) + blended[:, :, 3])
+        return np.asarray(self.compiled.vertices(np.ascontiguousarray(matrices), weights))

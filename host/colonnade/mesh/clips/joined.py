@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,7 +46,9 @@ class Place:
 
     def at(self, time: float) -> Floats:
         """From the clip to the scene of all at a time, seconds, float64 [4, 4]."""
-        return np.asarray(self.nodes.to_scene(self.nodes.moved(self.tracks, time))[-1])
+        last = len(self.nodes.parents) - 1
+        clip = replace(still_clip(np.zeros((1, 3))), nodes=self.nodes, tracks=self.tracks, joints=np.array([last]))
+        return np.vstack([clip.pose(time).matrices[0], [0.0, 0.0, 0.0, 1.0]])
 
 
 def still_clip(vertices: Floats) -> Clip:

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.terminal_text import plain
 from colonnade.common.types import Floats, Indices
-from colonnade.common.vectors import cofactors, unit_vectors
 from colonnade.mesh import losses as lost
 from colonnade.mesh.clips.clip import INFLUENCES, Clip, Morphs
 from colonnade.mesh.clips.tracks import Track
@@ -69,20 +67,12 @@ class ClipReader:
             UserError: A transform is not finite.
         """
         clip = self._clip()
-        with np.errstate(all="ignore"):
-            pose = clip.rest()
-            blended = clip.blended(pose.matrices)
-            vertices = clip.vertices(pose.matrices, pose.weights)
-        if not np.isfinite(vertices).all():
+        normals = None if joined.normals is None else np.ascontiguousarray(joined.normals)
+        is_finite, vertices, normals, is_mirrored = clip.compiled.rest_surface(joined.faces.astype(np.int32), normals)
+        if not is_finite:
             raise self._document.error("a transform of its rest pose is not finite, or too large: export it again")
-        turning = cofactors(blended[:, :, :3])
-        is_mirrored = fixed_order.dot(blended[:, :, 0], turning[:, :, 0]) < 0
-        normals = joined.normals
-        if normals is not None:
-            turned = fixed_order.dot(turning[joined.faces], unit_vectors(normals)[:, :, None, :])
-            normals = unit_vectors(turned * np.where(is_mirrored, -1.0, 1.0)[joined.faces][..., None])
         surface = replace(joined, vertices=vertices, normals=normals, clip=clip)
-        return surface.reversed(is_mirrored[joined.faces[:, 0]])
+        return surface.reversed(is_mirrored != 0)
 
     def _chosen(self, name: str) -> Mapping[str, Any]:
         animations = self._document.json.get("animations", [])
