@@ -21,8 +21,8 @@ const facesOf = (mesh, number) => [...mesh.materialOf.keys()].filter((face) => m
 /** The mesh of a file with materials, prepared for surfacesOf; another one is left. */
 export function prepared(library, mesh) {
   if (!mesh.materials) return mesh;
-  const rest = mesh.clip ? atRest(library, mesh) : mesh;
-  const found = swatched(library, withoutAlpha(library, withMaps(library, rest)));
+  const mapped = withMaps(library, mesh);
+  const found = swatched(library, withoutAlpha(library, mesh.clip ? atRest(library, mapped) : mapped));
   return { ...found, notes: [...new Set(found.notes)] };
 }
 
@@ -35,7 +35,7 @@ function atRest(library, mesh) {
       const [corner, part] = [Math.floor(at / width), at % width];
       return isMirrored[Math.floor(corner / 3)] ? values[width * (3 * Math.floor(corner / 3) + 2 - (corner % 3)) + part] : value;
     });
-  const widths = { faces: 1, normals: 3, colours: 3, alphas: 1, uvs: 2, metalUvs: 2, emissiveUvs: 2 };
+  const widths = { faces: 1, normals: 3, colours: 3, alphas: 1, uvs: 2 };
   return { ...mesh, vertices, ...Object.fromEntries(Object.entries(widths).map(([name, width]) => [name, ordered(name === "normals" ? normals : mesh[name], width)])) };
 }
 

@@ -86,19 +86,15 @@ public:
                               normals ? arrayOf<double>(rotated, {rotated.size(), 3, 3}) : nb::none(), arrayOf<std::uint8_t>(isMirrored, {isMirrored.size()}));
     }
 
-    /// Times, matrices and weights of the keys, and the box of all poses.
+    /// Times, matrices and weights of keys within a tolerance.
+    nb::tuple keys(double tolerance) const {
+        return tupleOf(released([&] { return mesh::KeyChooser(clip_, tolerance).make(); }));
+    }
+
+    /// Those within the clip's own tolerance, and the box of all poses.
     nb::tuple bake() {
         const mesh::BakedClip& baked = bakedClip();
-        const std::size_t count = baked.keys.size();
-        double *times, *matrices, *weights;
-        auto result = nb::make_tuple(makeArray({count}, times), makeArray({count, clip_.joints.size(), 3, 4}, matrices),
-                                     makeArray({count, clip_.morphs.weights.size()}, weights), arrayOf<double>(baked.box.low, {3}), arrayOf<double>(baked.box.high, {3}));
-        for (const mesh::ClipKey& key : baked.keys) {
-            *times++ = key.time;
-            for (const mesh::BoneMatrix& bone : key.pose.matrices) matrices = std::copy(bone.begin(), bone.end(), matrices);
-            weights = std::copy(key.pose.weights.begin(), key.pose.weights.end(), weights);
-        }
-        return result;
+        return nb::make_tuple(tupleOf(baked.keys), arrayOf<double>(baked.box.low, {3}), arrayOf<double>(baked.box.high, {3}));
     }
 
     nb::dict grid(const Numbers64& vertices, const Array<std::int32_t>& faces, const Numbers64& normals, const Array<std::int32_t>& clipCorners, int vertexBits) {
@@ -131,6 +127,18 @@ public:
     }
 
 private:
+    nb::tuple tupleOf(const std::vector<mesh::ClipKey>& keys) const {
+        double *times, *matrices, *weights;
+        auto result = nb::make_tuple(makeArray({keys.size()}, times), makeArray({keys.size(), clip_.joints.size(), 3, 4}, matrices),
+                                     makeArray({keys.size(), clip_.morphs.weights.size()}, weights));
+        for (const mesh::ClipKey& key : keys) {
+            *times++ = key.time;
+            for (const mesh::BoneMatrix& bone : key.pose.matrices) matrices = std::copy(bone.begin(), bone.end(), matrices);
+            weights = std::copy(key.pose.weights.begin(), key.pose.weights.end(), weights);
+        }
+        return result;
+    }
+
     nb::tuple poseOf(const mesh::ClipPose& pose) const {
         return nb::make_tuple(arrayOf<double>(pose.matrices, {pose.matrices.size(), 3, 4}), arrayOf<double>(pose.weights, {pose.weights.size()}));
     }
@@ -186,6 +194,7 @@ void bind_clip(nb::module_& module) {
         .def("pose", &Clip::pose, "time"_a, "before"_a)
         .def("vertices", &Clip::vertices, "matrices"_a, "weights"_a)
         .def("rest_surface", &Clip::restSurface, "faces"_a, "normals"_a.none())
+        .def("keys", &Clip::keys, "tolerance"_a)
         .def("bake", &Clip::bake)
         .def("grid", &Clip::grid, "vertices"_a, "faces"_a, "normals"_a, "clip_corners"_a, "vertex_bits"_a);
     module.def("clip_file", &clipFile, "vertices"_a, "changes"_a, "times"_a, "poses"_a, "numbers"_a, "tree"_a, "leaves"_a, "layouts"_a, "format_hash"_a, "is_ordered"_a);

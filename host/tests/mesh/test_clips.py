@@ -12,7 +12,7 @@ from animated_documents import HOSTILE, Evaluator, arm, changed
 from colonnade import _core
 from colonnade.common.errors import UserError
 from colonnade.mesh.clips.clip import Pose
-from colonnade.mesh.clips.keys import Keys, keys_of
+from colonnade.mesh.clips.keys import Keys, baked, keys_of
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.files.resolver import References
 from colonnade.mesh.load import load_mesh
@@ -118,7 +118,7 @@ def test_hostile_animations_are_refused(tmp_path: Path, places: tuple[Any, ...],
 @pytest.fixture(scope="module")
 def keys(mesh: Mesh) -> Keys:
     assert mesh.clip is not None
-    return keys_of(mesh.clip)
+    return baked(mesh.clip).keys
 
 
 def between(keys: Keys, time: float) -> Pose:
@@ -141,6 +141,14 @@ def test_keys_follow_the_clip_within_their_tolerance(mesh: Mesh, keys: Keys) -> 
         assert np.abs(found - exact).max() <= tolerance
 
 
+def test_keys_are_denser_for_a_smaller_tolerance(mesh: Mesh, keys: Keys) -> None:
+    assert mesh.clip is not None
+    tolerance = float(np.ptp(mesh.vertices, axis=0).max()) * _core.CLIP_TOLERANCE
+    same, denser = (keys_of(mesh.clip, share * tolerance) for share in (1, 0.25))
+    np.testing.assert_array_equal(same.times, keys.times)
+    assert len(denser.times) > len(keys.times)
+
+
 def test_keys_jump_where_the_clip_jumps(mesh: Mesh, keys: Keys) -> None:
     assert mesh.clip is not None
     assert (keys.times == 0.625).sum() == 2
@@ -149,7 +157,8 @@ def test_keys_jump_where_the_clip_jumps(mesh: Mesh, keys: Keys) -> None:
 
 def test_the_box_of_keys_holds_all_poses_between_them(mesh: Mesh, keys: Keys) -> None:
     assert mesh.clip is not None
-    low, high = keys.low, keys.high
+    found = baked(mesh.clip)
+    low, high = found.low, found.high
     assert (low <= mesh.vertices.min(axis=0)).all() and (mesh.vertices.max(axis=0) <= high).all()
     for time in np.linspace(0.0, mesh.clip.duration, 200):
         vertices = mesh.clip.vertices(*vars(between(keys, time)).values())

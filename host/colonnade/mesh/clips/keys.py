@@ -16,19 +16,33 @@ class Keys:
         times: Seconds, from 0 to the clip's duration, float64 [k].
         matrices: Of bones, float64 [k, b, 3, 4].
         weights: Of morph targets, float64 [k, t].
-        low, high: The box of all poses, also between keys and at rest, float64 [3].
     """
 
     times: Floats
     matrices: Floats
     weights: Floats
+
+
+@dataclass(frozen=True)
+class Baked:
+    """The keys of a clip, and the box of all of its poses, float64 [3] twice."""
+
+    keys: Keys
     low: Floats
     high: Floats
 
 
-def keys_of(clip: Clip) -> Keys:
-    """The keys of a clip (``cpp/mesh/clip_keys.hpp``).
+def keys_of(clip: Clip, tolerance: float) -> Keys:
+    """Keys with which no vertex is further than a tolerance from where the clip has it (``cpp/mesh/clip_keys.hpp``).
 
-    Interpolated, they miss the clip by at most ``_core.CLIP_TOLERANCE`` of the longest edge of the object at rest.
+    Args:
+        clip: The clip.
+        tolerance: In units of its scene.
     """
-    return Keys(*clip.compiled.bake())
+    return Keys(*clip.compiled.keys(tolerance))
+
+
+def baked(clip: Clip) -> Baked:
+    """The keys of a clip within ``_core.CLIP_TOLERANCE`` of the longest edge of the object at rest."""
+    keys, low, high = clip.compiled.bake()
+    return Baked(Keys(*keys), low, high)

@@ -14,7 +14,7 @@ from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import cofactors, unit_vectors
 from colonnade.mesh.clips.clip import Clip
 from colonnade.mesh.clips.joined import Place
-from colonnade.mesh.clips.keys import keys_of
+from colonnade.mesh.clips.keys import baked
 from colonnade.mesh.geometry import primitives
 from colonnade.mesh.geometry.topology import Faces
 from colonnade.mesh.materials.materials import MeshMaterial
@@ -133,9 +133,9 @@ class Mesh:
     def extent(self) -> Extent:
         """The bounding box and the outline; of a mesh with a clip the box of all of its poses, and its corners."""
         if self.clip is not None:
-            keys = keys_of(self.clip)
-            corners = np.array(list(product(*zip(keys.low, keys.high, strict=True))))
-            return Extent(keys.low, keys.high, corners)
+            clip = baked(self.clip)
+            corners = np.array(list(product(*zip(clip.low, clip.high, strict=True))))
+            return Extent(clip.low, clip.high, corners)
         points, _ = primitives.sphere(720)
         directions = np.unique(points, axis=0)
         outermost: set[int] = set()
