@@ -21,7 +21,7 @@ final class WorldDistanceIO(config: PathConfig) extends Bundle {
   val t        = Valid(new Fixed(new RayFormats(config.numbers).grid))
 }
 
-/** Finds a distance along the ray of the world each cycle, by a division; [[WorldDistance.latency]] cycles. Source:
+/** Finds a distance along the ray of the world each cycle, by a division; in `latency` cycles. Source:
   * docs/numbers.md, section 10.
   */
 final class WorldDistance(config: PathConfig) extends Module {
