@@ -72,21 +72,6 @@ def solve(matrix: Floats, right_side: Floats) -> Floats:
     return solution
 
 
-def stretches(matrix: Floats) -> tuple[float, float, float]:
-    """The singular values of a matrix [3, 3], largest first, by the one-sided method of Jacobi."""
-    columns = list(np.array(matrix.T, np.float64))
-    for i, j in ((0, 1), (0, 2), (1, 2)) * 8:  # converges quadratically
-        a, b = columns[i], columns[j]
-        across = float(dot(a, b))
-        if across != 0.0:
-            half = float(dot(b, b) - dot(a, a)) / (2.0 * across)
-            slope = math.copysign(1.0, half) / (abs(half) + math.sqrt(1.0 + half * half))
-            cosine = 1.0 / math.sqrt(1.0 + slope * slope)
-            columns[i], columns[j] = cosine * (a - slope * b), cosine * (b + slope * a)
-    large, middle, small = sorted((math.sqrt(dot(column, column)) for column in columns), reverse=True)
-    return large, middle, small
-
-
 def log(x: Floats) -> Floats:
     """Natural logarithms of positive numbers; relative error below 2^-50."""
     return _each("log", x)

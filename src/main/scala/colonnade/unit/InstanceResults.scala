@@ -18,7 +18,7 @@ final class VisitEntry(config: PathConfig) extends Bundle {
 
 final class InstanceResultsIO(config: PathConfig) extends Bundle {
 
-  /** What contexts wait for; one without an instance that is left ends by `ends`, too. */
+  /** What contexts wait for; one without an instance that is left comes by `misses`, too. */
   val steps   = Flipped(Valid(new InstanceStep(config)))
   val scales  = Flipped(Valid(new VisitScale(config)))
   val entries = Flipped(Valid(new VisitEntry(config)))
