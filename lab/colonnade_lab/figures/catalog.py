@@ -182,6 +182,23 @@ def _paper_maps() -> Entry:
     return Entry("paper-maps", "small", commands, (encoding,), libraries=("ASAP7",), sources=("maps", "tree"))
 
 
+#: Marches of a column, by which frames of a camera that moves are compared.
+MARCHES = (4, 8, 16)
+
+
+def _marches() -> Entry:
+    """A frame of a camera that is not the maps', whose pixels all march, and the area, by the marches of a column."""
+    commands: dict[str, tuple[str, ...]] = {}
+    for count in MARCHES:
+        hardware = ("--config", "edge", "--set", f"units.marches={count}")
+        options = ("--backend", "rtl", "--size", "192x144", "--samples", "1")
+        commands[str(count)] = ("colonnade", "render", "scenes/live.toml", *hardware, *options, "--json", REPORT)
+        area = ("colonnade", "ppa", *hardware, "--no-power", "--liberty", "ASAP7", "--json", REPORT)
+        commands[f"{count}, area"] = area
+    designs = tuple(Design("edge", (f"units.marches={count}",)) for count in MARCHES)
+    return Entry("marches", "edge", commands, libraries=("ASAP7",), designs=designs)
+
+
 def _gather() -> Entry:
     """Gathered light on `edge`: a pass of the RTL, and pictures of the model against the reference."""
 
@@ -253,6 +270,7 @@ def catalog() -> dict[str, Entry]:
             "edge",
             {"": ("tools/room-frames", "edge", "160x120", "--moved", "--compare", f"--json={REPORT}")},
         ),
+        _marches(),
         Entry("moving-frames", "small", _colonnade("study", "moved-frames", _MOVED), sources=("live", "tree")),
         Entry("captures", "small", _colonnade("study", "captures", *_ROOMS, _ATTIC), **_alone("maps")),
         _samples(),

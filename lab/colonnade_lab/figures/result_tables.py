@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from colonnade_lab.common.markdown import markdown
-from colonnade_lab.figures.catalog import SAMPLES, catalog
+from colonnade_lab.figures.catalog import MARCHES, SAMPLES, catalog
 from colonnade_lab.figures.data import Data, commands_of
 from colonnade_lab.figures.facts import MEGAHERTZ, PRESETS, facts, text
 
@@ -155,6 +155,17 @@ def moved_rooms(data: Data) -> str:
     )
 
 
+def marches(data: Data) -> str:
+    """Cycles of a frame whose pixels all march, and the area of the array, by the marches of a column of `edge`."""
+    found, rows = data.result("marches"), []
+    for count in MARCHES:
+        frame, array = found[str(count)], found[f"{count}, area"]["levels"]["array"]
+        width, height = frame["size"]
+        a_pixel = frame["cycles"] / (width * height)
+        rows.append([str(count), f"{frame['cycles']:,}", f"{a_pixel:.2f}", f"{array['mm2_28nm']:.2f}"])
+    return markdown(["`units.marches`", "cycles", "a pixel", "array, mm² at 28 nm"], rows)
+
+
 def gather(data: Data) -> str:
     """Passes of `edge` that gather light, and how near the model is to the reference."""
     found = data.result("gather")
@@ -234,6 +245,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     "board": board,
     "rooms": rooms,
     "moved-rooms": moved_rooms,
+    "marches": marches,
     "gather": gather,
     "environments": environments,
     "rebuilds": rebuilds,

@@ -1,4 +1,4 @@
-"""Tables of studies: energy and area, vertex bits and contexts, instances."""
+"""Tables of studies: energy and area, vertex bits and contexts, what features cost, instances."""
 
 from __future__ import annotations
 
@@ -33,6 +33,20 @@ def trade(name: str, data: Data) -> str:
     return markdown([*titles, "kGE·cycle/ray", f"energy × area ÷ rate, to `{study['baseline']}`"], rows)
 
 
+def features(data: Data) -> str:
+    """Area of `edge` with and without features, and its rate of objects that do not use them."""
+    study = data.result("features")
+    (library,) = study["libraries"]
+    area, a_rate = f"array_kge.{library}", f"area_per_rate.{library}"
+    base = study["points"][0]["figures"]
+    rows = []
+    for point in study["points"]:
+        own = point["figures"]
+        more = [f"{100 * (own[key] / base[key] - 1):+.1f} %" for key in (area, a_rate)]
+        rows.append([point["name"], number(own[area], ",.0f"), more[0], number(own["rays_per_cycle"], ".2f"), more[1]])
+    return markdown(["design", "array, kGE", "to `edge`", "rays per cycle", "area ÷ rate, to `edge`"], rows)
+
+
 def instances(data: Data) -> str:
     """Cycles of `edge` for objects as one mesh and as instances."""
     one, many = (point["workloads"] for point in data.result("instances")["points"])
@@ -51,5 +65,6 @@ def number(value: float | None, form: str, scale: float = 1.0) -> str:
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "energy-area": partial(trade, "energy-area"),
     "vertices-contexts": partial(trade, "vertices-contexts"),
+    "features": features,
     "instances": instances,
 }
