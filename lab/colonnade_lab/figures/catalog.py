@@ -132,7 +132,7 @@ def _samples() -> Entry:
 
 def _large() -> Entry:
     """Meshes of a million triangles, which no cache holds, on DRAM of one latency and on DRAM with rows."""
-    meshes = ("--mesh", "bunny:2", "--mesh", "rock:1000000", "--no-mirror", "--size", "320x240")
+    meshes = ("--mesh", "bunny:2", "--mesh", "rock:1000000", "--no-mirror")
     command = ("colonnade", "bench", "--config", "edge", "--reuse", *meshes)
     banks = ("--dram-banks", "8", "--json", REPORT)
     return Entry("bench-large", "edge", {"latency": (*command, "--json", REPORT), "banks": (*command, *banks)})

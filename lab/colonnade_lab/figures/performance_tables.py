@@ -34,6 +34,25 @@ def rates(data: Data) -> str:
     return markdown([*titles, "cycles as a mirror", "rays per cycle"], rows)
 
 
+def large(data: Data) -> str:
+    """Rays per cycle of `edge` for meshes that no cache holds, on DRAM of one latency and on DRAM with rows."""
+    found = data.result("bench-large")
+    latency, banks = (found[part]["meshes"] for part in ("latency", "banks"))
+    size = "×".join(str(each) for each in found["latency"]["size"])
+    rows = [
+        [
+            name,
+            f"{mesh['triangles']:,}",
+            f"{mesh['rays_per_cycle_in_box']:.2f}",
+            f"{mesh['per_ray']['dram_bytes']:.0f}",
+            f"{banks[name]['rays_per_cycle_in_box']:.2f}",
+        ]
+        for name, mesh in latency.items()
+    ]
+    titles = ["mesh", "triangles", f"in-box rays per cycle, {size}", "bytes of DRAM a ray", "with rows, rays per cycle"]
+    return markdown(titles, rows)
+
+
 def utilisation(data: Data) -> str:
     """Utilisation of units and ports of `edge`, and what each would allow alone."""
     meshes = data.result("bench-edge")["meshes"]
@@ -114,6 +133,7 @@ def view(data: Data) -> str:
 TABLES: Mapping[str, Callable[[Data], str]] = {
     "rates": rates,
     "utilisation": utilisation,
+    "large": large,
     "scaling": scaling,
     "ablation": ablation,
     "simulators": simulators,
