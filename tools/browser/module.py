@@ -22,9 +22,10 @@ PLAIN = ("-std=gnu++17", "-fno-exceptions", "-fno-rtti", "-Wno-keyword-macro", "
 CPP = (*PLAIN, "-Dthrow=__builtin_trap(),")
 Source = tuple[str, Path, tuple[str, ...]]
 SOURCES: tuple[Source, ...] = (
-    ("c++", LIBRARY / "colonnade_model.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{DRIVER / 'include'}")),
-    ("c++", LIBRARY / "colonnade_environment.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")),
-    *(("c++", LIVE / f"{name}.cpp", (*CPP, f"-I{ROOT / 'host' / 'cpp'}")) for name in ("live", "kernels")),
+    *(
+        ("c++", file, (*CPP, f"-I{ROOT / 'host' / 'cpp'}", f"-I{DRIVER / 'include'}"))
+        for file in (*sorted(LIBRARY.glob("colonnade_*.cpp")), LIVE / "live.cpp", LIVE / "kernels.cpp")
+    ),
     *(
         ("cc", file, ("-std=c11", f"-I{DRIVER / 'include'}"))
         for file in sorted([*(DRIVER / "src").glob("colonnade_*.c"), *LIBRARY.glob("colonnade_*.c")])
