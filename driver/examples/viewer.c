@@ -5,11 +5,14 @@
  *                                                q ends
  *        viewer /dev/uio0 IMAGE VIEW --keys KEYS a frame for the view and one after each key
  *        viewer /dev/uio0 IMAGE VIEW --turn N    N frames around the object
- *        viewer /dev/uio0 IMAGE VIEW --play N CLIP    N frames of objects that move
+ *        viewer /dev/uio0 IMAGE VIEW --play N CLIP [SCENE]    N frames of objects that move; SCENE has the records of a scene
+ *                                                in DRAM, whose meshes may bend
  *
- * It prints frames a second. IMAGE, VIEW and CLIP come from `colonnade pack`; colonnade_design.h from `colonnade registers`. */
+ * It prints frames a second. IMAGE, VIEW, CLIP and SCENE come from `colonnade pack`; colonnade_design.h from `colonnade
+ * registers`. */
 #define _POSIX_C_SOURCE 200809L
 
+#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <signal.h>
@@ -24,7 +27,7 @@
 #include "colonnade_view.h"
 #include "target.h"
 
-enum { STEP = 5, STEEPEST = 85, FILE_BYTES = 1 << 20, WRITES = 4096 };
+enum { STEP = 5, STEEPEST = 85, FILE_BYTES = 1 << 20, WRITES = 4096, PAGE = 4096 };
 
 static const double RADIAN = 3.14159265358979323846 / 180, METRE = 4294967296.0, ONE = 1073741824.0;
 
@@ -141,19 +144,41 @@ static void render(struct target *target, struct colonnade *device, struct colon
 /* Objects that move, and the instances of a frame and of the one before. */
 struct play {
     struct colonnade_motion motion;
+    struct colonnade_motion_memory memory;
     struct colonnade_instance instances[2][COLONNADE_INSTANCES];
 };
 
-/* Finds the registers of a frame: those of the view, then those of instances. */
-static void find_frames(struct colonnade_view *view, struct play *play, uint32_t number, uint32_t count,
-                        struct colonnade_frame frames[2]) {
+static void *allocate(size_t count, size_t size) {
+    void *found = calloc(count, size);
+    if (found == NULL) target_fail("memory", strerror(errno));
+    return found;
+}
+
+/* Puts the records of a scene behind a frame of so many bytes. */
+static void put_scene(struct target *target, struct colonnade *device, struct play *play, const char *name, uint64_t frame) {
+    struct colonnade_motion *motion = &play->motion;
+    const uint64_t at = (frame + PAGE - 1) / PAGE * PAGE;
+    if (at + motion->copy_bytes > target->size) target_fail(name, "has no space behind the frame");
+    const size_t bytes = target_read(name, target->memory + at, target->size - motion->copy_bytes - at);
+    play->memory = (struct colonnade_motion_memory){
+        (uint32_t *)(target->memory + at), allocate(motion->vertices + 1, sizeof *play->memory.vertices),
+        allocate(motion->depth + 1, sizeof *play->memory.path), allocate(motion->pose_words + 1, sizeof *play->memory.pose)};
+    target_check(name, colonnade_motion_copy(motion, &play->memory, (uint32_t)bytes));
+    target_check(name, colonnade_set_scene(device, target->base + at));
+}
+
+/* Finds the registers of a frame: those of the view, then those of instances; bends meshes. */
+static void find_frames(const struct colonnade *device, struct colonnade_view *view, struct play *play, uint32_t number,
+                        uint32_t count, struct colonnade_frame frames[2]) {
     static uint8_t writes[8 * WRITES], moves[8 * COLONNADE_MOTION_WRITES];
     const struct colonnade_motion *motion = &play->motion;
     struct colonnade_transform transforms[COLONNADE_INSTANCES];
     struct colonnade_instance *now = play->instances[number % 2];
     const struct colonnade_instance *before = number == 0 ? NULL : play->instances[(number + 1) % 2];
-    colonnade_motion_transforms(motion, (uint32_t)((uint64_t)motion->duration * number / count), transforms);
+    const uint32_t time = (uint32_t)((uint64_t)motion->duration * number / count);
+    colonnade_motion_transforms(motion, time, transforms);
     target_check("motion", colonnade_motion_find(motion, transforms, now));
+    target_check("mesh", colonnade_motion_bend(motion, device, &play->memory, time, before, now));
     const struct colonnade_shared shared = colonnade_find_shared(now, motion->objects);
     target_check("view", colonnade_view_set_bounds(view, shared.low, shared.high));
     target_check("view", colonnade_view_frame(view, writes, WRITES, &frames[0]));
@@ -162,14 +187,14 @@ static void find_frames(struct colonnade_view *view, struct play *play, uint32_t
     frames[1].count = colonnade_motion_writes(motion, now, before, moves);
 }
 
-/* Renders frames of a motion: registers are found and written while the last frame runs. */
+/* Renders frames of a motion: meshes are bent, and registers found and written, while the last frame runs. */
 static void play_all(struct target *target, struct colonnade *device, struct colonnade_view *view, struct play *play,
                      uint32_t count, struct speed *speed) {
     const double begin = seconds();
     bool is_running = false;
     for (uint32_t number = 0; number < count && !is_ended; ++number) {
         struct colonnade_frame frames[2];
-        find_frames(view, play, number, count, frames);
+        find_frames(device, view, play, number, count, frames);
         for (int part = 0; part < 2; ++part) {
             enum colonnade_error error = colonnade_set_frame(device, &frames[part]);
             if (error == COLONNADE_BUSY && is_running) { /* the shell has no space for so many writes */
@@ -196,15 +221,15 @@ int main(int argc, char **argv) {
     static struct play play;
     static struct colonnade_view view;
     const bool has_keys = argc == 6 && strcmp(argv[4], "--keys") == 0, turns = argc == 6 && strcmp(argv[4], "--turn") == 0;
-    const bool plays = argc == 7 && strcmp(argv[4], "--play") == 0;
+    const bool plays = (argc == 7 || argc == 8) && strcmp(argv[4], "--play") == 0;
     if (argc != 4 && !has_keys && !turns && !plays)
-        target_fail("usage", "viewer /dev/uio0 IMAGE VIEW [--keys KEYS | --turn FRAMES | --play FRAMES CLIP]");
+        target_fail("usage", "viewer /dev/uio0 IMAGE VIEW [--keys KEYS | --turn FRAMES | --play FRAMES CLIP [SCENE]]");
     const long count = turns || plays ? strtol(argv[5], NULL, 10) : 0;
     if ((turns || plays) && (count < 1 || count > 1000000)) target_fail(argv[4], "has a number of frames, 1 to 1000000");
     if (plays)
         target_check(argv[6],
                      colonnade_motion_open(&play.motion, &colonnade_design, clip, target_read(argv[6], clip, sizeof clip)));
-    if (plays && play.motion.clips != 0) target_fail(argv[6], "has meshes that bend, which this program does not");
+    if (argc == 7 && play.motion.clips != 0) target_fail(argv[6], "has meshes that bend: give the records of the scene");
     target_check(argv[3], colonnade_view_open(&view, &colonnade_design, file, target_read(argv[3], file, sizeof file)));
     struct target target;
     struct colonnade device;
@@ -217,6 +242,7 @@ int main(int argc, char **argv) {
     if (target.line != 0 && target.line != target_stride(start.width))
         target_fail(argv[3], "frames are not as wide as the display: give pack its --size");
     target_load(&target, &device, argv[2]);
+    if (argc == 8) put_scene(&target, &device, &play, argv[7], (uint64_t)target_stride(start.width) * start.height);
 
     struct orbit orbit = {0, 0, 1};
     struct speed speed = {0, 0, 0};

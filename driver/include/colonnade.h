@@ -37,7 +37,8 @@ enum colonnade_error {
     COLONNADE_BAD_LENGTH,      /* an image's sections do not fill it */
     COLONNADE_NO_PHOTO,        /* no photo: shell 1.0, or no environment; no strengths: a shell before 1.3 */
     COLONNADE_FRAME_INVALID,   /* the device has an error bit: colonnade_device_errors */
-    COLONNADE_NO_SCENE,        /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not */
+    COLONNADE_NO_SCENE,        /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not;
+                                * or meshes that bend have no second copy */
     /* Of colonnade_view.h */
     COLONNADE_NOT_A_VIEW, /* no view file, or one of another version, or numbers that no design has */
     COLONNADE_BAD_POSE,   /* a rotation is none, or a position is beyond 2^28 metres */
@@ -96,7 +97,7 @@ struct colonnade_design {
     uint32_t scene_page;    /* byte address of `dram.page` and of `control.invalidate`; 0 if no scene lies in DRAM */
     uint32_t invalidate;
     uint32_t rays_tail, rays_head;                    /* of a device for rays, like the next ones; 0: it has frames */
-    uint32_t bounds, scene, placement, ring;          /* byte addresses of the first words of these groups */
+    uint32_t bounds, scene, placement, ring;          /* first words of these groups; `scene` also with a scene in DRAM */
     uint32_t map_count;                               /* memories of a room's maps; 0: the device has no room */
     struct colonnade_memory maps[COLONNADE_MAX_MAPS]; /* an image's section for maps[i] has the target i + 1 */
 };

@@ -45,6 +45,8 @@ struct colonnade_instance {
 
 /* The words of `instances[i]`. */
 uint32_t colonnade_instance_words(const struct colonnade_world *world);
+/* The place of the root among them. */
+uint32_t colonnade_instance_root(const struct colonnade_world *world);
 
 /* Places an object. Refused is a transform that scales an axis to nothing, one that makes the object too small for the world,
  * and one with which it leaves the world's cube. */

@@ -65,6 +65,11 @@ uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh);
 enum colonnade_error colonnade_mesh_skin(const struct colonnade_mesh *mesh, const int32_t *pose,
                                          struct colonnade_vertex *vertices);
 
+/* Makes a copy of the mesh's records for another root, since nodes hold addresses. `from` and `copy` point at the roots, which
+ * have the addresses `from_root` and `root`; they do not overlap. `path` is that of colonnade_mesh_refit. */
+enum colonnade_error colonnade_mesh_copy(const struct colonnade_mesh *mesh, const uint32_t *from, uint32_t from_root,
+                                         uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path);
+
 /* Writes vertices into a copy of the mesh's records, whose root has the address `root`. Each record is written once; of the
  * tree none changes its place or its kind. `copy` points at the root, in the device's order of bytes, low byte first; `path`
  * has space for mesh->depth nodes. No frame may

@@ -13,28 +13,41 @@
 extern "C" {
 #endif
 
-/* Writes of a frame, at most: instances, bounds and `shading.offset`. */
-enum { COLONNADE_MOTION_WRITES = COLONNADE_INSTANCES * COLONNADE_INSTANCE_WORDS + 6 + 2 };
+/* Writes of a frame, at most: instances, bounds, `shading.offset`, and two of meshes that bend. */
+enum { COLONNADE_MOTION_WRITES = COLONNADE_INSTANCES * COLONNADE_INSTANCE_WORDS + 6 + 2 + 2 };
 
-/* Objects and where they are over time. Only the functions below read and write it. It points into the file. */
+/* Objects and where they are over time. Only the functions below write it. It points into the file. */
 struct colonnade_motion {
     struct colonnade_world world;
     uint32_t instances_address, bounds_address, offset_address;
-    uint32_t instance_words, offset_words; /* of `instances[i]`; of `shading.offset`, 0: the view file has it */
+    uint32_t invalidate_address, count_address; /* 0: no scene lies in DRAM */
+    uint32_t instance_words, offset_words;      /* of `instances[i]`; of `shading.offset`, 0: the view file has it */
     uint32_t objects, keys, clips;
     uint32_t duration; /* 2^-16 s */
     int32_t shift;     /* fraction bits of translations */
-    const uint8_t *object_words, *key_words, *clip_words;
+    const uint8_t *object_words, *key_words;
+    uint32_t vertices, depth, pose_words; /* of the largest mesh that bends */
+    uint32_t copy_bytes;                  /* of a second copy of all records of meshes that bend */
+    struct colonnade_mesh meshes[COLONNADE_INSTANCES];
+    uint32_t roots[COLONNADE_INSTANCES][2]; /* of each mesh: in the scene, in the second copy */
+    uint32_t records;                       /* of the scene with second copies; 0: there are none */
+};
+
+/* The caller's memory for meshes that bend. */
+struct colonnade_motion_memory {
+    uint32_t *scene;                   /* the records in DRAM, and behind them motion->copy_bytes bytes */
+    struct colonnade_vertex *vertices; /* motion->vertices */
+    struct colonnade_mesh_node *path;  /* motion->depth */
+    int32_t *pose;                     /* motion->pose_words */
 };
 
 /* Reads a clip file of instances, which `colonnade pack --clip-file` writes for a scene of several objects. */
 enum colonnade_error colonnade_motion_open(struct colonnade_motion *motion, const struct colonnade_design *design,
                                            const void *data, size_t bytes);
 
-/* Clip `index`, below motion->clips, of a mesh that bends, and the address of its root in the scene. It plays once, from the
- * start of the motion, and stays at its end. */
-enum colonnade_error colonnade_motion_mesh(const struct colonnade_motion *motion, const struct colonnade_design *design,
-                                           uint32_t index, struct colonnade_mesh *mesh, uint32_t *root);
+/* Makes the second copies of meshes that bend, behind the scene: `bytes` bytes, which `colonnade pack --dram-image` writes. */
+enum colonnade_error colonnade_motion_copy(struct colonnade_motion *motion, const struct colonnade_motion_memory *memory,
+                                           uint32_t bytes);
 
 /* The transforms of all objects at a time, 2^-16 s; the motion repeats. */
 void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t time, struct colonnade_transform *transforms);
@@ -48,9 +61,23 @@ enum colonnade_error colonnade_motion_move(const struct colonnade_view *view, co
 enum colonnade_error colonnade_motion_find(const struct colonnade_motion *motion, const struct colonnade_transform *transforms,
                                            struct colonnade_instance *instances);
 
+/* Has instances read the copy of each mesh that bends that `last` does not: the instances of the last frame that was started,
+ * NULL: none. Its root is roots[i] for motion->meshes[i]. With COLONNADE_BUSY a frame is queued, so that both copies are
+ * read. For programs that refit by the unit. */
+enum colonnade_error colonnade_motion_swap(const struct colonnade_motion *motion, const struct colonnade *device,
+                                           const struct colonnade_instance *last, struct colonnade_instance *instances,
+                                           uint32_t roots[COLONNADE_INSTANCES]);
+
+/* Bends meshes as they are at a time, 2^-16 s, in the copies of colonnade_motion_swap. Each plays once, from the start of the
+ * motion, and stays at its end. No frame may show instances of a call that fails. */
+enum colonnade_error colonnade_motion_bend(const struct colonnade_motion *motion, const struct colonnade *device,
+                                           const struct colonnade_motion_memory *memory, uint32_t time,
+                                           const struct colonnade_instance *last, struct colonnade_instance *instances);
+
 /* The pairs of words of instances, of their bounds and offset, but for those that `before` has, too: instances that the device
- * has, NULL if it has none. Answers their number. `writes` has space for COLONNADE_MOTION_WRITES pairs. Set them by
- * colonnade_set_frame after those of a view, whose bounds colonnade_view_set_bounds gives. */
+ * has, NULL if it has none. Where a mesh that bends has another root, they invalidate the caches. Answers their number.
+ * `writes` has space for COLONNADE_MOTION_WRITES pairs. Set them by colonnade_set_frame after those of a view, whose bounds
+ * colonnade_view_set_bounds gives. */
 uint32_t colonnade_motion_writes(const struct colonnade_motion *motion, const struct colonnade_instance *instances,
                                  const struct colonnade_instance *before, uint8_t *writes);
 

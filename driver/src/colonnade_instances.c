@@ -191,6 +191,10 @@ uint32_t colonnade_instance_words(const struct colonnade_world *world) {
     return world->vertex_bits + world->grid_fraction + 3 > 32 ? COLONNADE_INSTANCE_WORDS : COLONNADE_INSTANCE_WORDS - 3;
 }
 
+uint32_t colonnade_instance_root(const struct colonnade_world *world) {
+    return colonnade_instance_words(world) - (2 + 2 * 3); /* behind it: materialBase, box */
+}
+
 enum colonnade_error colonnade_find_instance(const struct colonnade_world *world, const struct colonnade_object *object,
                                              const struct colonnade_transform *transform, struct colonnade_instance *instance) {
     const int64_t cube = (int64_t)1 << (world->vertex_bits + LENGTH_BITS), unit = 1 << LENGTH_BITS;

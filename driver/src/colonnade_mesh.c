@@ -138,6 +138,19 @@ enum colonnade_error colonnade_mesh_end(const struct colonnade_mesh_walk *walk) 
     return is_whole ? COLONNADE_OK : COLONNADE_OTHER_RECORDS;
 }
 
+enum colonnade_error colonnade_mesh_copy(const struct colonnade_mesh *mesh, const uint32_t *from, uint32_t from_root,
+                                         uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path) {
+    struct colonnade_mesh_walk walk = {mesh, from, path, from_root, from_root, 0, 0};
+    for (size_t i = 0; i < (size_t)RECORD_WORDS * mesh->records; ++i) copy[i] = from[i];
+    for (struct colonnade_mesh_node *node; (node = colonnade_mesh_next(&walk)) != NULL;) {
+        uint32_t *to = copy + (size_t)RECORD_WORDS * (node->address - from_root);
+        struct colonnade_record change = {{0}};
+        colonnade_put(&change, mesh->fields[FIELD_FIRST], mesh->address_bits, node->first ^ (node->first - from_root + root));
+        for (int i = 0; i < RECORD_WORDS; ++i) to[i] ^= change.words[i];
+    }
+    return colonnade_mesh_end(&walk);
+}
+
 enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
                                           uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path,
                                           struct colonnade_refit *result) {

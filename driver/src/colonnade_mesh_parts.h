@@ -50,6 +50,10 @@ struct colonnade_keys {
 
 /* Whether times ascend from 0 on to the duration, and numbers are small enough for what is computed. */
 bool colonnade_are_keys(const struct colonnade_keys *keys);
+/* A time within a duration that repeats. */
+static inline uint32_t colonnade_repeated(uint32_t time, uint32_t duration) {
+    return time <= duration ? time : time % (duration != 0 ? duration : 1);
+}
 /* The numbers at a time, 2^-16 s; keys repeat. */
 void colonnade_find_pose(const struct colonnade_keys *keys, uint32_t time, int32_t *pose);
 

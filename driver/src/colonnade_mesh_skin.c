@@ -10,7 +10,7 @@ uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh) { return M
 void colonnade_find_pose(const struct colonnade_keys *keys, uint32_t time, int32_t *pose) {
     const size_t stride = 4 * (1 + (size_t)keys->numbers);
     uint32_t low = 0, high = keys->count;
-    if (time > keys->duration) time %= keys->duration != 0 ? keys->duration : 1;
+    time = colonnade_repeated(time, keys->duration);
     while (high - low > 1) { /* the last key up to the time */
         const uint32_t middle = low + (high - low) / 2;
         if (colonnade_word(keys->words + stride * middle, 0) <= time) low = middle;

@@ -7,6 +7,9 @@
 
 enum { VERSION = 1, HEADER_WORDS = 12, FIXED_WORDS = HEADER_WORDS + 13, OBJECT_WORDS = 11, CLIP_WORDS = 2 };
 enum { POSITION_BITS = 20, BOX_WORDS = 6, LIMIT = 1 << 16 };
+enum { RECORD_BYTES = 4 * RECORD_WORDS, PAIR_BYTES = 128 /* of lines, which the device reads at once */ };
+
+static uint32_t most(uint32_t a, uint32_t b) { return a > b ? a : b; }
 
 static struct colonnade_keys keys_of(const struct colonnade_motion *motion) {
     const uint32_t numbers = MATRIX_WORDS * motion->objects;
@@ -50,27 +53,38 @@ static bool read_numbers(struct colonnade_motion *motion, const uint8_t *bytes) 
 }
 
 static bool are_objects(const struct colonnade_motion *motion) {
-    const int64_t most = ((int64_t)1 << motion->world.vertex_bits) - 1;
+    const int64_t last = ((int64_t)1 << motion->world.vertex_bits) - 1;
     for (uint32_t i = 0; i < motion->objects; ++i) {
         struct colonnade_object object;
         read_object(motion, i, &object);
         for (int axis = 0; axis < 3; ++axis)
-            if (!colonnade_is_within(object.low[axis], 0, object.high[axis]) || object.high[axis] > most) return false;
+            if (!colonnade_is_within(object.low[axis], 0, object.high[axis]) || object.high[axis] > last) return false;
     }
     return true;
 }
 
-/* Whether clips, each with its root and its size in bytes before it, fill the rest of the file. */
-static bool are_clips(const struct colonnade_motion *motion, size_t words) {
-    size_t next = 0;
+/* Opens clips, each with its root and its size in bytes before it. They fill the rest of the file. */
+static enum colonnade_error open_clips(struct colonnade_motion *motion, const struct colonnade_design *design,
+                                       const uint8_t *at, size_t words) {
+    uint32_t records = 0;
     for (uint32_t i = 0; i < motion->clips; ++i) {
-        if (words - next < CLIP_WORDS) return false;
-        const uint32_t bytes = colonnade_word(motion->clip_words, next + 1);
-        next += CLIP_WORDS;
-        if (bytes % 4 != 0 || bytes / 4 > words - next) return false;
-        next += bytes / 4;
+        struct colonnade_mesh *mesh = &motion->meshes[i];
+        if (words < CLIP_WORDS) return COLONNADE_TRUNCATED;
+        const uint32_t bytes = colonnade_word(at, 1);
+        words -= CLIP_WORDS;
+        if (bytes % 4 != 0 || bytes / 4 > words) return COLONNADE_TRUNCATED;
+        const enum colonnade_error error = colonnade_mesh_open(mesh, design, at + 4 * CLIP_WORDS, bytes);
+        if (error != COLONNADE_OK) return error;
+        motion->roots[i][0] = colonnade_word(at, 0);
+        motion->vertices = most(motion->vertices, mesh->vertices);
+        motion->depth = most(motion->depth, mesh->depth);
+        motion->pose_words = most(motion->pose_words, colonnade_mesh_pose_words(mesh));
+        records += mesh->records;
+        words -= bytes / 4;
+        at += 4 * CLIP_WORDS + (size_t)bytes;
     }
-    return next == words;
+    motion->copy_bytes = (records * RECORD_BYTES + PAIR_BYTES - 1) / PAIR_BYTES * PAIR_BYTES;
+    return words == 0 ? COLONNADE_OK : COLONNADE_TRUNCATED;
 }
 
 enum colonnade_error colonnade_motion_open(struct colonnade_motion *motion, const struct colonnade_design *design,
@@ -86,8 +100,12 @@ enum colonnade_error colonnade_motion_open(struct colonnade_motion *motion, cons
     if (bytes % 4 != 0 || end > bytes / 4) return COLONNADE_TRUNCATED;
     found.object_words = at + 4 * FIXED_WORDS;
     found.key_words = at + 4 * keys;
-    found.clip_words = at + 4 * end;
-    if (!are_clips(&found, (size_t)(bytes / 4 - end))) return COLONNADE_TRUNCATED;
+    if (design->invalidate != 0) {
+        found.invalidate_address = (design->invalidate - COLONNADE_DEVICE_BASE) / 4;
+        found.count_address = (design->scene - COLONNADE_DEVICE_BASE) / 4;
+    }
+    const enum colonnade_error clips = open_clips(&found, design, at + 4 * end, (size_t)(bytes / 4 - end));
+    if (clips != COLONNADE_OK) return clips;
     const struct colonnade_keys all = keys_of(&found);
     if (!are_objects(&found) || !colonnade_are_keys(&all)) return COLONNADE_NOT_A_CLIP;
     if (!colonnade_are_frame_registers(design, found.instances_address, found.objects * found.instance_words) ||
@@ -96,15 +114,6 @@ enum colonnade_error colonnade_motion_open(struct colonnade_motion *motion, cons
         return COLONNADE_BAD_REGISTER;
     *motion = found;
     return COLONNADE_OK;
-}
-
-enum colonnade_error colonnade_motion_mesh(const struct colonnade_motion *motion, const struct colonnade_design *design,
-                                           uint32_t index, struct colonnade_mesh *mesh, uint32_t *root) {
-    const uint8_t *at = motion->clip_words;
-    for (; index > 0; --index) at += 4 * (size_t)CLIP_WORDS + colonnade_word(at, 1);
-    const enum colonnade_error error = colonnade_mesh_open(mesh, design, at + 4 * (size_t)CLIP_WORDS, colonnade_word(at, 1));
-    if (error == COLONNADE_OK) *root = colonnade_word(at, 0);
-    return error;
 }
 
 void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t time, struct colonnade_transform *transforms) {
@@ -190,6 +199,14 @@ static uint8_t *append(uint8_t *to, uint32_t address, uint32_t value, bool is_kn
     return to + 8;
 }
 
+static bool has_other_root(const struct colonnade_motion *motion, const struct colonnade_instance *instances,
+                           const struct colonnade_instance *before) {
+    const uint32_t root = colonnade_instance_root(&motion->world);
+    bool is_other = false;
+    for (uint32_t i = 0; i < motion->objects; ++i) is_other |= instances[i].words[root] != before[i].words[root];
+    return is_other;
+}
+
 uint32_t colonnade_motion_writes(const struct colonnade_motion *motion, const struct colonnade_instance *instances,
                                  const struct colonnade_instance *before, uint8_t *writes) {
     const bool is_known = before != NULL;
@@ -208,5 +225,9 @@ uint32_t colonnade_motion_writes(const struct colonnade_motion *motion, const st
     for (uint32_t word = 0; word < motion->offset_words; ++word)
         to = append(to, motion->offset_address + word, (uint32_t)(now.offset >> (32 * word)), is_known,
                     (uint32_t)(last.offset >> (32 * word)));
+    if (motion->records != 0 && (!is_known || has_other_root(motion, instances, before))) {
+        to = append(to, motion->invalidate_address, 1, false, 0);
+        to = append(to, motion->count_address, motion->records, false, 0);
+    }
     return (uint32_t)((to - writes) / 8);
 }

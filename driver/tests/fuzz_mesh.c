@@ -1,8 +1,9 @@
 /* Fuzzer of meshes that bend (tools/driver-fuzz): an input chooses the numbers of a clip file, each legal, from usual ones to
  * all of them extreme at once, and a tree over its leaves; in some files it then changes words or the length, and in some
  * trees records. File and records end where their memory ends. A legal file opens; a vertex is on the grid; a refit of the
- * tree succeeds, twice with the same records, and changes nothing behind them. */
-#include "colonnade_mesh.h"
+ * tree succeeds, twice with the same records, and changes nothing behind them. In a motion, a frame's copy of the mesh stays
+ * as it is while the next frame's bends. */
+#include "colonnade_motion.h"
 #include "fuzz.h"
 
 enum { MOST_WORDS = 8000, MOST_VERTICES = 24, MOST_NODES = 40, MOST_RECORDS = 1024, POSE_WORDS = 12 * 4 + 4 };
@@ -140,6 +141,58 @@ static void check_refit(const struct colonnade_mesh *mesh, const struct colonnad
     free(copy);
 }
 
+static uint32_t status;
+
+static uint32_t read_status(void *context, uint32_t address) {
+    (void)context;
+    (void)address;
+    return status;
+}
+
+/* The mesh as the only one of a scene, whose root may be a wrong one. */
+static void check_motion(const struct colonnade_mesh *mesh, bool is_legal) {
+    const struct colonnade_bus bus = {.read = read_status};
+    const struct colonnade device = {.bus = &bus};
+    const size_t bytes = 4 * (size_t)RECORD_WORDS * record_count;
+    const uint32_t from = take() < 16 ? take32() : take() < 16 ? below(record_count) : 0;
+    struct colonnade_motion motion = {
+        .world = {16, 5, 32}, .invalidate_address = 1, .objects = 1, .clips = 1, .duration = 100000, .meshes = {*mesh}};
+    struct colonnade_motion_memory memory = {malloc(2 * bytes), malloc(sizeof *memory.vertices * mesh->vertices),
+                                             malloc(sizeof *memory.path * mesh->depth),
+                                             malloc(4 * (size_t)colonnade_mesh_pose_words(mesh))};
+    uint32_t *before = malloc(2 * bytes);
+    CHECK(memory.scene != NULL && memory.vertices != NULL && memory.path != NULL && memory.pose != NULL && before != NULL);
+    motion.roots[0][0] = from;
+    memcpy(memory.scene, records, bytes);
+    enum colonnade_error error = colonnade_motion_copy(&motion, &memory, (uint32_t)bytes);
+    CHECK(error == COLONNADE_OK || !is_legal || from != 0);
+    CHECK(error != COLONNADE_OK || (motion.records == 2 * record_count && motion.roots[0][1] == record_count));
+    const uint32_t word = colonnade_instance_root(&motion.world);
+    uint32_t seen = 0;
+    for (int call = 0; call < 4 && error == COLONNADE_OK; ++call) {
+        struct colonnade_instance now = {.words[0] = 0}, last = now;
+        now.words[word] = 0;
+        last.words[word] = seen;
+        status = take() % 4;
+        memcpy(before, memory.scene, 2 * bytes);
+        error = colonnade_motion_bend(&motion, &device, &memory, take32(), call == 0 ? NULL : &last, &now);
+        CHECK((error == COLONNADE_BUSY) == (status == 3));
+        const size_t kept = call == 0 ? 1 : seen != 0; /* the copy that the last frame reads */
+        const size_t first = kept * RECORD_WORDS * record_count;
+        CHECK(memcmp(memory.scene + first, before + first, bytes) == 0);
+        if (error == COLONNADE_BUSY) error = COLONNADE_OK;
+        else if (error == COLONNADE_OK) {
+            CHECK(call == 0 || now.words[word] != seen);
+            seen = now.words[word];
+        } else CHECK(error == COLONNADE_OUTSIDE || !is_legal);
+    }
+    free(before);
+    free(memory.pose);
+    free(memory.path);
+    free(memory.vertices);
+    free(memory.scene);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static const uint32_t shares[] = {0, 2, 16, 256};
     open_input(data, size);
@@ -176,6 +229,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         free(vertices);
         free(pose);
     }
+    if (opened == COLONNADE_OK && mesh.records == record_count && mesh.leaf_records == step && root == 0)
+        check_motion(&mesh, !is_damaged);
     free(exact);
     return 0;
 }

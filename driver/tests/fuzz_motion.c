@@ -134,11 +134,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         has_frame = error == COLONNADE_OK;
         free(writes);
     }
-    for (uint32_t i = 0; opened == COLONNADE_OK && i < motion.clips; ++i) {
-        struct colonnade_mesh mesh;
-        uint32_t root;
-        (void)colonnade_motion_mesh(&motion, &design, i, &mesh, &root);
-    }
     free(exact);
     return 0;
 }

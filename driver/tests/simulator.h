@@ -44,7 +44,7 @@ static void bus_wait(void *context) {
     waited += cycles;
 }
 
-static void *read_file(const char *name, size_t *bytes) {
+static inline void *read_file(const char *name, size_t *bytes) {
     FILE *file = fopen(name, "rb");
     if (file == NULL || fseek(file, 0, SEEK_END) != 0) fail(name);
     *bytes = (size_t)ftell(file);

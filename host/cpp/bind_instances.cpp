@@ -87,10 +87,7 @@ public:
     auto meshes() const {
         std::vector<std::tuple<std::uint32_t, std::uint32_t>> result;
         for (std::uint32_t i = 0; i < motion_.clips; ++i) {
-            colonnade_mesh mesh;
-            std::uint32_t root;
-            check(colonnade_motion_mesh(&motion_, &design_, i, &mesh, &root));
-            result.emplace_back(root, mesh.duration);
+            result.emplace_back(motion_.roots[i][0], motion_.meshes[i].duration);
         }
         return result;
     }

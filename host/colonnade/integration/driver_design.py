@@ -27,7 +27,7 @@ class DriverDesign:
     Attributes:
         format_words: The format hash, 8 words.
         numbers: Those of ``struct colonnade_design`` by name. `scene_page` and `invalidate` are 0 if no scene lies in
-            DRAM, and so are those of rays in a design of frames.
+            DRAM, and so are those of rays in a design of frames, but for `scene` with a scene in DRAM.
         maps: Words of a record and number of records of each memory of a room's maps, in the order of their load
             targets, which begin at 1.
         errors: Names of the device's error bits, by their number.
@@ -67,6 +67,7 @@ class DriverDesign:
             if manifest.registers["dram.page"].words != 1:
                 raise ValueError("dram.page has more than one word")
             numbers |= {"scene_page": place("dram.page"), "invalidate": place("control.invalidate")}
+            numbers["scene"] = place(_OF_RAYS["scene"])
         if "rays.tail" in manifest.registers:
             numbers |= {name: place(register) for name, register in _OF_RAYS.items()}
         return cls(tuple(manifest.format_words), numbers, _maps(manifest), errors, counters)

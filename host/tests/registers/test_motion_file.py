@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from animated_documents import arm
 from instance_worlds import FRAME, instance
 
 from colonnade import _core
@@ -14,8 +15,11 @@ from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.clips.keys import Keys
+from colonnade.mesh.load import load_mesh
 from colonnade.registers.motion_file import Motion
+from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.header import ObjectFrame
+from colonnade.scene_image.packer import pack
 
 #: Words before the objects; of an object; words of a key of two objects.
 FIXED, OBJECT, KEY = 25, 11, 25
@@ -119,15 +123,48 @@ def test_numbers_that_no_motion_has_are_refused(word: int, value: int, error: st
         target(changed(motion().file(manifest), word, value), manifest)
 
 
-def test_clips_fill_the_rest_of_the_file(manifest: Manifest) -> None:
-    file = motion(((7, bytes(8)),)).file(manifest)
-    first = len(file) // 4 - 4
-    read = target(file, manifest)
-    with pytest.raises(ValueError, match="notAClip"):
-        read.meshes()
-    for value in (0, 4, 9, 12, 0xFFFFFFFC):
+@pytest.fixture(scope="module")
+def bending(manifest: Manifest, tmp_path_factory: pytest.TempPathFactory) -> Bending:
+    file = arm().write(tmp_path_factory.mktemp("clips") / "arm.gltf")
+    moves = pack(load_mesh(file, animation="bend"), manifest).moves
+    assert isinstance(moves, Bending)
+    return moves
+
+
+def test_clips_fill_the_rest_of_the_file(manifest: Manifest, bending: Bending) -> None:
+    clip = bending.file
+    assert target(motion(((7, clip), (9, clip))).file(manifest), manifest).meshes() == [
+        (7, bending.duration),
+        (9, bending.duration),
+    ]
+    file = motion(((7, clip),)).file(manifest)
+    size = len(file) // 4 - len(clip) // 4 - 1
+    for value in (0, 4, 9, len(clip) - 4, len(clip) + 4, 0xFFFFFFFC):
         with pytest.raises(ValueError, match="truncated"):
-            target(changed(file, first + 1, value), manifest)
+            target(changed(file, size, value), manifest)
+
+
+@pytest.mark.parametrize(
+    ("word", "value", "error"),
+    [
+        (0, 0, "notAClip"),
+        (2, 2, "notAClip"),
+        (3, 4, "truncated"),
+        (4, 1, "otherFormat"),
+        (17, 1, "notAClip"),  # records
+        (18, 258, "notAClip"),  # nodes on a path
+        (19, 0, "notAClip"),  # vertices
+        (20, 1, "truncated"),  # leaves
+        (25, 1, "notAClip"),  # duration
+    ],
+)
+def test_clips_that_no_mesh_has_are_refused(
+    word: int, value: int, error: str, manifest: Manifest, bending: Bending
+) -> None:
+    file = motion(((7, bending.file),)).file(manifest)
+    first = len(file) // 4 - len(bending.file) // 4
+    with pytest.raises(ValueError, match=error):
+        target(changed(file, first + word, value), manifest)
 
 
 def test_objects_that_leave_the_world_are_refused_when_they_do(manifest: Manifest) -> None:
