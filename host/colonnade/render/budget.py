@@ -21,7 +21,7 @@ CLOCK = 200e6
 _NODE = 4
 #: Cycles of a column for a lookup of the environment, with the ray that it gathers and its light, and at least those of
 #: its path over the contexts.
-_LOOKUP, _PATH = 10, 400
+_LOOKUP, _PATH = 4, 400
 #: Cycles of a march, and of each of its steps; the steps of a march from a mirror.
 _MARCH, _STEP, _STEPS = 212, 10, 18
 
