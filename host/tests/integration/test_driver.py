@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import shutil
 import subprocess
-from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
-from c_programs import DRIVER, DRIVER_FOLDER, RISCV, WARNINGS, compile_c, compile_test, driver_objects, scratch
+from c_programs import DRIVER, DRIVER_FOLDER, RISCV, WARNINGS, compile_c, compile_test, driver_objects
 from colonnade_lab.evaluation.demonstration.walk import walk_scene, write_walk
 from colonnade_lab.evaluation.studies.generated_rooms import generated_room
 from colonnade_lab.evaluation.studies.synthetic_attic import write_room
+from driver_runs import CACHE, PAGE, UNWRITTEN, run_driver, run_silently
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from colonnade.common.framebuffer import Frame
 from colonnade.common.framebuffer_formats import PIXEL_BYTES, framebuffer_bytes, photo_lines
@@ -25,9 +23,7 @@ from colonnade.common.image_io import resized_photo
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
-from colonnade.device.packed_objects import MovingInstances
 from colonnade.device.scene import DeviceScene
-from colonnade.device.shell_build import build_shell_simulator
 from colonnade.environment.sequence import load_sequence
 from colonnade.integration.design_header import design_header
 from colonnade.integration.register_table import register_table
@@ -36,23 +32,14 @@ from colonnade.maps.live import LiveEncoder, LiveFrame
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.frame_file import frame_file
-from colonnade.registers.instances import instance_registers
 from colonnade.registers.target_view import TargetView
-from colonnade.registers.view_words import camera_values, position_values
 from colonnade.render.sequence_frames import sequence_scenes
 from colonnade.scene.parser import load_scene
-from colonnade.scene.view import place
 from colonnade.scene_image.device_image import device_image, load_cycles, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.packer import pack
 
 WIDTH, HEIGHT = 28, 21
-PAGE, MEMORY = 4096, 1 << 22
-UNWRITTEN = 0xA5
-CACHE = {
-    **{"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2, "sharedMisses": 8},
-    **{"busBytes": 32, "parity": True},
-}
 
 
 @pytest.fixture(scope="module")
@@ -65,12 +52,6 @@ def stub() -> Path:
     return compile_test("stub", "shell")
 
 
-def run_silently(*command: str | Path) -> None:
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-#: Every error has its name, and no access is made that the shell refuses.
 TESTS = (
     "probe",
     "images",
@@ -142,49 +123,6 @@ def test_the_linux_example_compiles(tmp_path: Path, design: GeneratedDesign) -> 
         assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
 
 
-@functools.cache
-def compiled_driver(program: str, header: str) -> Path:
-    """A program of the tests, or the viewer of the examples, with the driver, for the design of a header."""
-    folder = scratch()
-    (folder / "colonnade_design.h").write_text(header)
-    tests, examples = DRIVER_FOLDER / "tests", DRIVER_FOLDER / "examples"
-    if program == "viewer":
-        sources = [
-            examples / "viewer.c",
-            examples / "target.c",
-            examples / "target_files.c",
-            tests / "target_simulated.c",
-        ]
-        return compile_c([*sources, *driver_objects()], folder / "driver", f"-I{examples}", "-lm")
-    return compile_c([tests / f"{program}.c", *driver_objects()], folder / "driver")
-
-
-def run_driver(
-    folder: Path, design: GeneratedDesign, files: Mapping[str, bytes], *arguments: str, program: str = "simulated"
-) -> tuple[NDArray[np.uint8], list[list[str]]]:
-    """Run the driver with files against the Verilated shell: the memory at the end, and the lines that it prints."""
-    for name, content in files.items():
-        (folder / name).write_bytes(content)
-    driver = compiled_driver(program, design_header(register_table(design), design.manifest))
-    options = {"bus": 16, "memory": MEMORY, "latency": 20, "stall": 10, "seed": 4, "shared": "ram"}
-    (folder / "ram").write_bytes(bytes([UNWRITTEN]) * MEMORY)
-    command = [
-        build_shell_simulator(design),
-        *(text for key, value in options.items() for text in (f"--{key}", str(value))),
-    ]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "cwd": folder}
-    with subprocess.Popen([*command, "-"], stderr=subprocess.PIPE, **pipes) as device:
-        done = subprocess.run(
-            [driver, *arguments], stdin=device.stdout, stdout=device.stdin, stderr=subprocess.PIPE, cwd=folder
-        )
-        assert device.stdin is not None and device.stderr is not None
-        device.stdin.close()
-        problems = device.stderr.read()
-        assert (device.wait(), done.returncode, problems) == (0, 0, b""), done.stderr.decode()
-    memory = np.frombuffer((folder / "memory").read_bytes(), dtype=np.uint8).copy()
-    return memory, [line.split() for line in done.stderr.decode().splitlines()]
-
-
 def take_file(memory: NDArray[np.uint8], place: int, content: bytes) -> None:
     """Check that a file is in the memory, and erase it."""
     assert memory[place : place + len(content)].tobytes() == content
@@ -233,145 +171,6 @@ def test_frames_by_the_driver_are_those_of_the_model(tmp_path: Path, case: str) 
     for code, line in zip((0, 1, 2, 0), lines, strict=True):
         take_frame(memory, line, expected, code)
     assert (memory == UNWRITTEN).all()
-
-
-def test_the_viewer_renders_the_orbit_of_its_keys(tmp_path: Path, design: GeneratedDesign) -> None:
-    """Its last frame is the model's, for the camera of the keys."""
-    size, manifest = (24, 16), design.manifest
-    scene = DeviceScene.of(
-        load_scene(toolchain.project_root() / "scenes" / "object.toml"), manifest, load_mesh("torus")
-    )
-    file = scene.view_file(size)
-    files = {"image": scene.device_image(), "view": file}
-    memory, (line,) = run_driver(
-        tmp_path, design, files, "interrupt", "image", "view", "--keys", "xds-q+", program="viewer"
-    )
-    assert line[:4] == ["4", "frames", "of", "24x16,"] and float(line[4]) > 0
-    placed = place(scene.scene, scene.image.header.extent, *size, None)
-    camera, (right, _, back) = placed.camera, placed.camera.axes
-    depth = float((camera.position - placed.pose.translate) @ back)
-    moved = Rotation.from_rotvec([0, 5, 0], degrees=True) * Rotation.from_rotvec(5 * right, degrees=True)
-    middle = camera.position - depth * back
-    axes = moved.apply(camera.axes)
-    target = TargetView(file, manifest)
-    rotation, lens = camera_values(camera)
-    turned = np.round(moved.as_matrix() @ rotation * 2.0**30).astype(int).ravel().tolist()
-    target.set_camera(position_values(middle + 1.1 * depth * axes[2], "camera"), turned, lens, size)
-    expected = framebuffer_bytes(render_model(manifest, scene.image, target.registers()), 0)
-    tile = int(manifest.config["frame"]["tileSize"])
-    stride = -(-size[0] // tile) * tile * 4
-    lines = memory[PAGE : PAGE + stride * size[1]].reshape(size[1], stride)[:, : expected.shape[1]]
-    np.testing.assert_array_equal(lines, expected)
-    assert len(np.unique(lines)) > 20
-
-
-MOVING_SCENE = """
-camera.position = [1.5, 2.0, 5.0]
-
-[[object]]
-mesh.name = "torus"
-motion = {turn = 90.0, translate = [0.3, 0.2, 0.0]}
-
-[[object]]
-mesh.name = "cube"
-transform = {scale = 0.4, translate = [0.9, 0.5, 0.6]}
-motion = {rotate = [50.0, 0.0, 20.0], translate = [-0.5, 0.4, 0.0]}
-"""
-
-
-#: As scenes/live.toml: three objects that move, and a figure that bends as it walks.
-BENDING_SCENE = """
-camera = {position = [0.5, 0.8, 1.9], target = [0.12, 0.5, 0.0], fov = 36.0}
-light.position = [0.9, 2.2, 1.6]
-paths.bounces = 2
-
-[[object]]
-mesh = {name = "teapot:4"}
-material = {kind = "mirror", albedo = [0.95, 0.94, 0.92]}
-transform = {scale = 0.1, translate = [-0.35, 0.3, -0.2]}
-motion = {turn = 360.0}
-
-[[object]]
-mesh = {name = "sphere:320"}
-material = {kind = "glass", albedo = [0.93, 0.98, 0.96], ior = 1.5}
-transform = {scale = 0.2, translate = [0.7, 0.2, 0.2]}
-motion = {translate = [-0.6, 0.3, 0.0]}
-
-[[object]]
-mesh = {name = "cube"}
-material = {albedo = [0.15, 0.5, 0.3]}
-transform = {scale = 0.12, translate = [-0.5, 0.2, 0.6]}
-motion = {rotate = [180.0, 90.0, 0.0], translate = [0.4, 0.3, 0.0]}
-
-[[object]]
-mesh = {path = "CHARACTER", animation = "walk"}
-transform = {scale = 0.6, translate = [0.2, 0.0, 0.2]}
-motion = {turn = 60.0, translate = [0.1, 0.0, -0.2]}
-"""
-
-BENDS = "in DRAM, with a mesh that bends"
-#: A scene, its design, and the number of frames.
-PLAYS = {
-    "on chip": (MOVING_SCENE, ("frame.instances=2",), 4),
-    BENDS: (
-        BENDING_SCENE.replace("CHARACTER", str(toolchain.project_root() / "scenes" / "character.gltf")),
-        (
-            "frame.instances=4",
-            "frame.maxBounces=2",
-            f"columnBvhMemory.cache={json.dumps(CACHE | {'lines': 64, 'sharedLines': 256})}",
-        ),
-        13,  # the steps of the figure are twelfths of the motion
-    ),
-}
-
-
-@pytest.mark.parametrize("case", PLAYS)
-def test_frames_that_the_viewer_plays_are_those_of_the_model(tmp_path: Path, case: str) -> None:
-    """Each: registers are written, and meshes bent, while the frame before runs."""
-    described, overrides, count = PLAYS[case]
-    size, design = (24, 16), shell_design_for("tiny", ("array.columns=2", *overrides), bus_bytes=16)
-    manifest = design.manifest
-    in_dram = "line" in manifest.memories["columnBvh"]
-    (tmp_path / "scene.toml").write_text(described)
-    scene = DeviceScene.of(load_scene(tmp_path / "scene.toml"), manifest)
-    moves = scene.image.moves
-    assert isinstance(moves, MovingInstances)
-    files = {"image": scene.device_image(), "view": scene.view_file(size), "clip": scene.clip_file()}
-    files |= {"scene": scene.dram_image()} if in_dram else {}
-    arguments = ("image", "view", "--play", str(count), "clip", *(["scene"] if in_dram else []))
-    memory, (line,) = run_driver(tmp_path, design, files, "interrupt", *arguments, program="viewer")
-    assert line[:4] == [str(count), "frames", "of", "24x16,"]
-    names = [f"frame.{number}" for number in range(count - 1)]
-    frames = [*(np.fromfile(tmp_path / name, np.uint8) for name in names), memory[PAGE:]]
-    stride = -(-size[0] // (tile := int(manifest.config["frame"]["tileSize"]))) * tile * 4
-    target, duration = TargetView(files["view"], manifest), round(moves.seconds * 65536)
-    different = set[bytes]()
-    for number, frame in enumerate(frames):
-        posed = scene.image.posed(duration * number // count / duration)
-        header = posed.header
-        target.set_bounds(header.bounds_low, header.bounds_high)
-        registers = target.registers() | instance_registers(header.instances, header.frame, manifest)
-        expected = framebuffer_bytes(render_model(manifest, posed, registers), 0)
-        lines = frame[: stride * size[1]].reshape(size[1], stride)[:, : expected.shape[1]]
-        np.testing.assert_array_equal(lines, expected, err_msg=f"frame {number}")
-        different.add(expected.tobytes())
-        at_rest = framebuffer_bytes(render_model(manifest, scene.image, registers), 0)
-        assert (at_rest != expected).any() == (in_dram and number > 0)
-    assert len(different) == count
-
-
-def test_no_frame_reads_a_copy_that_is_written_or_a_stale_record(tmp_path: Path) -> None:
-    """Of a mesh that bends, through a cache that keeps all records until it is invalidated."""
-    described, overrides, _ = PLAYS[BENDS]
-    manifest = shell_design_for("tiny", ("array.columns=2", *overrides), bus_bytes=16).manifest
-    (tmp_path / "scene.toml").write_text(described)
-    scene = DeviceScene.of(load_scene(tmp_path / "scene.toml"), manifest)
-    files = {"clip": scene.clip_file(), "scene": scene.dram_image()}
-    for name, content in files.items():
-        (tmp_path / name).write_bytes(content)
-    names = ("instances[0].matrix[0].x", "control.invalidate", "scene.recordCount")
-    registers = (str(manifest.registers[name].address) for name in names)
-    run_silently(compile_test("bend"), *(tmp_path / name for name in files), *registers)
 
 
 ROOM_SCENE = """
