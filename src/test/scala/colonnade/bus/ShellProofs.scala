@@ -2,7 +2,7 @@ package colonnade.bus
 
 import chisel3._
 import chisel3.util.{log2Ceil, Decoupled}
-import colonnade.axi.{AxiReadPort, AxiWritePort}
+import colonnade.axi.{AxiAddress, AxiReadPort, AxiWritePort}
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 /** A guard with a master that does anything, also when it is reset, and a memory that answers at any time. */
@@ -65,6 +65,64 @@ class AxiReadGuardProof(busBytes: Int) extends Module {
   assert(!abandon || guard.io.axi.r.ready, "data are taken")
   private val hadBurst = RegNext(beats =/= 0.U, false.B)
   cover(guard.io.isIdle && hadBurst && abandon)
+}
+
+/** Bursts of any master to any addresses: those that leave the window do not reach the bus, all are answered. */
+class AxiWindowProof(busBytes: Int) extends Module {
+  private val guarded = Module(new AxiWindow(1, busBytes))
+
+  val window = IO(Input(new AddressWindow))
+  val read   = IO(Flipped(new AxiReadPort(1, busBytes)))
+  val write  = IO(Flipped(new AxiWritePort(1, busBytes)))
+  val ar     = IO(Input(Bool()))
+  val aw     = IO(Input(Bool()))
+  val w      = IO(Input(Bool()))
+  guarded.io.innerRead :<>= read
+  guarded.io.innerWrite :<>= write
+
+  // The window holds still, in whole beats
+  private val held = RegNext(window)
+  assume(!RegNext(true.B, false.B) || (window.base === held.base && window.end === held.end))
+  guarded.io.window := window
+  assume(window.base(log2Ceil(busBytes) - 1, 0) === 0.U && window.end(log2Ceil(busBytes) - 1, 0) === 0.U)
+
+  private def isInside(burst: AxiAddress): Bool =
+    window.contains(burst.addr, (burst.len +& 1.U) << log2Ceil(busBytes))
+
+  // Reads: beyond the module nothing is answered, so all beats are those of refused bursts
+  assume(read.ar.bits.len < 3.U && read.ar.bits.addr(log2Ceil(busBytes) - 1, 0) === 0.U)
+  guarded.io.read.ar.ready := ar
+  guarded.io.read.r.valid  := false.B
+  guarded.io.read.r.bits   := DontCare
+  guarded.io.readIsIdle    := true.B
+  assert(!guarded.io.read.ar.valid || isInside(guarded.io.read.ar.bits), "a read stays in the window")
+  private val beats = RegInit(0.U(4.W))
+  beats := beats + Mux(read.ar.fire && !guarded.io.read.ar.fire, read.ar.bits.len +& 1.U, 0.U) - read.r.fire
+  assert(read.r.valid === (beats =/= 0.U), "a refused read is answered")
+  assert(!read.r.valid || read.r.bits.last === (beats === 1.U), "by as many beats as it asks for")
+
+  // Writes: the same
+  assume(write.aw.bits.len < 3.U && write.aw.bits.addr(log2Ceil(busBytes) - 1, 0) === 0.U)
+  guarded.io.write.aw.ready := aw
+  guarded.io.write.w.ready  := w
+  guarded.io.write.b.valid  := false.B
+  guarded.io.write.b.bits   := DontCare
+  guarded.io.writeIsIdle    := true.B
+  assert(!guarded.io.write.aw.valid || isInside(guarded.io.write.aw.bits), "a write stays in the window")
+  // The master sends the address before the beats, and no other one before the last of them
+  private val discards = RegInit(false.B)
+  private val writes   = RegInit(false.B)
+  private val answers  = RegInit(0.U(2.W))
+  private val refused  = write.aw.fire && !guarded.io.write.aw.fire
+  private val isLast   = write.w.fire && write.w.bits.last
+  assume(!write.w.valid || writes)
+  assume(!write.aw.valid || !writes)
+  writes   := Mux(writes, !isLast, write.aw.fire)
+  discards := Mux(discards, !isLast, refused)
+  answers  := answers + (discards && isLast) - write.b.fire
+  assert(!guarded.io.write.w.valid || (writes && !discards), "no beat of a refused write passes")
+  assert(write.b.valid === (answers =/= 0.U), "a refused write is answered once")
+  cover(read.r.fire && read.r.bits.last && write.b.fire)
 }
 
 /** Any rows at any place, in a window that holds still: no byte outside is written. */

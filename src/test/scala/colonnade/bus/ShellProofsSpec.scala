@@ -19,6 +19,10 @@ class ShellProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs
 
   it should "take all data, whenever the master is reset" in prove(cycles = 9)(new AxiReadGuardProof(4))
 
+  behavior of "AxiWindow"
+
+  it should "keep bursts in the window, and answer those that leave it" in prove(cycles = 7)(new AxiWindowProof(4))
+
   behavior of "BurstWriter"
 
   it should "write nothing outside the window, rows of less, as much and more than a beat" in
