@@ -2,7 +2,7 @@ package colonnade
 
 import chisel3._
 import colonnade.Scratch.names
-import colonnade.config.{ColonnadeConfig, ConfigIO, PrecisionConfig}
+import colonnade.config.{ColonnadeConfig, ConfigIO, MapEncoding, PrecisionConfig}
 import colonnade.numbers.Divider
 import org.scalacheck.Prop.propBoolean
 import org.scalacheck.{Gen, Prop}
@@ -35,8 +35,11 @@ class EmitSpec extends AnyFlatSpec with Matchers with Properties {
 
   private val small    = ConfigIO.load("small")
   private val treeless = small.copy(geometry = small.geometry.copy(bvh = false))
+  private val slic     = small.copy(
+    physicalAttributeMemory = small.physicalAttributeMemory.map(_.copy(encoding = MapEncoding.Slic))
+  )
 
-  for ((rows, columns, config) <- Seq((3, 5, small), (7, 1, TestConfigs.withPipelines(treeless))))
+  for ((rows, columns, config) <- Seq((3, 5, small), (7, 1, TestConfigs.withPipelines(treeless)), (1, 9, slic)))
     it should s"pass Verilator's linter: $rows×$columns, at any precision" in
       passes(rows, columns, config, ArbitraryConfig.precision)
 
