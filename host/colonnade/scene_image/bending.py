@@ -63,9 +63,8 @@ class Bending:
         """The image with the records of a part of the clip, 0.0 to 1.0; a line tells of lost normals."""
         records, flat = self.records(image.records, progress)
         if flat:
-            notes.tell(
-                f"mesh {image.header.mesh}: {flat:,} pairs of triangles are stretched so far that they are shaded flat"
-            )
+            # Without their number, which changes from frame to frame: told once
+            notes.tell(f"mesh {image.header.mesh}: the clip stretches triangles so far that they are shaded flat")
         return replace(image, records=records)
 
     def vertices(self, pose: npt.NDArray[np.int32]) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int16]]:
