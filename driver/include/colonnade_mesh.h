@@ -12,7 +12,6 @@ extern "C" {
 #endif
 
 enum {
-    COLONNADE_MESH_FIELDS = 85, /* of node and leaf records, whose places a clip file has */
     COLONNADE_MESH_CHILDREN = 4,
     COLONNADE_MESH_NO_VERTEX = 0xFFFF /* upper half of a leaf's fourth vertex, if it is a triangle */
 };
@@ -28,7 +27,6 @@ struct colonnade_mesh {
     uint32_t duration;    /* 2^-16 s */
     int32_t linear_shift; /* fraction bits of matrices beyond those of translations */
     int32_t shift;        /* fraction bits of translations */
-    uint8_t fields[COLONNADE_MESH_FIELDS];
     const uint8_t *vertex_words, *leaf_words, *change_words, *key_words;
 };
 

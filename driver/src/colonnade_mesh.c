@@ -7,113 +7,135 @@
 
 enum format { NEAR_PAIR, TRIANGLE, FLAT_PAIR, FAR_PAIR };
 
-/* The format of a pair: near or far, by its largest delta, else flat. */
-static enum format format_of(const struct colonnade_mesh *mesh, const struct colonnade_vertex *const corners[4]) {
-    uint32_t reach = 0;
-    for (int i = 1; i < 4; ++i)
-        for (int axis = 0; axis < 3; ++axis) {
-            const int32_t delta = corners[i]->position[axis] - corners[0]->position[axis];
-            reach |= (uint32_t)(delta < 0 ? ~delta : delta);
-        }
-    if (reach >> (mesh->delta_bits - 1) == 0) return NEAR_PAIR;
-    return reach >> mesh->delta_bits == 0 ? FAR_PAIR : FLAT_PAIR;
+static void put_position(struct colonnade_writer *writer, const int32_t position[3], uint32_t bits) {
+    for (int axis = 3; axis-- > 0;) colonnade_put(writer, colonnade_low_bits((uint32_t)position[axis], bits), bits);
 }
 
-static void put_normal(const struct colonnade_mesh *mesh, struct colonnade_record *record, enum format format, int corner,
-                       const int16_t code[2]) {
-    for (int i = 0; i < 2; ++i) {
-        const int place = 2 * corner + i;
-        const uint32_t bits = (uint32_t)(int32_t)code[i];
-        if (format == TRIANGLE) colonnade_put(record, mesh->fields[FIELD_NORMALS + place], OCTAHEDRAL_BITS, bits);
-        else colonnade_put(record, mesh->fields[FIELD_HIGH_NORMALS + place], OCTAHEDRAL_BITS - 1, bits >> 1);
-        if (format == NEAR_PAIR) colonnade_put(record, mesh->fields[FIELD_LOW_NORMALS + place], 1, bits);
-    }
-}
-
-static void widen(int32_t low[3], int32_t high[3], const int32_t other_low[3], const int32_t other_high[3]) {
-    for (int axis = 0; axis < 3; ++axis) {
-        if (other_low[axis] < low[axis]) low[axis] = other_low[axis];
-        if (other_high[axis] > high[axis]) high[axis] = other_high[axis];
-    }
+/* The bits of a code from one on, v below u. */
+static uint32_t code_bits(const int16_t code[2], int low, uint32_t count) {
+    const uint32_t u = (uint32_t)(code[0] >> low), v = (uint32_t)(code[1] >> low);
+    return colonnade_low_bits(v, count) | colonnade_low_bits(u, count) << count;
 }
 
 /* Writes a leaf; its material and whether it is clear stay. Answers whether it has become a flat pair. */
 static bool write_leaf(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices, const uint8_t *words,
                        uint32_t *to, int32_t low[3], int32_t high[3]) {
-    const struct colonnade_vertex *corners[4];
+    const uint32_t vertex_bits = (uint32_t)mesh->vertex_bits, delta_bits = (uint32_t)mesh->delta_bits;
+    uint32_t space[LEAF_WORDS];
+    words = colonnade_aligned(words, LEAF_WORDS, space);
     const bool is_pair = colonnade_word(words, 3) >> 16 != COLONNADE_MESH_NO_VERTEX;
     const int count = is_pair ? 4 : 3;
-    struct colonnade_record record = {{0}};
-    const uint8_t *fields = mesh->fields;
+    const struct colonnade_vertex *corners[4];
+    int32_t deltas[3][3];
+    uint32_t reach = 0;
     for (int i = 0; i < count; ++i) corners[i] = &vertices[colonnade_word(words, (size_t)i)];
-    const enum format format = is_pair ? format_of(mesh, corners) : TRIANGLE;
-    colonnade_put(&record, fields[FIELD_FORMAT], 2, format);
-    colonnade_put(&record, fields[FIELD_MATERIAL], 8, colonnade_field(to, fields[FIELD_MATERIAL], 8));
-    colonnade_put(&record, fields[FIELD_IS_CLEAR], 1, colonnade_field(to, fields[FIELD_IS_CLEAR], 1));
-    for (int axis = 0; axis < 3; ++axis) low[axis] = high[axis] = corners[0]->position[axis];
-    for (int i = 0; i < count; ++i) {
-        const int32_t *at = corners[i]->position, *from = corners[0]->position;
-        const bool is_relative = i > 0 && (format == NEAR_PAIR || format == FAR_PAIR);
-        for (int axis = 0; axis < 3; ++axis) {
-            const int place = 3 * i + axis;
-            const uint32_t delta = (uint32_t)(at[axis] - from[axis]);
-            if (!is_relative) colonnade_put(&record, fields[FIELD_VERTICES + place], mesh->vertex_bits, (uint32_t)at[axis]);
-            else colonnade_put(&record, fields[FIELD_DELTAS + place - 3], mesh->delta_bits, delta);
-            if (is_relative && format == FAR_PAIR) colonnade_put(&record, fields[FIELD_SIGNS + place - 3], 1, delta >> 31);
+    for (int axis = 0; axis < 3; ++axis) {
+        const int32_t from = corners[0]->position[axis];
+        int32_t least = 0, most = 0;
+        for (int i = 1; i < count; ++i) {
+            const int32_t delta = deltas[i - 1][axis] = corners[i]->position[axis] - from;
+            if (delta < least) least = delta;
+            if (delta > most) most = delta;
         }
-        widen(low, high, at, at);
-        if (format != FLAT_PAIR) put_normal(mesh, &record, format, i, corners[i]->normal);
+        low[axis] = from + least;
+        high[axis] = from + most;
+        reach |= (uint32_t)(most | (least < 0 ? ~least : 0));
     }
-    colonnade_store(to, &record);
+    enum format format = TRIANGLE;
+    if (is_pair) format = reach >> (delta_bits - 1) == 0 ? NEAR_PAIR : reach >> delta_bits == 0 ? FAR_PAIR : FLAT_PAIR;
+    const uint32_t kept = colonnade_leaf_head(to);
+    struct colonnade_writer writer = {to, 0, 0};
+    put_position(&writer, corners[0]->position, vertex_bits);
+    if (format == NEAR_PAIR || format == FAR_PAIR) {
+        uint32_t lowest = 0, signs = 0;
+        for (int i = 0; i < 3; ++i)
+            for (int axis = 3; axis-- > 0;)
+                colonnade_put(&writer, colonnade_low_bits((uint32_t)deltas[i][axis], delta_bits), delta_bits);
+        for (int i = 0; i < 4; ++i) {
+            colonnade_put(&writer, code_bits(corners[i]->normal, 1, OCTAHEDRAL_BITS - 1), 2 * (OCTAHEDRAL_BITS - 1));
+            lowest |= code_bits(corners[i]->normal, 0, 1) << (2 * i);
+        }
+        if (format == FAR_PAIR)
+            for (int i = 0; i < 9; ++i) signs |= (uint32_t)deltas[i / 3][2 - i % 3] >> 31 << i;
+        colonnade_put(&writer, format == NEAR_PAIR ? lowest : signs, 9);
+    } else {
+        for (int i = 1; i < count; ++i) put_position(&writer, corners[i]->position, vertex_bits);
+        for (int i = 0; format == TRIANGLE && i < 3; ++i)
+            colonnade_put(&writer, code_bits(corners[i]->normal, 0, OCTAHEDRAL_BITS), 2 * OCTAHEDRAL_BITS);
+    }
+    colonnade_put_leaf_head(&writer, to, kept, format);
     return format == FLAT_PAIR;
+}
+
+/* A box's planes, less `below` before they are rounded down to the grid of a node, side by side. */
+static uint32_t planes(const int32_t box[3], int32_t below, const int exponent[3], int bits) {
+    uint32_t found = 0;
+    for (int axis = 0; axis < 3; ++axis) found = (found << bits) + (uint32_t)((box[axis] - below) >> exponent[axis]);
+    return found;
 }
 
 /* Writes a node from its children's boxes; where they lie stays. Answers its own box. */
 static void write_node(const struct colonnade_mesh *mesh, const struct colonnade_mesh_node *node, uint32_t *to, int32_t low[3],
                        int32_t high[3]) {
-    struct colonnade_record record = {{0}};
-    const uint8_t *fields = mesh->fields;
-    const int32_t most = ((int32_t)1 << mesh->box_bits) - 1;
-    for (int axis = 0; axis < 3; ++axis) low[axis] = node->low[0][axis], high[axis] = node->high[0][axis];
-    for (uint32_t child = 1; child < node->children; ++child) widen(low, high, node->low[child], node->high[child]);
+    const int box_bits = mesh->box_bits;
+    const int32_t most = ((int32_t)1 << box_bits) - 1;
+    const uint32_t children = node->children;
+    struct colonnade_writer writer = {to, 0, 0};
+    int exponent[3];
     for (int axis = 0; axis < 3; ++axis) {
-        int32_t exponent = colonnade_bit_length((uint32_t)(high[axis] - low[axis])) - mesh->box_bits;
-        if (exponent < 0) exponent = 0;
-        while (((high[axis] - 1) >> exponent) + 1 - (low[axis] >> exponent) > most) ++exponent;
-        const int32_t origin = low[axis] >> exponent;
-        colonnade_put(&record, fields[FIELD_CORNER + axis], mesh->vertex_bits + 1, (uint32_t)((2 * origin + 1) << exponent));
-        for (uint32_t child = 0; child < node->children; ++child) {
-            const uint8_t *planes = fields + FIELD_PLANES + 6 * child + axis;
-            const int32_t raised = ((node->high[child][axis] - 1) >> exponent) + 1;
-            colonnade_put(&record, planes[0], mesh->box_bits, (uint32_t)((node->low[child][axis] >> exponent) - origin));
-            colonnade_put(&record, planes[3], mesh->box_bits, (uint32_t)(raised - origin));
+        int32_t least = node->low[0][axis], largest = node->high[0][axis];
+        for (uint32_t child = 1; child < children; ++child) {
+            if (node->low[child][axis] < least) least = node->low[child][axis];
+            if (node->high[child][axis] > largest) largest = node->high[child][axis];
         }
+        int shift = colonnade_bit_length((uint32_t)(largest - least) >> box_bits);
+        while (((largest - 1) >> shift) + 1 - (least >> shift) > most) ++shift;
+        low[axis] = least;
+        high[axis] = largest;
+        exponent[axis] = shift;
     }
-    colonnade_put(&record, fields[FIELD_FIRST], mesh->address_bits,
-                  colonnade_field(to, fields[FIELD_FIRST], mesh->address_bits));
-    colonnade_put(&record, fields[FIELD_LEAVES], COUNT_BITS, colonnade_field(to, fields[FIELD_LEAVES], COUNT_BITS));
-    colonnade_put(&record, fields[FIELD_NODES], COUNT_BITS, colonnade_field(to, fields[FIELD_NODES], COUNT_BITS));
-    colonnade_store(to, &record);
+    /* No plane is below the origin or further than `most` above it: sums and differences of all three carry nothing over */
+    const uint32_t origins = planes(low, 0, exponent, box_bits);
+    const uint32_t raised = origins - ((uint32_t)1 << 2 * box_bits | (uint32_t)1 << box_bits | 1);
+    for (uint32_t child = 0; child < children; ++child) {
+        colonnade_put(&writer, planes(node->low[child], 0, exponent, box_bits) - origins, 3 * (uint32_t)box_bits);
+        colonnade_put(&writer, planes(node->high[child], 1, exponent, box_bits) - raised, 3 * (uint32_t)box_bits);
+    }
+    colonnade_pad(&writer, to, 6 * COLONNADE_MESH_CHILDREN * (uint32_t)box_bits);
+    for (int axis = 3; axis-- > 0;) {
+        const uint32_t bits = (uint32_t)mesh->vertex_bits + 1, doubled = (uint32_t)(low[axis] >> exponent[axis]) * 2 + 1;
+        colonnade_put(&writer, colonnade_low_bits(doubled << exponent[axis], bits), bits);
+    }
+    colonnade_put_node_head(mesh, &writer, to, node->first, children - node->nodes, node->nodes);
+}
+
+/* A node's head. */
+static uint32_t head_of(const struct colonnade_mesh *mesh, const uint32_t *record) {
+    const uint32_t low = colonnade_node_head(mesh), at = low % 32, *word = record + low / 32;
+    const bool is_in_two = at + (uint32_t)mesh->address_bits + 2 * COUNT_BITS > 32;
+    return word[0] >> at | (is_in_two ? word[1] << (32 - at) : 0);
 }
 
 /* Enters a node; answers whether it is one of the clip's tree. */
 static bool enter(struct colonnade_mesh_walk *walk, uint32_t address) {
     const struct colonnade_mesh *mesh = walk->mesh;
     if (walk->open == mesh->depth) return false;
-    const uint32_t *record = walk->copy + (size_t)RECORD_WORDS * (address - walk->root);
-    const uint32_t nodes = colonnade_field(record, mesh->fields[FIELD_NODES], COUNT_BITS), step = mesh->leaf_records;
-    const uint32_t leaves = colonnade_field(record, mesh->fields[FIELD_LEAVES], COUNT_BITS);
+    const uint32_t head = head_of(mesh, walk->copy + (size_t)RECORD_WORDS * (address - walk->root));
+    const uint32_t counts = head >> mesh->address_bits, leaves = colonnade_low_bits(counts, COUNT_BITS);
+    const uint32_t nodes = colonnade_low_bits(counts >> COUNT_BITS, COUNT_BITS), children = nodes + leaves;
+    const uint32_t records = nodes + leaves * mesh->leaf_records;
     struct colonnade_mesh_node *node = &walk->path[walk->open++];
     node->address = address;
-    node->first = colonnade_field(record, mesh->fields[FIELD_FIRST], mesh->address_bits);
+    node->first = walk->next;
     node->nodes = nodes;
-    node->children = nodes + leaves;
+    node->children = children;
     node->next = 0;
     node->leaf = walk->leaf;
-    if (node->children == 0 || node->children > COLONNADE_MESH_CHILDREN || node->first != walk->next ||
-        nodes + leaves * step > walk->root + mesh->records - walk->next || leaves > mesh->leaves - walk->leaf)
+    if (children == 0 || children > COLONNADE_MESH_CHILDREN ||
+        colonnade_low_bits(head, (uint32_t)mesh->address_bits) != walk->next ||
+        records > walk->root + mesh->records - walk->next || leaves > mesh->leaves - walk->leaf)
         return false;
-    walk->next += nodes + leaves * step;
+    walk->next += records;
     walk->leaf += leaves;
     return true;
 }
@@ -144,9 +166,9 @@ enum colonnade_error colonnade_mesh_copy(const struct colonnade_mesh *mesh, cons
     for (size_t i = 0; i < (size_t)RECORD_WORDS * mesh->records; ++i) copy[i] = from[i];
     for (struct colonnade_mesh_node *node; (node = colonnade_mesh_next(&walk)) != NULL;) {
         uint32_t *to = copy + (size_t)RECORD_WORDS * (node->address - from_root);
-        struct colonnade_record change = {{0}};
-        colonnade_put(&change, mesh->fields[FIELD_FIRST], mesh->address_bits, node->first ^ (node->first - from_root + root));
-        for (int i = 0; i < RECORD_WORDS; ++i) to[i] ^= change.words[i];
+        const uint32_t change = node->first ^ (node->first - from_root + root), low = colonnade_node_head(mesh), at = low % 32;
+        to[low / 32] ^= change << at;
+        if (at + (uint32_t)mesh->address_bits > 32) to[low / 32 + 1] ^= change >> (32 - at);
     }
     return colonnade_mesh_end(&walk);
 }
@@ -158,20 +180,19 @@ enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, con
     struct colonnade_refit found = {{0}, {0}, 0, 0};
     uint64_t areas = 0, area = 0;
     for (struct colonnade_mesh_node *node; (node = colonnade_mesh_next(&walk)) != NULL;) {
+        uint32_t *to = copy + (size_t)RECORD_WORDS * (node->first + node->nodes - root);
+        const uint8_t *words = mesh->leaf_words + 4 * (size_t)LEAF_WORDS * node->leaf;
         for (uint32_t i = node->nodes; i < node->children; ++i) {
-            const uint32_t leaf = i - node->nodes;
-            uint32_t *to = copy + (size_t)RECORD_WORDS * (node->first + node->nodes + leaf * mesh->leaf_records - root);
-            const uint8_t *words = mesh->leaf_words + 4 * (size_t)LEAF_WORDS * (node->leaf + leaf);
             found.flat_pairs += write_leaf(mesh, vertices, words, to, node->low[i], node->high[i]);
+            to += RECORD_WORDS * mesh->leaf_records;
+            words += 4 * LEAF_WORDS;
         }
-        write_node(mesh, node, copy + (size_t)RECORD_WORDS * (node->address - root), found.low, found.high);
-        areas += area = colonnade_half_area(found.low, found.high);
-        if (walk.open == 0) break;
-        struct colonnade_mesh_node *parent = &path[walk.open - 1];
-        for (int axis = 0; axis < 3; ++axis) {
-            parent->low[parent->next - 1][axis] = found.low[axis];
-            parent->high[parent->next - 1][axis] = found.high[axis];
-        }
+        struct colonnade_mesh_node *parent = walk.open == 0 ? NULL : &path[walk.open - 1];
+        int32_t *low = parent == NULL ? found.low : parent->low[parent->next - 1];
+        int32_t *high = parent == NULL ? found.high : parent->high[parent->next - 1];
+        write_node(mesh, node, copy + (size_t)RECORD_WORDS * (node->address - root), low, high);
+        areas += area = colonnade_half_area(low, high);
+        if (parent == NULL) break;
     }
     const enum colonnade_error error = colonnade_mesh_end(&walk);
     found.cost = (uint32_t)(areas / (area / 256 + 1));

@@ -147,11 +147,10 @@ void colonnade_mesh_build(struct colonnade_mesh *mesh, const struct colonnade_ve
                 ends[i + 1] = cut(places, ends[i], ends[i + 2]);
             }
         for (uint32_t i = 0; i < children; ++i) nodes += ends[i + 1] - ends[i] > 1;
-        struct colonnade_record node = {{0}};
-        colonnade_put(&node, mesh->fields[FIELD_FIRST], mesh->address_bits, next);
-        colonnade_put(&node, mesh->fields[FIELD_NODES], COUNT_BITS, nodes);
-        colonnade_put(&node, mesh->fields[FIELD_LEAVES], COUNT_BITS, children - nodes);
-        colonnade_store(copy + (size_t)RECORD_WORDS * (range.address - root), &node);
+        uint32_t *record = copy + (size_t)RECORD_WORDS * (range.address - root);
+        struct colonnade_writer writer = {record, 0, 0};
+        colonnade_pad(&writer, record, colonnade_node_head(mesh));
+        colonnade_put_node_head(mesh, &writer, record, next, children - nodes, nodes);
         if (range.depth > mesh->depth) mesh->depth = range.depth;
         uint32_t address = next + nodes, below = nodes;
         for (uint32_t i = children; i-- > 0;) {
@@ -161,10 +160,9 @@ void colonnade_mesh_build(struct colonnade_mesh *mesh, const struct colonnade_ve
         for (uint32_t i = 0; i < children; ++i) {
             if (ends[i + 1] - ends[i] > 1) continue;
             const struct colonnade_leaf *leaf = &leaves[places[ends[i]].leaf];
-            struct colonnade_record record = {{0}};
-            colonnade_put(&record, mesh->fields[FIELD_MATERIAL], 8, leaf->material);
-            colonnade_put(&record, mesh->fields[FIELD_IS_CLEAR], 1, leaf->is_clear);
-            colonnade_store(copy + (size_t)RECORD_WORDS * (address++ - root), &record);
+            record = copy + (size_t)RECORD_WORDS * (address++ - root);
+            writer = (struct colonnade_writer){record, 0, 0};
+            colonnade_put_leaf_head(&writer, record, leaf->material | (uint32_t)leaf->is_clear << 8, 0);
             for (uint32_t k = 0; k < 4 * LEAF_WORDS; ++k)
                 leaf_words[4 * (size_t)LEAF_WORDS * mesh->leaves + k] = (uint8_t)(leaf->vertices[k / 4] >> (8 * (k % 4)));
             ++mesh->leaves;

@@ -3,32 +3,32 @@
 #include "colonnade_integers.h"
 #include "colonnade_mesh_parts.h"
 
-enum { VERSION = 1, HEADER_WORDS = 12, NUMBER_WORDS = 16, FIELD_WORD = HEADER_WORDS + NUMBER_WORDS };
-enum { FIXED_WORDS = FIELD_WORD + (COLONNADE_MESH_FIELDS + 3) / 4, MOST = 1 << 24 };
+enum { VERSION = 1, HEADER_WORDS = 12, NUMBER_WORDS = 16, FIELDS = 85, FIELD_WORD = HEADER_WORDS + NUMBER_WORDS };
+enum { FIXED_WORDS = FIELD_WORD + (FIELDS + 3) / 4, MOST = 1 << 24 };
 
-/* The bits of a field. */
-static uint32_t width_of(const struct colonnade_mesh *mesh, int field) {
-    if (field < FIELD_CORNER) return (uint32_t)mesh->box_bits;
-    if (field < FIELD_FIRST) return (uint32_t)mesh->vertex_bits + 1;
-    if (field == FIELD_FIRST) return (uint32_t)mesh->address_bits;
-    if (field < FIELD_VERTICES) return COUNT_BITS;
-    if (field < FIELD_DELTAS) return (uint32_t)mesh->vertex_bits;
-    if (field < FIELD_SIGNS) return (uint32_t)mesh->delta_bits;
-    if (field < FIELD_NORMALS) return 1;
-    if (field < FIELD_HIGH_NORMALS) return OCTAHEDRAL_BITS;
-    if (field < FIELD_LOW_NORMALS) return OCTAHEDRAL_BITS - 1;
-    if (field < FIELD_FORMAT) return 1;
-    return field == FIELD_FORMAT ? 2 : field == FIELD_MATERIAL ? 8 : 1;
+/* The bit behind vectors of so many fields that follow one another from a bit on, the last field of each lowest; more than a
+ * record has, if their places, which it reads, are others. */
+static int follow(const uint8_t **places, int vectors, int size, int width, int bit) {
+    bool is_good = true;
+    for (int vector = 0; vector < vectors; ++vector, *places += size)
+        for (int i = size; i-- > 0; bit += width) is_good &= (*places)[i] == bit;
+    return is_good ? bit : RECORD_BITS + 1;
 }
 
-/* Fields lie in a record. */
-static bool read_fields(struct colonnade_mesh *mesh, const uint8_t *bytes) {
-    bool is_good = true;
-    for (int field = 0; field < COLONNADE_MESH_FIELDS; ++field) {
-        const uint32_t low = mesh->fields[field] = bytes[4 * FIELD_WORD + field];
-        is_good &= low + width_of(mesh, field) <= RECORD_BITS;
-    }
-    return is_good;
+/* Whether fields have the places in which they are written. The file has them in the order of the calls. */
+static bool are_fields(const struct colonnade_mesh *mesh, const uint8_t *places) {
+    const int vertex = mesh->vertex_bits, high = OCTAHEDRAL_BITS - 1;
+    int node = follow(&places, 2 * COLONNADE_MESH_CHILDREN, 3, mesh->box_bits, 0);
+    node = follow(&places, 1, 3, vertex + 1, node);
+    node = follow(&places, 1, 1, mesh->address_bits, node);
+    node = follow(&places, 2, 1, COUNT_BITS, node);
+    const int flat = follow(&places, 4, 3, vertex, 0), deltas = follow(&places, 3, 3, mesh->delta_bits, 3 * vertex);
+    const int far_pair = follow(&places, 3, 3, 1, deltas + 4 * 2 * high);
+    const int triangle = follow(&places, 3, 2, OCTAHEDRAL_BITS, 3 * 3 * vertex);
+    const int near_pair = follow(&places, 4, 2, 1, follow(&places, 4, 2, high, deltas));
+    return node <= RECORD_BITS && flat <= LEAF_HEAD && far_pair <= LEAF_HEAD && triangle <= LEAF_HEAD &&
+           near_pair <= LEAF_HEAD && places[0] == LEAF_HEAD + KEPT_BITS && places[1] == LEAF_HEAD &&
+           places[2] == LEAF_HEAD + KEPT_BITS - 1;
 }
 
 static bool read_numbers(struct colonnade_mesh *mesh, const uint8_t *bytes) {
@@ -120,7 +120,7 @@ enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const stru
         colonnade_check_header(design, words, bytes, 4 * FIXED_WORDS, "CLNDCLIP", VERSION, COLONNADE_NOT_A_CLIP);
     if (error != COLONNADE_OK) return error;
     struct colonnade_mesh found;
-    if (!read_numbers(&found, words) || !read_fields(&found, words)) return COLONNADE_NOT_A_CLIP;
+    if (!read_numbers(&found, words) || !are_fields(&found, words + 4 * FIELD_WORD)) return COLONNADE_NOT_A_CLIP;
     const uint64_t leaves = FIXED_WORDS + (uint64_t)VERTEX_WORDS * found.vertices;
     const uint64_t changes = leaves + (uint64_t)LEAF_WORDS * found.leaves;
     const uint64_t keys = changes + (uint64_t)CHANGE_WORDS * found.changes;

@@ -10,37 +10,21 @@ enum {
     RECORD_WORDS = 8,
     RECORD_BITS = 32 * RECORD_WORDS,
     OCTAHEDRAL_BITS = 11,
-    COUNT_BITS = 3,
+    COUNT_BITS = 3,    /* of a node's numbers of nodes and leaves, above the address of the first child */
+    LEAF_HEAD = 245,   /* lowest bit of a leaf's head: its material, whether it is clear, its format */
+    KEPT_BITS = 8 + 1, /* of the head: all but the format */
+    FORMAT_BITS = 2,
     VERTEX_WORDS = 8,
     LEAF_WORDS = 4,
     CHANGE_WORDS = 6,
     MATRIX_WORDS = 12,
+    NORMAL_BITS = 15,        /* of a bound normal, without the sign */
     WEIGHT_BITS = 15,        /* of bones; the weights of a vertex have the sum 2^15 */
     TARGET_WEIGHT_BITS = 16, /* fraction of the weights of morph targets */
     BOUND_BITS = 25,         /* of a bound position and of what a morph target adds, without the sign */
     TARGET_BITS = 24,        /* of the weight of a morph target, without the sign */
     MATRIX_BITS = 30         /* of an element of a bone's matrix, without the sign */
 };
-
-/* The order of fields in a clip file. */
-enum field {
-    FIELD_PLANES = 0, /* by child: low x, y, z, high x, y, z */
-    FIELD_CORNER = FIELD_PLANES + 6 * COLONNADE_MESH_CHILDREN,
-    FIELD_FIRST = FIELD_CORNER + 3,
-    FIELD_LEAVES,
-    FIELD_NODES,
-    FIELD_VERTICES,                         /* absolute ones, by vertex */
-    FIELD_DELTAS = FIELD_VERTICES + 12,     /* of vertices 1 to 3 from vertex 0 */
-    FIELD_SIGNS = FIELD_DELTAS + 9,         /* of the deltas of a far pair */
-    FIELD_NORMALS = FIELD_SIGNS + 9,        /* of a triangle: u, v by corner */
-    FIELD_HIGH_NORMALS = FIELD_NORMALS + 6, /* of a pair: all bits but the lowest */
-    FIELD_LOW_NORMALS = FIELD_HIGH_NORMALS + 8,
-    FIELD_FORMAT = FIELD_LOW_NORMALS + 8,
-    FIELD_MATERIAL,
-    FIELD_IS_CLEAR
-};
-
-_Static_assert(FIELD_IS_CLEAR + 1 == COLONNADE_MESH_FIELDS, "each field has its place");
 
 /* Poses over time: of each key its time, 2^-16 s, and numbers, matrices first. */
 struct colonnade_keys {
@@ -70,6 +54,19 @@ struct colonnade_mesh_node *colonnade_mesh_next(struct colonnade_mesh_walk *walk
 /* Whether the walk has met the clip's tree. */
 enum colonnade_error colonnade_mesh_end(const struct colonnade_mesh_walk *walk);
 
+/* Words that may lie anywhere: themselves if they lie at a multiple of 4, where one instruction reads a word, else a copy. */
+static inline const uint8_t *colonnade_aligned(const uint8_t *words, size_t count, uint32_t *copy) {
+    if ((uintptr_t)words % 4 != 0) {
+        for (size_t i = 0; i < 4 * count; ++i) ((uint8_t *)copy)[i] = words[i];
+        words = (const uint8_t *)copy;
+    }
+#ifdef __GNUC__
+    return __builtin_assume_aligned(words, 4);
+#else
+    return words;
+#endif
+}
+
 static inline int32_t colonnade_signed_word(const uint8_t *bytes, size_t index) {
     return (int32_t)colonnade_word(bytes, index);
 }
@@ -83,33 +80,62 @@ static inline int32_t colonnade_signed_half(const uint8_t *bytes, size_t index) 
     return (int16_t)colonnade_half(bytes, index);
 }
 
-/* A field of a record. */
-static inline uint32_t colonnade_field(const uint32_t *record, uint32_t low, int32_t width) {
-    const uint32_t *word = &record[low / 32], at = low % 32;
-    const uint32_t more = at + (uint32_t)width > 32 ? word[1] << (32 - at) : 0;
-    return (word[0] >> at | more) & (((uint32_t)1 << width) - 1);
+/* The lowest bit of a node's head, above the planes of its children and its corner. */
+static inline uint32_t colonnade_node_head(const struct colonnade_mesh *mesh) {
+    return (uint32_t)(6 * COLONNADE_MESH_CHILDREN * mesh->box_bits + 3 * (mesh->vertex_bits + 1));
 }
 
-/* A record that is put together. */
-struct colonnade_record {
-    uint32_t words[RECORD_WORDS];
+/* Material of a leaf, and whether it is clear. */
+static inline uint32_t colonnade_leaf_head(const uint32_t *record) {
+    return record[LEAF_HEAD / 32] >> LEAF_HEAD % 32 & ((1 << KEPT_BITS) - 1);
+}
+
+/* The lowest bits of a number, less than 32. */
+static inline uint32_t colonnade_low_bits(uint32_t value, uint32_t count) { return value & (((uint32_t)1 << count) - 1); }
+
+/* Writes a record from its lowest bit on, each word once. */
+struct colonnade_writer {
+    uint32_t *to, bits, count; /* the next word, and the bits for it that there are */
 };
 
-static inline void colonnade_put(struct colonnade_record *record, uint32_t low, int32_t width, uint32_t value) {
-    uint32_t *word = &record->words[low / 32];
-    const uint32_t bits = value & (((uint32_t)1 << width) - 1), at = low % 32;
-    word[0] |= bits << at;
-    if (at + (uint32_t)width > 32) word[1] |= bits >> (32 - at);
+/* Appends a number of `width` bits, less than 32. */
+static inline void colonnade_put(struct colonnade_writer *writer, uint32_t value, uint32_t width) {
+    writer->bits |= value << writer->count;
+    writer->count += width;
+    if (writer->count < 32) return;
+    *writer->to++ = writer->bits;
+    writer->count -= 32;
+    writer->bits = value >> (width - writer->count);
 }
 
-static inline void colonnade_store(uint32_t *to, const struct colonnade_record *record) {
-    for (int i = 0; i < RECORD_WORDS; ++i) to[i] = record->words[i];
+/* Appends zeros up to a bit of the record. */
+static inline void colonnade_pad(struct colonnade_writer *writer, const uint32_t *record, uint32_t bit) {
+    while (writer->to < record + bit / 32) {
+        *writer->to++ = writer->bits;
+        writer->bits = 0;
+    }
+    writer->count = bit % 32;
+}
+
+/* Appends a node's head, and zeros up to the end of the record. */
+static inline void colonnade_put_node_head(const struct colonnade_mesh *mesh, struct colonnade_writer *writer,
+                                           const uint32_t *record, uint32_t first, uint32_t leaves, uint32_t nodes) {
+    const uint32_t counts = leaves | nodes << COUNT_BITS, bits = (uint32_t)mesh->address_bits;
+    colonnade_put(writer, first | counts << bits, bits + 2 * COUNT_BITS);
+    colonnade_pad(writer, record, RECORD_BITS);
+}
+
+/* Appends zeros up to a leaf's head, and its head. */
+static inline void colonnade_put_leaf_head(struct colonnade_writer *writer, const uint32_t *record, uint32_t kept,
+                                           uint32_t format) {
+    colonnade_pad(writer, record, LEAF_HEAD);
+    colonnade_put(writer, kept | format << KEPT_BITS, KEPT_BITS + FORMAT_BITS);
 }
 
 /* Half of a box's area. */
 static inline uint64_t colonnade_half_area(const int32_t low[3], const int32_t high[3]) {
-    const uint64_t x = (uint64_t)(high[0] - low[0]), y = (uint64_t)(high[1] - low[1]), z = (uint64_t)(high[2] - low[2]);
-    return x * y + y * z + z * x;
+    const uint32_t x = (uint32_t)(high[0] - low[0]), y = (uint32_t)(high[1] - low[1]), z = (uint32_t)(high[2] - low[2]);
+    return (uint64_t)x * (y + z) + (uint64_t)y * z;
 }
 
 #endif

@@ -13,7 +13,6 @@ enum {
 };
 
 struct plan {
-    const struct colonnade_mesh *mesh;
     uint32_t *lines; /* by line: how many had been read with it; 0: none */
     uint32_t *words;
     uint32_t entries, read;
@@ -46,7 +45,6 @@ static void add_lines(struct plan *plan, const uint32_t *vertices, uint32_t coun
 }
 
 static void add_leaf(struct plan *plan, const uint8_t *words, const uint32_t *record, uint32_t at) {
-    const uint8_t *fields = plan->mesh->fields;
     const bool is_pair = colonnade_word(words, 3) >> 16 != COLONNADE_MESH_NO_VERTEX;
     const uint32_t count = is_pair ? 4 : 3;
     uint32_t vertices[4], places[4] = {0};
@@ -58,7 +56,7 @@ static void add_leaf(struct plan *plan, const uint8_t *words, const uint32_t *re
     const uint32_t entry[ENTRY_LINES] = {
         places[0] | places[1] << 16,
         places[2] | places[3] << 16,
-        colonnade_field(record, fields[FIELD_MATERIAL], 8) | colonnade_field(record, fields[FIELD_IS_CLEAR], 1) << 8,
+        colonnade_leaf_head(record),
     };
     add(plan, is_pair ? PAIR : TRIANGLE, at, entry);
 }
@@ -66,7 +64,7 @@ static void add_leaf(struct plan *plan, const uint8_t *words, const uint32_t *re
 enum colonnade_error colonnade_mesh_plan(const struct colonnade_mesh *mesh, const uint32_t *copy, uint32_t root,
                                          struct colonnade_mesh_node *path, uint32_t *lines, uint32_t *plan, uint32_t *entries) {
     struct colonnade_mesh_walk walk = {mesh, copy, path, root, root, 0, 0};
-    struct plan to = {mesh, lines, plan, 0, 0};
+    struct plan to = {lines, plan, 0, 0};
     uint32_t boxes = 0;
     for (uint32_t i = 0; i < mesh->vertices; i += COLONNADE_LINE_VERTICES) lines[i / COLONNADE_LINE_VERTICES] = 0;
     for (const struct colonnade_mesh_node *node; (node = colonnade_mesh_next(&walk)) != NULL;) {

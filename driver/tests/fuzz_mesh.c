@@ -1,13 +1,13 @@
 /* Fuzzer of meshes that bend (tools/driver-fuzz): an input chooses the numbers of a clip file, each legal, from usual ones to
  * all of them extreme at once, and a tree over its leaves; in some files it then changes words or the length, and in some
- * trees records. File and records end where their memory ends. A legal file opens; a vertex is on the grid; a refit of the
- * tree succeeds, twice with the same records, and changes nothing behind them. In a motion, a frame's copy of the mesh stays
+ * trees records. File and records end where their memory ends. A legal file opens; a vertex is on the grid, and the same if the
+ * file begins in the middle of a word; a refit of the tree succeeds, twice with the same records, and changes nothing behind them. In a motion, a frame's copy of the mesh stays
  * as it is while the next frame's bends. */
 #include "colonnade_motion.h"
 #include "fuzz.h"
 
 enum { MOST_WORDS = 8000, MOST_VERTICES = 24, MOST_NODES = 40, MOST_RECORDS = 1024, POSE_WORDS = 12 * 4 + 4 };
-enum { FIELDS = COLONNADE_MESH_FIELDS, RECORD_WORDS = 8, SPARE = 0x5A5A5A5A };
+enum { FIELDS = 85, RECORD_WORDS = 8, ADDRESS_BITS = 22 };
 
 static const struct colonnade_design design = {.format_hash = {1, 2, 3, 4, 5, 6, 7, 0xFFFFFFFF}};
 
@@ -30,6 +30,7 @@ static struct file {
 
 static uint32_t records[MOST_RECORDS][RECORD_WORDS];
 static uint32_t record_count, leaf_count, depth, root, step;
+static int vertex_bits, delta_bits, box_bits;
 
 static void add(int64_t word) { file.words[file.count++] = (uint32_t)word; }
 
@@ -42,30 +43,34 @@ static void build(uint32_t address, uint32_t level) {
     const uint32_t count = 1 + below(4), nodes = record_count < MOST_NODES && level < 12 ? below(count + 1) : 0;
     const uint32_t leaves = count - nodes, first = record_count;
     if (level > depth) depth = level;
-    put(records[address], 228, 22, root + first);
-    put(records[address], 250, 3, leaves);
-    put(records[address], 253, 3, nodes);
+    const uint32_t head = (uint32_t)(24 * box_bits + 3 * (vertex_bits + 1));
+    put(records[address], head, ADDRESS_BITS, root + first);
+    put(records[address], head + ADDRESS_BITS, 3, leaves);
+    put(records[address], head + ADDRESS_BITS + 3, 3, nodes);
     record_count += nodes + leaves * step;
     leaf_count += leaves;
     for (uint32_t i = 0; i < nodes; ++i) build(first + i, level + 1);
 }
 
-/* The layout of records of vertices of 16 bits. */
+static uint8_t *add_vectors(uint8_t *to, int vectors, int size, int width, int low) {
+    for (int i = 0; i < vectors; ++i)
+        for (int k = size; k-- > 0;) *to++ = (uint8_t)(low + width * (size * i + k));
+    return to;
+}
+
 static void add_fields(void) {
-    uint8_t lows[FIELDS + 3] = {0};
-    size_t count = 0;
-    for (int child = 0; child < 4; ++child)
-        for (int i = 0; i < 6; ++i) lows[count++] = (uint8_t)(42 * child + 7 * i);
-    for (int i = 0; i < 3; ++i) lows[count++] = (uint8_t)(168 + 17 * i);
-    lows[count++] = 228, lows[count++] = 250, lows[count++] = 253;
-    for (int i = 0; i < 12; ++i) lows[count++] = (uint8_t)(16 * i);
-    for (int i = 0; i < 9; ++i) lows[count++] = (uint8_t)(48 + 12 * i);
-    for (int i = 0; i < 9; ++i) lows[count++] = (uint8_t)(236 + i);
-    for (int i = 0; i < 6; ++i) lows[count++] = (uint8_t)(144 + 11 * i);
-    for (int i = 0; i < 8; ++i) lows[count++] = (uint8_t)(156 + 10 * i);
-    for (int i = 0; i < 8; ++i) lows[count++] = (uint8_t)(236 + i);
-    lows[count++] = 254, lows[count++] = 245, lows[count++] = 253;
-    CHECK(count == FIELDS);
+    const int deltas = 3 * vertex_bits, normals = deltas + 9 * delta_bits, head = 24 * box_bits + 3 * (vertex_bits + 1);
+    uint8_t lows[FIELDS + 3] = {0}, *to = add_vectors(lows, 8, 3, box_bits, 0);
+    to = add_vectors(to, 1, 3, vertex_bits + 1, 24 * box_bits);
+    for (int i = 0; i < 3; ++i) *to++ = (uint8_t)(head + (i == 0 ? 0 : ADDRESS_BITS + 3 * (i - 1)));
+    to = add_vectors(to, 4, 3, vertex_bits, 0);
+    to = add_vectors(to, 3, 3, delta_bits, deltas);
+    to = add_vectors(to, 3, 3, 1, normals + 80);
+    to = add_vectors(to, 3, 2, 11, 9 * vertex_bits);
+    to = add_vectors(to, 4, 2, 10, normals);
+    to = add_vectors(to, 4, 2, 1, normals + 80);
+    *to++ = 254, *to++ = 245, *to++ = 253;
+    CHECK(to == lows + FIELDS);
     for (size_t i = 0; i < sizeof lows; i += 4)
         add(lows[i] | lows[i + 1] << 8 | lows[i + 2] << 16 | (int64_t)lows[i + 3] << 24);
 }
@@ -77,9 +82,10 @@ static void add_clip(void) {
     uint32_t time = 0, last = 0;
     file.count = 0;
     for (int i = 0; i < 12; ++i) add(head[i]);
-    const uint32_t numbers[] = {16,    12,      7,       22,   step, record_count, depth, vertices, leaf_count,
-                                bones, targets, changes, keys, 0,    15,           10};
-    for (int i = 0; i < 16; ++i) add(numbers[i]);
+    const int bits[] = {vertex_bits, delta_bits, box_bits, ADDRESS_BITS};
+    for (int i = 0; i < 4; ++i) add(bits[i]);
+    const uint32_t numbers[] = {step, record_count, depth, vertices, leaf_count, bones, targets, changes, keys, 0, 15, 10};
+    for (int i = 0; i < 12; ++i) add(numbers[i]);
     const size_t duration = file.count - 3;
     add_fields();
     for (uint32_t i = 0; i < vertices; ++i) {
@@ -107,8 +113,10 @@ static void add_clip(void) {
         add(time);
         file.words[duration] = time;
         time += take() < 64 ? 0 : take() < extremes ? take32() >> 2 : take32() % 100000;
-        for (uint32_t i = 0; i < 12 * bones; ++i) /* translations about a middle of 2^15 vertex units */
-            add(take() < extremes ? number(30, 30) : i % 4 == 3 ? (1 << 25) + number(18, 18) : number(19, 19));
+        for (uint32_t i = 0; i < 12 * bones; ++i) { /* translations about the middle of the grid */
+            const int64_t middle = ((int64_t)1 << (vertex_bits + 9)) + number(vertex_bits + 2, vertex_bits + 2);
+            add(take() < extremes ? number(30, 30) : i % 4 == 3 ? middle : number(vertex_bits + 3, vertex_bits + 3));
+        }
         for (uint32_t i = 0; i < targets; ++i) add(number(16, 24));
     }
     file.words[3] = 4 * (uint32_t)file.count;
@@ -199,38 +207,48 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     extremes = shares[take() % 4];
     step = 1 + take() % 2;
     root = take() < 128 ? 0 : below(1 << 21);
+    vertex_bits = take() < 128 ? 16 : 10 + (int)below(10);
+    delta_bits = (157 - 3 * vertex_bits) / 9;
+    box_bits = take() < 128 ? 7 : 4 + (int)below(4);
     memset(records, 0, sizeof records);
     record_count = 1, leaf_count = 0, depth = 0;
     build(0, 1);
     add_clip();
     const bool is_damaged = damage();
     const size_t bytes = take() < 240 ? 4 * file.count : below(4 * (uint32_t)file.count + 1);
-    uint8_t *exact = malloc(bytes == 0 ? 1 : bytes);
-    CHECK(exact != NULL);
+    uint8_t *exact = malloc(bytes == 0 ? 1 : bytes), *odd = malloc(bytes + 1);
+    CHECK(exact != NULL && odd != NULL);
     for (size_t i = 0; i < bytes; ++i) exact[i] = (uint8_t)(file.words[i / 4] >> (8 * (i % 4)));
-    struct colonnade_mesh mesh, before;
+    memcpy(odd + 1, exact, bytes);
+    struct colonnade_mesh mesh, before, same;
     memset(&mesh, 0x5A, sizeof mesh);
     memcpy(&before, &mesh, sizeof mesh);
     const enum colonnade_error opened = colonnade_mesh_open(&mesh, &design, exact, bytes);
     CHECK(opened == COLONNADE_OK || is_damaged || bytes != 4 * file.count);
     if (opened != COLONNADE_OK) CHECK(memcmp(&mesh, &before, sizeof mesh) == 0);
+    CHECK(colonnade_mesh_open(&same, &design, odd + 1, bytes) == opened);
     for (int call = 0; call < 4 && opened == COLONNADE_OK; ++call) {
         int32_t *pose = malloc(4 * (size_t)colonnade_mesh_pose_words(&mesh));
         struct colonnade_vertex *vertices = malloc(sizeof *vertices * mesh.vertices);
-        CHECK(pose != NULL && vertices != NULL);
+        struct colonnade_vertex *others = malloc(sizeof *others * mesh.vertices);
+        CHECK(pose != NULL && vertices != NULL && others != NULL);
         colonnade_mesh_pose(&mesh, take() < 16 ? take32() : below(200000), pose);
         const enum colonnade_error error = colonnade_mesh_skin(&mesh, pose, vertices);
         CHECK(error == COLONNADE_OK || error == COLONNADE_OUTSIDE);
+        CHECK(colonnade_mesh_skin(&same, pose, others) == error);
+        CHECK(error != COLONNADE_OK || memcmp(vertices, others, sizeof *vertices * mesh.vertices) == 0);
         for (uint32_t i = 0; error == COLONNADE_OK && i < mesh.vertices; ++i)
             for (int axis = 0; axis < 3; ++axis)
                 CHECK(vertices[i].position[axis] >= 0 && vertices[i].position[axis] >> mesh.vertex_bits == 0);
         if (error == COLONNADE_OK && mesh.records == record_count && mesh.leaf_records == step)
-            check_refit(&mesh, vertices, !is_damaged);
+            check_refit(call % 2 == 0 ? &mesh : &same, vertices, !is_damaged);
+        free(others);
         free(vertices);
         free(pose);
     }
     if (opened == COLONNADE_OK && mesh.records == record_count && mesh.leaf_records == step && root == 0)
         check_motion(&mesh, !is_damaged);
+    free(odd);
     free(exact);
     return 0;
 }

@@ -20,7 +20,7 @@ def delta_bits(vertex_bits: int) -> int:
 
 
 def places_of(vertex_bits: int) -> Places:
-    """The fields of nodes and leaves of 256 bits."""
+    """The fields of nodes and leaves of 256 bits, as a design has them: the last part of a vector is lowest."""
     v, d = vertex_bits, delta_bits(vertex_bits)
     body, low = 3 * v + 9 * d, 3 * v + 9 * d + 80
 
@@ -28,7 +28,7 @@ def places_of(vertex_bits: int) -> Places:
         return {
             f"{name}[{i}].{part}": (start + width * (len(parts) * i + k), width, signed)
             for i in range(count)
-            for k, part in enumerate(parts)
+            for k, part in enumerate(reversed(parts))
         }
 
     node = vectors("corner", 1, 168, v + 1, False)
@@ -37,7 +37,9 @@ def places_of(vertex_bits: int) -> Places:
         planes = vectors("low", 2, 42 * child, 7, False)
         for name, place in planes.items():
             node[f"children[{child}].{name.replace('low[1]', 'high').replace('[0]', '')}"] = place
-    node |= {"first": (228, ADDRESS_BITS, False), "leaves": (250, 3, False), "nodes": (253, 3, False)}
+    counts = 168 + 3 * (v + 1) + ADDRESS_BITS
+    node |= {"first": (counts - ADDRESS_BITS, ADDRESS_BITS, False)}
+    node |= {"leaves": (counts, 3, False), "nodes": (counts + 3, 3, False)}
     head = {"material": (245, 8, False), "isClear": (253, 1, False), "format": (254, 2, False)}
     near = vectors("body.deltas", 3, 3 * v, d, True) | vectors("body.normals", 4, body, 10, True, "uv")
     return {
