@@ -1,14 +1,13 @@
 /* A viewer under Linux, without DRM: renders into the device's memory, which is the display's (docs/soc.md), while
  * keys orbit the object.
  *
- * usage: viewer /dev/uio0 IMAGE VIEW             keys of the terminal: a d w s or arrows orbit, + - come nearer, r goes back,
- *                                                q ends
- *        viewer /dev/uio0 IMAGE VIEW --keys KEYS a frame for the view and one after each key
- *        viewer /dev/uio0 IMAGE VIEW --turn N    N frames around the object
- *        viewer /dev/uio0 IMAGE VIEW --play N CLIP [SCENE]    N frames of objects that move; SCENE has the records of a scene
- *                                                in DRAM, whose meshes may bend
+ * usage: viewer /dev/uio0 IMAGE VIEW [SCENE]               keys of the terminal: a d w s or arrows orbit, + - come nearer,
+ *                                                          r goes back, q ends
+ *        viewer /dev/uio0 IMAGE VIEW --keys KEYS [SCENE]   a frame for the view and one after each key
+ *        viewer /dev/uio0 IMAGE VIEW --turn N [SCENE]      N frames around the object
+ *        viewer /dev/uio0 IMAGE VIEW --play N CLIP [SCENE] N frames of a mesh that bends, or of objects that move
  *
- * It prints frames a second. IMAGE, VIEW, CLIP and SCENE come from `colonnade pack`; colonnade_design.h from `colonnade
+ * SCENE has the records of a scene in DRAM, whose meshes may bend. It prints frames a second. IMAGE, VIEW, CLIP and SCENE come from `colonnade pack`; colonnade_design.h from `colonnade
  * registers`. */
 #define _POSIX_C_SOURCE 200809L
 
@@ -27,7 +26,7 @@
 #include "colonnade_view.h"
 #include "target.h"
 
-enum { STEP = 5, STEEPEST = 85, FILE_BYTES = 1 << 20, WRITES = 4096, PAGE = 4096 };
+enum { STEP = 5, STEEPEST = 85, FILE_BYTES = 1 << 20, WRITES = 4096, PAGE = 4096, RECORD_BYTES = 32 };
 
 static const double RADIAN = 3.14159265358979323846 / 180, METRE = 4294967296.0, ONE = 1073741824.0;
 
@@ -141,9 +140,12 @@ static void render(struct target *target, struct colonnade *device, struct colon
     speed->cycles += colonnade_counter(device, COLONNADE_COUNTER_CYCLES);
 }
 
-/* Objects that move, and the instances of a frame and of the one before. */
+/* A mesh that bends, or objects that move; the instances of a frame and of the one before. */
 struct play {
+    bool is_mesh;
+    struct colonnade_mesh mesh;
     struct colonnade_motion motion;
+    uint32_t roots[2], records; /* of a mesh that bends: of its two copies; of both */
     struct colonnade_motion_memory memory;
     struct colonnade_instance instances[2][COLONNADE_INSTANCES];
 };
@@ -154,37 +156,85 @@ static void *allocate(size_t count, size_t size) {
     return found;
 }
 
-/* Puts the records of a scene behind a frame of so many bytes. */
+static void open_clip(struct play *play, const char *name) {
+    static _Alignas(4) uint8_t clip[FILE_BYTES];
+    const size_t bytes = target_read(name, clip, sizeof clip);
+    play->is_mesh = bytes >= 8 && memcmp(clip, "CLNDCLIP", 8) == 0;
+    if (play->is_mesh) target_check(name, colonnade_mesh_open(&play->mesh, &colonnade_design, clip, bytes));
+    else target_check(name, colonnade_motion_open(&play->motion, &colonnade_design, clip, bytes));
+    if (colonnade_design.scene_page == 0 && (play->is_mesh || play->motion.clips != 0))
+        target_fail(name, "has a mesh that bends, and this device holds its scene on chip: set columnBvhMemory.cache");
+}
+
+/* Makes the second copy of a mesh that is all of the scene. */
+static enum colonnade_error copy_mesh(struct play *play, uint32_t bytes) {
+    const struct colonnade_mesh *mesh = &play->mesh;
+    play->roots[1] = bytes / RECORD_BYTES;
+    play->records = play->roots[1] + mesh->records;
+    if (mesh->records > play->roots[1]) return COLONNADE_OTHER_RECORDS;
+    if (play->records > (uint32_t)1 << mesh->address_bits) return COLONNADE_TOO_LARGE;
+    uint32_t *scene = play->memory.scene;
+    return colonnade_mesh_copy(mesh, scene, 0, scene + RECORD_BYTES / 4 * (size_t)play->roots[1], play->roots[1],
+                               play->memory.path);
+}
+
+/* Puts the records of a scene behind a frame of so many bytes, and the second copies of meshes that bend behind them. */
 static void put_scene(struct target *target, struct colonnade *device, struct play *play, const char *name, uint64_t frame) {
-    struct colonnade_motion *motion = &play->motion;
+    const struct colonnade_mesh *mesh = &play->mesh;
     const uint64_t at = (frame + PAGE - 1) / PAGE * PAGE;
-    if (at + motion->copy_bytes > target->size) target_fail(name, "has no space behind the frame");
-    const size_t bytes = target_read(name, target->memory + at, target->size - motion->copy_bytes - at);
+    const uint64_t copy = play->is_mesh ? (uint64_t)RECORD_BYTES * mesh->records : play->motion.copy_bytes;
+    if (at + copy > target->size) target_fail(name, "has no space behind the frame");
+    const uint32_t bytes = (uint32_t)target_read(name, target->memory + at, target->size - copy - at);
+    const uint32_t vertices = play->is_mesh ? mesh->vertices : play->motion.vertices;
+    const uint32_t depth = play->is_mesh ? mesh->depth : play->motion.depth;
+    const uint32_t words = play->is_mesh ? colonnade_mesh_pose_words(mesh) : play->motion.pose_words;
     play->memory = (struct colonnade_motion_memory){
-        (uint32_t *)(target->memory + at), allocate(motion->vertices + 1, sizeof *play->memory.vertices),
-        allocate(motion->depth + 1, sizeof *play->memory.path), allocate(motion->pose_words + 1, sizeof *play->memory.pose)};
-    target_check(name, colonnade_motion_copy(motion, &play->memory, (uint32_t)bytes));
+        (uint32_t *)(target->memory + at), allocate(vertices + 1, sizeof *play->memory.vertices),
+        allocate(depth + 1, sizeof *play->memory.path), allocate(words + 1, sizeof *play->memory.pose)};
+    if (play->is_mesh) target_check(name, copy_mesh(play, bytes));
+    else if (play->motion.clips != 0) target_check(name, colonnade_motion_copy(&play->motion, &play->memory, bytes));
     target_check(name, colonnade_set_scene(device, target->base + at));
 }
 
-/* Finds the registers of a frame: those of the view, then those of instances; bends meshes. */
-static void find_frames(const struct colonnade *device, struct colonnade_view *view, struct play *play, uint32_t number,
-                        uint32_t count, struct colonnade_frame frames[2]) {
-    static uint8_t writes[8 * WRITES], moves[8 * COLONNADE_MOTION_WRITES];
+/* Bends a mesh in the copy that the last frame does not read. Answers the number of writes. */
+static uint32_t bend_mesh(const struct play *play, uint32_t time, uint32_t root, uint8_t *writes) {
+    const struct colonnade_mesh *mesh = &play->mesh;
+    const struct colonnade_motion_memory *memory = &play->memory;
+    struct colonnade_refit result;
+    colonnade_mesh_pose(mesh, time, memory->pose);
+    target_check("mesh", colonnade_mesh_skin(mesh, memory->pose, memory->vertices));
+    target_check("mesh", colonnade_mesh_refit(mesh, memory->vertices, memory->scene + RECORD_BYTES / 4 * (size_t)root, root,
+                                              memory->path, &result));
+    return colonnade_mesh_writes(&colonnade_design, root, play->records, writes);
+}
+
+/* Moves objects, and bends their meshes. Answers the number of writes. */
+static uint32_t move_objects(const struct colonnade *device, struct colonnade_view *view, struct play *play, uint32_t time,
+                             uint32_t number, uint8_t *writes) {
     const struct colonnade_motion *motion = &play->motion;
     struct colonnade_transform transforms[COLONNADE_INSTANCES];
     struct colonnade_instance *now = play->instances[number % 2];
     const struct colonnade_instance *before = number == 0 ? NULL : play->instances[(number + 1) % 2];
-    const uint32_t time = (uint32_t)((uint64_t)motion->duration * number / count);
     colonnade_motion_transforms(motion, time, transforms);
     target_check("motion", colonnade_motion_find(motion, transforms, now));
     target_check("mesh", colonnade_motion_bend(motion, device, &play->memory, time, before, now));
     const struct colonnade_shared shared = colonnade_find_shared(now, motion->objects);
     target_check("view", colonnade_view_set_bounds(view, shared.low, shared.high));
+    return colonnade_motion_writes(motion, now, before, writes);
+}
+
+/* Finds the registers of a frame: those of the view, then those of what moves. */
+static void find_frames(const struct colonnade *device, struct colonnade_view *view, struct play *play, uint32_t number,
+                        uint32_t count, struct colonnade_frame frames[2]) {
+    static uint8_t writes[8 * WRITES], moves[8 * COLONNADE_MOTION_WRITES];
+    const uint32_t duration = play->is_mesh ? play->mesh.duration : play->motion.duration;
+    const uint32_t time = (uint32_t)((uint64_t)duration * number / count);
+    const uint32_t moved = play->is_mesh ? bend_mesh(play, time, play->roots[number % 2], moves)
+                                         : move_objects(device, view, play, time, number, moves);
     target_check("view", colonnade_view_frame(view, writes, WRITES, &frames[0]));
     frames[1] = frames[0];
     frames[1].writes = moves;
-    frames[1].count = colonnade_motion_writes(motion, now, before, moves);
+    frames[1].count = moved;
 }
 
 /* Renders frames of a motion: meshes are bent, and registers found and written, while the last frame runs. */
@@ -217,19 +267,24 @@ static void play_all(struct target *target, struct colonnade *device, struct col
 }
 
 int main(int argc, char **argv) {
-    static uint8_t file[FILE_BYTES], clip[FILE_BYTES];
+    static uint8_t file[FILE_BYTES];
     static struct play play;
     static struct colonnade_view view;
-    const bool has_keys = argc == 6 && strcmp(argv[4], "--keys") == 0, turns = argc == 6 && strcmp(argv[4], "--turn") == 0;
-    const bool plays = (argc == 7 || argc == 8) && strcmp(argv[4], "--play") == 0;
-    if (argc != 4 && !has_keys && !turns && !plays)
-        target_fail("usage", "viewer /dev/uio0 IMAGE VIEW [--keys KEYS | --turn FRAMES | --play FRAMES CLIP [SCENE]]");
+    const char *option = argc > 4 && strncmp(argv[4], "--", 2) == 0 ? argv[4] : NULL;
+    const bool has_keys = option != NULL && strcmp(option, "--keys") == 0;
+    const bool turns = option != NULL && strcmp(option, "--turn") == 0;
+    const bool plays = option != NULL && strcmp(option, "--play") == 0;
+    const int last = option == NULL ? 4 : plays ? 7 : 6; /* arguments without SCENE */
+    if ((option != NULL && !has_keys && !turns && !plays) || (argc != last && argc != last + 1))
+        target_fail("usage", "viewer /dev/uio0 IMAGE VIEW [--keys KEYS | --turn FRAMES | --play FRAMES CLIP] [SCENE]");
+    const char *scene = argc > last ? argv[last] : NULL;
     const long count = turns || plays ? strtol(argv[5], NULL, 10) : 0;
-    if ((turns || plays) && (count < 1 || count > 1000000)) target_fail(argv[4], "has a number of frames, 1 to 1000000");
-    if (plays)
-        target_check(argv[6],
-                     colonnade_motion_open(&play.motion, &colonnade_design, clip, target_read(argv[6], clip, sizeof clip)));
-    if (argc == 7 && play.motion.clips != 0) target_fail(argv[6], "has meshes that bend: give the records of the scene");
+    if ((turns || plays) && (count < 1 || count > 1000000)) target_fail(option, "has a number of frames, 1 to 1000000");
+    if (plays) open_clip(&play, argv[6]);
+    if (colonnade_design.scene_page != 0 && scene == NULL)
+        target_fail("SCENE", "is missing: this device has its scene in DRAM; give the file of pack --dram-image at the end");
+    if (colonnade_design.scene_page == 0 && scene != NULL)
+        target_fail(scene, "is for a scene in DRAM, and this device holds its scene on chip: leave it out");
     target_check(argv[3], colonnade_view_open(&view, &colonnade_design, file, target_read(argv[3], file, sizeof file)));
     struct target target;
     struct colonnade device;
@@ -242,11 +297,11 @@ int main(int argc, char **argv) {
     if (target.line != 0 && target.line != target_stride(start.width))
         target_fail(argv[3], "frames are not as wide as the display: give pack its --size");
     target_load(&target, &device, argv[2]);
-    if (argc == 8) put_scene(&target, &device, &play, argv[7], (uint64_t)target_stride(start.width) * start.height);
+    if (scene != NULL) put_scene(&target, &device, &play, scene, (uint64_t)target_stride(start.width) * start.height);
 
     struct orbit orbit = {0, 0, 1};
     struct speed speed = {0, 0, 0};
-    if (argc == 4) open_terminal();
+    if (option == NULL) open_terminal();
     if (plays) play_all(&target, &device, &view, &play, (uint32_t)count, &speed);
     else render(&target, &device, &view, &speed);
     for (long number = 1; !is_ended && !plays; ++number) {
@@ -258,7 +313,7 @@ int main(int argc, char **argv) {
         const struct colonnade_camera camera = orbiting(&view, &start, &orbit);
         target_check("camera", colonnade_view_set_camera(&view, &camera));
         render(&target, &device, &view, &speed);
-        if (argc == 4) fprintf(stderr, "\r%.1f frames/s ", speed.frames / speed.seconds);
+        if (option == NULL) fprintf(stderr, "\r%.1f frames/s ", speed.frames / speed.seconds);
     }
     fprintf(stderr, "%" PRIu32 " frames of %" PRIu32 "x%" PRIu32 ", %.2f frames/s, %" PRIu64 " cycles a frame\n", speed.frames,
             start.width, start.height, speed.frames / speed.seconds, speed.cycles / speed.frames);

@@ -77,6 +77,13 @@ enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, con
                                           uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path,
                                           struct colonnade_refit *result);
 
+enum { COLONNADE_MESH_WRITES = 3 };
+
+/* The pairs of words of a frame that reads the copy at `root`, of a scene that is this mesh alone: they invalidate the caches.
+ * `records` is the number of all records of the scene with its copies, `writes` has space for COLONNADE_MESH_WRITES pairs.
+ * Answers their number, 0 if the scene lies on chip. Set them by colonnade_set_frame after those of a view. */
+uint32_t colonnade_mesh_writes(const struct colonnade_design *design, uint32_t root, uint32_t records, uint8_t *writes);
+
 enum {
     COLONNADE_PLAN_WORDS = 4,   /* of an entry */
     COLONNADE_PLAN_BOXES = 128, /* that the unit holds */

@@ -199,3 +199,15 @@ enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, con
     if (error == COLONNADE_OK) *result = found;
     return error;
 }
+
+uint32_t colonnade_mesh_writes(const struct colonnade_design *design, uint32_t root, uint32_t records, uint8_t *writes) {
+    /* `scene.root` is behind `scene.recordCount`, the first word of its group */
+    const uint32_t pairs[COLONNADE_MESH_WRITES][2] = {
+        {design->invalidate, 1}, {design->scene, records}, {design->scene + 4, root}};
+    if (design->scene_page == 0) return 0;
+    for (int i = 0; i < COLONNADE_MESH_WRITES; ++i) {
+        colonnade_write_word(writes + 8 * i, (pairs[i][0] - COLONNADE_DEVICE_BASE) / 4);
+        colonnade_write_word(writes + 8 * i + 4, pairs[i][1]);
+    }
+    return COLONNADE_MESH_WRITES;
+}

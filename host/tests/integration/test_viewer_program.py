@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from animated_documents import arm
 from c_programs import compile_test
-from driver_runs import CACHE, PAGE, run_driver, run_silently
+from driver_runs import CACHE, PAGE, compiled_driver, run_driver, run_silently
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from colonnade.common.framebuffer_formats import framebuffer_bytes
 from colonnade.design import toolchain
 from colonnade.design.generator import shell_design_for
+from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.packed_objects import MovingInstances
 from colonnade.device.scene import DeviceScene
+from colonnade.integration.design_header import design_header
+from colonnade.integration.register_table import register_table
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.instances import instance_registers
 from colonnade.registers.target_view import TargetView
@@ -24,36 +30,104 @@ from colonnade.registers.view_words import camera_values, position_values
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import place
 
+#: A cache that holds all records: a frame that does not invalidate it reads old ones.
+IN_DRAM = (f"columnBvhMemory.cache={json.dumps(CACHE | {'lines': 64, 'sharedLines': 256})}",)
+#: A design, arguments, and how they move the camera: degrees about the vertical and sideways, a factor of its distance.
+ORBITS = {
+    "keys": ((), ("--keys", "xds-q+"), 4, (5.0, 5.0, 1.1)),
+    "keys, in DRAM": (IN_DRAM, ("--keys", "xds-q+"), 4, (5.0, 5.0, 1.1)),
+    "a turn, in DRAM": (IN_DRAM, ("--turn", "2"), 2, (180.0, 0.0, 1.0)),
+}
 
-def test_the_viewer_renders_the_orbit_of_its_keys(tmp_path: Path) -> None:
-    """Its last frame is the model's, for the camera of the keys."""
-    design = shell_design_for("tiny", ("array.columns=2",), bus_bytes=16)
+
+@pytest.mark.parametrize("case", ORBITS)
+def test_the_viewer_renders_the_orbit_of_its_camera(tmp_path: Path, case: str) -> None:
+    """Its last frame is the model's, for the camera of the arguments."""
+    overrides, arguments, count, (azimuth, elevation, distance) = ORBITS[case]
+    design = shell_design_for("tiny", ("array.columns=2", *overrides), bus_bytes=16)
     size, manifest = (24, 16), design.manifest
     scene = DeviceScene.of(
         load_scene(toolchain.project_root() / "scenes" / "object.toml"), manifest, load_mesh("torus")
     )
     file = scene.view_file(size)
     files = {"image": scene.device_image(), "view": file}
-    memory, (line,) = run_driver(
-        tmp_path, design, files, "interrupt", "image", "view", "--keys", "xds-q+", program="viewer"
-    )
-    assert line[:4] == ["4", "frames", "of", "24x16,"] and float(line[4]) > 0
+    files |= {"scene": scene.dram_image()} if overrides else {}
+    arguments += ("scene",) if overrides else ()
+    memory, (line,) = run_driver(tmp_path, design, files, "interrupt", "image", "view", *arguments, program="viewer")
+    assert line[:4] == [str(count), "frames", "of", "24x16,"] and float(line[4]) > 0
     placed = place(scene.scene, scene.image.header.extent, *size, None)
     camera, (right, _, back) = placed.camera, placed.camera.axes
     depth = float((camera.position - placed.pose.translate) @ back)
-    moved = Rotation.from_rotvec([0, 5, 0], degrees=True) * Rotation.from_rotvec(5 * right, degrees=True)
+    sideways = Rotation.from_rotvec(elevation * right, degrees=True)
+    moved = Rotation.from_rotvec([0, azimuth, 0], degrees=True) * sideways
     middle = camera.position - depth * back
     axes = moved.apply(camera.axes)
     target = TargetView(file, manifest)
     rotation, lens = camera_values(camera)
     turned = np.round(moved.as_matrix() @ rotation * 2.0**30).astype(int).ravel().tolist()
-    target.set_camera(position_values(middle + 1.1 * depth * axes[2], "camera"), turned, lens, size)
+    target.set_camera(position_values(middle + distance * depth * axes[2], "camera"), turned, lens, size)
     expected = framebuffer_bytes(render_model(manifest, scene.image, target.registers()), 0)
-    tile = int(manifest.config["frame"]["tileSize"])
-    stride = -(-size[0] // tile) * tile * 4
-    lines = memory[PAGE : PAGE + stride * size[1]].reshape(size[1], stride)[:, : expected.shape[1]]
+    lines = lines_of(memory[PAGE:], size, manifest)[:, : expected.shape[1]]
     np.testing.assert_array_equal(lines, expected)
     assert len(np.unique(lines)) > 20
+
+
+def lines_of(frame: NDArray[np.uint8], size: tuple[int, int], manifest: Manifest) -> NDArray[np.uint8]:
+    """The lines of a frame at the start of a memory, as bytes."""
+    tile = int(manifest.config["frame"]["tileSize"])
+    stride = -(-size[0] // tile) * tile * 4
+    return frame[: stride * size[1]].reshape(size[1], stride)
+
+
+def test_a_mesh_that_the_viewer_bends_has_the_frames_of_the_model(tmp_path: Path) -> None:
+    """It is all of the scene: a frame reads one of two copies of its records while the other one is bent."""
+    size, count, design = (24, 16), 5, shell_design_for("tiny", ("array.columns=2", *IN_DRAM), bus_bytes=16)
+    manifest = design.manifest
+    arm().write(tmp_path / "arm.gltf")
+    (tmp_path / "scene.toml").write_text('mesh = {path = "arm.gltf", animation = "bend"}\n')
+    scene = DeviceScene.of(load_scene(tmp_path / "scene.toml"), manifest)
+    files = {"image": scene.device_image(), "view": scene.view_file(size), "clip": scene.clip_file()}
+    files |= {"scene": scene.dram_image()}
+    arguments = ("interrupt", "image", "view", "--play", str(count), "clip", "scene")
+    memory, (line,) = run_driver(tmp_path, design, files, *arguments, program="viewer")
+    assert line[:4] == [str(count), "frames", "of", "24x16,"]
+    frames = [*(np.fromfile(tmp_path / f"frame.{number}", np.uint8) for number in range(count - 1)), memory[PAGE:]]
+    registers, different = TargetView(files["view"], manifest).registers(), set[bytes]()
+    for number, frame in enumerate(frames):
+        expected = framebuffer_bytes(render_model(manifest, scene.image.posed(number / count), registers), 0)
+        np.testing.assert_array_equal(
+            lines_of(frame, size, manifest)[:, : expected.shape[1]], expected, err_msg=f"frame {number}"
+        )
+        different.add(expected.tobytes())
+    assert len(different) == count
+
+
+#: The design's scene is in DRAM; arguments behind the view; how the line begins.
+REFUSED = {
+    "no scene of keys": (True, ("--keys", "d"), "SCENE: is missing: this device has its scene in DRAM"),
+    "no scene of the terminal": (True, (), "SCENE: is missing: this device has its scene in DRAM"),
+    "no scene of a turn": (True, ("--turn", "2"), "SCENE: is missing: this device has its scene in DRAM"),
+    "no scene of a clip": (True, ("--play", "2", "clip"), "SCENE: is missing: this device has its scene in DRAM"),
+    "a scene of a device without DRAM": (False, ("--turn", "2", "scene"), "scene: is for a scene in DRAM"),
+    "a mesh that bends on chip": (False, ("--play", "2", "clip"), "clip: has a mesh that bends, and this device holds"),
+    "another option": (False, ("--spin", "2"), "usage: viewer /dev/uio0 IMAGE VIEW [--keys KEYS"),
+    "too many arguments": (True, ("--turn", "2", "scene", "scene"), "usage: viewer /dev/uio0 IMAGE VIEW [--keys KEYS"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_the_viewer_cannot_show_is_refused_in_one_line(tmp_path: Path, case: str) -> None:
+    in_dram, arguments, begin = REFUSED[case]
+    design = shell_design_for("tiny", ("array.columns=2", *(IN_DRAM if in_dram else ())), bus_bytes=16)
+    arm().write(tmp_path / "arm.gltf")
+    (tmp_path / "scene.toml").write_text('mesh = {path = "arm.gltf", animation = "bend"}\n')
+    scene = DeviceScene.of(load_scene(tmp_path / "scene.toml"), design.manifest)
+    (tmp_path / "clip").write_bytes(scene.clip_file())
+    program = compiled_driver("viewer", design_header(register_table(design), design.manifest))
+    command = [program, "interrupt", "image", "view", *arguments]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(begin) and len(done.stderr.splitlines()) == 1
 
 
 MOVING_SCENE = """
@@ -109,7 +183,7 @@ PLAYS = {
         (
             "frame.instances=4",
             "frame.maxBounces=2",
-            f"columnBvhMemory.cache={json.dumps(CACHE | {'lines': 64, 'sharedLines': 256})}",
+            *IN_DRAM,
         ),
         13,  # the steps of the figure are twelfths of the motion
     ),
@@ -134,7 +208,6 @@ def test_frames_that_the_viewer_plays_are_those_of_the_model(tmp_path: Path, cas
     assert line[:4] == [str(count), "frames", "of", "24x16,"]
     names = [f"frame.{number}" for number in range(count - 1)]
     frames = [*(np.fromfile(tmp_path / name, np.uint8) for name in names), memory[PAGE:]]
-    stride = -(-size[0] // (tile := int(manifest.config["frame"]["tileSize"]))) * tile * 4
     target, duration = TargetView(files["view"], manifest), round(moves.seconds * 65536)
     different = set[bytes]()
     for number, frame in enumerate(frames):
@@ -143,7 +216,7 @@ def test_frames_that_the_viewer_plays_are_those_of_the_model(tmp_path: Path, cas
         target.set_bounds(header.bounds_low, header.bounds_high)
         registers = target.registers() | instance_registers(header.instances, header.frame, manifest)
         expected = framebuffer_bytes(render_model(manifest, posed, registers), 0)
-        lines = frame[: stride * size[1]].reshape(size[1], stride)[:, : expected.shape[1]]
+        lines = lines_of(frame, size, manifest)[:, : expected.shape[1]]
         np.testing.assert_array_equal(lines, expected, err_msg=f"frame {number}")
         different.add(expected.tobytes())
         at_rest = framebuffer_bytes(render_model(manifest, scene.image, registers), 0)
