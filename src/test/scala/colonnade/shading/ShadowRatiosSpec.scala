@@ -29,9 +29,11 @@ class ShadowRatiosSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
-  private val room = TestConfigs.withEnvironment(TestConfigs.environment)
-  for ((config, name) <- Seq(room -> "that casts shadows alone", TestConfigs.gathering(room) -> "that gathers light"))
-    it should s"divide the light of a point by that without the object, in a room $name" in
+  private val mapped = TestConfigs.withEnvironment(TestConfigs.environment)
+  for (
+    (config, name) <- Seq(mapped -> "that takes shadows alone", TestConfigs.gathering(mapped) -> "that gathers light")
+  )
+    it should s"divide the light of a point by that without the object, in an environment $name" in
       test(new ShadowRatios(config, bits)) { dut =>
         val random = new Random(5)
         for (_ <- 0 until 300) {
