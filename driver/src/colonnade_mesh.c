@@ -26,14 +26,14 @@ static bool write_leaf(const struct colonnade_mesh *mesh, const struct colonnade
     const bool is_pair = colonnade_word(words, 3) >> 16 != COLONNADE_MESH_NO_VERTEX;
     const int count = is_pair ? 4 : 3;
     const struct colonnade_vertex *corners[4];
-    int32_t deltas[3][3];
+    int32_t deltas[9]; /* in the order of their fields: z, y, x of each */
     uint32_t reach = 0;
     for (int i = 0; i < count; ++i) corners[i] = &vertices[colonnade_word(words, (size_t)i)];
     for (int axis = 0; axis < 3; ++axis) {
         const int32_t from = corners[0]->position[axis];
         int32_t least = 0, most = 0;
         for (int i = 1; i < count; ++i) {
-            const int32_t delta = deltas[i - 1][axis] = corners[i]->position[axis] - from;
+            const int32_t delta = deltas[3 * i - 1 - axis] = corners[i]->position[axis] - from;
             if (delta < least) least = delta;
             if (delta > most) most = delta;
         }
@@ -48,15 +48,17 @@ static bool write_leaf(const struct colonnade_mesh *mesh, const struct colonnade
     put_position(&writer, corners[0]->position, vertex_bits);
     if (format == NEAR_PAIR || format == FAR_PAIR) {
         uint32_t lowest = 0, signs = 0;
-        for (int i = 0; i < 3; ++i)
-            for (int axis = 3; axis-- > 0;)
-                colonnade_put(&writer, colonnade_low_bits((uint32_t)deltas[i][axis], delta_bits), delta_bits);
+        for (int i = 0; i < 8; i += 2) { /* two of up to 14 bits at once */
+            const uint32_t upper = colonnade_low_bits((uint32_t)deltas[i + 1], delta_bits) << delta_bits;
+            colonnade_put(&writer, upper | colonnade_low_bits((uint32_t)deltas[i], delta_bits), 2 * delta_bits);
+        }
+        colonnade_put(&writer, colonnade_low_bits((uint32_t)deltas[8], delta_bits), delta_bits);
         for (int i = 0; i < 4; ++i) {
             colonnade_put(&writer, code_bits(corners[i]->normal, 1, OCTAHEDRAL_BITS - 1), 2 * (OCTAHEDRAL_BITS - 1));
             lowest |= code_bits(corners[i]->normal, 0, 1) << (2 * i);
         }
         if (format == FAR_PAIR)
-            for (int i = 0; i < 9; ++i) signs |= (uint32_t)deltas[i / 3][2 - i % 3] >> 31 << i;
+            for (int i = 0; i < 9; ++i) signs |= (uint32_t)deltas[i] >> 31 << i;
         colonnade_put(&writer, format == NEAR_PAIR ? lowest : signs, 9);
     } else {
         for (int i = 1; i < count; ++i) put_position(&writer, corners[i]->position, vertex_bits);

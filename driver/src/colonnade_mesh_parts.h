@@ -56,15 +56,11 @@ enum colonnade_error colonnade_mesh_end(const struct colonnade_mesh_walk *walk);
 
 /* Words that may lie anywhere: themselves if they lie at a multiple of 4, where one instruction reads a word, else a copy. */
 static inline const uint8_t *colonnade_aligned(const uint8_t *words, size_t count, uint32_t *copy) {
-    if ((uintptr_t)words % 4 != 0) {
-        for (size_t i = 0; i < 4 * count; ++i) ((uint8_t *)copy)[i] = words[i];
-        words = (const uint8_t *)copy;
-    }
 #ifdef __GNUC__
-    return __builtin_assume_aligned(words, 4);
-#else
-    return words;
+    if (__builtin_expect((uintptr_t)words % 4 == 0, 1)) return __builtin_assume_aligned(words, 4);
 #endif
+    for (size_t i = 0; i < 4 * count; ++i) ((uint8_t *)copy)[i] = words[i];
+    return (const uint8_t *)copy;
 }
 
 static inline int32_t colonnade_signed_word(const uint8_t *bytes, size_t index) {
