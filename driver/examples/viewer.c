@@ -7,8 +7,8 @@
  *        viewer /dev/uio0 IMAGE VIEW --turn N [SCENE]      N frames around the object
  *        viewer /dev/uio0 IMAGE VIEW --play N CLIP [SCENE] N frames of a mesh that bends, or of objects that move
  *
- * SCENE has the records of a scene in DRAM, whose meshes may bend. It prints frames a second. IMAGE, VIEW, CLIP and SCENE come from `colonnade pack`; colonnade_design.h from `colonnade
- * registers`. */
+ * SCENE has the records of a scene in DRAM, whose meshes may bend. It prints frames a second. IMAGE, VIEW, CLIP and SCENE come
+ * from `colonnade pack`; colonnade_design.h from `colonnade registers`. */
 #define _POSIX_C_SOURCE 200809L
 
 #include <errno.h>

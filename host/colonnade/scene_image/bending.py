@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common import notes
+from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest, field_places
 from colonnade.scene_image.clip_file import ClipTree, clip_file
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from colonnade.scene_image.file import SceneImage
 
 Records = npt.NDArray[np.uint8]
+_RECORD_BITS = 256  # that the driver writes
 
 
 @dataclass(frozen=True)
@@ -39,9 +41,21 @@ class Bending:
     def of(
         cls, clip: GridClip, manifest: Manifest, records: int, depth: int, leaves: npt.NDArray[np.int64], colours: bool
     ) -> Bending:
-        """Those of packed records, whose leaves have these vertices of the clip, int64 [l, 4]."""
+        """Those of packed records, whose leaves have these vertices of the clip, int64 [l, 4].
+
+        Raises:
+            UserError: The design has no tree, or wider records than the driver writes.
+        """
         places = field_places(manifest.layouts)
         geometry, node = manifest.config["geometry"], places["node"]
+        way_out = "or leave out what moves or bends meshes"
+        if manifest.record_bits > _RECORD_BITS:
+            raise UserError(
+                f"meshes bend in records of {_RECORD_BITS} bits, and geometry.vertexBits {geometry['vertexBits']} has "
+                f"{manifest.record_bits}: choose 19 or less, {way_out}"
+            )
+        if not geometry["bvh"]:
+            raise UserError(f"meshes bend with their tree, and geometry.bvh is false: set it, {way_out}")
         deltas, addresses = places["nearPair"]["body.deltas[0].x"][1], node["first"][1]
         numbers = (int(geometry["vertexBits"]), deltas, int(geometry["boxBits"]), addresses, 2 if colours else 1)
         words = tuple(int(word) for word in manifest.format_words)

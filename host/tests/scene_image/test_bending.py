@@ -13,6 +13,7 @@ from leaves import leaves_of
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET
 from colonnade.design import toolchain
+from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
@@ -54,6 +55,15 @@ def image(mesh: Mesh, manifest: Manifest) -> SceneImage:
 @pytest.fixture(scope="module")
 def clip(mesh: Mesh, manifest: Manifest) -> GridClip:
     return grid_clip(mesh, int(manifest.config["geometry"]["vertexBits"]))
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [("geometry.vertexBits=20", "vertexBits 20 has 288"), ("geometry.bvh=false", "bvh is false")],
+)
+def test_hardware_whose_records_do_not_bend_is_refused(mesh: Mesh, override: str, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        pack(mesh, manifest_for("tiny", (override,)).manifest)
 
 
 def test_the_rest_pose_has_the_records_of_the_packer(image: SceneImage, clip: GridClip) -> None:
