@@ -176,8 +176,14 @@ LONGEST = "test_starting_pages.py"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest file, so that no worker is left alone with it at the end; skip what needs Verilator."""
+    """Begin with the longest file, so that no worker is left alone with it at the end; skip what needs Verilator.
+
+    Tests of the matrix may take hours.
+    """
     items.sort(key=lambda item: item.path.name != LONGEST)
+    for item in items:
+        if item.get_closest_marker("matrix"):
+            item.add_marker(pytest.mark.timeout(0))
     if shutil.which("verilator") is None:
         for item in items:
             if item.get_closest_marker("verilator"):

@@ -2,15 +2,16 @@
 
 Each program runs in its own process group, so that its children end with it. SIGINT, SIGTERM, SIGHUP and SIGXCPU raise
 `Interrupted` in the main thread; `guarded` then ends every program, removes temporary files and exits. While the main
-thread is in a call of a library that does not return, another thread does so, as soon as the library lets it run. On
-Linux a program also ends when this process is killed.
+thread is in a call of a library that does not return, another thread does so, as soon as the library lets it run. Where
+there is util-linux, a program also ends when this process is killed.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
+import functools
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -47,10 +48,6 @@ _WORDS = {
 }
 
 _Stream = int | IO[str] | None
-
-#: Linux: the signal that a process receives when its parent ends.
-_PR_SET_PDEATHSIG = 1
-_libc = ctypes.CDLL(None) if sys.platform == "linux" else None
 
 
 class Interrupted(BaseException):
@@ -194,17 +191,10 @@ def _start(
     # Under the lock, so that ending a group finds all of its programs
     with _lock:
         _refuse_ended(group)
-        parent = os.getpid()
-
-        def end_with_parent() -> None:
-            # In the new process. The kernel does not tell of a parent that ended before
-            if _libc is not None:
-                _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-            if os.getppid() != parent:
-                os._exit(1)
-
+        # The error of a program that is not there is to come from here
+        before = _end_with_parent() if shutil.which(str(command[0])) else ()
         process = subprocess.Popen(
-            list(map(str, command)),
+            [*before, *map(str, command)],
             cwd=cwd,
             env=env,
             stdin=stdin,
@@ -213,10 +203,23 @@ def _start(
             text=True,
             errors="replace",
             start_new_session=True,
-            preexec_fn=end_with_parent,
         )
         _running[process] = group
         return process
+
+
+@functools.cache
+def _end_with_parent() -> tuple[str, ...]:
+    """Words before a command that the kernel ends with its parent; none without util-linux.
+
+    A function of Python's between fork and exec would do the same, but could wait for ever for a lock of a thread.
+    """
+    words = (shutil.which("setpriv") or "", "--pdeathsig", "TERM")
+    try:
+        done = subprocess.run([*words, "true"], capture_output=True, check=False)
+    except OSError:
+        return ()
+    return words if done.returncode == 0 else ()
 
 
 def _refuse_ended(group: Group | None) -> None:
