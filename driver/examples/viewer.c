@@ -7,8 +7,8 @@
  *        viewer /dev/uio0 IMAGE VIEW --turn N [SCENE]      N frames around the object
  *        viewer /dev/uio0 IMAGE VIEW --play N CLIP [SCENE] N frames of a mesh that bends, or of objects that move
  *
- * SCENE has the records of a scene in DRAM, whose meshes may bend. It prints frames a second. IMAGE, VIEW, CLIP and SCENE come
- * from `colonnade pack`; colonnade_design.h from `colonnade registers`. */
+ * SCENE has the records of a scene in DRAM, whose meshes may bend: by the unit of the shell, if it has one. It prints frames a
+ * second. IMAGE, VIEW, CLIP and SCENE come from `colonnade pack`; colonnade_design.h from `colonnade registers`. */
 #define _POSIX_C_SOURCE 200809L
 
 #include <errno.h>
@@ -23,10 +23,11 @@
 #include <unistd.h>
 
 #include "colonnade_motion.h"
+#include "colonnade_shell.h"
 #include "colonnade_view.h"
 #include "target.h"
 
-enum { STEP = 5, STEEPEST = 85, FILE_BYTES = 1 << 20, WRITES = 4096, PAGE = 4096, RECORD_BYTES = 32 };
+enum { STEP = 5, STEEPEST = 85, FILE_BYTES = 1 << 20, WRITES = 4096, PAGE = 4096, RECORD_BYTES = 32, LINE_BYTES = 64 };
 
 static const double RADIAN = 3.14159265358979323846 / 180, METRE = 4294967296.0, ONE = 1073741824.0;
 
@@ -147,6 +148,7 @@ struct play {
     struct colonnade_motion motion;
     uint32_t roots[2], records; /* of a mesh that bends: of its two copies; of both */
     struct colonnade_motion_memory memory;
+    struct colonnade_refit_job jobs[COLONNADE_INSTANCES]; /* of meshes, for the unit; without one they have no entries */
     struct colonnade_instance instances[2][COLONNADE_INSTANCES];
 };
 
@@ -178,6 +180,27 @@ static enum colonnade_error copy_mesh(struct play *play, uint32_t bytes) {
                                play->memory.path);
 }
 
+/* Plans the refits of a mesh by the unit, which reads vertices and plan in the device's memory, from byte `at` on.
+ * Answers the first byte behind them. */
+static uint64_t plan_refits(const struct target *target, struct play *play, uint32_t clip, uint64_t at) {
+    const struct colonnade_mesh *mesh = play->is_mesh ? &play->mesh : &play->motion.meshes[clip];
+    const uint32_t root = play->is_mesh ? 0 : play->motion.roots[clip][0];
+    const uint32_t *records = play->memory.scene + RECORD_BYTES / 4 * (size_t)root;
+    uint32_t *lines = allocate(mesh->vertices / COLONNADE_LINE_VERTICES + 1, sizeof *lines), entries;
+    const uint64_t vertices = (at + LINE_BYTES - 1) / LINE_BYTES * LINE_BYTES;
+    const uint64_t plan =
+        vertices + ((uint64_t)mesh->vertices + COLONNADE_LINE_VERTICES - 1) / COLONNADE_LINE_VERTICES * LINE_BYTES;
+    target_check("mesh", colonnade_mesh_plan(mesh, records, root, play->memory.path, lines, NULL, &entries));
+    const uint64_t end = plan + (uint64_t)4 * COLONNADE_PLAN_WORDS * entries;
+    if (end > target->size) target_fail("memory", "has no space for a refit by the unit");
+    uint32_t *words = (uint32_t *)(target->memory + plan);
+    target_check("mesh", colonnade_mesh_plan(mesh, records, root, play->memory.path, lines, words, &entries));
+    play->jobs[clip] = (struct colonnade_refit_job){target->base + plan, target->base + vertices, 0, entries,
+                                                    mesh->vertices,      mesh->records,           0};
+    free(lines);
+    return end;
+}
+
 /* Puts the records of a scene behind a frame of so many bytes, and the second copies of meshes that bend behind them. */
 static void put_scene(struct target *target, struct colonnade *device, struct play *play, const char *name, uint64_t frame) {
     const struct colonnade_mesh *mesh = &play->mesh;
@@ -193,44 +216,65 @@ static void put_scene(struct target *target, struct colonnade *device, struct pl
         allocate(depth + 1, sizeof *play->memory.path), allocate(words + 1, sizeof *play->memory.pose)};
     if (play->is_mesh) target_check(name, copy_mesh(play, bytes));
     else if (play->motion.clips != 0) target_check(name, colonnade_motion_copy(&play->motion, &play->memory, bytes));
+    if (device->capabilities & COLONNADE_SHELL__CAPABILITIES__REFIT_bm)
+        for (uint64_t clip = 0, end = at + bytes + copy; clip < (play->is_mesh ? 1 : play->motion.clips); ++clip)
+            end = plan_refits(target, play, (uint32_t)clip, end);
     target_check(name, colonnade_set_scene(device, target->base + at));
 }
 
-/* Bends a mesh in the copy that the last frame does not read. Answers the number of writes. */
-static uint32_t bend_mesh(const struct play *play, uint32_t time, uint32_t root, uint8_t *writes) {
-    const struct colonnade_mesh *mesh = &play->mesh;
+/* Bends a mesh in the copy at `root`, which no frame reads: by the unit of the shell, if it has one. */
+static void bend(const struct target *target, struct colonnade *device, const struct play *play, uint32_t clip, uint32_t time,
+                 uint32_t root) {
+    const struct colonnade_mesh *mesh = play->is_mesh ? &play->mesh : &play->motion.meshes[clip];
     const struct colonnade_motion_memory *memory = &play->memory;
+    struct colonnade_refit_job job = play->jobs[clip];
+    const bool has_unit = job.entries != 0;
+    uint8_t *records = (uint8_t *)memory->scene + RECORD_BYTES * (size_t)root;
+    struct colonnade_vertex *vertices =
+        has_unit ? (struct colonnade_vertex *)(target->memory + (job.vertices - target->base)) : memory->vertices;
     struct colonnade_refit result;
-    colonnade_mesh_pose(mesh, time, memory->pose);
-    target_check("mesh", colonnade_mesh_skin(mesh, memory->pose, memory->vertices));
-    target_check("mesh", colonnade_mesh_refit(mesh, memory->vertices, memory->scene + RECORD_BYTES / 4 * (size_t)root, root,
-                                              memory->path, &result));
+    colonnade_mesh_pose(mesh, time < mesh->duration ? time : mesh->duration, memory->pose);
+    target_check("mesh", colonnade_mesh_skin(mesh, memory->pose, vertices));
+    if (has_unit) {
+        job.records = target->base + (uint64_t)(records - target->memory);
+        job.root = root;
+        target_check("refit", colonnade_refit_start(device, &job));
+        target_check("refit", colonnade_refit_wait(device, UINT32_MAX, &result));
+    } else target_check("mesh", colonnade_mesh_refit(mesh, vertices, (uint32_t *)records, root, memory->path, &result));
+}
+
+/* Bends the mesh that is all of the scene. Answers the number of writes. */
+static uint32_t bend_mesh(const struct target *target, struct colonnade *device, const struct play *play, uint32_t time,
+                          uint32_t root, uint8_t *writes) {
+    bend(target, device, play, 0, time, root);
     return colonnade_mesh_writes(&colonnade_design, root, play->records, writes);
 }
 
 /* Moves objects, and bends their meshes. Answers the number of writes. */
-static uint32_t move_objects(const struct colonnade *device, struct colonnade_view *view, struct play *play, uint32_t time,
-                             uint32_t number, uint8_t *writes) {
+static uint32_t move_objects(const struct target *target, struct colonnade *device, struct colonnade_view *view,
+                             struct play *play, uint32_t time, uint32_t number, uint8_t *writes) {
     const struct colonnade_motion *motion = &play->motion;
     struct colonnade_transform transforms[COLONNADE_INSTANCES];
     struct colonnade_instance *now = play->instances[number % 2];
     const struct colonnade_instance *before = number == 0 ? NULL : play->instances[(number + 1) % 2];
     colonnade_motion_transforms(motion, time, transforms);
     target_check("motion", colonnade_motion_find(motion, transforms, now));
-    target_check("mesh", colonnade_motion_bend(motion, device, &play->memory, time, before, now));
+    uint32_t roots[COLONNADE_INSTANCES];
+    target_check("mesh", colonnade_motion_swap(motion, device, before, now, roots));
+    for (uint32_t clip = 0; clip < motion->clips; ++clip) bend(target, device, play, clip, time, roots[clip]);
     const struct colonnade_shared shared = colonnade_find_shared(now, motion->objects);
     target_check("view", colonnade_view_set_bounds(view, shared.low, shared.high));
     return colonnade_motion_writes(motion, now, before, writes);
 }
 
 /* Finds the registers of a frame: those of the view, then those of what moves. */
-static void find_frames(const struct colonnade *device, struct colonnade_view *view, struct play *play, uint32_t number,
-                        uint32_t count, struct colonnade_frame frames[2]) {
+static void find_frames(const struct target *target, struct colonnade *device, struct colonnade_view *view, struct play *play,
+                        uint32_t number, uint32_t count, struct colonnade_frame frames[2]) {
     static uint8_t writes[8 * WRITES], moves[8 * COLONNADE_MOTION_WRITES];
     const uint32_t duration = play->is_mesh ? play->mesh.duration : play->motion.duration;
     const uint32_t time = (uint32_t)((uint64_t)duration * number / count);
-    const uint32_t moved = play->is_mesh ? bend_mesh(play, time, play->roots[number % 2], moves)
-                                         : move_objects(device, view, play, time, number, moves);
+    const uint32_t moved = play->is_mesh ? bend_mesh(target, device, play, time, play->roots[number % 2], moves)
+                                         : move_objects(target, device, view, play, time, number, moves);
     target_check("view", colonnade_view_frame(view, writes, WRITES, &frames[0]));
     frames[1] = frames[0];
     frames[1].writes = moves;
@@ -244,7 +288,7 @@ static void play_all(struct target *target, struct colonnade *device, struct col
     bool is_running = false;
     for (uint32_t number = 0; number < count && !is_ended; ++number) {
         struct colonnade_frame frames[2];
-        find_frames(device, view, play, number, count, frames);
+        find_frames(target, device, view, play, number, count, frames);
         for (int part = 0; part < 2; ++part) {
             enum colonnade_error error = colonnade_set_frame(device, &frames[part]);
             if (error == COLONNADE_BUSY && is_running) { /* the shell has no space for so many writes */
@@ -315,7 +359,8 @@ int main(int argc, char **argv) {
         render(&target, &device, &view, &speed);
         if (option == NULL) fprintf(stderr, "\r%.1f frames/s ", speed.frames / speed.seconds);
     }
-    fprintf(stderr, "%" PRIu32 " frames of %" PRIu32 "x%" PRIu32 ", %.2f frames/s, %" PRIu64 " cycles a frame\n", speed.frames,
-            start.width, start.height, speed.frames / speed.seconds, speed.cycles / speed.frames);
+    fprintf(stderr, "%" PRIu32 " frames of %" PRIu32 "x%" PRIu32 ", %.2f frames/s, %" PRIu64 " cycles a frame%s\n",
+            speed.frames, start.width, start.height, speed.frames / speed.seconds, speed.cycles / speed.frames,
+            play.jobs[0].entries != 0 ? ", bent by the shell's unit" : "");
     return 0;
 }

@@ -109,9 +109,10 @@ def shell_design_for(
     bus_bytes: int = 16,
     progress: Progress = QUIET,
     pixel_stream: bool = False,
+    refit: bool = False,
 ) -> GeneratedDesign:
     """Generate the device in its AXI4 shell, for simulation; ``shell.json`` has the shell's registers."""
-    options = (*_shell_options(bus_bytes), *("--pixel-stream",) * pixel_stream)
+    options = (*_shell_options(bus_bytes), *("--pixel-stream",) * pixel_stream, *("--refit",) * refit)
     return _cached(config, overrides, options, progress)
 
 

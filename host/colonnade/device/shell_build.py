@@ -40,6 +40,8 @@ def build_shell_simulator(design: GeneratedDesign, progress: Progress = QUIET) -
     tools = simulator_tools()
     harness = [Path(__file__).parent / "harness" / name for name in _HARNESS]
     ports = ports_header(design.manifest, design.sources)
+    if "m_axi_refit_awvalid" in next(path.read_text() for path in design.sources if path.stem == _TOP):
+        ports += "#define HAS_REFIT\n"
     parts = [
         *tools.versions,
         Path(__file__).read_text(),

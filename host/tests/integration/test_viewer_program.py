@@ -44,7 +44,7 @@ ORBITS = {
 def test_the_viewer_renders_the_orbit_of_its_camera(tmp_path: Path, case: str) -> None:
     """Its last frame is the model's, for the camera of the arguments."""
     overrides, arguments, count, (azimuth, elevation, distance) = ORBITS[case]
-    design = shell_design_for("tiny", ("array.columns=2", *overrides), bus_bytes=16)
+    design = shell_design_for("tiny", ("array.columns=2", *overrides))
     size, manifest = (24, 16), design.manifest
     scene = DeviceScene.of(
         load_scene(toolchain.project_root() / "scenes" / "object.toml"), manifest, load_mesh("torus")
@@ -79,9 +79,10 @@ def lines_of(frame: NDArray[np.uint8], size: tuple[int, int], manifest: Manifest
     return frame[: stride * size[1]].reshape(size[1], stride)
 
 
-def test_a_mesh_that_the_viewer_bends_has_the_frames_of_the_model(tmp_path: Path) -> None:
+@pytest.mark.parametrize("refit", [False, True], ids=["by the driver", "by the unit"])
+def test_a_mesh_that_the_viewer_bends_has_the_frames_of_the_model(tmp_path: Path, refit: bool) -> None:
     """It is all of the scene: a frame reads one of two copies of its records while the other one is bent."""
-    size, count, design = (24, 16), 5, shell_design_for("tiny", ("array.columns=2", *IN_DRAM), bus_bytes=16)
+    size, count, design = (24, 16), 5, shell_design_for("tiny", ("array.columns=2", *IN_DRAM), refit=refit)
     manifest = design.manifest
     arm().write(tmp_path / "arm.gltf")
     (tmp_path / "scene.toml").write_text('mesh = {path = "arm.gltf", animation = "bend"}\n')
@@ -90,7 +91,7 @@ def test_a_mesh_that_the_viewer_bends_has_the_frames_of_the_model(tmp_path: Path
     files |= {"scene": scene.dram_image()}
     arguments = ("interrupt", "image", "view", "--play", str(count), "clip", "scene")
     memory, (line,) = run_driver(tmp_path, design, files, *arguments, program="viewer")
-    assert line[:4] == [str(count), "frames", "of", "24x16,"]
+    assert line[:4] == [str(count), "frames", "of", "24x16,"] and ("unit" in line) == refit
     frames = [*(np.fromfile(tmp_path / f"frame.{number}", np.uint8) for number in range(count - 1)), memory[PAGE:]]
     registers, different = TargetView(files["view"], manifest).registers(), set[bytes]()
     for number, frame in enumerate(frames):
@@ -118,7 +119,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_the_viewer_cannot_show_is_refused_in_one_line(tmp_path: Path, case: str) -> None:
     in_dram, arguments, begin = REFUSED[case]
-    design = shell_design_for("tiny", ("array.columns=2", *(IN_DRAM if in_dram else ())), bus_bytes=16)
+    design = shell_design_for("tiny", ("array.columns=2", *(IN_DRAM if in_dram else ())))
     arm().write(tmp_path / "arm.gltf")
     (tmp_path / "scene.toml").write_text('mesh = {path = "arm.gltf", animation = "bend"}\n')
     scene = DeviceScene.of(load_scene(tmp_path / "scene.toml"), design.manifest)
@@ -174,19 +175,14 @@ transform = {scale = 0.6, translate = [0.2, 0.0, 0.2]}
 motion = {turn = 60.0, translate = [0.1, 0.0, -0.2]}
 """
 
-BENDS = "in DRAM, with a mesh that bends"
+BENDS, BY_UNIT = "in DRAM, with a mesh that bends", "in DRAM, with a mesh that the shell's unit bends"
+WALKING_SCENE = BENDING_SCENE.replace("CHARACTER", str(toolchain.project_root() / "scenes" / "character.gltf"))
 #: A scene, its design, and the number of frames.
 PLAYS = {
     "on chip": (MOVING_SCENE, ("frame.instances=2",), 4),
-    BENDS: (
-        BENDING_SCENE.replace("CHARACTER", str(toolchain.project_root() / "scenes" / "character.gltf")),
-        (
-            "frame.instances=4",
-            "frame.maxBounces=2",
-            *IN_DRAM,
-        ),
-        13,  # the steps of the figure are twelfths of the motion
-    ),
+    # The steps of the figure are twelfths of the motion
+    BENDS: (WALKING_SCENE, ("frame.instances=4", "frame.maxBounces=2", *IN_DRAM), 13),
+    BY_UNIT: (WALKING_SCENE, ("frame.instances=4", "frame.maxBounces=2", *IN_DRAM), 13),
 }
 
 
@@ -194,7 +190,7 @@ PLAYS = {
 def test_frames_that_the_viewer_plays_are_those_of_the_model(tmp_path: Path, case: str) -> None:
     """Each: registers are written, and meshes bent, while the frame before runs."""
     described, overrides, count = PLAYS[case]
-    size, design = (24, 16), shell_design_for("tiny", ("array.columns=2", *overrides), bus_bytes=16)
+    size, design = (24, 16), shell_design_for("tiny", ("array.columns=2", *overrides), refit=case == BY_UNIT)
     manifest = design.manifest
     in_dram = "line" in manifest.memories["columnBvh"]
     (tmp_path / "scene.toml").write_text(described)
@@ -205,7 +201,7 @@ def test_frames_that_the_viewer_plays_are_those_of_the_model(tmp_path: Path, cas
     files |= {"scene": scene.dram_image()} if in_dram else {}
     arguments = ("image", "view", "--play", str(count), "clip", *(["scene"] if in_dram else []))
     memory, (line,) = run_driver(tmp_path, design, files, "interrupt", *arguments, program="viewer")
-    assert line[:4] == [str(count), "frames", "of", "24x16,"]
+    assert line[:4] == [str(count), "frames", "of", "24x16,"] and ("unit" in line) == (case == BY_UNIT)
     names = [f"frame.{number}" for number in range(count - 1)]
     frames = [*(np.fromfile(tmp_path / name, np.uint8) for name in names), memory[PAGE:]]
     target, duration = TargetView(files["view"], manifest), round(moves.seconds * 65536)
@@ -227,7 +223,7 @@ def test_frames_that_the_viewer_plays_are_those_of_the_model(tmp_path: Path, cas
 def test_no_frame_reads_a_copy_that_is_written_or_a_stale_record(tmp_path: Path) -> None:
     """Of a mesh that bends, through a cache that keeps all records until it is invalidated."""
     described, overrides, _ = PLAYS[BENDS]
-    manifest = shell_design_for("tiny", ("array.columns=2", *overrides), bus_bytes=16).manifest
+    manifest = shell_design_for("tiny", ("array.columns=2", *overrides)).manifest
     (tmp_path / "scene.toml").write_text(described)
     scene = DeviceScene.of(load_scene(tmp_path / "scene.toml"), manifest)
     files = {"clip": scene.clip_file(), "scene": scene.dram_image()}

@@ -33,7 +33,6 @@ public:
     Harness(std::map<std::string, unsigned>& options, const std::string& shared) : memory_(top_, options, shared) {
         top_.s_axil_awvalid = top_.s_axil_wvalid = top_.s_axil_bready = top_.s_axil_arvalid = top_.s_axil_rready = 0;
         top_.s_axil_awprot = top_.s_axil_arprot = 0;
-        top_.m_axi_bvalid = top_.m_axi_rvalid = top_.m_axi_bresp = top_.m_axi_rresp = top_.m_axi_bid = top_.m_axi_rid = 0;
         top_.reset = 1;
         // Outputs mean nothing before the first edges: the registers begin with random values
         for (int i = 0; i < 2; ++i) {

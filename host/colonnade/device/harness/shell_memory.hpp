@@ -55,59 +55,72 @@ struct Scene {
 /// When a memory takes the address and the data of a write; AXI4 allows all of these.
 enum class WriteOrder : unsigned { any, addressAfterDataValid, dataAfterAddress, together, addressAfterLastBeat, count };
 
-/// The memory behind m_axi, whose answers come in order, and behind m_axi_scene.
-class Memory {
-public:
-    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options, const std::string& shared)
-        : top_(top), bus_(options["--bus"]), latency_(options["--latency"]), stall_(options["--stall"]),
-          order_(static_cast<WriteOrder>(options["--order"] % static_cast<unsigned>(WriteOrder::count))), random_(options["--seed"]),
-          bytes_(options["--base"], options["--memory"], shared), scene_(top, {latency_, stall_, 0, 0, options["--seed"]}, bytes_) {}
+#define EACH_MASTER_PIN(DO, prefix) \
+    DO(prefix, awvalid) \
+    DO(prefix, awready) DO(prefix, awaddr) DO(prefix, awlen) DO(prefix, awid) DO(prefix, wvalid) DO(prefix, wready) DO(prefix, wdata) DO(prefix, wstrb) \
+        DO(prefix, wlast) DO(prefix, bvalid) DO(prefix, bready) DO(prefix, bid) DO(prefix, bresp) DO(prefix, arvalid) DO(prefix, arready) DO(prefix, araddr) \
+            DO(prefix, arlen) DO(prefix, arid) DO(prefix, rvalid) DO(prefix, rready) DO(prefix, rdata) DO(prefix, rid) DO(prefix, rlast) DO(prefix, rresp)
+#define PIN(prefix, pin) decltype(VColonnadeAxi::prefix##_##pin) pin; // a reference, whose type depends on the width
+#define CONNECTED(prefix, pin) , pin(top.prefix##_##pin)
+/// A struct with the pins of an AXI4 master that reads and writes.
+#define MASTER(Name, prefix) \
+    struct Name { \
+        explicit Name(VColonnadeAxi& top) : model(top) EACH_MASTER_PIN(CONNECTED, prefix) {} \
+        VColonnadeAxi& model; \
+        EACH_MASTER_PIN(PIN, prefix) \
+    };
 
-    std::uint8_t* range(std::uint64_t address, std::uint64_t size) { return bytes_.range(address, size); }
+MASTER(MasterPins, m_axi)
+#ifdef HAS_REFIT
+MASTER(RefitPins, m_axi_refit)
+#endif
+
+/// The memory behind a master, whose answers come in order.
+template <class Pins> class MemoryPort {
+public:
+    MemoryPort(VColonnadeAxi& top, std::map<std::string, unsigned>& options, BusBytes& bytes)
+        : pins_(top), bus_(options["--bus"]), latency_(options["--latency"]), stall_(options["--stall"]),
+          order_(static_cast<WriteOrder>(options["--order"] % static_cast<unsigned>(WriteOrder::count))), random_(options["--seed"]), bytes_(bytes) {
+        pins_.bvalid = pins_.rvalid = pins_.bresp = pins_.rresp = pins_.bid = pins_.rid = 0;
+    }
 
     /// Sets the inputs for this cycle. What is offered stays.
     void offer() {
         ++now_;
         offerWrites();
-        top_.m_axi_arready = moves();
-        top_.m_axi_bvalid = top_.m_axi_bvalid ? 1 : !answers_.empty() && answers_.front().due <= now_ && moves();
-        if (top_.m_axi_bvalid) top_.m_axi_bid = static_cast<CData>(answers_.front().id);
-        top_.m_axi_rvalid = top_.m_axi_rvalid ? 1 : !reads_.empty() && reads_.front().due <= now_ && moves();
-        if (top_.m_axi_rvalid) {
+        pins_.arready = moves();
+        pins_.bvalid = pins_.bvalid ? 1 : !answers_.empty() && answers_.front().due <= now_ && moves();
+        if (pins_.bvalid) pins_.bid = static_cast<CData>(answers_.front().id);
+        pins_.rvalid = pins_.rvalid ? 1 : !reads_.empty() && reads_.front().due <= now_ && moves();
+        if (pins_.rvalid) {
             const Burst& read = reads_.front();
-            std::memcpy(&top_.m_axi_rdata, range(read.address + read.done * bus_, bus_), bus_);
-            top_.m_axi_rid = static_cast<CData>(read.id);
-            top_.m_axi_rlast = read.done + 1 == read.beats;
+            std::memcpy(&pins_.rdata, bytes_.range(read.address + read.done * bus_, bus_), bus_);
+            pins_.rid = static_cast<CData>(read.id);
+            pins_.rlast = read.done + 1 == read.beats;
         }
-        scene_.offer();
-        top_.eval();
     }
 
     /// Takes the transfers of this cycle; afterwards `offer` may change what was taken.
     void take() {
         checkOrder();
-        if (top_.m_axi_awvalid && top_.m_axi_awready) writes_.push_back(burst(top_.m_axi_awaddr, top_.m_axi_awlen, top_.m_axi_awid));
-        if (top_.m_axi_arvalid && top_.m_axi_arready) reads_.push_back(burst(top_.m_axi_araddr, top_.m_axi_arlen, top_.m_axi_arid));
-        if (top_.m_axi_wvalid && top_.m_axi_wready) takeBeat();
+        if (pins_.awvalid && pins_.awready) writes_.push_back(burst(pins_.awaddr, pins_.awlen, pins_.awid));
+        if (pins_.arvalid && pins_.arready) reads_.push_back(burst(pins_.araddr, pins_.arlen, pins_.arid));
+        if (pins_.wvalid && pins_.wready) takeBeat();
         while (!writes_.empty() && !beats_.empty()) write();
-        if (top_.m_axi_bvalid && top_.m_axi_bready) {
+        if (pins_.bvalid && pins_.bready) {
             answers_.pop_front();
             takenB_ = true;
         }
-        if (top_.m_axi_rvalid && top_.m_axi_rready) {
+        if (pins_.rvalid && pins_.rready) {
             if (++reads_.front().done == reads_.front().beats) reads_.pop_front();
             takenR_ = true;
         }
-        scene_.take();
     }
-
-    /// So many of 1024 beats of the scene's reads fail from now on.
-    void failScene(unsigned errorsPer1024) { scene_.fail(errorsPer1024); }
 
     /// After the clock edge: withdraws what was taken.
     void finish() {
-        if (takenB_) top_.m_axi_bvalid = 0;
-        if (takenR_) top_.m_axi_rvalid = 0;
+        if (takenB_) pins_.bvalid = 0;
+        if (takenR_) pins_.rvalid = 0;
         takenB_ = takenR_ = false;
     }
 
@@ -127,12 +140,12 @@ private:
     Burst burst(std::uint64_t address, unsigned length, unsigned id) {
         const std::uint64_t first = address / bus_ * bus_, end = first + (length + 1ull) * bus_;
         if (first / 4096 != (end - 1) / 4096) throw std::runtime_error("a burst crosses a page of 4 KB");
-        range(first, end - first);
+        bytes_.range(first, end - first);
         return {first, now_ + latency_, length + 1, 0, id};
     }
 
     void offerWrites() {
-        const bool hasAddress = top_.m_axi_awvalid, hasData = top_.m_axi_wvalid;
+        const bool hasAddress = pins_.awvalid, hasData = pins_.wvalid;
         bool takesAddress = moves(), takesData = moves();
         switch (order_) {
         case WriteOrder::addressAfterDataValid: takesAddress &= hasData || !beats_.empty(); break;
@@ -144,25 +157,25 @@ private:
         case WriteOrder::addressAfterLastBeat: takesAddress &= wholeBursts_ > 0; break;
         default: break;
         }
-        top_.m_axi_awready = takesAddress;
-        top_.m_axi_wready = takesData;
+        pins_.awready = takesAddress;
+        pins_.wready = takesData;
     }
 
     /// No data are offered before their address is.
     void checkOrder() {
-        if (top_.m_axi_awvalid && !isAnnounced_) ++announced_;
-        isAnnounced_ = top_.m_axi_awvalid && !top_.m_axi_awready;
-        if (!top_.m_axi_wvalid) return;
+        if (pins_.awvalid && !isAnnounced_) ++announced_;
+        isAnnounced_ = pins_.awvalid && !pins_.awready;
+        if (!pins_.wvalid) return;
         if (isFirstBeat_) ++begun_;
-        isFirstBeat_ = top_.m_axi_wready && top_.m_axi_wlast;
+        isFirstBeat_ = pins_.wready && pins_.wlast;
         if (begun_ > announced_) throw std::runtime_error("data are offered before their address");
     }
 
     void takeBeat() {
         Beat beat;
-        std::memcpy(beat.data, &top_.m_axi_wdata, bus_);
-        std::memcpy(beat.strobes, &top_.m_axi_wstrb, (bus_ + 7) / 8);
-        beat.isLast = top_.m_axi_wlast;
+        std::memcpy(beat.data, &pins_.wdata, bus_);
+        std::memcpy(beat.strobes, &pins_.wstrb, (bus_ + 7) / 8);
+        beat.isLast = pins_.wlast;
         wholeBursts_ += beat.isLast;
         beats_.push_back(beat);
     }
@@ -172,7 +185,7 @@ private:
         const Beat beat = beats_.front();
         beats_.pop_front();
         wholeBursts_ -= beat.isLast;
-        std::uint8_t* to = range(burst.address + burst.done * bus_, bus_);
+        std::uint8_t* to = bytes_.range(burst.address + burst.done * bus_, bus_);
         for (unsigned i = 0; i < bus_; ++i)
             if (beat.strobes[i / 8] >> i % 8 & 1) to[i] = beat.data[i];
         ++burst.done;
@@ -183,15 +196,65 @@ private:
         writes_.pop_front();
     }
 
-    VColonnadeAxi& top_;
+    Pins pins_;
     unsigned bus_, latency_, stall_;
     WriteOrder order_;
     std::mt19937 random_;
-    BusBytes bytes_;
-    Scene scene_;
+    BusBytes& bytes_;
     std::deque<Burst> writes_, reads_, answers_;
     std::deque<Beat> beats_;        // without their address
     unsigned wholeBursts_ = 0;      // of them
     std::uint64_t now_ = 0, announced_ = 0, begun_ = 0; // addresses that were offered, bursts whose data were
     bool isAnnounced_ = false, isFirstBeat_ = true, takenB_ = false, takenR_ = false;
+};
+
+/// The memory behind all masters.
+class Memory {
+public:
+    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options, const std::string& shared)
+        : top_(top), bytes_(options["--base"], options["--memory"], shared), master_(top, options, bytes_), refit_(top, options, bytes_),
+          scene_(top, {options["--latency"], options["--stall"], 0, 0, options["--seed"]}, bytes_) {}
+
+    std::uint8_t* range(std::uint64_t address, std::uint64_t size) { return bytes_.range(address, size); }
+
+    /// Sets the inputs for this cycle. What is offered stays.
+    void offer() {
+        master_.offer();
+        refit_.offer();
+        scene_.offer();
+        top_.eval();
+    }
+
+    /// Takes the transfers of this cycle; afterwards `offer` may change what was taken.
+    void take() {
+        master_.take();
+        refit_.take();
+        scene_.take();
+    }
+
+    /// So many of 1024 beats of the scene's reads fail from now on.
+    void failScene(unsigned errorsPer1024) { scene_.fail(errorsPer1024); }
+
+    /// After the clock edge: withdraws what was taken.
+    void finish() {
+        master_.finish();
+        refit_.finish();
+    }
+
+private:
+    VColonnadeAxi& top_;
+    BusBytes bytes_;
+    MemoryPort<MasterPins> master_;
+#ifdef HAS_REFIT
+    MemoryPort<RefitPins> refit_;
+#else
+    /// A shell without the unit.
+    struct Nothing {
+        Nothing(VColonnadeAxi&, std::map<std::string, unsigned>&, BusBytes&) {}
+        void offer() {}
+        void take() {}
+        void finish() {}
+    } refit_;
+#endif
+    Scene scene_;
 };
