@@ -98,9 +98,9 @@ class Moved:
     def figures(self, energy: Energy) -> dict[str, float | None]:
         """Means of a frame with all of its samples.
 
-        Keys: ``refit``, milliseconds, and ``triangles``, refitted in one; ``rays`` in the objects' box, ``nodes``,
-        read by one of them, ``worst_nodes``, of the worst frame; ``steps`` of marches; ``frame``, milliseconds;
-        ``rate``, a second; ``millijoules``.
+        Keys: ``encode``, milliseconds; ``refit``, milliseconds, and ``triangles``, refitted in one; ``rays`` in the
+        objects' box, ``nodes``, read by one of them, ``worst_nodes``, of the worst frame; ``steps`` of marches;
+        ``load`` of the maps and ``frame``, milliseconds; ``rate``, of both, a second; ``millijoules``.
         """
 
         def mean(value: Callable[[MovedCost], float]) -> float:
@@ -110,15 +110,18 @@ class Moved:
         rays = mean(lambda cost: cost.samples * cost.rays_in_box)
         cycles = [cost.samples * cost.cycles for cost in self.costs if cost.cycles is not None]
         frame = 1e-3 * sum(cycles) / len(cycles) / MEGAHERTZ if cycles else None
+        load = 1e-3 * mean(lambda cost: cost.load_cycles) / MEGAHERTZ
         return {
+            "encode": mean(lambda cost: cost.encode_ms),
             "refit": refit,
             "triangles": self.triangles / refit,
             "rays": rays,
             "nodes": mean(lambda cost: cost.node_reads) / mean(lambda cost: cost.rays_in_box),
             "worst_nodes": max(cost.node_reads / max(cost.rays_in_box, 1) for cost in self.costs),
             "steps": mean(lambda cost: cost.samples * cost.march_steps),
+            "load": load,
             "frame": frame,
-            "rate": None if frame is None else 1e3 / frame,
+            "rate": None if frame is None else 1e3 / (load + frame),
             "millijoules": 1e-6 * rays * energy.nanojoules,
         }
 
@@ -126,14 +129,16 @@ class Moved:
         """Rows of the page's table."""
         found = self.figures(energy)
         names = {
+            "encode": "live encoder on a core: ms",
             "refit": "pose, vertices and records, the driver on a core: ms",
             "triangles": "refitted triangles a millisecond",
             "rays": "rays in the objects' box",
             "nodes": "nodes that one of them reads",
             "worst_nodes": "of the worst frame",
             "steps": "march steps",
+            "load": "load of the maps, 200 MHz: ms",
             "frame": "frame, 200 MHz: ms",
-            "rate": "frames a second",
+            "rate": "frames a second of the device",
             "millijoules": "energy of the rays: mJ",
         }
         return [

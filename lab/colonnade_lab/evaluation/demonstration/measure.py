@@ -76,14 +76,15 @@ class Demonstration:
     rtl_frames: Collection[int]
 
 
-class _Encoder:
-    """The live encoder, with the CPU time of the last frame."""
+class TimedEncoder:
+    """The live encoder for a design's maps of a sequence; `milliseconds` is the CPU time of the last frame."""
 
-    def __init__(self, demonstration: Demonstration) -> None:
-        self._live = LiveEncoder(layout_of(demonstration.design.manifest), demonstration.sequence.content.depth_noise)
+    def __init__(self, design: GeneratedDesign, sequence: Sequence) -> None:
+        self._live = LiveEncoder(layout_of(design.manifest), sequence.content.depth_noise)
         self.milliseconds = 0.0
 
     def __call__(self, room: Environment) -> AttributeImage:
+        """Encode the maps of a room."""
         frame = LiveFrame.of(room)
         begun = time.thread_time()
         image = self._live.encode(frame).image
@@ -106,7 +107,11 @@ def run(
         progress: Shows the frames.
     """
     sequence, manifest = demonstration.sequence, demonstration.design.manifest
-    size, encoder, costs = (sequence.content.width, sequence.content.height), _Encoder(demonstration), []
+    size, encoder, costs = (
+        (sequence.content.width, sequence.content.height),
+        TimedEncoder(demonstration.design, sequence),
+        [],
+    )
     scene = exposed(demonstration.scene).with_samples(demonstration.samples)
     scenes = sequence_scenes(sequence, scene, manifest, size, encoder, every=every)
     with progress.step(f"rendering {len(sequence)} frames with maps of every {every}") as report:

@@ -6,7 +6,7 @@ hide, and several samples a pixel at edges.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -133,11 +133,18 @@ def _sphere(count: int) -> Floats:
 
 def write_walk(folder: Path, size: tuple[int, int], frames: int = FRAMES, progress: Progress = QUIET) -> Path:
     """Write the sequence of the loop, and return its file."""
+    return write_sequence(folder, size, [camera_of(number / frames, *size) for number in range(frames)], progress)
+
+
+def write_sequence(
+    folder: Path, size: tuple[int, int], cameras: Sequence[EnvironmentCamera], progress: Progress = QUIET
+) -> Path:
+    """Write the sequence of cameras in the attic, and return its file."""
     folder.mkdir(parents=True, exist_ok=True)
-    one = partial(_write_frame, folder, size, frames)
-    with progress.step(f"rendering {frames} photos and depth maps of the attic") as report:
-        for done, _ in enumerate(_mapped(one, range(frames)), 1):
-            report(done / frames)
+    one = partial(_write_frame, folder, size)
+    with progress.step(f"rendering {len(cameras)} photos and depth maps of the attic") as report:
+        for done, _ in enumerate(_mapped(one, enumerate(cameras)), 1):
+            report(done / len(cameras))
     lines = [
         f"width = {size[0]}",
         f"height = {size[1]}",
@@ -145,8 +152,7 @@ def write_walk(folder: Path, size: tuple[int, int], frames: int = FRAMES, progre
         f"depth_step = {DEPTH_STEP}",
         "depth_noise = 0.0",
     ]
-    for number in range(frames):
-        camera = camera_of(number / frames, *size)
+    for number, camera in enumerate(cameras):
         lines += ["", "[[frame]]", f"time = {number / RATE}"]
         lines += [f'{key} = "{number:04d}{suffix}"' for key, suffix in _FILES.items()]
         lines += [f"{key} = {getattr(camera, key)}" for key in ("fx", "fy", "cx", "cy")]
@@ -159,18 +165,19 @@ def write_walk(folder: Path, size: tuple[int, int], frames: int = FRAMES, progre
 _FILES = {"photo": ".png", "depth": ".depth.png", "albedo": ".albedo.png", "normal": ".normal.png"}
 
 
-def _mapped(function: partial[None], numbers: Iterable[int]) -> Iterator[None]:
+def _mapped(function: partial[None], numbered: Iterable[tuple[int, EnvironmentCamera]]) -> Iterator[None]:
     if processors() == 1:
-        yield from map(function, numbers)
+        yield from map(function, numbered)
         return
     with ProcessPoolExecutor(processors()) as pool:
-        yield from pool.map(function, numbers)
+        yield from pool.map(function, numbered)
 
 
-def _write_frame(folder: Path, size: tuple[int, int], frames: int, number: int) -> None:
+def _write_frame(folder: Path, size: tuple[int, int], numbered: tuple[int, EnvironmentCamera]) -> None:
     from PIL import Image
 
-    view = attic_view(RoomModel("attic", attic_parts()), camera_of(number / frames, *size), *size)
+    number, camera = numbered
+    view = attic_view(RoomModel("attic", attic_parts()), camera, *size)
     write_png(folder / f"{number:04d}{_FILES['albedo']}", view.albedo)
     pictures = {
         "photo": view.photo,

@@ -72,28 +72,42 @@ def test_the_page_adds_up(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rtl", [[], pytest.param([1], marks=pytest.mark.verilator)])
 def test_costs_of_frames_of_objects_that_move(tmp_path: Path, rtl: list[int]) -> None:
-    ball = 'mesh = {name = "sphere:2"}\nsize = 0.3\n'
-    text = f"[[object]]\n{ball}stand_at = [40, 55]\nmotion = {{translate = [0.4, 0.1, 0.0]}}\n"
-    text += f'[[object]]\n{ball}stand_at = [60, 60]\nmaterial = {{kind = "mirror"}}\n[background]\nroom = "attic"\n'
-    text += "[light]\nposition = [0.6, 2.2, 0.6]\n[paths]\ngather = 1\n[frame]\nsamples = 2\n"
+    """Before a camera that moves, in maps of each frame."""
+    ball = 'mesh = {name = "sphere:2"}\n'
+    text = f"[[object]]\n{ball}transform = {{scale = 0.15, translate = [0.1, 0.9, 0.0]}}\n"
+    text += "motion = {translate = [0.4, 0.1, 0.0]}\n"
+    text += f'[[object]]\n{ball}transform = {{scale = 0.15, translate = [0.5, 0.3, 0.6]}}\nmaterial.kind = "mirror"\n'
+    text += '[background]\nroom = "attic"\n[camera]\nposition = [0.9, 1.55, 2.5]\ntarget = [0.2, 0.72, -0.4]\n'
+    text += "[[motion.camera]]\nposition = [0.7, 1.5, 2.3]\n[light]\nposition = [0.6, 2.2, 0.6]\n"
+    text += "[paths]\ngather = 1\n[frame]\nsamples = 2\n"
     (tmp_path / "scene.toml").write_text(text)
     write_attic(tmp_path / "attic", *SIZE)
     frames: list[np.ndarray] = []
     scene, design = load_scene(tmp_path / "scene.toml"), design_for("small", SINGLE)
-    triangles, costs = moved.run(scene, design, SIZE, 3, frames.append, rtl)
+    path = moved.cameras(scene, SIZE, 3)
+    np.testing.assert_allclose([camera.to_world[:, 3] for camera in path[::2]], [[0.9, 1.55, 2.5], [0.7, 1.5, 2.3]])
+    forward = path[0].to_world[:, 2]
+    np.testing.assert_allclose(np.cross(forward, [-0.7, -0.83, -2.9]), 0.0, atol=1e-12)
+    sequence = load_sequence(walk.write_sequence(tmp_path / "path", SIZE, path))
+    triangles, costs = moved.run(scene, sequence, design, frames.append, rtl)
     assert triangles > 0 and [frame.shape for frame in frames] == [(72, 96, 3)] * 3
     assert not np.array_equal(frames[0], frames[2])
     assert [cost.cycles is not None for cost in costs] == [number in rtl for number in range(3)]
     assert all(cost.differing == 0 and cost.rays_in_box > 0 and cost.refit_ms > 0 for cost in costs)
+    assert all(cost.encode_ms > 0 and cost.load_cycles > 0 for cost in costs)
 
 
 def test_the_page_has_the_objects(tmp_path: Path) -> None:
     (tmp_path / "a.mp4").write_bytes(b"film")
-    costs = [moved.MovedCost(4, 2.0, 1000, 3000, 5), moved.MovedCost(4, 4.0, 3000, 7000, 5, 100_000)]
+    costs = [
+        moved.MovedCost(4, 9.0, 2.0, 50_000, 1000, 3000, 5),
+        moved.MovedCost(4, 9.0, 4.0, 150_000, 3000, 7000, 5, 100_000),
+    ]
     objects = Moved(6000, costs, tmp_path / "a.mp4", 30.0)
     found = objects.figures(Energy(1.5, ""))
     assert found["triangles"] == pytest.approx(2000.0) and found["nodes"] == pytest.approx(2.5)
     assert found["worst_nodes"] == pytest.approx(3.0) and found["frame"] == pytest.approx(2.0)
-    assert found["rate"] == pytest.approx(500.0) and found["millijoules"] == pytest.approx(0.012)
+    assert found["load"] == pytest.approx(0.5) and found["encode"] == pytest.approx(9.0)
+    assert found["rate"] == pytest.approx(400.0) and found["millijoules"] == pytest.approx(0.012)
     text = page([], (640, 480), 30.0, [], Energy(1.5, ""), objects)
     assert "data:video/mp4;base64,ZmlsbQ==" in text and "6,000 triangles" in text and "100,000" in text
