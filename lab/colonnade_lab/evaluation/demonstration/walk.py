@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -169,7 +170,8 @@ def _mapped(function: partial[None], numbered: Iterable[tuple[int, EnvironmentCa
     if processors() == 1:
         yield from map(function, numbered)
         return
-    with ProcessPoolExecutor(processors()) as pool:
+    # Not copies of this process: they would lack the threads of Embree, and may wait for them for ever
+    with ProcessPoolExecutor(processors(), get_context("spawn")) as pool:
         yield from pool.map(function, numbered)
 
 
