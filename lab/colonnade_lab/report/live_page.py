@@ -85,12 +85,14 @@ class Moved:
 
     Attributes:
         triangles: Of all objects.
+        bent: Those of meshes that bend.
         costs: Of its frames.
         video: MP4 file.
         rate: Frames a second of the video.
     """
 
     triangles: int
+    bent: int
     costs: Sequence[MovedCost]
     video: Path
     rate: float
@@ -114,7 +116,7 @@ class Moved:
         return {
             "encode": mean(lambda cost: cost.encode_ms),
             "refit": refit,
-            "triangles": self.triangles / refit,
+            "triangles": self.bent / refit,
             "rays": rays,
             "nodes": mean(lambda cost: cost.node_reads) / mean(lambda cost: cost.rays_in_box),
             "worst_nodes": max(cost.node_reads / max(cost.rays_in_box, 1) for cost in self.costs),

@@ -79,8 +79,8 @@ def run(
     take: Callable[[NDArray[np.uint8]], None],
     rtl_frames: Collection[int] = (),
     progress: Progress = QUIET,
-) -> tuple[int, list[MovedCost]]:
-    """Render frames of a scene's motion; answers its triangles, and what each frame takes.
+) -> tuple[int, int, list[MovedCost]]:
+    """Render frames of a scene's motion; answers its triangles, how many of them bend, and what each frame takes.
 
     Args:
         scene: The scene, whose objects have transforms; it names its samples. The cameras are the sequence's.
@@ -91,7 +91,7 @@ def run(
         progress: Shows the frames.
     """
     frames, size = len(sequence), (sequence.content.width, sequence.content.height)
-    encoder, history, costs, triangles = TimedEncoder(design, sequence), History(), list[MovedCost](), 0
+    encoder, history, costs = TimedEncoder(design, sequence), History(), list[MovedCost]()
     here = exposed(replace(scene, camera=Camera(), motion=replace(scene.motion, camera=())))
     scenes = sequence_scenes(sequence, here, design.manifest, size, encoder)
     with progress.step(f"rendering {frames} frames of {len(scene.objects)} objects") as report:
@@ -108,9 +108,10 @@ def run(
             require_no_errors(found.frame.errors)
             take(frame.pixels(found))
             costs.append(_cost(posed, design, registers, (encoder.milliseconds, refit_ms), number in rtl_frames))
-            triangles = posed.image.header.triangles
             report((number + 1) / frames)
-    return triangles, costs
+    assert prepared.mesh is not None
+    bent = sum(len(one.faces) for one in prepared.mesh.objects if one.clip is not None)
+    return prepared.image.header.triangles, bent, costs
 
 
 def _cost(

@@ -89,8 +89,8 @@ def test_costs_of_frames_of_objects_that_move(tmp_path: Path, rtl: list[int]) ->
     forward = path[0].to_world[:, 2]
     np.testing.assert_allclose(np.cross(forward, [-0.7, -0.83, -2.9]), 0.0, atol=1e-12)
     sequence = load_sequence(walk.write_sequence(tmp_path / "path", SIZE, path))
-    triangles, costs = moved.run(scene, sequence, design, frames.append, rtl)
-    assert triangles > 0 and [frame.shape for frame in frames] == [(72, 96, 3)] * 3
+    triangles, bent, costs = moved.run(scene, sequence, design, frames.append, rtl)
+    assert triangles > 0 and bent == 0 and [frame.shape for frame in frames] == [(72, 96, 3)] * 3
     assert not np.array_equal(frames[0], frames[2])
     assert [cost.cycles is not None for cost in costs] == [number in rtl for number in range(3)]
     assert all(cost.differing == 0 and cost.rays_in_box > 0 and cost.refit_ms > 0 for cost in costs)
@@ -103,11 +103,11 @@ def test_the_page_has_the_objects(tmp_path: Path) -> None:
         moved.MovedCost(4, 9.0, 2.0, 50_000, 1000, 3000, 5),
         moved.MovedCost(4, 9.0, 4.0, 150_000, 3000, 7000, 5, 100_000),
     ]
-    objects = Moved(6000, costs, tmp_path / "a.mp4", 30.0)
+    objects = Moved(9000, 6000, costs, tmp_path / "a.mp4", 30.0)
     found = objects.figures(Energy(1.5, ""))
     assert found["triangles"] == pytest.approx(2000.0) and found["nodes"] == pytest.approx(2.5)
     assert found["worst_nodes"] == pytest.approx(3.0) and found["frame"] == pytest.approx(2.0)
     assert found["load"] == pytest.approx(0.5) and found["encode"] == pytest.approx(9.0)
     assert found["rate"] == pytest.approx(400.0) and found["millijoules"] == pytest.approx(0.012)
     text = page([], (640, 480), 30.0, [], Energy(1.5, ""), objects)
-    assert "data:video/mp4;base64,ZmlsbQ==" in text and "6,000 triangles" in text and "100,000" in text
+    assert "data:video/mp4;base64,ZmlsbQ==" in text and "9,000 triangles" in text and "100,000" in text
