@@ -144,7 +144,7 @@ class Moved:
             "millijoules": "energy of the rays: mJ",
         }
         return [
-            {"name": name, "cell": "–" if (value := found[key]) is None else f"{value:,.4g}"}
+            {"name": name, "cell": "–" if (value := found[key]) is None else _number(value)}
             for key, name in names.items()
         ]
 
@@ -155,6 +155,10 @@ class Moved:
             for number, cost in enumerate(self.costs)
             if cost.cycles is not None
         ]
+
+
+def _number(value: float) -> str:
+    return f"{value:,.0f}" if value >= 1000 else f"{value:.4g}"
 
 
 def page(
