@@ -86,9 +86,7 @@ public:
     /// The address of the root of each mesh that bends, and its duration, 2^-16 s.
     auto meshes() const {
         std::vector<std::tuple<std::uint32_t, std::uint32_t>> result;
-        for (std::uint32_t i = 0; i < motion_.clips; ++i) {
-            result.emplace_back(motion_.roots[i][0], motion_.meshes[i].duration);
-        }
+        for (std::uint32_t i = 0; i < motion_.clips; ++i) { result.emplace_back(motion_.roots[i][0], motion_.meshes[i].duration); }
         return result;
     }
 

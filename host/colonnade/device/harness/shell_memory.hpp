@@ -55,11 +55,14 @@ struct Scene {
 /// When a memory takes the address and the data of a write; AXI4 allows all of these.
 enum class WriteOrder : unsigned { any, addressAfterDataValid, dataAfterAddress, together, addressAfterLastBeat, count };
 
+// clang-format off
 #define EACH_MASTER_PIN(DO, prefix) \
-    DO(prefix, awvalid) \
-    DO(prefix, awready) DO(prefix, awaddr) DO(prefix, awlen) DO(prefix, awid) DO(prefix, wvalid) DO(prefix, wready) DO(prefix, wdata) DO(prefix, wstrb) \
-        DO(prefix, wlast) DO(prefix, bvalid) DO(prefix, bready) DO(prefix, bid) DO(prefix, bresp) DO(prefix, arvalid) DO(prefix, arready) DO(prefix, araddr) \
-            DO(prefix, arlen) DO(prefix, arid) DO(prefix, rvalid) DO(prefix, rready) DO(prefix, rdata) DO(prefix, rid) DO(prefix, rlast) DO(prefix, rresp)
+    DO(prefix, awvalid) DO(prefix, awready) DO(prefix, awaddr) DO(prefix, awlen) DO(prefix, awid) \
+    DO(prefix, wvalid) DO(prefix, wready) DO(prefix, wdata) DO(prefix, wstrb) DO(prefix, wlast) \
+    DO(prefix, bvalid) DO(prefix, bready) DO(prefix, bid) DO(prefix, bresp) \
+    DO(prefix, arvalid) DO(prefix, arready) DO(prefix, araddr) DO(prefix, arlen) DO(prefix, arid) \
+    DO(prefix, rvalid) DO(prefix, rready) DO(prefix, rdata) DO(prefix, rid) DO(prefix, rlast) DO(prefix, rresp)
+// clang-format on
 #define PIN(prefix, pin) decltype(VColonnadeAxi::prefix##_##pin) pin; // a reference, whose type depends on the width
 #define CONNECTED(prefix, pin) , pin(top.prefix##_##pin)
 /// A struct with the pins of an AXI4 master that reads and writes.
