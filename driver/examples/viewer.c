@@ -180,8 +180,8 @@ static enum colonnade_error copy_mesh(struct play *play, uint32_t bytes) {
                                play->memory.path);
 }
 
-/* Plans the refits of a mesh by the unit, which reads vertices and plan in the device's memory, from byte `at` on.
- * Answers the first byte behind them. */
+/* Plans the refits of a mesh by the unit, which reads vertices and plan in the device's memory, from byte `at` on. Answers
+ * the first byte behind them; `at` for a mesh that is too deep for the unit, or without space. */
 static uint64_t plan_refits(const struct target *target, struct play *play, uint32_t clip, uint64_t at) {
     const struct colonnade_mesh *mesh = play->is_mesh ? &play->mesh : &play->motion.meshes[clip];
     const uint32_t root = play->is_mesh ? 0 : play->motion.roots[clip][0];
@@ -190,13 +190,15 @@ static uint64_t plan_refits(const struct target *target, struct play *play, uint
     const uint64_t vertices = (at + LINE_BYTES - 1) / LINE_BYTES * LINE_BYTES;
     const uint64_t plan =
         vertices + ((uint64_t)mesh->vertices + COLONNADE_LINE_VERTICES - 1) / COLONNADE_LINE_VERTICES * LINE_BYTES;
-    target_check("mesh", colonnade_mesh_plan(mesh, records, root, play->memory.path, lines, NULL, &entries));
-    const uint64_t end = plan + (uint64_t)4 * COLONNADE_PLAN_WORDS * entries;
-    if (end > target->size) target_fail("memory", "has no space for a refit by the unit");
-    uint32_t *words = (uint32_t *)(target->memory + plan);
-    target_check("mesh", colonnade_mesh_plan(mesh, records, root, play->memory.path, lines, words, &entries));
-    play->jobs[clip] = (struct colonnade_refit_job){target->base + plan, target->base + vertices, 0, entries,
-                                                    mesh->vertices,      mesh->records,           0};
+    uint64_t end = at;
+    if (colonnade_mesh_plan(mesh, records, root, play->memory.path, lines, NULL, &entries) == COLONNADE_OK &&
+        plan + (uint64_t)4 * COLONNADE_PLAN_WORDS * entries <= target->size) {
+        end = plan + (uint64_t)4 * COLONNADE_PLAN_WORDS * entries;
+        uint32_t *words = (uint32_t *)(target->memory + plan);
+        target_check("mesh", colonnade_mesh_plan(mesh, records, root, play->memory.path, lines, words, &entries));
+        play->jobs[clip] = (struct colonnade_refit_job){target->base + plan, target->base + vertices, 0, entries,
+                                                        mesh->vertices,      mesh->records,           0};
+    }
     free(lines);
     return end;
 }
