@@ -131,7 +131,8 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
   }
   private val marches = environment.map { maps =>
     val marches = Module(new EnvironmentMarches(PathConfig(config))).io
-    marches.view := io.registers.environment.get
+    marches.view  := io.registers.environment.get
+    marches.start := io.start
     marches.paths :<>= units.marches.get
     maps.ports.zip(marches.maps).foreach { case (port, march) => port <> march }
     marches

@@ -1,12 +1,33 @@
 package colonnade.environment
 
 import chisel3._
+import colonnade.microcode.Overlap
+
+/** The request for a ray's first tile, which is made before the DDA is set up. */
+final class FirstTile(m: MarchOperations) {
+  import m.program._
+
+  val isAsked:   Bool = RegInit(false.B) // the request is not yet accepted
+  val isPending: Bool = RegInit(false.B) // requested, and not yet used
+  val hasCome:   Bool = RegInit(false.B) // and it is in `TileStepper.tile`
+
+  /** In a step: requests it. */
+  def request(condition: Bool): Unit = {
+    set(isAsked, condition)
+    set(isPending, condition)
+  }
+
+  /** In a step: it is used. */
+  def take(): Unit = {
+    set(isPending, false.B)
+    set(hasCome, false.B)
+  }
+}
 
 /** Set-up of the digital differential analyser (DDA) that walks through tiles: the ray's first tile, and along each axis
   * the distance to the first tile edge and from edge to edge.
   */
-final class DdaSetup(m: MarchOperations) {
-  import MarchLabel._
+final class DdaSetup(m: MarchOperations, first: FirstTile) {
   import m.formats._
   import m.program._
 
@@ -16,66 +37,77 @@ final class DdaSetup(m: MarchOperations) {
   val edge:   Vec[UInt] = Reg(Vec(2, UInt(distanceBits.W)))
   val stride: Vec[UInt] = Reg(Vec(2, UInt(distanceBits.W)))
 
+  val isOutside: Bool = Reg(Bool()) // the origin is outside the map
+
   val maxDistance: UInt = ((BigInt(1) << distanceBits) - 1).U(distanceBits.W)
 
-  private val tileWidth   = pixelFraction + layout.tileLog
-  private val isOutside   = Reg(Bool())
-  private val remainder   = Reg(UInt((tileWidth + 1).W))
-  private val coordinates = m.uvwOrigin.take(2).map(_.asUInt)
-  private val speed       = m.uvwDir(m.axis)
-  private val inTile      = VecInit(coordinates.map(_(tileWidth - 1, 0)))(m.axis(0))
+  private val tileWidth = pixelFraction + layout.tileLog
+  private val remainder = Reg(UInt((tileWidth + 1).W))
 
   def isNegative(axis: UInt): Bool = m.uvwDir(axis | 0.U(2.W)) < 0.S
 
-  /** Steps that end with u and v relative to the map's centre; then at `BoundingPlanes` if the origin is outside the map. */
+  /** The first tile, which is requested; then u and v relative to the map's centre. Three cycles. */
+  def firstTile(at: Overlap[MarchLabel], begin: Int): Unit = {
+    at(begin) {
+      val coordinates = m.uvwOrigin.take(2)
+      val pixels      = coordinates.map(p => (p >> pixelFraction).asSInt)
+      val isInside    = pixels.zip(sizes).map { case (pixel, size) => pixel >= 0.S && pixel < size.S }.reduce(_ && _)
+      set(isOutside, !isInside)
+      first.request(isInside)
+      for ((tile, p) <- tile.zip(coordinates))
+        set(tile, p.asUInt(originBits - 1, tileWidth).pad(tileBits)(tileBits - 1, 0))
+    }
+    for (a <- 0 to 1)
+      at(begin + 1 + a)(set(m.uvwOrigin(a), m.combine(m.uvwOrigin(a), m.constant(centre(a)), subtract = true)))
+  }
+
+  /** Steps between those of the projection and `Tile`. The second axis is normalised while the first one is divided. */
   def describe(): Unit = {
-    step(FirstTile) {
-      val pixels = m.uvwOrigin.take(2).map(p => (p >> pixelFraction).asSInt)
-      val within = pixels.zip(sizes).map { case (pixel, size) => pixel >= 0.S && pixel < size.S }
-      set(isOutside, !within.reduce(_ && _))
-      set(m.axis, 0.U)
-      for (a <- 0 to 1) set(tile(a), coordinates(a)(originBits - 1, tileWidth).pad(tileBits)(tileBits - 1, 0))
-      branch(Centre.when(!within.reduce(_ && _), "outside the map"))
-    }
-    step(AxisSetup) {
-      m.load(speed)
-      set(remainder, Mux(speed < 0.S, inTile, (BigInt(1) << tileWidth).U - inTile))
-      set(edge(m.axis(0)), maxDistance)
-      set(stride(m.axis(0)), maxDistance)
-      branch(NextAxis.when(speed === 0.S, "parallel to the axis"))
-    }
-    step(m.negate(m.sum < 0.S))
-    step(m.normalise())
-    step {
-      set(m.mantissa, m.sumMantissa)
-      set(m.exponents(0), m.exponent)
-    }
-    m.divide(m.one, m.mantissa)
-    step(m.multiply(m.quotient.zext, remainder.zext))
-    step {
-      m.load(m.product)
-      m.multiply(m.quotient.zext, m.constant(BigInt(1) << tileWidth))
-    }
-    step(measureDistance())
-    step {
-      set(edge(m.axis(0)), m.distance)
-      m.load(m.product)
-    }
-    step(measureDistance())
-    step(set(stride(m.axis(0)), m.distance))
-    step(NextAxis) {
-      set(m.axis, 1.U)
-      branch(AxisSetup.when(m.axis === 0.U, "second axis"))
-    }
-    step(Centre)(set(m.uvwOrigin(0), m.combine(m.uvwOrigin(0), m.constant(centre(0)), subtract = true)))
-    step {
-      set(m.uvwOrigin(1), m.combine(m.uvwOrigin(1), m.constant(centre(1)), subtract = true))
-      branch(BoundingPlanes.when(isOutside, "outside the map"))
+    overlap { at =>
+      for (a <- 0 to 1) {
+        at(2 * a)(m.loadSigned(m.uvwDir(a), m.uvwDir(a) < 0.S))
+        at(2 * a + 1)(m.normalise())
+        at(2 * a + 2)(set(m.exponents(a), m.exponent))
+      }
+      at(2)(m.startDivision(m.one, m.sumMantissa))
+      at(4)(set(m.mantissa, m.sumMantissa))
+      at(5)(remain(0))
+      measure(at, 0, begin = 6)
+      at(8)(m.startDivision(m.one, m.mantissa))
+      at(9)(remain(1))
+      measure(at, 1, begin = 11)
     }
   }
 
-  private def measureDistance(): Unit = {
+  /** The way to the tile's edge. */
+  private def remain(axis: Int): Unit = {
+    val offset = (BigInt(1) << tileWidth).U
+    val inTile = (m.uvwOrigin(axis).asUInt + centre(axis).U)(tileWidth - 1, 0)
+    set(remainder, Mux(m.uvwDir(axis) < 0.S, inTile, offset - inTile))
+  }
+
+  /** Distances from the reciprocal of the speed, as soon as it is there. Six cycles. */
+  private def measure(at: Overlap[MarchLabel], axis: Int, begin: Int): Unit = {
+    val isParallel = m.uvwDir(axis) === 0.S
+    at(begin) {
+      m.multiply(m.quotient.zext, remainder.zext)
+      m.load((m.quotient << tileWidth).zext)
+      m.awaitDivision()
+    }
+    at(begin + 1) {
+      m.takeQuotient()
+      measureDistance(axis)
+    }
+    at(begin + 2) {
+      set(stride(axis), Mux(isParallel, maxDistance, m.distance))
+      m.load(m.product)
+    }
+    at(begin + 3)(measureDistance(axis))
+    at(begin + 4)(set(edge(axis), Mux(isParallel, maxDistance, m.distance)))
+  }
+
+  private def measureDistance(axis: Int): Unit = {
     m.latchExponent()
-    m.setShift(m.exponents(0).zext +& (f - 1 - guardBits).S)
+    m.setShift(m.exponents(axis).zext +& (f - 1 - guardBits).S)
   }
 }

@@ -11,6 +11,7 @@ final class DirectDistance(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config.device)
 
   val isHit    = Bool() // the map shows something there, in front of the camera
+  val mayHide  = Bool() // it is a point of the map that the maps' camera sees
   val exponent = SInt(formats.shiftBits.W)
   val distance = UInt((formats.f + 1).W)
 }
@@ -104,6 +105,7 @@ final class DirectDepth(config: PathConfig) extends Module {
     result.bits.distance := divider.quotient.bits
     result.bits.exponent := latch(shifts, divider.division.fire)
     result.bits.isHit    := latch(hits, divider.division.fire)
+    result.bits.mayHide  := true.B
     result.ready         := divider.quotient.ready
     (divider.division, result)
   }

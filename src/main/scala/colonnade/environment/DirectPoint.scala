@@ -3,11 +3,10 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.{Cat, Decoupled}
 import colonnade.config.PathConfig
-import colonnade.formats.{AlbedoEntry, EnvironmentView, NormalEntry, Vec3}
+import colonnade.formats.EnvironmentView
 import colonnade.numbers.{Fixed, Normalise, Rounding}
-import colonnade.ray.RayFormats
 
-/** A pixel on its way through the [[DirectView]]. */
+/** A pixel on its way through the [[DirectView]], or the ray of a march. */
 final class DirectPixel(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config.device)
 
@@ -17,20 +16,16 @@ final class DirectPixel(config: PathConfig) extends Bundle {
 }
 
 final class DirectPointIO(config: PathConfig) extends Bundle {
-  val view   = Input(new EnvironmentView(config.numbers))
-  val origin = Input(Vec3(new Fixed(new RayFormats(config.numbers).scene))) // the camera's position, grid steps
+  val view = Input(new EnvironmentView(config.numbers))
 
-  /** Of the same pixel; they are offered until they are taken. Albedo and normal of hits only. */
-  val pixel    = Flipped(Decoupled(new DirectPixel(config)))
-  val distance = Flipped(Decoupled(new DirectDistance(config)))
-  val albedo   = Flipped(Decoupled(new AlbedoEntry))
-  val normal   = Flipped(Decoupled(new NormalEntry))
+  /** Directly seen pixels, and hits of marches. The second source goes first; it offers a distance only with all other parts. */
+  val sources = Vec(2, Flipped(new PointSource(config)))
 
   val answer = Decoupled(new MarchAnswer(config)) // offered until it is taken
 }
 
-/** Position and normal of a directly seen point, and whether it hides the object's hit. A pixel every four cycles, by one
-  * multiplier for the position and three for the normal.
+/** Position and normal of a directly seen point, or of a march's hit, and whether it hides the object's hit. A point every
+  * four cycles, by one multiplier for the position and three for the normal.
   */
 final class DirectPoint(config: PathConfig) extends Module {
   private val formats = new MarchFormats(config.device)
@@ -42,22 +37,34 @@ final class DirectPoint(config: PathConfig) extends Module {
   private val isHeld = RegInit(false.B)
   private val at     = Reg(UInt(2.W))
   private val isDone = RegInit(false.B) // the pixel before waits for its answer to be taken
-  private val found  = latch(io.distance.bits, io.distance.fire)
-  private val pixel  = io.pixel.bits
+
+  // The source of the next point, of the one that is held, and of the one whose answer waits
+  private val chosen   = io.sources(1).distance.valid.asUInt
+  private val mayEnter = WireInit(false.B)
+  private val enters   = mayEnter && io.sources.map(_.distance.valid).reduce(_ || _)
+  private val source   = latch(chosen, enters)
+  private val answers  = Reg(UInt(1.W))
+  private val found    = latch(of(chosen)(_.distance.bits), enters)
+  private val pixel    = of(source)(_.pixel.bits)
+  private val texel    = of(source)(_.normal.bits)
   // From its first step on, a pixel is ready until its last one. Its albedo may come later, behind that of the pixel before
-  private val isReady  = io.pixel.valid && (!found.isHit || io.normal.valid)
+  private val isReady  = of(source)(_.pixel.valid) && (!found.isHit || of(source)(_.normal.valid))
   private val takes    = io.answer.fire
   private val moves    = isHeld && isReady && (at =/= 1.U || !isDone || takes)
   private val isLast   = isHeld && at === 3.U
   private val advances = at =/= 1.U || moves // sum and offset of the pixel before stay until its answer is taken
-  io.distance.ready := !isHeld || isLast
-  when(io.distance.fire) {
+  mayEnter := !isHeld || isLast
+  when(enters) {
     isHeld := true.B
     at     := 0.U
   }.elsewhen(isLast) { isHeld := false.B }.elsewhen(moves) { at := at + 1.U }
   when(isLast) { isDone := true.B }.elsewhen(takes) { isDone := false.B }
-  io.pixel.ready  := isLast
-  io.normal.ready := isLast && found.isHit
+  when(isLast)(answers := source)
+  for ((from, index) <- io.sources.zipWithIndex) {
+    from.distance.ready := mayEnter && chosen === index.U
+    from.pixel.ready    := isLast && source === index.U
+    from.normal.ready   := isLast && source === index.U && found.isHit
+  }
 
   // Two cycles for each axis: distance · direction, shifted to grid steps; then the position
   private val product = latch(found.distance.zext * VecInit(pixel.dir :+ pixel.dir(0))(at), advances)
@@ -74,8 +81,9 @@ final class DirectPoint(config: PathConfig) extends Module {
   when(isHeld && at =/= 0.U && advances) {
     offset := Mux(exceeds, Mux(product < 0.S, ~most, most), Rounding.narrow(scaled.pad(sceneBits), sceneBits))
   }
-  private val axis      = Mux(isHeld, at, 0.U)
-  private val origin    = VecInit(io.origin.axes.map(_.integer))(Mux(axis < 2.U, 2.U, axis - 2.U))
+  private val origins   = of(source)(_.origin).axes.map(_.integer)
+  private val last      = latch(origins(2), isLast)
+  private val origin    = Mux(isHeld && at(1), Mux(at(0), origins(1), origins(0)), last)
   private val point     = SurfacePoint.clamped(offset +& origin)
   private val travelled = Mux(offset < 0.S, ~offset, offset).asUInt
   private val reach     = latch(pixel.hitDistance, isLast)
@@ -83,10 +91,19 @@ final class DirectPoint(config: PathConfig) extends Module {
   private val wasNearer = Reg(Bool())
   private val x         = latch(point, isHeld && at === 2.U)
   private val y         = latch(point, isLast)
-  when(isHeld && at === 2.U) { wasNearer := isNearer }.elsewhen(isLast) { wasNearer := wasNearer && isNearer }
+  private val isAway    = travelled > io.view.occlusionTolerance
+  private val wasAway   = Reg(Bool()) // off the ray's origin; a camera stands on no surface
+  private val mayHide   = latch(found.mayHide, isLast)
+  when(isHeld && at === 2.U) {
+    wasNearer := isNearer
+    wasAway   := isAway || pixel.request.isDirectView
+  }.elsewhen(isLast) {
+    wasNearer := wasNearer && isNearer
+    wasAway   := wasAway || isAway
+  }
 
   // The normal, a component at a time for all axes of its rotation
-  private val components = Seq(io.normal.bits.x, io.normal.bits.y, io.normal.bits.z).map(_.integer)
+  private val components = Seq(texel.x, texel.y, texel.z).map(_.integer)
   private val component  = VecInit(components :+ components.head)(at)
   private val normal     = io.view.rotation.map { row =>
     val term = latch(component * VecInit(row.axes.map(_.integer) :+ row.axes.head.integer)(at), advances)
@@ -99,14 +116,20 @@ final class DirectPoint(config: PathConfig) extends Module {
   private val answer  = io.answer.bits
   private val request = latch(pixel.request, isLast)
   private val isHit   = latch(found.isHit, isLast)
-  io.answer.valid        := isDone && (!isHit || io.albedo.valid)
-  io.albedo.ready        := takes && isHit
-  answer.isOcclusionTest := request.isOcclusionTest
-  answer.isHit           := isHit && (!request.isOcclusionTest || (wasNearer && isNearer))
+  private val albedo  = of(answers)(_.albedo.bits)
+  io.answer.valid                                                  := isDone && (!isHit || of(answers)(_.albedo.valid))
+  for ((from, index) <- io.sources.zipWithIndex) from.albedo.ready := takes && isHit && answers === index.U
+  answer.isOcclusionTest                                           := request.isOcclusionTest
+  answer.isHit := isHit && (!request.isOcclusionTest || (mayHide && wasNearer && isNearer && (wasAway || isAway)))
   answer.surface.context := request.context
   answer.surface.shadows := !request.isFresnelReflection
   answer.surface.point.axes.zip(Seq(x, y, point)).foreach { case (to, from) => to := Fixed(to.format, from) }
   answer.surface.normal.axes.zip(normal).foreach { case (to, from) => to := from }
-  private val albedo = io.albedo.bits
-  answer.surface.albedo.channels.zip(Seq(albedo.r, albedo.g, albedo.b)).foreach { case (to, from) => to := from }
+  answer.surface.albedo.channels.zip(Seq(albedo.r, albedo.g, albedo.b)).foreach { case (to, from) =>
+    to := from
+  }
+
+  /** A part of a source; as a number, because firtool writes no multiplexer of vectors. */
+  private def of[T <: Data](source: UInt)(part: PointSource => T): T =
+    Mux(source(0), part(io.sources(1)).asUInt, part(io.sources(0)).asUInt).asTypeOf(part(io.sources(0)))
 }

@@ -13,7 +13,8 @@ final class DirectViewIO(config: PathConfig) extends Bundle {
   val order   = Flipped(Valid(new MarchOrder(config)))
   val isReady = Output(Bool())
 
-  val answer = Decoupled(new MarchAnswer(config)) // in the order of the orders; offered until it is taken
+  val march  = Flipped(new PointSource(config))   // hits of marches, which share the last stage
+  val answer = Decoupled(new MarchAnswer(config)) // in the order of orders, and of hits; offered until it is taken
   val maps = new AttributePort(AttributeLayout.of(config.device)) // several requests may be in flight in each channel
   val isIllegal = Output(Bool()) // a response is illegal
 }
@@ -35,7 +36,8 @@ final class DirectView(config: PathConfig) extends Module {
 
   private val projection = Module(new DirectProjection(config)).io
   private val depth      = Module(new DirectDepth(config)).io
-  private val point      = Module(new DirectPoint(config)).io
+  private val last       = Module(new DirectPoint(config)).io
+  private val point      = last.sources(0)
   private val layout     = AttributeLayout.of(config.device)
   private val maps       = io.maps
 
@@ -101,13 +103,14 @@ final class DirectView(config: PathConfig) extends Module {
   }
 
   // The point
-  point.view   := io.view
+  last.view    := io.view
   point.origin := order.ray.origin
   point.pixel :<>= queue(new DirectPixel(config), places)(enters, pixel)
   point.distance :<>= depth.distance
   point.albedo :<>= queue(new AlbedoEntry, texels)(maps.albedo.resp.valid, maps.albedo.resp.bits.content)
   point.normal :<>= queue(new NormalEntry, texels)(maps.normals.resp.valid, maps.normals.resp.bits.content)
-  io.answer :<>= point.answer
+  last.sources(1) :<>= io.march
+  io.answer :<>= last.answer
   io.isIllegal := Seq(maps.cells.resp, maps.albedo.resp, maps.normals.resp)
     .map(resp => resp.valid && resp.bits.isIllegal)
     .reduce(_ || _)

@@ -19,46 +19,42 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   private val datapath   = Module(new MarchDatapath(config))
   private val operations = new MarchOperations(config, datapath.io)
   private val projection = prefix("projection")(new RayProjection(operations, io.view, request))
-  private val dda        = prefix("dda")(new DdaSetup(operations))
+  private val firstTile  = prefix("firstTile")(new FirstTile(operations))
+  private val dda        = prefix("dda")(new DdaSetup(operations, firstTile))
   private val planes     = prefix("planes")(new PlaneCache(operations, io.maps.planes))
   private val stepper    = prefix("stepper")(new TileStepper(operations, planes, dda))
-  private val tiles      = prefix("tiles")(new TileProgram(operations, stepper, planes, dda, io.maps.cells))
+  private val tiles      = prefix("tiles")(new TileProgram(operations, stepper, planes, dda, firstTile, io.maps.cells))
   private val planeTest  = prefix("planeTest")(new PlaneTest(operations, stepper, planes))
   private val hitPixel   = prefix("hitPixel")(new HitPixel(operations, stepper, planeTest.hitDistance))
   private val cells      = prefix("cells")(new CellProgram(operations, stepper, planes, dda, hitPixel, io.maps.cells))
-  private val texel      = prefix("texel")(new TexelFetch(operations, planes, hitPixel, io.maps))
   private val resolver   = prefix("resolver")(
-    new HitResolver(operations, stepper, planes, hitPixel, texel, planeTest.hitDistance, io.view, request)
+    new HitResolver(operations, stepper, planes, hitPixel, planeTest.hitDistance, io.view, request)
   )
-  private val clip    = prefix("clip")(new RayClip(operations, stepper, resolver, io.view))
-  private val surface = prefix("surface")(new SurfacePoint(operations, stepper, texel, resolver, io.view, request))
-  private val isBusy  = WireInit(true.B)
+  private val clip   = prefix("clip")(new RayClip(operations, stepper, resolver, io.view, io.camera, io.test))
+  private val isBusy = WireInit(true.B)
 
   val program: Microprogram[MarchLabel] = operations.program
 
   io.request.ready                         := false.B
-  io.result.valid                          := false.B
+  io.hit.valid                             := false.B
   io.maps.cells.req.valid                  := false.B
   io.maps.cells.req.bits.tag               := 0.U
   io.maps.cells.req.bits.content.pixel     := stepper.cellCorner
   io.maps.cells.req.bits.content.wholeTile := false.B
 
-  // A response of the maps to the current ray was illegal
-  private val isIllegal = RegInit(false.B)
-  private val responses = Seq(io.maps.cells.resp, io.maps.albedo.resp, io.maps.normals.resp)
-  when(responses.map(resp => resp.valid && resp.bits.isIllegal).reduce(_ || _)) { isIllegal := true.B }
-
   program.step(MarchLabel.Idle) {
-    program.set(isIllegal, false.B)
-    projection.clear()
+    projection.clear(io.camera)
     stepper.clear()
     planes.clear()
-    hitPixel.clear()
     resolver.clear()
+    clip.clear()
     when(program.now)(isBusy := io.request.valid)
-    program.await(io.request.valid, "request")
+    program.branch(
+      Repeat.until(io.request.valid, "request"),
+      MarchLabel.ProjectDir.when(request.isFromCamera && io.camera.valid, "from a known camera")
+    )
   }
-  projection.describe()
+  projection.describe(dda)
   dda.describe()
   tiles.describe()
   planes.describe()
@@ -66,24 +62,26 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   cells.describe()
   planeTest.describeCrossing()
   resolver.describeHit()
-  hitPixel.describe()
+  hitPixel.describe(resolver.measureDistance)
   resolver.describeBoundingPlanes()
   clip.describe()
-  surface.describe()
   program.step(MarchLabel.Finish) {
     when(program.now) {
-      io.result.valid  := true.B
-      io.request.ready := io.result.ready
+      io.hit.valid     := true.B
+      io.request.ready := io.hit.ready
     }
-    program.branch(Repeat.until(io.result.ready, "the result is taken"), MarchLabel.Idle.otherwise)
+    val hasTexel = resolver.kind === HitKind.boundingPlane
+    program.branch(
+      Repeat.until(io.hit.ready, "the hit is taken"),
+      MarchLabel.Texel.when(hasTexel, "a bounding plane"),
+      MarchLabel.Idle.otherwise
+    )
   }
+  planes.fetchTexel(resolver.boundingPlane, io.texel)
   operations.build()
 
-  resolver.result(io.result.bits)
-  surface.result(io.result.bits)
-  io.result.bits.context   := request.context
-  io.result.bits.isIllegal := isIllegal
-  io.events.step           := RegNext(stepper.steps, 0.U) =/= stepper.steps && stepper.steps =/= 0.U
-  io.events.busy           := isBusy
-  io.events.illegal        := isIllegal
+  resolver.result(io.hit.bits)
+  io.events.step    := RegNext(stepper.steps, 0.U) =/= stepper.steps && stepper.steps =/= 0.U
+  io.events.busy    := isBusy
+  io.events.illegal := io.maps.cells.resp.valid && io.maps.cells.resp.bits.isIllegal
 }

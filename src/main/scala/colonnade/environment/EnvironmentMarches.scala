@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{log2Ceil, PopCount, PriorityEncoderOH, Queue, RRArbiter}
+import chisel3.util.{log2Ceil, Mux1H, PopCount, PriorityEncoderOH, RRArbiter, Valid}
 import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.EnvironmentView
 
@@ -16,6 +16,7 @@ final class MarchSums(config: PathConfig) extends Bundle {
 
 final class EnvironmentMarchesIO(config: PathConfig) extends Bundle {
   val view  = Input(new EnvironmentView(config.numbers)) // constant while a frame runs
+  val start = Input(Bool())                              // of a frame: its camera may be another one
   val paths = Flipped(new MarchPort(config))
 
   /** One for each march; the last one for the pipeline of directly seen pixels. */
@@ -24,10 +25,11 @@ final class EnvironmentMarchesIO(config: PathConfig) extends Bundle {
 }
 
 /** The marches of a column, and the pipeline for directly seen pixels. One request a cycle goes into the pipeline, or else
-  * to an empty march; one answer every other cycle, by round-robin, goes back to the path unit.
+  * to an empty march. A march is empty once [[MarchHits]] takes its hit, by round-robin. From there hits go to the
+  * pipeline's last stage, whose answers go back to the path unit.
   *
-  * A march is empty once its answer has left it. An answer leaves as soon as the path unit stores no ray in the same cycle,
-  * and it stores at most one ray for each of its contexts without an answer. So every request ends.
+  * An answer leaves as soon as the path unit stores no ray in the same cycle, and it stores at most one ray for each of its
+  * contexts without an answer. No answer waits for a request. So every request ends.
   */
 final class EnvironmentMarches(config: PathConfig) extends Module {
   val io = IO(new EnvironmentMarchesIO(config))
@@ -44,23 +46,44 @@ final class EnvironmentMarches(config: PathConfig) extends Module {
   for ((awaited, free) <- isAwaited.zip(PriorityEncoderOH(isFree))) awaited := io.paths.march.fire && free
 
   // Marches, and directly seen pixels
+  private val camera = RegInit(0.U.asTypeOf(Valid(new CameraOrigin(config))))
   for (((march, awaited), maps) <- marches.zip(isAwaited).zip(io.maps)) {
     march.view        := io.view
+    march.camera      := camera
     march.order.valid := awaited
     march.order.bits  := io.paths.order
-    maps <> march.maps
+    maps.tieOff()
+    maps.cells <> march.maps.cells
+    maps.planes <> march.maps.planes
   }
   direct.view        := io.view
   direct.order.valid := hasDirect
   direct.order.bits  := io.paths.order
   io.maps.last <> direct.maps
 
-  // Answers
-  private val answers = Module(new RRArbiter(new MarchAnswer(config), marches.size + 1)).io
-  for ((in, answer) <- answers.in.zip(marches.map(_.answer) :+ direct.answer)) in :<>= answer
-  io.paths.answer :<>= Queue(answers.out, 1)
+  // The camera's origin, once a ray of the first march is tested against all planes, in order
+  private val test = marches.head.test
+  when(test.valid) {
+    camera.valid                         := camera.valid || test.bits.plane === (RayClip.planes - 1).U
+    camera.bits.origin                   := test.bits.origin
+    camera.bits.exponent                 := test.bits.exponent
+    camera.bits.outside(test.bits.plane) := test.bits.isOutside
+  }
+  when(io.start) { camera.valid := false.B }
+
+  // Hits, which read albedo and normal by the port of the first march; and answers
+  private val arbiter = Module(new RRArbiter(new OrderedHit(config), marches.size)).io
+  private val hits    = Module(new MarchHits(config)).io
+  for ((in, march) <- arbiter.in.zip(marches)) in :<>= march.hit
+  hits.hit :<>= arbiter.out
+  hits.texel.valid := marches.map(_.texel.valid).reduce(_ || _)
+  hits.texel.bits  := Mux1H(marches.map(march => march.texel.valid -> march.texel.bits))
+  io.maps.head.albedo <> hits.albedo
+  io.maps.head.normals <> hits.normals
+  direct.march :<>= hits.point
+  io.paths.answer :<>= direct.answer
 
   io.events.marchSteps      := PopCount(marches.map(_.events.step))
   io.events.busyEnvironment := PopCount(marches.map(_.events.busy))
-  io.events.illegalRecord   := marches.map(_.events.illegal).reduce(_ || _) || direct.isIllegal
+  io.events.illegalRecord   := marches.map(_.events.illegal).reduce(_ || _) || hits.illegal || direct.isIllegal
 }

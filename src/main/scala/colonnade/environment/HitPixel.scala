@@ -2,6 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.Enum
+import colonnade.microcode.Overlap
 
 /** Projects a point of the ray to a pixel, and clamps the pixel to a part of the map. */
 final class HitPixel(m: MarchOperations, stepper: TileStepper, hitDistance: UInt) {
@@ -25,24 +26,28 @@ final class HitPixel(m: MarchOperations, stepper: TileStepper, hitDistance: UInt
   /** In the step before `Pixel`: project the hit, and continue at `HitDistance`. */
   def forHit(): Unit = set(purpose, Mux(stepper.isBehind, hidden, visible))
 
-  def clear(): Unit = {
-    set(x, 0.U)
-    set(y, 0.U)
+  /** Steps from `Pixel` on, with those that measure the hit's distance beside them; for a cell they have no effect. */
+  def describe(distance: Overlap[MarchLabel] => Unit): Unit = {
+    label(Pixel)
+    overlap { at =>
+      distance(at)
+      pixel(at)
+    }
   }
 
-  def describe(): Unit = {
-    step(Pixel)(m.multiply(at.zext, m.uvwDir(0)))
-    step(set(coordinate, m.combine(m.uvwOrigin(0), m.scaledProduct)))
-    step {
+  private def pixel(cycle: Overlap[MarchLabel]): Unit = {
+    cycle(0)(m.multiply(at.zext, m.uvwDir(0)))
+    cycle(1)(set(coordinate, m.combine(m.uvwOrigin(0), m.scaledProduct)))
+    cycle(2) {
       set(coordinate, m.combine(coordinate, m.constant(centre(0))))
       m.multiply(at.zext, m.uvwDir(1))
     }
-    step {
+    cycle(3) {
       set(x, clamp(stepper.tileCorner.x, stepper.frontCorner.x, sizes(0)))
       set(coordinate, m.combine(m.uvwOrigin(1), m.scaledProduct))
     }
-    step(set(coordinate, m.combine(coordinate, m.constant(centre(1)))))
-    step {
+    cycle(4)(set(coordinate, m.combine(coordinate, m.constant(centre(1)))))
+    cycle(5) {
       set(y, clamp(stepper.tileCorner.y, stepper.frontCorner.y, sizes(1)))
       branch(FirstCell.when(purpose === cell, "first cell"), HitDistance.otherwise)
     }

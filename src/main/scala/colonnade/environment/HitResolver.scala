@@ -2,7 +2,7 @@ package colonnade.environment
 
 import chisel3._
 import colonnade.formats.EnvironmentView
-import colonnade.microcode.Repeat
+import colonnade.microcode.Overlap
 
 /** The end of a march: a hit on a surface of the map, a hit on the nearest bounding plane, or a miss. */
 final class HitResolver(
@@ -10,7 +10,6 @@ final class HitResolver(
     stepper:     TileStepper,
     planes:      PlaneCache,
     hitPixel:    HitPixel,
-    texel:       TexelFetch,
     hitDistance: UInt,
     view:        EnvironmentView,
     request:     MarchRequest
@@ -34,53 +33,50 @@ final class HitResolver(
   /** In a step: nothing is hit yet. */
   def clear(): Unit = {
     set(kind, HitKind.miss)
-    set(exponent, 0.S)
     set(boundingPlane, 0.U)
-    set(m.quotient, 0.U)
   }
 
   /** Connects the result, which is valid in `Finish`. */
-  def result(to: MarchResult): Unit = {
-    val isMap  = kind === HitKind.map
-    val isMiss = kind === HitKind.miss
-    to.kind             := kind
-    to.x                := Mux(isMap, hitPixel.x, 0.U)
-    to.y                := Mux(isMap, hitPixel.y, 0.U)
-    to.boundingPlane    := boundingPlane
-    to.isHidden         := isMap && stepper.isBehind
-    to.distance         := Mux(isMiss, 0.U, m.quotient)
-    to.distanceExponent := Mux(isMiss, 0.S, exponent)
-    to.steps            := stepper.steps
+  def result(to: MarchHit): Unit = {
+    to.kind         := kind
+    to.pixel.x      := hitPixel.x
+    to.pixel.y      := hitPixel.y
+    to.isHidden     := stepper.isBehind
+    to.numerator    := m.numerator
+    to.denominator  := m.mantissa
+    to.exponent     := exponent
+    to.way.mantissa := rateMantissa
+    to.way.exponent := rateExponent
   }
 
   /** Steps after `Meets`: the hit's pixel, and its distance s / w in the length of the scaled direction. */
   def describeHit(): Unit = {
     step(Hit) {
       hitPixel.forHit()
+      m.multiply(hitDistance.zext, m.uvwDir(2))
       goto(Pixel)
     }
     step(HitDistance) {
-      m.multiply(hitDistance.zext, m.uvwDir(2))
       set(kind, HitKind.map)
-      texel.requestPixel()
+      set(exponent, exponent - m.uvwDirExponent.zext)
+      goto(Finish)
     }
-    step(set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct)))
-    step(m.load(Mux(stepper.wExit < 1.S, 1.S, stepper.wExit)))
-    step(m.normalise())
-    step {
+  }
+
+  /** Numerator and denominator of the distance, beside the steps from `Pixel` on. */
+  def measureDistance(at: Overlap[MarchLabel]): Unit = {
+    at(0)(set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct)))
+    at(1)(m.load(Mux(stepper.wExit < 1.S, 1.S, stepper.wExit)))
+    at(2)(m.normalise())
+    at(3) {
       set(m.mantissa, m.sumMantissa)
       set(m.exponents(0), m.exponent)
       m.load(hitDistance.zext)
     }
-    step(m.normalise())
-    step {
+    at(4)(m.normalise())
+    at(5) {
       set(m.numerator, m.sumMantissa)
       set(exponent, m.exponent.zext +& (f.S +& view.exponent) - m.exponents(0).zext - m.projectedDirExponent.zext)
-    }
-    step {
-      m.startDivision(m.numerator, m.mantissa)
-      set(exponent, exponent - m.uvwDirExponent.zext)
-      goto(Point)
     }
   }
 
@@ -111,32 +107,32 @@ final class HitResolver(
       set(m.exponents(0), m.exponent)
       m.load(planes.depth.value)
     }
-    step(m.normalise())
-    step(Rate)(set(m.mantissa, m.sumMantissa))
-    m.divide(m.numerator, m.mantissa)
+    step {
+      m.normalise()
+      goto(Rate)
+    }
+    step(Rate)(m.startDivision(m.numerator, m.sumMantissa))
     step {
       val quotient = Mux(m.quotient(f), m.quotient, (m.quotient << 1)(f, 0))
       val rate     = m.exponents(0).zext - m.exponent.zext +& Mux(m.quotient(f), (f + 1).S, f.S)
       val isFirst  = kind === HitKind.miss && !request.isFromCamera
       val isNearer = isFirst || rate > rateExponent || (rate === rateExponent && quotient > rateMantissa)
-      set(kind, HitKind.boundingPlane, !request.isFromCamera)
-      set(rateMantissa, quotient, isNearer)
-      set(rateExponent, rate, isNearer)
-      set(boundingPlane, index, isNearer && !request.isFromCamera)
+      set(kind, HitKind.boundingPlane, m.hasQuotient && !request.isFromCamera)
+      set(rateMantissa, quotient, m.hasQuotient && isNearer)
+      set(rateExponent, rate, m.hasQuotient && isNearer)
+      set(boundingPlane, index, m.hasQuotient && isNearer && !request.isFromCamera)
+      m.takeQuotient()
+      m.awaitDivision(ClipPlane.when(request.isFromCamera, "from a camera"))
     }
     step(NextBoundingPlane) {
       set(index, index + 1.U)
-      branch(ClipPlane.when(request.isFromCamera, "from a camera"), BoundingPlane.otherwise)
+      goto(BoundingPlane)
     }
     step(BoundingPlanesDone) {
-      val isMiss = kind === HitKind.miss
-      texel.requestBoundingPlane(boundingPlane, !isMiss)
-      branch(Finish.when(isMiss, "miss"), Repeat.until(texel.isRequested, "planes.req is ready"))
-    }
-    step {
-      m.startDivision(m.depthMantissa, (rateMantissa >> 1)(f - 1, 0))
+      set(m.numerator, m.depthMantissa)
+      set(m.mantissa, (rateMantissa >> 1)(f - 1, 0))
       set(exponent, m.depthExponent.zext +& m.uvwOriginExponent.zext - rateExponent - m.projectedDirExponent.zext)
-      goto(Point)
+      goto(Finish)
     }
   }
 

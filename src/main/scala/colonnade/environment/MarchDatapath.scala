@@ -89,7 +89,7 @@ final class MarchDatapath(config: PathConfig) extends Module {
   io.along      := saturateNatural(alongBits)
   io.distance   := saturateNatural(distanceBits)
 
-  private val divider = Module(new Divider(f, f))
+  private val divider = Module(new Divider(f, f, digitsPerCycle = 2))
   divider.io.division.valid := io.divide.valid
   divider.io.division.bits  := io.divide.bits
   divider.io.quotient.ready := io.takeQuotient

@@ -28,14 +28,10 @@ final class MarchFormats(config: ColonnadeConfig) {
   val maxSteps: Int = 512
   val stepBits: Int = log2Ceil(maxSteps + 1)
 
-  val digitBits: Int = 21 // digits of a factor that is wider than the multiplier; unsigned, except for the highest
-
-  def digits(bits: Int): Int = (bits - 2) / digitBits + 1
-
   val originBits:    Int = f + 5
   val directionBits: Int = f + 4
   val wideBits:      Int = distanceBits - 2 + 1
-  val narrowBits:    Int = (digitBits + 1).max(alongBits + 1)
+  val narrowBits:    Int = AttributeLayout.coefficientBits.max(alongBits + 1)
   val productBits:   Int = wideBits + narrowBits
 
   /** A plane's depth at the ray's origin, its slope, and its depth at a distance along the ray. */

@@ -15,7 +15,6 @@ object MarchLabel {
   case object UvwRay        extends MarchLabel
 
   // RayClip: moves the origin of a camera's ray into the maps' frustum, plane by plane
-  case object NearPlane   extends MarchLabel
   case object ClipPlane   extends MarchLabel
   case object MovedOrigin extends MarchLabel
   case object Rate        extends MarchLabel
@@ -60,7 +59,6 @@ object MarchLabel {
   case object BoundingPlanesDone extends MarchLabel
 
   case object Pixel  extends MarchLabel // HitPixel: projects a point of the ray to a pixel
-  case object Point  extends MarchLabel // SurfacePoint: the point and its normal
-  case object Way    extends MarchLabel // SurfacePoint: the offset of each axis
-  case object Finish extends MarchLabel // offers the result
+  case object Finish extends MarchLabel // offers the hit
+  case object Texel  extends MarchLabel // fetches albedo and normal of a bounding plane
 }

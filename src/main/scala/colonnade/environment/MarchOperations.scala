@@ -5,6 +5,8 @@ import colonnade.config.PathConfig
 import colonnade.microcode.{Exit, Microprogram, Operand, Repeat, StepEncoding}
 import colonnade.numbers.Rounding
 
+import scala.collection.mutable
+
 /** The program of the march, the registers of its ray, and the operations that its steps have of the datapath. */
 final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val formats = new MarchFormats(config.device)
@@ -33,7 +35,6 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val exponents: Vec[UInt] = Reg(Vec(3, UInt(exponentBits.W)))
   val mantissa:  UInt      = Reg(UInt(f.W))
   val numerator: UInt      = Reg(UInt(f.W))
-  val quotient:  UInt      = Reg(UInt((f + 1).W))
 
   // Outputs of the datapath
   val product:     SInt = datapath.product
@@ -45,6 +46,10 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val summand:     SInt = datapath.summand
   val along:       UInt = datapath.along
   val distance:    UInt = datapath.distance
+
+  /** The divider's quotient, from [[awaitDivision]] on until [[takeQuotient]]. */
+  val quotient:    UInt = datapath.quotient.bits
+  val hasQuotient: Bool = datapath.quotient.valid
 
   val scaledProduct: SInt = Rounding.floor(product, f) // the product without its fraction bits
   val sumMantissa: UInt = shifted.asUInt(f - 1, 0) // the shifted sum, whose exponent was measured in the step before
@@ -76,18 +81,22 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
     subtracts.choose(subtracted.asSInt)
   }
 
-  /** Shifts the sum up by a digit and adds the product. */
-  def shiftAccumulate(): Unit = add((sum << digitBits).asSInt, product)
+  /** Shifts the sum up and adds the product. */
+  def shiftAccumulate(by: Int): Unit = add(shiftedUp.getOrElseUpdate(by, (sum << by).asSInt), product)
+
+  private val shiftedUp = mutable.Map.empty[Int, SInt] // one operand for all steps of a shift
 
   /** Puts a value into the sum. */
   def load(value: SInt): Unit = base.choose(value)
 
-  /** Negates the sum if the condition holds. */
-  def negate(condition: Bool): Unit = {
-    addend.choose(Mux(condition, sum, 0.S))
-    base.choose(Mux(condition, 0.S, sum))
-    subtracts.choose(condition.asSInt)
+  /** Puts a value into the sum, negated if the condition holds. */
+  def loadSigned(value: SInt, negated: Bool = true.B): Unit = {
+    addend.choose(value)
+    subtracts.choose(negated.asSInt)
   }
+
+  /** Puts a difference into the sum. */
+  def loadDifference(from: SInt, by: SInt): Unit = add(from, by, subtract = true)
 
   private def add(from: SInt, by: SInt, subtract: Boolean = false): Unit = {
     base.choose(from)
@@ -124,18 +133,12 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
     division(1).choose(denominator.zext)
   }
 
-  /** Adds a step after which the quotient is ready. */
-  def awaitDivision(exits: => Seq[Exit[MarchLabel]] = Nil): Unit = program.step {
-    program.set(quotient, datapath.quotient.bits)
-    when(program.now)(datapath.takeQuotient := true.B)
-    program.branch(Repeat.until(datapath.quotient.valid, "quotient") +: exits: _*)
-  }
+  /** In a step: repeats it until the quotient is ready, which stays until a step takes it. */
+  def awaitDivision(exits: Exit[MarchLabel]*): Unit =
+    program.branch(Repeat.until(hasQuotient, "quotient") +: exits: _*)
 
-  /** Adds two steps. */
-  def divide(numerator: => UInt, denominator: => UInt): Unit = {
-    program.step(startDivision(numerator, denominator))
-    awaitDivision()
-  }
+  /** In a step: the last one that uses the quotient; the divider is free in the next step. */
+  def takeQuotient(): Unit = when(program.now)(datapath.takeQuotient := true.B)
 
   /** The numerator of a reciprocal ⌊2^(2f − 1) / mantissa⌋. */
   def one: UInt = (BigInt(1) << (f - 1)).U(f.W)
@@ -149,7 +152,7 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
     datapath.multiply.bits.wide   := wideFactor.value
     datapath.multiply.bits.narrow := narrowFactor.value
 
-    datapath.add.valid         := base.isChosen
+    datapath.add.valid         := base.isChosen || addend.isChosen
     datapath.add.bits.base     := base.value
     datapath.add.bits.addend   := addend.value
     datapath.add.bits.subtract := subtracts.value =/= 0.S

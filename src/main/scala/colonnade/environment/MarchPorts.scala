@@ -1,10 +1,9 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.Decoupled
-import colonnade.common.Context
-import colonnade.config.{AttributeLayout, NumberFormats, PathConfig}
-import colonnade.formats.{AlbedoEntry, EnvironmentView, PixelPosition, Vec3}
+import chisel3.util.{Decoupled, Valid}
+import colonnade.config.{AttributeLayout, PathConfig}
+import colonnade.formats.{AlbedoEntry, BoundingPlaneEntry, EnvironmentView, NormalEntry, PixelPosition, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 
@@ -19,11 +18,8 @@ final class EnvironmentRay(config: PathConfig) extends Bundle {
 
 /** A ray to march. */
 final class MarchRequest(config: PathConfig) extends Bundle {
-  val context = Context(config)
-
   val ray          = new EnvironmentRay(config)
   val isFromCamera = Bool() // the ray comes from a camera, which may be anywhere: it sees the maps or misses
-  val hitDistance = HitDistance(config) // the distance of the object on this ray; see `MarchResult.hidesObject`
 }
 
 /** The distance of the object's hit from the ray's origin along its dominant axis, in grid steps. */
@@ -36,53 +32,52 @@ object HitKind extends ChiselEnum {
   val miss, map, boundingPlane = Value
 }
 
-/** The point of the environment that a ray hits. Fields that do not belong to its kind are 0. */
-final class MarchResult(config: PathConfig) extends Bundle {
+/** The way of a ray to the frustum of the maps: mantissa · 2^exponent times its direction. */
+final class MarchWay(formats: MarchFormats) extends Bundle {
+  val mantissa = UInt((formats.f + 1).W)
+  val exponent = SInt(formats.shiftBits.W)
+}
+
+/** What of the environment a ray hits. */
+final class MarchHit(config: PathConfig) extends Bundle {
   private val formats = new MarchFormats(config.device)
-  private val layout  = AttributeLayout.of(config.device)
 
-  val context = Context(config)
-  val kind    = HitKind()
-
-  /** `map`: the pixel with the point's albedo and normal. */
-  val x = UInt(layout.xBits.W)
-  val y = UInt(layout.yBits.W)
-
-  val boundingPlane = UInt(layout.boundingPlaneIndexBits.W) // `boundingPlane`: the plane with albedo and normal
+  val kind  = HitKind()
+  val pixel = new MapPixel(formats.layout) // `map`: the pixel with the point's albedo and normal
   val isHidden = Bool() // `map`: the point is on the extension of a surface, hidden by another one
 
-  /** The point is at distance · 2^distanceExponent times the ray's direction. */
-  val distance         = UInt((formats.f + 1).W)
-  val distanceExponent = SInt(formats.shiftBits.W)
+  /** The point is at numerator / denominator · 2^(f + exponent) times the ray's direction; of a camera's ray behind `way`. */
+  val numerator, denominator = UInt(formats.f.W)
+  val exponent               = SInt(formats.shiftBits.W)
+  val way                    = new MarchWay(formats)
+}
 
-  val steps = UInt(formats.stepBits.W)                              // tiles and cells that the ray has passed
-  val point = Vec3(new Fixed(new RayFormats(config.numbers).scene)) // grid steps, clamped to half the scene
-
-  /** Of the maps; the normal is in the object's space. */
+/** Albedo and normal of a point, as in the maps. */
+final class MarchTexel extends Bundle {
   val albedo = new AlbedoEntry
-  val normal = Vec3(SInt(NumberFormats.normalBits.W))
-
-  /** The point is of the map, visible to the camera, and nearer than the request's `hitDistance` by more than the
-    * tolerance; and if the ray does not come from the camera, also farther than the tolerance from its origin.
-    */
-  val hidesObject = Bool()
-
-  val isIllegal = Bool() // a response of the maps was illegal
+  val normal = new NormalEntry
 }
 
 /** Events of this cycle, for the counters. */
 final class MarchEvents extends Bundle {
   val step    = Bool() // a tile or a cell is passed
   val busy    = Bool()
-  val illegal = Bool() // a response to the current ray was illegal
+  val illegal = Bool() // a response of the maps is illegal
+}
+
+/** The maps that a march reads; at most one request in flight in each channel. */
+final class MarchMaps(layout: AttributeLayout) extends Bundle {
+  val cells  = new AttributeChannel(new CellRequest(layout), new CellResponse(layout), tagBits = 0)
+  val planes = new AttributeChannel(new PlaneRequest(layout), new BoundingPlaneEntry, tagBits = 0)
 }
 
 final class EnvironmentMarchIO(config: PathConfig) extends Bundle {
-  private val layout = AttributeLayout.of(config.device)
-
   val view    = Input(new EnvironmentView(config.numbers)) // constant while a ray is marched
+  val camera  = Flipped(Valid(new CameraOrigin(config)))   // the origin of all rays from the camera, once it is known
   val request = Flipped(Decoupled(new MarchRequest(config)))
-  val result  = Decoupled(new MarchResult(config))
-  val maps    = new AttributePort(layout)                  // at most one request in flight in each channel
+  val hit     = Decoupled(new MarchHit(config))            // taken together with its request
+  val texel   = Valid(new MarchTexel)                      // after a hit of a bounding plane: its albedo and normal
+  val maps    = new MarchMaps(AttributeLayout.of(config.device))
+  val test    = Valid(new ClipTest(config))                // a ray from the camera is tested against a plane, 0 to 4
   val events  = Output(new MarchEvents)
 }

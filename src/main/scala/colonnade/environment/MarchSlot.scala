@@ -5,12 +5,21 @@ import chisel3.util.{Decoupled, RegEnable, Valid}
 import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.EnvironmentView
 
+/** A hit of a march, with its order. */
+final class OrderedHit(config: PathConfig) extends Bundle {
+  val hit   = new MarchHit(config)
+  val order = new MarchOrder(config)
+}
+
 final class MarchSlotIO(config: PathConfig) extends Bundle {
   val view    = Input(new EnvironmentView(config.numbers)) // constant while a frame runs
+  val camera  = Flipped(Valid(new CameraOrigin(config)))   // see [[EnvironmentMarchIO]]
   val order   = Flipped(Valid(new MarchOrder(config)))     // only in a cycle after one with `isEmpty`
   val isEmpty = Output(Bool())                             // no order is held
-  val answer  = Decoupled(new MarchAnswer(config))
-  val maps    = new AttributePort(AttributeLayout.of(config.device))
+  val hit     = Decoupled(new OrderedHit(config))
+  val texel   = Valid(new MarchTexel)
+  val maps    = new MarchMaps(AttributeLayout.of(config.device))
+  val test    = Valid(new ClipTest(config))
   val events  = Output(new MarchEvents)
 }
 
@@ -18,32 +27,24 @@ final class MarchSlotIO(config: PathConfig) extends Bundle {
 final class MarchSlot(config: PathConfig) extends Module {
   val io = IO(new MarchSlotIO(config))
 
-  private val march  = Module(new EnvironmentMarch(config))
+  private val march  = Module(new EnvironmentMarch(config)).io
   private val isHeld = RegInit(false.B)
   private val order  = RegEnable(io.order.bits, io.order.valid)
-  when(io.order.valid) { isHeld := true.B }.elsewhen(march.io.request.ready) { isHeld := false.B }
+  when(io.order.valid) { isHeld := true.B }.elsewhen(march.request.ready) { isHeld := false.B }
   io.isEmpty := !isHeld
 
-  march.io.view                      := io.view
-  march.io.request.valid             := isHeld
-  march.io.request.bits.context      := order.request.context
-  march.io.request.bits.ray          := order.ray
-  march.io.request.bits.isFromCamera := order.request.isDirectView
-  march.io.request.bits.hitDistance  := order.hitDistance
-  io.maps <> march.io.maps
-  io.events := march.io.events
+  march.view                      := io.view
+  march.camera                    := io.camera
+  march.request.valid             := isHeld
+  march.request.bits.ray          := order.ray
+  march.request.bits.isFromCamera := order.request.isDirectView
+  io.maps <> march.maps
+  io.texel  := march.texel
+  io.test   := march.test
+  io.events := march.events
 
-  private val result  = march.io.result
-  private val surface = io.answer.bits.surface
-  io.answer.valid                := result.valid
-  io.answer.bits.isOcclusionTest := order.request.isOcclusionTest
-  io.answer.bits.isHit           :=
-    Mux(order.request.isOcclusionTest, result.bits.hidesObject, result.bits.kind =/= HitKind.miss)
-  surface.context := result.bits.context
-  surface.point   := result.bits.point
-  surface.normal  := result.bits.normal
-  surface.shadows := !order.request.isFresnelReflection
-  private val albedo = result.bits.albedo
-  surface.albedo.channels.zip(Seq(albedo.r, albedo.g, albedo.b)).foreach { case (to, from) => to := from }
-  result.ready := io.answer.ready
+  io.hit.valid      := march.hit.valid
+  io.hit.bits.hit   := march.hit.bits
+  io.hit.bits.order := order
+  march.hit.ready   := io.hit.ready
 }

@@ -1,7 +1,7 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{Cat, Enum, OHToUInt}
+import chisel3.util.{Cat, Enum, OHToUInt, Valid}
 import colonnade.formats.{BoundingPlaneEntry, Plane}
 import colonnade.microcode.Repeat
 
@@ -45,11 +45,23 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
   /** In a step: invalidates the planes of the previous ray. */
   def clear(): Unit = isValid.foreach(set(_, false.B))
 
-  /** In a step: requests a bounding plane with its texel. */
-  def requestBoundingPlane(index: UInt, condition: Bool): Unit = when(now && condition) {
-    req.valid                        := true.B
-    req.bits.content.isBoundingPlane := true.B
-    req.bits.content.index           := index
+  /** Two steps that fetch a bounding plane with its texel. */
+  def fetchTexel(index: UInt, texel: Valid[MarchTexel]): Unit = {
+    texel.valid       := false.B
+    texel.bits.albedo := channel.resp.bits.content.albedo
+    texel.bits.normal := channel.resp.bits.content.normal
+    step(Texel) {
+      when(now) {
+        req.valid                        := true.B
+        req.bits.content.isBoundingPlane := true.B
+        req.bits.content.index           := index
+      }
+      await(req.ready, "planes.req is ready")
+    }
+    step {
+      when(now)(texel.valid := channel.resp.valid)
+      branch(Repeat.until(channel.resp.valid, "planes.resp"), Idle.otherwise)
+    }
   }
 
   /** Steps from `Plane` on. For a bounding plane they end with its products in the sum. */

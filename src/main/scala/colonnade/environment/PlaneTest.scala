@@ -86,21 +86,23 @@ final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCac
     step {
       set(m.numerator, m.sumMantissa)
       set(m.exponents(0), m.exponent)
-      m.load(depth.slope)
+      m.loadSigned(depth.slope)
     }
-    step(m.negate(true.B))
     step(m.normalise())
-    step(set(m.mantissa, m.sumMantissa))
-    m.divide(m.numerator, m.mantissa)
-    step(m.load(m.quotient.zext))
+    step(m.startDivision(m.numerator, m.sumMantissa))
     step {
+      m.load(m.quotient.zext)
+      m.awaitDivision()
+    }
+    step {
+      m.takeQuotient()
       m.setShift(m.exponent.zext +& f.S - m.exponents(0).zext)
       m.latchExponent()
     }
     step(set(hitDistance, m.along))
-    step(set(hitDistance, stepper.exit, hitDistance > stepper.exit))
     step {
-      set(hitDistance, stepper.enter, hitDistance < stepper.enter)
+      val isAfter = hitDistance > stepper.exit
+      set(hitDistance, Mux(isAfter, stepper.exit, stepper.enter), isAfter || hitDistance < stepper.enter)
       goto(Hit)
     }
     step(Meets)(set(hitDistance, stepper.enter))

@@ -1,6 +1,7 @@
 package colonnade.environment
 
 import chisel3._
+import chisel3.util.Valid
 import colonnade.formats.EnvironmentView
 import colonnade.microcode.{Exit, Overlap}
 import colonnade.numbers.Rounding
@@ -16,60 +17,75 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
   import m.formats._
   import m.program._
 
-  // What `m.axis` selects: a row of the matrix, and of the offset. Registers, because a multiplication follows
-  private val matrixRow   = Reg(Vec(3, chiselTypeOf(view.matrix.head.x)))
-  private val offset      = Reg(chiselTypeOf(view.offset.axes.head))
+  /** A number as digits of a power of two, the lowest first; unsigned, except for the highest. */
+  private class Digits(number: SInt, val bits: Int) {
+    private val count = (number.getWidth - 2) / bits + 1
+    val values: Seq[SInt] = Seq.tabulate(count) { i =>
+      if (i == count - 1) Rounding.floor(number, i * bits) else number(i * bits + bits - 1, i * bits).zext
+    }
+  }
+
+  /** A product of two digits, in units of 2^log. */
+  private class Term(val log: Int, val wide: SInt, val narrow: SInt)
+
+  // The multiplier's wide factor holds digits of the registers, the narrow one those of the ray
+  private def ofView(number: SInt): Digits = new Digits(number, wideBits - 1)
+  private def ofRay(number:  SInt): Digits = new Digits(number, narrowBits - 1)
+
+  private val matrix      = view.matrix.map(_.axes.map(ofView))
+  private val offset      = view.offset.axes.map(ofView)
   private val offsetPower = {
     val isMax = view.offsetShift >= sceneBits.U // a larger shift counts as this one
-    isMax ## (1.U(1.W) << view.offsetShift)(sceneBits - 1, 0)
+    ofRay((isMax ## (1.U(1.W) << view.offsetShift)(sceneBits - 1, 0)).zext)
   }
-  private val origin       = request.ray.origin.axes.map(_.integer)
+  private val origin       = request.ray.origin.axes.map(component => ofRay(component.integer))
+  private val direction    = request.ray.dir.axes.map(ofRay)
   private val inverseDepth = m.quotient.zext
 
-  /** In a step: selects an axis, and its row of matrix and offset. */
-  def selectRow(axis: UInt): Unit = {
-    set(m.axis, axis)
-    val selected = VecInit(view.matrix.map(row => VecInit(row.axes)))(axis)
-    for ((entry, column) <- matrixRow.zipWithIndex) set(entry, selected(column))
-    set(offset, VecInit(view.offset.axes)(axis))
-  }
-
-  /** Steps that project the ray. They end at `Finish` if the origin is behind the camera. */
-  def describe(): Unit = {
-    val offsetTerm = (offset, digitsOf(offsetPower.zext))
-    matrixProduct(ProjectOrigin, m.uvwOrigin, m.uvwOriginExponent)(terms(origin) :+ offsetTerm) {
-      ProjectDir.when(request.isFromCamera, "from a camera")
-    }
+  /** Steps that project the ray. They end at `Finish` if the origin is behind the camera, and at `BoundingPlanes` if it is
+    * outside the map.
+    */
+  def describe(dda: DdaSetup): Unit = {
+    matrixProduct(ProjectOrigin, m.uvwOrigin, m.uvwOriginExponent)(axis =>
+      terms(matrix(axis), origin) ++ terms(Seq(offset(axis)), Seq(offsetPower))
+    )(ProjectDir.when(request.isFromCamera, "from a camera"))
     step(OriginDepth) {
       m.load(m.uvwOrigin(2))
       branch(Finish.when(m.uvwOrigin(2) <= 0.S, "behind the camera"))
     }
     step(m.normalise())
     step {
-      set(m.mantissa, m.sumMantissa)
+      m.startDivision(m.one, m.sumMantissa)
       set(m.depthMantissa, m.sumMantissa)
       set(m.depthExponent, m.exponent)
-    }
-    step {
-      m.startDivision(m.one, m.mantissa)
       branch(UvwRay.when(request.isFromCamera, "from a camera"))
     }
-    matrixProduct(ProjectDir, m.projectedDir, m.projectedDirExponent)(terms(request.ray.dir.axes)) {
-      NearPlane.when(request.isFromCamera, "from a camera")
-    }
+    matrixProduct(ProjectDir, m.projectedDir, m.projectedDirExponent)(axis => terms(matrix(axis), direction))(
+      ClipPlane.when(request.isFromCamera, "from a camera")
+    )
     label(UvwRay)
-    m.awaitDivision()
     overlap { at =>
+      at(0) {
+        m.load(inverseDepth)
+        m.awaitDivision()
+      }
       uvwOrigin(at)
-      for (axis <- 0 until 3) uvwDir(at, axis, begin = 6 + 3 * axis)
-      align(at, m.uvwDir, m.uvwDirExponent, begin = 17)
+      for ((axis, index) <- Seq(2, 0, 1).zipWithIndex) uvwDir(at, axis, begin = 5 + 2 * index, isFirst = index == 0)
+      dda.firstTile(at, begin = 7)
+      align(at, m.uvwDir, m.uvwDirExponent, begin = 13)
+      at(16)(branch(BoundingPlanes.when(dda.isOutside, "outside the map")))
     }
   }
 
-  /** The origin's u and v; w is the inverse depth. Eight cycles. */
+  /** The origin's w, which is the inverse depth, then u and v. Seven cycles. */
   private def uvwOrigin(at: Overlap[MarchLabel]): Unit = {
+    at(1) {
+      m.latchExponent()
+      m.setShift(m.depthExponent.zext +& m.uvwOriginExponent.zext - view.exponent - 1.S)
+    }
+    at(2)(set(m.uvwOrigin(2), m.coordinate))
     for (axis <- 0 to 1) {
-      val begin = 2 * axis
+      val begin = 1 + 2 * axis
       at(begin)(m.multiply(m.uvwOrigin(axis), inverseDepth))
       at(begin + 1)(m.load(m.product))
       at(begin + 2) {
@@ -78,85 +94,71 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
       }
       at(begin + 3)(set(m.uvwOrigin(axis), m.coordinate))
     }
-    at(5)(m.load(inverseDepth))
-    at(6) {
-      m.latchExponent()
-      m.setShift(m.depthExponent.zext +& m.uvwOriginExponent.zext - view.exponent - 1.S)
-    }
-    at(7)(set(m.uvwOrigin(2), m.coordinate))
+    at(3)(m.takeQuotient())
   }
 
-  /** The change of (u, v, w), times the depth: projectedDir − uvwOrigin · projectedDir₂; for w without the first term. Five
+  /** The change of (u, v, w), times the depth: projectedDir − uvwOrigin · projectedDir₂; for w without the first term. Four
     * cycles.
     */
-  private def uvwDir(at: Overlap[MarchLabel], axis: Int, begin: Int): Unit = {
+  private def uvwDir(at: Overlap[MarchLabel], axis: Int, begin: Int, isFirst: Boolean): Unit = {
     at(begin)(m.multiply(m.uvwOrigin(axis), m.projectedDir(2)))
-    at(begin + 1)(m.load(if (axis == 2) 0.S else (m.projectedDir(axis) << f).asSInt))
-    at(begin + 2)(m.accumulate(subtract = true))
-    normalise(at, m.uvwDir, m.uvwDirExponent, axis, begin + 3)
+    at(begin + 1) {
+      if (axis == 2) m.loadSigned(m.product) else m.loadDifference((m.projectedDir(axis) << f).asSInt, m.product)
+    }
+    normalise(at, m.uvwDir, m.uvwDirExponent, axis, begin + 2, isFirst)
   }
 
-  /** In a step before `ProjectOrigin`: its first row, and the least exponent of the origin's block, which for a camera also holds the depth of
-    * the near plane.
+  /** In a step before `ProjectOrigin`: the least exponent of the origin's block, which for a camera also holds the depth of
+    * the near plane. Or the camera's origin, if it is known.
     */
-  def clear(): Unit = {
-    selectRow(0.U)
-    val most = ((BigInt(1) << exponentBits) - 1).U
-    val next = (view.exponent +& 1.S(2.W)).asUInt
-    val some = if (view.exponent.getWidth > exponentBits) Mux(next > most, most, next) else next
-    set(m.uvwOriginExponent, Mux(request.isFromCamera && view.exponent >= 0.S, some, 0.U))
+  def clear(camera: Valid[CameraOrigin]): Unit = {
+    val most  = ((BigInt(1) << exponentBits) - 1).U
+    val next  = (view.exponent +& 1.S(2.W)).asUInt
+    val some  = if (view.exponent.getWidth > exponentBits) Mux(next > most, most, next) else next
+    val least = Mux(camera.valid, camera.bits.exponent, Mux(view.exponent >= 0.S, some, 0.U))
+    set(m.uvwOriginExponent, Mux(request.isFromCamera, least, 0.U))
+    for ((to, from) <- m.uvwOrigin.zip(camera.bits.origin)) set(to, from.pad(originBits))
   }
 
-  /** The matrix times a vector, row by row; `axis` is 0 before and after. */
-  private def matrixProduct(name: MarchLabel, vector: Vec[SInt], maxExponent: UInt)(
-      factors: Seq[(SInt, Seq[SInt])]
-  )(exit: => Exit[MarchLabel]): Unit = {
+  /** The matrix times a vector: a row begins one cycle after the sum of the row before. */
+  private def matrixProduct(name: MarchLabel, vector: Vec[SInt], maxExponent: UInt)(row: Int => Seq[Term])(
+      exit: => Exit[MarchLabel]
+  ): Unit = {
     label(name)
-    row(factors)
-    step(m.normalise())
-    step {
-      latch(vector, maxExponent, m.axis)
-      selectRow(Mux(m.axis === 2.U, 0.U, m.axis + 1.U))
-      branch(name.when(m.axis =/= 2.U, "next row"))
-    }
     overlap { at =>
-      align(at, vector, maxExponent, begin = 0)
-      at(3)(branch(exit))
-    }
-  }
-
-  /** A sum of products, digit by digit. */
-  private def row(factors: Seq[(SInt, Seq[SInt])]): Unit = {
-    val products = for {
-      (entry, vectorDigits) <- factors
-      (entryDigit, i)       <- digitsOf(entry).zipWithIndex
-      (vectorDigit, j)      <- vectorDigits.zipWithIndex
-    } yield (i + j, vectorDigit, entryDigit)
-    val ordered = products.sortBy(-_._1)
-    for (((_, wide, narrow), index) <- ordered.zipWithIndex)
-      step {
-        m.multiply(wide, narrow)
-        if (index > 0) add(index - 1)
+      val end = (0 until 3).foldLeft(0) { (begin, axis) =>
+        val terms = row(axis).sortBy(-_.log)
+        for ((term, index) <- terms.zipWithIndex) {
+          at(begin + index)(m.multiply(term.wide, term.narrow))
+          at(begin + index + 1) {
+            if (index == 0) m.load(m.product)
+            else m.shiftAccumulate(terms(index - 1).log - term.log)
+          }
+        }
+        val next = begin + terms.size + 1
+        normalise(at, vector, maxExponent, axis, next, isFirst = axis == 0 && !(vector eq m.uvwOrigin))
+        next
       }
-    step(add(ordered.size - 1))
-
-    def add(index: Int): Unit =
-      if (index == 0) m.load(m.product)
-      else if (ordered(index)._1 < ordered(index - 1)._1) m.shiftAccumulate()
-      else m.accumulate()
+      align(at, vector, maxExponent, begin = end + 2)
+      at(end + 5)(branch(exit))
+    }
   }
 
   /** Makes a component from the sum that is ready at `begin`. Two cycles. */
-  private def normalise(at: Overlap[MarchLabel], vector: Vec[SInt], maxExponent: UInt, axis: Int, begin: Int): Unit = {
+  private def normalise(
+      at:          Overlap[MarchLabel],
+      vector:      Vec[SInt],
+      maxExponent: UInt,
+      axis:        Int,
+      begin:       Int,
+      isFirst:     Boolean
+  ): Unit = {
     at(begin)(m.normalise())
-    at(begin + 1)(latch(vector, maxExponent, axis.U(2.W)))
-  }
-
-  /** In the step after the sum is normalised. */
-  private def latch(vector: Vec[SInt], maxExponent: UInt, axis: UInt): Unit = {
-    set(vector(axis), component(vector))
-    set(m.exponents(axis), m.exponent)
-    set(maxExponent, m.exponent, (axis === 0.U && !(vector eq m.uvwOrigin).B) || m.exponent > maxExponent)
+    at(begin + 1) {
+      set(vector(axis), component(vector))
+      set(m.exponents(axis), m.exponent)
+      set(maxExponent, m.exponent, isFirst.B || m.exponent > maxExponent)
+    }
   }
 
   /** Aligns components to the largest one. Four cycles. */
@@ -171,14 +173,10 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
 
   private def component(vector: Vec[SInt]): SInt = Rounding.narrow(m.shifted, f + 1).pad(vector(0).getWidth)
 
-  private def terms(vector: Seq[SInt]): Seq[(SInt, Seq[SInt])] =
-    vector.zipWithIndex.map { case (component, column) => (matrixRow(column), digitsOf(component)) }
-
-  def digitsOf(number: SInt): Seq[SInt] = {
-    val count = digits(number.getWidth)
-    Seq.tabulate(count) { i =>
-      if (i == count - 1) Rounding.floor(number, i * digitBits)
-      else number(i * digitBits + digitBits - 1, i * digitBits).zext
-    }
-  }
+  /** The products of two rows of numbers. */
+  private def terms(left: Seq[Digits], right: Seq[Digits]): Seq[Term] = for {
+    (a, b)      <- left.zip(right)
+    (wide, i)   <- a.values.zipWithIndex
+    (narrow, j) <- b.values.zipWithIndex
+  } yield new Term(i * a.bits + j * b.bits, wide, narrow)
 }

@@ -11,6 +11,7 @@ final class TileProgram(
     stepper: TileStepper,
     planes:  PlaneCache,
     dda:     DdaSetup,
+    first:   FirstTile,
     channel: AttributeChannel[CellRequest, CellResponse]
 ) {
   import MarchLabel._
@@ -25,27 +26,36 @@ final class TileProgram(
 
   /** Steps from `Tile` on; they end at `BoundingPlanes` if the ray hits nothing. */
   def describe(): Unit = {
+    val resp = channel.resp
+    when(first.isAsked) {
+      request()
+      first.isAsked := !req.ready
+    }
+    when(resp.valid && first.isPending) {
+      stepper.tile  := resp.bits.content
+      first.hasCome := true.B
+    }
     step(Tile) {
       val isInside = dda.tile(0) < layout.tileColumns.U && dda.tile(1) < layout.tileRows.U
-      when(now) {
-        req.valid                  := isInside
-        req.bits.content.pixel     := stepper.tileCorner
-        req.bits.content.wholeTile := true.B
-      }
+      val isMade   = first.isPending
+      when(now && isInside && !isMade)(request())
       set(stepper.isSecondAxis, dda.edge(0) > dda.edge(1))
       set(number, 0.U)
-      branch(BoundingPlanes.when(!isInside, "outside the map"), Repeat.until(req.ready, "cells.req is ready"))
+      branch(
+        BoundingPlanes.when(!isInside, "outside the map"),
+        Repeat.until(req.ready || isMade, "cells.req is ready")
+      )
     }
     step {
-      val resp    = channel.resp
-      val content = resp.bits.content
+      val content = Mux(first.hasCome, stepper.tile, resp.bits.content)
       val isOne   = content.count === 1.U
+      when(resp.valid || first.hasCome)(first.take())
       set(stepper.tile, content)
       set(stepper.tExit, stepper.tileExit)
       set(planes.id, content.ids(0))
       set(planes.purpose, Mux(isOne, planes.forTile, planes.forNearest))
       branch(
-        Repeat.until(resp.valid, "cells.resp"),
+        Repeat.until(resp.valid || first.hasCome, "cells.resp"),
         Cells.when(!isOne && stepper.isBehind, "several planes, ray behind the map"),
         Plane.otherwise
       )
@@ -66,6 +76,12 @@ final class TileProgram(
       set(dda.tile(axis), Mux(dda.isNegative(axis), dda.tile(axis) - 1.U, dda.tile(axis) + 1.U))
       branch(BoundingPlanes.when(isOver, "beyond the map"), Tile.otherwise)
     }
+  }
+
+  private def request(): Unit = {
+    req.valid                  := true.B
+    req.bits.content.pixel     := stepper.tileCorner
+    req.bits.content.wholeTile := true.B
   }
 
   /** The ray is in front of one of several planes. Finds the plane that is nearest where the ray exits. */

@@ -12,6 +12,7 @@ import scala.util.Random
 private class DirectViewHarness(config: ColonnadeConfig) extends OrderHarness(config) {
   private val pipeline = Module(new DirectView(config)).io
   connect(pipeline.view, pipeline.order, pipeline.answer, pipeline.maps)
+  MarchUnit.tieOff(pipeline.march)
   isReady   := pipeline.isReady
   isIllegal := pipeline.isIllegal
 }

@@ -1,33 +1,100 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.Valid
+import chisel3.util.{Decoupled, RegEnable, Valid}
 import chiseltest._
 import colonnade.TestParts._
-import colonnade.config.{AttributeLayout, ColonnadeConfig, MapEncoding}
-import colonnade.formats.{EnvironmentView, Load}
-import colonnade.numbers.StreamTester
+import colonnade.common.Context
+import colonnade.config.{AttributeLayout, ColonnadeConfig, MapEncoding, NumberFormats, PathConfig}
+import colonnade.formats.{AlbedoEntry, EnvironmentView, Load, Vec3}
+import colonnade.numbers.{Fixed, StreamTester}
+import colonnade.ray.RayFormats
 import colonnade.{Always, Matrix, Model, Packed, PackedUnit, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
-/** A march with its maps; their responses are delayed if `isSlow`. */
+/** What the model answers. Fields that do not belong to the kind are 0. */
+private class MarchResult(config: ColonnadeConfig) extends Bundle {
+  private val formats = new MarchFormats(config)
+  private val layout  = AttributeLayout.of(config)
+
+  val context          = Context(PathConfig(config))
+  val kind             = HitKind()
+  val x                = UInt(layout.xBits.W)
+  val y                = UInt(layout.yBits.W)
+  val boundingPlane    = UInt(layout.boundingPlaneIndexBits.W)
+  val isHidden         = Bool()
+  val distance         = UInt((formats.f + 1).W)
+  val distanceExponent = SInt(formats.shiftBits.W)
+  val steps            = UInt(formats.stepBits.W)
+  val point            = Vec3(new Fixed(new RayFormats(config.numbers).scene))
+  val albedo           = new AlbedoEntry
+  val normal           = Vec3(SInt(NumberFormats.normalBits.W))
+  val hidesObject      = Bool()
+  val isIllegal        = Bool()
+}
+
+/** A march with its maps; their responses are delayed if `isSlow`. All rays are occlusion tests. */
 private class EnvironmentMarchHarness(config: ColonnadeConfig)
-    extends PackedUnit(new MarchRequest(config), new MarchResult(config)) {
-  private val march = Module(new EnvironmentMarch(config))
-  private val maps  = Module(new PhysicalAttributeMemory(config, 1, tagBits = 0))
+    extends PackedUnit(new MarchOrder(config), new MarchResult(config)) {
+  private val march  = Module(new MarchUnit(config))
+  private val maps   = Module(new PhysicalAttributeMemory(config, 1, tagBits = 0))
+  private val order  = Wire(Decoupled(new MarchOrder(config)))
+  private val answer = Wire(Decoupled(new MarchResult(config)))
 
   val load   = IO(Flipped(Valid(new Load(config))))
-  val view   = IO(Input(UInt(march.io.view.getWidth.W)))
+  val view   = IO(Input(UInt(march.view.getWidth.W)))
   val isSlow = IO(Input(Bool()))
   val events = IO(Output(new MarchEvents))
 
-  connect(march.io.request, march.io.result)
-  SlowMaps.connect(march.io.maps, maps.io.ports.head, isSlow)
-  maps.io.load  := load
-  march.io.view := view.asTypeOf(march.io.view)
-  events        := march.io.events
+  connect(order, answer)
+  SlowMaps.connect(march.maps, maps.io.ports.head, isSlow)
+  maps.io.load := load
+  march.view   := view.asTypeOf(march.view)
+  events       := march.events
+
+  // One ray at a time
+  private val isBusy = RegInit(false.B)
+  when(order.fire) { isBusy := true.B }.elsewhen(answer.fire) { isBusy := false.B }
+  order.ready        := !isBusy && march.isEmpty
+  march.order.valid  := order.fire
+  march.order.bits   := order.bits
+  answer.valid       := march.answer.valid
+  march.answer.ready := answer.ready
+
+  private val hit       = RegEnable(march.hit.bits, march.hit.valid)
+  private val distance  = RegEnable(march.distance.bits, march.distance.valid)
+  private val asked     = march.maps.planes.req
+  private val plane     = RegEnable(asked.bits.content.index, asked.fire && asked.bits.content.isBoundingPlane)
+  private val steps     = Reg(UInt(new MarchFormats(config).stepBits.W))
+  private val isIllegal = Reg(Bool())
+  when(order.fire) {
+    steps     := 0.U
+    isIllegal := false.B
+  }.otherwise {
+    steps     := steps + march.events.step
+    isIllegal := isIllegal || march.isIllegal
+  }
+  private val surface = march.answer.bits.surface
+  private val isMap   = hit.kind === HitKind.map
+  private val isHit   = hit.kind =/= HitKind.miss
+  private val result  = answer.bits
+  result.context          := surface.context
+  result.kind             := hit.kind
+  result.x                := Mux(isMap, hit.pixel.x, 0.U)
+  result.y                := Mux(isMap, hit.pixel.y, 0.U)
+  result.boundingPlane    := Mux(hit.kind === HitKind.boundingPlane, plane, 0.U)
+  result.isHidden         := isMap && hit.isHidden
+  result.distance         := Mux(isHit, distance.distance, 0.U)
+  result.distanceExponent := Mux(isHit, distance.exponent, 0.S)
+  result.steps            := steps
+  result.hidesObject      := march.answer.bits.isHit
+  result.isIllegal        := isIllegal
+  for ((to, from) <- result.point.axes.zip(surface.point.axes)) to   := Fixed(to.format, Mux(isHit, from.integer, 0.S))
+  for ((to, from) <- result.normal.axes.zip(surface.normal.axes)) to := Mux(isHit, from, 0.S)
+  for ((to, from) <- Seq(result.albedo.r, result.albedo.g, result.albedo.b).zip(surface.albedo.channels))
+    to := Mux(isHit, from, 0.U)
 }
 
 class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
@@ -45,12 +112,16 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
       random: Random,
       isSlow: Boolean
   ): Seq[Map[String, BigInt]] = {
-    val (request, result) = (new Packed(new MarchRequest(config)), new Packed(new MarchResult(config)))
+    val (order, result) = (new Packed(new MarchOrder(config)), new Packed(new MarchResult(config)))
     unit.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
     unit.isSlow.poke(isSlow)
     val inputs = rays.map { ray =>
       val fields = ray.fields(config.numbers.shadeBits)
-      request.pack(fields - "isDirectView" + ("isFromCamera" -> fields("isDirectView")))
+      val names  = Seq("context", "isDirectView")
+      order.pack(
+        fields -- names ++ names.map(name => s"request.$name" -> fields(name)) +
+          ("request.isFresnelReflection" -> BigInt(0)) + ("request.isOcclusionTest" -> BigInt(1))
+      )
     }
     val found = StreamTester.exchange(unit.clock, unit.in, unit.out, inputs)(
       (port: UInt, bits: BigInt) => port.poke(bits),

@@ -33,9 +33,10 @@ private class EnvironmentMarchesHarness(config: ColonnadeConfig) extends Module 
   val view   = IO(Input(UInt(marches.io.view.getWidth.W)))
   val load   = IO(Flipped(Valid(new Load(config))))
   val events = IO(chiselTypeOf(marches.io.events))
-  marches.io.view := view.asTypeOf(marches.io.view)
-  maps.io.load    := load
-  events          := marches.io.events
+  marches.io.view  := view.asTypeOf(marches.io.view)
+  marches.io.start := false.B // a frame of one camera
+  maps.io.load     := load
+  events           := marches.io.events
   marches.io.maps.zip(maps.io.ports).foreach { case (march, port) => SlowMaps.connect(march, port, isSlow = true.B) }
   private val rays = Module(new EnvironmentRays(config)).io
   marches.io.paths :<>= rays.marches
@@ -142,8 +143,11 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
       val scene    = new EnvironmentScene(config, random)
       val camera   = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
       val view     = camera.view.copy(isMapCamera = isMapCamera)
-      def seen     = if (isMapCamera) stimulus.fromCamera(camera) else stimulus.fromElsewhere(camera)
-      def nextRay  = if (random.nextInt(3) == 0) seen else stimulus.inRoom(camera)
+      // All rays from a camera have its position
+      val position = if (isMapCamera) camera.steps(Seq(0.0, 0.0, 0.0)) else camera.steps(Seq(0.3, 0.1, -0.2))
+      def seen     =
+        (if (isMapCamera) stimulus.fromCamera(camera) else stimulus.fromElsewhere(camera)).copy(origin = position)
+      def nextRay = if (random.nextInt(3) == 0) seen else stimulus.inRoom(camera)
       dut.clock.setTimeout(0)
       dut.paths.isMapCamera.poke(isMapCamera)
       EnvironmentImage.load(dut.load, dut.clock, config, scene.words)

@@ -10,10 +10,10 @@ import org.scalatest.flatspec.AnyFlatSpec
 import scala.util.Random
 
 private class MarchSlotHarness(config: ColonnadeConfig) extends OrderHarness(config) {
-  private val slot = Module(new MarchSlot(config)).io
-  connect(slot.view, slot.order, slot.answer, slot.maps)
-  isReady   := slot.isEmpty
-  isIllegal := slot.events.illegal
+  private val march = Module(new MarchUnit(config))
+  connect(march.view, march.order, march.answer, march.maps)
+  isReady   := march.isEmpty
+  isIllegal := march.isIllegal
 }
 
 class MarchSlotSpec extends AnyFlatSpec with ChiselScalatestTester {
