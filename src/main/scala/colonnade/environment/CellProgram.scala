@@ -19,7 +19,6 @@ final class CellProgram(
   /** Distances to the next cell edges, with guard bits. A ray may go one cell beyond the largest distance. */
   private val edge         = Reg(Vec(2, UInt((distanceBits + 1).W)))
   private val isSecondAxis = Reg(Bool())
-  private val firstEdge    = Reg(SInt(combineBits.W))
 
   /** A value by the log2 of a tile's cells along each edge: 2, 3 or 4. */
   private def byCells(value: Int => UInt): UInt = {
@@ -78,8 +77,9 @@ final class CellProgram(
       // To the last cell, last - cell, without a carry before the multiplier
       m.multiply(width(m.axis(0)).zext, (cell ^ Mux(dda.isNegative(m.axis(0)), 0.U, last)).zext)
     }
-    step(set(firstEdge, m.combine(dda.edge(m.axis(0)).zext, m.product, subtract = true)))
+    step(m.combineForNext(dda.edge(m.axis(0)).zext, m.product, subtract = true))
     step {
+      val firstEdge = m.lastCombined
       val isAhead = firstEdge > stepper.tEnter.zext
       val next    = Mux(isAhead, firstEdge.asUInt(distanceBits, 0), stepper.tEnter)
       set(edge(m.axis(0)), Mux(m.uvwDir(m.axis) === 0.S, dda.maxDistance, next))

@@ -81,7 +81,7 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   operations.build()
 
   resolver.result(io.hit.bits)
-  io.events.step    := RegNext(stepper.steps, 0.U) =/= stepper.steps && stepper.steps =/= 0.U
+  io.events.step    := stepper.isStep
   io.events.busy    := isBusy
   io.events.illegal := io.maps.cells.resp.valid && io.maps.cells.resp.bits.isIllegal
 }

@@ -3,6 +3,7 @@ package colonnade.environment
 import chisel3._
 import chisel3.util.Enum
 import colonnade.microcode.Overlap
+import colonnade.numbers.Rounding
 
 /** Projects a point of the ray to a pixel, and clamps the pixel to a part of the map. */
 final class HitPixel(m: MarchOperations, stepper: TileStepper, hitDistance: UInt) {
@@ -12,7 +13,7 @@ final class HitPixel(m: MarchOperations, stepper: TileStepper, hitDistance: UInt
 
   private val Seq(cell, visible, hidden) = Enum(3)
   private val purpose                    = Reg(UInt(2.W))
-  private val coordinate                 = Reg(SInt(depthBits.W))
+  private val coordinate                 = Rounding.narrow(m.lastCombined, depthBits) // of the step before
 
   val x: UInt = Reg(UInt(layout.xBits.W))
   val y: UInt = Reg(UInt(layout.yBits.W))
@@ -37,16 +38,16 @@ final class HitPixel(m: MarchOperations, stepper: TileStepper, hitDistance: UInt
 
   private def pixel(cycle: Overlap[MarchLabel]): Unit = {
     cycle(0)(m.multiply(at.zext, m.uvwDir(0)))
-    cycle(1)(set(coordinate, m.combine(m.uvwOrigin(0), m.scaledProduct)))
+    cycle(1)(m.combineForNext(m.uvwOrigin(0), m.scaledProduct))
     cycle(2) {
-      set(coordinate, m.combine(coordinate, m.constant(centre(0))))
+      m.combineForNext(coordinate, m.constant(centre(0)))
       m.multiply(at.zext, m.uvwDir(1))
     }
     cycle(3) {
       set(x, clamp(stepper.tileCorner.x, stepper.frontCorner.x, sizes(0)))
-      set(coordinate, m.combine(m.uvwOrigin(1), m.scaledProduct))
+      m.combineForNext(m.uvwOrigin(1), m.scaledProduct)
     }
-    cycle(4)(set(coordinate, m.combine(coordinate, m.constant(centre(1)))))
+    cycle(4)(m.combineForNext(coordinate, m.constant(centre(1))))
     cycle(5) {
       set(y, clamp(stepper.tileCorner.y, stepper.frontCorner.y, sizes(1)))
       branch(FirstCell.when(purpose === cell, "first cell"), HitDistance.otherwise)

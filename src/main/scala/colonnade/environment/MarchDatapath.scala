@@ -43,9 +43,10 @@ final class MarchDatapathIO(formats: MarchFormats) extends Bundle {
   val along      = Output(UInt(alongBits.W))
   val distance   = Output(UInt(distanceBits.W))
 
-  /** The small adder; combinational. */
-  val combine  = Input(new MarchAddition(combineBits))
-  val combined = Output(SInt(combineBits.W))
+  /** The small adder; combinational, and latched. */
+  val combine      = Flipped(Valid(new MarchAddition(combineBits)))
+  val combined     = Output(SInt(combineBits.W))
+  val lastCombined = Output(SInt(combineBits.W))
 
   val divide       = Flipped(Valid(new Division(f))) // starts a division of mantissas, one at a time
   val quotient     = Valid(UInt((f + 1).W))
@@ -71,7 +72,11 @@ final class MarchDatapath(config: PathConfig) extends Module {
   when(io.add.valid)(sum          := io.add.bits.result)
   io.product  := product
   io.sum      := sum
-  io.combined := io.combine.result
+  io.combined := io.combine.bits.result
+
+  private val lastCombined = Reg(chiselTypeOf(io.combined))
+  when(io.combine.valid)(lastCombined := io.combined)
+  io.lastCombined := lastCombined
 
   io.sumExponent := Normalise.bitLength(Mux(sum < 0.S, ~sum, sum).asUInt)
   io.exponent    := exponent

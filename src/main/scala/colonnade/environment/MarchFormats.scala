@@ -30,7 +30,7 @@ final class MarchFormats(config: ColonnadeConfig) {
 
   val originBits:    Int = f + 5
   val directionBits: Int = f + 4
-  val wideBits:      Int = distanceBits - 2 + 1
+  val wideBits:      Int = (distanceBits - 1).max(numbers.macBits.min(32)) // an entry of the matrix in one digit
   val narrowBits:    Int = AttributeLayout.coefficientBits.max(alongBits + 1)
   val productBits:   Int = wideBits + narrowBits
 

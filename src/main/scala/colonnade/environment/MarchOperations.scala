@@ -36,7 +36,11 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val mantissa:  UInt      = Reg(UInt(f.W))
   val numerator: UInt      = Reg(UInt(f.W))
 
+  /** A shifted value for the next steps. */
+  val scaled: SInt = Reg(SInt(scaledBits.W))
+
   // Outputs of the datapath
+  val lastCombined: SInt = datapath.lastCombined
   val product:     SInt = datapath.product
   val sum:         SInt = datapath.sum
   val sumExponent: UInt = datapath.sumExponent
@@ -112,6 +116,11 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
     datapath.combined
   }
 
+  /** The same, in [[lastCombined]] for the next step. */
+  def combineForNext(a: SInt, b: SInt, subtract: Boolean = false): Unit = {
+    val _ = combine(a, b, subtract)
+  }
+
   /** Sets the shift of the datapath's shifted and saturated sums. */
   def setShift(amount: SInt): Unit = when(program.now) {
     datapath.shift.valid := true.B
@@ -157,9 +166,10 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
     datapath.add.bits.addend   := addend.value
     datapath.add.bits.subtract := subtracts.value =/= 0.S
 
-    datapath.combine.base     := first.value
-    datapath.combine.addend   := second.value
-    datapath.combine.subtract := combineSubtracts.value =/= 0.S
+    datapath.combine.valid         := first.isChosen
+    datapath.combine.bits.base     := first.value
+    datapath.combine.bits.addend   := second.value
+    datapath.combine.bits.subtract := combineSubtracts.value =/= 0.S
 
     datapath.divide.valid            := division(0).isChosen
     datapath.divide.bits.numerator   := division(0).value.asUInt(f - 1, 0)

@@ -30,8 +30,6 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
   private val oldest  = RegInit(0.U(2.W))
   private val slot    = Reg(UInt(2.W))
   private val plane   = Reg(new Plane)
-  private val aligned = Reg(SInt((originBits + planeFraction - f).W))
-  private val partial = Reg(SInt(valueBits.W))
   private val matches = VecInit(slots.zip(isValid).map { case (slot, isValid) => isValid && slot.id === id })
   private val req     = channel.req
 
@@ -100,17 +98,17 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
     step {
       m.multiply(m.uvwDir(1), plane.b)
       m.load(m.product)
-      set(partial, m.combine(aligned, scaledSum, subtract = true))
+      m.combineForNext(m.scaled, scaledSum, subtract = true)
     }
     step {
       m.multiply(m.projectedDir(2), plane.c) // for a bounding plane
       m.accumulate()
-      set(depth.value, m.combine(partial, plane.c, subtract = true))
+      set(depth.value, m.combine(m.lastCombined, plane.c, subtract = true))
       alignW(m.uvwDir(2))
     }
     step {
       m.accumulate()
-      set(depth.slope, m.combine(aligned, scaledSum, subtract = true))
+      set(depth.slope, m.combine(m.scaled, scaledSum, subtract = true))
       branch(
         BoundingDepth.when(purpose === forBoundingPlane, "bounding plane"),
         RecordFront.when(purpose === forFront, "nearest plane"),
@@ -123,5 +121,5 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
 
   /** A step of w has 2^(22 − f − exponent) steps of the plane. */
   private def alignW(w: SInt): Unit =
-    set(aligned, (Cat(w, 0.U((planeFraction - f).W)).asSInt >> plane.exponent).asSInt)
+    set(m.scaled, (Cat(w, 0.U((planeFraction - f).W)).asSInt >> plane.exponent).asSInt)
 }

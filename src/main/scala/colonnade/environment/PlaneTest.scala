@@ -8,8 +8,7 @@ final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCac
   import m.formats._
   import m.program._
 
-  private val scaled = Reg(SInt(scaledBits.W))
-  private val probe  = Reg(SInt(depthBits.W))
+  private val probe = m.lastCombined // of the step before
 
   val hitDistance: UInt = Reg(UInt(alongBits.W)) // the distance along the ray where it hits the environment
 
@@ -28,7 +27,7 @@ final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCac
     }
     step {
       set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct))
-      set(stepper.steps, stepper.steps + 1.U, !isNearest)
+      stepper.countStep(!isNearest)
       stepper.recordFront(stepper.isInFront && !isNearest)
       val isSame = stepper.hasFront && stepper.front.id === planes.id
       branch(
@@ -54,11 +53,11 @@ final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCac
       m.setShift(planeFraction.S - planes.depth.exponent.zext)
     }
     step {
-      set(probe, m.combine(m.uvwOrigin(2), m.scaledProduct))
-      set(scaled, m.shifted)
+      m.combineForNext(m.uvwOrigin(2), m.scaledProduct)
+      set(m.scaled, m.shifted)
     }
     step {
-      val isNear = m.combine(scaled, (probe >> nearLog).asSInt) > 0.S
+      val isNear = m.combine(m.scaled, (probe >> nearLog).asSInt) > 0.S
       set(stepper.isBehind, true.B, !isNear)
       branch(Meets.when(isNear, "slightly behind"))
     }
@@ -70,7 +69,7 @@ final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCac
       m.multiply(stepper.front.slope, stepper.exit.zext)
       branch(Emerge.when(!stepper.hasFront, "no front plane"))
     }
-    step(set(probe, m.combine(stepper.front.value, m.scaledProduct)))
+    step(m.combineForNext(stepper.front.value, m.scaledProduct))
     step(branch(Crosses.when(probe < 0.S, "hidden surface")))
     step(Emerge)(stepper.recordFront(stepper.depthExit >= 0.S))
   }

@@ -20,7 +20,6 @@ final class TileProgram(
 
   private val req       = channel.req
   private val number    = Reg(UInt(2.W))
-  private val scaled    = Reg(SInt(scaledBits.W))
   private val nearest   = Reg(SInt(scaledBits.W))
   private val nearestId = Reg(chiselTypeOf(planes.id))
 
@@ -63,7 +62,7 @@ final class TileProgram(
     nearestPlane()
     step(RecordFront) {
       stepper.recordFront(true.B)
-      set(stepper.steps, stepper.steps + 1.U)
+      stepper.countStep(true.B)
     }
     step(TilePassed) {
       val max     = ((BigInt(1) << alongBits) - 1).S
@@ -90,11 +89,11 @@ final class TileProgram(
       m.load(stepper.depthExit)
       m.setShift(planeFraction.S - planes.depth.exponent.zext)
     }
-    step(set(scaled, m.shifted))
+    step(set(m.scaled, m.shifted))
     step {
-      val isNearer = number === 0.U || scaled < nearest
+      val isNearer = number === 0.U || m.scaled < nearest
       val isLast   = number === stepper.tile.count - 1.U
-      set(nearest, scaled, isNearer)
+      set(nearest, m.scaled, isNearer)
       set(nearestId, planes.id, isNearer)
       set(number, number + 1.U)
       set(planes.id, Mux(isLast, Mux(isNearer, planes.id, nearestId), stepper.tile.ids(number + 1.U)))

@@ -55,6 +55,15 @@ final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
     m.program.set(tEnter, 0.U)
   }
 
+  /** In this cycle a tile or a cell is passed. */
+  val isStep: Bool = WireInit(false.B)
+
+  /** In a step: it is passed if the condition holds. */
+  def countStep(condition: Bool): Unit = {
+    m.program.set(steps, steps + 1.U, condition)
+    when(m.program.now && condition)(isStep := true.B)
+  }
+
   /** In a step: the ray is in front of the current plane. */
   def recordFront(condition: Bool): Unit = {
     val isCell = planes.purpose === planes.forCell
