@@ -71,13 +71,19 @@ final class CellProgram(
       set(m.axis, 0.U)
       for (a <- 0 to 1) set(stepper.cell(a), byCells(log => inTile(a) >> (layout.tileLog - log)))
     }
-    step(CellEdge) {
+    val left = {
       val cell = stepper.cell(m.axis(0))
       val last = byCells(log => ((1 << log) - 1).U)
       // To the last cell, last - cell, without a carry before the multiplier
-      m.multiply(width(m.axis(0)).zext, (cell ^ Mux(dda.isNegative(m.axis(0)), 0.U, last)).zext)
+      (cell ^ Mux(dda.isNegative(m.axis(0)), 0.U, last)).zext
     }
-    step(m.combineForNext(dda.edge(m.axis(0)).zext, m.product, subtract = true))
+    val half = (distanceBits - 2) / 2
+    step(CellEdge)(m.multiply(width(m.axis(0))(half - 1, 0).zext, left))
+    step {
+      m.combineForNext(dda.edge(m.axis(0)).zext, m.product, subtract = true)
+      m.multiply((width(m.axis(0)) >> half).zext, left)
+    }
+    step(m.combineForNext(m.lastCombined, (m.product << half).asSInt, subtract = true))
     step {
       val firstEdge = m.lastCombined
       val isAhead = firstEdge > stepper.tEnter.zext

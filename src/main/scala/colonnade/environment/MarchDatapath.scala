@@ -39,7 +39,6 @@ final class MarchDatapathIO(formats: MarchFormats) extends Bundle {
 
   // Saturated; the sum's exponent must be latched. The natural ones are for sums that are not negative
   val coordinate = Output(SInt((alongBits + 1).W))
-  val summand    = Output(SInt(sceneBits.W))
   val along      = Output(UInt(alongBits.W))
   val distance   = Output(UInt(distanceBits.W))
 
@@ -90,7 +89,6 @@ final class MarchDatapath(config: PathConfig) extends Module {
   io.shifted := Rounding.narrow(Cat(sum, 0.U(f.W)).asSInt >> amount, scaledBits)
 
   io.coordinate := saturate(alongBits)
-  io.summand    := saturate(sceneBits - 1)
   io.along      := saturateNatural(alongBits)
   io.distance   := saturateNatural(distanceBits)
 

@@ -30,17 +30,18 @@ final class MarchFormats(config: ColonnadeConfig) {
 
   val originBits:    Int = f + 5
   val directionBits: Int = f + 4
-  val wideBits:      Int = (distanceBits - 1).max(numbers.macBits.min(32)) // an entry of the matrix in one digit
   val narrowBits:    Int = AttributeLayout.coefficientBits.max(alongBits + 1)
-  val productBits:   Int = wideBits + narrowBits
 
   /** A plane's depth at the ray's origin, its slope, and its depth at a distance along the ray. */
   val valueBits: Int = planeFraction + 6
   val slopeBits: Int = planeFraction + 2
   val depthBits: Int = valueBits + 2
 
+  val wideBits:    Int = originBits.max(slopeBits)
+  val productBits: Int = wideBits + narrowBits
+
   val sumBits: Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits) // the model's widest has 128
-  val scaledBits:   Int = (depthBits + f - 7).max(sceneBits) // a depth in steps of w, or a position in the scene
+  val scaledBits:   Int = depthBits + f - 7                  // a depth in steps of w
   val combineBits:  Int = scaledBits + 1
   val exponentBits: Int = 8
   val shiftBits:    Int = 12                                 // shift amounts, and exponents that may be negative

@@ -47,7 +47,6 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
   val exponent:    UInt = datapath.exponent
   val shifted:     SInt = datapath.shifted
   val coordinate:  SInt = datapath.coordinate
-  val summand:     SInt = datapath.summand
   val along:       UInt = datapath.along
   val distance:    UInt = datapath.distance
 
