@@ -86,8 +86,8 @@ final class CellProgram(
     step(m.combineForNext(m.lastCombined, (m.product << half).asSInt, subtract = true))
     step {
       val firstEdge = m.lastCombined
-      val isAhead = firstEdge > stepper.tEnter.zext
-      val next    = Mux(isAhead, firstEdge.asUInt(distanceBits, 0), stepper.tEnter)
+      val isAhead   = firstEdge > stepper.tEnter.zext
+      val next      = Mux(isAhead, firstEdge.asUInt(distanceBits, 0), stepper.tEnter)
       set(edge(m.axis(0)), Mux(m.uvwDir(m.axis) === 0.S, dda.maxDistance, next))
       set(m.axis, 1.U)
       branch(CellEdge.when(m.axis === 0.U, "second axis"), Cell.otherwise)

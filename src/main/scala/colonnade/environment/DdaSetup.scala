@@ -3,31 +3,36 @@ package colonnade.environment
 import chisel3._
 import colonnade.microcode.Overlap
 
-/** The request for a ray's first tile, which is made before the DDA is set up. */
-final class FirstTile(m: MarchOperations) {
-  import m.program._
+/** A request to the maps that is made before the program awaits its response: for a ray's first tile, or its plane. */
+final class EarlyRequest(m: MarchOperations) {
+  val isAsked:   Bool = RegInit(false.B) // it is not yet accepted
+  val isPending: Bool = RegInit(false.B) // it is made, and its response is not yet used
+  val hasCome:   Bool = RegInit(false.B) // the response is stored
 
-  val isAsked:   Bool = RegInit(false.B) // the request is not yet accepted
-  val isPending: Bool = RegInit(false.B) // requested, and not yet used
-  val hasCome:   Bool = RegInit(false.B) // and it is in `TileStepper.tile`
-
-  /** In a step: requests it. */
-  def request(condition: Bool): Unit = {
-    set(isAsked, condition)
-    set(isPending, condition)
+  /** Makes it. */
+  def make(): Unit = {
+    isAsked   := true.B
+    isPending := true.B
   }
 
-  /** In a step: it is used. */
+  /** In a step that repeats until the response, or a later one, is there: uses it. */
   def take(): Unit = {
-    set(isPending, false.B)
-    set(hasCome, false.B)
+    m.program.set(isPending, false.B)
+    m.program.set(hasCome, false.B)
+  }
+
+  /** While it is asked. */
+  def drive[Q <: Data, R <: Data](channel: AttributeChannel[Q, R], request: Q => Unit): Unit = when(isAsked) {
+    channel.req.valid := true.B
+    request(channel.req.bits.content)
+    isAsked := !channel.req.ready
   }
 }
 
 /** Set-up of the digital differential analyser (DDA) that walks through tiles: the ray's first tile, and along each axis
   * the distance to the first tile edge and from edge to edge.
   */
-final class DdaSetup(m: MarchOperations, first: FirstTile) {
+final class DdaSetup(m: MarchOperations, first: EarlyRequest) {
   import m.formats._
   import m.program._
 
@@ -53,7 +58,7 @@ final class DdaSetup(m: MarchOperations, first: FirstTile) {
       val pixels      = coordinates.map(p => (p >> pixelFraction).asSInt)
       val isInside    = pixels.zip(sizes).map { case (pixel, size) => pixel >= 0.S && pixel < size.S }.reduce(_ && _)
       set(isOutside, !isInside)
-      first.request(isInside)
+      when(now && isInside)(first.make())
       for ((tile, p) <- tile.zip(coordinates))
         set(tile, p.asUInt(originBits - 1, tileWidth).pad(tileBits)(tileBits - 1, 0))
     }

@@ -40,12 +40,12 @@ final class MarchFormats(config: ColonnadeConfig) {
   val wideBits:    Int = originBits.max(slopeBits)
   val productBits: Int = wideBits + narrowBits
 
-  val sumBits: Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits) // the model's widest has 128
-  val scaledBits:   Int = depthBits + f - 7                  // a depth in steps of w
+  val sumBits:      Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits) // the model's widest has 128
+  val scaledBits:   Int = depthBits + f - 7                                           // a depth in steps of w
   val combineBits:  Int = scaledBits + 1
   val exponentBits: Int = 8
-  val shiftBits:    Int = 12                                 // shift amounts, and exponents that may be negative
-  val tileBits:     Int = 9                                  // a coordinate in tiles, with one bit to spare
+  val shiftBits: Int = 12 // shift amounts, and exponents that may be negative
+  val tileBits:  Int = 9  // a coordinate in tiles, with one bit to spare
 
   val centre: Seq[BigInt] = sizes.map(size => BigInt(size) << (pixelFraction - 1)) // half the map's size in map units
 

@@ -43,12 +43,12 @@ final class MarchHits(config: PathConfig) extends Module {
 
   val io = IO(new MarchHitsIO(config))
 
-  private val isHeld   = RegInit(false.B)
-  private val item     = latch(io.hit.bits, io.hit.fire)
-  private val hit      = item.hit
-  private val request  = item.order.request
-  private val isHit    = hit.kind =/= HitKind.miss
-  private val moves    = WireInit(false.B) // to the registers of the point
+  private val isHeld  = RegInit(false.B)
+  private val item    = latch(io.hit.bits, io.hit.fire)
+  private val hit     = item.hit
+  private val request = item.order.request
+  private val isHit   = hit.kind =/= HitKind.miss
+  private val moves   = WireInit(false.B) // to the registers of the point
   io.hit.ready := !isHeld
   when(io.hit.fire) { isHeld := true.B }.elsewhen(moves) { isHeld := false.B }
 
@@ -103,11 +103,11 @@ final class MarchHits(config: PathConfig) extends Module {
   point.distance.bits := latch(bits, moves)
   point.origin        := latch(item.order.ray.origin, moves)
   private val pixel = point.pixel.bits
-  pixel.request     := latch(request, moves)
-  pixel.hitDistance := latch(item.order.hitDistance, moves)
+  pixel.request                                                 := latch(request, moves)
+  pixel.hitDistance                                             := latch(item.order.hitDistance, moves)
   for ((to, from) <- pixel.dir.zip(item.order.ray.dir.axes)) to := latch(from, moves)
-  point.normal.bits := latch(normal, moves).asTypeOf(point.normal.bits)
-  point.albedo.bits := latch(albedo, moves).asTypeOf(point.albedo.bits)
+  point.normal.bits                                             := latch(normal, moves).asTypeOf(point.normal.bits)
+  point.albedo.bits                                             := latch(albedo, moves).asTypeOf(point.albedo.bits)
 
   /** Half the number, shifted right. */
   private def down(number: UInt, by: SInt): UInt = {

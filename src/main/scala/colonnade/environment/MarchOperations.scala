@@ -41,14 +41,14 @@ final class MarchOperations(config: PathConfig, datapath: MarchDatapathIO) {
 
   // Outputs of the datapath
   val lastCombined: SInt = datapath.lastCombined
-  val product:     SInt = datapath.product
-  val sum:         SInt = datapath.sum
-  val sumExponent: UInt = datapath.sumExponent
-  val exponent:    UInt = datapath.exponent
-  val shifted:     SInt = datapath.shifted
-  val coordinate:  SInt = datapath.coordinate
-  val along:       UInt = datapath.along
-  val distance:    UInt = datapath.distance
+  val product:      SInt = datapath.product
+  val sum:          SInt = datapath.sum
+  val sumExponent:  UInt = datapath.sumExponent
+  val exponent:     UInt = datapath.exponent
+  val shifted:      SInt = datapath.shifted
+  val coordinate:   SInt = datapath.coordinate
+  val along:        UInt = datapath.along
+  val distance:     UInt = datapath.distance
 
   /** The divider's quotient, from [[awaitDivision]] on until [[takeQuotient]]. */
   val quotient:    UInt = datapath.quotient.bits

@@ -35,6 +35,8 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
 
   val depth: PlaneDepth = slots(slot) // the plane that was looked up
 
+  val first = new EarlyRequest(m) // of the ray's first plane
+
   req.valid                        := false.B
   req.bits.tag                     := 0.U
   req.bits.content.isBoundingPlane := purpose === forBoundingPlane
@@ -62,22 +64,38 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
     }
   }
 
-  /** Steps from `Plane` on. For a bounding plane they end with its products in the sum. */
-  def describe(): Unit = {
+  /** Steps from `Plane` on. For a bounding plane they end with its products in the sum.
+    *
+    * @param firstId the plane of [[first]]
+    */
+  def describe(firstId: UInt): Unit = {
+    first.drive(
+      channel,
+      (content: PlaneRequest) => {
+        content.isBoundingPlane := false.B
+        content.index           := firstId
+      }
+    )
+    when(channel.resp.valid && first.isPending) {
+      plane         := channel.resp.bits.content.plane
+      first.hasCome := true.B
+    }
     step(Plane) {
       val isFound = matches.asUInt.orR && purpose =/= forBoundingPlane
-      when(now)(req.valid := !isFound)
+      when(now && !isFound && !first.isPending)(req.valid := true.B)
       set(slot, OHToUInt(matches))
       branch(
         RecordFront.when(isFound && purpose === forFront, "nearest plane cached"),
         DepthLabel.when(isFound, "cached"),
-        Repeat.until(req.ready, "planes.req is ready")
+        Repeat.until(req.ready || first.isPending, "planes.req is ready")
       )
     }
     step {
-      set(plane, channel.resp.bits.content.plane)
+      val isThere = channel.resp.valid || first.hasCome
+      set(plane, channel.resp.bits.content.plane, channel.resp.valid)
       set(slot, oldest)
-      await(channel.resp.valid, "planes.resp")
+      when(isThere)(first.take())
+      await(isThere, "planes.resp")
     }
     step {
       m.multiply(m.uvwOrigin(0), plane.a)

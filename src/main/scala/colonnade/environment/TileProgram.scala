@@ -11,7 +11,7 @@ final class TileProgram(
     stepper: TileStepper,
     planes:  PlaneCache,
     dda:     DdaSetup,
-    first:   FirstTile,
+    first:   EarlyRequest,
     channel: AttributeChannel[CellRequest, CellResponse]
 ) {
   import MarchLabel._
@@ -26,18 +26,19 @@ final class TileProgram(
   /** Steps from `Tile` on; they end at `BoundingPlanes` if the ray hits nothing. */
   def describe(): Unit = {
     val resp = channel.resp
-    when(first.isAsked) {
-      request()
-      first.isAsked := !req.ready
-    }
+    first.drive(channel, request)
     when(resp.valid && first.isPending) {
       stepper.tile  := resp.bits.content
       first.hasCome := true.B
+      planes.first.make()
     }
     step(Tile) {
       val isInside = dda.tile(0) < layout.tileColumns.U && dda.tile(1) < layout.tileRows.U
       val isMade   = first.isPending
-      when(now && isInside && !isMade)(request())
+      when(now && isInside && !isMade) {
+        req.valid := true.B
+        request(req.bits.content)
+      }
       set(stepper.isSecondAxis, dda.edge(0) > dda.edge(1))
       set(number, 0.U)
       branch(
@@ -77,10 +78,9 @@ final class TileProgram(
     }
   }
 
-  private def request(): Unit = {
-    req.valid                  := true.B
-    req.bits.content.pixel     := stepper.tileCorner
-    req.bits.content.wholeTile := true.B
+  private def request(content: CellRequest): Unit = {
+    content.pixel     := stepper.tileCorner
+    content.wholeTile := true.B
   }
 
   /** The ray is in front of one of several planes. Finds the plane that is nearest where the ray exits. */
