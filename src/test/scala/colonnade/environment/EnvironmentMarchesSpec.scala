@@ -156,7 +156,7 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
       val rays   = new Rays(dut.paths, config, () => nextRay, random)
       var cycles = 0
       var steps  = BigInt(0)
-      while (rays.answers.size < 45) {
+      while (rays.answers.size < 90) {
         rays.step(willing = 0.05)
         steps += dut.events.marchSteps.peekInt()
         cycles += 1
