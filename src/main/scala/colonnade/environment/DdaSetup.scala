@@ -5,13 +5,13 @@ import colonnade.microcode.Overlap
 
 /** A request to the maps that is made before the program awaits its response: for a ray's first tile, or its plane. */
 final class EarlyRequest(m: MarchOperations) {
-  val isAsked:   Bool = RegInit(false.B) // it is not yet accepted
+  val isIssued:   Bool = RegInit(false.B) // it is not yet accepted
   val isPending: Bool = RegInit(false.B) // it is made, and its response is not yet used
   val hasCome:   Bool = RegInit(false.B) // the response is stored
 
   /** Makes it. */
   def make(): Unit = {
-    isAsked   := true.B
+    isIssued   := true.B
     isPending := true.B
   }
 
@@ -21,11 +21,11 @@ final class EarlyRequest(m: MarchOperations) {
     m.program.set(hasCome, false.B)
   }
 
-  /** While it is asked. */
-  def drive[Q <: Data, R <: Data](channel: AttributeChannel[Q, R], request: Q => Unit): Unit = when(isAsked) {
+  /** While it is issued. */
+  def drive[Q <: Data, R <: Data](channel: AttributeChannel[Q, R], request: Q => Unit): Unit = when(isIssued) {
     channel.req.valid := true.B
     request(channel.req.bits.content)
-    isAsked := !channel.req.ready
+    isIssued := !channel.req.ready
   }
 }
 

@@ -36,15 +36,15 @@ final class DirectPoint(config: PathConfig) extends Module {
 
   private val isHeld = RegInit(false.B)
   private val at     = Reg(UInt(2.W))
-  private val isDone = RegInit(false.B) // the pixel before waits for its answer to be taken
+  private val isDone = RegInit(false.B) // the pixel before waits until it is taken
 
-  // The source of the next point, of the one that is held, and of the one whose answer waits
-  private val chosen   = io.sources(1).distance.valid.asUInt
+  // The source of the next point, of the one that is held, and of the one that leaves
+  private val selected   = io.sources(1).distance.valid.asUInt
   private val mayEnter = WireInit(false.B)
   private val enters   = mayEnter && io.sources.map(_.distance.valid).reduce(_ || _)
-  private val source   = latch(chosen, enters)
-  private val answers  = Reg(UInt(1.W))
-  private val found    = latch(of(chosen)(_.distance.bits), enters)
+  private val source   = latch(selected, enters)
+  private val leaving  = Reg(UInt(1.W))
+  private val found    = latch(of(selected)(_.distance.bits), enters)
   private val pixel    = of(source)(_.pixel.bits)
   private val texel    = of(source)(_.normal.bits)
   // From its first step on, a pixel is ready until its last one. Its albedo may come later, behind that of the pixel before
@@ -52,16 +52,16 @@ final class DirectPoint(config: PathConfig) extends Module {
   private val takes    = io.answer.fire
   private val moves    = isHeld && isReady && (at =/= 1.U || !isDone || takes)
   private val isLast   = isHeld && at === 3.U
-  private val advances = at =/= 1.U || moves // sum and offset of the pixel before stay until its answer is taken
+  private val advances = at =/= 1.U || moves // sum and offset of the pixel before stay until it is taken
   mayEnter := !isHeld || isLast
   when(enters) {
     isHeld := true.B
     at     := 0.U
   }.elsewhen(isLast) { isHeld := false.B }.elsewhen(moves) { at := at + 1.U }
   when(isLast) { isDone := true.B }.elsewhen(takes) { isDone := false.B }
-  when(isLast)(answers := source)
+  when(isLast)(leaving := source)
   for ((from, index) <- io.sources.zipWithIndex) {
-    from.distance.ready := mayEnter && chosen === index.U
+    from.distance.ready := mayEnter && selected === index.U
     from.pixel.ready    := isLast && source === index.U
     from.normal.ready   := isLast && source === index.U && found.isHit
   }
@@ -113,19 +113,19 @@ final class DirectPoint(config: PathConfig) extends Module {
   }
 
   // The answer
-  private val answer  = io.answer.bits
+  private val result  = io.answer.bits
   private val request = latch(pixel.request, isLast)
   private val isHit   = latch(found.isHit, isLast)
-  private val albedo  = of(answers)(_.albedo.bits)
-  io.answer.valid                                                  := isDone && (!isHit || of(answers)(_.albedo.valid))
-  for ((from, index) <- io.sources.zipWithIndex) from.albedo.ready := takes && isHit && answers === index.U
-  answer.isOcclusionTest                                           := request.isOcclusionTest
-  answer.isHit := isHit && (!request.isOcclusionTest || (mayHide && wasNearer && isNearer && (wasAway || isAway)))
-  answer.surface.context := request.context
-  answer.surface.shadows := !request.isFresnelReflection
-  answer.surface.point.axes.zip(Seq(x, y, point)).foreach { case (to, from) => to := Fixed(to.format, from) }
-  answer.surface.normal.axes.zip(normal).foreach { case (to, from) => to := from }
-  answer.surface.albedo.channels.zip(Seq(albedo.r, albedo.g, albedo.b)).foreach { case (to, from) =>
+  private val albedo  = of(leaving)(_.albedo.bits)
+  io.answer.valid                                                  := isDone && (!isHit || of(leaving)(_.albedo.valid))
+  for ((from, index) <- io.sources.zipWithIndex) from.albedo.ready := takes && isHit && leaving === index.U
+  result.isOcclusionTest                                           := request.isOcclusionTest
+  result.isHit := isHit && (!request.isOcclusionTest || (mayHide && wasNearer && isNearer && (wasAway || isAway)))
+  result.surface.context := request.context
+  result.surface.shadows := !request.isFresnelReflection
+  result.surface.point.axes.zip(Seq(x, y, point)).foreach { case (to, from) => to := Fixed(to.format, from) }
+  result.surface.normal.axes.zip(normal).foreach { case (to, from) => to := from }
+  result.surface.albedo.channels.zip(Seq(albedo.r, albedo.g, albedo.b)).foreach { case (to, from) =>
     to := from
   }
 

@@ -20,7 +20,7 @@ final class MarchHitsIO(config: PathConfig) extends Bundle {
   private val layout = AttributeLayout.of(config.device)
 
   val hit   = Flipped(Decoupled(new OrderedHit(config)))
-  val texel = Flipped(Valid(new MarchTexel)) // of the last hit, if that is of a bounding plane
+  val texel = Flipped(Valid(new BoundingTexel)) // of the last hit, if that is of a bounding plane
 
   /** At most one request in flight in each channel. */
   val albedo  = new AttributeChannel(new MapPixel(layout), new AlbedoEntry, tagBits = 0)
@@ -31,10 +31,10 @@ final class MarchHitsIO(config: PathConfig) extends Bundle {
 }
 
 /** Completes the hits of a column's marches, one after the other: divides for the distance while albedo and normal are
-  * fetched, and adds the way from the camera to the maps. About 10 cycles a hit, with 32-bit formats and if the maps answer
+  * fetched, and adds the way from the camera to the maps. About 10 cycles a hit, with 32-bit formats and if the maps respond
   * at once.
   *
-  * It waits for responses of the maps alone, and [[DirectPoint]] for nothing but an answer to be taken.
+  * It waits for responses of the maps alone, and [[DirectPoint]] for nothing but its result to be taken.
   */
 final class MarchHits(config: PathConfig) extends Module {
   private val formats = new MarchFormats(config.device)

@@ -17,7 +17,7 @@ final class MarchSlotIO(config: PathConfig) extends Bundle {
   val order   = Flipped(Valid(new MarchOrder(config)))     // only in a cycle after one with `isEmpty`
   val isEmpty = Output(Bool())                             // no order is held
   val hit     = Decoupled(new OrderedHit(config))
-  val texel   = Valid(new MarchTexel)
+  val texel   = Valid(new BoundingTexel)
   val maps    = new MarchMaps(AttributeLayout.of(config.device))
   val test    = Valid(new ClipTest(config))
   val events  = Output(new MarchEvents)

@@ -46,7 +46,7 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
   def clear(): Unit = isValid.foreach(set(_, false.B))
 
   /** Two steps that fetch a bounding plane with its texel. */
-  def fetchTexel(index: UInt, texel: Valid[MarchTexel]): Unit = {
+  def fetchTexel(index: UInt, texel: Valid[BoundingTexel]): Unit = {
     texel.valid       := false.B
     texel.bits.albedo := channel.resp.bits.content.albedo
     texel.bits.normal := channel.resp.bits.content.normal
@@ -91,11 +91,11 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
       )
     }
     step {
-      val isThere = channel.resp.valid || first.hasCome
+      val isAvailable = channel.resp.valid || first.hasCome
       set(plane, channel.resp.bits.content.plane, channel.resp.valid)
       set(slot, oldest)
-      when(isThere)(first.take())
-      await(isThere, "planes.resp")
+      when(isAvailable)(first.take())
+      await(isAvailable, "planes.resp")
     }
     step {
       m.multiply(m.uvwOrigin(0), plane.a)

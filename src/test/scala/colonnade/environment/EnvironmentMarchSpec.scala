@@ -65,8 +65,8 @@ private class EnvironmentMarchHarness(config: ColonnadeConfig)
 
   private val hit       = RegEnable(march.hit.bits, march.hit.valid)
   private val distance  = RegEnable(march.distance.bits, march.distance.valid)
-  private val asked     = march.maps.planes.req
-  private val plane     = RegEnable(asked.bits.content.index, asked.fire && asked.bits.content.isBoundingPlane)
+  private val planeReq  = march.maps.planes.req
+  private val plane     = RegEnable(planeReq.bits.content.index, planeReq.fire && planeReq.bits.content.isBoundingPlane)
   private val steps     = Reg(UInt(new MarchFormats(config).stepBits.W))
   private val isIllegal = Reg(Bool())
   when(order.fire) {
