@@ -5,13 +5,13 @@ import colonnade.microcode.Overlap
 
 /** A request to the maps that is made before the program awaits its response: for a ray's first tile, or its plane. */
 final class EarlyRequest(m: MarchOperations) {
-  val isIssued:   Bool = RegInit(false.B) // it is not yet accepted
+  val isIssued:  Bool = RegInit(false.B) // it is not yet accepted
   val isPending: Bool = RegInit(false.B) // it is made, and its response is not yet used
   val hasCome:   Bool = RegInit(false.B) // the response is stored
 
   /** Makes it. */
   def make(): Unit = {
-    isIssued   := true.B
+    isIssued  := true.B
     isPending := true.B
   }
 

@@ -39,7 +39,7 @@ final class DirectPoint(config: PathConfig) extends Module {
   private val isDone = RegInit(false.B) // the pixel before waits until it is taken
 
   // The source of the next point, of the one that is held, and of the one that leaves
-  private val selected   = io.sources(1).distance.valid.asUInt
+  private val selected = io.sources(1).distance.valid.asUInt
   private val mayEnter = WireInit(false.B)
   private val enters   = mayEnter && io.sources.map(_.distance.valid).reduce(_ || _)
   private val source   = latch(selected, enters)

@@ -76,7 +76,7 @@ final class EnvironmentMarchIO(config: PathConfig) extends Bundle {
   val camera  = Flipped(Valid(new CameraOrigin(config)))   // the origin of all rays from the camera, once it is known
   val request = Flipped(Decoupled(new MarchRequest(config)))
   val hit     = Decoupled(new MarchHit(config))            // taken together with its request
-  val texel   = Valid(new BoundingTexel)                      // after a hit of a bounding plane: its albedo and normal
+  val texel   = Valid(new BoundingTexel)                   // after a hit of a bounding plane: its albedo and normal
   val maps    = new MarchMaps(AttributeLayout.of(config.device))
   val test    = Valid(new ClipTest(config))                // a ray from the camera is tested against a plane, 0 to 4
   val events  = Output(new MarchEvents)
