@@ -10,7 +10,7 @@ final class CellProgram(
     planes:   PlaneCache,
     dda:      DdaSetup,
     hitPixel: HitPixel,
-    channel:  AttributeChannel[CellRequest, CellResponse]
+    cells:    CellReader
 ) {
   import MarchLabel._
   import m.formats._
@@ -28,37 +28,56 @@ final class CellProgram(
 
   private def width(axis: UInt): UInt = byCells(dda.stride(axis) >> _)
 
-  private val isInside = stepper.cell.map(_ < byCells(log => (1 << log).U)).reduce(_ && _)
+  private def isInTile(cell: Seq[UInt]): Bool = cell.map(_ < byCells(log => (1 << log).U)).reduce(_ && _)
+
+  /** The cell behind the edge that the ray crosses first. */
+  private val nextCell = stepper.cell.zipWithIndex.map { case (cell, a) =>
+    Mux(isSecondAxis === (a == 1).B, Mux(dda.isNegative(a.U), cell - 1.U, cell + 1.U), cell)
+  }
 
   /** Steps from `Cells` on. */
   def describe(): Unit = {
     step(Cells) {
+      when(now)(cells.channel.drop())
       hitPixel.forCell()
       goto(Pixel)
     }
     firstCell()
     step(Cell) {
-      when(now)(channel.req.valid := isInside)
+      val isInside = isInTile(stepper.cell)
+      when(now && isInside && !cells.channel.isPending && cells.channel.isFree)(cells.requestCell(stepper.cellCorner))
       set(isSecondAxis, edge(0) > edge(1))
-      branch(CellsPassed.when(!isInside, "outside the tile"), Repeat.until(channel.req.ready, "cells.req is ready"))
+      branch(
+        CellsPassed.when(!isInside, "outside the tile"),
+        Repeat.until(cells.channel.isPending || cells.channel.isFree, "a dropped response")
+      )
     }
     step {
-      val next = edge(isSecondAxis)
+      val next        = edge(isSecondAxis)
+      val isAvailable = cells.channel.isAvailable
+      when(now && isAvailable) {
+        cells.take()
+        when(isInTile(nextCell) && next < stepper.tileExit)(cells.requestCell(stepper.cornerOf(nextCell)))
+      }
       set(stepper.tExit, Mux(next < stepper.tileExit, next, stepper.tileExit))
-      set(planes.id, channel.resp.bits.content.ids(0))
+      set(planes.id, cells.content.ids(0))
       set(planes.purpose, planes.forCell)
-      branch(Repeat.until(channel.resp.valid, "cells.resp"), Plane.otherwise)
+      branch(Repeat.until(isAvailable, "cells.resp"), Plane.otherwise)
     }
     step(CellPassed) {
       val axis = isSecondAxis.asUInt
       set(stepper.tEnter, stepper.tExit)
       set(edge(axis), m.combine(edge(axis).zext, width(axis).zext).asUInt)
-      set(stepper.cell(axis), Mux(dda.isNegative(axis), stepper.cell(axis) - 1.U, stepper.cell(axis) + 1.U))
+      for ((cell, next) <- stepper.cell.zip(nextCell)) set(cell, next)
       val isOver = stepper.tExit >= stepper.tileExit || stepper.steps >= maxSteps.U
       branch(CellsPassed.when(isOver, "end of the tile"), Cell.otherwise)
     }
-    step(CellsPassed)(m.multiply(stepper.tileExit(distanceBits - 1, guardBits).zext, m.uvwDir(2)))
+    step(CellsPassed) {
+      when(now)(cells.channel.drop())
+      m.multiply(stepper.tileExit(distanceBits - 1, guardBits).zext, m.uvwDir(2))
+    }
     step {
+      when(now && cells.channel.isFree && cells.isInMap(stepper.nextTile))(cells.requestTile(stepper.nextTile))
       set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct))
       goto(TilePassed)
     }

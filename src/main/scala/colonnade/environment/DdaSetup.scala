@@ -3,36 +3,10 @@ package colonnade.environment
 import chisel3._
 import colonnade.microcode.Overlap
 
-/** A request to the maps that is made before the program awaits its response: for a ray's first tile, or its plane. */
-final class EarlyRequest(m: MarchOperations) {
-  val isIssued:  Bool = RegInit(false.B) // it is not yet accepted
-  val isPending: Bool = RegInit(false.B) // it is made, and its response is not yet used
-  val hasCome:   Bool = RegInit(false.B) // the response is stored
-
-  /** Makes it. */
-  def make(): Unit = {
-    isIssued  := true.B
-    isPending := true.B
-  }
-
-  /** In a step that repeats until the response, or a later one, is there: uses it. */
-  def take(): Unit = {
-    m.program.set(isPending, false.B)
-    m.program.set(hasCome, false.B)
-  }
-
-  /** While it is issued. */
-  def drive[Q <: Data, R <: Data](channel: AttributeChannel[Q, R], request: Q => Unit): Unit = when(isIssued) {
-    channel.req.valid := true.B
-    request(channel.req.bits.content)
-    isIssued := !channel.req.ready
-  }
-}
-
 /** Set-up of the digital differential analyser (DDA) that walks through tiles: the ray's first tile, and along each axis
   * the distance to the first tile edge and from edge to edge.
   */
-final class DdaSetup(m: MarchOperations, first: EarlyRequest) {
+final class DdaSetup(m: MarchOperations, cells: CellReader) {
   import m.formats._
   import m.program._
 
@@ -58,10 +32,10 @@ final class DdaSetup(m: MarchOperations, first: EarlyRequest) {
       val pixels      = coordinates.map(p => (p >> pixelFraction).asSInt)
       val isInside    = pixels.zip(sizes).map { case (pixel, size) => pixel >= 0.S && pixel < size.S }.reduce(_ && _)
       set(isOutside, !isInside)
-      when(now && isInside)(first.make())
       for ((tile, p) <- tile.zip(coordinates))
         set(tile, p.asUInt(originBits - 1, tileWidth).pad(tileBits)(tileBits - 1, 0))
     }
+    at(begin + 1)(when(now && !isOutside && cells.channel.isFree)(cells.requestTile(tile)))
     for (a <- 0 to 1)
       at(begin + 1 + a)(set(m.uvwOrigin(a), m.combine(m.uvwOrigin(a), m.constant(centre(a)), subtract = true)))
   }

@@ -19,14 +19,14 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   private val datapath   = Module(new MarchDatapath(config))
   private val operations = new MarchOperations(config, datapath.io)
   private val projection = prefix("projection")(new RayProjection(operations, io.view, request))
-  private val firstTile  = prefix("firstTile")(new EarlyRequest(operations))
-  private val dda        = prefix("dda")(new DdaSetup(operations, firstTile))
+  private val reader     = prefix("reader")(new CellReader(operations, io.maps.cells))
+  private val dda        = prefix("dda")(new DdaSetup(operations, reader))
   private val planes     = prefix("planes")(new PlaneCache(operations, io.maps.planes))
   private val stepper    = prefix("stepper")(new TileStepper(operations, planes, dda))
-  private val tiles      = prefix("tiles")(new TileProgram(operations, stepper, planes, dda, firstTile, io.maps.cells))
+  private val tiles      = prefix("tiles")(new TileProgram(operations, stepper, planes, dda, reader))
   private val planeTest  = prefix("planeTest")(new PlaneTest(operations, stepper, planes))
   private val hitPixel   = prefix("hitPixel")(new HitPixel(operations, stepper, planeTest.hitDistance))
-  private val cells      = prefix("cells")(new CellProgram(operations, stepper, planes, dda, hitPixel, io.maps.cells))
+  private val cells      = prefix("cells")(new CellProgram(operations, stepper, planes, dda, hitPixel, reader))
   private val resolver   = prefix("resolver")(
     new HitResolver(operations, stepper, planes, hitPixel, planeTest.hitDistance, io.view, request)
   )
@@ -35,12 +35,8 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
 
   val program: Microprogram[MarchLabel] = operations.program
 
-  io.request.ready                         := false.B
-  io.hit.valid                             := false.B
-  io.maps.cells.req.valid                  := false.B
-  io.maps.cells.req.bits.tag               := 0.U
-  io.maps.cells.req.bits.content.pixel     := stepper.cellCorner
-  io.maps.cells.req.bits.content.wholeTile := false.B
+  io.request.ready := false.B
+  io.hit.valid     := false.B
 
   program.step(MarchLabel.Idle) {
     projection.clear(io.camera)
@@ -48,7 +44,10 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
     planes.clear()
     resolver.clear()
     clip.clear()
-    when(program.now)(isBusy := io.request.valid)
+    when(program.now) {
+      isBusy := io.request.valid
+      reader.channel.drop()
+    }
     program.branch(
       Repeat.until(io.request.valid, "request"),
       MarchLabel.ProjectDir.when(request.isFromCamera && io.camera.valid, "from a known camera")
@@ -57,7 +56,7 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   projection.describe(dda)
   dda.describe()
   tiles.describe()
-  planes.describe(firstId = stepper.tile.ids(0))
+  planes.describe(reader, resolver.hasNext)
   planeTest.describe()
   cells.describe()
   planeTest.describeCrossing()
@@ -83,5 +82,5 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   resolver.result(io.hit.bits)
   io.events.step    := stepper.isStep
   io.events.busy    := isBusy
-  io.events.illegal := io.maps.cells.resp.valid && io.maps.cells.resp.bits.isIllegal
+  io.events.illegal := reader.isIllegal
 }

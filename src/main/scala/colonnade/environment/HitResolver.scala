@@ -30,6 +30,11 @@ final class HitResolver(
   val rateMantissa: UInt = Reg(UInt((f + 1).W))
   val rateExponent: SInt = Reg(SInt(shiftBits.W))
 
+  /** There is a bounding plane after that of the index. */
+  val hasNext: Bool = !isOver(index +& 1.U)
+
+  private def isOver(index: UInt): Bool = index === view.boundingPlanes || index === layout.config.boundingPlanes.U
+
   /** In a step: nothing is hit yet. */
   def clear(): Unit = {
     set(kind, HitKind.miss)
@@ -95,8 +100,7 @@ final class HitResolver(
     step(set(m.uvwDir(1), m.combine(m.projectedDir(1), fromCentre, subtract = true)))
     step(BoundingPlane) {
       set(planes.id, index)
-      val isOver = index === view.boundingPlanes || index === layout.config.boundingPlanes.U
-      branch(BoundingPlanesDone.when(isOver, "no more planes"), Plane.otherwise)
+      branch(BoundingPlanesDone.when(isOver(index), "no more planes"), Plane.otherwise)
     }
     step(BoundingDepth) {
       branch(NextBoundingPlane.when(planes.depth.value <= 0.S || m.sum <= 0.S, "behind, or not approaching"))

@@ -14,7 +14,7 @@ final class PlaneDepth(formats: MarchFormats) extends Bundle {
 }
 
 /** Depths of the last four planes along the current ray. A plane that is not cached is fetched. */
-final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneRequest, BoundingPlaneEntry]) {
+final class PlaneCache(m: MarchOperations, maps: AttributeChannel[PlaneRequest, BoundingPlaneEntry]) {
   import MarchLabel.{PlaneDepth => DepthLabel, _}
   import m.formats._
   import m.program._
@@ -31,71 +31,80 @@ final class PlaneCache(m: MarchOperations, channel: AttributeChannel[PlaneReques
   private val slot    = Reg(UInt(2.W))
   private val plane   = Reg(new Plane)
   private val matches = VecInit(slots.zip(isValid).map { case (slot, isValid) => isValid && slot.id === id })
-  private val req     = channel.req
+  private val channel = new Lookahead(maps, (response: TaggedResponse[BoundingPlaneEntry]) => response.content.plane)
 
   val depth: PlaneDepth = slots(slot) // the plane that was looked up
 
-  val first = new EarlyRequest(m) // of the ray's first plane
-
-  req.valid                        := false.B
-  req.bits.tag                     := 0.U
-  req.bits.content.isBoundingPlane := purpose === forBoundingPlane
-  req.bits.content.index           := id
+  private val isForBoundingPlane = purpose === forBoundingPlane
 
   /** In a step: invalidates the planes of the previous ray. */
-  def clear(): Unit = isValid.foreach(set(_, false.B))
+  def clear(): Unit = {
+    isValid.foreach(set(_, false.B))
+    set(purpose, forTile)
+    when(now)(channel.drop())
+  }
+
+  private def request(index: UInt, isBoundingPlane: Bool): Unit = channel.make { (request: PlaneRequest) =>
+    request.index           := index
+    request.isBoundingPlane := isBoundingPlane
+  }
+
+  /** Requests the plane of the next tile or cell, once, while that waits for the current one's test. */
+  private def lookAhead(cells: CellReader): Unit = {
+    val next     = cells.channel.stored.content.ids(0)
+    val isDone   = RegInit(false.B)
+    val isCached = slots.zip(isValid).map { case (slot, isValid) => isValid && slot.id === next }.reduce(_ || _)
+    val mayStart = channel.isFree && !channel.isStored && (purpose === forTile || purpose === forCell)
+    isDone := cells.channel.isStored && (isDone || mayStart)
+    when(cells.channel.isStored && !isDone && mayStart && !isCached)(request(next, false.B))
+  }
 
   /** Two steps that fetch a bounding plane with its texel. */
   def fetchTexel(index: UInt, texel: Valid[BoundingTexel]): Unit = {
     texel.valid       := false.B
-    texel.bits.albedo := channel.resp.bits.content.albedo
-    texel.bits.normal := channel.resp.bits.content.normal
+    texel.bits.albedo := maps.resp.bits.content.albedo
+    texel.bits.normal := maps.resp.bits.content.normal
     step(Texel) {
-      when(now) {
-        req.valid                        := true.B
-        req.bits.content.isBoundingPlane := true.B
-        req.bits.content.index           := index
-      }
-      await(req.ready, "planes.req is ready")
+      fetch(index, true.B)
+      await(channel.isFree, "a dropped response")
     }
     step {
-      when(now)(texel.valid := channel.resp.valid)
-      branch(Repeat.until(channel.resp.valid, "planes.resp"), Idle.otherwise)
+      when(now)(texel.valid := channel.arrives)
+      branch(Repeat.until(channel.arrives, "planes.resp"), Idle.otherwise)
     }
+  }
+
+  /** In a step that repeats until the channel is free: requests a plane in place of any other one. */
+  private def fetch(index: UInt, isBoundingPlane: Bool, condition: Bool = true.B): Unit = when(now && condition) {
+    when(channel.isFree)(request(index, isBoundingPlane)).otherwise(channel.drop())
   }
 
   /** Steps from `Plane` on. For a bounding plane they end with its products in the sum.
     *
-    * @param firstId the plane of [[first]]
+    * @param hasNext of a bounding plane: there is another one
     */
-  def describe(firstId: UInt): Unit = {
-    first.drive(
-      channel,
-      (content: PlaneRequest) => {
-        content.isBoundingPlane := false.B
-        content.index           := firstId
-      }
-    )
-    when(channel.resp.valid && first.isPending) {
-      plane         := channel.resp.bits.content.plane
-      first.hasCome := true.B
-    }
+  def describe(cells: CellReader, hasNext: Bool): Unit = {
+    lookAhead(cells)
     step(Plane) {
-      val isFound = matches.asUInt.orR && purpose =/= forBoundingPlane
-      when(now && !isFound && !first.isPending)(req.valid := true.B)
+      val isFound     = matches.asUInt.orR && !isForBoundingPlane
+      val last        = channel.request
+      val isRequested = channel.isPending && last.index === id && last.isBoundingPlane === isForBoundingPlane
+      fetch(id, isForBoundingPlane, !isFound && !isRequested)
       set(slot, OHToUInt(matches))
       branch(
         RecordFront.when(isFound && purpose === forFront, "nearest plane cached"),
         DepthLabel.when(isFound, "cached"),
-        Repeat.until(req.ready || first.isPending, "planes.req is ready")
+        Repeat.until(isRequested || channel.isFree, "a dropped response")
       )
     }
     step {
-      val isAvailable = channel.resp.valid || first.hasCome
-      set(plane, channel.resp.bits.content.plane, channel.resp.valid)
+      set(plane, channel.response)
       set(slot, oldest)
-      when(isAvailable)(first.take())
-      await(isAvailable, "planes.resp")
+      when(now && channel.isAvailable) {
+        channel.take()
+        when(isForBoundingPlane && hasNext)(request(id + 1.U, true.B))
+      }
+      await(channel.isAvailable, "planes.resp")
     }
     step {
       m.multiply(m.uvwOrigin(0), plane.a)

@@ -11,52 +11,43 @@ final class TileProgram(
     stepper: TileStepper,
     planes:  PlaneCache,
     dda:     DdaSetup,
-    first:   EarlyRequest,
-    channel: AttributeChannel[CellRequest, CellResponse]
+    cells:   CellReader
 ) {
   import MarchLabel._
   import m.formats._
   import m.program._
 
-  private val req       = channel.req
   private val number    = Reg(UInt(2.W))
   private val nearest   = Reg(SInt(scaledBits.W))
   private val nearestId = Reg(chiselTypeOf(planes.id))
 
   /** Steps from `Tile` on; they end at `BoundingPlanes` if the ray hits nothing. */
   def describe(): Unit = {
-    val resp = channel.resp
-    first.drive(channel, request)
-    when(resp.valid && first.isPending) {
-      stepper.tile  := resp.bits.content
-      first.hasCome := true.B
-      planes.first.make()
-    }
     step(Tile) {
-      val isInside = dda.tile(0) < layout.tileColumns.U && dda.tile(1) < layout.tileRows.U
-      val isMade   = first.isPending
-      when(now && isInside && !isMade) {
-        req.valid := true.B
-        request(req.bits.content)
-      }
+      val isInside = cells.isInMap(dda.tile)
+      when(now && isInside && !cells.channel.isPending && cells.channel.isFree)(cells.requestTile(dda.tile))
       set(stepper.isSecondAxis, dda.edge(0) > dda.edge(1))
       set(number, 0.U)
       branch(
         BoundingPlanes.when(!isInside, "outside the map"),
-        Repeat.until(req.ready || isMade, "cells.req is ready")
+        Repeat.until(cells.channel.isPending || cells.channel.isFree, "a dropped response")
       )
     }
     step {
-      val content = Mux(first.hasCome, stepper.tile, resp.bits.content)
-      val isOne   = content.count === 1.U
-      when(resp.valid || first.hasCome)(first.take())
-      set(stepper.tile, content)
+      val isOne       = cells.content.count === 1.U
+      val byCells     = !isOne && stepper.isBehind
+      val isAvailable = cells.channel.isAvailable
+      when(now && isAvailable) {
+        cells.take()
+        when(!byCells && cells.isInMap(stepper.nextTile))(cells.requestTile(stepper.nextTile))
+      }
+      set(stepper.tile, cells.content)
       set(stepper.tExit, stepper.tileExit)
-      set(planes.id, content.ids(0))
+      set(planes.id, cells.content.ids(0))
       set(planes.purpose, Mux(isOne, planes.forTile, planes.forNearest))
       branch(
-        Repeat.until(resp.valid || first.hasCome, "cells.resp"),
-        Cells.when(!isOne && stepper.isBehind, "several planes, ray behind the map"),
+        Repeat.until(isAvailable, "cells.resp"),
+        Cells.when(byCells, "several planes, ray behind the map"),
         Plane.otherwise
       )
     }
@@ -73,14 +64,9 @@ final class TileProgram(
       val next    = m.combine(dda.edge(axis).zext, dda.stride(axis).zext)
       set(stepper.tEnter, stepper.tileExit)
       set(dda.edge(axis), Mux(next(distanceBits), dda.maxDistance, next.asUInt(distanceBits - 1, 0)))
-      set(dda.tile(axis), Mux(dda.isNegative(axis), dda.tile(axis) - 1.U, dda.tile(axis) + 1.U))
+      for ((tile, next) <- dda.tile.zip(stepper.nextTile)) set(tile, next)
       branch(BoundingPlanes.when(isOver, "beyond the map"), Tile.otherwise)
     }
-  }
-
-  private def request(content: CellRequest): Unit = {
-    content.pixel     := stepper.tileCorner
-    content.wholeTile := true.B
   }
 
   /** The ray is in front of one of several planes. Finds the plane that is nearest where the ray exits. */

@@ -40,12 +40,23 @@ final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
 
   val isInFront: Bool = !isBehind && depthEnter >= 0.S && depthExit >= 0.S
 
-  val tileCorner: MapPixel = corner(dda.tile.map(tile => (tile << layout.tileLog).asUInt))
-  val cellCorner: MapPixel =
-    corner(dda.tile.zip(cell).zip(sizes).map { case ((tile, cell), size) =>
-      val pixel = (tile << layout.tileLog) + (cell << this.tile.cellLog)
-      Mux(pixel < size.U, pixel, (size - 1).U)
-    })
+  /** The tile behind that edge. */
+  val nextTile: Seq[UInt] = dda.tile.zipWithIndex.map { case (tile, a) =>
+    Mux(isSecondAxis === (a == 1).B, Mux(dda.isNegative(a.U), tile - 1.U, tile + 1.U), tile)
+  }
+
+  val tileCorner: MapPixel = CellReader.corner(layout, dda.tile)
+  val cellCorner: MapPixel = cornerOf(cell)
+
+  /** The first pixel of a cell of the current tile, or the map's last one. */
+  def cornerOf(cell: Seq[UInt]): MapPixel =
+    CellReader.pixel(
+      layout,
+      dda.tile.zip(cell).zip(sizes).map { case ((tile, cell), size) =>
+        val pixel = (tile << layout.tileLog) + (cell << this.tile.cellLog)
+        Mux(pixel < size.U, pixel, (size - 1).U)
+      }
+    )
 
   /** In a step: no plane has been passed yet. */
   def clear(): Unit = {
@@ -73,12 +84,5 @@ final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
     m.program.set(frontDistance, Mux(planes.purpose === planes.forFront, exit, enter), condition)
     m.program.set(frontCorner, Mux(isCell, cellCorner, tileCorner), condition)
     m.program.set(frontLog, Mux(isCell, tile.cellLog, layout.tileLog.U), condition)
-  }
-
-  private def corner(position: Seq[UInt]): MapPixel = {
-    val pixel = Wire(new MapPixel(layout))
-    pixel.x := position(0)
-    pixel.y := position(1)
-    pixel
   }
 }
