@@ -56,7 +56,7 @@ final class EnvironmentMarch(config: PathConfig) extends Module {
   projection.describe(dda)
   dda.describe()
   tiles.describe()
-  planes.describe(reader, resolver.hasNext)
+  planes.describe(tiles.nextPlane, resolver.hasNext, stepper.exit)
   planeTest.describe()
   cells.describe()
   planeTest.describeCrossing()

@@ -37,7 +37,7 @@ final class MarchFormats(config: ColonnadeConfig) {
   val slopeBits: Int = planeFraction + 2
   val depthBits: Int = valueBits + 2
 
-  val wideBits:    Int = originBits.max(slopeBits)
+  val wideBits:    Int = originBits.max(slopeBits).max(numbers.macBits.min(32)) // a component of the matrix
   val productBits: Int = wideBits + narrowBits
 
   val sumBits:      Int = (numbers.macBits + sceneBits + 3).min(128).max(productBits) // the model's widest has 128

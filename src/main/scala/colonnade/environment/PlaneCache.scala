@@ -49,14 +49,13 @@ final class PlaneCache(m: MarchOperations, maps: AttributeChannel[PlaneRequest, 
     request.isBoundingPlane := isBoundingPlane
   }
 
-  /** Requests the plane of the next tile or cell, once, while that waits for the current one's test. */
-  private def lookAhead(cells: CellReader): Unit = {
-    val next     = cells.channel.stored.content.ids(0)
-    val isDone   = RegInit(false.B)
-    val isCached = slots.zip(isValid).map { case (slot, isValid) => isValid && slot.id === next }.reduce(_ || _)
-    val mayStart = channel.isFree && !channel.isStored && (purpose === forTile || purpose === forCell)
-    isDone := cells.channel.isStored && (isDone || mayStart)
-    when(cells.channel.isStored && !isDone && mayStart && !isCached)(request(next, false.B))
+  /** Requests a plane that is likely to be looked up next. */
+  private def lookAhead(next: Valid[UInt]): Unit = {
+    val isCached = slots.zip(isValid).map { case (slot, isValid) => isValid && slot.id === next.bits }.reduce(_ || _)
+    when(next.valid && channel.isFree && !channel.isStored && !isCached && next.bits =/= id)(request(
+      next.bits,
+      false.B
+    ))
   }
 
   /** Two steps that fetch a bounding plane with its texel. */
@@ -81,16 +80,19 @@ final class PlaneCache(m: MarchOperations, maps: AttributeChannel[PlaneRequest, 
 
   /** Steps from `Plane` on. For a bounding plane they end with its products in the sum.
     *
+    * @param next    the plane of the map that is likely to be looked up next
     * @param hasNext of a bounding plane: there is another one
+    * @param exit    w at a distance along the ray; its product is ready with the plane's depth
     */
-  def describe(cells: CellReader, hasNext: Bool): Unit = {
-    lookAhead(cells)
+  def describe(next: Valid[UInt], hasNext: Bool, exit: UInt): Unit = {
+    lookAhead(next)
     step(Plane) {
       val isFound     = matches.asUInt.orR && !isForBoundingPlane
       val last        = channel.request
       val isRequested = channel.isPending && last.index === id && last.isBoundingPlane === isForBoundingPlane
       fetch(id, isForBoundingPlane, !isFound && !isRequested)
       set(slot, OHToUInt(matches))
+      m.multiply(exit.zext, m.uvwDir(2))
       branch(
         RecordFront.when(isFound && purpose === forFront, "nearest plane cached"),
         DepthLabel.when(isFound, "cached"),
@@ -135,6 +137,7 @@ final class PlaneCache(m: MarchOperations, maps: AttributeChannel[PlaneRequest, 
     }
     step {
       m.accumulate()
+      m.multiply(exit.zext, m.uvwDir(2))
       set(depth.slope, m.combine(m.scaled, scaledSum, subtract = true))
       branch(
         BoundingDepth.when(purpose === forBoundingPlane, "bounding plane"),

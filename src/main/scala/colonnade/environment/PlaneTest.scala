@@ -1,6 +1,7 @@
 package colonnade.environment
 
 import chisel3._
+import colonnade.numbers.Rounding
 
 /** Tests a plane in an interval of the ray: the ray stays in front of it, crosses it, or is behind it. */
 final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCache) {
@@ -16,25 +17,26 @@ final class PlaneTest(m: MarchOperations, stepper: TileStepper, planes: PlaneCac
   def describe(): Unit = {
     val isCell    = planes.purpose === planes.forCell
     val isNearest = planes.purpose === planes.forNearest
-    step(PlaneDepth)(m.multiply(planes.depth.slope, stepper.enter.zext))
+    step(PlaneDepth) {
+      m.multiply(planes.depth.slope, stepper.enter.zext)
+      set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct))
+    }
     step {
       m.multiply(planes.depth.slope, stepper.exit.zext)
       set(stepper.depthEnter, m.combine(planes.depth.value, m.scaledProduct))
     }
     step {
-      m.multiply(stepper.exit.zext, m.uvwDir(2))
-      set(stepper.depthExit, m.combine(planes.depth.value, m.scaledProduct))
-    }
-    step {
-      set(stepper.wExit, m.combine(m.uvwOrigin(2), m.scaledProduct))
+      val depthExit = Rounding.narrow(m.combine(planes.depth.value, m.scaledProduct), depthBits)
+      val isInFront = !stepper.isBehind && stepper.depthEnter >= 0.S && depthExit >= 0.S
+      set(stepper.depthExit, depthExit)
       stepper.countStep(!isNearest)
-      stepper.recordFront(stepper.isInFront && !isNearest)
+      stepper.recordFront(isInFront && !isNearest)
       val isSame = stepper.hasFront && stepper.front.id === planes.id
       branch(
-        Cells.when(isNearest && !stepper.isInFront, "several planes, not in front"),
+        Cells.when(isNearest && !isInFront, "several planes, not in front"),
         NearestPlane.when(isNearest, "several planes, in front"),
-        CellPassed.when(stepper.isInFront && isCell, "cell, in front"),
-        TilePassed.when(stepper.isInFront, "tile, in front"),
+        CellPassed.when(isInFront && isCell, "cell, in front"),
+        TilePassed.when(isInFront, "tile, in front"),
         Behind.when(stepper.isBehind, "already behind"),
         Crosses.when(stepper.depthEnter >= 0.S, "from front to back"),
         Meets.when(isSame, "behind the last front plane")

@@ -1,6 +1,7 @@
 package colonnade.environment
 
 import chisel3._
+import chisel3.util.Valid
 import colonnade.microcode.Repeat
 
 /** Steps from tile to tile. A tile of one plane is tested at once. A tile of several planes is passed if the ray is in
@@ -20,6 +21,16 @@ final class TileProgram(
   private val number    = Reg(UInt(2.W))
   private val nearest   = Reg(SInt(scaledBits.W))
   private val nearestId = Reg(chiselTypeOf(planes.id))
+
+  /** The plane that is likely to be looked up next: of the same tile, or of the next tile or cell. */
+  def nextPlane: Valid[UInt] = {
+    val next      = Wire(Valid(chiselTypeOf(planes.id)))
+    val isInTile  = planes.purpose === planes.forNearest && number +& 1.U < stepper.tile.count
+    val isForCell = cells.channel.isStored && planes.purpose =/= planes.forBoundingPlane
+    next.valid := isInTile || isForCell
+    next.bits  := Mux(isInTile, stepper.tile.ids(number + 1.U), cells.channel.stored.content.ids(0))
+    next
+  }
 
   /** Steps from `Tile` on; they end at `BoundingPlanes` if the ray hits nothing. */
   def describe(): Unit = {
@@ -72,10 +83,10 @@ final class TileProgram(
   /** The ray is in front of one of several planes. Finds the plane that is nearest where the ray exits. */
   private def nearestPlane(): Unit = {
     step(NearestPlane) {
-      m.load(stepper.depthExit)
-      m.setShift(planeFraction.S - planes.depth.exponent.zext)
+      // In steps of w
+      val wide = (stepper.depthExit << planes.depth.exponent).asSInt
+      set(m.scaled, (wide >> (planeFraction - f)).asSInt)
     }
-    step(set(m.scaled, m.shifted))
     step {
       val isNearer = number === 0.U || m.scaled < nearest
       val isLast   = number === stepper.tile.count - 1.U

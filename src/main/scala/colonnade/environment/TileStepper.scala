@@ -38,8 +38,6 @@ final class TileStepper(m: MarchOperations, planes: PlaneCache, dda: DdaSetup) {
 
   val tileExit: UInt = dda.edge(isSecondAxis) // the distance where the ray exits the tile
 
-  val isInFront: Bool = !isBehind && depthEnter >= 0.S && depthExit >= 0.S
-
   /** The tile behind that edge. */
   val nextTile: Seq[UInt] = dda.tile.zipWithIndex.map { case (tile, a) =>
     Mux(isSecondAxis === (a == 1).B, Mux(dda.isNegative(a.U), tile - 1.U, tile + 1.U), tile)
