@@ -82,7 +82,7 @@ final class RayClip(
       set(index, next)
       set(outside, outside & (outside - 1.U))
       m.load(m.constant(1))
-      m.setShift(m.uvwOriginExponent.zext - view.exponent)
+      m.setShift(m.uvwOriginExponent.zext -& view.exponent)
       branch(
         OriginDepth.when(isOver && !resolver.rateMantissa(f), "in the frustum"),
         MovedOrigin.when(isOver, "outside")

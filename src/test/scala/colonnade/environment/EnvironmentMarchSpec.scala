@@ -229,4 +229,30 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
       }
     }
   }
+
+  it should "clip a ray whose projection has a far larger exponent than the maps" in {
+    def numbers(values: String*): Seq[BigInt] = values.map(BigInt(_))
+
+    val config = environments.find(_.numbers.macBits == 64).get
+    val random = new Random(1)
+    val ray    = MarchCase(
+      context = 3,
+      origin = numbers("-56223315771477880000", "-12229843468425832000", "43998773078572400000"),
+      dir = numbers("135756", "0", "110054"),
+      isDirectView = true
+    )
+    val matrix = numbers("6357208618966589712", "-3353649405112903119", "-4306530287245947097") ++
+      numbers("3411574935950413602", "3975928620937549823", "578958312146110915") ++
+      numbers("3528574910186657953", "4547660689561012311", "-5381418378950176706")
+    val offset = numbers("-8992774347053600250", "-6179843817817458089", "-4415726896805374526")
+    val angles = Seq.fill(9)(BigInt(0))
+    val view   = ViewCase(matrix, offset, 102, -208, angles, numbers("1", "1"), 0)
+    test(new EnvironmentMarchHarness(config)).withAnnotations(Simulation.verilator) { unit =>
+      unit.clock.setTimeout(0)
+      val image = new EnvironmentImage(config, random)
+      EnvironmentImage.load(unit.load, unit.clock, config, image.words)
+      val answers = check(unit, config, image.words, view, Seq(ray), random, isSlow = false)
+      assert(answers.head("steps") > 0)
+    }
+  }
 }
