@@ -100,7 +100,7 @@ final class HitResolver(
     step(set(m.uvwDir(1), m.combine(m.projectedDir(1), fromCentre, subtract = true)))
     step(BoundingPlane) {
       set(planes.id, index)
-      branch(BoundingPlanesDone.when(isOver(index), "no more planes"), Plane.otherwise)
+      branch(BoundingPlanesDone.when(isOver(index), "no planes"), Plane.otherwise)
     }
     step(BoundingDepth) {
       branch(NextBoundingPlane.when(planes.depth.value <= 0.S || m.sum <= 0.S, "behind, or not approaching"))
@@ -130,7 +130,8 @@ final class HitResolver(
     }
     step(NextBoundingPlane) {
       set(index, index + 1.U)
-      goto(BoundingPlane)
+      set(planes.id, index + 1.U)
+      branch(Plane.when(hasNext, "another plane"))
     }
     step(BoundingPlanesDone) {
       set(m.numerator, m.depthMantissa)

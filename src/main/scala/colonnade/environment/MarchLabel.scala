@@ -28,7 +28,6 @@ object MarchLabel {
   // TileProgram: from tile to tile
   case object Tile         extends MarchLabel
   case object NearestPlane extends MarchLabel
-  case object RecordFront  extends MarchLabel
   case object TilePassed   extends MarchLabel
 
   // CellProgram: from cell to cell within a tile of several planes

@@ -94,7 +94,7 @@ final class PlaneCache(m: MarchOperations, maps: AttributeChannel[PlaneRequest, 
       set(slot, OHToUInt(matches))
       m.multiply(exit.zext, m.uvwDir(2))
       branch(
-        RecordFront.when(isFound && purpose === forFront, "nearest plane cached"),
+        TilePassed.when(isFound && purpose === forFront, "nearest plane cached"),
         DepthLabel.when(isFound, "cached"),
         Repeat.until(isRequested || channel.isFree, "a dropped response")
       )
@@ -141,7 +141,7 @@ final class PlaneCache(m: MarchOperations, maps: AttributeChannel[PlaneRequest, 
       set(depth.slope, m.combine(m.scaled, scaledSum, subtract = true))
       branch(
         BoundingDepth.when(purpose === forBoundingPlane, "bounding plane"),
-        RecordFront.when(purpose === forFront, "nearest plane"),
+        TilePassed.when(purpose === forFront, "nearest plane"),
         DepthLabel.otherwise
       )
     }

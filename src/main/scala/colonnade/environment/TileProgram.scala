@@ -63,11 +63,8 @@ final class TileProgram(
       )
     }
     nearestPlane()
-    step(RecordFront) {
-      stepper.recordFront(true.B)
-      stepper.countStep(true.B)
-    }
     step(TilePassed) {
+      stepper.recordFront(planes.purpose === planes.forFront)
       val max     = ((BigInt(1) << alongBits) - 1).S
       val isInMap = stepper.wExit > 0.S && stepper.wExit < max
       val isOver  = stepper.steps >= maxSteps.U || stepper.tileExit === dda.maxDistance || !isInMap
@@ -95,7 +92,8 @@ final class TileProgram(
       set(number, number + 1.U)
       set(planes.id, Mux(isLast, Mux(isNearer, planes.id, nearestId), stepper.tile.ids(number + 1.U)))
       set(planes.purpose, planes.forFront, isLast)
-      goto(Plane)
+      stepper.countStep(isLast)
+      branch(TilePassed.when(isLast && isNearer, "the last one is the nearest"), Plane.otherwise)
     }
   }
 }
