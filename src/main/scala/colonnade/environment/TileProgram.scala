@@ -52,10 +52,11 @@ final class TileProgram(
         cells.take()
         when(!byCells && cells.isInMap(stepper.nextTile))(cells.requestTile(stepper.nextTile))
       }
+      // While it waits, nothing must name planes to look ahead to
       set(stepper.tile, cells.content)
       set(stepper.tExit, stepper.tileExit)
       set(planes.id, cells.content.ids(0))
-      set(planes.purpose, Mux(isOne, planes.forTile, planes.forNearest))
+      set(planes.purpose, Mux(isOne, planes.forTile, planes.forNearest), isAvailable)
       branch(
         Repeat.until(isAvailable, "cells.resp"),
         Cells.when(byCells, "several planes, ray behind the map"),

@@ -67,15 +67,27 @@ private class EnvironmentMarchHarness(config: ColonnadeConfig)
   private val distance  = RegEnable(march.distance.bits, march.distance.valid)
   private val planeReq  = march.maps.planes.req
   private val plane     = RegEnable(planeReq.bits.content.index, planeReq.fire && planeReq.bits.content.isBoundingPlane)
+  private val cells     = march.maps.cells.resp
+  private val idBits    = AttributeLayout.of(config).planeIdBits
+  private val named     = Reg(Vec(1 << idBits, Bool())) // planes of the ray's tiles so far
   private val steps     = Reg(UInt(new MarchFormats(config).stepBits.W))
   private val isIllegal = Reg(Bool())
   when(order.fire) {
     steps     := 0.U
     isIllegal := false.B
+    named.foreach(_ := false.B)
   }.otherwise {
     steps     := steps + march.events.step
     isIllegal := isIllegal || march.isIllegal
+    when(cells.valid)(for ((id, i) <- cells.bits.content.ids.zipWithIndex) when(i.U < cells.bits.content.count) {
+      named(id) := true.B
+    })
   }
+  private val content = planeReq.bits.content
+  assert(
+    !planeReq.valid || content.isBoundingPlane || named(content.index(idBits - 1, 0)),
+    "a plane that no tile has named"
+  )
   private val surface = march.answer.bits.surface
   private val isMap   = hit.kind === HitKind.map
   private val isHit   = hit.kind =/= HitKind.miss
