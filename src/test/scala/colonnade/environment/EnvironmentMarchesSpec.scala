@@ -32,9 +32,10 @@ private class EnvironmentMarchesHarness(config: ColonnadeConfig) extends Module 
   val paths  = IO(new RayPorts(config))
   val view   = IO(Input(UInt(marches.io.view.getWidth.W)))
   val load   = IO(Flipped(Valid(new Load(config))))
+  val start  = IO(Input(Bool()))
   val events = IO(chiselTypeOf(marches.io.events))
   marches.io.view  := view.asTypeOf(marches.io.view)
-  marches.io.start := false.B // a frame of one camera
+  marches.io.start := start
   maps.io.load     := load
   events           := marches.io.events
   marches.io.maps.zip(maps.io.ports).foreach { case (march, port) => SlowMaps.connect(march, port, isSlow = true.B) }
@@ -82,17 +83,20 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
     /** Contexts whose answer has come, in order of the requests. */
     var answers = Vector.empty[Answer]
 
-    def step(willing: Double): Unit = {
+    def isIdle: Boolean = inFlight.isEmpty && offered.isEmpty
+
+    /** @param asks may store another ray, and request another answer */
+    def step(willing: Double, asks: Boolean): Unit = {
       val free =
         (0 until config.units.pathContexts).filterNot(c => inFlight.contains(c) || offered.exists(_.ray.context == c))
-      val next = Option.when(free.nonEmpty && random.nextInt(6) == 0) {
+      val next = Option.when(asks && free.nonEmpty && random.nextInt(6) == 0) {
         nextRay().copy(context = free(random.nextInt(free.size)))
       }
       port.ray.valid.poke(next.nonEmpty)
       for (ray <- next)
         port.ray.bits.poke(stored.pack(ray.fields(config.numbers.shadeBits) - "isDirectView" - "hitDistance"))
       val ready = free.filter(context => rays.contains(context) && !next.exists(_.context == context))
-      if (offered.isEmpty && ready.nonEmpty && random.nextInt(4) == 0)
+      if (asks && offered.isEmpty && ready.nonEmpty && random.nextInt(4) == 0)
         offered = Some(Request(rays(ready(random.nextInt(ready.size))), random.nextBoolean(), random.nextBoolean()))
       port.hitDistance.poke(distance.getOrElse(BigInt(config.numbers.sceneBits, random)))
       distance = None
@@ -141,48 +145,65 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
       val random   = new Random(3)
       val stimulus = new MarchStimulus(config, random)
       val scene    = new EnvironmentScene(config, random)
-      val camera   = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
-      val view     = camera.view.copy(isMapCamera = isMapCamera)
-      // All rays from a camera have its position
-      val position = if (isMapCamera) camera.steps(Seq(0.0, 0.0, 0.0)) else camera.steps(Seq(0.3, 0.1, -0.2))
-      def seen     =
-        (if (isMapCamera) stimulus.fromCamera(camera) else stimulus.fromElsewhere(camera)).copy(origin = position)
-      def nextRay = if (random.nextInt(3) == 0) seen else stimulus.inRoom(camera)
       dut.clock.setTimeout(0)
       dut.paths.isMapCamera.poke(isMapCamera)
       EnvironmentImage.load(dut.load, dut.clock, config, scene.words)
-      dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
-
-      val rays   = new Rays(dut.paths, config, () => nextRay, random)
-      var cycles = 0
-      var steps  = BigInt(0)
-      while (rays.answers.size < 90) {
-        rays.step(willing = 0.05)
-        steps += dut.events.marchSteps.peekInt()
-        cycles += 1
-        assert(cycles < 60000, s"only ${rays.answers.size} answers")
-        dut.clock.step()
-      }
-      assert(rays.maxInFlight > (if (isMapCamera) 4 else 3), "several contexts are under way at a time")
-
-      val answers = rays.answers
-      val words   = answers.map(answer => view.words ++ answer.request.ray.words)
-      val models  = Model.attributes(config, scene.words, words, "march").map(MarchCase.answer.zip(_).toMap)
-      for ((Answer(request, surface, isVisible), expected) <- answers.zip(models)) {
-        val isHit =
-          if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss.litValue
-        assert(surface.nonEmpty == isHit && isVisible == (request.isOcclusionTest && !isHit), s"of $request")
-        for (bits <- surface) {
-          val values = new Packed(new EnvironmentSurface(config)).unpack(bits)
-          val added  = Map(
-            "context" -> BigInt(request.ray.context),
-            "shadows" -> BigInt(if (request.isFresnelReflection) 0 else 1)
-          )
-          assert(values == (expected.filter(value => values.contains(value._1)) ++ added), s"of $request")
-        }
-      }
-      assert(steps >= models.map(_("steps")).sum, "steps are counted")
-      assert(answers.exists(_.isVisible) && answers.exists(a => a.request.isOcclusionTest && a.surface.nonEmpty))
-      assert(answers.exists(_.request.ray.isDirectView) && answers.exists(!_.request.ray.isDirectView))
+      // Frames of different cameras
+      for (from <- Seq(Seq(0.3, 0.1, -0.2), Seq(-0.4, 0.2, 0.3)))
+        checkFrame(dut, stimulus, scene, isMapCamera, from, random)
     }
+
+  /** @param from the position of a camera that is not the maps', in that one's view space */
+  private def checkFrame(
+      dut:         EnvironmentMarchesHarness,
+      stimulus:    MarchStimulus,
+      scene:       EnvironmentScene,
+      isMapCamera: Boolean,
+      from:        Seq[Double],
+      random:      Random
+  ): Unit = {
+    val camera = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
+    val view   = camera.view.copy(isMapCamera = isMapCamera)
+    // All rays from a camera have its position
+    val position = camera.steps(if (isMapCamera) Seq(0.0, 0.0, 0.0) else from)
+    def seen     =
+      (if (isMapCamera) stimulus.fromCamera(camera) else stimulus.fromElsewhere(camera)).copy(origin = position)
+    def nextRay = if (random.nextInt(3) == 0) seen else stimulus.inRoom(camera)
+    dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
+    dut.start.poke(true)
+    dut.clock.step()
+    dut.start.poke(false)
+
+    val rays   = new Rays(dut.paths, config, () => nextRay, random)
+    var cycles = 0
+    var steps  = BigInt(0)
+    while (rays.answers.size < 90 || !rays.isIdle) {
+      rays.step(willing = 0.05, asks = rays.answers.size < 90)
+      steps += dut.events.marchSteps.peekInt()
+      cycles += 1
+      assert(cycles < 60000, s"only ${rays.answers.size} answers")
+      dut.clock.step()
+    }
+    assert(rays.maxInFlight > (if (isMapCamera) 4 else 3), "several contexts are under way at a time")
+
+    val answers = rays.answers
+    val words   = answers.map(answer => view.words ++ answer.request.ray.words)
+    val models  = Model.attributes(config, scene.words, words, "march").map(MarchCase.answer.zip(_).toMap)
+    for ((Answer(request, surface, isVisible), expected) <- answers.zip(models)) {
+      val isHit =
+        if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss.litValue
+      assert(surface.nonEmpty == isHit && isVisible == (request.isOcclusionTest && !isHit), s"of $request")
+      for (bits <- surface) {
+        val values = new Packed(new EnvironmentSurface(config)).unpack(bits)
+        val added  = Map(
+          "context" -> BigInt(request.ray.context),
+          "shadows" -> BigInt(if (request.isFresnelReflection) 0 else 1)
+        )
+        assert(values == (expected.filter(value => values.contains(value._1)) ++ added), s"of $request")
+      }
+    }
+    assert(steps >= models.map(_("steps")).sum, "steps are counted")
+    assert(answers.exists(_.isVisible) && answers.exists(a => a.request.isOcclusionTest && a.surface.nonEmpty))
+    assert(answers.exists(_.request.ray.isDirectView) && answers.exists(!_.request.ray.isDirectView))
+  }
 }
