@@ -1,7 +1,8 @@
 package colonnade.environment
 
 import chisel3._
-import chisel3.util.{log2Ceil, Mux1H, PopCount, PriorityEncoderOH, RRArbiter, Valid}
+import chisel3.util.{log2Ceil, Mux1H, PopCount, PriorityEncoderOH, PriorityMux, Valid}
+import colonnade.common.RoundRobin
 import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.EnvironmentView
 
@@ -72,12 +73,16 @@ final class EnvironmentMarches(config: PathConfig) extends Module {
   when(io.start) { camera.valid := false.B }
 
   // Hits, which read albedo and normal by the port of the first march; and answers
-  private val arbiter = Module(new RRArbiter(new OrderedHit(config), marches.size)).io
-  private val hits    = Module(new MarchHits(config)).io
-  for ((in, march) <- arbiter.in.zip(marches)) in :<>= march.hit
-  hits.hit :<>= arbiter.out
-  hits.texel.valid := marches.map(_.texel.valid).reduce(_ || _)
-  hits.texel.bits  := Mux1H(marches.map(march => march.texel.valid -> march.texel.bits))
+  private val turns  = Module(new RoundRobin(marches.size)).io
+  private val hits   = Module(new MarchHits(config)).io
+  private val grants = turns.grant.asBools
+  turns.requests                                                  := VecInit(marches.map(_.hit.valid)).asUInt
+  turns.isTaken                                                   := hits.hit.fire
+  hits.hit.valid                                                  := turns.requests.orR
+  hits.hit.bits                                                   := PriorityMux(grants, marches.map(_.hit.bits))
+  for ((march, isGranted) <- marches.zip(grants)) march.hit.ready := isGranted && hits.hit.ready
+  hits.texel.valid                                                := marches.map(_.texel.valid).reduce(_ || _)
+  hits.texel.bits := Mux1H(marches.map(march => march.texel.valid -> march.texel.bits))
   io.maps.head.albedo <> hits.albedo
   io.maps.head.normals <> hits.normals
   direct.march :<>= hits.point
