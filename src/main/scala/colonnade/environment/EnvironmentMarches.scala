@@ -73,12 +73,12 @@ final class EnvironmentMarches(config: PathConfig) extends Module {
   when(io.start) { camera.valid := false.B }
 
   // Hits, which read albedo and normal by the port of the first march; and answers
-  private val turns  = Module(new RoundRobin(marches.size)).io
-  private val hits   = Module(new MarchHits(config)).io
-  private val grants = turns.grant.asBools
-  turns.requests                                                  := VecInit(marches.map(_.hit.valid)).asUInt
-  turns.isTaken                                                   := hits.hit.fire
-  hits.hit.valid                                                  := turns.requests.orR
+  private val arbiter = Module(new RoundRobin(marches.size)).io
+  private val hits    = Module(new MarchHits(config)).io
+  private val grants  = arbiter.grant.asBools
+  arbiter.requests                                                := VecInit(marches.map(_.hit.valid)).asUInt
+  arbiter.isTaken                                                 := hits.hit.fire
+  hits.hit.valid                                                  := arbiter.requests.orR
   hits.hit.bits                                                   := PriorityMux(grants, marches.map(_.hit.bits))
   for ((march, isGranted) <- marches.zip(grants)) march.hit.ready := isGranted && hits.hit.ready
   hits.texel.valid                                                := marches.map(_.texel.valid).reduce(_ || _)
