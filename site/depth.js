@@ -3,7 +3,6 @@
 
 const SIGNATURE = [137, 80, 78, 71, 13, 10, 26, 10];
 const MOST_EDGE = 8192;
-const SAME_SURFACE = 0.05;
 const MOST_HOLES = 0.5;
 
 /** Reads depth, metres: {width, height, values}; 0 is a hole. `step`: metres of a step of a PNG. */
@@ -88,29 +87,6 @@ function readNumpy(bytes) {
 export function cropOf(photo, width, height) {
   const scale = Math.min(photo.width / width, photo.height / height);
   return { left: (photo.width - scale * width) / 2, top: (photo.height - scale * height) / 2, scale };
-}
-
-/** Depth in the size of the maps: on one surface linear in inverse depth, else the nearest sample; a hole is 0. */
-export function fitDepth(depth, photo, crop, width, height) {
-  const size = [depth.width, depth.height];
-  const place = (index, start, along, most) => Math.max(0, Math.min(most - 1, (start + (index + 0.5) * crop.scale) * along - 0.5));
-  const result = new Float64Array(width * height);
-  for (let y = 0; y < height; ++y) {
-    const v = place(y, crop.top, size[1] / photo.height, size[1]);
-    const top = Math.min(Math.floor(v), size[1] - 2);
-    for (let x = 0; x < width; ++x) {
-      const u = place(x, crop.left, size[0] / photo.width, size[0]);
-      const left = Math.min(Math.floor(u), size[0] - 2);
-      const at = top * size[0] + left;
-      const corners = [at, at + 1, at + size[0], at + size[0] + 1].map((index) => depth.values[index]);
-      const [s, t] = [u - left, v - top];
-      const isOne = corners.every((value) => value > 0) && Math.max(...corners) <= Math.min(...corners) * (1 + SAME_SURFACE);
-      const weights = [(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t];
-      const nearest = corners[2 * Math.round(t) + Math.round(s)];
-      result[y * width + x] = isOne ? 1 / corners.reduce((sum, value, index) => sum + weights[index] / value, 0) : Number.isFinite(nearest) && nearest > 0 ? nearest : 0;
-    }
-  }
-  return result;
 }
 
 /** Fills holes, in place, from the nearest pixel; returns which they were. */

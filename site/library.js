@@ -288,6 +288,12 @@ export class Library {
     return this.result([missing], Int32Array, missing.length, (from, to) => this.wasm.colonnade_environment_nearest(from, width, missing.length / width, to));
   }
 
+  /** Depth of the part `crop` of a photo (depth.js), in the size of the maps; a hole is 0. */
+  fittedDepth(depth, photo, { left, top, scale }, width, height) {
+    const sizes = [depth, photo].map((picture) => Int32Array.of(picture.width, picture.height));
+    return this.result([depth.values, ...sizes, Float64Array.of(left, top, scale)], Float64Array, width * height, (values, size, whole, part, to) => this.wasm.colonnade_environment_depth(values, size, whole, part, width, height, to));
+  }
+
   /** Unit normals of depth towards the camera, view space, three of each pixel; the noise of the depth. */
   normals(depth, holes, { fx, fy, cx, cy }, width, height) {
     let noise;

@@ -1,7 +1,7 @@
 // A room of a visitor's photo and depth: pose, light and maps, as the host finds them
 // (docs/background.md), but one white lamp and no shadows of the photo.
 
-import { cropOf, fillHoles, fitDepth } from "./depth.js";
+import { cropOf, fillHoles } from "./depth.js";
 import { decode, encode } from "./photo.js";
 
 /** Points that tell floor and light, of a map's pixels every so many across and down. */
@@ -37,7 +37,7 @@ export function prepareRoom(/** @type {any} */ library, /** @type {any} */ { pho
     throw new Error(`the depth map is ${depth.width} × ${depth.height}, the photo ${whole.width} × ${whole.height}: both have to show the same part of the room`);
   const crop = cropOf(whole, width, height);
   const own = { fx: lens.fx / crop.scale, fy: lens.fy / crop.scale, cx: (lens.cx - crop.left) / crop.scale, cy: (lens.cy - crop.top) / crop.scale };
-  const filled = fitDepth(depth, whole, crop, width, height);
+  const filled = library.fittedDepth(depth, whole, crop, width, height);
   const { holes, count } = fillHoles(library, filled, width);
   const { normals, noise } = library.normals(filled, holes, own, width, height);
   const notes = [`normals are those of the depth map, whose noise is ${(100 * noise).toFixed(2)} %`];

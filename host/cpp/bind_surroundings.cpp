@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "binding.hpp"
+#include "environment/fitted_depth.hpp"
 #include "environment/light_cube.hpp"
 #include "environment/wavelet.hpp"
 
@@ -40,6 +41,13 @@ nb::tuple depthNormals(const Map<double>& depth, const Map<bool>& holes, const s
     environment::DepthMap map = mapOf(depth, holes, lens);
     const environment::DepthNormals found = released([&] { return map.normals(noise, maxPlanes); });
     return nb::make_tuple(arrayOf<double>(found.normals, {depth.shape(0), depth.shape(1), 3}), found.planes, found.onPlanes);
+}
+
+nb::object fittedDepth(const Map<double>& depth, const std::array<int, 2>& photo, const std::array<double, 3>& part, int width, int height) {
+    if (depth.size() == 0 || photo[0] < 1 || photo[1] < 1 || width < 1 || height < 1) throw std::invalid_argument("depth, photo and maps have pixels");
+    const environment::PhotoDepth whole(depth.data(), static_cast<int>(depth.shape(1)), static_cast<int>(depth.shape(0)));
+    const auto fitted = released([&] { return whole.fitted({part[0], part[1], part[2], photo[0], photo[1]}, width, height); });
+    return arrayOf<double>(fitted, {static_cast<std::size_t>(height), static_cast<std::size_t>(width)});
 }
 
 nb::object nearestKnown(const Map<bool>& missing) {
@@ -95,6 +103,7 @@ nb::tuple wavelet(const std::array<Pixels3, 3>& surface, const Map<bool>& mask, 
 void bind_surroundings(nb::module_& module) {
     module.def("depth_noise", [](const Map<double>& depth, const Map<bool>& holes) { return mapOf(depth, holes, {1, 1, 0, 0}).noise(); }, "depth"_a, "holes"_a);
     module.def("depth_normals", &depthNormals, "depth"_a, "holes"_a, "lens"_a, "noise"_a, "max_planes"_a);
+    module.def("fitted_depth", &fittedDepth, "depth"_a, "photo"_a, "part"_a, "width"_a, "height"_a);
     module.def("nearest_known", &nearestKnown, "missing"_a);
     module.def("rotated_cube", &rotatedCube, "radiance"_a, "size"_a, "rotation"_a);
     module.def("cube_words", &cubeWords, "radiance"_a, "lights"_a);

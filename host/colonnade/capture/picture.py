@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
+from colonnade import _core
 from colonnade.capture.source import Frame, Lens
 from colonnade.common.types import Floats
-
-#: Neighbouring samples of depth that differ by more than this share lie on different surfaces.
-_SAME_SURFACE = 0.05
 
 
 def quarter_turns(to_world: Floats) -> int:
@@ -45,28 +43,10 @@ def fitted(frame: Frame, width: int, height: int) -> Frame:
     filter_ = Image.Resampling.LANCZOS if scale > 1 else Image.Resampling.BICUBIC
     photo = Image.fromarray(np.ascontiguousarray(frame.photo))
     lens = frame.lens
-    across, down = frame.depth.shape[1] / columns, frame.depth.shape[0] / rows
-    u = (left + (np.arange(width) + 0.5) * scale) * across - 0.5
-    v = (top + (np.arange(height) + 0.5) * scale) * down - 0.5
+    depth = np.ascontiguousarray(frame.depth, dtype=np.float64)
     return replace(
         frame,
         photo=np.asarray(photo.resize((width, height), filter_, box=box)),
-        depth=_sampled(frame.depth, u, v),
+        depth=_core.fitted_depth(depth, (columns, rows), (left, top, scale), width, height),
         lens=Lens(lens.fx / scale, lens.fy / scale, (lens.cx - left) / scale, (lens.cy - top) / scale),
     )
-
-
-def _sampled(depth: Floats, u: Floats, v: Floats) -> Floats:
-    """Depth at columns u and rows v: on one surface linear in inverse depth, as planes are, else the nearest sample."""
-    rows, columns = depth.shape
-    u, v = u.clip(0, columns - 1), v.clip(0, rows - 1)
-    column = np.floor(u).astype(int).clip(max=max(columns - 2, 0))
-    row = np.floor(v).astype(int).clip(max=max(rows - 2, 0))
-    right, below = (column + 1).clip(max=columns - 1), (row + 1).clip(max=rows - 1)
-    across, down = (u - column)[np.newaxis, :], (v - row)[:, np.newaxis]
-    corners = np.stack([depth[np.ix_(r, c)] for r in (row, below) for c in (column, right)])
-    nearest = depth[np.ix_(np.rint(v).astype(int), np.rint(u).astype(int))]
-    is_one = (corners.min(axis=0) > 0) & (corners.max(axis=0) <= corners.min(axis=0) * (1 + _SAME_SURFACE))
-    inverse = 1.0 / np.where(is_one, corners, 1.0)
-    weights = np.stack([(1 - across) * (1 - down), across * (1 - down), (1 - across) * down, across * down])
-    return np.asarray(np.where(is_one, 1.0 / (inverse * weights).sum(axis=0), nearest))

@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "environment/fitted_depth.hpp"
 #include "environment/light_cube.hpp"
 
 using namespace colonnade::environment;
@@ -16,6 +17,11 @@ template <class Values> void copy(const Values& values, void* out) { std::memcpy
 
 void colonnade_environment_nearest(const std::uint8_t* missing, std::int32_t width, std::int32_t height, std::int32_t* nearest) {
     copy(nearestKnown(missing, width, height), nearest);
+}
+
+void colonnade_environment_depth(const double* depth, const std::int32_t* size, const std::int32_t* whole, const double* part, std::int32_t width, std::int32_t height,
+                                 double* fitted) {
+    copy(PhotoDepth(depth, size[0], size[1]).fitted({part[0], part[1], part[2], whole[0], whole[1]}, width, height), fitted);
 }
 
 double colonnade_environment_normals(const double* depth, const std::uint8_t* holes, std::int32_t width, std::int32_t height, const double* lens, double* normals) {

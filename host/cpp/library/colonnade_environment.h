@@ -11,6 +11,9 @@ extern "C" {
 /* The number of the nearest pixel of each that is not missing; -1 if all are. */
 void colonnade_environment_nearest(const uint8_t *missing, int32_t width, int32_t height, int32_t *nearest);
 
+/* Depth of a part of a photo, at width x height pixels of maps; `size` and `whole`: width and height of the depth map, and of the photo. `part`: the first pixel of the photo, left and top, and pixels of it per pixel of the maps. A hole is 0. */
+void colonnade_environment_depth(const double *depth, const int32_t *size, const int32_t *whole, const double *part, int32_t width, int32_t height, double *fitted);
+
 /* Unit normals of filled depth, view space, towards the camera. `lens`: fx, fy, cx, cy, pixels. Returns the noise of the depth, as a share. */
 double colonnade_environment_normals(const double *depth, const uint8_t *holes, int32_t width, int32_t height, const double *lens, double *normals);
 

@@ -1,8 +1,9 @@
 // Encodes a room in WebAssembly, and derives normals, as the page does: node room.mjs FOLDER, which has job.json, the
-// codes of the maps and a depth map. It writes the memories, what the encoder returns beside them, and the normals.
+// codes of the maps and a depth map. It writes the memories, what the encoder returns beside them, the normals, and the
+// depth of a part of a photo.
 
 import { readFileSync, writeFileSync } from "node:fs";
-import { fillHoles, readDepth } from "../../../site/depth.js";
+import { cropOf, fillHoles, readDepth } from "../../../site/depth.js";
 import { encodeStill, sizesOf } from "../../../site/encoder.js";
 import { Library } from "../../../site/library.js";
 
@@ -25,7 +26,10 @@ const refusal = (() => {
   }
 })();
 
-const { width, height, values } = await readDepth("depth.png", bytes("depth.png"), job.step);
+const depth = await readDepth("depth.png", bytes("depth.png"), job.step);
+const part = cropOf(job.photo, ...job.part);
+writeFileSync(`${folder}/part.bin`, new Uint8Array(library.fittedDepth(depth, job.photo, part, ...job.part).buffer));
+const { width, height, values } = depth;
 const { holes, count } = fillHoles(library, values, width);
 const { normals, noise } = library.normals(values, holes, job.lens, width, height);
 writeFileSync(`${folder}/derived.bin`, new Uint8Array(normals.buffer));

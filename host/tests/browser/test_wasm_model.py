@@ -11,6 +11,8 @@ import pytest
 from built_page import MODULE, NEEDS_MODULE, ROOT, RTL, cube_of, run_node
 from PIL import Image
 
+from colonnade.capture.picture import fitted
+from colonnade.capture.source import Frame, Lens
 from colonnade.common.accumulation import UNSHADOWED, Accumulation
 from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.design.manifest import Manifest
@@ -101,7 +103,7 @@ def test_a_file_is_cleaned_as_by_the_host(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ROOMS)
 def test_a_room_is_encoded_as_by_the_host(tmp_path: Path, name: str) -> None:
-    """Bytes of all memories, depths and errors of tiles; normals of a depth map with noise and holes."""
+    """Bytes of all memories, depths and errors of tiles; normals and a part of a depth map with noise and holes."""
     manifest = Manifest.load(ROOT / "configs" / "golden" / "edge.json")
     room = load_environment(ROOT / "scenes" / "rooms" / name)
     frame, encoder = LiveFrame.of(room), LiveEncoder(layout_of(manifest))
@@ -119,6 +121,8 @@ def test_a_room_is_encoded_as_by_the_host(tmp_path: Path, name: str) -> None:
         "codes": codes | {"toWorld": room.camera.to_world[:3].ravel().tolist()},
         "step": 0.001,
         "lens": lens,
+        "photo": {"width": 300, "height": 225},
+        "part": [90, 80],
     }
     for part in ("albedo", "normals", "depth"):
         getattr(frame, part).tofile(tmp_path / f"{part}.bin")
@@ -134,6 +138,9 @@ def test_a_room_is_encoded_as_by_the_host(tmp_path: Path, name: str) -> None:
     assert result["depthUnit"] == maps.image.depth_unit and result["count"] == np.count_nonzero(steps == 0)
     holes = steps == 0
     own = normals_of_depth(filled(steps * 0.001, holes), holes, replace(room.camera, **lens))
+    photo = np.zeros((225, 300, 3), dtype=np.uint8)
+    part = fitted(Frame(0, 0.0, photo, steps * 0.001, Lens(**lens), np.eye(4)[:3]), 90, 80)
+    assert (tmp_path / "part.bin").read_bytes() == part.depth.tobytes()
     assert (tmp_path / "derived.bin").read_bytes() == own.normals.tobytes() and result["noise"] == own.noise
 
 
