@@ -20,6 +20,8 @@ TARGET = ("-target", "wasm32-wasi", "-O2", "-DNDEBUG", "-ffp-contract=off")
 #: A throw ends the module: it has no exceptions.
 PLAIN = ("-std=gnu++17", "-fno-exceptions", "-fno-rtti", "-Wno-keyword-macro", "-Wno-unused-value")
 CPP = (*PLAIN, "-Dthrow=__builtin_trap(),")
+#: Sources that run once for a scene: compiled for size, not for speed.
+SMALL = ("colonnade_pack", "colonnade_surfaces", "colonnade_environment")
 Source = tuple[str, Path, tuple[str, ...]]
 SOURCES: tuple[Source, ...] = (
     *(
@@ -70,7 +72,8 @@ def _compile_module(
 
 def _compile(language: str, source: Path, options: tuple[str, ...]) -> Path:
     target = OBJECTS / f"{source.stem}.o"
-    zig(language, *TARGET, *options, "-c", str(source), "-o", str(target))
+    size = ("-Os",) if source.stem in SMALL else ()
+    zig(language, *TARGET, *options, *size, "-c", str(source), "-o", str(target))
     return target
 
 
