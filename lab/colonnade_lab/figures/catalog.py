@@ -183,7 +183,7 @@ def _paper_maps() -> Entry:
 
 
 #: Marches of a column, by which frames of a camera that moves are compared.
-MARCHES = (4, 8, 16)
+MARCHES = (2, 4, 8)
 
 
 def _marches() -> Entry:
