@@ -93,13 +93,6 @@ class RecordLayout:
             result[field.name] = value
         return result
 
-    def count_of(self, pattern: str) -> int:
-        """Length of an array of fields, e.g. ``count_of("kinds[{}]")`` for the arity."""
-        count = 0
-        while pattern.format(count) in self.fields:
-            count += 1
-        return count
-
 
 @dataclass(frozen=True)
 class Register:
