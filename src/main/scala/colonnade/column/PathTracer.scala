@@ -73,6 +73,7 @@ final class PathTracer(config: ColonnadeConfig) extends PathTracerModule(config)
     walk.instances := io.registers.instances.get
     walk.rays :<>= hits.rays
     hits.visits.get :<>= walk.requests
+    hits.worldRays.get :<>= walk.worldRays
     walk.objectResults := rows.connect(walk.objectRays, scene, io.start, io.broadcasts)
     hits.results       := walk.results
     hits.instances.get := io.registers.instances.get

@@ -16,8 +16,10 @@ final class DelayLineIO[T <: Data](value: T) extends Bundle {
   * A value written with a move comes out `delay` moves later; it is `in` before the first of them. `out` stays until the
   * next move with `reads`: a register holds it, so that a stall costs no read of the memory. A word is never read in the
   * cycle in which it is written.
+  *
+  * @param isSteady false: `out` is valid for one cycle
   */
-final class DelayLine[T <: Data](value: T, delay: Int) extends Module {
+final class DelayLine[T <: Data](value: T, delay: Int, isSteady: Boolean = true) extends Module {
   require(delay >= 2, s"a delay line of $delay moves; it must have at least 2")
 
   val io = IO(new DelayLineIO(value))
@@ -33,5 +35,5 @@ final class DelayLine[T <: Data](value: T, delay: Int) extends Module {
   private val reads  = io.moves && io.reads
   private val isRead = RegNext(reads, false.B)
   private val out    = memory.read(next, reads)
-  io.out := Mux(isRead, out, RegEnable(out, isRead))
+  io.out := (if (isSteady) Mux(isRead, out, RegEnable(out, isRead)) else out)
 }

@@ -1,8 +1,8 @@
 package colonnade.instance
 
 import chisel3._
-import chisel3.util.{Decoupled, RegEnable, Valid}
-import colonnade.common.{Context, DelayLine}
+import chisel3.util.{Cat, Decoupled, RegEnable, Valid}
+import colonnade.common.Context
 import colonnade.config.{NumberFormats, PathConfig}
 import colonnade.formats.{InstanceNumber, ObjectInstance, Vec3}
 import colonnade.numbers.{Fixed, Normalise, Normalised, Rounding}
@@ -54,7 +54,6 @@ final class InstanceTransformIO(config: PathConfig) extends Bundle {
   */
 final class InstanceTransform(config: PathConfig) extends Module {
   private val numbers = config.numbers
-  private val grid    = numbers.gridBits
 
   val io = IO(new InstanceTransformIO(config))
 
@@ -63,72 +62,92 @@ final class InstanceTransform(config: PathConfig) extends Module {
   private val holds   = RegInit(VecInit.fill(5)(false.B))
   private val moves   = !io.ray.valid || io.ray.ready
   private val isFirst = phase === 0.U
+  private val isNext  = phase === 1.U
   private val isLast  = phase === 2.U
-  io.readyNext := phase === 1.U
+  io.readyNext := isNext
   io.ray.valid := holds.last && isFirst
   when(moves) { phase := Mux(isLast, 0.U, phase + 1.U) }
   when(moves && isLast) { holds.zip(io.visit.valid +: holds.init).foreach { case (to, from) => to := from } }
   assert(!io.visit.valid || isLast, "a visit comes when none is taken")
 
-  /** A value of the cycle before; of the stage before. */
+  /** A value of the cycle before; of the stage before; of the second cycle of the stage before. */
   private def delayed[T <: Data](value: T): T = RegEnable(value, moves)
   private def staged[T <: Data](value:  T): T = RegEnable(value, moves && isLast)
+  private def early[T <: Data](value:   T): T = RegEnable(value, moves && isNext)
 
-  // Stage 0: operands. Their products and sums of three, by row of the matrix, reach into stage 1
-  private val visit      = staged(io.visit.bits)
-  private val instance   = io.instances(visit.instance)
-  private val ray        = visit.ray
-  private val one        = (BigInt(1) << numbers.shearFraction).S((grid + 1).W)
-  private val slopes     = ray.shear.map(_.integer.pad(grid + 1)) :+ Mux(ray.orientation.negative(2), -one, one)
-  private val position   = PermutedFrame.back(ray.origin.map(_.integer), ray.orientation.axis)
-  private val fromOrigin = position.axes.zip(instance.origin.axes).map { case (at, origin) => at -& origin }
-  private val way        = PermutedFrame.back(slopes, ray.orientation.axis).axes
-  private val row        = Mux(isFirst, instance.matrix(0), Mux(isLast, instance.matrix(2), instance.matrix(1)))
-  private val factors    = row.axes.map(delayed(_))
-  private val sumBits    = ObjectInstance.matrixBits + grid + 3
-  private val Seq(steps, direction) = Seq(fromOrigin, way).map { vector =>
-    val operands = vector.map(RegEnable(_, moves && isFirst))
-    val products = factors.zip(operands).map { case (factor, operand) => delayed(factor * operand) }
-    delayed(Rounding.narrow(products.reduce(_ +& _), sumBits))
+  // The operands, in the ray's own frame, as a visit comes. Products and sums of three, by row of the matrix, reach into
+  // stage 1. Along the dominant axis the direction is 1 or -1
+  private val visit      = io.visit.bits
+  private val info0      = staged(VisitInfo(visit))
+  private val axis0      = staged(visit.ray.orientation.axis)
+  private val axis       = Mux(isLast, visit.ray.orientation.axis, axis0)
+  private val instance   = io.instances(Mux(isLast, visit.instance, info0.instance))
+  private val shift0     = staged(instance.shift)
+  private val row        = Mux(isLast, instance.matrix(0), Mux(isFirst, instance.matrix(1), instance.matrix(2)))
+  private val factors    = PermutedFrame(row, axis).map(delayed(_))
+  private val fromOrigin = visit.ray.origin.zip(PermutedFrame(instance.origin, axis)).map { case (at, origin) =>
+    staged(at.integer -& origin)
+  }
+  private val slopes     = visit.ray.shear.map(shear => staged(shear.integer))
+  private val isNegative = staged(visit.ray.orientation.negative(2))
+  private val along      = delayed(Mux(isNegative, 0.S -& factors(2), factors(2))) << numbers.shearFraction
+  private val sumBits    = ObjectInstance.matrixBits + numbers.gridBits + 3
+  private def products(vector: Seq[SInt]): Seq[SInt] =
+    factors.zip(vector).map { case (factor, operand) => delayed(factor * operand) }
+  private val Seq(steps, direction) = Seq(products(fromOrigin), products(slopes.toSeq) :+ along).map { terms =>
+    delayed(Rounding.narrow(terms.reduce(_ +& _), sumBits))
   }
 
-  // Stage 1: origin and direction in the object, the last row two cycles after the first one
-  private val info1     = staged(Info(visit, instance.shift))
-  private val halves    = (steps << 1).asSInt >> info1.shift
+  // Stage 1: a row of origin and direction in the object each cycle
+  private val shift1    = staged(shift0)
+  private val halves    = (steps << 1).asSInt >> Mux(isLast, shift0, shift1)
   private val origin    = delayed(((halves +& 1.S) >> 1).asUInt(numbers.sceneBits - 1, 0).asSInt)
   private val component = delayed(
     Rounding.narrow(Rounding.floor(direction, ObjectInstance.directionDrop(numbers)), numbers.directionBits)
   )
 
-  // Stage 2: the direction's dominant component
-  private val info2     = staged(info1)
+  // They wait for stage 4 in memories of a word for each stage on the way. An offered ray is read again
+  private val place     = RegInit(0.U(2.W))
+  private val nextPlace = Mux(place === 2.U, 0.U, place + 1.U)
+  when(moves && isLast) { place := nextPlace }
+  private def waiting[T <: Data](value: T, cycle: Bool): T = {
+    val memory = SyncReadMem(3, UInt(value.getWidth.W))
+    when(moves && holds(1) && cycle) { memory.write(place, value.asUInt) }
+    memory.read(Mux(isLast, nextPlace, place), Mux(isLast, holds(3), !moves)).asTypeOf(value)
+  }
+  private val cycles     = Seq(isFirst, isNext, isLast)
+  private val info4      = waiting(staged(info0), isFirst)
+  private val origins    = cycles.map(waiting(origin, _))
+  private val components = cycles.map(waiting(component, _))
+
+  // Stage 2: the direction's dominant component, up to the second cycle
   private val magnitude = delayed(Normalise.magnitude(component))
   private val largest   = RegInit(0.U(numbers.directionBits.W))
-  when(moves && (isLast || magnitude > largest)) { largest := magnitude }
-  private val ofObject = Wire(new Bundle {
-    val origin = Vec3(new Fixed(new RayFormats(numbers).scene))
-    val dir    = Vec3(SInt(numbers.directionBits.W))
-  })
-  ofObject.origin := Vec3.of(rows(origin).map(Fixed(new RayFormats(numbers).scene, _)))
-  ofObject.dir    := Vec3.of(rows(component))
-  private val line = Module(new DelayLine(chiselTypeOf(ofObject), 6)).io
-  line.moves  := moves
-  line.writes := holds(2) && isFirst
-  line.in     := ofObject
-  line.reads  := holds(3) && isLast
+  when(moves && (isNext || magnitude > largest)) { largest := magnitude }
+  private val length = early(Normalise(largest, ObjectScale.mantissaBits(numbers)))
 
-  // Stage 3: the limit, tMax with the errors of distances, times the length, rounded up
-  private val info3   = staged(info2)
-  private val length  = staged(Normalise(largest, ObjectScale.mantissaBits(numbers)))
-  private val slack   = (numbers.distanceDigits - 4).max(0)
-  private val tMax    = visit.tMax.integer.asUInt
-  private val widened = staged(staged(staged(tMax +& 8.U) +& staged(tMax >> slack)))
-  private val product = delayed(widened * delayed(length.mantissa +& 1.U))
+  // The limit, tMax with the errors of distances, times the length, rounded up: a third of the mantissa a cycle
+  private val slack     = (numbers.distanceDigits - 4).max(0)
+  private val tMax      = staged(staged(staged(visit.tMax.integer.asUInt)))
+  private val widened   = early(tMax +& 8.U +& (tMax >> slack))
+  private val digitBits = (ObjectScale.mantissaBits(numbers) + 2) / 3
+  private val digits    = length.mantissa.pad(3 * digitBits)
+  private val digit     =
+    Mux(isLast, digits(digitBits - 1, 0), Mux(isFirst, digits(2 * digitBits - 1, digitBits), digits >> (2 * digitBits)))
+  private val high = Reg(UInt((widened.getWidth + digitBits).W))
+  private val low  = Reg(UInt((2 * digitBits).W))
+  private val sum  = Rounding.narrow(widened * digit +& Mux(isLast, widened, high >> digitBits), high.getWidth)
+  when(moves) {
+    high := sum
+    low  := Cat(high(digitBits - 1, 0), low) >> digitBits
+  }
+  private val product = high ## low
   // product · 2^-(mantissaBits - exponent + shearFraction + shift - drop)
   private val drop   = ObjectInstance.directionDrop(numbers)
   private val least  = ObjectScale.mantissaBits(numbers) + numbers.shearFraction - drop - numbers.directionBits
   private val raised = (-least).max(0)
-  private val right  = delayed(info3.shift +& (least + raised + numbers.directionBits).U - length.exponent)
+  private val shift3 = staged(staged(shift1))
+  private val right  = delayed(shift3 +& (least + raised + numbers.directionBits).U - length.exponent)
   private val limit  =
     Rounding.saturate(
       Rounding.saturate((product << raised).asUInt >> right, numbers.sceneBits + 1) +& 2.U,
@@ -136,42 +155,33 @@ final class InstanceTransform(config: PathConfig) extends Module {
     )
 
   // Stage 4: the ray
-  private val info4   = staged(info3)
   private val request = io.ray.bits.request
   request.context  := info4.context
   request.isShadow := info4.isShadow
-  request.origin   := line.out.origin
-  request.dir      := line.out.dir
+  request.origin   := Vec3.of(origins.map(Fixed(new RayFormats(numbers).scene, _)))
+  request.dir      := Vec3.of(components)
   request.limits.foreach(_ := DontCare)
   for (visit <- request.visit) {
     visit.valid         := true.B
     visit.bits.instance := info4.instance
     visit.bits.tMax     := delayed(limit)
   }
-  io.ray.bits.scale.length := staged(length)
-  io.ray.bits.scale.shift  := info4.shift
-
-  /** The rows of three cycles, the last one of this cycle. */
-  private def rows[T <: Data](last: T): Seq[T] = {
-    val middle = delayed(last)
-    Seq(delayed(middle), middle, last)
-  }
+  io.ray.bits.scale.length := early(length)
+  io.ray.bits.scale.shift  := staged(shift3)
 
   /** What goes along with a ray. */
-  private final class Info extends Bundle {
+  private final class VisitInfo extends Bundle {
     val context  = Context(config)
     val isShadow = Bool()
     val instance = InstanceNumber(config.device).get
-    val shift    = UInt(ObjectInstance.shiftBits.W)
   }
 
-  private object Info {
-    def apply(visit: InstanceVisit, shift: UInt): Info = {
-      val info = Wire(new Info)
+  private object VisitInfo {
+    def apply(visit: InstanceVisit): VisitInfo = {
+      val info = Wire(new VisitInfo)
       info.context  := visit.context
       info.isShadow := visit.isShadow
       info.instance := visit.instance
-      info.shift    := shift
       info
     }
   }

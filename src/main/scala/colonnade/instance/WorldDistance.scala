@@ -29,23 +29,22 @@ final class WorldDistance(config: PathConfig) extends Module {
   private val grid     = numbers.gridBits
   private val digits   = numbers.distanceDigits
   private val mantissa = ObjectScale.mantissaBits(numbers)
-  private val stages   = PipelinedDivider.stages(digits)
 
   val io = IO(new WorldDistanceIO(config))
 
-  // Stages: sum, mantissa, division, shift
-  private val holds = Seq.iterate(io.distance.valid, WorldDistance.latency(numbers) + 1)(RegNext(_, false.B))
+  // Stages: sum, mantissa, division, shift. Those after the first one hold still if it does
+  private def next[T <: Data](value: T): T = RegEnable(value, true.B)
+  private val isFirst                      = io.distance.valid
+  private val input                        = io.distance.bits
+  private val sum                          =
+    RegEnable(Rounding.floor(input.tEntry.natural, -numbers.gridFraction) +& input.t.integer.asUInt, isFirst)
+  private val scales = next(RegEnable(input.scale, isFirst))
 
-  /** A register of a stage. */
-  private def load[T <: Data](value: T, stage: Int): T = RegEnable(value, holds(stage - 1))
-
-  private val input  = io.distance.bits
-  private val sum    = load(Rounding.floor(input.tEntry.natural, -numbers.gridFraction) +& input.t.integer.asUInt, 1)
-  private val scales = load(load(input.scale, 1), 2)
-
-  private val dividend = load(Normalise(sum, mantissa), 2)
-  private val divider  = Module(new PipelinedDivider(mantissa, digits, lanes = 1)).io
-  divider.loads       := VecInit(holds.slice(2, 2 + stages))
+  private val dividend = next(Normalise(sum, mantissa))
+  private val divider  = Module(
+    new PipelinedDivider(mantissa, digits, lanes = 1, bitsPerStage = WorldDistance.bitsPerStage)
+  ).io
+  divider.loads.foreach(_ := true.B)
   divider.numerators  := VecInit(dividend.mantissa)
   divider.denominator := scales.length.mantissa
 
@@ -55,15 +54,19 @@ final class WorldDistance(config: PathConfig) extends Module {
   private val raised = (grid - digits).max(0) + 1
   private val amount =
     (scales.length.exponent.zext -& dividend.exponent.zext) -& scales.shift.zext +& (least + raised).S
-  private val right    = (2 until 2 + stages).foldLeft(amount)((value, stage) => load(value, stage + 1))
+  private val right    = Seq.iterate(amount, WorldDistance.stages(numbers) + 1)(next(_)).last
   private val quotient = divider.quotients.head
   private val shifted = Rounding.saturate(Cat(quotient, 0.U(raised.W)) >> right.asUInt(right.getWidth - 2, 0), grid - 1)
   private val most    = ((BigInt(1) << (grid - 1)) - 1).U((grid - 1).W)
-  private val t       = load(Mux(right < 0.S && quotient.orR, most, shifted), WorldDistance.latency(numbers))
-  io.t.valid := holds.last
+  private val t       = next(Mux(right < 0.S && quotient.orR, most, shifted))
+  io.t.valid := Seq.iterate(isFirst, WorldDistance.latency(numbers) + 1)(RegNext(_, false.B)).last
   io.t.bits  := Fixed(new RayFormats(numbers).grid, t.zext)
 }
 
 private[colonnade] object WorldDistance {
-  def latency(numbers: NumberFormats): Int = PipelinedDivider.stages(numbers.distanceDigits) + 3
+  private val bitsPerStage = 3
+
+  private def stages(numbers: NumberFormats): Int = PipelinedDivider.stages(numbers.distanceDigits, bitsPerStage)
+
+  def latency(numbers: NumberFormats): Int = stages(numbers) + 3
 }

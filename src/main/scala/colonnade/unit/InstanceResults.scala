@@ -4,11 +4,11 @@ import chisel3._
 import chisel3.util.{Decoupled, OHToUInt, Valid}
 import colonnade.common.{Context, ContextTable, DelayLine}
 import colonnade.config.PathConfig
+import colonnade.formats.RecordFormats
 import colonnade.instance.{ObjectScale, WorldDistance}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
 import colonnade.shading.Occlusion
-import colonnade.traversal.TriangleHit
 
 /** Where a context's ray enters the cube of an object. */
 final class VisitEntry(config: PathConfig) extends Bundle {
@@ -55,20 +55,22 @@ final class InstanceResults(config: PathConfig) extends Module {
   result.context     := ofObject.context
   result.hasHit      := ofObject.hasHit && io.objectResults.valid
   result.occlusion   := Mux(io.objectResults.valid, ofObject.occlusion, Occlusion.none)
-  result.hit         := ofObject.hit
+  result.id          := ofObject.hit.id
+  result.weights     := ofObject.hit.weights
+  result.backSide    := ofObject.hit.backSide
   io.misses(0).ready := !io.objectResults.valid
   io.misses(1).ready := !io.objectResults.valid && !io.misses(0).valid
   when(!io.objectResults.valid) { result.context := Mux(io.misses(0).valid, io.misses(0).bits, io.misses(1).bits) }
 
   // Its distance along the ray of the world; the rest of it comes out then
   private val distance = Module(new WorldDistance(config)).io
-  private val line     = Module(new DelayLine(new VisitResult, latency - 1)).io
+  private val line     = Module(new DelayLine(new VisitResult, latency - 1, isSteady = false)).io
   private val measured = comes && result.hasHit
   private val arrives  = Seq.iterate(comes, latency + 1)(RegNext(_, false.B))
   distance.distance.valid       := RegNext(measured, false.B)
   distance.distance.bits.tEntry := entries.read(result.context, measured)
   distance.distance.bits.scale  := scales.read(result.context, measured)
-  distance.distance.bits.t      := RegNext(result.hit.t)
+  distance.distance.bits.t      := RegNext(ofObject.hit.t)
   line.moves                    := true.B
   line.writes                   := comes
   line.in                       := result
@@ -92,14 +94,16 @@ final class InstanceResults(config: PathConfig) extends Module {
 
   private val isResolved = arrives(latency)
   private val resolved   = RegNext(nearest)
-  io.again.valid            := RegNext(isResolved && !isLast, false.B)
-  io.again.bits             := resolved
-  io.results.valid          := RegNext(isResolved, false.B)
-  io.results.bits.context   := resolved.context
-  io.results.bits.hasHit    := resolved.hasHit
-  io.results.bits.occlusion := resolved.occlusion
-  io.results.bits.hit       := RegNext(found.hit)
-  io.results.bits.hit.t     := resolved.tMax
+  io.again.valid               := RegNext(isResolved && !isLast, false.B)
+  io.again.bits                := resolved
+  io.results.valid             := RegNext(isResolved, false.B)
+  io.results.bits.context      := resolved.context
+  io.results.bits.hasHit       := resolved.hasHit
+  io.results.bits.occlusion    := resolved.occlusion
+  io.results.bits.hit.id       := RegNext(found.id)
+  io.results.bits.hit.weights  := RegNext(found.weights)
+  io.results.bits.hit.backSide := RegNext(found.backSide)
+  io.results.bits.hit.t        := resolved.tMax
   io.results.bits.isClear.foreach(_ := DontCare)
   for (visit <- io.results.bits.visit) {
     visit.instance := RegNext(OHToUInt(step.next))
@@ -107,11 +111,13 @@ final class InstanceResults(config: PathConfig) extends Module {
     visit.isLast   := RegNext(isLast)
   }
 
-  /** What a ray has met in an object, along the ray there. */
+  /** What a ray has met in an object, but the distance. */
   private final class VisitResult extends Bundle {
     val context   = Context(config)
     val hasHit    = Bool()
     val occlusion = Occlusion()
-    val hit       = new TriangleHit(config)
+    val id        = UInt(RecordFormats.idBits(config.device).W)
+    val weights   = chiselTypeOf(ofObject.hit.weights)
+    val backSide  = Bool()
   }
 }

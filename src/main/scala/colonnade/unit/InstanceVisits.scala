@@ -7,7 +7,7 @@ import colonnade.config.PathConfig
 import colonnade.formats.{InstanceNumber, ObjectInstance}
 import colonnade.instance.{InstanceTransform, ObjectScale}
 import colonnade.numbers.Fixed
-import colonnade.ray.{PreparedRay, RayFormats, RayRequest, TriangleRay}
+import colonnade.ray.{RayFormats, RayRequest, TriangleRay}
 import colonnade.shading.Occlusion
 
 /** A ray of the world that is yet to be traced in some instances, or in none: what it has met before. */
@@ -41,6 +41,12 @@ final class InstanceStep(config: PathConfig) extends RayProgress(config) {
   }
 }
 
+/** Reads a context's ray of the world: it comes in the cycle after the read. */
+final class WorldRayRead(config: PathConfig) extends Bundle {
+  val context = Decoupled(Context(config))
+  val ray     = Input(new TriangleRay(config.numbers))
+}
+
 /** The scale of the ray that a context has in the axes of its next object. */
 final class VisitScale(config: PathConfig) extends Bundle {
   val context = Context(config)
@@ -50,9 +56,9 @@ final class VisitScale(config: PathConfig) extends Bundle {
 final class InstanceVisitsIO(config: PathConfig) extends Bundle {
   val instances = Input(Vec(config.device.frame.instances, new ObjectInstance(config.device)))
 
-  /** Rays of the world; contexts with an instance that is left, at least a cycle later. */
-  val rays  = Flipped(Valid(new PreparedRay(config)))
+  /** Contexts with an instance that is left, and their rays of the world. */
   val steps = Flipped(Valid(new InstanceStep(config)))
+  val rays  = new WorldRayRead(config)
 
   /** In the axes of objects, to ray set-up. */
   val requests = Decoupled(new RayRequest(config))
@@ -63,33 +69,30 @@ final class InstanceVisitsIO(config: PathConfig) extends Bundle {
 final class InstanceVisits(config: PathConfig) extends Module {
   val io = IO(new InstanceVisitsIO(config))
 
-  private val rays    = ContextTable(config, new WorldRay(config))
   private val steps   = ContextTable(config, new PendingVisit(config))
   private val waiting = Module(new ReservedQueue(Context(config), config.contexts.max(2))).io
-  private val ray     = Wire(new WorldRay(config))
   private val step    = Wire(new PendingVisit(config))
-  ray.isShadow  := io.rays.bits.isShadow
-  ray.ray       := io.rays.bits.ray.forTriangles
+  step.isShadow := io.steps.bits.isShadow
   step.instance := OHToUInt(io.steps.bits.next)
   step.tMax     := io.steps.bits.tMax
-  when(io.rays.valid) { rays.write(io.rays.bits.context, ray) }
   when(io.steps.valid) { steps.write(io.steps.bits.context, step) }
   waiting.in.valid := io.steps.valid
   waiting.in.bits  := io.steps.bits.context
 
-  // The tables are read in the cycle before a visit enters the transform
+  // Ray and step are read in the cycle before a visit enters the transform
   private val transform = Module(new InstanceTransform(config)).io
   private val reads     = waiting.out.fire
   private val context   = waiting.out.bits
-  private val readRay   = rays.read(context, reads)
   private val readStep  = steps.read(context, reads)
   waiting.mayTakeNext           := true.B
-  waiting.out.ready             := transform.readyNext
+  io.rays.context.valid         := waiting.out.valid && transform.readyNext
+  io.rays.context.bits          := context
+  waiting.out.ready             := transform.readyNext && io.rays.context.ready
   transform.instances           := io.instances
   transform.visit.valid         := RegNext(reads, false.B)
   transform.visit.bits.context  := RegNext(context)
-  transform.visit.bits.isShadow := readRay.isShadow
-  transform.visit.bits.ray      := readRay.ray
+  transform.visit.bits.isShadow := readStep.isShadow
+  transform.visit.bits.ray      := io.rays.ray
   transform.visit.bits.instance := readStep.instance
   transform.visit.bits.tMax     := readStep.tMax
 
@@ -101,13 +104,9 @@ final class InstanceVisits(config: PathConfig) extends Module {
   io.scales.bits.scale   := transform.ray.bits.scale
 }
 
-/** What the transform reads of a ray, and of its step. */
-final private class WorldRay(config: PathConfig) extends Bundle {
-  val isShadow = Bool()
-  val ray      = new TriangleRay(config.numbers)
-}
-
+/** What the transform needs of a step. */
 final private class PendingVisit(config: PathConfig) extends Bundle {
+  val isShadow = Bool()
   val instance = InstanceNumber(config.device).get
   val tMax     = new Fixed(new RayFormats(config.numbers).grid)
 }

@@ -15,6 +15,9 @@ final class InstanceWalkIO(config: PathConfig) extends Bundle {
   /** From ray set-up: rays of the world that enter the box of all objects, and rays in the axes of objects. */
   val rays = Flipped(Decoupled(new PreparedRay(config)))
 
+  /** Rays of the world as their visits read them. */
+  val worldRays = new WorldRayRead(config)
+
   /** To ray set-up: rays in the axes of objects. */
   val requests = Decoupled(new RayRequest(config))
 
@@ -52,8 +55,6 @@ final class InstanceWalk(config: PathConfig) extends Module {
   io.objectRays.bits      := ray
   io.objectRays.bits.root.foreach(_ := Mux(isOff, io.scene.root, io.instances(visit.bits).root))
   io.rays.ready         := Mux(isWorld, filter.ray.ready, Mux(misses, results.misses(1).ready, io.objectRays.ready))
-  visits.rays.valid     := filter.ray.fire
-  visits.rays.bits      := ray
   results.entries.valid := io.objectRays.fire
   results.entries.bits.context := ray.context
   results.entries.bits.tEntry  := ray.tEntry
@@ -80,6 +81,7 @@ final class InstanceWalk(config: PathConfig) extends Module {
   visits.steps       := step
   visits.steps.valid := step.valid && step.bits.left =/= 0.U
   results.scales     := visits.scales
+  io.worldRays :<>= visits.rays
   io.requests :<>= visits.requests
 
   results.objectResults       := io.objectResults

@@ -32,6 +32,9 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
   val results = Flipped(Valid(new TraceResult(config)))
   val visits  = Option.when(config.device.frame.hasInstances)(Flipped(Decoupled(new RayRequest(config))))
 
+  /** An [[InstanceWalk]] reads rays of the world. */
+  val worldRays = Option.when(config.device.frame.hasInstances)(Flipped(new WorldRayRead(config)))
+
   /** To the column's records, for attributes. */
   val requests   = Decoupled(new RecordRequest(config.device))
   val broadcasts = Flipped(Vec(config.device.columnBvhMemory.banks, Valid(new RecordBroadcast(config.device))))
@@ -91,7 +94,7 @@ final class PathHits(config: PathConfig) extends Module {
   private val hits    = ContextTable(paths, new HitPoint(config))
   private val rays    = ContextTable(paths, new TriangleRay(config.numbers))
   private val writes  = io.rays.fire && isWorld && !ray.isShadow // nobody shades what a shadow ray hits
-  when(writes) { rays.write(ray.context, ray.ray.forTriangles) }
+  when(if (io.worldRays.isEmpty) writes else io.rays.fire && isWorld) { rays.write(ray.context, ray.ray.forTriangles) }
   when(isHit) {
     val entry = Wire(new ClosestHit(config))
     entry.id                                                 := result.hit.id
@@ -149,7 +152,7 @@ final class PathHits(config: PathConfig) extends Module {
   private val face               = offered.bits
   trace.hits.valid                     := offered.valid
   trace.hits.bits.context              := face.context
-  trace.hits.bits.ray                  := rays.read(granted.bits, granted.valid)
+  trace.hits.bits.ray                  := rayOf(granted)
   trace.hits.bits.hit                  := hits.read(granted.bits, granted.valid)
   trace.hits.bits.face.normals         := face.normals
   trace.hits.bits.face.geometricNormal := face.geometricNormal
@@ -169,15 +172,23 @@ final class PathHits(config: PathConfig) extends Module {
     (decoder.grantNext, decoder.face)
   }
 
-  /** The same in the axes of the world. */
+  /** The same in the axes of the world; without instances those of leaves are. */
   private def facesInWorld(instances: Vec[ObjectInstance]): (Valid[UInt], Valid[HitFace]) = {
     val faces = Module(new WorldFaces(config)).io
-    faces.objectFace    := decoder.face
-    faces.instances     := instances
-    faces.hasInstances  := io.scene.instances.get =/= 0.U
-    faces.mayTakeNext   := trace.hitsReadyNext
-    decoder.mayTakeNext := faces.mayComeNext
-    (faces.grantNext, faces.face)
+    val isOff = io.scene.instances.get === 0.U
+    faces.objectFace.valid := decoder.face.valid && !isOff
+    faces.objectFace.bits  := decoder.face.bits
+    faces.instances        := instances
+    faces.mayTakeNext      := trace.hitsReadyNext
+    decoder.mayTakeNext    := Mux(isOff, trace.hitsReadyNext, faces.mayComeNext)
+    (Mux(isOff, decoder.grantNext, faces.grantNext), Mux(isOff, decoder.face, faces.face))
+  }
+
+  /** The ray of a hit that is shaded; else a visit may read one. */
+  private def rayOf(hit: Valid[UInt]): TriangleRay = io.worldRays.fold(rays.read(hit.bits, hit.valid)) { visit =>
+    visit.context.ready := !hit.valid
+    visit.ray           := rays.read(Mux(hit.valid, hit.bits, visit.context.bits), hit.valid || visit.context.valid)
+    visit.ray
   }
 
   /** The material of the face of a leaf, in the scene. */

@@ -13,9 +13,8 @@ final class WorldFacesIO(config: PathConfig) extends Bundle {
   val objectFace  = Flipped(Valid(new HitFace(config)))
   val mayComeNext = Output(Bool())
 
-  /** None: faces are in the axes of the world. Constant while a face is in the unit. */
-  val instances    = Input(Vec(config.device.frame.instances, new ObjectInstance(config.device)))
-  val hasInstances = Input(Bool())
+  /** Constant while a face is in the unit. */
+  val instances = Input(Vec(config.device.frame.instances, new ObjectInstance(config.device)))
 
   /** A face is accepted in the next cycle; the context that gets its face then. */
   val mayTakeNext = Input(Bool())
@@ -69,7 +68,7 @@ final class WorldFaces(config: PathConfig) extends Module {
   when(io.objectFace.valid) {
     face   := io.objectFace.bits
     isHeld := true.B
-    step   := Mux(io.hasInstances, 0.U, stored.U)
+    step   := 0.U
   }
   io.grantNext.valid := gives
   io.grantNext.bits  := face.context

@@ -25,8 +25,10 @@ private class InstanceTransformHarness(config: ColonnadeConfig)
   transform.visit.valid := in.fire
   transform.visit.bits  := input.visit
   in.ready              := RegNext(transform.readyNext, false.B)
-  for ((instance, number) <- transform.instances.zipWithIndex)
-    instance          := RegEnable(input.instance, in.fire && input.visit.instance === number.U)
+  for ((instance, number) <- transform.instances.zipWithIndex) {
+    val comes = in.fire && input.visit.instance === number.U
+    instance := Mux(comes, input.instance, RegEnable(input.instance, comes))
+  }
   out.valid           := transform.ray.valid
   out.bits            := transform.ray.bits.asUInt
   transform.ray.ready := out.ready

@@ -16,20 +16,18 @@ class WorldFacesSpec extends AnyFlatSpec with OneSimulation with Matchers {
   private val config = TestConfigs.withInstances(TestConfigs.tiny, 2)
 
   inOneSimulation(new WorldFaces(config))(
-    "transform faces"                 -> transform(few = 1, hasInstances = true),
-    "as the shader is ready"          -> transform(few = 7, hasInstances = true),
-    "forward faces without instances" -> transform(few = 3, hasInstances = false)
+    "transform faces"        -> transform(few = 1),
+    "as the shader is ready" -> transform(few = 7)
   )
 
   /** A face may leave in one of `few` cycles. */
-  private def transform(few: Int, hasInstances: Boolean)(dut: WorldFaces): Unit = {
+  private def transform(few: Int)(dut: WorldFaces): Unit = {
     val random               = new Random(few)
     val io                   = dut.io
     val waiting              = mutable.Queue.empty[(BigInt, Seq[BigInt])]
     var (done, cycle)        = (0, 0)
     var (mayCome, isLeaving) = (false, false)
     dut.clock.setTimeout(0)
-    io.hasInstances.poke(hasInstances)
     while (done < 60) {
       cycle should be < 60 * 200
       val comes = mayCome && random.nextInt(3) == 0
@@ -45,7 +43,7 @@ class WorldFacesSpec extends AnyFlatSpec with OneSimulation with Matchers {
         io.objectFace.bits.instance.get.poke(number)
         val request = normals ++ material ++ matrix ++ base
         val inWorld = Model.answers(config, Seq(request), "instanceface").head
-        waiting.enqueue(context -> (if (hasInstances) inWorld else normals ++ material))
+        waiting.enqueue(context -> inWorld)
       }
       val accepts = random.nextInt(few) == 0
       io.mayTakeNext.poke(accepts)
