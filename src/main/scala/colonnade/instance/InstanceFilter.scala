@@ -81,8 +81,8 @@ final class InstanceFilter(config: PathConfig) extends Module {
     val high   = PermutedFrame(box.high, axis)
     val planes = Seq.tabulate(3) { i =>
       val (from, up, down) = (origin(i), low(i).zext, high(i).zext)
-      val near             = Mux(negative(i), from, up) -& Mux(negative(i), down, from) -& 1.S
-      val far              = Mux(negative(i), from, down) -& Mux(negative(i), up, from) +& 1.S
+      val near             = Mux(negative(i), from, up) +& ~Mux(negative(i), down, from) // their difference minus 1
+      val far              = Mux(negative(i), from +& 1.S, down) -& Mux(negative(i), up, from -& 1.S)
       (next(near), next(far))
     }
     (next(isOn), planes)

@@ -21,12 +21,14 @@ import scala.util.Random
 class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers {
   behavior of "PathHits"
 
-  for ((contexts, colours) <- Seq((5, true), (40, false)))
-    it should s"join hits with rays and attributes, $contexts contexts${if (colours) ", colours" else ""}" in {
+  for ((contexts, colours, instances) <- Seq((5, true, 0), (40, false, 0), (12, false, 2)))
+    it should s"join hits with rays and attributes, $contexts contexts${if (colours) ", colours"
+      else ""}${if (instances > 0) ", while visits read rays" else ""}" in {
       val tiny   = TestConfigs.tiny
       val config = tiny.copy(
         units = tiny.units.copy(pathContexts = contexts),
-        geometry = tiny.geometry.copy(cornerColours = colours)
+        geometry = tiny.geometry.copy(cornerColours = colours),
+        frame = tiny.frame.copy(instances = instances)
       )
       test(new PathHitsHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         val driver = new PathHitsDriver(dut, config, new Random(contexts))
@@ -34,6 +36,7 @@ class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
         driver.shaded should be > 160
         if (colours) driver.refused should be > 4
         driver.measured should be > 60
+        if (instances > 0) driver.visited should be > 160
       }
     }
 }
@@ -52,6 +55,7 @@ private class PathHitsHarness(config: ColonnadeConfig) extends Module {
   val foundRay   = IO(Output(UInt()))
   val foundHit   = IO(Output(UInt()))
   val foundFace  = IO(Output(UInt()))
+  val visitRay   = unit.io.worldRays.map(port => IO(Output(UInt())))
   private val of = ray.asTypeOf(new TracedRay(config.numbers))
   private val at = Wire(new TriangleHit(config))
   io :<>= unit.io
@@ -62,9 +66,10 @@ private class PathHitsHarness(config: ColonnadeConfig) extends Module {
   forHit                      := of.forTriangles.asUInt
   details                     := at.point.asUInt
   t                           := at.t.integer
-  foundRay                    := unit.io.trace.hits.bits.ray.asUInt
-  foundHit                    := unit.io.trace.hits.bits.hit.asUInt
-  foundFace                   := unit.io.trace.hits.bits.face.asUInt
+  visitRay.zip(unit.io.worldRays).foreach { case (to, port) => to := port.ray.asUInt }
+  foundRay  := unit.io.trace.hits.bits.ray.asUInt
+  foundHit  := unit.io.trace.hits.bits.hit.asUInt
+  foundFace := unit.io.trace.hits.bits.face.asUInt
 }
 
 /** Takes each context round: a ray, its result, its resolution, and its attributes if it is shaded. */
@@ -100,6 +105,10 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
   /** Hits that were shaded, hits whose colours have an illegal address, and hits whose distance was asked for alone. */
   var (shaded, refused, measured) = (0, 0, 0)
 
+  /** Rays that visits have read, and the one that comes now. */
+  var visited          = 0
+  private var visitRay = Option.empty[BigInt]
+
   private val recordCount = 24
   private val wants       = Seq.fill(config.frame.materials)(random.nextBoolean())
 
@@ -123,6 +132,7 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
   }
 
   private def step(): Unit = {
+    readRay()
     offerRay()
     val result   = offerResult()
     val resolved = resolve()
@@ -142,8 +152,19 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     resolved.foreach(checkOutcome)
     checkMeasured()
     takeShaded()
+    for (port <- dut.io.worldRays if !port.context.ready.peekBoolean()) visitRay = None
     dut.clock.step()
     cycle += 1
+  }
+
+  /** A visit reads the ray of a context that is traced. */
+  private def readRay(): Unit = for (port <- dut.io.worldRays) {
+    visitRay.foreach(dut.visitRay.get.expect(_))
+    visited += visitRay.size
+    val context = if (chance(2)) one(in(traced)) else None
+    port.context.valid.poke(context.nonEmpty)
+    context.foreach(port.context.bits.poke(_))
+    visitRay = context.map(all(_).ray)
   }
 
   private def offerRay(): Unit = {
@@ -186,6 +207,10 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
       result.bits.context.poke(context)
       result.bits.hasHit.poke(now.hasHit)
       result.bits.occlusion.poke(now.occlusion)
+      for (visit <- result.bits.visit) {
+        visit.isNearer.poke(now.hasHit)
+        visit.isLast.poke(true)
+      }
       // t is never negative
       dut.hit.poke(BigInt(dut.hit.getWidth - 1, random))
       dut.id.poke(now.id)
