@@ -25,14 +25,11 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
   val scene = Input(new SceneMap(config.device))
   val trace = Flipped(new TracePort(config)) // to the path unit
 
-  /** Rays that enter the object's box, to the traversal units; what they have met. With instances also rays in the axes of
-    * objects, between ray set-up and an [[InstanceWalk]].
-    */
+  /** Rays that enter the object's box; what they have met. An [[InstanceWalk]] adds those of visits, and reads rays. */
   val rays    = Decoupled(new PreparedRay(config))
   val results = Flipped(Valid(new TraceResult(config)))
-  val visits  = Option.when(config.device.frame.hasInstances)(Flipped(Decoupled(new RayRequest(config))))
 
-  /** An [[InstanceWalk]] reads rays of the world. */
+  val visits    = Option.when(config.device.frame.hasInstances)(Flipped(Decoupled(new RayRequest(config))))
   val worldRays = Option.when(config.device.frame.hasInstances)(Flipped(new WorldRayRead(config)))
 
   /** To the column's records, for attributes. */
