@@ -107,13 +107,13 @@ final class InstanceTransform(config: PathConfig) extends Module {
   )
 
   // They wait for stage 4 in memories of a word for each stage on the way. An offered ray is read again
-  private val place     = RegInit(0.U(2.W))
-  private val nextPlace = Mux(place === 2.U, 0.U, place + 1.U)
-  when(moves && isLast) { place := nextPlace }
+  private val word     = RegInit(0.U(2.W))
+  private val nextWord = Mux(word === 2.U, 0.U, word + 1.U)
+  when(moves && isLast) { word := nextWord }
   private def waiting[T <: Data](value: T, cycle: Bool): T = {
     val memory = SyncReadMem(3, UInt(value.getWidth.W))
-    when(moves && holds(1) && cycle) { memory.write(place, value.asUInt) }
-    memory.read(Mux(isLast, nextPlace, place), Mux(isLast, holds(3), !moves)).asTypeOf(value)
+    when(moves && holds(1) && cycle) { memory.write(word, value.asUInt) }
+    memory.read(Mux(isLast, nextWord, word), Mux(isLast, holds(3), !moves)).asTypeOf(value)
   }
   private val cycles     = Seq(isFirst, isNext, isLast)
   private val info4      = waiting(staged(info0), isFirst)
