@@ -43,7 +43,7 @@ final class InstanceStep(config: PathConfig) extends RayProgress(config) {
 
 /** Reads a context's ray of the world: it comes in the cycle after the read. */
 final class WorldRayRead(config: PathConfig) extends Bundle {
-  val context = Decoupled(Context(config))
+  val context = Valid(Context(config))
   val ray     = Input(new TriangleRay(config.numbers))
 }
 
@@ -85,9 +85,9 @@ final class InstanceVisits(config: PathConfig) extends Module {
   private val context   = waiting.out.bits
   private val readStep  = steps.read(context, reads)
   waiting.mayTakeNext           := true.B
-  io.rays.context.valid         := waiting.out.valid && transform.readyNext
+  waiting.out.ready             := transform.readyNext
+  io.rays.context.valid         := reads
   io.rays.context.bits          := context
-  waiting.out.ready             := transform.readyNext && io.rays.context.ready
   transform.instances           := io.instances
   transform.visit.valid         := RegNext(reads, false.B)
   transform.visit.bits.context  := RegNext(context)

@@ -171,20 +171,21 @@ final class PathHits(config: PathConfig) extends Module {
 
   /** The same in the axes of the world; without instances those of leaves are. */
   private def facesInWorld(instances: Vec[ObjectInstance]): (Valid[UInt], Valid[HitFace]) = {
-    val faces = Module(new WorldFaces(config)).io
-    val isOff = io.scene.instances.get === 0.U
+    val faces       = Module(new WorldFaces(config)).io
+    val isOff       = io.scene.instances.get === 0.U
+    val mayTakeNext = trace.hitsReadyNext && !io.worldRays.get.context.valid
     faces.objectFace.valid := decoder.face.valid && !isOff
     faces.objectFace.bits  := decoder.face.bits
     faces.instances        := instances
-    faces.mayTakeNext      := trace.hitsReadyNext
-    decoder.mayTakeNext    := Mux(isOff, trace.hitsReadyNext, faces.mayComeNext)
+    faces.mayTakeNext      := mayTakeNext
+    decoder.mayTakeNext    := Mux(isOff, mayTakeNext, faces.mayComeNext)
     (Mux(isOff, decoder.grantNext, faces.grantNext), Mux(isOff, decoder.face, faces.face))
   }
 
-  /** The ray of a hit that is shaded; else a visit may read one. */
+  /** The ray of a hit that is shaded, which waits while a visit reads one. */
   private def rayOf(hit: Valid[UInt]): TriangleRay = io.worldRays.fold(rays.read(hit.bits, hit.valid)) { visit =>
-    visit.context.ready := !hit.valid
-    visit.ray           := rays.read(Mux(hit.valid, hit.bits, visit.context.bits), hit.valid || visit.context.valid)
+    visit.ray := rays.read(Mux(visit.context.valid, visit.context.bits, hit.bits), hit.valid || visit.context.valid)
+    assert(!(hit.valid && visit.context.valid), "one ray is read in a cycle")
     visit.ray
   }
 

@@ -1,7 +1,6 @@
 package colonnade.unit
 
 import chisel3._
-import chisel3.util.random.LFSR
 import chisel3.util.{Decoupled, Valid}
 import chiseltest._
 import colonnade.TestParts._
@@ -35,14 +34,12 @@ private class InstanceWalkHarness(config: ColonnadeConfig) extends Module {
   walk.scene.instances.get := count
   walk.instances           := instances.asTypeOf(walk.instances)
 
-  // Rays of the world are read in three of four cycles
   private val worldRays = SyncReadMem(config.units.pathContexts, chiselTypeOf(walk.worldRays.ray))
   when(walk.rays.fire && !walk.rays.bits.visit.get.valid) {
     worldRays.write(walk.rays.bits.context, walk.rays.bits.ray.forTriangles)
   }
   private val read = walk.worldRays.context
-  read.ready         := LFSR(8)(1, 0).orR
-  walk.worldRays.ray := worldRays.read(read.bits, read.fire)
+  walk.worldRays.ray := worldRays.read(read.bits, read.valid)
 
   // Rays in the axes of objects come back by ray set-up, before those of the world
   setup.request :<>= walk.requests

@@ -152,7 +152,6 @@ private class PathHitsDriver(dut: PathHitsHarness, config: ColonnadeConfig, rand
     resolved.foreach(checkOutcome)
     checkMeasured()
     takeShaded()
-    for (port <- dut.io.worldRays if !port.context.ready.peekBoolean()) visitRay = None
     dut.clock.step()
     cycle += 1
   }
