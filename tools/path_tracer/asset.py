@@ -17,7 +17,7 @@ from common import colour, mesh, picture
 
 
 def texture(values: Any, is_colour: bool) -> dict[str, Any]:
-    """A texture from a picture, uint8; one channel of it if it has no colour."""
+    """A texture from a picture, uint8, or float32 if linear; one channel of it if it has no colour."""
     bitmap = mi.Bitmap(np.ascontiguousarray(values))
     return {"type": "bitmap", "bitmap": bitmap, "raw": not is_colour, "filter_type": "bilinear"}
 
@@ -41,6 +41,18 @@ def material(part: dict[str, Any], index: int, job: Any, is_mirrored: bool) -> d
         tilts = np.where([False, is_mirrored, False], 255 - tilts, tilts).astype(np.uint8)
         own = {"type": "normalmap", "normalmap": texture(tilts, False), "bsdf": own}
     return {"type": "twosided", "bsdf": own}
+
+
+def emitter(part: dict[str, Any], index: int, job: Any) -> dict[str, Any]:
+    """The area emitter of a primitive, as argument `emitter` of `mesh`; nothing for one that emits no light."""
+    if "emission" not in part:
+        return {}
+    radiance = colour(part["emission"])
+    if f"{index}-emissiveTexture" in job:
+        bitmap = mi.Bitmap(np.ascontiguousarray(job[f"{index}-emissiveTexture"]))
+        linear = np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False))
+        radiance = texture((linear * part["emission"]).astype(np.float32), False)
+    return {"emitter": {"type": "area", "radiance": radiance}}
 
 
 def sides(vertices: Any, faces: Any, normals: Any, uv: Any) -> list[tuple[bool, Any]]:
@@ -94,7 +106,8 @@ def main() -> None:
             halves = sides(vertices, faces, arrays["normals"], arrays["uv"]) if "uv" in arrays else [(False, faces)]
             for is_mirrored, own_faces in halves:
                 name = f"part{index}{'mirrored' if is_mirrored else ''}"
-                parts[name] = mesh(vertices, own_faces, material(part, index, job, is_mirrored), **arrays)
+                own_material = material(part, index, job, is_mirrored)
+                parts[name] = mesh(vertices, own_faces, own_material, **arrays, **emitter(part, index, job))
         found = picture(mi.load_dict(parts), camera(plan), int(sys.argv[2]))
         np.savez_compressed(own / "truth.npz", picture=found)
         print(own.name, flush=True)

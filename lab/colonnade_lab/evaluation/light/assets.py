@@ -1,7 +1,8 @@
 """glTF files with metallic-roughness materials, by Colonnade and by a path tracer.
 
 Both get a constant environment, one point light and Colonnade's framing camera. The path tracer's meshes and textures
-are read by trimesh, not by Colonnade, so errors of its reader count. Occlusion and emission are left out.
+are read by trimesh, not by Colonnade, so errors of its reader count. Occlusion is left out, and emission has no factor
+above 1.
 """
 
 from __future__ import annotations
@@ -154,6 +155,12 @@ def _parts(file: Path) -> list[tuple[dict[str, NDArray[Any]], dict[str, Any]]]:
             picture = getattr(own, key, None)
             if picture is not None and "uv" in values:
                 values[key] = np.asarray(picture.convert("RGB"))
+        emitted = getattr(own, "emissiveFactor", None)
+        if emitted is not None and np.any(emitted):
+            material["emission"] = [float(value) for value in emitted]
+            picture = getattr(own, "emissiveTexture", None)
+            if picture is not None and "uv" in values:
+                values["emissiveTexture"] = np.asarray(picture.convert("RGB"))
         parts.append((values, material))
     return parts
 
