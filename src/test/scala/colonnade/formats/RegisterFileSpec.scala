@@ -120,4 +120,25 @@ class RegisterFileSpec extends AnyFlatSpec with OneSimulation with Matchers {
       read(unit, 0) shouldBe 0
     }
   )
+
+  private val withInstances = ConfigIO.load("tiny", Seq("frame.instances=2"))
+
+  inOneSimulation(RegisterFile.ofFrames(withInstances))(
+    "read 0 after a reset from registers of instances, which have none" -> { unit =>
+      val random    = new Random(10)
+      val instances = RegisterMap(withInstances).filter(_.name.startsWith("instances["))
+      val values    = instances.map(r => r -> (BigInt(r.width, random) | 1))
+      values.foreach { case (register, bits) => writeWhole(unit, register, bits) }
+      for ((register, bits) <- values) withClue(s"${register.name}: ")(readWhole(unit, register) shouldBe bits)
+      unit.reset.asBool.poke(true)
+      unit.clock.step()
+      unit.reset.asBool.poke(false)
+      for (register <- instances) withClue(s"${register.name}: ")(readWhole(unit, register) shouldBe 0)
+      // A write brings back one word, not the others
+      val (register, bits) = values.head
+      writeWhole(unit, register, bits)
+      readWhole(unit, register) shouldBe bits
+      for (other <- instances.tail) withClue(s"${other.name}: ")(readWhole(unit, other) shouldBe 0)
+    }
+  )
 }

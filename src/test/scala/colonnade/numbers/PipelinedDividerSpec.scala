@@ -12,11 +12,11 @@ class PipelinedDividerSpec extends AnyFlatSpec with ChiselScalatestTester with M
   private type Operands = (BigInt, BigInt)
 
   /** A division a cycle, but when nothing loads: two lanes, the second one divides the numerators in reverse. */
-  private def check(mantissaBits: Int, digits: Int, operands: Seq[Operands]): Unit =
-    test(new PipelinedDivider(mantissaBits, digits, lanes = 2)) { divider =>
+  private def check(mantissaBits: Int, digits: Int, bitsPerStage: Int, operands: Seq[Operands]): Unit =
+    test(new PipelinedDivider(mantissaBits, digits, lanes = 2, bitsPerStage = bitsPerStage)) { divider =>
       divider.io.loads.foreach(_.poke(true))
       val random  = new Random(2)
-      val latency = PipelinedDivider.stages(digits)
+      val latency = PipelinedDivider.stages(digits, bitsPerStage)
       val lanes   = operands.map(_._1).zip(operands.map(_._1).reverse)
       for (cycle <- 0 until operands.size + latency) {
         for (((one, other), (_, denominator)) <- lanes.lift(cycle).zip(operands.lift(cycle))) {
@@ -40,16 +40,17 @@ class PipelinedDividerSpec extends AnyFlatSpec with ChiselScalatestTester with M
 
   private def mantissas(bits: Int) = BigInt(1) << (bits - 1) until BigInt(1) << bits
 
-  for ((mantissaBits, digits) <- Seq((2, 0), (2, 5), (3, 1), (4, 2), (5, 4), (5, 9)))
-    it should s"divide all $mantissaBits-bit mantissas to $digits digits" in
+  for ((mantissaBits, digits, bits) <- Seq((2, 0, 2), (2, 5, 2), (3, 1, 2), (4, 2, 3), (5, 4, 2), (5, 9, 3)))
+    it should s"divide all $mantissaBits-bit mantissas to $digits digits, $bits bits a stage" in
       check(
         mantissaBits,
         digits,
+        bits,
         for (n <- BigInt(0) +: mantissas(mantissaBits); d <- mantissas(mantissaBits)) yield (n, d)
       )
 
-  for ((mantissaBits, digits) <- Seq((32, 30), (32, 22), (32, 18), (8, 8)))
-    it should s"divide random and extreme $mantissaBits-bit mantissas to $digits digits" in {
+  for ((mantissaBits, digits, bits) <- Seq((32, 30, 2), (32, 22, 3), (32, 18, 2), (8, 8, 3)))
+    it should s"divide random and extreme $mantissaBits-bit mantissas to $digits digits, $bits bits a stage" in {
       val random   = new Random(1)
       val top      = BigInt(1) << (mantissaBits - 1)
       val extremes = Seq(top, top + 1, 2 * top - 2, 2 * top - 1)
@@ -57,6 +58,7 @@ class PipelinedDividerSpec extends AnyFlatSpec with ChiselScalatestTester with M
       check(
         mantissaBits,
         digits,
+        bits,
         (for (n <- BigInt(0) +: extremes; d <- extremes) yield (n, d)) ++ Seq.fill(300)((any, any))
       )
     }
