@@ -74,7 +74,7 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
   private val tracer     = Module(pathTracer(config))
   private val units      = tracer.io
   private val controller = Module(new ColumnBvhController(config))
-  private val collector  = Module(new PixelCollector(config, 2))
+  private val collector  = Module(new PixelCollector(config, 3))
 
   // Walk tiles: pixel positions
   private val window = EnvironmentWindow(config, io.registers)
@@ -141,8 +141,9 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
   for ((port, texture) <- io.texture.zip(units.texture)) port :<>= texture
   for ((port, cube) <- io.cube.zip(units.cube)) port :<>= cube
 
-  // Collect finished pixels
-  for ((source, pixels) <- collector.io.sources.zip(Seq(units.pixels, background.io.pixels))) source <> pixels
+  // Collect finished pixels: a rejected one holds up the next position to render, and a finished one holds a context
+  for ((source, pixels) <- collector.io.sources.zip(Seq(background.io.rejected, units.pixels, background.io.pixels)))
+    source <> pixels
   io.pixels <> collector.io.pixels
 
   // Registers
@@ -151,7 +152,7 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
 
   // Progress: pixels that have started and not yet retired
   private val inFlight = RegInit(0.U((2 * config.numbers.coordinateBits).W))
-  private val enters   = walker.io.positions.fire +& background.io.pixels.fire
+  private val enters   = walker.io.positions.fire +& (background.io.rejected.fire || background.io.pixels.fire)
   private val retired  = io.pixels.fire
   inFlight := inFlight + enters - retired
 

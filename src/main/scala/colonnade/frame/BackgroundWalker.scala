@@ -11,35 +11,39 @@ final class BackgroundWalkerIO(config: ColonnadeConfig) extends Bundle {
   val colour = Input(Rgb(FrameRegisters.colour))
   val tiles  = Flipped(Decoupled(new Tile(config)))
 
-  /** Background pixels of tiles of other kinds, by priority; they go before those of its own tiles. */
+  /** Background pixels of tiles of other kinds, by priority. */
   val others = Vec(TileKind.all(config).size - 1, Flipped(Decoupled(new PixelPosition(config))))
-  val pixels = Decoupled(new Pixel(config))
+
+  /** Pixels of `others`, and of the own tiles. */
+  val rejected = Decoupled(new Pixel(config))
+  val pixels   = Decoupled(new Pixel(config))
 
   val isIdle = Output(Bool()) // no pixel of a tile is left
 }
 
 /** Colours the pixels that show the background, in parallel with the path tracer: all pixels of its own tiles, and those
-  * that the column's [[TileWalker]] and [[EnvironmentWalker]] reject. Throughput: one pixel per cycle.
+  * that the column's [[TileWalker]] and [[EnvironmentWalker]] reject. Throughput: one pixel per cycle of either.
   */
 final class BackgroundWalker(config: ColonnadeConfig) extends Module {
   val io = IO(new BackgroundWalkerIO(config))
 
-  private val scan      = Module(new TileScan(config))
-  private val positions = Module(new Arbiter(new PixelPosition(config), io.others.size + 1))
+  private val scan   = Module(new TileScan(config))
+  private val others = Module(new Arbiter(new PixelPosition(config), io.others.size))
   scan.io.frame     := io.frame
   scan.io.isDivided := false.B
   scan.io.tiles <> io.tiles
+  others.io.in.zip(io.others).foreach { case (in, positions) => in <> positions }
 
   private val own = TimingSlice.queue(scan.io.positions)
-  positions.io.in.zip(io.others :+ own).foreach { case (in, positions) => in <> positions }
-
-  io.pixels.valid         := positions.io.out.valid
-  io.pixels.bits.x        := positions.io.out.bits.x
-  io.pixels.bits.y        := positions.io.out.bits.y
-  io.pixels.bits.colour   := io.colour
-  io.pixels.bits.isObject := false.B
-  io.pixels.bits.ratio.foreach(_.channels.foreach(_ := FrameRegisters.one))
-  io.pixels.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
-  positions.io.out.ready := io.pixels.ready
-  io.isIdle              := scan.io.isIdle && !own.valid
+  for ((pixels, positions) <- Seq(io.rejected -> others.io.out, io.pixels -> own)) {
+    pixels.valid         := positions.valid
+    pixels.bits.x        := positions.bits.x
+    pixels.bits.y        := positions.bits.y
+    pixels.bits.colour   := io.colour
+    pixels.bits.isObject := false.B
+    pixels.bits.ratio.foreach(_.channels.foreach(_ := FrameRegisters.one))
+    pixels.bits.hit.foreach(_ := 0.U.asTypeOf(new PixelHit(config)))
+    positions.ready := pixels.ready
+  }
+  io.isIdle := scan.io.isIdle && !own.valid
 }

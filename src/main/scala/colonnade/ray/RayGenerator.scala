@@ -35,10 +35,11 @@ final class RayGeneratorIO(config: PathConfig) extends Bundle {
 
 /** Generates primary rays: `dir = (camera.dir << stepShift) + x · stepX + y · stepY`, exact, from `position << unitShift`.
   *
-  * Throughput: a ray per cycle while each pixel follows the one before it in the Morton order of its tile; pixels of two
-  * tiles may be mixed, `inObjectTile` tells them apart. Another pixel takes `coordinateBits` + 1 cycles. Any order gives the
-  * same rays. Latency: 2 cycles, later by the cycles of a sum bit by bit, and if another ray waits before it. The registers
-  * may change when the unit has been empty for [[RayGenerator.emptyCycles]] cycles. Source: docs/traversal.md.
+  * Throughput: a ray per cycle while each pixel follows the one before it in the Morton order of its tile, and a cycle more
+  * for each pixel that is left out; pixels of two tiles may be mixed, `inObjectTile` tells them apart. Another pixel takes
+  * `coordinateBits` + 1 cycles, which is the most. Any order gives the same rays. Latency: 2 cycles, later by the cycles of
+  * such sums, and if another ray waits before it. The registers may change when the unit has been empty for
+  * [[RayGenerator.emptyCycles]] cycles. Source: docs/traversal.md.
   */
 final class RayGenerator(config: PathConfig) extends Module {
   val io = IO(new RayGeneratorIO(config))
@@ -55,18 +56,24 @@ final class RayGenerator(config: PathConfig) extends Module {
   private val position = RegEnable(io.position.bits, io.position.fire)
 
   // The tiles' last pixels, and whether a pixel comes after those of the other tile
-  private val takes    = io.position.fire
+  private val accepts  = io.position.fire
   private val changes  = !isNew && tileOf(io.position.bits) =/= tileOf(position)
-  private val isChange = RegEnable(changes, takes)
-  private val other    = RegEnable(position, takes && changes)
+  private val isChange = RegEnable(changes, accepts)
+  private val other    = RegEnable(position, accepts && changes)
   private val hasOther = Reg(Bool())
-  when(takes) { hasOther := !isNew && (hasOther || changes) }
+  when(accepts) { hasOther := !isNew && (hasOther || changes) }
   private val isKnown = !isNew && (!changes || hasOther)
-  private val follows = RegEnable(isKnown && isNext(Mux(changes, other, position), io.position.bits), takes)
+  private val before  = Mux(changes, other, position)
   private val topBit  = numbers.coordinateBits
+  private val follows = RegEnable(isKnown && isLater(before, io.position.bits), accepts)
   private val bit     = RegInit(topBit.U)
   private val sums    = inFront && (!inBack || io.ray.ready)
-  private val moves   = sums && (follows || bit === 0.U)
+  private val isFirst = RegEnable(accepts, accepts || sums)
+
+  // A pixel that follows: the sum goes through the codes up to its own
+  private val code  = Reg(UInt((2 * levels).W))
+  private val moves = sums && Mux(follows, code === tileCode(position), bit === 0.U)
+  when(accepts) { code := tileCode(before) + 1.U }.elsewhen(sums) { code := code + 1.U }
 
   io.ray.valid      := inBack
   io.position.ready := !inFront || moves
@@ -75,16 +82,15 @@ final class RayGenerator(config: PathConfig) extends Module {
   when(sums && !follows) { bit := Mux(bit === 0.U, topBit.U, bit - 1.U) }
   when(inFront || inBack) { empty := 0.U }.elsewhen(!isNew) { empty := empty + 1.U }
 
-  // What is added, by the table in docs/traversal.md: a pixel that follows sets the lowest clear bit of the Morton code
-  // before. For another pixel, the sum goes through the bits of x and y from the top, and takes in the camera's direction
-  // at bit stepShift, so that needs no shifter.
-  private val code     = tileCode(position).asBools
-  private val sets     = code.indices.map(n => follows && code(n) && !code.take(n).fold(false.B)(_ || _))
+  // What is added, by the table in docs/traversal.md: the next code sets the lowest clear bit of the one before. For
+  // another pixel, the sum goes through the bits of x and y from the top, and takes in the camera's direction at bit
+  // stepShift, so that needs no shifter.
+  private val sets     = (0 until 2 * levels).map(n => follows && code(n, 0) === (BigInt(1) << n).U)
   private val clears   = sets.tail.reduce(_ || _)
   private val addsX    = follows || bitOf(position.x)
   private val addsY    = Mux(follows, clears, bitOf(position.y))
   private val addsDir  = !follows && bit === io.registers.camera.stepShift
-  private val isDouble = !follows && bit =/= topBit.U
+  private val isDouble = !follows && !isFirst
 
   // Datapath: the camera registers are constant, so their terms have no registers of their own
   private val pixel = RegEnable(position, moves)
@@ -122,9 +128,10 @@ final class RayGenerator(config: PathConfig) extends Module {
     val subtracted = sets.indices.tail.map(n => sets(n) -> ~shifted(terms((n + 1) % 2), (n + 1) / 2))
     val third      = Mux1H((addsDir -> terms(2)) +: subtracted)
     // The direction before: the last one, or that of the other tile, which is kept when the tile changes
-    val ofOther = RegEnable(sum, sums && isChange && (follows || bit === topBit.U))
+    val returns = isChange && isFirst
+    val ofOther = RegEnable(sum, sums && returns)
     val start   =
-      Mux1H(Seq((follows && !isChange) -> sum, (follows && isChange) -> ofOther, isDouble -> shifted(sum, 1)))
+      Mux1H(Seq((follows && !returns) -> sum, (follows && returns) -> ofOther, isDouble -> shifted(sum, 1)))
 
     val (steps, stepCarries) = CarrySave(Mux(addsX, terms(0), 0.U), Mux(addsY, terms(1), 0.U), third, clears)
     val (whole, carries)     = CarrySave(start, steps, stepCarries)
@@ -138,10 +145,11 @@ final class RayGenerator(config: PathConfig) extends Module {
   /** Which of two tiles a pixel belongs to. */
   private def tileOf(pixel: RayPosition): Bool = pixel.inObjectTile.getOrElse(true.B)
 
-  /** Whether a pixel follows another one in a tile. */
-  private def isNext(before: RayPosition, pixel: RayPosition): Bool = {
+  /** Whether a pixel comes after another one in a tile, and its sum is no longer than bit by bit. */
+  private def isLater(before: RayPosition, pixel: RayPosition): Bool = {
     def tile(pixel: RayPosition): UInt = (pixel.y >> levels) ## (pixel.x >> levels)
-    tileCode(pixel) === tileCode(before) +& 1.U && tile(pixel) === tile(before)
+    val codes                          = tileCode(pixel) -& tileCode(before)
+    tile(pixel) === tile(before) && !codes.head(1).asBool && codes.tail(1).orR && codes.tail(1) <= (topBit + 1).U
   }
 
   /** The Morton code of a pixel in its tile. */

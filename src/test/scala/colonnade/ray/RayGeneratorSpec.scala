@@ -28,6 +28,7 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
           setRegisters(generator, frame)
           run(generator, pixels(formats, random, 12), random)(frame)
           run(generator, tileWithGaps(formats, random), random)(frame)
+          run(generator, backwards(formats, random), random)(frame)
           // Then the registers change, even if the next pixel would follow the last one
           stop(generator, RayGenerator.emptyCycles)
         }
@@ -65,6 +66,28 @@ class RayGeneratorSpec extends AnyFlatSpec with ChiselScalatestTester with Match
       intervals.head should be <= config.numbers.coordinateBits + 1
       all(intervals.tail) should be <= 1
       taken.size should be > 20
+    }
+  }
+
+  it should "take a cycle for each pixel that is left out, but no more than for a pixel alone" in {
+    val config = TestConfigs.tiny
+    val alone  = config.numbers.coordinateBits + 1
+    test(new RayGenerator(config)) { generator =>
+      val pixels = tile(config, new Random(3))
+      generator.io.position.valid.poke(true)
+      generator.io.ray.ready.poke(true)
+      for (step <- Seq(1, 2, alone - 1, alone, alone + 1, 2 * alone)) withClue(s"every ${step}th pixel: ") {
+        val kept  = pixels.grouped(step).map(_.head).toSeq
+        var taken = Seq.empty[Int]
+        for (cycle <- 0 until 2 * alone * pixels.size if taken.size < kept.size) {
+          poke(generator, kept(taken.size))
+          if (generator.io.position.ready.peekBoolean()) taken :+= cycle
+          generator.clock.step()
+        }
+        taken.size shouldBe kept.size
+        val intervals = taken.zip(taken.tail).map { case (one, next) => next - one }
+        all(intervals.tail) shouldBe step.min(alone)
+      }
     }
   }
 
@@ -212,10 +235,13 @@ object RayGeneratorSpec {
     }
   }
 
-  /** The same, but some pixels are left out, and some moved to a tile beside it. */
+  /** The same, but some pixels and runs of pixels are left out, and some moved to a tile beside it. */
   private def tileWithGaps(config: ColonnadeConfig, random: Random): Seq[Pixel] = {
     val size = BigInt(config.frame.tileSize)
-    tile(config, random).flatMap { pixel =>
+    val runs = tile(config, random).grouped(3).flatMap { run =>
+      run.take(if (random.nextInt(4) == 0) 0 else run.size)
+    }
+    runs.toSeq.flatMap { pixel =>
       random.nextInt(16) match {
         case 0 => None
         case 1 => Some(pixel.copy(x = pixel.x ^ size))
@@ -223,6 +249,12 @@ object RayGeneratorSpec {
         case _ => Some(pixel)
       }
     }
+  }
+
+  /** From the last pixels of a tile to its first ones. */
+  private def backwards(config: ColonnadeConfig, random: Random): Seq[Pixel] = {
+    val pixels = tile(config, random)
+    pixels.takeRight(2) ++ pixels.take(2)
   }
 
   /** The pixels of two tiles, mixed at random: in turns, and in runs. */
