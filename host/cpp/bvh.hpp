@@ -1,6 +1,6 @@
-/// The binary tree over quantised triangles, from which every tree layout is derived.
+/// The binary tree over leaves, from which every tree layout is derived.
 ///
-/// Splits are binned by a surface-area heuristic, and exact sweeps near the leaves. All costs are exact integers, so a mesh
+/// Splits are binned by a surface-area heuristic, and exact sweeps of few leaves. All costs are exact integers, so a mesh
 /// gives the same tree on every machine. The order of the leaves, left first, defines the triangles' packed ids.
 #pragma once
 
@@ -8,7 +8,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <vector>
 
@@ -49,22 +48,16 @@ struct BinaryNode {
 
 struct BinaryTree {
     std::vector<BinaryNode> nodes;      ///< the root is node 0
-    std::vector<std::uint32_t> order;   ///< the triangle index of each packed id
+    std::vector<std::uint32_t> order;   ///< the leaves, left first
 };
 
 /// Fraction bits of `readWeights`.
 constexpr int readWeightFraction = 8;
 
-/// Whether two triangles share a leaf: they are a pair.
-using IsPair = std::function<bool(std::uint32_t, std::uint32_t)>;
-
-/// Number of leaf records for `triangles` triangles, if all are pairs.
-inline std::uint64_t leafRecords(std::uint64_t triangles) { return (triangles + 1) / 2; }
-
-/// Height of a balanced tree over `triangles` triangles without pairs; 0 for one leaf.
-inline unsigned balancedHeight(std::uint64_t triangles) {
+/// Height of a balanced tree over `leaves` leaves; 0 for one.
+inline unsigned balancedHeight(std::uint64_t leaves) {
     unsigned height = 0;
-    while ((std::uint64_t{1} << height) < triangles) ++height;
+    while ((std::uint64_t{1} << height) < leaves) ++height;
     return height;
 }
 
@@ -84,8 +77,8 @@ inline std::vector<std::uint32_t> readWeights(std::uint64_t most) {
 /// Builds the binary tree. No leaf is deeper than `heightLimit` (0: no limit), which must be at least the balanced height.
 class BinaryBuilder {
 public:
-    BinaryBuilder(const std::vector<Box>& boxes, const IsPair& isPair, unsigned heightLimit)
-        : boxes_(boxes), isPair_(isPair), heightLimit_(heightLimit ? heightLimit : UINT32_MAX), weights_(readWeights(leafRecords(boxes.size()))) {}
+    BinaryBuilder(const std::vector<Box>& boxes, unsigned heightLimit)
+        : boxes_(boxes), heightLimit_(heightLimit ? heightLimit : UINT32_MAX), weights_(readWeights(boxes.size())) {}
 
     BinaryTree build() {
         const auto count = static_cast<std::uint32_t>(boxes_.size());
@@ -104,7 +97,7 @@ public:
             const Task task = tasks.back();
             tasks.pop_back();
             const std::uint32_t begin = tree_.nodes[task.node].begin, end = tree_.nodes[task.node].end;
-            if (records(begin, end) == 1) continue;
+            if (end - begin == 1) continue;
             const std::uint32_t middle = partition(begin, end, heightLimit_ - task.depth - 1);
             const std::int32_t left = addNode(begin, middle), right = addNode(middle, end);
             tree_.nodes[task.node].left = left;
@@ -117,13 +110,13 @@ public:
 
 private:
     static constexpr int bins = 64;
-    static constexpr std::uint32_t sweepBelow = 33;  ///< ranges of fewer triangles are split by an exact sweep
+    static constexpr std::uint32_t sweepBelow = 33;  ///< ranges of fewer leaves are split by an exact sweep
     static constexpr Cost worst = ~Cost{0};
 
     struct Split {
         Cost cost = worst;
         int axis = -1;
-        std::uint32_t at = 0;  ///< last bin of the left side, or number of triangles on the left side of a sweep
+        std::uint32_t at = 0;  ///< last bin of the left side, or number of leaves on the left side of a sweep
     };
 
     std::int32_t addNode(std::uint32_t begin, std::uint32_t end) {
@@ -137,11 +130,6 @@ private:
 
     Cost cost(std::uint64_t leftArea, std::uint64_t leftRecords, std::uint64_t rightArea, std::uint64_t rightRecords) const {
         return Cost{leftArea} * weights_[leftRecords] + Cost{rightArea} * weights_[rightRecords];
-    }
-
-    /// Leaf records of `order[begin, end)`: exact for two triangles at most, else as if all were pairs.
-    std::uint64_t records(std::uint32_t begin, std::uint32_t end) const {
-        return end - begin == 2 && !isPair_(tree_.order[begin], tree_.order[begin + 1]) ? 2 : leafRecords(end - begin);
     }
 
     bool fits(std::uint64_t left, std::uint64_t right, unsigned height) const { return balancedHeight(left) <= height && balancedHeight(right) <= height; }
@@ -165,23 +153,23 @@ private:
         if (split.axis >= 0) {
             std::uint32_t left = begin, right = 0;
             for (std::uint32_t i = begin; i < end; ++i) {
-                const std::uint32_t triangle = tree_.order[i];
-                if (binOf(triangle, split.axis, low, high) <= static_cast<int>(split.at)) tree_.order[left++] = triangle;
-                else scratch_[right++] = triangle;
+                const std::uint32_t leaf = tree_.order[i];
+                if (binOf(leaf, split.axis, low, high) <= static_cast<int>(split.at)) tree_.order[left++] = leaf;
+                else scratch_[right++] = leaf;
             }
             std::copy_n(scratch_.begin(), right, tree_.order.begin() + left);
             return left;
         }
-        // No binned split fits: halve the leaf records along the longest axis, by index where centres coincide
+        // No binned split fits: halve the leaves along the longest axis, by index where centres coincide
         int axis = 0;
         for (int a = 1; a < 3; ++a)
             if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
         sortAlong(begin, end, axis);
-        return begin + static_cast<std::uint32_t>((leafRecords(count) + 1) / 2 * 2);
+        return begin + (count + 1) / 2;
     }
 
-    int binOf(std::uint32_t triangle, int axis, const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high) const {
-        const std::int64_t offset = std::int64_t{boxes_[triangle].centre2(axis)} - low[axis];
+    int binOf(std::uint32_t leaf, int axis, const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high) const {
+        const std::int64_t offset = std::int64_t{boxes_[leaf].centre2(axis)} - low[axis];
         return static_cast<int>(offset * bins / (std::int64_t{high[axis]} - low[axis] + 1));
     }
 
@@ -192,9 +180,9 @@ private:
             std::array<Box, bins> box;
             std::array<std::uint32_t, bins> count{};
             for (std::uint32_t i = begin; i < end; ++i) {
-                const std::uint32_t triangle = tree_.order[i];
-                const int bin = binOf(triangle, axis, low, high);
-                box[bin].add(boxes_[triangle]);
+                const std::uint32_t leaf = tree_.order[i];
+                const int bin = binOf(leaf, axis, low, high);
+                box[bin].add(boxes_[leaf]);
                 ++count[bin];
             }
             std::array<std::uint64_t, bins> rightArea{};
@@ -210,15 +198,14 @@ private:
                 left += count[bin];
                 const std::uint32_t right = end - begin - left;
                 if (left == 0 || right == 0 || !fits(left, right, height)) continue;
-                const Cost value = cost(side.halfArea(), leafRecords(left), rightArea[bin + 1], leafRecords(right));
+                const Cost value = cost(side.halfArea(), left, rightArea[bin + 1], right);
                 if (value < best.cost) best = {value, axis, static_cast<std::uint32_t>(bin)};
             }
         }
         return best;
     }
 
-    /// The best split of a few triangles along any axis; the balanced split always fits. The left side has an even number of
-    /// triangles, which saves 1 % of the records for 0.5 % more reads.
+    /// The best split of a few leaves along any axis; the balanced split always fits.
     Split sweep(std::uint32_t begin, std::uint32_t end, unsigned height) {
         const std::uint32_t count = end - begin;
         std::array<std::uint64_t, sweepBelow> rightArea{};
@@ -233,8 +220,8 @@ private:
             side = Box{};
             for (std::uint32_t left = 1; left < count; ++left) {
                 side.add(boxes_[tree_.order[begin + left - 1]]);
-                if ((left % 2 != 0 && count > 2) || !fits(left, count - left, height)) continue;
-                const Cost value = cost(side.halfArea(), records(begin, begin + left), rightArea[left], records(begin + left, end));
+                if (!fits(left, count - left, height)) continue;
+                const Cost value = cost(side.halfArea(), left, rightArea[left], count - left);
                 if (value < best.cost) best = {value, axis, left};
             }
         }
@@ -249,7 +236,6 @@ private:
     }
 
     const std::vector<Box>& boxes_;
-    const IsPair& isPair_;
     const unsigned heightLimit_;
     const std::vector<std::uint32_t> weights_;
     BinaryTree tree_;

@@ -223,6 +223,10 @@ private:
     std::unordered_map<std::uint64_t, Form> limited_;  ///< forms within a stack, by node, slots and stack
 };
 
+/// The triangles of a leaf; the second one may be `noTriangle`.
+using LeafTriangles = std::array<std::uint32_t, 2>;
+constexpr std::uint32_t noTriangle = UINT32_MAX;
+
 /// A wide tree and the order of its triangles.
 struct Bvh {
     WideTree tree;
@@ -230,16 +234,36 @@ struct Bvh {
     unsigned heightLimit = 0;          ///< height limit that the stack required; 0 for none
 };
 
-/// Builds the tree. If the binary tree is higher than the stack is deep, it is built again with that limit. The caller must check
-/// whether the returned tree fits the stack.
-inline Bvh build(const std::vector<Box>& boxes, const IsPair& isPair, unsigned most, unsigned boxBits, unsigned stackDepth, unsigned leafRecords) {
-    const unsigned limit = std::max(stackDepth, balancedHeight(boxes.size()));
-    BinaryTree tree = BinaryBuilder(boxes, isPair, 0).build();
+/// The triangles in the order of their leaves, of which the nodes have their ranges then.
+inline std::vector<std::uint32_t> orderOfTriangles(BinaryTree& tree, const std::vector<LeafTriangles>& leaves) {
+    std::vector<std::uint32_t> order, starts{0};
+    for (const std::uint32_t leaf : tree.order) {
+        for (const std::uint32_t triangle : leaves[leaf])
+            if (triangle != noTriangle) order.push_back(triangle);
+        starts.push_back(static_cast<std::uint32_t>(order.size()));
+    }
+    for (BinaryNode& node : tree.nodes) {
+        node.begin = starts[node.begin];
+        node.end = starts[node.end];
+    }
+    return order;
+}
+
+/// Builds the tree over leaves; `boxes` are those of the triangles. If the binary tree is higher than the stack is deep, it is built
+/// again with that limit. The caller must check whether the returned tree fits the stack.
+inline Bvh build(const std::vector<Box>& boxes, const std::vector<LeafTriangles>& leaves, unsigned most, unsigned boxBits, unsigned stackDepth, unsigned leafRecords) {
+    std::vector<Box> boxesOfLeaves(leaves.size());
+    for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf)
+        for (const std::uint32_t triangle : leaves[leaf])
+            if (triangle != noTriangle) boxesOfLeaves[leaf].add(boxes[triangle]);
+    const unsigned limit = std::max(stackDepth, balancedHeight(leaves.size()));
+    BinaryTree tree = BinaryBuilder(boxesOfLeaves, 0).build();
     const bool isTooHigh = heights(tree)[0] > limit;
-    if (isTooHigh) tree = BinaryBuilder(boxes, isPair, limit).build();
+    if (isTooHigh) tree = BinaryBuilder(boxesOfLeaves, limit).build();
     tree = Reinsertion(std::move(tree), limit).optimise();
+    std::vector<std::uint32_t> order = orderOfTriangles(tree, leaves);
     WideTree wide = Collapser(tree, most, boxBits, limit, leafRecords).collapse();
-    return {std::move(wide), std::move(tree.order), isTooHigh ? limit : 0};
+    return {std::move(wide), std::move(order), isTooHigh ? limit : 0};
 }
 
 }  // namespace colonnade::bvh

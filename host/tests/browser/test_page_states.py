@@ -156,11 +156,11 @@ def test_each_work_shows_what_it_is(context: BrowserContext) -> None:
 def test_hardware_that_cannot_hold_the_mesh_is_not_taken(context: BrowserContext) -> None:
     tab = Tab(context, "#pixel=4")
     page = tab.page
-    rows = range(280)  # more records than tiny has, fewer than small
+    rows = range(330)  # more records than tiny has, fewer than small
     with tab.another_frame():
         vertices = "".join(f"v {x} {(x * x + z * z) % 7 / 3} {z}\n" for x in rows for z in rows)
-        corners = [280 * x + z + 1 for x in rows[1:] for z in rows[1:]]
-        faces = "".join(f"f {at} {at - 1} {at - 281} {at - 280}\n" for at in corners)
+        corners = [330 * x + z + 1 for x in rows[1:] for z in rows[1:]]
+        faces = "".join(f"f {at} {at - 1} {at - 331} {at - 330}\n" for at in corners)
         tab.drop("grid.obj", vertices + faces)
         expect(page.locator("#mesh")).to_have_text("grid.obj")
     colours = tab.picture()["colours"]
