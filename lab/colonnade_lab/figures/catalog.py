@@ -45,7 +45,8 @@ class Entry:
         overrides: Changes to the configuration, ``key.path=value``.
         report: The file that the commands write, below the root, where they take no name of one.
         libraries: Those of `LIBRARIES` that the commands need.
-        designs: Those whose Verilog decides the figures, also of the model, which equals it; None: the configuration.
+        designs: Those whose Verilog decides the figures; None: the configuration. None at all for figures of the model,
+            whose pictures and counts no timing changes.
         sources: Names of the host's sources that decide them, too (`digests.SOURCES`).
     """
 
@@ -64,9 +65,13 @@ class Entry:
         return (Design(self.config, self.overrides),) if self.designs is None else self.designs
 
 
-def _alone(source: str) -> dict[str, Any]:
+def _alone(*sources: str) -> dict[str, Any]:
     """What decides figures without hardware."""
-    return {"designs": (), "sources": (source,)}
+    return {"designs": (), "sources": sources}
+
+
+#: What decides figures of the bit-exact model.
+_MODEL = _alone("model", "tree")
 
 
 def _colonnade(*arguments: str) -> dict[str, tuple[str, ...]]:
@@ -82,19 +87,19 @@ def _area(config: str, library: str, *options: str) -> Entry:
     return Entry(f"area-{config}-{library.lower()}", config, command, libraries=(library,))
 
 
-def _verify(name: str, config: str, *options: str) -> Entry:
-    return Entry(f"{name}-{config}", config, _colonnade("verify", "--config", config, *options))
+def _verify(name: str, config: str, *options: str, **decided: Any) -> Entry:
+    return Entry(f"{name}-{config}", config, _colonnade("verify", "--config", config, *options), **decided)
 
 
-def _study(name: str, *libraries: str) -> Entry:
+def _study(name: str, *libraries: str, **decided: Any) -> Entry:
     path = Path("scenes") / "studies" / f"{name}.toml"
     file = load_study(project_root() / path)
     design = file.study.design
-    designs = tuple(Design(design.config, point.overrides) for point in points_of(file))
+    decided = decided or {"designs": tuple(Design(design.config, point.overrides) for point in points_of(file))}
     report = f"out/{name}/study.json"
     options = (option for library in libraries for option in ("--library", f"{library.lower()}={library}"))
     command = ("colonnade", "explore", str(path), *options, "--output", f"out/{name}")
-    return Entry(name, design.config, {"": command}, design.set, report, libraries, designs)
+    return Entry(name, design.config, {"": command}, design.set, report, libraries, **decided)
 
 
 #: Meshes for small arrays, whose frames take millions of cycles.
@@ -127,7 +132,7 @@ def _samples() -> Entry:
         commands[f"-{number}"] = picture("model", number)
         commands[str(number)] = ("colonnade", "compare", "--no-dists", reference, f"out/model-{number}.png")
         commands[str(number)] += ("--json", REPORT)
-    return Entry("samples", "small", commands)
+    return Entry("samples", "small", commands, **_MODEL)
 
 
 def _large() -> Entry:
@@ -240,8 +245,8 @@ def catalog() -> dict[str, Entry]:
         Entry("rooms", "edge", {"": ("tools/room-frames", "edge", "640x480", "--compare", f"--json={REPORT}")}),
         _bench("lean", "--no-mirror"),
         _area("lean", "ASAP7"),
-        _verify("quality", "edge", "--no-rtl"),
-        _verify("quality", "lean", "--no-rtl"),
+        _verify("quality", "edge", "--no-rtl", **_MODEL),
+        _verify("quality", "lean", "--no-rtl", **_MODEL),
         Entry(
             "environments",
             "edge",
@@ -271,14 +276,14 @@ def catalog() -> dict[str, Entry]:
             {"": ("tools/room-frames", "edge", "160x120", "--moved", "--compare", f"--json={REPORT}")},
         ),
         _marches(),
-        Entry("moving-frames", "small", _colonnade("study", "moved-frames", _MOVED), sources=("live", "tree")),
+        Entry("moving-frames", "small", _colonnade("study", "moved-frames", _MOVED), **_alone("live", "model", "tree")),
         Entry("captures", "small", _colonnade("study", "captures", *_ROOMS, _ATTIC), **_alone("maps")),
         _samples(),
         _gather(),
         _light(),
-        Entry("light-users", "small", {"frames": ("tools/light", "frames", *USERS_ROOMS, "--json", REPORT)}),
-        Entry("light-defaults", "small", {"": ("tools/light", "defaults", "--json", REPORT)}),
-        Entry("assets", "small", {"": ("tools/light", "samples", "--json", REPORT)}),
+        Entry("light-users", "small", {"frames": ("tools/light", "frames", *USERS_ROOMS, "--json", REPORT)}, **_MODEL),
+        Entry("light-defaults", "small", {"": ("tools/light", "defaults", "--json", REPORT)}, **_MODEL),
+        Entry("assets", "small", {"": ("tools/light", "samples", "--json", REPORT)}, **_MODEL),
         _bench("small", *_TWO, "--no-mirror"),
         _area("small", "ASAP7"),
         _bench("tiny", *_TWO),
@@ -298,17 +303,20 @@ def catalog() -> dict[str, Entry]:
             sources=("rays",),
         ),
         Entry(
-            "ray-rates", "edge", _colonnade("rays", "--config", "edge", "--mesh", "armadillo"), sources=("rays", "tree")
+            "ray-rates",
+            "edge",
+            _colonnade("rays", "--config", "edge", "--mesh", "armadillo"),
+            **_alone("model", "rays", "tree"),
         ),
         Entry("ray-device", "traversal", _colonnade("bench", "--config", "traversal", "--rays", "262144")),
-        Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}),
+        Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}, **_MODEL),
         _paper_unit(),
         _paper_maps(),
         _study("ablation"),
         _study("features", "ASAP7"),
         _study("scaling"),
         _study("instances"),
-        _study("bvh-tests"),
+        _study("bvh-tests", **_MODEL),
         _study("bvh-costs", "ASAP7"),
         _study("bvh-cycles"),
         _study("mixed-precision", "ASAP7"),

@@ -22,10 +22,11 @@ from colonnade_lab.figures.catalog import Design, Entry
 #: Files of the host that decide figures, by what they are called in data files.
 SOURCES: Mapping[str, tuple[str, ...]] = {
     "live": ("host/cpp/live/*.[ch]*",),
+    "model": ("host/cpp/model/*.hpp",),
     "maps": tuple(f"host/colonnade/maps/{each}.py" for each in ("*_encoder", "*_fit", "slic", "palette", "heap")),
     "rays": ("host/colonnade/rays/*.py", "host/cpp/rays/*.[ch]pp", "tools/ray_suites/*"),
     "roomLight": ("host/colonnade/environment/*_fit.py", "host/colonnade/maps/room_light.py"),
-    "tree": ("host/cpp/*bvh.hpp", "host/cpp/reinsertion.hpp", "host/cpp/packer/tree.hpp"),
+    "tree": ("host/cpp/*bvh.hpp", "host/cpp/reinsertion.hpp", "host/cpp/packer/tree.hpp", "host/cpp/packer/pairs.hpp"),
 }
 
 #: Strings, which stay, and comments and includes, of C++ and Verilog; comments, docstrings and imports of Python.
