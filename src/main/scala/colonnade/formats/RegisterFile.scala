@@ -52,7 +52,6 @@ final class RegisterFile[S <: Bundle with SceneRegisters, D <: Bundle with BusyR
   private val writes = io.register.write && !io.device.status.busy
 
   // Settings: one hardware register per number, combined to the bundle by its layout.
-  // No reset of those of instances: none is on then
   private val written = registers.filter(_.access == Access.ReadWrite).map(r => r -> storage(r))
   private val legal   = written.map { case (r, value) => r.name -> RegisterLimits.clamp(value, r.limit) }.toMap
   io.frame := Cat(Layout.of(io.frame).sortBy(-_.offset).map(field => legal(field.name))).asTypeOf(io.frame)
@@ -122,7 +121,8 @@ final class RegisterFile[S <: Bundle with SceneRegisters, D <: Bundle with BusyR
     (register.width - word * RegisterMap.dataBits).min(RegisterMap.dataBits)
 
   private def storage(register: Register): UInt = Cat((0 until register.words).reverse.map { word =>
-    val bits  = wordBits(register, word)
+    val bits = wordBits(register, word)
+    // After a reset no instance is on
     val reset = !register.name.startsWith("instances[")
     val value = (if (reset) RegInit(0.U(bits.W)) else Reg(UInt(bits.W)))
       .suggestName(s"${register.name.replaceAll("[.\\[]", "_").replace("]", "")}_$word")
