@@ -124,13 +124,13 @@ def report_lines(header: ImageHeader, manifest: Manifest | None = None) -> list[
         f"box         {header.bounds_low} to {header.bounds_high} units, {header.frame.scale:.6g} units per mesh unit"
     )
     used = f"{header.record_count:,} records of {header.record_bits} bits"
-    size = f"{header.record_count * header.record_bits // 8:,} bytes per column"
+    size, where = header.record_count * header.record_bits // 8, "per column"
     if manifest is not None:
         shape = manifest.memories["columnBvh"]
         used += f", {header.record_count / int(shape['depth']):.1%} of {int(shape['depth']):,}"
         if "line" in shape:
-            size = f"{dram_lines(header.record_count, manifest) * shape['line']['pitch']:,} bytes of DRAM"
-    lines.append(f"memory      {used} ({size})")
+            size, where = dram_lines(header.record_count, manifest) * shape["line"]["pitch"], "of DRAM"
+    lines.append(f"memory      {used} ({size:,} bytes {where}, {size / header.triangles:.1f} a triangle)")
     lines += [f"  {name:<10}{count:>9,} records" for name, count in sections(header) if count]
     return (
         lines

@@ -278,40 +278,6 @@ def test_large_triangles_among_small_ones_move_up() -> None:
     assert max(level[len(small) + i] for i in range(len(large))) <= 5 < 8 <= max(level.values())
 
 
-@settings(deadline=None, max_examples=40)
-@given(seed=st.integers(0, 2**32 - 1), kept=st.sampled_from([0.5, 0.8, 1.0]))
-def test_no_triangle_is_alone_beside_another_one_or_beside_a_pair_that_may_be_divided(seed: int, kept: float) -> None:
-    """Triangles of a flat grid with holes, in any order, of which each may be a pair with up to three others."""
-    generator = np.random.default_rng(seed)
-    size = 9
-    vertices = np.stack([*np.meshgrid(np.arange(size), np.arange(size)), np.zeros((size, size))], axis=-1).reshape(
-        -1, 3
-    )
-    corner = (np.arange(size - 1)[:, None] * size + np.arange(size - 1)).ravel()
-    quads = corner[:, None] + np.array([0, 1, size + 1, size])
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    faces = generator.permutation(faces)[: round(kept * len(faces))].astype(np.int32)
-    tree = build((vertices * 99).astype(np.int32), faces)
-
-    beside: dict[int, set[int]] = {face: set() for face in range(len(faces))}
-    for one, other in itertools.combinations(range(len(faces)), 2):
-        if len(set(faces[one]) & set(faces[other])) == 2:
-            beside[one].add(other)
-            beside[other].add(one)
-    leaves = [
-        tree.order[first : first + count].tolist()
-        for first, count in zip(tree.leaf_first, tree.leaf_count, strict=True)
-    ]
-    partner = {one: other for leaf in leaves if len(leaf) == 2 for one, other in (leaf, leaf[::-1])}
-    alone = beside.keys() - partner.keys()
-    for face in alone:
-        assert not beside[face] & alone
-        for neighbour in beside[face]:
-            assert not (beside[partner[neighbour]] - {face}) & alone
-    if kept == 1.0:
-        assert len(alone) <= 4
-
-
 @pytest.mark.parametrize("children", [2, 4])
 def test_one_triangle_has_a_root_with_one_leaf(children: int) -> None:
     vertices, faces = random_triangles(1, 1, 1)
