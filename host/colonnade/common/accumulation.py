@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -184,6 +184,8 @@ class FramePasses:
         squares: Sums over the squared luminance of the samples that show the object, of 1.0, and of the shadow ratios
             of the others, float64 [2, height, width].
         white: The device's number for the colour 1.0.
+        albedo_of: The albedo that the frame of a pass of surfaces shows, given its number; None: `albedo` is not kept.
+        albedo: Sums over all passes, float64 [height, width, 3].
         layers: The passes of other layers, by name; their counters and errors are also in those of the frame.
     """
 
@@ -193,6 +195,8 @@ class FramePasses:
     has_squares: bool = False
     squares: npt.NDArray[np.float64] | None = None
     white: float = WHITE
+    albedo_of: Callable[[Frame, int], npt.NDArray[np.float64]] | None = None
+    albedo: npt.NDArray[np.float64] | float = 0.0
     layers: dict[str, FramePasses] = field(default_factory=dict)
     _sums: Accumulation | None = None
 
@@ -207,6 +211,8 @@ class FramePasses:
             light = np.stack([frame.colour / self.white, ratio / UNSHADOWED]) @ LUMINANCE
             squares = np.where([frame.is_object, ~frame.is_object], light, 0.0) ** 2
             self.squares = squares if self.squares is None else self.squares + squares
+        if self.albedo_of is not None:
+            self.albedo = self.albedo + self.albedo_of(frame, 0 if self.first is None else self.sums.samples)
         if self.first is None:
             self.first, self.counters, self.errors = frame, dict(frame.counters), list(frame.errors)
             return

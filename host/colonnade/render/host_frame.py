@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from colonnade.common.accumulation import WHITE, Accumulation, FramePasses
+from colonnade.common.accumulation import LUMINANCE, WHITE, Accumulation, FramePasses
 from colonnade.common.errors import UserError
 from colonnade.common.extras import require_extra
 from colonnade.common.framebuffer import Frame
@@ -29,6 +30,7 @@ from colonnade.scene.samples import CENTRE
 if TYPE_CHECKING:
     from colonnade.render.denoise import Guide
     from colonnade.render.history import Camera, History
+    from colonnade.render.hit_points import HitPoints
 
 #: The least albedo by which the light of a single sample is known.
 _DARK = 0.02
@@ -71,7 +73,12 @@ class HostFrame:
 
     def no_passes(self) -> FramePasses:
         """Where its passes are added."""
-        return FramePasses(has_squares=bool(self.denoise), white=WHITE * self.prepared.scene.exposure)
+        is_filtered = bool(self.denoise)
+        return FramePasses(
+            has_squares=is_filtered,
+            white=WHITE * self.prepared.scene.exposure,
+            albedo_of=self._albedo if is_filtered and self.prepared.mesh is not None else None,
+        )
 
     def image(self, sums: Accumulation) -> Floats:
         """The picture of sums, with those of all layers: linear, float64 [height, width, 3]."""
@@ -112,11 +119,10 @@ class HostFrame:
         from colonnade.render import oidn
         from colonnade.render.denoise import Guide
         from colonnade.render.history import Camera
-        from colonnade.render.hit_points import HitPoints
 
         depth, position = self._hits(passes.frame)
-        shows_object, mesh = ~np.isnan(depth), self.prepared.mesh
-        points = None if mesh is None else HitPoints.of(mesh, hit_faces(self.prepared.image, passes.frame), position)
+        shows_object = ~np.isnan(depth)
+        points = self._points(passes.frame, position)
         normals = None if points is None or self.prepared.scene.material.flat else points.normals()
         camera = Camera.of(self.prepared.view(self.size, self.passes[0]))
 
@@ -125,15 +131,15 @@ class HostFrame:
             colours = sums.objects / np.maximum(count, 1) / sums.white
             guide = Guide.of(position, shows_object & (count[..., 0] > 0), normals)
             # Other layers are not textured
-            albedo = np.ones_like(position) if points is None or layer is not passes else points.albedo()
+            is_textured = points is not None and layer is passes
+            albedo = passes.albedo / np.maximum(count, 1) if is_textured else np.ones_like(position)
             if self.denoise == "oidn":
                 # Beside a photo without noise it would leave the pattern of several samples
                 around = self.image(sums) if passes.sums.samples == 1 else np.zeros_like(position)
                 found = oidn.filtered(colours, around, guide, albedo)
             else:
-                # Of several samples the first one's albedo is not the mean
-                light = albedo.clip(min=_DARK) if sums.samples == 1 else np.ones_like(albedo)
-                variance = layer.object_variance()
+                light, variance = albedo.clip(min=_DARK), layer.object_variance()
+                variance = None if variance is None else variance / (light @ LUMINANCE) ** 2
                 found = light * self._without_noise(
                     name, colours / light, variance, guide, camera, are_few=sums.samples < _ENOUGH
                 )
@@ -192,9 +198,23 @@ class HostFrame:
         found = self._without_noise("room", ratio, passes.ratio_variance(), guide, camera, prepared.scene.is_still)
         return replace(sums, ratio=np.rint(found * count * sums.unshadowed).astype(sums.ratio.dtype))
 
-    def _hits(self, frame: Frame) -> tuple[Floats, Floats]:
-        """Depth and position of the first pass, NaN for a miss, mesh units, float64 [height, width] and with [3]."""
-        view = self.prepared.view(self.size, self.passes[0])
+    def _albedo(self, frame: Frame, number: int) -> Floats:
+        """The albedo of the object in a pass of surfaces, linear, float64 [height, width, 3]; 0 elsewhere."""
+        points = self._points(frame, self._hits(frame, number)[1])
+        assert points is not None
+        return points.albedo()
+
+    def _points(self, frame: Frame, position: Floats) -> HitPoints | None:
+        """The points of the mesh that a pass shows; of an image without its mesh None."""
+        from colonnade.render.hit_points import HitPoints
+
+        mesh = self.prepared.mesh
+        return None if mesh is None else HitPoints.of(mesh, hit_faces(self.prepared.image, frame), position)
+
+    def _hits(self, frame: Frame, number: int = 0) -> tuple[Floats, Floats]:
+        """Depth and position of a surface pass, NaN for a miss, mesh units, float64 [height, width] and with [3]."""
+        surfaces = (one for one in self.passes if one.sample.layer == "surface")
+        view = self.prepared.view(self.size, next(itertools.islice(surfaces, number, None)))
         x, y = np.arange(view.width)[None, :, None], np.arange(view.height)[:, None, None]
         rays = view.direction + x * view.step_x + y * view.step_y
         depth = frame.distance / (self.prepared.image.header.frame.scale * np.abs(rays).max(axis=2))

@@ -214,12 +214,13 @@ def test_the_albedo_of_a_point_is_that_of_its_texture(tmp_path: Path) -> None:
     np.testing.assert_allclose(HitPoints.of(mesh, hits, weights @ np.eye(3)).albedo(), expected, atol=1e-6)
 
 
-def test_a_texture_stays_in_a_frame_of_one_sample(tmp_path: Path) -> None:
-    """By light alone, which is constant here."""
+@pytest.mark.parametrize("samples", [1, 4])
+def test_a_texture_stays(tmp_path: Path, samples: int) -> None:
+    """Light alone is filtered, which is constant here."""
     codes = np.random.default_rng(1).integers(30, 255, (6, 6, 3)).astype(np.uint8)
     gltf(tmp_path, np.asarray(Image.fromarray(codes).resize((64, 64), Image.Resampling.BILINEAR)))
     (tmp_path / "scene.toml").write_text('mesh.path = "a.gltf"\npaths.gather = 1\n')
-    request = RenderRequest(tmp_path / "scene.toml", "small", backend="model", size=(64, 48), samples=1)
+    request = RenderRequest(tmp_path / "scene.toml", "small", backend="model", size=(64, 48), samples=samples)
     raw, found = (render(replace(request, denoise=denoise)) for denoise in (False, True))
     difference = encode_srgb(raw.image).astype(int) - encode_srgb(found.image)
     assert np.abs(difference[raw.object_mask]).mean() < 5
