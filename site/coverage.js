@@ -1,7 +1,7 @@
 // Prepares the faces of a file as the host does: metal and emission by maps, then without what alpha hides (host/colonnade/mesh/materials/
 // coverage.py), then swatches at the corners of faces (swatches.py).
 
-import { areasOf, MIRROR_ROUGHNESS } from "./surfaces.js";
+import { areasOf, MIRROR_ROUGHNESS, shownEmission } from "./surfaces.js";
 
 /** As host/colonnade/mesh/geometry/topology.py: faces of a mesh that is split, and edges that are not, as part of the mesh. */
 const [MOST_SPLIT_FACES, SMALLEST_SPLIT] = [49152, 1 / 400];
@@ -52,7 +52,7 @@ function withMaps(library, mesh) {
     const own = facesOf(mesh, number);
     const metal = hasMetal && library.metal(textures[material.metal.texture], valuesOf(metalUvs, own, 6), material.factors);
     const shares = emits && library.emission(textures[material.emissive.texture], valuesOf(emissiveUvs, own, 6), valuesOf(areas, own, 1));
-    const emissionOf = (i) => (shares ? material.emission.map((value, channel) => value * shares[3 * i + channel]) : material.emission);
+    const emissionOf = (i) => shownEmission(material.emission.map((value, channel) => value * (shares ? shares[3 * i + channel] : 1)));
     if (emits) found[number] = { ...material, emissive: null, emission: [0, 0, 0] };
     const rows = own.map((_, i) => [...(metal ? [metal.isMetal[i], metal.roughness[i]] : []), ...(shares ? emissionOf(i) : [])]);
     const order = [...own.keys()].sort((a, b) => rows[a].map((value, column) => value - rows[b][column]).find(Boolean) ?? 0);

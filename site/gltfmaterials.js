@@ -1,17 +1,17 @@
 // The materials of a glTF document, as host/colonnade/mesh/materials/materials.py and files/gltf_textures.py read them, with the
 // pictures of their textures, which decodePictures (surfaces.js) decodes.
 
-import { MIRROR_ROUGHNESS } from "./surfaces.js";
+import { MIRROR_ROUGHNESS, shownEmission } from "./surfaces.js";
 
-const [IOR, MOST_IOR] = [1.5, 4];
+const [IOR, MOST_IOR, BRIGHTEST] = [1.5, 4, 1e6];
 const METAL = 0.5;
 const WRAPS = new Map([[33648, 1], [33071, 2]]);
 const NEAREST = 9728;
-const USED = ["transmission", "ior", "emissive_strength", "pbrSpecularGlossiness"].map((name) => `KHR_materials_${name}`);
+const USED = ["transmission", "ior", "emissive_strength", "pbrSpecularGlossiness", "unlit"].map((name) => `KHR_materials_${name}`);
 
-const clamped = (value) => Math.max(0, Math.min(1, value));
+const clamped = (value, most = 1) => Math.max(0, Math.min(most, value));
 const number = (value, otherwise) => (Number.isFinite(value) ? value : otherwise);
-const colour = (values, otherwise) => (Array.isArray(values) && values.length >= 3 ? otherwise.map((value, i) => clamped(number(values[i], value))) : otherwise);
+const colour = (values, otherwise, most = 1) => (Array.isArray(values) && values.length >= 3 ? otherwise.map((value, i) => clamped(number(values[i], value), most)) : otherwise);
 
 export class GltfMaterials {
   /** `notes`: a set that takes what pictures do not show. */
@@ -46,11 +46,15 @@ export class GltfMaterials {
   read(material) {
     const { extensions = {} } = material;
     const extension = (name) => extensions[`KHR_materials_${name}`] ?? {};
-    const surface = this.surfaceOf(material, extensions.KHR_materials_pbrSpecularGlossiness);
+    const surface = this.surfaceOf(material, extensions);
     const [metallic, roughness] = [number(surface.metallicFactor, 1), clamped(number(surface.roughnessFactor, 1))];
     const albedo = colour(surface.baseColorFactor, [1, 1, 1]);
-    const strength = Math.max(0, number(extension("emissive_strength").emissiveStrength, 1));
-    const emission = colour(colour(material.emissiveFactor, [0, 0, 0]).map((value) => strength * value), [0, 0, 0]);
+    const strength = clamped(number(extension("emissive_strength").emissiveStrength, 1), BRIGHTEST);
+    const emitted = colour(material.emissiveFactor, [0, 0, 0], BRIGHTEST).map((value) => strength * value);
+    const emissive = emitted.some(Boolean) ? this.use(material.emissiveTexture) : null;
+    const emission = emissive ? emitted : shownEmission(emitted);
+    if (Math.max(...emitted) > 1 && !emissive) this.notes.add("emission above 1 is scaled to 1");
+    if (extensions.KHR_materials_unlit) this.notes.add("unlit materials are lit: matt surfaces have their base colour");
     const given = number(extension("ior").ior, IOR);
     const alpha = this.alphaOf(material, surface);
     const isGlass = number(extension("transmission").transmissionFactor, 0) > 0.5;
@@ -70,7 +74,7 @@ export class GltfMaterials {
       metal: isGlass ? null : metal,
       factors: [metallic, number(surface.roughnessFactor, 1)],
       relief: this.relief(material.normalTexture),
-      emissive: emission.some(Boolean) ? this.use(material.emissiveTexture) : null,
+      emissive,
     };
   }
 
@@ -82,7 +86,8 @@ export class GltfMaterials {
   }
 
   /** @returns {any} The metallic-roughness part of a material, or what stands for it. */
-  surfaceOf({ pbrMetallicRoughness: surface = { metallicFactor: 0 } }, older) {
+  surfaceOf({ pbrMetallicRoughness: surface = { metallicFactor: 0 } }, { KHR_materials_unlit: unlit, KHR_materials_pbrSpecularGlossiness: older }) {
+    if (unlit) return { baseColorFactor: surface.baseColorFactor, baseColorTexture: surface.baseColorTexture, metallicFactor: 0, roughnessFactor: 1 };
     if (!older) return surface;
     const { glossinessFactor, diffuseFactor, diffuseTexture } = older;
     return { metallicFactor: 0, roughnessFactor: 1 - number(glossinessFactor, 1), baseColorFactor: diffuseFactor, baseColorTexture: diffuseTexture };

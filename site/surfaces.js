@@ -9,6 +9,9 @@ const [SHARP_ROUGHNESS, GLASS_ROUGHNESS] = [0.25, 0.5];
 /** Pixels of textures, together: more are halved; and of one mesh at most. */
 const [KEPT_PIXELS, MOST_PIXELS] = [1 << 25, 1 << 29];
 
+/** An emission with a largest channel of at most 1, and its hue. */
+export const shownEmission = (emission) => emission.map((value) => value / Math.max(1, ...emission));
+
 /** The share of light that microfacets reflect at once (docs/gather.md). */
 export const microfacetAlbedo = (roughness) => 1 - roughness ** 4 / (0.25 + 0.9 * roughness ** 2 + 0.55 * roughness ** 4);
 
@@ -101,7 +104,7 @@ export function surfacesOf(library, mesh, { manifest, gathers, headroom }) {
     const scaled = (colour, use) => (use ? colour.map((value, i) => value * means[use.texture][i]) : colour);
     const isTextured = Boolean(material.base) && hasTextures;
     if (material.base && !hasTextures) notes.push("this hardware has no textures: their surfaces have mean colours");
-    const emission = scaled(material.emission, material.emissive);
+    const emission = shownEmission(scaled(material.emission, material.emissive));
     return { ...material, emission, isTextured, isCorner: coloured.has(number), paint: material.albedo, albedo: isTextured ? material.albedo : scaled(material.albedo, material.base) };
   });
   /** What materials differ in that share no entry: the colours of textures and corners are of no account. */

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from colonnade.common.limits import KEPT_TEXTURE_PIXELS, MAX_PIXELS
+from colonnade.common.terminal_text import one_line
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,12 @@ MAPS = {
     "emissiveTexture": Loss.of("emission map", "averaged", "a face emits one of four colours"),
 }
 TEXTURE_OBJ = Loss.of("texture map", "not shown", "only map_Kd is")
+OUTSIDE_PICTURES = Loss.of(
+    "picture of a texture",
+    "outside of the mesh's folder",
+    "surfaces have their base colour; copies in the folder are read",
+    "pictures of textures",
+)
 NO_PICTURES = Loss.of("picture of a texture", "missing", "surfaces have their base colour", "pictures of textures")
 PICTURE_FORMATS = Loss.of(
     "picture of a texture", "not readable", "pictures must be PNG, JPEG, WebP or TGA", "pictures of textures"
@@ -49,20 +56,22 @@ LARGE_PICTURES = Loss.of(
     "picture of a texture", "too large", f"a picture may have {MAX_PIXELS:,} pixels", "pictures of textures"
 )
 NO_MAP_UVS = Loss.of(
-    "face with a normal map", "smooth", "it has no texture coordinates of the map", "faces with a normal map"
+    "face with a normal map", "smooth", "texture coordinates of the map are missing", "faces with a normal map"
 )
 NO_UVS = Loss.of(
-    "face of a textured material", "untextured", "it has no texture coordinates", "faces of a textured material"
+    "face of a textured material", "untextured", "texture coordinates are missing", "faces of a textured material"
 )
-TEXTURED_COLOURS = Loss.of("colour of a textured face", "not shown", "its texture is", "colours of textured faces")
+TEXTURED_COLOURS = Loss.of("colour of a textured face", "not shown", "textures are", "colours of textured faces")
 TEXTURE_OPTIONS = Loss.of(
     "option of a texture map", "not used", "only -s, -o and -clamp are", "options of texture maps"
 )
 LIGHTS = Loss.of("light", "not used", "the scene file has the lights")
 CAMERAS = Loss.of("camera", "not used", "the scene file has the camera")
 ANIMATIONS = Loss.of("animation", "not played", "nodes stand as the file places them")
-SKINS = Loss.of("skin", "not applied", "its mesh has the pose in which it was bound")
-MORPHS = Loss.of("morph target", "not applied", "its mesh has its base shape")
+_BOUND = "meshes have the pose in which they were bound"
+SKINS = Loss.of("skin", "not applied", _BOUND)
+PLAYABLE_SKINS = Loss.of("skin", "not applied", f"{_BOUND}; mesh.animation of a scene plays an animation")
+MORPHS = Loss.of("morph target", "not applied", "meshes have their base shape")
 CHANNELS = Loss.of(
     "channel of an animation", "not played", "only those of nodes and morph targets are", "channels of an animation"
 )
@@ -73,10 +82,10 @@ INFLUENCES = Loss.of(
     "vertices with more than four joints",
 )
 BENT_RELIEF = Loss.of(
-    "normal map of an animated mesh", "not shown", "its smooth normals are", "normal maps of an animated mesh"
+    "normal map of an animated mesh", "not shown", "smooth normals are", "normal maps of an animated mesh"
 )
 BENT_COPIES = Loss.of(
-    "copy of an animated mesh", "not shown", "its node has one: give each a node", "copies of an animated mesh"
+    "copy of an animated mesh", "not shown", "a node has one: give each a node", "copies of an animated mesh"
 )
 BENT_ALPHA = Loss.of(
     "partly transparent material of an animated mesh",
@@ -89,7 +98,7 @@ BEAMS = Loss.of("beam lattice", "not shown", "only faces are rendered")
 MATERIAL_GROUPS = Loss.of(
     "group of materials or colours", "not read", "faces have the default material", "groups of materials or colours"
 )
-WRAPS = Loss.of("wrap of a texture", "not used", "its picture repeats", "wraps of textures")
+WRAPS = Loss.of("wrap of a texture", "not used", "pictures repeat", "wraps of textures")
 LINES = Loss.of("line primitive", "not shown", "only faces are rendered")
 POINTS = Loss.of("point primitive", "not shown", "only faces are rendered")
 CURVES = Loss.of("free-form curve or surface", "not shown", "only faces are rendered", "free-form curves and surfaces")
@@ -103,10 +112,16 @@ COVERED = Loss.of(
     "not blended",
     "from alpha 1/2 on it is opaque, else a tinted pane: frame.samples of 2 or more blend it",
 )
-COARSE_CUTS = Loss.of("alpha mask", "cut coarsely", "its outline has more detail than the mesh may have faces")
+COARSE_CUTS = Loss.of("alpha mask", "cut coarsely", "outlines have more detail than the mesh may have faces")
 EMISSION = Loss.of(
     "emissive mirror or glass", "not emitting", "only diffuse surfaces do", "emissive mirrors or glasses"
 )
+BRIGHT = Loss(
+    "material shines brighter than the hardware shows",
+    "materials shine brighter than the hardware shows",
+    "the largest channel of an emission is 1",
+)
+UNLIT = Loss.of("unlit material", "lit", "a matt surface has its base colour")
 ROUGH_MIRROR = Loss.of("slightly rough metal", "a perfect mirror", "paths.gather = 1 renders blurred reflections")
 ROUGH_METAL = Loss.of("rough metal", "diffuse", "paths.gather = 1 renders blurred reflections")
 ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "paths.gather = 1 renders its roughness", "rough glasses")
@@ -122,6 +137,9 @@ HIGHLIGHTS = Loss.of("glossy material", "diffuse", "highlights are not rendered"
 NEGATIVE_SHININESS = Loss.of(
     "material's negative Ns", "taken as 0", "highlights are not rendered", "materials' negative Ns"
 )
+NO_VALUES = Loss.of(
+    "value of a material", "not read", "a colour has three numbers, others have one", "values of materials"
+)
 CLIPPED_COLOURS = Loss.of("colour of a vertex", "clipped", "colours are from 0 to 1", "colours of vertices")
 DARK_COLOURS = Loss.of("colour of a vertex", "black", "colours are finite numbers", "colours of vertices")
 SOME_COLOURS = Loss.of("colour of a vertex", "not shown", "not all vertices have one", "colours of vertices")
@@ -132,12 +150,18 @@ SCENES = Loss.of("further scene", "not shown", "only the default scene is render
 #: A line without a number, the last one: most open surfaces are single-sided, and few are seen from behind.
 BACKS = "open single-sided surfaces are shown from behind: viewers show their front only"
 SHORT_FACES = Loss.of(
-    "face of fewer than three corners", "left out", "it has no area", "faces of fewer than three corners"
+    "face of fewer than three corners", "left out", "they have no area", "faces of fewer than three corners"
 )
 CROSSED = Loss(
     "polygon crosses or folds over itself",
     "polygons cross or fold over themselves",
     "triangles may overlap",
+)
+SPARE_CORNERS = Loss.of(
+    "corner after the last triangle", "left out", "a triangle has three", "corners after the last triangle"
+)
+SPARE_BYTES = Loss.of(
+    "byte after the last facet", "not read", "the header has the number of facets", "bytes after the last facet"
 )
 FACET_COLOURS = Loss.of("facet colour", "not shown", "STL has no standard for them")
 COLOURS = Loss(
@@ -150,12 +174,13 @@ FACE_ALPHA = Loss.of("partly transparent face", "opaque", "transparency is not r
 FLIPPED = Loss(
     "face has normals that point to its back", "faces have normals that point to their back", "they are negated"
 )
+_COMPUTED = "normals are computed from the faces"
 REPLACED = Loss(
     "corner normal points to the back of its face",
     "corner normals point to the back of their face",
-    "they are computed from the faces",
+    _COMPUTED,
 )
-MISSING = Loss("corner has no normal", "corners have no normal", "they are computed from the faces")
+MISSING = Loss("corner has no normal", "corners have no normal", _COMPUTED)
 MIXED = Loss.of(
     "closed part with mixed winding", "repaired", "all faces point outward", "closed parts with mixed winding"
 )
@@ -195,22 +220,29 @@ def extension_loss(name: str) -> Loss:
 
 @dataclass
 class Losses:
-    """What one file loses, in the order of discovery."""
+    """What one file loses, in the order of discovery, and by kind what the first is named."""
 
     counts: dict[Loss, int] = field(default_factory=dict)
+    names: dict[Loss, str] = field(default_factory=dict)
 
-    def add(self, loss: Loss, count: int = 1) -> None:
+    def add(self, loss: Loss, count: int = 1, name: str = "") -> None:
         """Count a loss; none for a count of 0."""
         if count > 0:
             self.counts[loss] = self.counts.get(loss, 0) + count
+            if name:
+                self.names.setdefault(loss, name)
 
     def lines(self, label: str = "") -> tuple[str, ...]:
         """One line for each kind, after the label."""
         prefix = f"{label}: " if label else ""
         return tuple(
-            f"{prefix}{count:,} {loss.one if count == 1 else loss.several}: {loss.instead}"
+            f"{prefix}{count:,} {loss.one if count == 1 else loss.several}{self._named(loss, count)}: {loss.instead}"
             for loss, count in self.counts.items()
         )
+
+    def _named(self, loss: Loss, count: int) -> str:
+        name = one_line(self.names.get(loss, ""))
+        return name and (f" ({name})" if count == 1 else f" (the first is {name})")
 
     def update(self, others: Iterable[tuple[Loss, int]]) -> None:
         """Add several losses."""

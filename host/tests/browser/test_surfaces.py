@@ -28,7 +28,7 @@ pytestmark = NEEDS_MODULE
 KINDS = {"rough metal": "metal"}
 
 
-def textured_sheet(folder: Path, glows: bool = False) -> Path:
+def textured_sheet(folder: Path, strength: float = 0.0) -> Path:
     """A bent sheet with a picture and a normal map, half of it metal or aglow by a map, and one with colours."""
     steps = 12
     random = np.random.default_rng(5)
@@ -89,11 +89,12 @@ def textured_sheet(folder: Path, glows: bool = False) -> Path:
         ],
         "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
     }
-    if glows:
+    if strength > 0:
         surface = document["materials"][0]
         emissive = surface["pbrMetallicRoughness"].pop("metallicRoughnessTexture")
         surface["pbrMetallicRoughness"]["metallicFactor"] = 0.0
         surface |= {"emissiveTexture": emissive, "emissiveFactor": [1.0, 0.4, 0.7]}
+        surface["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
     (folder / "sheet.gltf").write_text(json.dumps(document))
     return folder / "sheet.gltf"
 
@@ -139,9 +140,10 @@ def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: floa
     assert (tmp_path / "records.bin").read_bytes() == image.records.tobytes()
 
 
-def test_a_sheet_glows_as_by_the_host(tmp_path: Path) -> None:
+@pytest.mark.parametrize("strength", [1.0, 4.0])
+def test_a_sheet_glows_as_by_the_host(tmp_path: Path, strength: float) -> None:
     (tmp_path / "file").mkdir()
-    file = textured_sheet(tmp_path / "file", glows=True)
+    file = textured_sheet(tmp_path / "file", strength=strength)
     found = beside_host(tmp_path, file)
     mesh = load_mesh(file, corner_colours=True)
     used = {mesh.materials[number].emission for number in np.unique(mesh.face_materials)}

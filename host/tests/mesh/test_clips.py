@@ -89,8 +89,13 @@ def test_an_animation_has_a_name_or_a_number(path: Path, mesh: Mesh) -> None:
     assert mesh.clip is not None
     other = load_mesh(path, animation="0").clip
     assert other is not None and other.pose(0.3).is_equal(mesh.clip.pose(0.3))
-    with pytest.raises(UserError, match="it has no animation jump: it has bend"):
+    with pytest.raises(UserError, match="it has no animation jump: it has 1 animation, bend"):
         load_mesh(path, animation="jump")
+    document = arm()
+    unnamed = {key: value for key, value in document.json["animations"][0].items() if key != "name"}
+    document.json["animations"] = [unnamed, unnamed]
+    with pytest.raises(UserError, match="it has no animation Walk: it has 2 animations, 0, 1"):
+        load_mesh(document.write(path.parent / "unnamed.gltf"), animation="Walk")
 
 
 def test_meshes_without_animations_are_refused(tmp_path: Path) -> None:

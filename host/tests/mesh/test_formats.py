@@ -223,9 +223,10 @@ def test_what_a_gltf_file_loses_is_named(tmp_path: Path) -> None:
     )
     assert lost(load_mesh(file)) == [
         "1 further scene is not shown: only the default scene is rendered",
-        "1 skin is not applied: its mesh has the pose in which it was bound",
-        "1 morph target is not applied: its mesh has its base shape",
-        "1 picture of a texture is missing: surfaces have their base colour",
+        "1 skin is not applied: meshes have the pose in which they were bound; mesh.animation of a scene plays an"
+        " animation",
+        "1 morph target is not applied: meshes have their base shape",
+        "1 picture of a texture is missing (none.png): surfaces have their base colour",
         "1 line primitive is not shown: only faces are rendered",
         "1 point primitive is not shown: only faces are rendered",
         "1 use of the extension KHR_materials_sheen is ignored: not supported",
@@ -245,12 +246,12 @@ def test_what_an_obj_file_loses_is_named(tmp_path: Path) -> None:
         "1 line primitive is not shown: only faces are rendered",
         "2 smoothing groups are not used: edges are smooth up to the crease angle",
         "1 file of materials is missing: faces have the default material",
-        "1 picture of a texture is missing: surfaces have their base colour",
+        "1 picture of a texture is missing (a.png): surfaces have their base colour",
         "1 texture map is not shown: only map_Kd is",
         "1 partly transparent material is not blended: from alpha 1/2 on it is opaque, else a tinted pane or not shown",
         "1 glossy material is diffuse: highlights are not rendered",
         "1 material name is not defined: faces have the default material",
-        "1 face of fewer than three corners is left out: it has no area",
+        "1 face of fewer than three corners is left out: they have no area",
     ]
 
 
@@ -269,6 +270,24 @@ def test_a_plain_file_loses_nothing(tmp_path: Path) -> None:
 def test_a_file_without_faces_says_what_it_holds(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="has no faces: 1 line primitive is not shown"):
         load_mesh(written(tmp_path / "a.obj", f"{OBJ_POINTS}l 1 2\n"))
+    triangle = {"attributes": {"POSITION": 0}}
+    file = gltf(tmp_path, [triangle], [floats(POINTS[:3])], scenes=[{"nodes": []}, {"nodes": [0]}])
+    with pytest.raises(UserError, match="its default scene has no faces: choose another one"):
+        load_mesh(file)
+
+
+def test_what_follows_the_last_triangle_is_noted(tmp_path: Path) -> None:
+    for count, note in ((3, []), (4, ["1 corner after the last triangle is left out: a triangle has three"])):
+        order = np.array([0, 1, 2, 3], np.uint16)[:count]
+        file = gltf(tmp_path, [{"attributes": {"POSITION": 0}, "indices": 1}], [floats(POINTS), order])
+        assert lost(load_mesh(file)) == note and len(load_mesh(file).faces) == 1
+    facet = struct.pack("<12fH", 0, 0, 1, *POINTS[:3].ravel(), 0)
+    for facets, note in (
+        (1, []),
+        (3, ["100 bytes after the last facet are not read: the header has the number of facets"]),
+    ):
+        mesh = load_mesh(written(tmp_path / "a.stl", bytes(80) + struct.pack("<I", 1) + facet * facets))
+        assert lost(mesh) == note and len(mesh.faces) == 1
 
 
 @given(data=st.data())

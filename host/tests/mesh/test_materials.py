@@ -33,6 +33,38 @@ def test_gltf_materials() -> None:
     )
 
 
+def test_an_unlit_material_is_matt_and_noted(tmp_path: Path) -> None:
+    surface = {"baseColorFactor": [0.5, 0.25, 0.125, 1.0]}
+    matt = MeshMaterial("diffuse", (0.5, 0.25, 0.125))
+    for more in ({}, {"metallicFactor": 1.0, "roughnessFactor": 0.0}, {"metallicRoughnessTexture": {"index": 0}}):
+        material = {"pbrMetallicRoughness": surface | more, "extensions": {"KHR_materials_unlit": {}}}
+        mesh = load_mesh(gltf(tmp_path, materials=[material | {"doubleSided": True}]))
+        assert mesh.materials == (matt,)
+        assert [note.partition(": ")[2] for note in mesh.notes] == [
+            "1 unlit material is lit: a matt surface has its base colour"
+        ]
+
+
+def test_an_emission_beyond_1_keeps_its_hue_and_is_noted(tmp_path: Path) -> None:
+    surface = {"pbrMetallicRoughness": {"metallicFactor": 0}, "doubleSided": True}
+    strong = {"KHR_materials_emissive_strength": {"emissiveStrength": 5}}
+    note = "1 material shines brighter than the hardware shows: the largest channel of an emission is 1"
+    for change, notes in (
+        ({"emissiveFactor": [1, 0.5, 0.25], "extensions": strong}, [note]),
+        ({"emissiveFactor": [5, 2.5, 1.25]}, [note]),
+        ({"emissiveFactor": [1, 0.5, 0.25]}, []),
+    ):
+        mesh = load_mesh(gltf(tmp_path, materials=[surface | change]))
+        assert mesh.materials[0].emission == pytest.approx((1.0, 0.5, 0.25))
+        assert [one.partition(": ")[2] for one in mesh.notes] == notes
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    for head, green in (("# Blender", 0.5), ("", 0.2)):
+        (tmp_path / "a.mtl").write_text(f"{head}\nnewmtl a\nKe 5 2.5 0\n")
+        mesh = load_mesh(tmp_path / "a.obj")
+        assert mesh.materials[0].emission == pytest.approx((1.0, green, 0.0), abs=0.02)
+        assert [one.partition(": ")[2] for one in mesh.notes] == [note]
+
+
 def test_mtl_materials() -> None:
     assert from_mtl({"kd": [0.1, 0.2, 0.3], "illum": ["2"]}) == MeshMaterial("diffuse", (0.1, 0.2, 0.3))
     assert from_mtl({"kd": [0.1, 0.2, 0.3], "pm": ["1.0"]}).kind == "mirror"

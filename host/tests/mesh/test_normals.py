@@ -87,6 +87,6 @@ def test_normals_that_point_to_the_back_are_negated_or_computed_and_noted() -> N
     np.testing.assert_allclose(mesh.corner_normals[2], [up, [0, 0, 1], [0, 0, 1]])
     assert mesh.notes == (
         "mesh a: 1 face has normals that point to its back: they are negated",
-        "mesh a: 1 corner normal points to the back of its face: they are computed from the faces",
-        "mesh a: 2 corners have no normal: they are computed from the faces",
+        "mesh a: 1 corner normal points to the back of its face: normals are computed from the faces",
+        "mesh a: 2 corners have no normal: normals are computed from the faces",
     )

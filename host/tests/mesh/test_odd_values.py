@@ -150,6 +150,22 @@ def test_a_negative_shininess_is_noted(tmp_path: Path) -> None:
     assert mesh.notes[0].endswith("1 material's negative Ns is taken as 0: highlights are not rendered")
 
 
+@pytest.mark.parametrize(
+    ("line", "note"),
+    [
+        ("Kd red", "1 value of a material is not read (Kd red)"),
+        ("Kd 0.5", "1 value of a material is not read (Kd 0.5)"),
+        ("Kd 1 1 x\nillum a", "2 values of materials are not read (the first is Kd 1 1 x)"),
+        ("Kd 1 1 1 # red\nd 1.0", ""),
+    ],
+)
+def test_values_of_materials_that_are_no_numbers_are_noted(tmp_path: Path, line: str, note: str) -> None:
+    (tmp_path / "a.mtl").write_text(f"newmtl a\n{line}\n")
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\nusemtl a\n{TRIANGLE}f 1 2 3\n")
+    notes = [one.partition(".obj: ")[2] for one in load_mesh(tmp_path / "a.obj").notes]
+    assert notes == [f"{note}: a colour has three numbers, others have one"] * bool(note)
+
+
 @pytest.mark.parametrize("normal", ["-nan(ind) 0 0", "-1.#IND 0 0", "0 0"])
 def test_normals_of_stl_that_are_no_numbers_print_nothing(
     tmp_path: Path, normal: str, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
@@ -188,7 +204,9 @@ def test_rows_of_ply_that_are_longer_than_the_header_states(tmp_path: Path) -> N
 def test_faces_of_obj_with_normals_that_the_file_lacks(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text(f"{TRIANGLE}f 1//7 2//8 3\n")
     mesh = load_mesh(tmp_path / "a.obj")
-    assert len(mesh.faces) == 1 and mesh.notes[0].endswith("2 corners have no normal: they are computed from the faces")
+    assert len(mesh.faces) == 1 and mesh.notes[0].endswith(
+        "2 corners have no normal: normals are computed from the faces"
+    )
     (tmp_path / "a.obj").write_text(f"vn 0 0 1\n{TRIANGLE}f 1//1 2//1 3//2\n")
     with pytest.raises(UserError, match="a face names normal 2, but the file has 1 normals"):
         load_mesh(tmp_path / "a.obj")

@@ -20,6 +20,7 @@ from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.files.gltf_emission import emission_of
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import MeshMaterial
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.mesh.materials.texture import Texture, Wrap, sampled
 from colonnade.scene.model import Material, MeshSource, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
@@ -55,7 +56,7 @@ def test_faces_without_positions_have_the_plain_colour(tmp_path: Path) -> None:
     mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3\nf 1 3 4"))
     found = [mesh.materials[index] for index in mesh.face_materials]
     assert [material.texture for material in found] == [0, None]
-    assert mesh.notes[0].endswith("1 face of a textured material is untextured: it has no texture coordinates")
+    assert mesh.notes[0].endswith("1 face of a textured material is untextured: texture coordinates are missing")
 
 
 def test_a_gltf_texture_is_embedded_and_wraps_as_its_sampler_says(tmp_path: Path) -> None:
@@ -162,9 +163,9 @@ def test_the_note_on_a_picture_says_what_is_wrong_with_it(tmp_path: Path) -> Non
     large = header + struct.pack(">I", zlib.crc32(header[12:])) + struct.pack(">I4sI", 0, b"IDAT", zlib.crc32(b"IDAT"))
     mesh = load_mesh(painted(tmp_path, png(random)[:-400], large, b"GIF89a"))
     assert mesh.textures == () and [note.partition(": ")[2] for note in mesh.notes] == [
-        "1 picture of a texture is truncated or damaged: surfaces have their base colour",
-        "1 picture of a texture is too large: a picture may have 33,554,432 pixels",
-        "1 picture of a texture is not readable: pictures must be PNG, JPEG, WebP or TGA",
+        "1 picture of a texture is truncated or damaged (0.png): surfaces have their base colour",
+        "1 picture of a texture is too large (1.png): a picture may have 33,554,432 pixels",
+        "1 picture of a texture is not readable (2.png): pictures must be PNG, JPEG, WebP or TGA",
     ]
     assert "truncated" in load_mesh(painted(tmp_path, png(random)[:20])).notes[0]
 
@@ -175,6 +176,60 @@ def test_a_targa_picture_is_read(tmp_path: Path) -> None:
     mesh = load_mesh(painted(tmp_path, stream.getvalue(), suffix="tga"))
     assert mesh.notes == ()
     np.testing.assert_array_equal(mesh.textures[0].pixels, FOUR)
+
+
+@pytest.mark.parametrize("kind", ["obj", "gltf", "ply"])
+def test_a_picture_outside_of_the_folder_is_not_read_but_noted(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "source").mkdir()
+    (tmp_path / "textures").mkdir()
+    (tmp_path / "textures" / "wood.png").write_bytes(png(FOUR))
+    folder, outside = tmp_path / "source", "../textures/wood.png"
+
+    def read() -> Mesh:
+        if kind == "obj":
+            return load_mesh(obj(folder, "f 1/1 2/2 3/3", f"map_Kd {outside}"))
+        if kind == "gltf":
+            return load_mesh(gltf(folder, images=[{"uri": outside}]))
+        return load_mesh(
+            ply(folder, "float s;float t|", ["0 0", "1 0", "1 1", "0 1"], ["3 0 1 2"], f"TextureFile {outside}")
+        )
+
+    assert read().textures == () and [note.partition(": ")[2] for note in read().notes] == [
+        "1 picture of a texture is outside of the mesh's folder (../textures/wood.png): surfaces have their base"
+        " colour; copies in the folder are read"
+    ]
+    (folder / "wood.png").write_bytes(png(FOUR))
+    assert read().notes == () and len(read().textures) == 1
+
+
+def test_of_missing_pictures_the_first_is_named(tmp_path: Path) -> None:
+    file = painted(tmp_path, b"", b"", b"")
+    for number in range(3):
+        (tmp_path / f"{number}.png").unlink()
+    assert load_mesh(file).notes == (
+        f"mesh {file}: 3 pictures of textures are missing (the first is 0.png): surfaces have their base colour",
+    )
+
+
+@pytest.mark.parametrize(
+    ("written", "files", "is_found"),
+    [
+        ('"a b.png"', ["a b.png"], True),
+        ('-s 1 1 1 "a b.tga"', ["a b.tga"], True),
+        ("maps/case.png", ["Maps/Case.PNG"], True),
+        ("case.png", ["Case.png", "CASE.png"], False),
+        ("case.png", ["case.png", "CASE.png"], True),
+    ],
+)
+def test_names_of_pictures_may_have_quotes_and_another_case(
+    tmp_path: Path, written: str, files: list[str], is_found: bool
+) -> None:
+    for name in files:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        Image.fromarray(FOUR if name == files[0] else 255 - FOUR).save(tmp_path / name)
+    mesh = load_mesh(obj(tmp_path, "f 1/1 2/2 3/3", f"map_Kd {written}"))
+    assert [texture.pixels.tolist() for texture in mesh.textures] == [FOUR.tolist()] * is_found
+    assert ["is missing (case.png): " in note for note in mesh.notes] == [True] * (not is_found)
 
 
 @pytest.mark.parametrize("missing", ["images", "textures"])
@@ -200,6 +255,18 @@ def test_a_face_emits_what_its_map_does(tmp_path: Path) -> None:
     mesh = load_mesh(gltf(tmp_path, half, materials=[glowing], meshes=[{"primitives": without}]))
     (material,) = (mesh.materials[index] for index in mesh.face_materials)
     np.testing.assert_allclose(material.emission, (0.5, 0.25, 0.5))
+
+
+def test_a_bright_map_keeps_its_hue(tmp_path: Path) -> None:
+    strong = {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}}
+    glowing = {"emissiveFactor": [1, 0.5, 0.25], "emissiveTexture": {"index": 0}, "doubleSided": True}
+    for grey, emission, is_bright in ((255, (1.0, 0.5, 0.25), True), (124, (0.8, 0.4, 0.2), False)):
+        pixels = np.full((4, 4, 3), grey, np.uint8)
+        found = 4.0 * linear_from_srgb(np.array(grey / 255.0))
+        mesh = load_mesh(gltf(tmp_path, pixels, materials=[glowing | {"extensions": strong}]))
+        (material,) = (mesh.materials[index] for index in mesh.face_materials)
+        np.testing.assert_allclose(material.emission, emission, rtol=0.02)
+        assert (found > 1.0) == is_bright == any("1 material shines brighter" in note for note in mesh.notes)
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 8]))
@@ -268,7 +335,7 @@ def test_positions_of_the_corners_of_ply(tmp_path: Path) -> None:
     textures = [mesh.materials[index].texture for index in mesh.face_materials]
     pixels = [None if texture is None else mesh.textures[texture].pixels[0, 0, 0] for texture in textures]
     assert pixels == [0, 255, None, None]
-    assert mesh.notes[0].endswith("1 face of a textured material is untextured: it has no texture coordinates")
+    assert mesh.notes[0].endswith("1 face of a textured material is untextured: texture coordinates are missing")
     assert mesh.corner_uvs is not None
     np.testing.assert_allclose(mesh.corner_uvs[0], mesh.vertices[mesh.faces[0]][:, :2] * (1, -1) + (0, 1))
 
@@ -281,13 +348,13 @@ def test_a_texture_of_ply_is_shown_before_colours(tmp_path: Path, corner_colours
     assert mesh.materials == (MeshMaterial(albedo=(1.0, 1.0, 1.0), texture=0),) and mesh.corner_colours is None
     assert [note.partition(": ")[2] for note in mesh.notes] == [
         "1 partly transparent vertex is opaque: transparency is not rendered",
-        "1 colour of a textured face is not shown: its texture is",
+        "1 colour of a textured face is not shown: textures are",
     ]
 
 
 def test_a_picture_of_ply_that_is_missing_is_noted(tmp_path: Path) -> None:
     mesh = load_mesh(ply(tmp_path, "float s;float t|", ["0 0"] * 4, ["3 0 1 2"], "TextureFile ../none.png"))
-    assert mesh.notes[0].endswith("1 picture of a texture is missing: surfaces have their base colour")
+    assert mesh.notes[0].endswith("1 picture of a texture is missing (../none.png): surfaces have their base colour")
     assert mesh.materials == (MeshMaterial(),)
 
 

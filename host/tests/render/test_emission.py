@@ -34,11 +34,11 @@ def test_gltf_and_mtl_materials_emit() -> None:
     strength = {"extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}}}
     surface = {"pbrMetallicRoughness": {"metallicFactor": 0.0}, "emissiveFactor": [0.1, 0.2, 0.5]}
     assert from_gltf(surface).emission == (0.1, 0.2, 0.5)
-    assert from_gltf(surface | strength).emission == pytest.approx((0.4, 0.8, 1.0))
+    assert from_gltf(surface | strength).emission == pytest.approx((0.2, 0.4, 1.0))
     assert from_gltf({**surface, "pbrMetallicRoughness": {"roughnessFactor": 0.0}}) == MeshMaterial(
         "mirror", (1.0, 1.0, 1.0)
     )
-    assert from_mtl({"ke": ["0.25", "0", "3"]}).emission == (0.25, 0.0, 1.0)
+    assert from_mtl({"ke": ["0.25", "0", "3"]}).emission == pytest.approx((0.25 / 3, 0.0, 1.0))
     assert from_mtl({"ke": ["1", "1", "1"], "d": "0.2"}).emission == (0.0, 0.0, 0.0)
 
 

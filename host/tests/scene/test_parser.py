@@ -56,6 +56,14 @@ def test_the_page_of_the_scene_file_has_all_keys_and_their_defaults() -> None:
         assert keys.keys() <= set(re.findall("`([a-z_]+)`", row[1])), name
 
 
+@pytest.mark.parametrize("value", ["0", '"0"'])
+def test_an_animation_is_a_name_or_a_number(tmp_path: Path, value: str) -> None:
+    text = f'[mesh]\nname = "a"\nanimation = {value}\n[[object]]\nmesh = {{name = "a", animation = {value}}}'
+    table, objects = text.split("[[")
+    assert load_scene(write(tmp_path, table)).mesh.animation == "0"
+    assert load_scene(write(tmp_path, f"[[{objects}")).objects[0].mesh.animation == "0"
+
+
 def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
     scene = load_scene(write(tmp_path, '[mesh]\npath = "parts/a.obj"'))
     assert scene.mesh_source == tmp_path / "parts" / "a.obj"
@@ -68,6 +76,10 @@ def test_a_path_is_relative_to_the_scene(tmp_path: Path) -> None:
         ("mesh = 3", "mesh must be a table"),
         ('[mesh]\nname = "a"\npath = "b"', "either a name or a path"),
         ("[mesh]\nname = 3", "mesh.name must be text"),
+        *(
+            (f'[mesh]\nname = "a"\nanimation = {value}', "mesh.animation must be text or a whole number from 0")
+            for value in (-1, 0.5, "true", "[0]", '""')
+        ),
         ('[mesh]\nname = "a"\n[lihgt]', "unknown key lihgt; known here: mesh"),
         ('[mesh]\nname = "a"\n[light]\ncolor = [1, 1, 1]', "unknown key light.color; known here"),
         ('[mesh]\nname = "a"\n[light]\ncolour = [1, 1]', "light.colour must be three numbers"),

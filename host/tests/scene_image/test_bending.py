@@ -164,7 +164,7 @@ def test_vertices_of_a_clip_file_are_in_the_order_in_which_leaves_need_them(
     ("text", "message"),
     [
         ('mesh = {path = "arm.gltf", animation = "bend", simplify = 100}', "leave out mesh.simplify"),
-        ("mesh = {path = 'arm.gltf', animation = 3}", "mesh.animation"),
+        ("mesh = {path = 'arm.gltf', animation = -1}", "mesh.animation"),
     ],
 )
 def test_scenes_refuse_what_an_animation_excludes(tmp_path: Path, text: str, message: str) -> None:

@@ -36,6 +36,7 @@ from colonnade.mesh.materials.materials import (
     MeshMaterial,
     Vector,
     from_gltf,
+    gltf_emission,
     gltf_losses,
     metal_factors,
     unused_extensions,
@@ -80,13 +81,16 @@ def read_gltf(
         losses.update((extension_loss(name), 1) for name in unused_extensions(material))
         if textures.emission_of(index) is not None:
             found[index] = replace(found[index], emission=DARK)
+        losses.add(lost.BRIGHT, any(found[index].emission) and max(gltf_emission(material)) > 1.0)
     _count_other(document, losses, clip is not None)
     textures.reader.count_losses()
     if not parts:
+        if len(document.json.get("scenes", [])) > 1:
+            raise document.error("its default scene has no faces: choose another one by scene in the file")
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     surface = joined([part.surface for part in parts])
     surface = surface if clip is None else clip.surface(surface)
-    parts = _with_emission(parts, materials, textures)
+    parts = _with_emission(parts, document, materials, textures, losses)
     materials, face_materials = _materials_of(tuple(found), parts, textures)
     areas = surface_areas(surface.vertices, surface.faces, face_materials, len(materials))
     materials, _ = merged_roughness(materials, areas, max(_MAPPED_MATERIALS, len(found)))
@@ -145,12 +149,13 @@ class _Part:
 def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip: ClipReader | None) -> list[_Part]:
     """The primitives of the default scene, whose vertices a clip takes; refused if they have too many materials."""
     compressed, default = DracoPrimitives(document), len(document.json.get("materials", []))
+    skins = lost.PLAYABLE_SKINS if document.json.get("animations") else lost.SKINS
     parts: list[_Part] = []
     # Of surfaces that no texture or corner colours; metal by a map keeps these, too
     plain: set[tuple[Vector, float]] = set()
     triangles = 0
     for index, node, matrix in mesh_nodes(document, losses, is_animated=clip is not None):
-        losses.add(lost.SKINS, clip is None and "skin" in node)
+        losses.add(skins, clip is None and "skin" in node)
         for primitive in document.entry("meshes", node["mesh"]).get("primitives", []):
             losses.add(lost.MORPHS, 0 if clip is not None else len(primitive.get("targets", [])))
             to_scene = matrix if clip is None else np.eye(4)
@@ -174,17 +179,22 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
     return parts
 
 
-def _with_emission(parts: list[_Part], materials: tuple[MeshMaterial, ...], textures: GltfTextures) -> list[_Part]:
+def _with_emission(
+    parts: list[_Part],
+    document: GltfDocument,
+    materials: tuple[MeshMaterial, ...],
+    textures: GltfTextures,
+    losses: Losses,
+) -> list[_Part]:
     """The parts with what their faces emit by the emission maps of their materials."""
     found = list(parts)
     for number in {part.material for part in parts} - {len(materials) - 1}:
-        use, factor = textures.emission_of(number), np.array(materials[number].emission)
-        own = [i for i, part in enumerate(parts) if part.material == number]
-        if use is None or not factor.any():
+        use, own = textures.emission_of(number), [i for i, part in enumerate(parts) if part.material == number]
+        if use is None or not any(materials[number].emission):
             continue
+        factor = np.array(gltf_emission(document.entry("materials", number)))
         texture, mapped = textures.reader.textures[use.texture], [i for i in own if parts[i].emission_uvs is not None]
-        for i in own:
-            found[i] = replace(parts[i], emission=np.tile(texture.mean * factor, (len(parts[i].surface.faces), 1)))
+        colours = {i: np.tile(texture.mean * factor, (len(parts[i].surface.faces), 1)) for i in own}
         if mapped:
             emission = factor * emission_of(
                 texture,
@@ -192,8 +202,10 @@ def _with_emission(parts: list[_Part], materials: tuple[MeshMaterial, ...], text
                 np.concatenate([parts[i].surface.vertices[parts[i].surface.faces] for i in mapped]),
             )
             ends = np.cumsum([len(parts[i].surface.faces) for i in mapped])[:-1]
-            for i, colours in zip(mapped, np.split(emission, ends), strict=True):
-                found[i] = replace(parts[i], emission=colours)
+            colours |= zip(mapped, np.split(emission, ends), strict=True)
+        losses.add(lost.BRIGHT, any((values > 1.0).any() for values in colours.values()))
+        for i, values in colours.items():
+            found[i] = replace(parts[i], emission=values / values.max(axis=1, initial=1.0, keepdims=True))
     return found
 
 
@@ -284,7 +296,9 @@ def _primitive(
         return np.asarray(values[:, :width], dtype=np.float64)
 
     corners = _corners(document, arrays, count)
-    faces = _faces(corners, mode if arrays.mesh is None else _TRIANGLES)
+    mode = mode if arrays.mesh is None else _TRIANGLES
+    faces = _faces(corners, mode)
+    losses.add(lost.SPARE_CORNERS, len(corners) % 3 if mode == _TRIANGLES else 0)
     width = arrays.attribute("COLOR_0").shape[1] if "COLOR_0" in attributes else 0
     colours, alphas = attribute("COLOR_0", max(width, 3)), None
     if colours is not None:

@@ -18,7 +18,6 @@ READ_EXTENSIONS = (
     DRACO,
     "KHR_mesh_quantization",
     "KHR_lights_punctual",
-    "KHR_materials_unlit",
     "KHR_texture_transform",
     "KHR_texture_basisu",
     INSTANCING,

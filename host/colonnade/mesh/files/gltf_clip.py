@@ -81,7 +81,8 @@ class ClipReader:
             return self._document.entry("animations", names.index(name))
         if name.isdecimal() and int(name) < len(animations):
             return self._document.entry("animations", int(name))
-        known = f"it has {', '.join(map(plain, names))}" if names else "it has none"
+        count = f"{len(names)} animation{'s' * (len(names) > 1)}"
+        known = f"it has {count}, {', '.join(map(plain, names))}" if names else "it has none"
         raise self._document.error(f"it has no animation {plain(name)}: {known}")
 
     def _read_tracks(self, animation: Mapping[str, Any]) -> tuple[Track, ...]:

@@ -117,7 +117,8 @@ class GltfTextures:
         if _WEBP in extensions:
             source = extensions[_WEBP].get("source", source)
         if source is None:
-            self._losses.add(lost.PICTURE_FORMATS if extensions else lost.NO_PICTURES)
+            loss = lost.PICTURE_FORMATS if extensions else lost.NO_PICTURES
+            self._losses.add(loss, name=f"texture {info.get('index')}")
             return None
         sampler = self._document.entry("samplers", entry["sampler"]) if "sampler" in entry else {}
         wrap_u, wrap_v = (_WRAPS.get(sampler.get(key, 10497), "repeat") for key in ("wrapS", "wrapT"))
@@ -134,11 +135,11 @@ class GltfTextures:
         elif isinstance(uri, str) and uri.startswith("data:"):
             data = self._document.embedded(uri, name)
         elif isinstance(uri, str):
-            found = self._references.picture(unquote(uri))
+            name = unquote(uri)
+            found = self._references.picture(name, self._losses)
             if found is None:
-                self._losses.add(lost.NO_PICTURES)
                 return None
-            data, name = found, unquote(uri)
+            data = found
         else:
             raise self._document.error(f"{name} has no picture: export it again")
         return self.reader.read(data, name, (wrap_u, wrap_v), is_nearest)

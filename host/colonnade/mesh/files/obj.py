@@ -22,7 +22,7 @@ from colonnade.mesh import losses as lost
 from colonnade.mesh.files.obj_textures import MtlTextures, TextureMap, uvs_of
 from colonnade.mesh.files.resolver import References
 from colonnade.mesh.losses import Losses
-from colonnade.mesh.materials.materials import PLAIN, MeshMaterial, from_mtl, mtl_losses
+from colonnade.mesh.materials.materials import BRIGHTEST, PLAIN, MeshMaterial, from_mtl, mtl_losses, unread_values
 from colonnade.mesh.materials.surface import RawSurface, from_polygons, linear_colours
 from colonnade.mesh.materials.texture import MAX_UV, Texture
 
@@ -75,7 +75,7 @@ class _Statements:
             elif keyword == "usemtl":
                 material = index.setdefault(rest.strip(), len(index))
             elif keyword == "mtllib":
-                self.libraries.append(rest.strip())
+                self.libraries.append(rest.strip().strip('"'))
             elif keyword == "s" and rest.strip() not in ("off", "0"):
                 groups.add(rest.strip())
             elif keyword in ("l", "p") or keyword in _CURVES:
@@ -94,6 +94,9 @@ def read_obj(data: bytes, path: Path, references: References, losses: Losses) ->
     vertices, vertex_colours = _vertices(file.vertices, losses)
     normals = _rows(file.normals, 3)[:, :3]
     sizes, corners, corner_normals, corner_uvs = _corners(file, path, losses)
+    odd = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(odd) and len(named := np.intersect1d(odd, corners)):
+        raise UserError(f"mesh {path}: vertex {named[0] + 1} is not a finite number: repair the file")
     losses.add(lost.POINTS, file.losses.get("p", 0))
     losses.add(lost.LINES, file.losses.get("l", 0))
     losses.add(lost.CURVES, sum(file.losses.get(name, 0) for name in _CURVES))
@@ -242,6 +245,8 @@ def _materials(
         if name in defined:
             materials[index], maps[index] = textures.textured(from_mtl(defined[name]), defined[name])
             losses.update(mtl_losses(defined[name]))
+            for value in unread_values(defined[name]):
+                losses.add(lost.NO_VALUES, name=value)
             losses.add(lost.NEGATIVE_SHININESS, any(word.startswith("-") for word in defined[name].get("ns", [])))
         elif name and (defined or not is_missing):
             losses.add(lost.UNKNOWN_MATERIALS)
@@ -272,9 +277,10 @@ def parse_mtl(text: str) -> dict[str, dict[str, Sequence[Any]]]:
 
 
 def _linear(words: Sequence[str]) -> Sequence[Any]:
-    """Linear numbers of sRGB ones, from 0 to 1; the words if they are none."""
+    """Linear numbers of sRGB ones; the words if they are none."""
     try:
         values = np.array(words[:3], dtype=np.float64)
     except ValueError:
         return words
-    return linear_from_srgb(np.clip(values, 0.0, 1.0)).tolist() if np.isfinite(values).all() else words
+    is_colour = len(values) == 3 and bool(np.isfinite(values).all())
+    return linear_from_srgb(np.clip(values, 0.0, BRIGHTEST)).tolist() if is_colour else words

@@ -43,7 +43,7 @@ class MtlTextures:
         """The material with the texture of its maps, if they are there; a colour Kd of black counts as white.
 
         Raises:
-            UserError: The picture is no regular file, or is outside the folder.
+            UserError: The picture is no regular file.
         """
         colour, alpha = (
             self._parsed(words) if (words := entries.get(keyword)) else None for keyword in ("map_kd", "map_d")
@@ -82,9 +82,8 @@ class MtlTextures:
         return index
 
     def _picture(self, described: TextureMap) -> int | None:
-        data = self._references.picture(described.name)
+        data = self._references.picture(described.name, self._losses)
         if data is None:
-            self._losses.add(lost.NO_PICTURES)
             return None
         wrap: tuple[Wrap, Wrap] = ("clamp", "clamp") if described.is_clamped else ("repeat", "repeat")
         return self.reader.read(data, described.name, wrap)
@@ -107,7 +106,7 @@ class MtlTextures:
                 found = replace(found, scale=pair) if option == "-s" else replace(found, offset=pair)
             else:
                 self._losses.add(lost.TEXTURE_OPTIONS)
-        return replace(found, name=" ".join(words[at:]))
+        return replace(found, name=" ".join(words[at:]).strip('"'))
 
 
 def uvs_of(values: Floats, maps: Sequence[TextureMap | None], materials: Any) -> Floats:

@@ -64,8 +64,7 @@ def textured_polygons(
     # Material of each number; 0 shows no texture
     materials = np.zeros(len(names) + 2, dtype=np.int64)
     for number in np.unique(numbers[(numbers >= 0) & (numbers < len(names))]).tolist():
-        picture = references.picture(names[number])
-        losses.add(lost.NO_PICTURES, picture is None)
+        picture = references.picture(names[number], losses)
         found = None if picture is None else reader.read(picture, names[number], ("repeat", "repeat"))
         materials[number] = 0 if found is None else found + 1
     reader.count_losses()

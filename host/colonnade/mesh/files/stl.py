@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from colonnade.common.errors import UserError
-from colonnade.mesh.losses import FACET_COLOURS, Losses
+from colonnade.mesh.losses import FACET_COLOURS, SPARE_BYTES, Losses
 from colonnade.mesh.materials.surface import RawSurface
 
 #: Bytes before the facets of a binary file, and of a facet.
@@ -47,6 +47,7 @@ def read_stl(data: bytes, path: Path, losses: Losses) -> RawSurface:
         if present < count:
             raise UserError(f"mesh {path} is truncated: its header states {count:,} facets, it holds {present:,}")
         records = np.frombuffer(data, np.uint8, _FACET * count, _HEADER).reshape(-1, _FACET)
+        losses.add(SPARE_BYTES, len(data) - _HEADER - _FACET * count)
         losses.add(FACET_COLOURS, int(records[:, 48:].any(axis=1).sum()))
         if count == 0:
             raise UserError(f"mesh {path} has no faces: its header states none")

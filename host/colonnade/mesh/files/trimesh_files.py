@@ -43,5 +43,6 @@ def read_by_trimesh(data: bytes, path: Path, references: References, losses: Los
     if done.returncode != 0:
         raise UserError(f"{path} cannot be read as a mesh: {reason}")
     found, _, content = done.stdout.partition(b"\n")
-    losses.update((Loss(one, several, instead), count) for one, several, instead, count in json.loads(found))
+    for one, several, instead, count, name in json.loads(found):
+        losses.add(Loss(one, several, instead), count, name)
     return read_gltf(content, path, references, losses)

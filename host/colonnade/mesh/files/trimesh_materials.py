@@ -53,7 +53,7 @@ class Pictures:
         if key not in self._found:
             # A picture without a number is one of the archive that trimesh has opened, and not decoded
             image = self._image(key) if number is not None else self._embedded(picture.fp.getvalue(), "")
-            self._losses.add(lost.NO_PICTURES, image is None)
+            self._losses.add(lost.NO_PICTURES, image is None, key)
             self._found[key] = None if image is None else len(self.images)
             self.images += [] if image is None else [image]
         index = self._found[key]

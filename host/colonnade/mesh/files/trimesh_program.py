@@ -219,7 +219,10 @@ def _main() -> None:
         name = "" if isinstance(error, UserError | DaeError) else f"{type(error).__name__}: "
         print(name, *str(error).split(), file=sys.stderr)
         sys.exit(DAMAGED)
-    found = [(loss.one, loss.several, loss.instead, count) for loss, count in losses.counts.items()]
+    found = [
+        (loss.one, loss.several, loss.instead, count, losses.names.get(loss, ""))
+        for loss, count in losses.counts.items()
+    ]
     output.write(json.dumps(found).encode() + b"\n" + content)
 
 

@@ -9,9 +9,9 @@
 | clear coat | `KHR_materials_clearcoat`, its factors | – |
 | alpha | `alphaMode` with the factor of the base colour and its texture | `map_d` |
 | index of refraction | `KHR_materials_ior` | `Ni` |
-| emission of a diffuse surface | emissive factor times `KHR_materials_emissive_strength`, at most 1 | `Ke`, as `Kd` |
+| emission of a diffuse surface, scaled to at most 1 | emissive factor times `KHR_materials_emissive_strength` | `Ke` |
 
-`as_rendered` says what a rough mirror becomes. The readers add base-colour textures.
+`as_rendered` says what a rough mirror becomes. Unlit materials of glTF are matt. The readers add base-colour textures.
 What a material holds beyond this is counted as lost.
 """
 
@@ -50,9 +50,12 @@ USED_EXTENSIONS = (
     "KHR_materials_emissive_strength",
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_clearcoat",
+    "KHR_materials_unlit",
 )
 #: Textures whose readers count what is lost of them.
 _READ_TEXTURES = ("baseColorTexture", "diffuseTexture", "normalTexture")
+#: Values of MTL files that are used, and how many numbers each has.
+_MTL_VALUES = {"Kd": 3, "Ke": 3, "Tf": 3, "illum": 1, "d": 1, "Tr": 1, "Ni": 1, "Pm": 1, "Pr": 1}
 #: What coats reflect, and glass of lights: between 0.04, where it faces the eye, and 0.09, the mean over a sphere.
 COAT_REFLECTANCE = 0.06
 #: Roughness from which on mirrors and glass have highlights: that of the device's narrowest lobe.
@@ -65,6 +68,8 @@ LAYERS: tuple[Layer, ...] = get_args(Layer)
 #: The layers of lights alone, and the radiance of a lamp that surfaces already show in the device's numbers, by its
 #: mark: what a mirror brings is at most 1, and glass reflects so little of the mark that all of it counts.
 MARKS: Mapping[Layer, float] = {"highlight": 1.0, "glass highlight": 16.0}
+#: A channel of an emission in a file, at most.
+BRIGHTEST = 1e6
 #: No emission.
 DARK = (0.0, 0.0, 0.0)
 
@@ -197,9 +202,16 @@ def in_layer(material: MeshMaterial, layer: Layer) -> MeshMaterial:
 
 
 def gltf_surface(material: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The metallic-roughness values of a material from a glTF file's JSON, also of one with specular-glossiness."""
+    """The metallic-roughness values of a material from a glTF file's JSON, also of one with specular-glossiness.
+
+    An unlit one is matt.
+    """
     surface = material.get("pbrMetallicRoughness")
-    older = material.get("extensions", {}).get("KHR_materials_pbrSpecularGlossiness")
+    extensions = material.get("extensions", {})
+    older = extensions.get("KHR_materials_pbrSpecularGlossiness")
+    if "KHR_materials_unlit" in extensions:
+        colours = {key: value for key, value in (surface or {}).items() if key.startswith("baseColor")}
+        return colours | {"metallicFactor": 0.0, "roughnessFactor": 1.0}
     if isinstance(older, Mapping):
         found = {"metallicFactor": 0.0, "roughnessFactor": 1.0 - _number(older.get("glossinessFactor"), 1.0)}
         named = (("diffuseFactor", "baseColorFactor"), ("diffuseTexture", "baseColorTexture"))
@@ -235,11 +247,12 @@ def from_gltf(material: Mapping[str, Any]) -> MeshMaterial:
         red, green, blue = (1.0 - share + share * value for value in colour)
         return MeshMaterial("glass", (red, green, blue), _ior(ior), roughness=_share(roughness), clear_coat=coat)
     if metallic >= 0.5:
-        emission = _gltf_emission(material) if roughness > MIRROR_ROUGHNESS else DARK
+        emission = _shown_emission(gltf_emission(material)) if roughness > MIRROR_ROUGHNESS else DARK
         found = MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=_share(roughness))
     else:
         gloss = coat_roughness(roughness)
-        found = MeshMaterial("diffuse", colour, emission=_gltf_emission(material), alpha=alpha, roughness=gloss)
+        emission = _shown_emission(gltf_emission(material))
+        found = MeshMaterial("diffuse", colour, emission=emission, alpha=alpha, roughness=gloss)
     return replace(found, clear_coat=coat)
 
 
@@ -252,11 +265,19 @@ def _gltf_alpha(material: Mapping[str, Any], surface: Mapping[str, Any]) -> Alph
     return Alpha(min(max(factor, 0.0), 1.0), min(max(cutoff, 0.0), 2.0), mode == "BLEND")
 
 
-def _gltf_emission(material: Mapping[str, Any]) -> Vector:
+def _shown_emission(emission: Vector) -> Vector:
+    """An emission with a largest channel of at most 1, and its hue."""
+    red, green, blue = (value / max(1.0, *emission) for value in emission)
+    return red, green, blue
+
+
+def gltf_emission(material: Mapping[str, Any]) -> Vector:
+    """The emission of a material from a glTF file's JSON, which may exceed 1."""
     extension = material.get("extensions", {}).get("KHR_materials_emissive_strength", {})
     strength = _number(extension.get("emissiveStrength"), 1.0)
-    red, green, blue = (max(0.0, strength) * value for value in _colour(material.get("emissiveFactor"), DARK))
-    return _colour((red, green, blue), DARK)
+    factor = _colour(material.get("emissiveFactor"), DARK, BRIGHTEST)
+    red, green, blue = (min(max(0.0, strength), BRIGHTEST) * value for value in factor)
+    return red, green, blue
 
 
 def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
@@ -273,10 +294,14 @@ def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
     is_metal = first("pm", 0.0) >= 0.5 or model in (3.0, 5.0)
     if is_metal:
         roughness = _share(first("pr", 0.0))
-        emission = _colour(entries.get("ke"), DARK) if roughness > MIRROR_ROUGHNESS else DARK
+        emission = _shown_emission(_mtl_emission(entries)) if roughness > MIRROR_ROUGHNESS else DARK
         return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=roughness)
-    emission = _colour(entries.get("ke"), DARK)
+    emission = _shown_emission(_mtl_emission(entries))
     return MeshMaterial("diffuse", colour, emission=emission, alpha=alpha, roughness=coat_roughness(first("pr", 1.0)))
+
+
+def _mtl_emission(entries: Mapping[str, Any]) -> Vector:
+    return _colour(entries.get("ke"), DARK, math.inf)
 
 
 def _opacity(entries: Mapping[str, Any]) -> float:
@@ -300,8 +325,9 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     surface, extensions = gltf_surface(material), material.get("extensions", {})
     maps = [key for part in (material, surface, *extensions.values()) for key in part if key.endswith("Texture")]
     found = [(lost.MAPS.get(key, lost.TEXTURES), 1) for key in maps if key not in _READ_TEXTURES]
-    if any(_colour(material.get("emissiveFactor"), DARK)) and not _is_lit(from_gltf(material)):
+    if any(gltf_emission(material)) and not _is_lit(from_gltf(material)):
         found.append((lost.EMISSION, 1))
+    found.append((lost.UNLIT, "KHR_materials_unlit" in extensions))
     transmission = _number(extensions.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
     metallic = _number(surface.get("metallicFactor"), 1.0)
     if 0.0 < transmission < 1.0:
@@ -324,13 +350,26 @@ def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         or key in ("bump", "disp", "decal", "refl", "norm")
     ]
     found = [(lost.TEXTURE_OBJ, len(maps))]
-    if any(_colour(entries.get("ke"), DARK)) and not _is_lit(from_mtl(entries)):
+    emission = _mtl_emission(entries)
+    if any(emission) and not _is_lit(from_mtl(entries)):
         found.append((lost.EMISSION, 1))
+    elif max(emission) > 1.0:
+        found.append((lost.BRIGHT, 1))
     opacity = _opacity(entries)
     if 0.0 < opacity < 1.0 and "tf" not in entries:
         found.append((lost.PARTLY_GLASS if kind == "glass" else lost.BLENDED, 1))
     if kind == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
         found.append((lost.HIGHLIGHTS, 1))
+    return found
+
+
+def unread_values(entries: Mapping[str, Any]) -> list[str]:
+    """The values of a material of an MTL file that `from_mtl` replaces by defaults, each with its keyword."""
+    found = []
+    for keyword, count in _MTL_VALUES.items():
+        words = entries.get(keyword.lower(), [0.0] * count)
+        if len(words) < count or any(math.isnan(_number(word, math.nan)) for word in words[:count]):
+            found.append(" ".join((keyword, *map(str, words))))
     return found
 
 
@@ -366,9 +405,9 @@ def _number(value: Any, default: float) -> float:
     return number if math.isfinite(number) else default
 
 
-def _colour(values: Any, default: Vector) -> Vector:
+def _colour(values: Any, default: Vector, limit: float = 1.0) -> Vector:
     if not isinstance(values, Sequence) or isinstance(values, str) or len(values) < 3:
         return default
     channels = zip(values[:3], default, strict=True)
-    red, green, blue = (min(max(_number(value, fallback), 0.0), 1.0) for value, fallback in channels)
+    red, green, blue = (min(max(_number(value, fallback), 0.0), limit) for value, fallback in channels)
     return red, green, blue

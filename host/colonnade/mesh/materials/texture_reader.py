@@ -53,7 +53,7 @@ class TextureReader:
             if error is refused:
                 raise
             kinds = {UnknownFormat: lost.PICTURE_FORMATS, TooManyPixels: lost.LARGE_PICTURES}
-            self._losses.add(kinds.get(type(error), lost.DAMAGED_PICTURES))
+            self._losses.add(kinds.get(type(error), lost.DAMAGED_PICTURES), name=name)
             return None
         for _ in range(self._halvings):
             texture = texture.halved()

@@ -32,6 +32,14 @@ def _as_keys(value: object) -> object:
     return (value,) if isinstance(value, Mapping) else value
 
 
+def _as_text(value: object) -> object:
+    """The number of an animation as text."""
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) and value >= 0 else value
+
+
+Animation = Annotated[Text, BeforeValidator(_as_text, json_schema_input_type=Text | Annotated[int, Interval(ge=0)])]
+
+
 @dataclass(frozen=True, config=STRICT)
 class MeshSource:
     """The mesh: a name (see `colonnade.mesh.load.load_mesh`), or a file relative to the scene file.
@@ -49,7 +57,7 @@ class MeshSource:
     path: File | None = None
     crease: Annotated[Float, Interval(ge=0.0, le=180.0)] | None = None
     simplify: Triangles | None = None
-    animation: Text | None = None
+    animation: Animation | None = None
     children: Literal[2, 4] = 4
 
     @model_validator(mode="after")
