@@ -13,11 +13,15 @@ def check_size(size: Size, manifest: Manifest) -> None:
     """Refuse a frame larger than the design's maximum (`frame.maxWidth`, `frame.maxHeight`).
 
     Raises:
-        UserError: The size is no pair of whole numbers, or the frame is empty or too large.
+        UserError: The size is no pair of whole numbers, the frame is empty or too large, or the design has no frames.
     """
     if min(size) < 1:
         raise UserError(f"a frame of {size[0]}x{size[1]} has no pixels")
     limits = manifest.config["frame"]
+    if limits["rays"]:
+        raise UserError(
+            "this hardware traces rays of applications and has no frames (frame.rays): take another, such as edge"
+        )
     for length, key in zip(size, ("maxWidth", "maxHeight"), strict=True):
         if length > limits[key]:
             raise UserError(

@@ -24,7 +24,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.render.samples import within_budget
 from colonnade.scene.model import Scene
-from colonnade.scene_image.inspect import coarse_line, dense_line
+from colonnade.scene_image.inspect import coarse_line, dense_line, lost_line
 
 
 def device_frames(
@@ -47,6 +47,8 @@ def device_frames(
         prepared = DeviceScene.of(scene, manifest, mesh, size=size, relit=relit, encoder=encoder, progress=progress)
         if (line := coarse_line(prepared.image.header)) is not None:
             notes.tell(line)
+        if (line := lost_line(prepared.image.header)) is not None:
+            notes.report([line])
     prepared, note = within_budget(prepared, size, note, progress)
     with progress.step("computing the registers"):
         poses = [prepared.scene.at(fraction) for fraction in scene.frame_progress(request.frames)]
@@ -104,7 +106,10 @@ def rendered(
     for frame, (passes, seconds, rate) in zip(frames, found, strict=True):
         require_no_errors(passes.frame.errors)
         maps, header = frame.prepared.maps, frame.prepared.image.header
-        if (line := dense_line(header, int(passes.frame.is_object.sum()))) is not None:
+        pixels = int(passes.frame.is_object.sum())
+        if pixels == 0:
+            notes.tell("a frame has no pixel of the object: it lies behind the room, or the camera looks elsewhere")
+        if (line := dense_line(header, pixels)) is not None:
             notes.tell(line)
         report = replace(
             frame_report(request.backend, frame.prepared.manifest, header, passes.frame),

@@ -92,6 +92,18 @@ def coarse_line(header: ImageHeader) -> str | None:
     )
 
 
+def lost_line(header: ImageHeader) -> str | None:
+    """The line on a mesh of which the grid loses a percent of the faces, or more; None for others."""
+    lost = header.source_triangles - header.triangles
+    if 100 * lost < header.source_triangles or lost == 0:
+        return None
+    return (
+        f"mesh {one_line(header.mesh)}: {lost:,} of {header.source_triangles:,} faces are left out, since they have no"
+        f" area on a grid of {_step(header)}, or equal others: remove parts that lie far away, or raise"
+        " geometry.vertexBits"
+    )
+
+
 def dense_line(header: ImageHeader, pixels: int) -> str | None:
     """The line on a large mesh of more than four triangles for each of the ``pixels`` that show it; None for others."""
     if header.triangles <= max(_LARGE, 4 * pixels) or pixels == 0:

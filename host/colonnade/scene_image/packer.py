@@ -133,6 +133,7 @@ def pack_geometry(
         corner_normals = normals[clip.corners]
     entries, index = table_entries(materials)
     is_glass = np.array([material.kind == "glass" or material.coverage < 0.5 for material in materials])
+    _check_leaves(mesh.name, manifest, -(-len(quantised.faces) // 2) * (1 if colours is None else 2))
     packing: Any = _core.Packing(
         quantised.vertices,
         quantised.faces,
@@ -208,6 +209,23 @@ def memory_use(header: ImageHeader, manifest: Manifest) -> dict[str, Any]:
 
 
 def _check_fits(name: str, manifest: Manifest, tree: TreeStatistics, record_count: int) -> None:
+    _check_records(name, manifest, record_count)
+    stack_depth = int(manifest.config["columnBvhMemory"]["stackDepth"])
+    if manifest.bvh and tree.stack_bound > stack_depth:
+        raise UserError(
+            f"mesh {name} needs a stack of {tree.stack_bound} entries even with a balanced tree,"
+            f" columnBvhMemory.stackDepth is {stack_depth}: raise columnBvhMemory.stackDepth"
+        )
+
+
+def _check_leaves(name: str, manifest: Manifest, leaf_records: int) -> None:
+    """Refuse a mesh of whose records so many, the leaves if all are pairs, are too many: its tree may take minutes."""
+    if leaf_records > int(manifest.memories["columnBvh"]["depth"]):
+        # Nodes, and triangles without a partner, are about half as many
+        _check_records(name, manifest, leaf_records + leaf_records // 2, "about ")
+
+
+def _check_records(name: str, manifest: Manifest, record_count: int, about: str = "") -> None:
     depth = int(manifest.memories["columnBvh"]["depth"])
     enough = 1 << (record_count - 1).bit_length()
     advice = "simplify the mesh (--simplify)"
@@ -216,12 +234,8 @@ def _check_fits(name: str, manifest: Manifest, tree: TreeStatistics, record_coun
     if enough <= MAX_MEMORY_DEPTH:
         advice = f"raise columnBvhMemory.depth to {enough}, {advice}"
     if record_count > depth:
-        raise UserError(f"mesh {name} needs {record_count:,} records, columnBvhMemory.depth is {depth:,}: {advice}")
-    stack_depth = int(manifest.config["columnBvhMemory"]["stackDepth"])
-    if manifest.bvh and tree.stack_bound > stack_depth:
         raise UserError(
-            f"mesh {name} needs a stack of {tree.stack_bound} entries even with a balanced tree,"
-            f" columnBvhMemory.stackDepth is {stack_depth}: raise columnBvhMemory.stackDepth"
+            f"mesh {name} needs {about}{record_count:,} records, columnBvhMemory.depth is {depth:,}: {advice}"
         )
 
 

@@ -198,6 +198,7 @@ CASES |= {
     "no-frames": Case(f"{RENDER} --frames 0 --output f.png", "1<=x<=10000"),
     "frames-digits": Case(f"{RENDER} --frames {NINES} --output f.png", "--frames"),
     "size-digits": Case(f"{RENDER} --size {NINES}x8", "WIDTHxHEIGHT"),
+    "hardware-without-frames": Case("render s.toml --config traversal --backend model", "(frame.rays)"),
     "size-too-wide": Case("render s.toml --config tiny --backend model --size 999999999x8", "frame.maxWidth"),
     "delay-nan": Case("ppa --delay nan", "finite"),
     "clock-inf": Case("ppa --clock inf", "finite"),

@@ -62,3 +62,9 @@ def test_an_albedo_of_the_scene_replaces_all_colours(folder: Path) -> None:
     (folder / "s.toml").write_text(f"{hostile.SCENE}[material]\nalbedo = [0.5, 0.5, 0.5]\n")
     noted = invoked(folder, f"{hostile.RENDER} --mesh x.obj --set frame.materials=1")
     assert noted.exit_code == 0 and "become" not in noted.stderr, noted.output
+
+
+def test_an_object_that_no_pixel_shows_is_noted(folder: Path) -> None:
+    (folder / "s.toml").write_text(f"{hostile.SCENE}[camera]\nposition = [0.0, 0.0, 9.0]\ntarget = [0.0, 0.0, 18.0]\n")
+    noted = invoked(folder, f"{hostile.RENDER} --mesh cube")
+    assert noted.exit_code == 0 and "a frame has no pixel of the object" in noted.stderr, noted.output

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from leaves import leaf_addresses, leaves_of, packed_triangles
 
+from colonnade import _core
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
@@ -20,7 +21,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 from colonnade.mesh.load import clean_mesh, load_mesh
 from colonnade.mesh.materials.mesh import Mesh
-from colonnade.scene_image.inspect import dense_line, describe, report_lines
+from colonnade.scene_image.inspect import dense_line, describe, lost_line, report_lines
 from colonnade.scene_image.packer import QuantisedMesh, memory_use, pack, quantise
 
 MakeManifest = Callable[..., Manifest]
@@ -147,6 +148,16 @@ def test_too_many_records_are_refused(make_manifest: MakeManifest) -> None:
         pack(load_mesh("teapot"), make_manifest(depth=4096))
 
 
+def test_a_mesh_that_is_far_too_large_is_refused_before_its_tree_is_built(
+    make_manifest: MakeManifest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(_core, "Packing", None)
+    with pytest.raises(
+        UserError, match=r"needs about 4,\d\d\d records, .* is 2,048: raise columnBvhMemory.depth to 8192,"
+    ):
+        pack(load_mesh("teapot"), make_manifest(depth=2048))
+
+
 @pytest.mark.parametrize("triangles", [190_000, pytest.param(1_000_000, marks=pytest.mark.matrix)])
 def test_a_preset_with_its_scene_in_dram_takes_a_large_mesh(triangles: int) -> None:
     manifest = manifest_for("edge").manifest
@@ -219,3 +230,13 @@ def test_a_large_mesh_on_few_pixels_gets_a_line(manifest: Manifest) -> None:
     assert line is not None and line.startswith("mesh cube has more than four triangles for each pixel")
     assert dense_line(header, 100_001) is None and dense_line(header, 0) is None
     assert dense_line(replace(header, triangles=100_000), 1) is None
+
+
+def test_faces_that_the_grid_loses_are_told(manifest: Manifest) -> None:
+    """A large face takes the grid from all others."""
+    near = load_mesh("sphere:1000")
+    faces = np.vstack([near.faces, len(near.vertices) + np.arange(3)])
+    far = clean_mesh(np.vstack([near.vertices, 1e6 * np.eye(3)]), faces, "far")
+    assert lost_line(pack(near, manifest).header) is None
+    line = lost_line(pack(far, manifest).header)
+    assert line is not None and line.startswith("mesh far: 980 of 981 faces are left out")
