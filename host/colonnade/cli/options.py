@@ -72,8 +72,8 @@ def configuration_options(command: Command) -> Command:
         default="small",
         show_default=True,
         metavar="CONFIG",
-        help="Hardware configuration: a preset (tiny, small, fpga, lean, edge), a JSON file, "
-        "or a precision like 32b32s64d.",
+        help="Hardware configuration: a preset (tiny, small, fpga, lean, edge, traversal), a JSON "
+        "file, or a precision like 32b32s64d.",
     )(command)
 
 

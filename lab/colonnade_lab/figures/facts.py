@@ -12,9 +12,9 @@ from colonnade_lab.ppa.equal_area import fastest_clock
 
 #: What each preset is for, and the command whose frames show that its RTL equals the model. The largest comes first.
 PRESETS = {
-    "edge": ("AR: rooms, their light, mirrors, glass, textures", "`make verify`, six rooms"),
+    "edge": ("AR: rooms, their light, mirrors, glass, textures", "`make verify`, `tools/room-frames`"),
     "lean": ("as `edge`, narrower arithmetic, finer vertices", "`make verify`"),
-    "small": ("the simulator: `edge` of 2×2, the scene on chip", "`make test`"),
+    "small": ("the simulator: what `edge` does, 2×2, smaller units, the scene on chip", "`make test`"),
     "traversal": ("rays of applications", "`make verify`"),
     "tiny": ("tests, the smallest array", "`make test`"),
     "fpga": ("an ECP5 board", "`make verify`"),

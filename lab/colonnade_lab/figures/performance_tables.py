@@ -23,14 +23,15 @@ def rates(data: Data) -> str:
             f"{mesh['rays']['in_box']:,}",
             f"**{mesh['rays_per_cycle_in_box']:.2f}**",
             f"{mesh['bottleneck']}, {_percent(mesh['utilisation'][mesh['bottleneck']])}",
+            f"{mesh['per_ray']['dram_bytes']:.1f}",
             f"{mirrors[name]['cycles']:,}",
             f"**{mirrors[name]['rays_per_cycle_in_box']:.2f}**",
         ]
         for name, mesh in bench["meshes"].items()
     ]
     means = (f"**{each['geomean_rays_per_cycle_in_box']:.2f}**" for each in (bench, bench["mirror"]))
-    rows.append(["geometric mean", "", "", "", next(means), "", "", next(means)])
-    titles = ["mesh", "triangles", "cycles", "in-box rays", "rays per cycle", "bottleneck, %"]
+    rows.append(["geometric mean", "", "", "", next(means), "", "", "", next(means)])
+    titles = ["mesh", "triangles", "cycles", "in-box rays", "rays per cycle", "bottleneck, %", "bytes of DRAM a ray"]
     return markdown([*titles, "cycles as a mirror", "rays per cycle"], rows)
 
 
