@@ -47,6 +47,15 @@ def test_colours_of_mirrors_are_merged_among_themselves() -> None:
     assert [mesh.materials[index].kind for index in mesh.face_materials[:9]] == ["mirror"] * 8 + ["diffuse"]
 
 
+def test_emissions_are_merged_where_they_are_too_many() -> None:
+    lamps = [MeshMaterial(albedo=(0.5, 0.5, 0.5), emission=(0.1 * k, 0.1, 0.0)) for k in range(1, 9)]
+    mesh, line = reduced(coloured(np.zeros((2, 3)), *lamps), 4)
+    found = np.array([mesh.materials[index].emission for index in mesh.face_materials])
+    assert len(mesh.materials) == 4 and line is not None
+    assert np.abs(found[:8] - [lamp.emission for lamp in lamps]).max() < 0.15
+    np.testing.assert_allclose(found[8:], 0.0, atol=1e-9)
+
+
 def test_equal_materials_are_one() -> None:
     mesh, line = reduced(coloured(np.ones((20, 3))), 2)
     assert len(mesh.materials) == 1 and line is None and not mesh.face_materials.any()

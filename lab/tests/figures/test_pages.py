@@ -61,7 +61,7 @@ def test_without_data_a_table_is_written_all_the_same(tmp_path: Path, name: str)
 
 
 def test_figures_are_those_of_the_data(docs: Path) -> None:
-    assert "|bunny|12|100|50|**1.00**|box unit, 80|100|**1.00**|" in table(docs, "rates")
+    assert "|bunny|12|100|50|**1.00**|box unit, 80|77.0|100|**1.00**|" in table(docs, "rates")
     assert "|bunny|12|1.00|77|1.00|" in table(docs, "large")
     assert "|`array.rows`|4|2.00|2.00|2.00|" in table(docs, "scaling")
     assert "|bunny|12|1.000|1.250|" in table(docs, "ablation")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials.materials import (
     BLACK,
+    DARK,
     MARKS,
     PLAIN,
     SMOOTH_ROUGHNESS,
@@ -36,6 +38,8 @@ _WITHOUT_ROUGHNESS = {"diffuse": lost.COATS, "mirror": lost.ROUGH_MIRROR, "glass
 
 #: Steps of the clustering, at most.
 _STEPS = 30
+#: Colours in which materials that are merged may differ; the second ones if the first do not suffice.
+_MERGED: tuple[dict[str, Any], ...] = ({"albedo": DARK}, {"albedo": DARK, "emission": DARK})
 
 
 def coloured_materials(
@@ -228,6 +232,8 @@ def without_emission(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
 def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     """Reduce a mesh to so many materials by merging similar colours of the same kind and index of refraction.
 
+    Emissions that differ are merged only if there are too many of them.
+
     Returns:
         The mesh, and a line on what was merged; the mesh itself and None if it has no more materials, or too many
         kinds.
@@ -237,10 +243,13 @@ def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     materials, index = _used(list(mesh.materials), mesh.face_materials.astype(np.int64))
     if len(materials) <= count:
         return replace(mesh, materials=materials, face_materials=index.astype(np.uint8)), None
-    kinds: dict[MeshMaterial, list[int]] = {}
-    for number, material in enumerate(materials):
-        kinds.setdefault(replace(material, albedo=(0.0, 0.0, 0.0)), []).append(number)
-    if len(kinds) > count:
+    for merged in _MERGED:
+        kinds: dict[MeshMaterial, list[int]] = {}
+        for number, material in enumerate(materials):
+            kinds.setdefault(replace(material, **merged), []).append(number)
+        if len(kinds) <= count:
+            break
+    else:
         return mesh, None
     weights = np.bincount(index, minlength=len(materials))
     table = np.zeros(len(materials), dtype=np.uint8)
@@ -249,14 +258,14 @@ def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
     # Small kinds keep all of their colours, if an equal share suffices
     for done, members in enumerate(sorted(kinds.values(), key=len)):
         space = (count - len(found)) // (len(kinds) - done)
-        albedo = srgb_from_linear(np.array([materials[number].albedo for number in members]))
-        centres, nearest = clustered(albedo, weights[members], space)
-        squares += float((weights[members, None] * (centres[nearest] - albedo) ** 2).sum()) / 3
+        own = [[channel for key in merged for channel in getattr(materials[number], key)] for number in members]
+        colours = srgb_from_linear(np.array(own))
+        centres, nearest = clustered(colours, weights[members], space)
+        squares += float((weights[members, None] * (centres[nearest] - colours) ** 2).sum()) / colours.shape[1]
         table[members] = len(found) + nearest
-        found += [
-            replace(materials[members[0]], albedo=(float(red), float(green), float(blue)))
-            for red, green, blue in linear_from_srgb(centres)
-        ]
+        for centre in linear_from_srgb(centres).reshape(len(centres), len(merged), 3).tolist():
+            values: dict[str, Any] = dict(zip(merged, map(tuple, centre), strict=True))
+            found.append(replace(materials[members[0]], **values))
     line = (
         f"mesh {mesh.name}: {len(materials)} materials become {len(found)}, their colours off by"
         f" {255 * math.sqrt(squares / len(index)):.1f}/255 on average: frame.materials is {count}"
@@ -265,7 +274,7 @@ def reduced(mesh: Mesh, count: int) -> tuple[Mesh, str | None]:
 
 
 def clustered(colours: Floats, weights: npt.NDArray[np.int64], count: int) -> tuple[Floats, Indices]:
-    """Weighted k-means of colours: at most ``count`` centres, float64 [k, 3], and the nearest one of each, int64 [n].
+    """Weighted k-means of colours: at most ``count`` centres, float64 [k, c], and the nearest one of each, int64 [n].
 
     It begins with the heaviest colour, then the one with the largest weighted distance to those chosen.
     """
@@ -284,7 +293,7 @@ def clustered(colours: Floats, weights: npt.NDArray[np.int64], count: int) -> tu
         if (nearest == previous).all():
             break
         total = np.bincount(nearest, weights, len(centres))
-        sums = np.stack([np.bincount(nearest, weights * colours[:, axis], len(centres)) for axis in range(3)], axis=1)
+        sums = np.stack([np.bincount(nearest, weights * colour, len(centres)) for colour in colours.T], axis=1)
         filled = total > 0
         centres[filled] = sums[filled] / total[filled, None]
     return centres, nearest
