@@ -64,6 +64,12 @@ class Entry:
         """The designs whose Verilog decides the figures."""
         return (Design(self.config, self.overrides),) if self.designs is None else self.designs
 
+    @property
+    def scenes(self) -> list[str]:
+        """The scenes and studies that the commands name, below the root."""
+        named = {part for command in self.commands.values() for part in command}
+        return sorted(part for part in named if part.startswith("scenes/") and part.endswith(".toml"))
+
 
 def _alone(*sources: str) -> dict[str, Any]:
     """What decides figures without hardware."""

@@ -1,17 +1,19 @@
-"""Digests of what figures are measured on: the Verilog of configurations, and sources of the host.
+"""Digests of what figures are measured on: the Verilog of configurations, sources of the host, scenes and studies.
 
-A digest is the SHA-256 of texts without comments, imports, places of assertions and white space that no meaning depends
-on, in any order: a renamed file is the same text.
+A digest of Verilog or sources is the SHA-256 of texts without comments, imports, places of assertions and white space
+that no meaning depends on, in any order: a renamed file is the same text.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from colonnade.common import cache
+from colonnade.common.toml_files import parse_toml
 from colonnade.design.config_name import find_configuration
 from colonnade.design.generator import design_for, source_hash
 from colonnade.design.toolchain import cache_directory, project_root
@@ -35,6 +37,9 @@ _PYTHON = re.compile(
     r'("(?:\\.|[^"\\\n])+")|#[^\n]*|^[ \t]*""".*?"""|^[ \t]*(?:from \S+ )?import (?:\([^)]*\)|[^\n]*)', re.S | re.M
 )
 
+#: What digests of scenes and studies are called.
+SCENES = "scenes"
+
 _PLACE = re.compile(r"\bat \w+\.scala:\d+")
 
 
@@ -53,11 +58,24 @@ def _normal(file: Path) -> str:
     return re.sub(r" ?([^\w ]) ?", r"\1", " ".join(_PLACE.sub("", text).split()))
 
 
+def digest_of_scenes(files: Iterable[Path]) -> str:
+    """The digest of the values of scenes, and of studies with the scenes that they name."""
+    contents = []
+    for file in files:
+        content = parse_toml(file.read_bytes(), f"scene {file.name}")
+        named = [file.parent / name for name in content.get("workload", {}).get("scenes", ())]
+        others = [parse_toml(one.read_bytes(), f"scene {one.name}") for one in named]
+        contents.append([{key: value for key, value in content.items() if key not in ("title", "description")}, others])
+    return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()
+
+
 def digests_of(entry: Entry) -> dict[str, str | None]:
     """What an entry would be measured on: digests by configuration, and of sources; None if they are not cached."""
     root, texts = project_root(), {}
     for name in entry.sources:
         texts[name] = digest_of(file for pattern in SOURCES[name] for file in root.glob(pattern))
+    if entry.scenes:
+        texts[SCENES] = digest_of_scenes([root / name for name in entry.scenes])
     return {design.name: _cached(design) for design in entry.hardware} | texts
 
 
@@ -99,4 +117,5 @@ def stale(entry: Entry, measured: Mapping[str, str]) -> Iterator[str]:
         yield f"it has no digest of {name}" if name in today else f"its digest of {name} belongs to no measurement"
     for name, digest in today.items():
         if digest is not None and measured.get(name, digest) != digest:
-            yield f"{'sources' if name in SOURCES else 'the Verilog'} of {name} changed"
+            changed = "sources of " if name in SOURCES else "" if name == SCENES else "the Verilog of "
+            yield f"{changed}{name} changed"

@@ -158,6 +158,27 @@ def test_figures_of_other_sources_are_refused(docs: Path, monkeypatch: pytest.Mo
     assert "sources of model changed" in problem
 
 
+def test_figures_of_another_study_or_scene_are_refused(
+    docs: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    study, scene = tmp_path / "scenes" / "study.toml", tmp_path / "scenes" / "cube.toml"
+    scene.parent.mkdir()
+    scene.write_text('mesh.name = "cube"\n')
+    study.write_text('title = "A"\n[workload]\nscenes = ["cube.toml"]\nsize = [8, 8]\n')
+    monkeypatch.setattr(digests, "project_root", lambda: tmp_path)
+    entry = replace(ENTRY, commands={"": (*ENTRY.commands[""], "scenes/study.toml")})
+    monkeypatch.setattr(data, "catalog", lambda: {entry.name: entry})
+    measure.measure(entry, docs)
+    study.write_text(study.read_text().replace('"A"', '"B"') + "# why\n")
+    assert not list(data.problems(docs))
+    for file, before, after in ((study, "[8, 8]", "[9, 8]"), (scene, "cube", "sphere")):
+        text = file.read_text()
+        file.write_text(text.replace(before, after))
+        (problem,) = data.problems(docs)
+        assert "scenes changed" in problem
+        file.write_text(text)
+
+
 @pytest.mark.parametrize(
     ("suffix", "text", "same", "other"),
     [
