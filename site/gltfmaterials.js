@@ -53,7 +53,7 @@ export class GltfMaterials {
     const emitted = colour(material.emissiveFactor, [0, 0, 0], BRIGHTEST).map((value) => strength * value);
     const emissive = emitted.some(Boolean) ? this.use(material.emissiveTexture) : null;
     const emission = emissive ? emitted : shownEmission(emitted);
-    if (Math.max(...emitted) > 1 && !emissive) this.notes.add("emission above 1 is scaled to 1");
+    if (Math.max(...emitted) > 1) this.notes.add("emission above 1 is scaled to 1");
     if (extensions.KHR_materials_unlit) this.notes.add("unlit materials are lit: matt surfaces have their base colour");
     const given = number(extension("ior").ior, IOR);
     const alpha = this.alphaOf(material, surface);
