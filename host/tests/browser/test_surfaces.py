@@ -148,6 +148,7 @@ def test_a_sheet_glows_as_by_the_host(tmp_path: Path, strength: float) -> None:
     mesh = load_mesh(file, corner_colours=True)
     used = {mesh.materials[number].emission for number in np.unique(mesh.face_materials)}
     entries = np.array(sorted(one["emission"] for one in found["entries"]))
+    assert found["notes"] == ["emission above 1 is scaled to 1"] * (strength > 1)
     assert len(used) > 3
     np.testing.assert_allclose(np.unique(entries, axis=0), np.array(sorted(used)), atol=1e-12)
 
