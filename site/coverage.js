@@ -5,6 +5,10 @@ import { areasOf, MIRROR_ROUGHNESS, shownEmission } from "./surfaces.js";
 
 /** As host/colonnade/mesh/geometry/topology.py: faces of a mesh that is split, and edges that are not, as part of the mesh. */
 const [MOST_SPLIT_FACES, SMALLEST_SPLIT] = [49152, 1 / 400];
+/** As host/colonnade/mesh/files/gltf_emission.py: the part of the faces that a mesh may have more which emission takes. */
+const EMISSION_SHARE = 4;
+/** As host/colonnade/mesh/files/gltf_metal.py: metal that emits at least so much has this roughness. */
+const [GLOW, GLOWING_ROUGHNESS] = [1 / 8, 3 / 8];
 /** Blended faces of less alpha are not shown. */
 const THIN = 0.05;
 const WHOLE_FACE = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1);
@@ -21,7 +25,7 @@ const facesOf = (mesh, number) => [...mesh.materialOf.keys()].filter((face) => m
 /** The mesh of a file with materials, prepared for surfacesOf; another one is left. */
 export function prepared(library, mesh) {
   if (!mesh.materials) return mesh;
-  const mapped = withMaps(library, mesh);
+  const mapped = withMaps(library, mesh.clip ? mesh : bisected(library, mesh));
   const found = swatched(library, withoutAlpha(library, mesh.clip ? atRest(library, mapped) : mapped));
   return { ...found, notes: [...new Set(found.notes)] };
 }
@@ -39,6 +43,29 @@ function atRest(library, mesh) {
   return { ...mesh, vertices, ...Object.fromEntries(Object.entries(widths).map(([name, width]) => [name, ordered(name === "normals" ? normals : mesh[name], width)])) };
 }
 
+/** Whether faces of a material emit by a map. */
+const emitsByMap = (material) => material.emissive && !material.emitsMean && material.emission.some(Boolean);
+
+/** The mesh with pieces of faces on which the emission by a map varies, and of their neighbours. */
+function bisected(library, mesh) {
+  let found = mesh;
+  mesh.materials.forEach((material, number) => {
+    if (!emitsByMap(material) || !found.materialOf.includes(number)) return;
+    const shows = Uint8Array.from(found.materialOf, (own) => Number(own === number));
+    const budget = Math.floor((MOST_SPLIT_FACES - shows.length) / EMISSION_SHARE);
+    const { owners, weights } = library.emissionPieces(mesh.textures[material.emissive.texture], material.emission, found, shows, found.emissiveUvs, budget);
+    if (owners.length > shows.length) found = split(found, cornersOf(found), [...owners].map((owner, i) => ({ owner, weights: weights.subarray(9 * i, 9 * i + 9) })));
+  });
+  return found;
+}
+
+/** The positions of the corners of faces. */
+function cornersOf({ vertices, faces }) {
+  const corners = new Float64Array(3 * faces.length);
+  faces.forEach((vertex, corner) => corners.set(vertices.subarray(3 * vertex, 3 * vertex + 3), 3 * corner));
+  return corners;
+}
+
 /** The mesh with the materials that metallic-roughness and emission maps make of its faces, numbered as the host does. */
 function withMaps(library, mesh) {
   const { materials, metalUvs, emissiveUvs, textures } = mesh;
@@ -47,7 +74,7 @@ function withMaps(library, mesh) {
   const areas = areasOf(mesh);
   materials.forEach((material, number) => {
     const hasMetal = material.metal && material.kind === "diffuse";
-    const emits = material.emissive && !material.emitsMean && material.emission.some(Boolean);
+    const emits = emitsByMap(material);
     if (!hasMetal && !emits) return;
     const own = facesOf(mesh, number);
     const metal = hasMetal && library.metal(textures[material.metal.texture], valuesOf(metalUvs, own, 6), material.factors);
@@ -59,11 +86,12 @@ function withMaps(library, mesh) {
     const numbers = new Map();
     for (const i of order) {
       const isMetal = Boolean(metal?.isMetal[i]);
-      const isDark = isMetal && metal.roughness[i] <= MIRROR_ROUGHNESS;
-      const emission = isDark ? [0, 0, 0] : emissionOf(i);
+      const glows = isMetal && Math.max(...emissionOf(i)) >= GLOW;
+      const roughness = isMetal && (glows ? GLOWING_ROUGHNESS : metal.roughness[i]);
+      const emission = isMetal && roughness <= MIRROR_ROUGHNESS ? [0, 0, 0] : emissionOf(i);
       if (!isMetal && !emission.some((value, channel) => value !== found[number].emission[channel])) continue;
-      const key = [isMetal && metal.roughness[i], ...emission].join();
-      if (!numbers.has(key)) numbers.set(key, found.push({ ...found[number], emission, ...(isMetal ? { kind: "mirror", roughness: metal.roughness[i] } : {}) }) - 1);
+      const key = [roughness, ...emission].join();
+      if (!numbers.has(key)) numbers.set(key, found.push({ ...found[number], emission, ...(isMetal ? { kind: "mirror", roughness } : {}) }) - 1);
       materialOf[own[i]] = numbers.get(key);
     }
   });
@@ -80,8 +108,7 @@ function withoutAlpha(library, mesh) {
   const whole = [];
   const parts = [];
   const panes = [];
-  const corners = new Float64Array(3 * mesh.faces.length);
-  mesh.faces.forEach((vertex, corner) => corners.set(mesh.vertices.subarray(3 * vertex, 3 * vertex + 3), 3 * corner));
+  const corners = cornersOf(mesh);
   const edge = SMALLEST_SPLIT * Math.max(...[0, 1, 2].map((axis) => extent(mesh.vertices, axis)));
   let budget = MOST_SPLIT_FACES - mesh.materialOf.length;
   mesh.materials.forEach((material, number) => {
@@ -120,7 +147,7 @@ function withoutAlpha(library, mesh) {
   }
   const pieces = [...whole.sort((a, b) => a - b).map((owner) => ({ owner, weights: WHOLE_FACE })), ...parts].sort((a, b) => a.owner - b.owner);
   if (!pieces.length) throw new Error(`mesh ${mesh.name}: all its faces are transparent by their alpha: export it with alphaMode OPAQUE`);
-  return split(found, corners, pieces);
+  return { ...split(found, corners, pieces), alphas: null };
 }
 
 function extent(vertices, axis) {
@@ -161,7 +188,9 @@ function split(mesh, corners, pieces) {
     normals: interpolated(mesh.normals, 3),
     colours: interpolated(mesh.colours, 3),
     uvs: interpolated(mesh.uvs, 2),
-    alphas: null,
+    metalUvs: interpolated(mesh.metalUvs, 2),
+    emissiveUvs: interpolated(mesh.emissiveUvs, 2),
+    alphas: interpolated(mesh.alphas, 1),
     materialOf: ofOwners(mesh.materialOf),
     hasOwnColours: ofOwners(mesh.hasOwnColours),
     relief: relief && { ...relief, mapOf: ofOwners(relief.mapOf), uvs: interpolated(relief.uvs, 2), tangents: interpolated(relief.tangents, 4) },
@@ -175,7 +204,8 @@ function swatched(library, mesh) {
   const colours = mesh.colours ? Float64Array.from(mesh.colours) : new Float64Array(3 * mesh.faces.length).fill(1);
   let hasSwatches = false;
   mesh.materials.forEach((material, number) => {
-    const faces = material.base ? facesOf(mesh, number) : [];
+    // Metal that emits has no second entry of the material table
+    const faces = material.base && !(material.kind === "mirror" && material.emission.some(Boolean)) ? facesOf(mesh, number) : [];
     if (!faces.length) return;
     const { isPlain, colours: found } = library.swatches(mesh.textures[material.base.texture], valuesOf(mesh.uvs, faces, 6));
     const own = isPlain.includes(1) ? materials.push({ ...material, base: null, albedo: [1, 1, 1], ofTexture: material }) - 1 : -1;

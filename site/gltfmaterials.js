@@ -85,7 +85,7 @@ export class GltfMaterials {
     return { factor: clamped(number(baseColorFactor?.[3], 1)), cutoff: Math.max(0, Math.min(2, cutoff)), blends: alphaMode === "BLEND" };
   }
 
-  /** @returns {any} The metallic-roughness part of a material, or what stands for it. */
+  /** The metallic-roughness part of a material, or what stands for it. @param {any} material @returns {any} */
   surfaceOf({ pbrMetallicRoughness: surface = { metallicFactor: 0 } }, { KHR_materials_unlit: unlit, KHR_materials_pbrSpecularGlossiness: older }) {
     if (unlit) return { baseColorFactor: surface.baseColorFactor, baseColorTexture: surface.baseColorTexture, metallicFactor: 0, roughnessFactor: 1 };
     if (!older) return surface;

@@ -184,6 +184,17 @@ export class Library {
     );
   }
 
+  /** The faces of a mesh in pieces where what they emit by a map varies, at most so many more: `owners` and `weights`, as of cut. */
+  emissionPieces(texture, factors, { vertices, faces }, shows, uvs, budget) {
+    return this.withArrays([texture.pixels, Float64Array.from(factors), vertices, faces, shows, uvs, new Uint32Array(3)], (pixels, f, v, corners, is, u, out) =>
+      this.withArrays([Int32Array.from(textureWords(texture, pixels))], (map) => {
+        this.check(this.wasm.colonnade_model_emission_pieces(map, f, v, vertices.length / 3, corners, faces.length / 3, is, u, budget, out));
+        const [count, owners, weights] = new Uint32Array(this.wasm.memory.buffer, out, 3);
+        return { owners: new Int32Array(this.wasm.memory.buffer, owners, count).slice(), weights: new Float64Array(this.wasm.memory.buffer, weights, 9 * count).slice() };
+      }),
+    );
+  }
+
   /**
    * What of the faces of a material its alpha shows: `kinds`, the `owners` and `weights` of pieces, `panes`, and the pixels of
    * the texture, `filled` (colonnade_cut). `corners`, `uvs` and `alphas` are of the faces, `values` and `budget` as there.

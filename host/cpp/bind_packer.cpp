@@ -206,6 +206,29 @@ auto emissionOf(const Texture& map, const Positions& uvs, const Column<double>& 
     return result;
 }
 
+/// Owners and weights of pieces, as arrays.
+template <class Piece> std::pair<nb::object, nb::object> arraysOf(const std::vector<Piece>& pieces) {
+    std::vector<std::int64_t> owners;
+    std::vector<mesh::Corners> weights;
+    for (const Piece& piece : pieces) {
+        owners.push_back(piece.owner);
+        weights.push_back(piece.weights);
+    }
+    return {arrayOf<std::int64_t>(owners, {owners.size()}), arrayOf<double>(weights, {weights.size(), 3, 3})};
+}
+
+nb::tuple emissionPieces(const Texture& map, const Column<double>& factor, const Rows<double>& vertices, const Rows<std::int32_t>& faces,
+                         const Column<std::uint8_t>& shows, const Positions& uvs, std::int64_t budget, const Column<double>& linear) {
+    checkFaces(faces, vertices.shape(0));
+    if (std::min(shows.shape(0), uvs.shape(0)) < faces.shape(0) || factor.shape(0) < 3 || linear.shape(0) < 256) throw std::invalid_argument("a face has no emission");
+    const std::vector<mesh::Piece> pieces = released([&] {
+        return mesh::emissionPieces(pictureOf(map), {factor.data()[0], factor.data()[1], factor.data()[2]}, vectorOf<mesh::Vector>(vertices), vectorOf<mesh::Face>(faces),
+                                    shows.data(), uvs.data(), budget, linear.data());
+    });
+    const auto [owners, weights] = arraysOf(pieces);
+    return nb::make_tuple(owners, weights);
+}
+
 nb::tuple cutAlpha(const CornerRows<double>& corners, const Positions& uvs, const Rows<double>& alphas, const std::optional<Texture>& texture,
                    const std::optional<nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>>& alpha, const Column<double>& linear, double factor,
                    double cutoff, std::optional<double> paneFactor, double smallest, std::int64_t budget) {
@@ -231,17 +254,11 @@ nb::tuple cutAlpha(const CornerRows<double>& corners, const Positions& uvs, cons
         if (alpha) filled = coverage.filled();
         return mesh::cutAlpha(coverage, faces, smallest, budget, paneFactor);
     });
-    std::vector<std::int64_t> owners;
-    std::vector<mesh::Corners> weights;
-    for (const mesh::CutPiece& piece : cut.pieces) {
-        owners.push_back(piece.owner);
-        weights.push_back(piece.weights);
-    }
+    const auto [owners, weights] = arraysOf(cut.pieces);
     std::vector<double> panes;
     for (const mesh::Pane& pane : cut.panes) panes.insert(panes.end(), {pane.alpha, pane.colour[0], pane.colour[1], pane.colour[2]});
     const auto width = static_cast<std::size_t>(visible.width), height = static_cast<std::size_t>(visible.height);
-    return nb::make_tuple(arrayOf<std::int8_t>(cut.kinds, {faces.size()}), arrayOf<std::int64_t>(owners, {owners.size()}),
-                          arrayOf<double>(weights, {weights.size(), 3, 3}), arrayOf<double>(panes, {cut.panes.size(), 4}), cut.isCoarse, cut.isBlended,
+    return nb::make_tuple(arrayOf<std::int8_t>(cut.kinds, {faces.size()}), owners, weights, arrayOf<double>(panes, {cut.panes.size(), 4}), cut.isCoarse, cut.isBlended,
                           arrayOf<std::uint8_t>(filled, {height, width, 3}));
 }
 
@@ -281,15 +298,10 @@ nb::tuple baked(const Rows<double>& vertices, const Rows<std::int32_t>& faces, c
     });
     const std::size_t parts = mesh.pieces.size();
     std::vector<mesh::Face> corners;
-    std::vector<std::int64_t> owners;
-    std::vector<mesh::Corners> weights;
-    for (const mesh::Piece& piece : mesh.pieces) {
-        corners.push_back(piece.face);
-        owners.push_back(piece.owner);
-        weights.push_back(piece.weights);
-    }
+    for (const mesh::Piece& piece : mesh.pieces) corners.push_back(piece.face);
+    const auto [owners, weights] = arraysOf(mesh.pieces);
     return nb::make_tuple(arrayOf<double>(mesh.vertices, {mesh.vertices.size(), 3}), arrayOf<std::int32_t>(corners, {parts, 3}),
-                          arrayOf<double>(mesh.normals, {parts, 3, 3}), arrayOf<std::int64_t>(owners, {parts}), arrayOf<double>(weights, {parts, 3, 3}), mesh.error);
+                          arrayOf<double>(mesh.normals, {parts, 3, 3}), owners, weights, mesh.error);
 }
 
 nb::object atlas(const Positions& uvs, const Column<std::int32_t>& textures, const Rows<double>& factors, const std::vector<Texture>& pictures,
@@ -336,5 +348,7 @@ void bind_packer(nb::module_& module) {
     module.def("baked", &baked, "vertices"_a, "faces"_a, "normals"_a, "maps"_a, "index"_a, "uvs"_a, "tangents"_a, "budget"_a);
     module.def("metal_of", &metalOf, "map"_a, "uvs"_a, "metallic"_a, "roughness"_a);
     module.def("emission_of", &emissionOf, "map"_a, "uvs"_a, "areas"_a, "linear"_a);
+    module.def("emission_pieces", &emissionPieces, "map"_a, "factor"_a, "vertices"_a, "faces"_a, "shows"_a, "uvs"_a, "budget"_a, "linear"_a,
+               "Owners and weights of the pieces of faces, bisected where what they emit by a map varies.");
     module.def("merged_values", &mesh::mergedValues, "values"_a, "weights"_a, "kinds"_a, "count"_a);
 }

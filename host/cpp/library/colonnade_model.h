@@ -119,6 +119,13 @@ struct colonnade_cut {
     const uint8_t *filled; /* the texture without its hidden pixels */
 };
 
+/* Parts of faces, by the faces; they are valid until the next call. */
+struct colonnade_pieces {
+    uint32_t count;
+    const int32_t *owners;
+    const double *weights; /* as of colonnade_cut */
+};
+
 struct colonnade_step {
     int32_t kind;      /* 0 a ray, 1 a node is read, 2 a child's box, 3 a record of triangles is read, 4 a triangle, 5 a hit */
     int32_t value;     /* ray: 0 primary, 1 shadow, 2 reflection, 3 refraction, 4 gathered; an address; a packed id */
@@ -180,6 +187,12 @@ const char *colonnade_model_metal(const struct colonnade_texture *map, const dou
 
 /* What so many faces emit by an emission map, linear, at most four colours: `uvs` of the corners, and the faces' areas. */
 const char *colonnade_model_emission(const struct colonnade_texture *map, const double *uvs, const double *areas, uint32_t count, double *colours);
+
+/* Faces in pieces where what they emit by a map varies: factors of its channels, which faces show it, 0 or 1, `uvs` of the corners in
+ * it, and the pieces that may be added. */
+const char *colonnade_model_emission_pieces(const struct colonnade_texture *map, const double *factors, const double *vertices, uint32_t vertex_count,
+                                            const int32_t *faces, uint32_t face_count, const uint8_t *shows, const double *uvs, int32_t budget,
+                                            struct colonnade_pieces *pieces);
 
 /* Merges the nearest of values of equal kinds until so many are left, by their weights; `merged` has the new value of each. */
 const char *colonnade_model_merge(const double *values, const double *weights, const int32_t *kinds, uint32_t count, uint32_t left, double *merged);

@@ -76,15 +76,6 @@ const char* checkFit(const packer::Sections& sections, const bvh::Bvh& tree) {
     return nullptr;
 }
 
-/// Values of C, in the types of C++.
-template <class To, class From> std::vector<To> copied(const From* from, std::uint32_t count) {
-    std::vector<To> values(count);
-    if constexpr (std::is_arithmetic_v<To>) std::copy(from, from + count, values.begin());
-    else
-        for (std::uint32_t i = 0; i < count; ++i) std::copy(from + values[i].size() * i, from + values[i].size() * (i + 1), values[i].begin());
-    return values;
-}
-
 mesh::Clip clipOf(const colonnade_clip& from) {
     mesh::Clip clip;
     clip.nodes = {copied<std::int64_t>(from.parents, from.node_count),       copied<std::int64_t>(from.order, from.node_count),

@@ -28,11 +28,28 @@ using namespace colonnade;
 
 namespace {
 
+/// Owners and weights of pieces, as the caller reads them.
+struct PieceArrays {
+    std::vector<std::int32_t> owners;
+    std::vector<mesh::Corners> weights;
+
+    template <class Piece> void assign(const std::vector<Piece>& pieces) {
+        owners.clear();
+        weights.clear();
+        for (const Piece& piece : pieces) {
+            owners.push_back(static_cast<std::int32_t>(piece.owner));
+            weights.push_back(piece.weights);
+        }
+    }
+
+    colonnade_pieces view() const { return {static_cast<std::uint32_t>(owners.size()), owners.data(), weights.empty() ? nullptr : weights[0][0].data()}; }
+};
+
+PieceArrays pieceArrays;
+
 /// A cut by alpha, as the caller reads it.
 struct Cut {
     mesh::AlphaCut found;
-    std::vector<std::int32_t> owners;
-    std::vector<mesh::Corners> weights;
     std::vector<std::uint8_t> filled;
 };
 
@@ -53,6 +70,15 @@ const char* colonnade_model_emission(const colonnade_texture* map, const double*
     return nullptr;
 }
 
+const char* colonnade_model_emission_pieces(const colonnade_texture* map, const double* factors, const double* vertices, std::uint32_t vertexCount,
+                                            const std::int32_t* faces, std::uint32_t faceCount, const std::uint8_t* shows, const double* uvs, std::int32_t budget,
+                                            colonnade_pieces* pieces) {
+    pieceArrays.assign(mesh::emissionPieces(pictureOf(*map), {factors[0], factors[1], factors[2]}, copied<mesh::Vector>(vertices, vertexCount),
+                                            copied<mesh::Face>(faces, faceCount), shows, uvs, budget, linearCodes().data()));
+    *pieces = pieceArrays.view();
+    return nullptr;
+}
+
 const char* colonnade_model_cut(const colonnade_alpha* from, colonnade_cut* to) {
     std::vector<mesh::CoveredFace> faces(from->count);
     for (std::size_t i = 0; i < faces.size(); ++i) {
@@ -70,20 +96,12 @@ const char* colonnade_model_cut(const colonnade_alpha* from, colonnade_cut* to) 
     mesh::Coverage coverage(colours, alpha, linearCodes().data(), from->values[0], from->values[1]);
     const std::optional<double> paneFactor = from->values[2] < 0 ? std::nullopt : std::optional(from->values[2]);
     static Cut cut;
-    cut = {mesh::cutAlpha(coverage, faces, from->values[3], from->budget, paneFactor), {}, {}, {}};
-    for (const mesh::CutPiece& piece : cut.found.pieces) {
-        cut.owners.push_back(static_cast<std::int32_t>(piece.owner));
-        cut.weights.push_back(piece.weights);
-    }
+    cut = {mesh::cutAlpha(coverage, faces, from->values[3], from->budget, paneFactor), {}};
+    pieceArrays.assign(cut.found.pieces);
+    const colonnade_pieces pieces = pieceArrays.view();
     if (from->alpha) cut.filled = coverage.filled();
-    *to = {cut.found.kinds.data(),
-           static_cast<std::uint32_t>(cut.owners.size()),
-           cut.owners.data(),
-           cut.weights.empty() ? nullptr : cut.weights[0][0].data(),
-           cut.found.panes.empty() ? nullptr : &cut.found.panes[0].alpha,
-           cut.found.isCoarse,
-           cut.found.isBlended,
-           cut.filled.data()};
+    *to = {cut.found.kinds.data(), pieces.count,        pieces.owners,    pieces.weights, cut.found.panes.empty() ? nullptr : &cut.found.panes[0].alpha,
+           cut.found.isCoarse,     cut.found.isBlended, cut.filled.data()};
     return nullptr;
 }
 

@@ -80,6 +80,15 @@ const char* refuse(const std::string& error);
 /// Linear values of the codes of sRGB.
 const std::array<double, 256>& linearCodes();
 
+/// Values of C, in the types of C++.
+template <class To, class From> std::vector<To> copied(const From* from, std::uint32_t count) {
+    std::vector<To> values(count);
+    if constexpr (std::is_arithmetic_v<To>) std::copy(from, from + count, values.begin());
+    else
+        for (std::uint32_t i = 0; i < count; ++i) std::copy(from + values[i].size() * i, from + values[i].size() * (i + 1), values[i].begin());
+    return values;
+}
+
 mesh::Picture<std::uint8_t> pictureOf(const colonnade_texture& texture);
 
 } // namespace colonnade

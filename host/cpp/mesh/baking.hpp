@@ -4,6 +4,7 @@
 /// neighbours keep common vertices. The normals at the corners are then the least-squares fit to the map.
 #pragma once
 
+#include "bisection.hpp"
 #include "relief_surface.hpp"
 
 namespace colonnade::mesh {
@@ -26,7 +27,7 @@ public:
     /// The surface, of at most so many faces more.
     BakedMesh make(std::int64_t budget) {
         split(budget);
-        std::stable_sort(surface_.pieces.pieces.begin(), surface_.pieces.pieces.end(), [](const Piece& a, const Piece& b) { return a.owner < b.owner; });
+        surface_.pieces.sort();
         BakedMesh baked;
         std::vector<Corners> base;
         for (const Piece& piece : surface_.pieces.pieces) base.push_back(surface_.smooth(piece));
@@ -47,10 +48,6 @@ public:
 private:
     /// Mean square of the difference between the map and interpolated corners of a face that is not split: 2.5 degrees.
     static constexpr double flat = 2e-3;
-    /// Faces are split at the same time if their errors are at least this part of the largest one.
-    static constexpr double near = 0.25;
-    /// Edges are not split below this part of the mesh.
-    static constexpr double smallest = 1.0 / 400;
     static constexpr int fitSteps = 6;
 
     /// Area times the mean square of what interpolated corners of pieces from one on differ from the map, 0 where little.
@@ -79,42 +76,14 @@ private:
 
     /// Splits faces until their maps are nearly linear on them, edges are too short, or there are so many more.
     void split(std::int64_t budget) {
-        const auto [low, high] = surface_.pieces.bounds();
-        const double shortest = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}) * smallest;
+        const double shortest = surface_.pieces.shortest();
         double area = 0;
         for (const Piece& piece : surface_.pieces.pieces)
             if (surface_.hasMap(piece)) area += surface_.pieces.area(piece);
         // Half an edge of as many equal faces: finer detail is not looked for
         const double faces = static_cast<double>(surface_.pieces.pieces.size()) + static_cast<double>(std::max<std::int64_t>(budget, 0));
         const double width = std::max(shortest, std::sqrt(area / faces) / 2);
-        std::vector<double> errors = errorsFrom(0, width);
-        while (budget > 1) {
-            std::vector<double> splittable(errors.size());
-            for (std::size_t i = 0; i < errors.size(); ++i)
-                if (surface_.pieces.longest(surface_.pieces.pieces[i]) > shortest * shortest) splittable[i] = errors[i];
-            const double least = near * *std::max_element(splittable.begin(), splittable.end());
-            std::vector<std::int64_t> selected;
-            for (std::size_t i = 0; i < splittable.size(); ++i)
-                if (splittable[i] > least) selected.push_back(static_cast<std::int64_t>(i));
-            std::stable_sort(selected.begin(), selected.end(), [&](std::int64_t a, std::int64_t b) { return errors[a] > errors[b]; });
-            selected.resize(std::min(selected.size(), static_cast<std::size_t>(budget / 2)));
-            const PieceEdges edges(surface_.pieces);
-            std::vector<std::uint8_t> marked = edges.closed(selected);
-            while (!selected.empty() && edges.sides(marked) > budget) {
-                selected.resize(selected.size() / 2);
-                marked = edges.closed(selected);
-            }
-            if (selected.empty()) break;
-            std::vector<double> kept;
-            for (std::size_t i = 0; i < errors.size(); ++i)
-                if (!edges.isHit(i, marked)) kept.push_back(errors[i]);
-            const std::size_t before = surface_.pieces.pieces.size();
-            surface_.pieces.bisect(edges.keys(marked));
-            const std::vector<double> others = errorsFrom(kept.size(), width);
-            kept.insert(kept.end(), others.begin(), others.end());
-            errors = std::move(kept);
-            budget -= static_cast<std::int64_t>(surface_.pieces.pieces.size() - before);
-        }
+        bisectWorst(surface_.pieces, shortest, budget, [&](std::size_t first) { return errorsFrom(first, width); });
     }
 
     /// Normals at the corners. Those of one vertex and base normal are equal; where no face of theirs has a map, the base normal.

@@ -1,9 +1,12 @@
 /// Emission of faces by a map: a face emits one of a few colours, as a table of materials has room for.
 #pragma once
 
+#include <cstring>
 #include <map>
 #include <vector>
 
+#include "bisection.hpp"
+#include "relief.hpp"
 #include "texture.hpp"
 
 namespace colonnade::mesh {
@@ -66,6 +69,57 @@ inline std::vector<Rgb> emissionOf(const Picture<std::uint8_t>& map, const doubl
         for (const std::size_t face : group.faces) found[face] = colour;
     }
     return found;
+}
+
+/// Bisects the faces of a surface on which the emission by a map varies, at most so many more; vertices at the same place stay together.
+/// @param factor of the map's values
+/// @param shows which faces show the map
+/// @param uvs positions of the corners in it, six for a face
+/// @return the pieces of all faces, in their order
+inline std::vector<Piece> emissionPieces(const Picture<std::uint8_t>& map, const Rgb& factor, const std::vector<Vector>& vertices, std::vector<Face> faces,
+                                         const std::uint8_t* shows, const double* uvs, std::int64_t budget, const double* linear) {
+    /// Sum of the variances of the channels on a piece that is not split: a channel differs by 1/16.
+    constexpr double flat = 1.0 / 256;
+    const bool isFinite = std::all_of(vertices.begin(), vertices.end(), [](const Vector& at) { return std::isfinite(at[0] + at[1] + at[2]); });
+    // What is not finite is refused when the mesh is cleaned
+    if (!isFinite || faces.empty()) return Pieces(vertices, faces).pieces;
+    const MergedRows<double> merged = mergeRows(vertices.data(), vertices.size());
+    for (Face& face : faces)
+        for (std::int32_t& vertex : face) vertex = static_cast<std::int32_t>(merged.index[vertex]);
+    Pieces surface(merged.rows, faces);
+    const auto errorOf = [&](const Piece& piece, const std::vector<Vector>& points) {
+        Triangle corners;
+        std::memcpy(&corners, uvs + 6 * piece.owner, sizeof corners);
+        corners = weighted(piece.weights, corners);
+        Rgb sum{};
+        double squares = 0;
+        for (const Vector& point : points) {
+            const Pair at = weighted(point, corners);
+            Rgb found;
+            map.sample(at.data(), [&](std::uint8_t code) { return linear[code]; }, found.data());
+            for (int channel = 0; channel < 3; ++channel) found[channel] *= factor[channel];
+            const double scale = std::max({1.0, found[0], found[1], found[2]});
+            for (int channel = 0; channel < 3; ++channel) {
+                sum[channel] += found[channel] / scale;
+                squares += found[channel] / scale * (found[channel] / scale);
+            }
+        }
+        const auto count = static_cast<double>(points.size());
+        const double variance = squares / count - (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]) / (count * count);
+        return variance > flat ? variance * surface.area(piece) : 0.0;
+    };
+    bisectWorst(surface, surface.shortest(), budget, [&](std::size_t first) {
+        std::size_t users = 0;
+        for (std::size_t i = first; i < surface.pieces.size(); ++i) users += shows[surface.pieces[i].owner];
+        int steps = 16;
+        while (steps > 4 && users * static_cast<std::size_t>(steps * (steps + 1) / 2) > 1u << 22) steps /= 2;
+        const std::vector<Vector> points = trianglePoints(steps);
+        std::vector<double> errors;
+        for (std::size_t i = first; i < surface.pieces.size(); ++i) errors.push_back(shows[surface.pieces[i].owner] ? errorOf(surface.pieces[i], points) : 0.0);
+        return errors;
+    });
+    surface.sort();
+    return std::move(surface.pieces);
 }
 
 } // namespace colonnade::mesh

@@ -42,6 +42,12 @@ public:
         return box;
     }
 
+    /// Length of edges that are not split: 1/400 of the surface.
+    double shortest() const {
+        const auto [low, high] = bounds();
+        return std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}) * (1.0 / 400);
+    }
+
     /// Squares of the lengths of the edges from each corner to the next.
     Vector squares(const Piece& piece) const {
         Vector found;
@@ -97,6 +103,11 @@ public:
             rest.insert(rest.end(), right.begin(), right.end());
         }
         pieces = std::move(done);
+    }
+
+    /// Orders the pieces by the faces that they are parts of.
+    void sort() {
+        std::stable_sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.owner < b.owner; });
     }
 
     std::vector<Vector> vertices;

@@ -17,7 +17,6 @@ from textured_files import FOUR, gltf, png
 from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
-from colonnade.mesh.files.gltf_emission import emission_of
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.mesh.materials.mesh import Mesh
@@ -236,50 +235,6 @@ def test_names_of_pictures_may_have_quotes_and_another_case(
 def test_a_texture_that_does_not_exist_is_refused(tmp_path: Path, missing: str) -> None:
     with pytest.raises(UserError, match=rf"{missing}\[0\] is used, but does not exist"):
         load_mesh(gltf(tmp_path, **{missing: []}))
-
-
-def test_a_face_emits_what_its_map_does(tmp_path: Path) -> None:
-    surface = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
-    glowing = {"pbrMetallicRoughness": surface, "emissiveFactor": [1, 0.5, 1], "emissiveTexture": {"index": 0}}
-    half = np.zeros((8, 8, 3), np.uint8)
-    half[:, 4:] = 255
-    for pixels, factor in ((half[:, ::-1], (1.0, 0.5, 1.0)), (half, (0.0, 0.0, 0.0))):
-        # The triangle lies on the left, if the right half is shown twice as wide
-        transform = {"KHR_texture_transform": {"scale": [0.4, 0.4]}}
-        mapped = glowing | {"emissiveTexture": {"index": 0, "extensions": transform}}
-        mesh = load_mesh(gltf(tmp_path, pixels, materials=[mapped | {"doubleSided": True}]))
-        (material,) = (mesh.materials[index] for index in mesh.face_materials)
-        np.testing.assert_allclose(material.emission, factor)
-        assert "1 emission map is averaged: a face emits one of four colours" in mesh.notes[0]
-    without = [{"attributes": {"POSITION": 0}, "material": 0}]
-    mesh = load_mesh(gltf(tmp_path, half, materials=[glowing], meshes=[{"primitives": without}]))
-    (material,) = (mesh.materials[index] for index in mesh.face_materials)
-    np.testing.assert_allclose(material.emission, (0.5, 0.25, 0.5))
-
-
-def test_a_bright_map_keeps_its_hue(tmp_path: Path) -> None:
-    strong = {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}}
-    glowing = {"emissiveFactor": [1, 0.5, 0.25], "emissiveTexture": {"index": 0}, "doubleSided": True}
-    for grey, emission, is_bright in ((255, (1.0, 0.5, 0.25), True), (124, (0.8, 0.4, 0.2), False)):
-        pixels = np.full((4, 4, 3), grey, np.uint8)
-        found = 4.0 * linear_from_srgb(np.array(grey / 255.0))
-        mesh = load_mesh(gltf(tmp_path, pixels, materials=[glowing | {"extensions": strong}]))
-        (material,) = (mesh.materials[index] for index in mesh.face_materials)
-        np.testing.assert_allclose(material.emission, emission, rtol=0.02)
-        assert (found > 1.0) == is_bright == any("1 material shines brighter" in note for note in mesh.notes)
-
-
-@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 8]))
-def test_faces_emit_at_most_four_colours_with_the_mean_of_theirs(seed: int, cells: int) -> None:
-    random = np.random.default_rng(seed)
-    colours = random.integers(0, 256, (cells, cells, 3), np.uint8)
-    pixels = np.repeat(np.repeat(colours, 64 // cells, axis=0), 64 // cells, axis=1)
-    corners = random.uniform(0.02, 0.98 / cells - 0.02, (40, 3, 2)) + random.integers(0, cells, (40, 1, 2)) / cells
-    texture = Texture("a", pixels)
-    emission = emission_of(texture, corners, random.normal(size=(40, 3, 3)))
-    assert len(np.unique(emission, axis=0)) <= 4
-    if cells <= 2:  # each cell has a colour of its own
-        np.testing.assert_allclose(emission, texture.colours(corners.mean(axis=1)), atol=0.13)
 
 
 def test_specular_glossiness_gives_the_base_colour(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from colonnade.mesh.files.gltf_checks import DRACO, INSTANCING, READ_EXTENSIONS
 from colonnade.mesh.files.gltf_clip import ClipReader
 from colonnade.mesh.files.gltf_document import COMPRESSION, GltfDocument
 from colonnade.mesh.files.gltf_draco import DracoPrimitives, PrimitiveArrays
-from colonnade.mesh.files.gltf_emission import emission_of
+from colonnade.mesh.files.gltf_emission import emission_of, emission_pieces
 from colonnade.mesh.files.gltf_metal import metal_of, of_map
 from colonnade.mesh.files.gltf_nodes import mesh_nodes
 from colonnade.mesh.files.gltf_relief import relief_of
@@ -43,7 +43,7 @@ from colonnade.mesh.materials.materials import (
 )
 from colonnade.mesh.materials.palette import MAX_MATERIALS
 from colonnade.mesh.materials.roughness import merged_roughness, surface_areas
-from colonnade.mesh.materials.surface import RawSurface, joined
+from colonnade.mesh.materials.surface import Pieces, RawSurface, joined
 from colonnade.mesh.materials.texture import MAX_UV
 
 #: Materials of a file up to which those with a map have all of its roughnesses.
@@ -88,6 +88,8 @@ def read_gltf(
         if len(document.json.get("scenes", [])) > 1:
             raise document.error("its default scene has no faces: choose another one by scene in the file")
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    if clip is None:
+        parts = _bisected(parts, document, materials, textures)
     surface = joined([part.surface for part in parts])
     surface = surface if clip is None else clip.surface(surface)
     parts = _with_emission(parts, document, materials, textures, losses)
@@ -140,6 +142,16 @@ class _Part:
             found.append(number_of(own if metal is None else of_map(own, bool(values[0]), values[1])))
         return np.array(found)[places.reshape(-1)]
 
+    def pieces(self, pieces: Pieces) -> _Part:
+        """That of parts of the faces."""
+        uvs, metal = self.emission_uvs, self.metal
+        return replace(
+            self,
+            surface=self.surface.pieces(pieces),
+            metal=None if metal is None else (metal[0][pieces.owners], metal[1][pieces.owners]),
+            emission_uvs=None if uvs is None else pieces.corners(uvs),
+        )
+
     @property
     def has_one_colour(self) -> bool:
         """Whether all of its faces, of which there are some, have the colour of the material."""
@@ -176,6 +188,39 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
                     plain.add((material.albedo, material.ior))
             if len(plain) > MAX_MATERIALS:
                 raise document.error(f"it has more than {MAX_MATERIALS} materials: use at most {MAX_MATERIALS}")
+    return parts
+
+
+def _bisected(
+    parts: list[_Part], document: GltfDocument, materials: tuple[MeshMaterial, ...], textures: GltfTextures
+) -> list[_Part]:
+    """The parts, with pieces of faces on which the emission by a map varies, and of their neighbours."""
+    for number in sorted({part.material for part in parts if part.emission_uvs is not None}):
+        use = textures.emission_of(number)
+        if use is None or not any(materials[number].emission):
+            continue
+        counts = [len(part.surface.faces) for part in parts]
+        shows = [part.material == number and part.emission_uvs is not None for part in parts]
+        found = emission_pieces(
+            textures.reader.textures[use.texture],
+            gltf_emission(document.entry("materials", number)),
+            joined([part.surface for part in parts]),
+            np.repeat(shows, counts),
+            np.concatenate(
+                [
+                    np.zeros((count, 3, 2)) if part.emission_uvs is None else part.emission_uvs
+                    for part, count in zip(parts, counts, strict=True)
+                ]
+            ),
+        )
+        if len(found.owners) == sum(counts):
+            continue
+        starts = np.cumsum([0, *counts])
+        ends = np.searchsorted(found.owners, starts)
+        parts = [
+            part.pieces(Pieces(found.owners[first:last] - start, found.weights[first:last]))
+            for part, start, first, last in zip(parts, starts[:-1], ends[:-1], ends[1:], strict=True)
+        ]
     return parts
 
 

@@ -11,6 +11,9 @@ from colonnade.common.types import Floats
 from colonnade.mesh.materials.materials import DARK, MIRROR_ROUGHNESS, MeshMaterial, coat_roughness
 from colonnade.mesh.materials.texture import Texture
 
+#: Metal that emits at least so much by its maps has this roughness: a mirror emits nothing, and tables are small.
+_GLOW, _GLOWING_ROUGHNESS = 1 / 8, 3 / 8
+
 
 def metal_of(texture: Texture, uvs: Floats, factors: tuple[float, float]) -> tuple[NDArray[np.bool_], Floats]:
     """Which faces are metal by a map, bool [m], and their mean roughness in sixteenths, 0 to 1, float64 [m].
@@ -30,5 +33,7 @@ def of_map(material: MeshMaterial, is_metal: bool, roughness: float) -> MeshMate
     """The metal beside a diffuse material, or this one with the coat of a roughness."""
     if not is_metal:
         return replace(material, roughness=coat_roughness(roughness))
+    if max(material.emission) >= _GLOW:
+        roughness = _GLOWING_ROUGHNESS
     emission = material.emission if roughness > MIRROR_ROUGHNESS else DARK
     return replace(material, kind="mirror", roughness=roughness, emission=emission)

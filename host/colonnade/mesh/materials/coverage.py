@@ -12,39 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from colonnade.common import fixed_order
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.geometry.topology import MAX_SPLIT_FACES, SMALLEST_SPLIT
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials.materials import Alpha, MeshMaterial
-from colonnade.mesh.materials.surface import RawSurface
+from colonnade.mesh.materials.surface import Pieces, RawSurface
 from colonnade.mesh.materials.texture import LINEAR, Texture
 
 #: Blended faces of less alpha are not shown.
 _THIN = 0.05
-
-
-@dataclass(frozen=True)
-class _Pieces:
-    """Parts of faces.
-
-    Attributes:
-        owners: The face of each, int64 [k].
-        weights: Weights of the owner's corners at the corners of each, float64 [k, 3, 3].
-    """
-
-    owners: Indices
-    weights: Floats
-
-    def __getitem__(self, chosen: Indices) -> _Pieces:
-        return _Pieces(self.owners[chosen], self.weights[chosen])
-
-    @classmethod
-    def joined(cls, *parts: _Pieces) -> _Pieces:
-        owners = np.concatenate([part.owners for part in parts])
-        return cls(owners, np.concatenate([part.weights for part in parts]))
 
 
 @dataclass(frozen=True)
@@ -61,7 +39,7 @@ class _Cut:
     """
 
     kinds: npt.NDArray[np.int8]
-    pieces: _Pieces
+    pieces: Pieces
     panes: Floats
     is_coarse: bool
     is_blended: bool
@@ -100,7 +78,7 @@ def _cut(
         budget,
     )
     whole = None if texture is None or texture.alpha is None else replace(texture, pixels=filled, alpha=None)
-    return _Cut(kinds, _Pieces(faces[owners], weights), panes, is_coarse, is_blended, whole)
+    return _Cut(kinds, Pieces(faces[owners], weights), panes, is_coarse, is_blended, whole)
 
 
 def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
@@ -152,10 +130,10 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
     surface = replace(surface, materials=tuple(materials), textures=tuple(textures))
     surface, thin = _with_panes(surface, panes)
     kept = np.sort(np.concatenate([*whole, thin]))
-    found = _Pieces.joined(_Pieces(kept, np.repeat(np.eye(3)[None], len(kept), axis=0)), *pieces)
+    found = Pieces.joined(Pieces.whole(kept), *pieces)
     if not len(found.owners):
         raise UserError("all its faces are transparent by their alpha: export it with alphaMode OPAQUE")
-    return _split(surface, found[np.argsort(found.owners, kind="stable")])
+    return replace(surface.pieces(found[np.argsort(found.owners, kind="stable")]), alphas=None)
 
 
 def _with_panes(surface: RawSurface, panes: list[tuple[Indices, Floats]]) -> tuple[RawSurface, Indices]:
@@ -183,32 +161,3 @@ def _with_panes(surface: RawSurface, panes: list[tuple[Indices, Floats]]) -> tup
         colours[faces] = np.nan
     all_materials = (*surface.materials, *materials)
     return replace(surface, materials=all_materials, face_materials=index, colours=colours), faces
-
-
-def _split(surface: RawSurface, pieces: _Pieces) -> RawSurface:
-    """The surface of pieces of its faces."""
-    owners, weights = pieces.owners, pieces.weights
-
-    def interpolated(values: Floats | None) -> Floats | None:
-        return None if values is None else fixed_order.product(weights, values[owners])
-
-    # Corners that are kept keep their vertex
-    kept = weights.max(axis=2) == 1.0
-    corner = np.take_along_axis(surface.faces[owners], weights.argmax(axis=2), axis=1)
-    own = fixed_order.product(weights, surface.vertices[surface.faces[owners]])
-    faces = np.where(kept, corner, 0)
-    faces[~kept] = len(surface.vertices) + np.arange(int((~kept).sum()))
-    return replace(
-        surface,
-        vertices=np.concatenate([surface.vertices, own[~kept]]),
-        faces=faces,
-        normals=interpolated(surface.normals),
-        face_materials=surface.material_index[owners],
-        colours=interpolated(surface.colours),
-        uvs=interpolated(surface.uvs),
-        source_faces=owners,
-        single_sided=None if surface.single_sided is None else surface.single_sided[owners],
-        source_count=len(surface.faces),
-        relief=None if surface.relief is None else surface.relief.pieces(owners, weights),
-        alphas=None,
-    )

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from colonnade.common import fixed_order
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh.clips.clip import Clip
@@ -16,6 +18,38 @@ from colonnade.mesh.losses import CLIPPED_COLOURS, CROSSED, DARK_COLOURS, SHORT_
 from colonnade.mesh.materials.materials import PLAIN, MeshMaterial
 from colonnade.mesh.materials.relief import Relief
 from colonnade.mesh.materials.texture import Texture
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Parts of faces.
+
+    Attributes:
+        owners: The face of each, int64 [k].
+        weights: Weights of the owner's corners at the corners of each, float64 [k, 3, 3].
+    """
+
+    owners: Indices
+    weights: Floats
+
+    def __getitem__(self, chosen: Indices | slice) -> Pieces:
+        return Pieces(self.owners[chosen], self.weights[chosen])
+
+    @classmethod
+    def whole(cls, faces: Indices) -> Pieces:
+        """Faces themselves."""
+        return cls(faces, np.repeat(np.eye(3)[None], len(faces), axis=0))
+
+    @classmethod
+    def joined(cls, *parts: Pieces) -> Pieces:
+        """Those of all parts, one after the other."""
+        owners = np.concatenate([part.owners for part in parts])
+        return cls(owners, np.concatenate([part.weights for part in parts]))
+
+    def corners(self, values: Floats) -> Floats:
+        """Values at the corners of the faces, float64 [m, 3, …], as those of the pieces, float64 [k, 3, …]."""
+        own = values[self.owners]
+        return fixed_order.product(self.weights, own.reshape(*own.shape[:2], -1)).reshape(own.shape)
 
 
 @dataclass(frozen=True)
@@ -65,6 +99,36 @@ class RawSurface:
             if value is not None
         }
         return replace(self, **flipped)
+
+    def pieces(self, pieces: Pieces) -> RawSurface:
+        """The surface of parts of its faces, which name those of the file in `source_faces`. It has no clip."""
+        owners, weights = pieces.owners, pieces.weights
+        # Corners that are kept keep their vertex
+        kept = weights.max(axis=2) == 1.0
+        corner = np.take_along_axis(self.faces[owners], weights.argmax(axis=2), axis=1)
+        own = pieces.corners(self.vertices[self.faces])
+        faces = np.where(kept, corner, 0)
+        faces[~kept] = len(self.vertices) + np.arange(int((~kept).sum()))
+        names = ("normals", "colours", "uvs", "alphas")
+        at_corners: dict[str, Any] = {
+            name: pieces.corners(values) for name in names if (values := getattr(self, name)) is not None
+        }
+        return replace(
+            self,
+            vertices=np.concatenate([self.vertices, own[~kept]]),
+            faces=faces,
+            face_materials=self.material_index[owners],
+            source_faces=owners if self.source_faces is None else self.source_faces[owners],
+            source_count=self.file_faces,
+            single_sided=None if self.single_sided is None else self.single_sided[owners],
+            relief=None if self.relief is None else self.relief.pieces(owners, weights),
+            **at_corners,
+        )
+
+    @property
+    def file_faces(self) -> int:
+        """Faces of the file."""
+        return len(self.faces) if self.source_faces is None else self.source_count
 
     @property
     def material_index(self) -> Indices:
@@ -152,6 +216,9 @@ def joined(parts: Sequence[RawSurface]) -> RawSurface:
         blanks = [np.full((len(part.faces), *shape), value) for part in parts]
         return np.concatenate([blank if one is None else one for one, blank in zip(values, blanks, strict=True)])
 
+    file_starts = np.cumsum([0] + [part.file_faces for part in parts])
+    owners = [np.arange(len(part.faces)) if part.source_faces is None else part.source_faces for part in parts]
+    is_whole = all(part.source_faces is None for part in parts)
     return RawSurface(
         vertices=np.concatenate([part.vertices for part in parts]),
         faces=np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)]),
@@ -160,6 +227,10 @@ def joined(parts: Sequence[RawSurface]) -> RawSurface:
         face_materials=np.concatenate([part.material_index for part in parts]),
         colours=filled("colours", (3, 3), np.nan),
         textures=parts[0].textures,
+        source_faces=None
+        if is_whole
+        else np.concatenate([own + start for own, start in zip(owners, file_starts[:-1], strict=True)]),
+        source_count=int(file_starts[-1]),
         uvs=filled("uvs", (3, 2), 0.0),
         alphas=filled("alphas", (3,), 1.0),
         relief=Relief.joined([part.relief for part in parts], [len(part.faces) for part in parts]),

@@ -24,7 +24,12 @@ def with_swatches(surface: RawSurface) -> RawSurface:
     colours = np.full((len(index), 3, 3), np.nan) if surface.colours is None else surface.colours.copy()
     uvs = surface.uvs.copy()
     for number, texture in enumerate(surface.textures):
-        users = [place for place, material in enumerate(surface.materials) if material.texture == number]
+        # Metal that emits has no second entry of the material table
+        users = [
+            place
+            for place, material in enumerate(surface.materials)
+            if material.texture == number and not (material.kind == "mirror" and any(material.emission))
+        ]
         faces = np.flatnonzero(np.isin(index, users))
         if not len(faces):
             continue
