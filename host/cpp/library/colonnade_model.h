@@ -200,8 +200,10 @@ const char *colonnade_model_merge(const double *values, const double *weights, c
 /* The words of a memory of textures for the packed mesh, each of whole bytes, low byte first. */
 const uint8_t *colonnade_model_texture(const char *memory);
 
-/* The records, and the clip file of the packed mesh: its bytes. */
+/* The records of the packed mesh. */
 const uint8_t *colonnade_model_records(void);
+
+/* The clip file of the packed mesh, and its bytes. */
 const uint8_t *colonnade_model_clip(uint32_t *bytes);
 
 /* Counters of the frame that the model has: primary, shadow, reflected, refracted, gathered and in-box rays, nodes read, boxes
