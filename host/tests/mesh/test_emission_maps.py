@@ -134,6 +134,21 @@ def test_a_face_of_a_file_shows_the_shape_of_its_map(tmp_path: Path) -> None:
     assert len(mesh.faces) > 100 and mesh.source_count == 1 and not mesh.source_faces.any()
 
 
+def test_pieces_that_alpha_cuts_are_of_the_faces_of_the_file(tmp_path: Path) -> None:
+    pixels = np.zeros((64, 64, 4), np.uint8)
+    pixels[:16, :32, :3] = pixels[:32, ..., 3] = 255
+    colour = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    glowing = {"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}, "doubleSided": True}
+    mesh = load_mesh(
+        gltf(tmp_path, pixels, materials=[glowing | {"pbrMetallicRoughness": colour, "alphaMode": "MASK"}])
+    )
+    emission = np.array([material.emission[0] for material in mesh.materials])[mesh.face_materials]
+    areas = areas_of(mesh.vertices[mesh.faces])
+    # Of the triangle the upper three quarters are left
+    assert areas[emission > 0.5].sum() / areas.sum() == pytest.approx(1 / 3, abs=0.02)
+    assert mesh.source_count == 1 and not mesh.source_faces.any()
+
+
 def test_vertices_that_are_no_numbers_are_left_to_the_cleaning() -> None:
     vertices = np.array([(0, 0, 0), (1, 0, 0), (np.nan, 1, 0)])
     texture = Texture("a", np.repeat(np.array([0, 255], np.uint8), 12).reshape(2, 4, 3))
