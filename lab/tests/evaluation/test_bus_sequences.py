@@ -44,8 +44,10 @@ def test_no_abuse_at_the_bus_breaks_a_rule_or_the_next_frame(overrides: tuple[st
     ],
 )
 def test_no_abuse_at_the_bus_breaks_a_rule_or_the_batch_of_rays_that_follows(
-    overrides: tuple[str, ...], sequences: int
+    overrides: tuple[str, ...], sequences: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """In an optimised simulator: thousands of batches take longer than its compilation."""
+    monkeypatch.delenv("COLONNADE_QUICK_SIMULATORS", raising=False)
     result = run_sequences(shell_design_for("tiny", (*RAYS, *overrides), bus_bytes=64), sequences)
     assert result.broken_rules == ()
     assert result.sequences == result.ended == result.exact == sequences
