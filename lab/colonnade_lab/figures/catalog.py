@@ -333,7 +333,7 @@ def catalog() -> dict[str, Entry]:
 
 
 def selected(parts: tuple[str, ...]) -> list[Entry]:
-    """The entries of parts: a part is the name of an entry or what it begins with before a hyphen; none: all entries.
+    """The entries of parts: a part is the name of an entry, else what names begin with before a hyphen; none: all.
 
     Raises:
         KeyError: A part that names no entry.
@@ -341,8 +341,8 @@ def selected(parts: tuple[str, ...]) -> list[Entry]:
     entries = catalog()
     found: dict[str, Entry] = {}
     for part in parts or tuple(entries):
-        of_part = {name: entry for name, entry in entries.items() if name == part or name.startswith(f"{part}-")}
+        of_part = [part] if part in entries else [name for name in entries if name.startswith(f"{part}-")]
         if not of_part:
             raise KeyError(part)
-        found |= of_part
+        found |= {name: entries[name] for name in of_part}
     return list(found.values())

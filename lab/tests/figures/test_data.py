@@ -305,6 +305,7 @@ def test_the_catalog_measures_every_preset() -> None:
         "area-edge-asap7",
         "area-edge-sky130",
     }
+    assert [entry.name for entry in catalog.selected(("light",))] == ["light"]  # not light-users
     with pytest.raises(KeyError):
         catalog.selected(("beauty",))
 
