@@ -125,8 +125,8 @@ struct colonnade_leaf {
     bool is_clear;
 };
 
-/* Pairs triangles along edges, each with the neighbour that gives the smallest box. Answers the number of leaves. `layout` is any
- * clip of the design. `scratch` has space for vertex_count + 4 * count words. */
+/* Pairs triangles along edges, each with the neighbour that gives the smallest box, of 32 at an edge. Answers the number of
+ * leaves. `layout` is any clip of the design. Space: `leaves` that of count, scratch vertex_count + 4 * count words. */
 uint32_t colonnade_mesh_pairs(const struct colonnade_mesh *layout, const struct colonnade_vertex *vertices,
                               uint32_t vertex_count, const struct colonnade_triangle *triangles, uint32_t count,
                               struct colonnade_leaf *leaves, uint32_t *scratch);

@@ -3,7 +3,7 @@
 #include "colonnade_integers.h"
 #include "colonnade_mesh_parts.h"
 
-enum { CODE_BITS = 10, DIGIT_BITS = 8, DIGITS = 1 << DIGIT_BITS, MOST_RANGES = 256 };
+enum { CODE_BITS = 10, DIGIT_BITS = 8, DIGITS = 1 << DIGIT_BITS, MOST_RANGES = 256, MOST_NEIGHBOURS = 32 };
 
 /* The box of a leaf's vertices. */
 static void bounds(const struct colonnade_vertex *vertices, const uint32_t of[4], int32_t low[3], int32_t high[3]) {
@@ -23,18 +23,54 @@ static bool is_near(const struct colonnade_mesh *mesh, const int32_t low[3], con
     return ((high[0] - low[0]) | (high[1] - low[1]) | (high[2] - low[2])) >> mesh->delta_bits == 0;
 }
 
+/* The vertex at which an edge begins, or with `end` 1 ends; the number of an edge is 3 * triangle + corner. */
+static uint32_t at_edge(const struct colonnade_triangle *triangles, uint32_t edge, uint32_t end) {
+    return triangles[edge / 3].vertices[(edge % 3 + end) % 3];
+}
+
+/* Makes places in a sorted list of the counts of its keys. */
+static void to_places(uint32_t *counts, uint32_t keys) {
+    for (uint32_t i = 0, sum = 0; i < keys; ++i) {
+        const uint32_t own = counts[i];
+        counts[i] = sum;
+        sum += own;
+    }
+}
+
+/* Sorts edges by the vertex at which they begin, then that at which they end, then their number. Answers in `ends` where the
+ * edges of each first vertex end. Vertices of `leaves` are memory meanwhile. */
+static void sort_edges(const struct colonnade_triangle *triangles, uint32_t count, uint32_t *ends, uint32_t vertex_count,
+                       uint32_t *sorted, struct colonnade_leaf *leaves) {
+    for (uint32_t end = 2; end-- > 0;) {
+        for (uint32_t i = 0; i < vertex_count; ++i) ends[i] = 0;
+        for (uint32_t i = 0; i < 3 * count; ++i) ++ends[at_edge(triangles, i, end)];
+        to_places(ends, vertex_count);
+        for (uint32_t i = 0; i < 3 * count; ++i) {
+            const uint32_t edge = end == 1 ? i : leaves[i / 3].vertices[i % 3], place = ends[at_edge(triangles, edge, end)]++;
+            if (end == 1) leaves[place / 3].vertices[place % 3] = edge;
+            else sorted[place] = edge;
+        }
+    }
+}
+
+/* Where the edges to a vertex end, within those of a first vertex. */
+static uint32_t end_of(const struct colonnade_triangle *triangles, const uint32_t *sorted, uint32_t low, uint32_t high,
+                       uint32_t vertex) {
+    while (low < high) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (at_edge(triangles, sorted[middle], 1) <= vertex) low = middle + 1;
+        else high = middle;
+    }
+    return low;
+}
+
 uint32_t colonnade_mesh_pairs(const struct colonnade_mesh *layout, const struct colonnade_vertex *vertices,
                               uint32_t vertex_count, const struct colonnade_triangle *triangles, uint32_t count,
                               struct colonnade_leaf *leaves, uint32_t *scratch) {
-    /* Edges by their first vertex; the number of an edge is 3 * triangle + corner, one more in the lists */
-    uint32_t *first = scratch, *next = scratch + vertex_count, found = 0;
-    for (uint32_t i = 0; i < vertex_count; ++i) first[i] = 0;
-    for (uint32_t i = 0; i < 3 * count; ++i) {
-        uint32_t *head = &first[triangles[i / 3].vertices[i % 3]];
-        next[i] = *head;
-        *head = i + 1;
-    }
-    uint8_t *const is_taken = (uint8_t *)(next + 3 * (size_t)count);
+    uint32_t *const ends = scratch, *const sorted = ends + vertex_count;
+    uint32_t found = 0;
+    uint8_t *const is_taken = (uint8_t *)(sorted + 3 * (size_t)count);
+    sort_edges(triangles, count, ends, vertex_count, sorted, leaves);
     for (uint32_t i = 0; i < count; ++i) is_taken[i] = 0;
     for (uint32_t i = 0; i < count; ++i) {
         const struct colonnade_triangle *own = &triangles[i];
@@ -46,19 +82,19 @@ uint32_t colonnade_mesh_pairs(const struct colonnade_mesh *layout, const struct 
             {own->vertices[0], own->vertices[1], own->vertices[2], UINT32_MAX}, own->material, own->is_clear};
         for (uint32_t corner = 0; corner < 3; ++corner) {
             const uint32_t a = own->vertices[corner], b = own->vertices[(corner + 1) % 3], c = own->vertices[(corner + 2) % 3];
-            for (uint32_t edge = first[b]; edge != 0; edge = next[edge - 1]) {
-                const uint32_t other = (edge - 1) / 3, at = (edge - 1) % 3;
+            const uint32_t begin = b == 0 ? 0 : ends[b - 1], end = end_of(triangles, sorted, begin, ends[b], a);
+            for (uint32_t k = end; k-- > begin && end - k <= MOST_NEIGHBOURS && at_edge(triangles, sorted[k], 1) == a;) {
+                const uint32_t other = sorted[k] / 3, pair[4] = {a, b, c, at_edge(triangles, sorted[k], 2)};
                 const struct colonnade_triangle *its = &triangles[other];
-                const uint32_t pair[4] = {a, b, c, its->vertices[(at + 2) % 3]};
                 int32_t low[3], high[3];
-                if (is_taken[other] || other == i || its->vertices[(at + 1) % 3] != a) continue;
+                if (is_taken[other] || other == i) continue;
                 if (its->material != own->material || its->is_clear != own->is_clear) continue;
                 bounds(vertices, pair, low, high);
                 const uint64_t area = colonnade_half_area(low, high);
                 if (area >= least || !is_near(layout, low, high)) continue;
                 least = area;
                 partner = other;
-                for (int k = 0; k < 4; ++k) leaf->vertices[k] = pair[k];
+                for (int j = 0; j < 4; ++j) leaf->vertices[j] = pair[j];
             }
         }
         is_taken[i] = is_taken[partner] = 1;
@@ -92,13 +128,9 @@ struct place {
 
 static void sort(struct place *places, struct place *others, uint32_t count) {
     for (uint32_t low = 0; low < 32; low += DIGIT_BITS) { /* an even number of passes */
-        uint32_t starts[DIGITS] = {0}, sum = 0;
+        uint32_t starts[DIGITS] = {0};
         for (uint32_t i = 0; i < count; ++i) ++starts[places[i].code >> low & (DIGITS - 1)];
-        for (uint32_t digit = 0; digit < DIGITS; ++digit) {
-            const uint32_t own = starts[digit];
-            starts[digit] = sum;
-            sum += own;
-        }
+        to_places(starts, DIGITS);
         for (uint32_t i = 0; i < count; ++i) others[starts[places[i].code >> low & (DIGITS - 1)]++] = places[i];
         struct place *const swapped = places;
         places = others;

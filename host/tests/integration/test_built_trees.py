@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bent_trees import ADDRESS_BITS, BOX_BITS, Tree, delta_bits, places_of, read_leaf, swept, walk
-from c_programs import SANITIZERS
+from c_programs import DRIVER_FOLDER, SANITIZERS, compile_c
 from leaves import leaves_of
 from target_programs import build
 
@@ -131,3 +131,16 @@ def test_a_tree_wears_as_its_mesh_bends_until_a_new_one_is_better(program: Path)
     bent, new = (found.others / found.cost).T
     assert bent[0] < 5 / 4 < bent[1:].min() and new[0] > 0.95 * bent[0] and (new[1:] < 0.95 * bent[1:]).all()
     assert np.mean(found.leaves[:, 3] >= 0) > 0.9
+
+
+def test_pairs_take_steps_in_proportion_to_triangles_however_many_meet_at_a_vertex_or_an_edge(tmp_path: Path) -> None:
+    source, counted = DRIVER_FOLDER / "src" / "colonnade_mesh_build.c", tmp_path / "counted.o"
+    compile_c([source], counted, "-c", "-fsanitize-coverage=trace-pc")
+    fan = compile_c([DRIVER_FOLDER / "tests" / "fan.c", counted], tmp_path / "fan")
+    for place, share in (("vertex", 0.5), ("edge", 1.0)):
+        (few, short), (many, long) = (
+            map(int, subprocess.run([fan, str(count), place], capture_output=True, check=True).stdout.split())
+            for count in (1_000, 16_000)
+        )
+        assert (few, many) == (1_000 * share, 16_000 * share)
+        assert long < 1.5 * 16 * short
