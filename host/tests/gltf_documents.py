@@ -97,8 +97,8 @@ def _sparse(**changes: Any) -> bytes:
     return _accessor(sparse=sparse | {"values": {"bufferView": 0, "byteOffset": 20}} | changes)
 
 
-def _copies(many: int = 0, **arrays: np.ndarray) -> bytes:
-    """Copies of the triangle; ``many``: so many with a translation of 0."""
+def _copies(many: int = 0, nodes: int = 1, **arrays: np.ndarray) -> bytes:
+    """Copies of the triangle in each of some nodes; ``many``: so many with a translation of 0."""
     document = json.loads(_arrays(arrays)) if arrays else gltf(accessors=[], bufferViews=[])
     accessors, views = document["accessors"], document["bufferViews"]
     numbers = {name: 2 + number for number, name in enumerate(arrays)}
@@ -109,7 +109,8 @@ def _copies(many: int = 0, **arrays: np.ndarray) -> bytes:
         changes = {"indices": {"bufferView": 1, "componentType": 5123}, "values": {"bufferView": 0}}
         accessors.append(_NO_DATA | {"count": many, "sparse": changes | {"count": 1}})
     return _text(
-        nodes=[{"mesh": 0, "translation": [0, 0, 1], "extensions": {_INSTANCING: {"attributes": numbers}}}],
+        nodes=[{"mesh": 0, "translation": [0, 0, 1], "extensions": {_INSTANCING: {"attributes": numbers}}}] * nodes,
+        scenes=[{"nodes": list(range(nodes))}],
         accessors=gltf()["accessors"] + accessors,
         bufferViews=gltf()["bufferViews"] + views,
         buffers=gltf()["buffers"] + document["buffers"],
@@ -209,7 +210,8 @@ REFUSED: dict[str, tuple[str, bytes]] = {
     "copies-none.gltf": ("the copies of node 0 (EXT_mesh_gpu_instancing) are not valid", _copies()),
     "copies-some.gltf": ("the copies of node 0", _copies(TRANSLATION=POINTS, SCALE=POINTS[:2])),
     "copies-width.gltf": ("the copies of node 0", _copies(ROTATION=POINTS)),
-    "copies-many.gltf": ("node 0 has 65,537 copies of its mesh: at most 65,536 are read", _copies(65_537)),
+    "copies-many.gltf": ("it has more than 65,536 copies of meshes: leave some out", _copies(65_537)),
+    "copies-of-nodes.gltf": ("it has more than 65,536 copies of meshes: leave some out", _copies(65_536, 16)),
     "copies-infinite.gltf": ("transform of node 0 is not finite", _copies(TRANSLATION=np.full_like(POINTS, np.inf))),
     "meshopt.gltf": (f"its meshes are compressed ({_MESHOPT})", _text(extensionsRequired=[_MESHOPT])),
     "meshopt-optional.gltf": (

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
-from gltf_documents import READ
+from gltf_documents import POINTS, READ
+from gltf_documents import _arrays as with_arrays
 
 from colonnade.common.errors import UserError
 from colonnade.mesh.files import gltf
+from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.geometry.topology import subdivide
 from colonnade.mesh.load import clean_mesh, load_mesh
 
@@ -38,6 +41,34 @@ def test_copies_of_a_mesh_have_a_limit(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(gltf, "MAX_TRIANGLES", 2)
     with pytest.raises(UserError, match="it has more than 2 triangles: leave some out"):
         load_mesh(tmp_path / "a.gltf")
+
+
+def test_copies_of_a_mesh_are_those_of_nodes_and_its_arrays_are_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    turned, moved = np.float32([[0, 0, 0.6, 0.8], [0.6, 0, 0, 0.8]]), np.float32([[1, 2, 3], [4, 5, 6]])
+    scales = np.float32([[1, 2, 3], [-1, 1, 1]])
+    names = {"ROTATION": turned, "TRANSLATION": moved, "SCALE": scales}
+    normals = {"POSITION": POINTS, "NORMAL": np.float32([[0, 0.6, 0.8]] * 3)}
+    document = json.loads(with_arrays(normals))
+    nodes = [{"mesh": 0} | {name.lower(): array[k].tolist() for name, array in names.items()} for k in (0, 1)]
+    (tmp_path / "nodes.gltf").write_text(json.dumps(document | {"nodes": nodes, "scenes": [{"nodes": [0, 1]}]}))
+    attributes = {"POSITION": POINTS, "NORMAL": normals["NORMAL"]}
+    copied = json.loads(with_arrays(attributes | names))
+    primitive = copied["meshes"][0]["primitives"][0]["attributes"]
+    given = {name: primitive.pop(name) for name in names}
+    copied["nodes"] = [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": given}}}]
+    (tmp_path / "copies.gltf").write_text(json.dumps(copied))
+    read: list[object] = []
+    array = GltfDocument.array
+    monkeypatch.setattr(GltfDocument, "array", lambda self, index: (read.append(index), array(self, index))[1])
+    own, others = load_mesh(tmp_path / "copies.gltf"), load_mesh(tmp_path / "nodes.gltf")
+    np.testing.assert_allclose(own.vertices[own.faces], others.vertices[others.faces], rtol=1e-6)
+    np.testing.assert_allclose(own.corner_normals, others.corner_normals, atol=1e-6)
+    read.clear()
+    (tmp_path / "a.gltf").write_bytes(READ["copies-100.gltf"])
+    load_mesh(tmp_path / "a.gltf")
+    assert len(read) == 4  # positions and indices, of which all copies are made, translations and rotations
 
 
 def test_normals_are_weighted_by_angle() -> None:

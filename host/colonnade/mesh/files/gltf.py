@@ -166,12 +166,13 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
     # Of surfaces that no texture or corner colours; metal by a map keeps these, too
     plain: set[tuple[Vector, float]] = set()
     triangles = 0
-    for index, node, matrix in mesh_nodes(document, losses, is_animated=clip is not None):
-        losses.add(skins, clip is None and "skin" in node)
+    for index, node, matrices in mesh_nodes(document, losses, is_animated=clip is not None):
+        losses.add(skins, len(matrices) if clip is None and "skin" in node else 0)
         for primitive in document.entry("meshes", node["mesh"]).get("primitives", []):
-            losses.add(lost.MORPHS, 0 if clip is not None else len(primitive.get("targets", [])))
-            to_scene = matrix if clip is None else np.eye(4)
-            part = _primitive(document, primitive, to_scene, default, losses, textures, compressed)
+            losses.add(lost.MORPHS, 0 if clip is not None else len(matrices) * len(primitive.get("targets", [])))
+            to_scene = matrices if clip is None else np.eye(4)[np.newaxis]
+            left = MAX_TRIANGLES - triangles
+            part = _primitive(document, primitive, to_scene, default, losses, textures, compressed, left)
             if part is None:
                 continue
             if clip is not None:
@@ -180,8 +181,6 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
                 part = replace(part, surface=replace(part.surface, relief=None))
             parts.append(part)
             triangles += len(part.surface.faces)
-            if triangles > MAX_TRIANGLES:
-                raise document.error(f"it has more than {MAX_TRIANGLES:,} triangles: leave some out")
             if part.material != default and part.has_one_colour:
                 material = from_gltf(document.entry("materials", part.material))
                 if material.alpha is None:
@@ -307,23 +306,36 @@ def _count_other(document: GltfDocument, losses: Losses, is_animated: bool) -> N
 def _primitive(
     document: GltfDocument,
     primitive: Mapping[str, Any],
-    matrix: Floats,
+    matrices: Floats,
     default: int,
     losses: Losses,
     textures: GltfTextures,
     compressed: DracoPrimitives,
+    left: int,
 ) -> _Part | None:
-    """A primitive; None for points and lines."""
+    """The copies of a primitive, one after the other; None for points and lines.
+
+    Args:
+        document: Its document.
+        primitive: Its JSON.
+        matrices: Transforms of the copies to the scene, float64 [c, 4, 4].
+        default: Number of the default material.
+        losses: Counts what is not read.
+        textures: Those of the document.
+        compressed: The decoder of the document's primitives.
+        left: Triangles that they may have.
+    """
+    copies = len(matrices)
     mode, attributes = primitive.get("mode", _TRIANGLES), primitive.get("attributes", {})
     if mode == _POINTS or mode in _LINE_MODES:
-        losses.add(lost.POINTS if mode == _POINTS else lost.LINES)
+        losses.add(lost.POINTS if mode == _POINTS else lost.LINES, copies)
         return None
     if mode not in (_TRIANGLES, _STRIP, _FAN):
         raise document.error(f"a primitive has the unknown mode {mode}")
     for name in primitive.get("extensions", {}):
         if name in COMPRESSION and "bufferView" not in document.entry("accessors", attributes.get("POSITION")):
             raise document.compressed(name)
-        losses.add(extension_loss(name), name not in (DRACO, *COMPRESSION))
+        losses.add(extension_loss(name), 0 if name in (DRACO, *COMPRESSION) else copies)
     if "POSITION" not in attributes:
         raise document.error("a primitive has no positions")
     arrays = compressed.arrays(primitive)
@@ -342,29 +354,34 @@ def _primitive(
 
     corners = _corners(document, arrays, count)
     mode = mode if arrays.mesh is None else _TRIANGLES
-    faces = _faces(corners, mode)
-    losses.add(lost.SPARE_CORNERS, len(corners) % 3 if mode == _TRIANGLES else 0)
+    own = _faces(corners, mode)
+    if copies * len(own) > left:
+        raise document.error(f"it has more than {MAX_TRIANGLES:,} triangles: leave some out")
+    losses.add(lost.SPARE_CORNERS, copies * (len(corners) % 3) if mode == _TRIANGLES else 0)
     width = arrays.attribute("COLOR_0").shape[1] if "COLOR_0" in attributes else 0
     colours, alphas = attribute("COLOR_0", max(width, 3)), None
     if colours is not None:
         if not np.isfinite(colours).all():
             raise document.error("a primitive has a COLOR_0 that is not a finite number: export it again")
-        losses.add(lost.CLIPPED_COLOURS, int(((colours < 0) | (colours > 1)).any(axis=1).sum()))
+        losses.add(lost.CLIPPED_COLOURS, copies * int(((colours < 0) | (colours > 1)).any(axis=1).sum()))
         colours, alphas = colours[:, :3], np.clip(colours[:, 3], 0.0, 1.0) if width == 4 else None
     normals = attribute("NORMAL", 3)
-    linear = matrix[:3, :3]
+    linear = matrices[:, :3, :3]
     turning = cofactors(linear)
-    is_mirrored = float(fixed_order.dot(linear[:, 0], turning[:, 0])) < 0
+    is_mirrored = fixed_order.dot(linear[:, :, 0], turning[:, :, 0])[:, np.newaxis, np.newaxis] < 0
     if normals is not None:
-        normals = unit_vectors(fixed_order.product(unit_vectors(normals), turning.T) * (-1.0 if is_mirrored else 1.0))
-    if is_mirrored:
-        faces = faces[:, ::-1]
+        turned = fixed_order.product(unit_vectors(normals), turning.transpose(0, 2, 1))
+        normals = unit_vectors(turned * np.where(is_mirrored, -1.0, 1.0)).reshape(-1, 3)
+    # Faces of the copies: in the vertices of all of them, and in those of the file
+    placed = np.where(is_mirrored, own[:, ::-1], own)
+    places = placed.reshape(-1, 3)
+    faces = (placed + count * np.arange(copies)[:, np.newaxis, np.newaxis]).reshape(-1, 3)
     material = primitive.get("material", default)
     has_alpha = False
     if material != default or "material" in primitive:
         has_alpha = from_gltf(document.entry("materials", material)).alpha is not None
     if alphas is not None and not has_alpha:
-        losses.add(lost.ALPHA, int((alphas < 1.0).sum()))
+        losses.add(lost.ALPHA, copies * int((alphas < 1.0).sum()))
     use = textures.use_of(int(material)) if material != default else None
     uvs = None if use is None else attribute(use.coordinates, 2)
     if uvs is not None and use is not None:
@@ -381,19 +398,21 @@ def _primitive(
         losses.add(lost.TEXTURED_COLOURS, len(faces) if shows_colours else 0)
         shows_colours = False
     surface = RawSurface(
-        vertices=fixed_order.product(positions, linear.T) + matrix[:3, 3],
+        vertices=(fixed_order.product(positions, linear.transpose(0, 2, 1)) + matrices[:, np.newaxis, :3, 3]).reshape(
+            -1, 3
+        ),
         faces=faces,
         normals=None if normals is None else normals[faces],
-        colours=np.clip(colours, 0, 1)[faces] if colours is not None and shows_colours else None,
-        uvs=None if uvs is None else uvs[faces],
-        alphas=None if alphas is None else alphas[faces],
+        colours=np.clip(colours, 0, 1)[places] if colours is not None and shows_colours else None,
+        uvs=None if uvs is None else uvs[places],
+        alphas=None if alphas is None else alphas[places],
         relief=relief_of(relief, attribute, faces, linear, losses),
     )
 
     def positions_in(use: TextureUse | None) -> Floats | None:
-        places = None if use is None else attribute(use.coordinates, 2)
-        known = use is not None and places is not None and bool((np.abs(places) <= MAX_UV).all())
-        return use.uvs(places)[faces] if known and use is not None and places is not None else None
+        found = None if use is None else attribute(use.coordinates, 2)
+        known = use is not None and found is not None and bool((np.abs(found) <= MAX_UV).all())
+        return use.uvs(found)[places] if known and use is not None and found is not None else None
 
     part = _Part(surface, int(material))
     if material == default:

@@ -19,7 +19,7 @@ from colonnade.mesh.losses import Losses
 
 #: Components of the attributes of copies of a mesh.
 _OF_COPIES = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
-#: Copies of a mesh, at most.
+#: Nodes with a mesh, with the copies of each, at most.
 MAX_COPIES = 1 << 16
 #: Largest magnitude of a transform's element, in the scene.
 _MAX_TRANSFORM = 1e100
@@ -28,9 +28,9 @@ _MAX_TRANSFORM = 1e100
 def mesh_nodes(
     document: GltfDocument, losses: Losses, *, is_animated: bool = False
 ) -> Iterator[tuple[int, Mapping[str, Any], Floats]]:
-    """The nodes with a mesh of the default scene, with their numbers, and transforms to the scene, float64 [4, 4].
+    """The nodes with a mesh of the default scene, with their numbers, and transforms to the scene, float64 [c, 4, 4].
 
-    A node with copies of its mesh comes once for each; if it is animated, once.
+    A node has one for each copy of its mesh; if it is animated, one.
     """
     json = document.json
     scenes, nodes = json.get("scenes", []), json.get("nodes", [])
@@ -41,7 +41,7 @@ def mesh_nodes(
     else:
         children = {child for node in nodes for child in node.get("children", [])}
         roots = [index for index in range(len(nodes)) if index not in children]
-    pending = [(root, np.eye(4)) for root in reversed(roots)]
+    pending, count = [(root, np.eye(4)) for root in reversed(roots)], 0
     while pending:
         index, parent = pending.pop()
         node = document.entry("nodes", index)
@@ -50,12 +50,20 @@ def mesh_nodes(
         if "mesh" not in node:
             continue
         extension = node.get("extensions", {}).get(INSTANCING)
+        count += 1 if extension is None else _copy_count(document, extension)
+        if count > MAX_COPIES:
+            raise document.error(f"it has more than {MAX_COPIES:,} copies of meshes: leave some out, or join them")
         copies = np.eye(4)[np.newaxis] if extension is None else _copies(document, index, extension)
         if is_animated:
             losses.add(lost.BENT_COPIES, len(copies) - 1)
             copies = np.eye(4)[np.newaxis]
-        for copy in _finite(document, index, fixed_order.product(matrix, copies)):
-            yield index, node, copy
+        yield index, node, _finite(document, index, fixed_order.product(matrix, copies))
+
+
+def _copy_count(document: GltfDocument, extension: Mapping[str, Any]) -> int:
+    """The number of copies that the first of their attributes states."""
+    accessors = [accessor for name, accessor in extension.get("attributes", {}).items() if name in _OF_COPIES]
+    return int(document.entry("accessors", accessors[0])["count"]) if accessors else 0
 
 
 def _copies(document: GltfDocument, index: int, extension: Mapping[str, Any]) -> Floats:
@@ -65,8 +73,6 @@ def _copies(document: GltfDocument, index: int, extension: Mapping[str, Any]) ->
     count = max(map(len, values.values()), default=0)
     if count == 0 or any(value.shape != (count, _OF_COPIES[name]) for name, value in values.items()):
         raise document.error(f"the copies of node {index} ({INSTANCING}) are not valid: export it again")
-    if count > MAX_COPIES:
-        raise document.error(f"node {index} has {count:,} copies of its mesh: at most {MAX_COPIES:,} are read")
     rotation = values.get("ROTATION", np.array([[0.0, 0.0, 0.0, 1.0]]))
     length = np.sqrt(fixed_order.dot(rotation, rotation))[:, np.newaxis]
     placed = np.tile(np.eye(4), (count, 1, 1))

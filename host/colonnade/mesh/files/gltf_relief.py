@@ -27,8 +27,8 @@ def relief_of(
     Args:
         given: Its normal map; None: it has none.
         attribute: Values of an attribute of its vertices, float64 [n, width]; None: it has none.
-        faces: Its faces in the winding of the scene, int64 [m, 3].
-        linear: Transform of directions to the scene, float64 [3, 3].
+        faces: The faces of its copies in the winding of the scene, int64 [m, 3].
+        linear: Transforms of the directions of each copy to the scene, float64 [c, 3, 3].
         losses: Counts faces without positions in the map.
     """
     if given is None:
@@ -42,7 +42,9 @@ def relief_of(
         return None
     if tangents is None or not np.isfinite(tangents).all():
         tangents = np.zeros((len(uvs), 4))
-    x, y, z = linear.T
-    side = np.sign(tangents[:, 3:]) * (-1.0 if float(fixed_order.dot(x, np.cross(y, z))) < 0 else 1.0)
-    tangents = np.column_stack([fixed_order.product(tangents[:, :3], linear.T), side])
-    return Relief((normal_map,), np.zeros(len(faces), dtype=np.int64), uvs[faces], tangents[faces])
+    x, y, z = (linear[:, :, axis] for axis in range(3))
+    is_mirrored = fixed_order.dot(x, np.cross(y, z))[:, np.newaxis, np.newaxis] < 0
+    turned = fixed_order.product(tangents[:, :3], linear.transpose(0, 2, 1))
+    sides = np.sign(tangents[:, 3:]) * np.where(is_mirrored, -1.0, 1.0)
+    tangents = np.concatenate([turned, sides], axis=2).reshape(-1, 4)
+    return Relief((normal_map,), np.zeros(len(faces), dtype=np.int64), uvs[faces % len(uvs)], tangents[faces])
