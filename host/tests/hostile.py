@@ -7,7 +7,6 @@ import io
 import json
 import os
 import shlex
-import signal
 import stat
 import struct
 from collections.abc import Callable, Iterator, Mapping
@@ -23,9 +22,6 @@ from PIL import Image
 
 from colonnade.cli.main import cli
 from colonnade.design import toolchain
-
-#: Seconds after which a command counts as hung.
-MAX_SECONDS = 20
 
 #: Content of a file: bytes, text, or a function that creates the file.
 Content = bytes | str | Callable[[Path], None]
@@ -97,7 +93,7 @@ def run(case: Case, folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     for variable, value in case.environment.items():
         monkeypatch.setenv(variable, value)
     before = snapshot(folder)
-    with inside(folder), no_longer_than(MAX_SECONDS):
+    with inside(folder):
         result = CliRunner().invoke(cli, shlex.split(case.arguments))
     line = refused(result, case)
     assert snapshot(folder) == before, "files were made, changed or removed"
@@ -192,21 +188,3 @@ def inside(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.chdir(before)
-
-
-class HungError(BaseException):
-    """Raised on a timeout; handlers of `Exception` do not catch it."""
-
-
-@contextmanager
-def no_longer_than(seconds: int) -> Iterator[None]:
-    def ring(number: int, frame: object) -> None:
-        raise HungError(f"no answer after {seconds} seconds")
-
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.alarm(seconds)
-    try:
-        yield
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)

@@ -7,6 +7,7 @@ refuses the data.
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -32,7 +33,9 @@ def decode(
         UserError: It does not start.
     """
     words = [sys.executable, "-I", "-m", module, memory, seconds, *arguments]
-    done = subprocess.run(list(map(str, words)), input=data, capture_output=True, check=False)
+    # Memory of more threads of linear algebra would count
+    own = os.environ | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    done = subprocess.run(list(map(str, words)), input=data, capture_output=True, check=False, env=own)
     if done.returncode > 0 and done.returncode != DAMAGED:
         raise UserError(f"the decoder {module} does not start: {last_line(done.stderr)}: install Colonnade again")
     return done

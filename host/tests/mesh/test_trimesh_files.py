@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import io
 import logging
+import struct
 import subprocess
 import sys
+import tracemalloc
 import warnings
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +23,7 @@ from colonnade.common import decoder_process
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.files import trimesh_files, trimesh_program
+from colonnade.mesh.files.mesh_archive import MeshArchive
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 
@@ -248,7 +252,14 @@ def test_what_trimesh_passes_over_is_noted(tmp_path: Path) -> None:
             threemf(f'<object id="1">{MESH.replace(chr(34) + "3" + chr(34), chr(34) + "9" + chr(34))}</object>'),
             "names vertex 9",
         ),
-        ("a.3mf", threemf(unit='unit="cubit"'), 'must be in the form "1.21 . meters", not "cubit"'),
+        ("a.3mf", threemf(unit='unit="cubit"'), "its unit is cubit: 3MF has micron, "),
+        ("a.3mf", threemf(unit='unit="parsec"'), "its unit is parsec: 3MF has micron, "),
+        ("a.dae", dae(asset='<unit meter="-1"/>'), "its unit has -1.0 metres: it must be a positive length"),
+        ("a.dae", dae(asset='<unit meter="0"/>'), "its unit has 0.0 metres"),
+        ("a.dae", dae(asset='<unit meter="1e999"/>'), "its unit has inf metres"),
+        ("a.dae", dae((4, "0 1 2 -2")), "a face names vertex -2, which does not exist"),
+        ("a.dae", dae((3, "0 1 -2")).replace("polylist", "triangles"), "a face names vertex -2, which does not exist"),
+        ("a.xaml", XAML.replace("0 1 2", "0 1 -1"), "a face names vertex -1, which does not exist"),
         ("a.3mf", archive(a__txt=""), "its archive holds no file that ends with 3d/3dmodel.model"),
         ("a.3mf", b"PK", "File is not a zip file"),
         ("a.zae", archive(a__txt=""), "its archive holds no file that ends with .dae"),
@@ -262,6 +273,30 @@ def test_invalid_files_are_one_line(name: str, content: bytes | str, message: st
     with pytest.raises(UserError, match=message) as refused:
         loaded(tmp_path, name, content)
     assert str(tmp_path / name) in str(refused.value)
+
+
+def test_a_member_is_unpacked_to_the_size_that_its_archive_states() -> None:
+    data = archive(a__dae="<a>" + " " * (1 << 24))
+    directory = data.index(b"PK\1\2")
+    lying = MeshArchive(data[: directory + 24] + struct.pack("<I", 100) + data[directory + 28 :])
+    tracemalloc.start()
+    try:
+        with pytest.raises(zipfile.BadZipFile):
+            lying.read("a.dae")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_pictures_of_an_archive_are_not_held_together(tmp_path: Path) -> None:
+    """The host reads them from the archive, one after the other; the other process names them."""
+    picture = Image.fromarray(np.random.default_rng(1).integers(0, 255, (512, 512, 3), dtype=np.uint8))
+    content = io.BytesIO()
+    picture.save(content, "PNG")
+    (tmp_path / "a.zae").write_bytes(archive(a__dae=dae(image="a.png", **TEXTURED), a__png=content.getvalue()))
+    done = trimesh_files.decode("trimesh_program", 0, 0, ".zae", data=(tmp_path / "a.zae").read_bytes())
+    assert len(done.stdout) < 10_000 < len(content.getvalue())
+    assert load_mesh(tmp_path / "a.zae").textures[0].size == (512, 512)
 
 
 def test_a_reader_that_does_not_start_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,13 +36,16 @@ def prepare_collada(losses: Losses, report: Callable[[str], None]) -> None:
 
 def _triangles(polygons: Any, losses: Losses) -> Any:
     """In place of ``Polylist.triangleset``."""
+    if polygons._triangleset is not None:
+        return polygons._triangleset
     rows = polygons.index
     if len(rows):
         split = triangulate(polygons.vertex[polygons.vertex_index].astype(np.float64), polygons.vcounts)
         losses.add(SHORT_FACES, split.short)
         losses.add(CROSSED, split.crossed)
         rows = rows[split.corners.reshape(-1)]
-    return TriangleSet(polygons.sources, polygons.material, rows.reshape(-1), polygons.xmlnode)
+    polygons._triangleset = TriangleSet(polygons.sources, polygons.material, rows.reshape(-1), polygons.xmlnode)
+    return polygons._triangleset
 
 
 def _bound(document: Any, node: Any) -> Any:

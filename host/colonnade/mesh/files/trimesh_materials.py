@@ -5,32 +5,31 @@ from __future__ import annotations
 import io
 import json
 import posixpath
-import zipfile
 from typing import Any
 from urllib.parse import quote, unquote
 
 import numpy as np
 from PIL import Image, PngImagePlugin
 
-from colonnade.common.image_io import TARGA
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats
 from colonnade.mesh import losses as lost
 from colonnade.mesh.files.glb import Glb
+from colonnade.mesh.files.mesh_archive import MeshArchive
 from colonnade.mesh.losses import Losses
 
 
 class Pictures:
     """The pictures of materials.
 
-    For the name of a file trimesh gets a picture of one pixel with a number, by which the file is found here: beside
-    the mesh, where the host reads it, or in the archive.
+    For the name of a file trimesh gets a picture of one pixel with a number, by which the file is found here. The host
+    reads it, beside the mesh or in the archive.
 
     Attributes:
         images: Those of the glTF document.
     """
 
-    def __init__(self, glb: Glb, losses: Losses, archive: zipfile.ZipFile | None, folder: str) -> None:
+    def __init__(self, glb: Glb, losses: Losses, archive: MeshArchive | None, folder: str) -> None:
         self._glb, self._losses, self._archive, self._folder = glb, losses, archive, folder
         self._names: list[str] = []
         self._found: dict[str, int | None] = {}
@@ -52,7 +51,7 @@ class Pictures:
         key = str(id(picture)) if number is None else self._names[int(number)]
         if key not in self._found:
             # A picture without a number is one of the archive that trimesh has opened, and not decoded
-            image = self._image(key) if number is not None else self._embedded(picture.fp.getvalue(), "")
+            image = self._image(key) if number is not None else self._embedded(picture.fp.getvalue())
             self._losses.add(lost.NO_PICTURES, image is None, key)
             self._found[key] = None if image is None else len(self.images)
             self.images += [] if image is None else [image]
@@ -63,16 +62,18 @@ class Pictures:
         if self._archive is None:
             return {"uri": quote(unquote(name))}
         path = posixpath.normpath(posixpath.join(self._folder, unquote(name)))
-        members = self._archive.namelist()
+        members = self._archive.names
         same = [one for one in members if posixpath.basename(one) == posixpath.basename(path)]
         found = path if path in members else next(iter(same), None)
-        return None if found is None else self._embedded(self._archive.read(found), found)
+        if found is not None and found.lower().endswith(".bmp"):
+            return self._embedded(self._archive.read(found))
+        return None if found is None else {"uri": quote(found)}
 
-    def _embedded(self, data: bytes, name: str) -> dict[str, Any]:
-        """A picture's bytes; of the formats that glTF does not have, as PNG."""
-        if name.lower().endswith(".tga") or data.startswith(b"BM"):
+    def _embedded(self, data: bytes) -> dict[str, Any]:
+        """A picture's bytes; those of a BMP file, which the host does not read, as PNG."""
+        if data.startswith(b"BM"):
             content = io.BytesIO()
-            Image.open(io.BytesIO(data), formats=[TARGA, "BMP"]).save(content, "PNG")
+            Image.open(io.BytesIO(data), formats=["BMP"]).save(content, "PNG")
             data = content.getvalue()
         return {"bufferView": self._glb.view(data)}
 

@@ -8,16 +8,17 @@ from __future__ import annotations
 import io
 import json
 import logging
+import math
 import posixpath
 import re
 import sys
 import warnings
-import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import trimesh.util
 from collada.common import DaeError
 from trimesh.exchange.load import mesh_loaders
 from trimesh.scene.transforms import SceneGraph
@@ -26,11 +27,13 @@ from trimesh.units import unit_conversion
 from colonnade.common.decoder_process import DAMAGED
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import text_of
-from colonnade.common.limits import MAX_MESH_BYTES, MAX_TRIANGLES
+from colonnade.common.limits import MAX_TRIANGLES
 from colonnade.common.machine_limits import limit_this_process
 from colonnade.mesh import losses as lost
 from colonnade.mesh.files.glb import Glb
+from colonnade.mesh.files.mesh_archive import MeshArchive
 from colonnade.mesh.files.trimesh_collada import prepare_collada
+from colonnade.mesh.files.trimesh_counts import bound_parts, no_vertex, too_many_triangles
 from colonnade.mesh.files.trimesh_materials import Materials, Pictures
 from colonnade.mesh.losses import Losses
 
@@ -54,6 +57,10 @@ _PASSED_OVER = {
 }
 #: How the name of a member ends that an archive has to hold.
 _MEMBERS = {".zae": ".dae", ".3mf": "3d/3dmodel.model", ".3dxml": ".3dxml"}
+#: How the names of the members end that trimesh gets; nothing: all.
+_READ = {".3mf": ".model", ".3dxml": ""}
+#: Units of 3MF.
+_UNITS = ("micron", "millimeter", "millimeters", "centimeter", "inch", "foot", "meter")
 #: Rotations to y up, from the axis that a COLLADA file states.
 _UP = {b"X": ((0, -1, 0), (1, 0, 0), (0, 0, 1)), b"Z": ((1, 0, 0), (0, 0, 1), (0, -1, 0))}
 #: Parts that cannot be read and have a note of their own.
@@ -66,55 +73,57 @@ class _Source:
 
     Attributes:
         kind: Its suffix; of a COLLADA archive that of the file in it.
-        data: What trimesh reads.
-        text: Its XML, of the formats whose elements are searched.
-        archive: The archive that it is, or that it comes from.
+        data: What trimesh reads; nothing if it is an archive.
+        texts: Its XML, of the formats whose elements are searched.
+        archive: The archive that it comes from.
         folder: Its folder in the archive.
+        members: The members that trimesh reads.
     """
 
     kind: str
     data: bytes
-    text: bytes = b""
-    archive: zipfile.ZipFile | None = None
+    texts: Sequence[bytes] = ()
+    archive: MeshArchive | None = None
     folder: str = ""
+    members: Mapping[str, bytes] = field(default_factory=dict)
 
 
 def _source(kind: str, data: bytes, losses: Losses) -> _Source:
     """The file of these bytes, with that suffix."""
     if kind not in _MEMBERS:
-        return _Source(kind, data, text_of(data).encode("utf-8", "surrogateescape"))
-    archive, wanted = zipfile.ZipFile(io.BytesIO(data)), _MEMBERS[kind]
-    if sum(member.file_size for member in archive.infolist()) > MAX_MESH_BYTES:
-        raise UserError(f"its archive unpacks to more than {MAX_MESH_BYTES:,} bytes, the most of a mesh")
-    names = [name for name in archive.namelist() if name.lower().endswith(wanted) and "__MACOSX" not in name]
+        return _Source(kind, data, [text_of(data).encode("utf-8", "surrogateescape")])
+    archive, wanted = MeshArchive(data), _MEMBERS[kind]
+    names = [name for name in archive.names if name.lower().endswith(wanted) and "__MACOSX" not in name]
     if not names:
         raise UserError(f"its archive holds no file that ends with {wanted}")
     if kind == ".zae":
         losses.add(lost.SCENES, len(names) - 1)
         found = _source(wanted, archive.read(names[0]), losses)
         return replace(found, archive=archive, folder=posixpath.dirname(names[0]))
-    models = [name for name in archive.namelist() if name.lower().endswith(".model")]
-    return _Source(kind, data, b"\n".join(archive.read(name) for name in models), archive)
+    members = {name: archive.read(name) for name in archive.names if name.lower().endswith(_READ[kind])}
+    return _Source(kind, b"", list(members.values()), members=members)
 
 
 def _converted(source: _Source, losses: Losses) -> bytes:
     """The binary glTF of a file."""
     for pattern, loss in _PASSED_OVER.get(source.kind, ()):
-        losses.add(loss, len(re.findall(pattern, source.text)))
+        losses.add(loss, sum(len(re.findall(pattern, text)) for text in source.texts))
     axes, is_linear = np.eye(4), False
     if source.kind == ".dae":
-        if re.search(rb"(?i)[\s>]-?nan[\s<]", source.text):
+        (text,) = source.texts
+        if re.search(rb"(?i)[\s>]-?nan[\s<]", text):
             raise UserError("a value is not a finite number: repair the file")  # pycollada would take 0
-        if up := re.search(rb"<up_axis>\s*([XZ])_UP", source.text):
+        if up := re.search(rb"<up_axis>\s*([XZ])_UP", text):
             axes[:3, :3] = _UP[up[1]]
         # As in MTL files
-        is_linear = re.search(rb"<authoring_tool>\s*Blender\b", source.text) is not None
+        is_linear = re.search(rb"<authoring_tool>\s*Blender\b", text) is not None
     glb = Glb()
     pictures = Pictures(glb, losses, source.archive, source.folder)
     materials = Materials(pictures, is_linear)
     kind = source.kind[1:]
+    trimesh.util.decompress = lambda *_, **__: {name: io.BytesIO(own) for name, own in source.members.items()}
     loaded = mesh_loaders[kind](file_obj=io.BytesIO(source.data), file_type=kind, resolver=pictures)
-    meshes, nodes = _scene(loaded, glb, materials, losses)
+    meshes, nodes = _scene(source, loaded, glb, materials, losses)
     return glb.content(
         {
             "scenes": [{"nodes": [len(nodes)]}],
@@ -128,7 +137,7 @@ def _converted(source: _Source, losses: Losses) -> bytes:
 
 
 def _scene(
-    loaded: Mapping[str, Any], glb: Glb, materials: Materials, losses: Losses
+    source: _Source, loaded: Mapping[str, Any], glb: Glb, materials: Materials, losses: Losses
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """The meshes and nodes of what a loader of trimesh returns: those of a scene, or the arrays of one mesh."""
     geometry = loaded.get("geometry", {"mesh": loaded})
@@ -146,22 +155,33 @@ def _scene(
             raise UserError(f"the transform of {frame} is not finite")
         triangles += len(mesh["faces"])
         if triangles > MAX_TRIANGLES:
-            raise UserError(f"its parts have more than {MAX_TRIANGLES:,} triangles, the most of a mesh: leave some out")
+            raise too_many_triangles(MAX_TRIANGLES)
         if not len(mesh["faces"]):
             continue
         if name not in numbers:
             numbers[name] = len(meshes)
             meshes.append({"primitives": [_primitive(mesh, glb, materials, losses)]})
-        units = mesh.get("metadata", {}).get("units")
-        metres = unit_conversion(units, "meters") if units else 1.0
+        metres = _metres(source.kind, mesh.get("metadata", {}).get("units"))
         scaled = matrix * np.array([metres, metres, metres, 1.0])[:, None]
         nodes.append({"mesh": numbers[name], "matrix": scaled.T.reshape(-1).tolist()})
     return meshes, nodes
 
 
+def _metres(kind: str, units: str | None) -> float:
+    """The length of a unit; 1 without one."""
+    if kind == ".3mf" and units not in _UNITS:
+        raise UserError(f"its unit is {units}: 3MF has {', '.join(_UNITS)}")
+    metres = unit_conversion(units, "meters") if units else 1.0
+    if not 0.0 < metres < math.inf:
+        raise UserError(f"its unit has {metres} metres: it must be a positive length")
+    return metres
+
+
 def _primitive(mesh: Mapping[str, Any], glb: Glb, materials: Materials, losses: Losses) -> dict[str, Any]:
     """The primitive of a mesh, the arguments of ``trimesh.Trimesh``."""
     faces = np.asarray(mesh["faces"], dtype=np.int64).reshape(-1, 3)
+    if (least := int(faces.min())) < 0:
+        raise no_vertex(least)
     values = {"POSITION": np.asarray(mesh["vertices"], dtype=np.float64)}
     if mesh.get("vertex_normals") is not None:
         values["NORMAL"] = np.asarray(mesh["vertex_normals"], dtype=np.float64)
@@ -207,6 +227,7 @@ def _main() -> None:
     reports = _Reports(losses)
     logging.getLogger("trimesh").addHandler(reports)
     prepare_collada(losses, reports.add)
+    bound_parts(MAX_TRIANGLES)
     # Numbers after one that is none would be left out
     warnings.filterwarnings("error", message="string or file could not be read")
     memory, seconds, kind = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
