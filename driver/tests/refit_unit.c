@@ -6,6 +6,7 @@
 
 enum { HAS_REFIT = COLONNADE_SHELL__CAPABILITIES__REFIT_bm, RESETTING = 8 };
 
+#define END ((uint64_t)1 << 40)
 static const struct colonnade_design design = {.device_end = DEVICE_BASE + 4};
 static struct shell shell;
 static uint32_t polls, ends_after, errors;
@@ -54,6 +55,10 @@ int main(void) {
         {{0x40, 0x8080, 0x9020, 5, 1 << 26, 7, 3}, COLONNADE_TOO_LARGE},
         {{0x40, 0x8080, 0x9020, 5, 9, 1 << 24, 3}, COLONNADE_TOO_LARGE},
         {{0x40, 0x8080, 0x9020, 5, 9, 7, 1 << 24}, COLONNADE_TOO_LARGE},
+        /* The last of them behind the last address */
+        {{END - 64, 0x8080, 0x9020, 5, 9, 7, 3}, COLONNADE_TOO_LARGE},
+        {{0x40, END - 2 * 64, 0x9020, 5, 9, 7, 3}, COLONNADE_TOO_LARGE},
+        {{0x40, 0x8080, END - 6 * 32, 5, 9, 7, 3}, COLONNADE_TOO_LARGE},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i)
         CHECK(colonnade_refit_start(&device, &wrong[i].job) == wrong[i].error && shell.writes == 0);
@@ -73,6 +78,9 @@ int main(void) {
     CHECK(registers[AT(refit_vertices_low)] == 0x8080 && registers[AT(refit_records_low)] == 0x9020);
     CHECK(registers[AT(refit_entries)] == 5 && registers[AT(refit_lines)] == 3);
     CHECK(registers[AT(refit_count)] == 7 && registers[AT(refit_root)] == 3);
+
+    const struct colonnade_refit_job last = {END - 128, END - 3 * 64, END - 7 * 32, 5, 9, 7, 3};
+    CHECK(refit(&device, &last, 3, &result) == COLONNADE_OK);
 
     /* One that does not end in time, and what comes meanwhile and after */
     CHECK(refit(&device, &job, 2, &result) == COLONNADE_TIMEOUT);
