@@ -2,7 +2,7 @@
 
 A table replaces the text between ``<!-- NAME -->`` on a line of its own and ``<!-- end -->``. A figure replaces that
 between ``<!-- figure:PRESET.NAME -->`` and ``<!-- end -->`` within a line, see `facts`; for PRESET ``paper`` see
-`paper_facts`.
+`paper_tables.FACTS`.
 """
 
 from __future__ import annotations
@@ -74,10 +74,11 @@ def page(content: str, data: Data) -> str:
     def figure(match: re.Match[str]) -> str:
         preset, name = match.groups()
         used.append(f"figure:{preset}.{name}")
-        of_paper = paper_tables.paper_facts(data) if preset == "paper" else {}
-        if name not in of_paper and (preset not in PRESETS or name not in FORMATS):
-            raise UserError(f"there is no figure {preset}.{name}: choose from {', '.join(FORMATS)} of a preset")
-        value = of_paper[name] if of_paper else text(facts(data, preset), name)
+        is_of_paper = preset == "paper"
+        known = paper_tables.FACTS if is_of_paper else FORMATS
+        if name not in known or not (is_of_paper or preset in PRESETS):
+            raise UserError(f"there is no figure {preset}.{name}: choose from {', '.join(known)} of paper or a preset")
+        value = paper_tables.fact(data, name) if is_of_paper else text(facts(data, preset), name)
         return f"<!-- figure:{preset}.{name} -->{value}<!-- end -->"
 
     new = _FIGURE.sub(figure, _TABLE.sub(table, content))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from colonnade_lab.common import paper
 from colonnade_lab.common.markdown import markdown
 from colonnade_lab.evaluation.bench import geometric_mean
-from colonnade_lab.figures.data import Data
+from colonnade_lab.figures.data import Data, Missing
 from colonnade_lab.figures.facts import MEGAHERTZ, facts, text
+from colonnade_lab.figures.precision_tables import lowest_psnr, printed_index, saved
+from colonnade_lab.figures.tree_tables import megabytes, more_area, more_records, speed_ups
+from colonnade_lab.ppa.netlist.memories import chip_unit_kge
 
 #: Presets of 10×8 arrays, which table 1 has.
 ARRAYS = ("edge", "lean")
@@ -61,26 +63,68 @@ def minutes(data: Data) -> str:
     return markdown(["`tools/figures …`", "minutes"], [[f"`{name}`", f"{found[name]:.1f}"] for name in found])
 
 
-def paper_facts(data: Data) -> dict[str, str]:
-    """Single figures of the page, as text.
+def fact(data: Data, name: str) -> str:
+    """A single figure of the page, as text; a dash without its data."""
+    try:
+        return FACTS[name](data)
+    except Missing:
+        return "–"
 
-    Returns:
-        ``mapBytes``, ``mapRatio``: of an environment's albedo, and how much smaller than its source it is. ``nj``:
-        energy of a ray of the chip. ``raysAFrame``: rays of a frame of the paper. ``againstRivals``: its efficiency
-        relative to the other designs of table 1, without the graphics card.
-    """
-    maps = data.optional("environments")
+
+def _map(data: Data, key: str) -> float:
+    """Bytes of an environment's albedo, or how much smaller than its source it is."""
+    return float(data.result("environments")["living"][key]["albedo"])
+
+
+def _relit(data: Data, encoding: str) -> str:
+    return f"{data.result('paper-maps')[f'{encoding}, relit']['dists']:.4f}"
+
+
+def _marched(data: Data) -> str:
+    """Mirror rays that find the right place of a room, %: the lowest and the highest of the rooms."""
+    accuracy = data.result("environments")["accuracy"]
+    found = [100 * each["mirror"]["ok"] for name, each in accuracy.items() if name.endswith(", device")]
+    return " to ".join(f"{share:.1f}" for share in sorted({min(found), max(found)}))
+
+
+def _against_rivals(_: Data) -> str:
+    """The paper's efficiency relative to the other designs of table 1, without the graphics card."""
     own = [float(design.frames_per_joule) for design in paper.DESIGNS]
     ratios = sorted(paper.FRAMES_PER_JOULE / each for each in own[:-1] if each > 1)
-    found = {
-        "nj": f"{paper.MILLIWATTS / paper.MRAYS:.2f}",
-        "raysAFrame": f"{round(paper.RAYS_A_FRAME, -3):,.0f}",
-        "againstRivals": f"{ratios[0]:.0f} to {ratios[-1]:.0f}",
-    }
-    if maps is not None:
-        living: Mapping[str, Any] = maps["living"]
-        found |= {"mapBytes": f"{living['bytes']['albedo']:,}", "mapRatio": f"{living['ratio']['albedo']:.1f}"}
-    return found
+    return f"{ratios[0]:.0f} to {ratios[-1]:.0f}"
 
+
+def _place(data: Data) -> str:
+    """The place of the paper's precision by its own formula."""
+    ordinals = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
+    return ordinals[list(printed_index(data)).index(paper.PRECISION)]
+
+
+#: Single figures of the page by name, as text.
+FACTS: Mapping[str, Callable[[Data], str]] = {
+    "mapBytes": lambda data: f"{_map(data, 'bytes'):,.0f}",
+    "mapRatio": lambda data: f"{_map(data, 'ratio'):.1f}",
+    "slicDists": lambda data: _relit(data, "slic"),
+    "twoLevelDists": lambda data: _relit(data, "twoLevel"),
+    "marched": _marched,
+    "nj": lambda _: f"{paper.MILLIWATTS / paper.MRAYS:.2f}",
+    "raysAFrame": lambda _: f"{round(paper.RAYS_A_FRAME, -3):,.0f}",
+    "againstRivals": _against_rivals,
+    "unitKge": lambda data: f"{data.result('paper-unit')['area']['levels']['column']['logic_kge']:,.0f}",
+    "chipRate": lambda _: f"{paper.RAYS_PER_CYCLE / paper.UNITS:.4f}",
+    "chipKge": lambda _: f"{chip_unit_kge():.0f}",
+    "sceneMegabytes": megabytes,
+    "moreRecords": more_records,
+    "moreArea": more_area,
+    "speedUps": speed_ups,
+    "powerSaved": lambda data: saved(data, paper.PRECISION, "mw"),
+    "areaSaved": lambda data: saved(data, paper.PRECISION, "array_kge"),
+    "printedIndex": lambda data: f"{printed_index(data)[paper.PRECISION]:.3f}",
+    "printedPlace": _place,
+    "printedBest": lambda data: next(iter(printed_index(data))),
+    "printedLowest": lambda data: f"{min(printed_index(data).values()):.3f}",
+    "roughPsnr": lambda data: lowest_psnr(data, "24b24s24d"),
+    "finePsnr": lambda data: lowest_psnr(data, paper.PRECISION),
+}
 
 TABLES: Mapping[str, Callable[[Data], str]] = {"table-1": table_1, "paper-unit": unit, "paper-minutes": minutes}

@@ -7,7 +7,7 @@ from typing import Any
 
 from colonnade_lab.common import paper
 from colonnade_lab.common.markdown import markdown
-from colonnade_lab.explore.render_index import indices
+from colonnade_lab.explore.render_index import PRINTED, indices
 from colonnade_lab.figures.data import Data
 from colonnade_lab.figures.study_tables import number
 
@@ -47,24 +47,45 @@ def precision(data: Data) -> str:
 def savings(data: Data) -> str:
     """What the best precision and the paper's choice save against the baseline, beside the paper."""
     study = data.result("mixed-precision")
-    (library,) = study["libraries"]
     points = {point["name"]: point for point in study["points"]}
-    base = points[study["baseline"]]["figures"]
     rows: list[Sequence[str]] = [PAPER]
     for name in {_best(study) or paper.PRECISION: None, paper.PRECISION: None}:
-        own = points[name]["figures"]
         losses = [100 * frame["dists_baseline"] for frame in points[name]["workloads"].values()]
-        saved = [1 - own[f"{key}.{library}"] / base[f"{key}.{library}"] for key in ("nj", "mw", "array_kge")]
-        shares = (f"{100 * share:.1f}" for share in saved)
+        shares = (saved(data, name, key) for key in ("nj", "mw", "array_kge"))
         rows.append(["Colonnade, ASAP7", name, *shares, f"{min(losses):.4f} to {max(losses):.4f}"])
     return markdown(["saved, %", "design", "energy per ray", "power", "area", "DISTS loss, %"], rows)
 
 
-def render_index(data: Data) -> str:
-    """The RenderIndex of each precision by each choice of Norm; bold: the lowest of a choice."""
+def saved(data: Data, name: str, figure: str) -> str:
+    """What a precision saves of a figure of its library against the baseline, %."""
     study = data.result("mixed-precision")
     (library,) = study["libraries"]
-    choices = indices(study["points"], study["baseline"], library)
+    values = {point["name"]: point["figures"][f"{figure}.{library}"] for point in study["points"]}
+    return f"{100 * (1 - values[name] / values[study['baseline']]):.1f}"
+
+
+def printed_index(data: Data) -> dict[str, float]:
+    """The RenderIndex of each precision with the paper's terms, the lowest first."""
+    found = _indices(data.result("mixed-precision"))[PRINTED]
+    return dict(sorted(found.items(), key=lambda item: item[1]))
+
+
+def lowest_psnr(data: Data, name: str) -> str:
+    """The lowest PSNR of a precision's pictures, dB."""
+    (figures,) = (p["figures"] for p in data.result("mixed-precision")["points"] if p["name"] == name)
+    return f"{figures['psnr_min']:.1f}"
+
+
+def _indices(study: Study) -> dict[str, dict[str, float]]:
+    (library,) = study["libraries"]
+    return indices(study["points"], study["baseline"], library)
+
+
+def render_index(data: Data) -> str:
+    """The RenderIndex of each precision by each choice of Norm, as printed first; bold: the lowest of a choice."""
+    study = data.result("mixed-precision")
+    choices = _indices(study)
+    choices = {PRINTED: choices[PRINTED], **choices}
     rows = []
     for point in study["points"]:
         cells = []

@@ -72,22 +72,60 @@ def costs(data: Data) -> str:
 
     def row(title: str, value: Callable[[Point], float], form: str, published: float | None = None) -> list[str]:
         values = {name: value(point) for name, point in points.items()}
-        shares = [f"{100 * (own / values[NONE] - 1):+.1f}" for name, own in values.items() if name != NONE]
+        shares = [_more(own, values[NONE]) for name, own in values.items() if name != NONE]
         claim = "–" if published is None else f"+{100 * published:.1f}"
         return [title, *(format(own, form) for own in values.values()), *shares, claim]
 
-    def records(kind: str) -> Callable[[Point], float]:
-        return lambda point: geometric_mean(frame["records"][kind] for frame in point["workloads"].values())
-
     rows = [
-        row("leaves", records("triangles"), ",.0f"),
-        row("**all records**, with nodes", records("records"), ",.0f", paper.TREE_MEMORY),
+        row("leaves", lambda point: _records(point, "triangles"), ",.0f"),
+        row("**all records**, with nodes", lambda point: _records(point, "records"), ",.0f", paper.TREE_MEMORY),
         row("traversal unit, kGE", lambda point: point["area"][library]["traversal_unit_kge"], ".1f"),
         row("**array**, MGE", lambda point: point["area"][library]["array_kge"] / 1e3, ".2f", paper.TREE_AREA),
     ]
     names = list(points)
     overheads = [f"{name}, %" for name in names if name != NONE]
     return markdown(["", *names, *overheads, "the paper, %"], rows)
+
+
+def more_records(data: Data) -> str:
+    """The records of the tree of `edge` against none, %."""
+    tree, none = _tree_and_none(data.result("bvh-costs"))
+    return _more(_records(tree, "records"), _records(none, "records"))
+
+
+def more_area(data: Data) -> str:
+    """The array of `edge` with its tree against that without one, %."""
+    study = data.result("bvh-costs")
+    (library,) = study["libraries"]
+    return _more(*(point["area"][library]["array_kge"] for point in _tree_and_none(study)))
+
+
+def speed_ups(data: Data) -> str:
+    """The lowest and the highest speed-up by the tree of `edge`, over sizes of meshes."""
+    study = data.result("bvh-cycles")
+    found = [each.speed_up(study["points"][0]["name"]) for each in reductions(study)]
+    return f"{min(found):.1f} to {max(found):.1f}"
+
+
+def megabytes(data: Data) -> str:
+    """The smallest and the largest scene of the meshes, MB."""
+    frames = data.result("bvh-tests")["points"][0]["workloads"].values()
+    sizes = [frame["records"]["bytes"] / 1e6 for frame in frames]
+    return f"{min(sizes):.2f} to {max(sizes):.2f}"
+
+
+def _tree_and_none(study: Mapping[str, Any]) -> tuple[Point, Point]:
+    """The points of the tree of `edge`, which is the first, and of none."""
+    return study["points"][0], _points(study)[NONE]
+
+
+def _records(point: Point, kind: str) -> float:
+    return geometric_mean(frame["records"][kind] for frame in point["workloads"].values())
+
+
+def _more(own: float, other: float) -> str:
+    """How much more than another one it is, %."""
+    return f"{100 * (own / other - 1):+.1f}"
 
 
 TABLES: Mapping[str, Callable[[Data], str]] = {"bvh-tests": tests, "bvh-cycles": cycles, "bvh-costs": costs}

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colonnade_lab.explore.figures import Column, area_figures, columns, front, point_figures
-from colonnade_lab.explore.render_index import index_rows, indices, sensitivity
+from colonnade_lab.explore.render_index import PRINTED, index_rows, indices, sensitivity
 from colonnade_lab.explore.search import check_search, parse_condition, search_front
 from colonnade_lab.explore.study import FieldValue
 from colonnade_lab.explore.study_file import StudyFile, load_study
@@ -62,7 +62,7 @@ def test_render_index_of_the_baseline_is_one_and_a_loss_of_zero_does_not_win_by_
     assert rankings["energy × area alone"][0] == "coarse"
     assert rankings["shares of the ranges (a 0 wins)"][0] in ("wide", "exact", "coarse")
     assert rankings["1 + loss / 0.03 %"][-1] == "coarse"
-    assert rankings["power in place of energy"][0] == "lean"
+    assert rankings[PRINTED][0] == "lean"
     # Where the baseline's pictures have an error of their own, a ratio to it is a norm: 1.5 × 0.5 × 0.6
     by_ratio = indices(found, "wide", "a")["DISTS to Embree in place of the loss"]
     assert by_ratio == pytest.approx({"wide": 1.0, "exact": 0.9405, "lean": 0.45, "coarse": 2.0})
