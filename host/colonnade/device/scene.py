@@ -26,13 +26,14 @@ from colonnade.scene.cameras import check_camera
 from colonnade.scene.joined_mesh import with_transform
 from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, photo_strength, view_photo
 from colonnade.scene.model import Camera, Scene, Transform
-from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
+from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, stated_triangles, with_materials
 from colonnade.scene.passes import frame_passes
 from colonnade.scene.view import View, make_view, place, rendered_materials
 from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.device_image import device_image, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.environment import with_environment
+from colonnade.scene_image.packer import check_triangles
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
@@ -99,6 +100,9 @@ class DeviceScene:
         Raises:
             UserError: Mesh or room cannot be read, or the design cannot render them.
         """
+        if mesh is None:
+            for name, triangles in stated_triangles(scene):
+                check_triangles(name, triangles, manifest, about="at least ")
         if room is None:
             room = device_room(scene, manifest)
         if mesh is None:

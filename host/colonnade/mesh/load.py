@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
 from colonnade.mesh.clips.clip import Clip
-from colonnade.mesh.files import catalog
+from colonnade.mesh.files import catalog, stated
 from colonnade.mesh.files.formats import SUFFIXES, read_surface
 from colonnade.mesh.geometry import primitives, teapot
 from colonnade.mesh.geometry.cleaning import clean
@@ -100,14 +100,42 @@ def _loaded(name_or_path: str | Path, crease: float | None, corner_colours: bool
         if animation is not None:
             raise UserError(f"mesh {text} has no animations: leave out mesh.animation, or give a glTF file")
         return clean_mesh(*built, name=text, crease=crease)
+    file = _file_of(name_or_path)
+    mesh = _read(file.path, file.subdivisions, crease, corner_colours, animation)
+    return mesh if file.is_path else replace(mesh, name=text)
+
+
+@dataclass(frozen=True)
+class _File:
+    """The file of a mesh, how often its triangles are cut in four, and whether its path was given, not its name."""
+
+    path: Path
+    subdivisions: int
+    is_path: bool
+
+
+def _file_of(name_or_path: str | Path) -> _File:
+    """The file of a mesh that is not built in."""
+    text = str(name_or_path)
     looks_like_path = os.sep in text or Path(text).suffix.lower() in SUFFIXES
-    if isinstance(name_or_path, str) and not looks_like_path and not is_file(Path(text)):
-        base, colon, number = text.partition(":")
-        found = catalog.find(base)
-        cuts = _size(text, number, 0, 0, SUBDIVISION_LIMIT, bool(colon))
-        mesh = _read(found.path, found.subdivisions + cuts, crease, corner_colours, animation)
-        return replace(mesh, name=text)
-    return _read(Path(text), 0, crease, corner_colours, animation)
+    if not isinstance(name_or_path, str) or looks_like_path or is_file(Path(text)):
+        return _File(Path(text), 0, True)
+    base, colon, number = text.partition(":")
+    found = catalog.find(base)
+    return _File(found.path, found.subdivisions + _size(text, number, 0, 0, SUBDIVISION_LIMIT, bool(colon)), False)
+
+
+def stated_triangles(name_or_path: str | Path) -> int:
+    """The least number of triangles of a mesh, from the header of its file; 0 if it is unknown, or built in.
+
+    Raises:
+        UserError: There is no mesh of this name.
+    """
+    base = str(name_or_path).partition(":")[0]
+    if isinstance(name_or_path, str) and base in ("teapot", *primitives.PLAIN, *primitives.SIZED):
+        return 0
+    file = _file_of(name_or_path)
+    return stated.stated_triangles(file.path) << 2 * file.subdivisions
 
 
 def _built_in(name: str) -> tuple[Floats, Faces] | None:

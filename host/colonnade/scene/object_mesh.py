@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from colonnade.common import notes
-from colonnade.mesh.load import load_mesh
+from colonnade.mesh import load
 from colonnade.mesh.materials.palette import (
     reduced,
     table_entries,
@@ -68,9 +69,18 @@ def object_mesh(scene: Scene, environment: Environment | None = None, corner_col
     """
     if scene.objects:
         return joined_mesh(scene, environment, corner_colours)
-    mesh = load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours, scene.mesh.simplify, scene.mesh.animation)
+    mesh = load.load_mesh(
+        scene.mesh_source, scene.mesh.crease, corner_colours, scene.mesh.simplify, scene.mesh.animation
+    )
     report_replaced(mesh, scene.material)
     return mesh
+
+
+def stated_triangles(scene: Scene) -> Iterator[tuple[str, int]]:
+    """The meshes of a scene that are not simplified, with the least numbers of their triangles, or 0."""
+    for own in [described.mesh for described in scene.objects] or [scene.mesh]:
+        if own.simplify is None:
+            yield str(own.source), load.stated_triangles(own.source)
 
 
 def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:

@@ -133,7 +133,7 @@ def pack_geometry(
         corner_normals = normals[clip.corners]
     entries, index = table_entries(materials)
     is_glass = np.array([material.kind == "glass" or material.coverage < 0.5 for material in materials])
-    _check_leaves(mesh.name, manifest, -(-len(quantised.faces) // 2) * (1 if colours is None else 2))
+    check_triangles(mesh.name, len(quantised.faces), manifest, 1 if colours is None else 2)
     packing: Any = _core.Packing(
         quantised.vertices,
         quantised.faces,
@@ -218,24 +218,48 @@ def _check_fits(name: str, manifest: Manifest, tree: TreeStatistics, record_coun
         )
 
 
-def _check_leaves(name: str, manifest: Manifest, leaf_records: int) -> None:
-    """Refuse a mesh of whose records so many, the leaves if all are pairs, are too many: its tree may take minutes."""
-    if leaf_records > int(manifest.memories["columnBvh"]["depth"]):
-        # Nodes, and triangles without a partner, are about half as many
-        _check_records(name, manifest, leaf_records + leaf_records // 2, "about ")
+def check_triangles(name: str, triangles: int, manifest: Manifest, leaf_records: int = 1, about: str = "") -> None:
+    """Refuse a mesh of more triangles than a design holds if all are in pairs: its tree may take minutes.
 
+    Args:
+        name: Of the mesh.
+        triangles: Their number.
+        manifest: The design's manifest.
+        leaf_records: Records of a leaf.
+        about: What the message says before the number.
 
-def _check_records(name: str, manifest: Manifest, record_count: int, about: str = "") -> None:
+    Raises:
+        UserError: They are too many.
+    """
     depth = int(manifest.memories["columnBvh"]["depth"])
+    # A tree of n leaves has (n - 1) / 3 nodes of four children
+    most = 2 * ((3 * depth + 1) // (3 * leaf_records + 1) if manifest.bvh else depth // leaf_records)
+    if triangles > most:
+        # Nodes, and triangles without a partner, are about half as many as pairs
+        advice = _advice(manifest, -(-triangles // 2) * leaf_records * 3 // 2)
+        raise UserError(
+            f"mesh {name} has {about}{triangles:,} triangles, the {depth:,} records of columnBvhMemory.depth hold"
+            f" {most:,} at most: {advice}"
+        )
+
+
+def _advice(manifest: Manifest, record_count: int) -> str:
+    """What to do with a mesh of so many records."""
     enough = 1 << (record_count - 1).bit_length()
     advice = "simplify the mesh (--simplify)"
     if manifest.memories["columnBvh"].get("line") is None:
         advice += ", or take a preset whose scene lies in DRAM, such as edge"
     if enough <= MAX_MEMORY_DEPTH:
         advice = f"raise columnBvhMemory.depth to {enough}, {advice}"
+    return advice
+
+
+def _check_records(name: str, manifest: Manifest, record_count: int) -> None:
+    depth = int(manifest.memories["columnBvh"]["depth"])
     if record_count > depth:
         raise UserError(
-            f"mesh {name} needs {about}{record_count:,} records, columnBvhMemory.depth is {depth:,}: {advice}"
+            f"mesh {name} needs {record_count:,} records, columnBvhMemory.depth is {depth:,}:"
+            f" {_advice(manifest, record_count)}"
         )
 
 

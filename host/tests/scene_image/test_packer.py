@@ -142,10 +142,10 @@ def test_one_triangle_and_a_flat_square(make_manifest: MakeManifest) -> None:
 def test_too_many_records_are_refused(make_manifest: MakeManifest) -> None:
     with pytest.raises(
         UserError,
-        match=r"teapot needs 4,\d\d\d records, columnBvhMemory.depth is 4,096: raise columnBvhMemory.depth to 8192,"
+        match=r"teapot needs 4,\d\d\d records, columnBvhMemory.depth is 4,300: raise columnBvhMemory.depth to 8192,"
         r" simplify the mesh \(--simplify\), or take a preset whose scene lies in DRAM, such as edge$",
     ):
-        pack(load_mesh("teapot"), make_manifest(depth=4096))
+        pack(load_mesh("teapot"), make_manifest(depth=4300))
 
 
 def test_a_mesh_that_is_far_too_large_is_refused_before_its_tree_is_built(
@@ -153,7 +153,9 @@ def test_a_mesh_that_is_far_too_large_is_refused_before_its_tree_is_built(
 ) -> None:
     monkeypatch.setattr(_core, "Packing", None)
     with pytest.raises(
-        UserError, match=r"needs about 4,\d\d\d records, .* is 2,048: raise columnBvhMemory.depth to 8192,"
+        UserError,
+        match=r"mesh teapot has 6,\d\d\d triangles, the 2,048 records of columnBvhMemory.depth hold 3,072 at most:"
+        " raise columnBvhMemory.depth to 8192, simplify the mesh",
     ):
         pack(load_mesh("teapot"), make_manifest(depth=2048))
 

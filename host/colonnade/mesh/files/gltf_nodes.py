@@ -23,6 +23,8 @@ _OF_COPIES = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
 MAX_COPIES = 1 << 16
 #: Largest magnitude of a transform's element, in the scene.
 _MAX_TRANSFORM = 1e100
+#: Modes of primitives.
+TRIANGLES, STRIP, FAN = 4, 5, 6
 
 
 def mesh_nodes(
@@ -32,16 +34,8 @@ def mesh_nodes(
 
     A node has one for each copy of its mesh; if it is animated, one.
     """
-    json = document.json
-    scenes, nodes = json.get("scenes", []), json.get("nodes", [])
-    if scenes:
-        default = json.get("scene", 0)
-        losses.add(lost.SCENES, len(scenes) - 1)
-        roots = document.entry("scenes", default).get("nodes", [])
-    else:
-        children = {child for node in nodes for child in node.get("children", [])}
-        roots = [index for index in range(len(nodes)) if index not in children]
-    pending, count = [(root, np.eye(4)) for root in reversed(roots)], 0
+    losses.add(lost.SCENES, len(document.json.get("scenes", [])) - 1)
+    pending, count = [(root, np.eye(4)) for root in reversed(_roots(document))], 0
     while pending:
         index, parent = pending.pop()
         node = document.entry("nodes", index)
@@ -58,6 +52,42 @@ def mesh_nodes(
             losses.add(lost.BENT_COPIES, len(copies) - 1)
             copies = np.eye(4)[np.newaxis]
         yield index, node, _finite(document, index, fixed_order.product(matrix, copies))
+
+
+def _roots(document: GltfDocument) -> list[int]:
+    """The nodes of the default scene."""
+    json = document.json
+    if json.get("scenes", []):
+        return list(document.entry("scenes", json.get("scene", 0)).get("nodes", []))
+    nodes = json.get("nodes", [])
+    children = {child for node in nodes for child in node.get("children", [])}
+    return [index for index in range(len(nodes)) if index not in children]
+
+
+def triangles_of(document: GltfDocument) -> int:
+    """The triangles of the default scene, with all copies, by the counts of accessors."""
+    meshes: dict[int, int] = {}
+    pending, count = _roots(document), 0
+    while pending:
+        node = document.entry("nodes", pending.pop())
+        pending += node.get("children", [])
+        if "mesh" not in node:
+            continue
+        if (mesh := node["mesh"]) not in meshes:
+            primitives = document.entry("meshes", mesh).get("primitives", [])
+            meshes[mesh] = sum(_triangles_of(document, primitive) for primitive in primitives)
+        extension = node.get("extensions", {}).get(INSTANCING)
+        count += meshes[mesh] * (1 if extension is None else _copy_count(document, extension))
+    return count
+
+
+def _triangles_of(document: GltfDocument, primitive: Mapping[str, Any]) -> int:
+    mode = primitive.get("mode", TRIANGLES)
+    if mode not in (TRIANGLES, STRIP, FAN):
+        return 0
+    accessor = primitive.get("indices", primitive.get("attributes", {}).get("POSITION"))
+    corners = int(document.entry("accessors", accessor)["count"])
+    return corners // 3 if mode == TRIANGLES else max(0, corners - 2)
 
 
 def _copy_count(document: GltfDocument, extension: Mapping[str, Any]) -> int:

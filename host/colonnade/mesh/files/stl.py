@@ -16,7 +16,7 @@ from colonnade.mesh.losses import FACET_COLOURS, SPARE_BYTES, Losses
 from colonnade.mesh.materials.surface import RawSurface
 
 #: Bytes before the facets of a binary file, and of a facet.
-_HEADER, _FACET = 84, 50
+HEADER_BYTES, FACET_BYTES = 84, 50
 
 
 def read_stl(data: bytes, path: Path, losses: Losses) -> RawSurface:
@@ -25,8 +25,8 @@ def read_stl(data: bytes, path: Path, losses: Losses) -> RawSurface:
     Raises:
         UserError: The file is invalid or truncated.
     """
-    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= _HEADER else 0
-    is_binary = len(data) >= _HEADER and len(data) == _HEADER + _FACET * count
+    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= HEADER_BYTES else 0
+    is_binary = len(data) >= HEADER_BYTES and len(data) == HEADER_BYTES + FACET_BYTES * count
     if not is_binary and _is_ascii(data):
         facets, corners = (len(re.findall(word, data)) for word in (rb"(?i)\bfacet\s+normal\b", rb"(?i)\bvertex\b"))
         if corners != 3 * facets or len(re.findall(rb"(?i)\bendsolid\b", data)) == 0:
@@ -41,13 +41,13 @@ def read_stl(data: bytes, path: Path, losses: Losses) -> RawSurface:
             raise UserError(f"mesh {path}: a vertex has fewer than 3 numbers")
         vertices = np.array(words).astype(np.float64).reshape(-1, 3)
     else:
-        if len(data) < _HEADER:
-            raise UserError(f"mesh {path} is truncated: a binary STL file has {_HEADER} bytes and its facets")
-        present = (len(data) - _HEADER) // _FACET
+        if len(data) < HEADER_BYTES:
+            raise UserError(f"mesh {path} is truncated: a binary STL file has {HEADER_BYTES} bytes and its facets")
+        present = (len(data) - HEADER_BYTES) // FACET_BYTES
         if present < count:
             raise UserError(f"mesh {path} is truncated: its header states {count:,} facets, it holds {present:,}")
-        records = np.frombuffer(data, np.uint8, _FACET * count, _HEADER).reshape(-1, _FACET)
-        losses.add(SPARE_BYTES, len(data) - _HEADER - _FACET * count)
+        records = np.frombuffer(data, np.uint8, FACET_BYTES * count, HEADER_BYTES).reshape(-1, FACET_BYTES)
+        losses.add(SPARE_BYTES, len(data) - HEADER_BYTES - FACET_BYTES * count)
         losses.add(FACET_COLOURS, int(records[:, 48:].any(axis=1).sum()))
         if count == 0:
             raise UserError(f"mesh {path} has no faces: its header states none")
