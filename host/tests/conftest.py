@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 from one_generator import OneGenerator
+from patience import PATIENCE
 
 from colonnade.common import notes, processes
 from colonnade.design.manifest import VERSION, Manifest
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 MakeManifest = Callable[..., Manifest]
+
+# No property depends on the speed of the machine
+settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
 
 
 def manifest_data(
@@ -230,9 +236,9 @@ def browser() -> Iterator[Browser]:
     program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if program is None:
         pytest.skip("no Chromium: install it with `apt-get install chromium`")
-    expect.set_options(timeout=30_000)  # as long as the pages of the tests wait, on a busy machine
+    expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"], timeout=PATIENCE)
         yield browser
         browser.close()
 

@@ -17,7 +17,7 @@ from colonnade.common.machine_limits import limit_this_process
 #: Memory of the process beside its libraries, bytes, and bytes more for each byte of the longest output.
 _MEMORY, _MEMORY_OF_A_BYTE = 1 << 26, 8
 #: Its processor time, seconds, and streams for one more.
-_SECONDS, _STREAMS_OF_A_SECOND = 5, 20
+_SECONDS, _STREAMS_OF_A_SECOND = 60, 20
 #: The last block of a stream.
 _END = b"bvx$"
 

@@ -233,13 +233,13 @@ def check_triangles(name: str, triangles: int, manifest: Manifest, leaf_records:
     """
     depth = int(manifest.memories["columnBvh"]["depth"])
     # A tree of n leaves has (n - 1) / 3 nodes of four children
-    most = 2 * ((3 * depth + 1) // (3 * leaf_records + 1) if manifest.bvh else depth // leaf_records)
-    if triangles > most:
+    max_triangles = 2 * ((3 * depth + 1) // (3 * leaf_records + 1) if manifest.bvh else depth // leaf_records)
+    if triangles > max_triangles:
         # Nodes, and triangles without a partner, are about half as many as pairs
         advice = _advice(manifest, -(-triangles // 2) * leaf_records * 3 // 2)
         raise UserError(
             f"mesh {name} has {about}{triangles:,} triangles, the {depth:,} records of columnBvhMemory.depth hold"
-            f" {most:,} at most: {advice}"
+            f" {max_triangles:,} at most: {advice}"
         )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from animated_documents import arm, turn
 from built_page import FILE, NEEDS_PAGE, OBJ, ROOT, Tab
 from page_frames import host_frame, light_around
+from patience import PATIENCE
 from playwright.sync_api import Browser, BrowserContext, expect
 
 from colonnade.mesh.load import load_mesh
@@ -20,11 +21,9 @@ from colonnade.mesh.load import load_mesh
 pytestmark = NEEDS_PAGE
 
 
-def test_the_page_is_small_and_fast_and_equals_the_host(context: BrowserContext) -> None:
+def test_the_page_is_small_and_equals_the_host(context: BrowserContext) -> None:
     assert len(gzip.compress(FILE.read_bytes())) < 1_000_000
-    begin = time.monotonic()
     tab = Tab(context, "#pixel=4")
-    assert time.monotonic() - begin < 10  # some 3 s on a busy machine
     picture = tab.picture()
     frame = host_frame(picture, load_mesh("teapot"), "small")
     assert frame.is_object.sum() > 100
@@ -111,6 +110,7 @@ def triangle_document() -> dict[str, Any]:
 
 def test_controls_and_the_size_of_a_phone(browser: Browser) -> None:
     context = browser.new_context(viewport={"width": 360, "height": 640}, has_touch=True, is_mobile=True, offline=True)
+    context.set_default_timeout(PATIENCE)
     tab = Tab(context, "#pixel=4&design=tiny")
     page = tab.page
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
@@ -175,9 +175,9 @@ def test_an_animated_file_plays_and_equals_the_host(context: BrowserContext, tmp
     expect(page.locator("#play")).to_have_text("Pause")
     shots = set()
     for _ in range(3):
-        before, end = int(page.evaluate("colonnade.played ?? 0")), time.monotonic() + 30
+        before = int(page.evaluate("colonnade.played ?? 0"))
         while page.evaluate("colonnade.played ?? 0") < before + 3:
-            assert time.monotonic() < end, "it does not play"
+            time.sleep(0.02)
         shots.add(page.evaluate("document.getElementById('picture').toDataURL()"))
     assert len(shots) == 3
     with tab.another_frame():
@@ -257,7 +257,7 @@ def test_recorded_cycles_are_those_of_the_rtl(context: BrowserContext) -> None:
     x, y = recording["pixels"][longest]
     tab = Tab(context, f"#pixel=4&design=tiny&follow={x},{y},64,48,24,18,4.6,0,0")
     tab.page.click("#time")
-    expect(tab.page.locator("#times caption")).to_contain_text("the recording is of the RTL of tiny", timeout=60_000)
+    expect(tab.page.locator("#times caption")).to_contain_text("the recording is of the RTL of tiny")
     rows = [row.split("\t") for row in tab.page.locator("#times tbody").inner_text().splitlines()]
     assert rows[0][1:] == ["tiny", "tiny, recorded"] and len(rows) == 8
     # Schedules that run without pause may be a cycle further at the start
@@ -270,10 +270,10 @@ def test_the_rtl_in_the_tab_equals_the_model(context: BrowserContext) -> None:
     tab = Tab(context, "#pixel=4&azimuth=70")
     page = tab.page
     page.click("#rtl-start")
-    expect(page.locator("#rtl-status")).to_contain_text("Equal: 3072 pixels", timeout=60_000)
+    expect(page.locator("#rtl-status")).to_contain_text("Equal: 3072 pixels")
     page.mouse.click(208, 120)
     page.click("#time")
-    expect(page.locator("#times caption")).to_contain_text("its colour is the model's", timeout=60_000)
+    expect(page.locator("#times caption")).to_contain_text("its colour is the model's")
     pixel = page.evaluate("colonnade.pixelCounters")
     assert pixel["raysPrimary"] == pixel["hits"] == 1 and pixel["waitRecord"] > 0
     result = page.evaluate("colonnade.rtl")

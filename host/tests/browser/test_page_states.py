@@ -175,16 +175,21 @@ def test_hardware_that_cannot_hold_the_mesh_is_not_taken(context: BrowserContext
     assert tab.is_quiet()
 
 
-#: Puts a worker without end in the place of one of the renderer's, for a call, and counts the seconds of silence.
+#: Puts a worker without end in the place of one of the renderer's, for a call, of which it is silent too long at once.
 ENDLESS = """([index, call]) => {
   const { renderer } = colonnade;
   const { url } = renderer;
   const answer = `if (data.call !== "${call}") return postMessage({ id: data.id, answer: {} }); for (;;);`;
   renderer.url = URL.createObjectURL(new Blob([`onmessage = ({ data }) => { ${answer} };`]));
   renderer.workers.at(index).terminate();
-  renderer.workers[renderer.workers.length + index] = renderer.start();
+  const endless = renderer.workers[renderer.workers.length + index] = renderer.start();
   renderer.url = url;
-  setInterval(() => renderer.watch(), 20);
+  const timer = setInterval(() => {
+    if (![...renderer.waiting.values()].some((each) => each.worker === endless && each.call === call)) return;
+    clearInterval(timer);
+    endless.silence = 20;
+    renderer.watch();
+  }, 20);
 }"""
 
 

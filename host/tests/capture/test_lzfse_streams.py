@@ -25,7 +25,7 @@ def stored(content: bytes) -> bytes:
     return b"bvx-" + struct.pack("<I", len(content)) + content
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.integers(1, 1 << 18), st.booleans())
 def test_streams_are_decoded_in_their_order_and_none_is_longer_than_the_longest(size: int, is_noise: bool) -> None:
     content = np.random.default_rng(size).bytes(size) if is_noise else bytes(size)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -56,10 +55,8 @@ def test_help_is_readable_and_names_every_command() -> None:
 def test_help_imports_nothing_heavy() -> None:
     heavy = "{'numpy', 'trimesh', 'skimage', 'scipy', 'matplotlib', 'PIL', 'embreex', 'rich'}"
     code = f"import sys, colonnade.cli; print(sorted({heavy} & set(sys.modules)))"
-    start = time.perf_counter()
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
     assert loaded == "[]"
-    assert time.perf_counter() - start < 2.0
 
 
 def test_module_and_script_are_the_same_command() -> None:

@@ -20,7 +20,6 @@ from colonnade.cli.main import DEBUG, cli
 from colonnade.common import atomic_files, image_io, processes
 from colonnade.common.errors import UserError
 
-SECONDS = 30
 LIVING = Path(__file__).resolve().parents[3] / "scenes" / "rooms" / "living"
 IS_ROOT = os.geteuid() == 0
 
@@ -30,9 +29,7 @@ def colonnade(
 ) -> subprocess.CompletedProcess[str]:
     command = [*before, sys.executable, "-m", "colonnade", *arguments.split()]
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | more
-    return subprocess.run(
-        command, cwd=folder, stdin=subprocess.DEVNULL, text=True, timeout=SECONDS, check=False, **streams
-    )
+    return subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, text=True, check=False, **streams)
 
 
 @contextlib.contextmanager
@@ -154,7 +151,7 @@ def test_output_to_a_closed_pipe_is_one_line(folder: Path) -> None:
 
 def test_arguments_may_be_invalid_utf_8(folder: Path) -> None:
     command = [sys.executable.encode(), b"-m", b"colonnade", b"render", b"\xff\x1b[31m.toml", b"--config", b"tiny"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=SECONDS, check=False)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     hostile.one_error_line(done.stderr, "\\xff\\x1b[31m.toml")
 

@@ -35,7 +35,7 @@ def passes_of(frames: list[Frame]) -> FramePasses:
     return passes
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seeds=st.lists(st.integers(0, 1000), min_size=1, max_size=12), room=st.booleans(), data=st.data())
 def test_sums_are_exact_and_free_of_order(seeds: list[int], room: bool, data: st.DataObject) -> None:
     frames = [random_frame(seed, room) for seed in seeds]

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -26,15 +26,16 @@ from colonnade.common.temporary import temporary_folder
 
 def one(number):
     with temporary_folder(".job.", Path(sys.argv[1])) as place:
-        code = "import subprocess, sys; subprocess.run(['sleep', '61'])"
+        code = "import subprocess, sys; subprocess.run(['sleep', '100000'])"
         processes.run([sys.executable, "-c", code])
 
 def main():
     if sys.argv[2] == "alone":
         one(0)
     elif sys.argv[2] == "busy":
-        list(in_order(lambda number: time.sleep(30), range(4), 2))
+        list(in_order(lambda number: time.sleep(100_000), range(4), 2))
     else:
+        processes.CLEANUP_SECONDS = 100_000
         for result in in_order(one, range(4), 2):
             pass
 
@@ -58,10 +59,8 @@ def is_running(pid: int) -> bool:
         return False
 
 
-def wait_for(condition: object, seconds: float = 10.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():  # type: ignore[operator]
-        assert time.monotonic() < deadline
+def wait_for(condition: Callable[[], bool]) -> None:
+    while not condition():
         time.sleep(0.02)
 
 
@@ -95,11 +94,8 @@ def test_a_signal_to_the_parent_ends_everything(
         wait_for(lambda: len(list(Path(f"/proc/{process.pid}/task").iterdir())) > 2)
     below = children(process.pid)
     time.sleep(0.1)
-    at = time.monotonic()
     process.send_signal(number)
-    _, said = process.communicate(timeout=10)
-    # It takes at most 1.3 seconds on an idle machine
-    assert time.monotonic() - at < 4.0
+    _, said = process.communicate()
     assert process.returncode == 128 + number
     assert said == f"colonnade: error: {processes._WORDS.get(number, 'terminated')}\n"
     assert not [pid for pid in below if is_running(pid)]
@@ -108,9 +104,7 @@ def test_a_signal_to_the_parent_ends_everything(
 
 def test_a_program_that_ignores_sigterm_is_killed(tmp_path: Path) -> None:
     group = processes.Group()
-    code = (
-        "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('ready', flush=True); time.sleep(60)"
-    )
+    code = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('ready', flush=True); signal.pause()"
     ended = []
 
     def work() -> None:
@@ -126,9 +120,9 @@ def test_a_program_that_ignores_sigterm_is_killed(tmp_path: Path) -> None:
     ready = threading.Event()
     thread = threading.Thread(target=work)
     thread.start()
-    assert ready.wait(10)
+    ready.wait()
     group.end()
-    thread.join(5)
+    thread.join()
     assert ended == [-signal.SIGKILL]
 
 
@@ -146,7 +140,7 @@ def test_an_ended_group_starts_nothing(tmp_path: Path) -> None:
 
     thread = threading.Thread(target=work)
     thread.start()
-    thread.join(5)
+    thread.join()
     assert raised
     assert list(tmp_path.iterdir()) == []
 
@@ -158,11 +152,9 @@ def test_an_error_in_one_task_ends_the_others() -> None:
             raise ValueError("wrong")
         processes.run(["sleep", str(seconds)])
 
-    at = time.monotonic()
     with pytest.raises(ValueError, match="wrong"):
-        list(in_order(work, [0, 61, 61], 2))
-    assert time.monotonic() - at < 4.0
-    wait_for(lambda: not processes._running, 3.0)
+        list(in_order(work, [0, 100_000, 100_000], 2))
+    wait_for(lambda: not processes._running)
 
 
 def test_runs_programs_as_subprocess_does(tmp_path: Path) -> None:
@@ -174,15 +166,16 @@ def test_runs_programs_as_subprocess_does(tmp_path: Path) -> None:
     assert processes._running == {}
 
 
-def test_a_program_ends_when_its_block_fails() -> None:
-    with pytest.raises(KeyError), processes.started(["sleep", "61"]) as process:
+def test_a_program_ends_when_its_block_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(processes, "GRACE", 100_000)
+    with pytest.raises(KeyError), processes.started(["sleep", "100000"]) as process:
         raise KeyError
     assert process.returncode == -signal.SIGTERM
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells programs of their parent's end")
 def test_programs_end_when_their_parent_is_killed(tmp_path: Path, begun: list[subprocess.Popen[str]]) -> None:
-    code = "from colonnade.common import processes; processes.run(['sleep', '61'])"
+    code = "from colonnade.common import processes; processes.run(['sleep', '100000'])"
     process = subprocess.Popen([sys.executable, "-c", code], text=True)
     begun.append(process)
     wait_for(lambda: len(children(process.pid)) == 1)
@@ -232,7 +225,7 @@ def main():
         os.kill(os.getpid(), signal.SIGINT)
     except BaseException:
         pass
-    time.sleep(60)
+    time.sleep(100_000)
 
 processes.INSIST_SECONDS = 0.1
 processes.guarded(main)
@@ -241,9 +234,9 @@ processes.guarded(main)
 
 
 def test_a_signal_while_a_library_does_not_return_is_obeyed(tmp_path: Path) -> None:
-    """The call computes for minutes, without Python's lock; the files that it writes go."""
+    """The call waits for a lock without end, and without Python's; the files that it writes go."""
     program = """
-import hashlib, os, signal, threading
+import ctypes, os, signal, threading
 from pathlib import Path
 from colonnade.common import processes
 from colonnade.common.atomic_files import replacing
@@ -252,13 +245,13 @@ from colonnade.common.temporary import temporary_folder
 def main():
     threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     with temporary_folder(".job.", Path()), replacing(Path("picture.png")):
-        hashlib.pbkdf2_hmac("sha256", b"", b"", 1 << 30)
+        library, lock = ctypes.CDLL(None), ctypes.create_string_buffer(256)
+        library.pthread_mutex_lock(lock)
+        library.pthread_mutex_lock(lock)
 
 processes.guarded(main)
 """
-    begun = time.monotonic()
     assert interrupted(program, tmp_path)
-    assert time.monotonic() - begun < 10.0
     assert list(tmp_path.iterdir()) == []
 
 

@@ -22,7 +22,7 @@ with temporary_folder(".entry.", Path(sys.argv[1])) as place:
     (place / "inner").mkdir()
     (place / "inner" / "file").write_text("something")
     print("ready", flush=True)
-    time.sleep(60)
+    time.sleep(100_000)
 """
 
 

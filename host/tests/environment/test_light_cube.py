@@ -33,7 +33,7 @@ def test_a_texel_lies_in_its_directions() -> None:
     assert abs(6 * weights.sum() * (2 / FACE) ** 2 - 4 * np.pi) < 0.05, "they fill the sphere"
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(DIRECTION, st.floats(0.1, 100))
 def test_length_does_not_matter(direction: list[float], length: float) -> None:
     cube = LightCube(np.random.default_rng(1).random((6, FACE, FACE, 3)))
@@ -65,7 +65,7 @@ def test_words_hold_light_above_one_and_saturate() -> None:
     ]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.floats(0, 15.8), min_size=3, max_size=3))
 def test_a_word_holds_its_light_to_a_hundredth(texel: list[float]) -> None:
     """Of its largest channel, and to half a step of 12 bits."""
@@ -74,7 +74,7 @@ def test_a_word_holds_its_light_to_a_hundredth(texel: list[float]) -> None:
     assert np.abs(np.ldexp(mantissas, exponent - 12) - texel).max() <= max(max(texel) / 128, 0.5 / 4096)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(DIRECTION, st.floats(0.0, 0.6))
 def test_a_light_is_where_it_is(direction: list[float], radius: float) -> None:
     """In its directions and near them, for those that see lights; its texels keep their light for the others."""

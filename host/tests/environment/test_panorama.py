@@ -62,7 +62,7 @@ def test_formats_show_the_same(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(turned.at(np.array([[-1.0, -0.1, -0.1]]))[0], expected, atol=0.005)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(2, 400), st.floats(0.01, 50))
 def test_a_constant_panorama_is_a_constant_cube(
     tmp_path_factory: pytest.TempPathFactory, rows: int, level: float
@@ -84,7 +84,7 @@ def test_yaw_turns_the_directions(yaw: float) -> None:
     assert np.abs(light.direction - expected).max() < 0.01
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(
     st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1)).filter(lambda v: float(np.linalg.norm(v)) > 0.1),
     st.floats(0.06, 0.3),

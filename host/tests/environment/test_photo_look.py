@@ -39,7 +39,7 @@ def test_rooms_without_grain_and_blur_have_none(name: str) -> None:
     assert measured_blur(picture(name)) < 0.75
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(name=st.sampled_from([SMOOTH[0], SMOOTH[3]]), grey=st.floats(1.5, 8), colour=st.floats(0.5, 4))
 def test_noise_is_measured(name: str, grey: float, colour: float) -> None:
     grain = Grain.of(noisy(picture(name), grey, colour))

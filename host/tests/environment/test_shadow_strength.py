@@ -31,7 +31,7 @@ def wall(share: float, scale: float = 1.0) -> Environment:
     return Environment("wall", albedo, room.normals, room.depth, True, room.camera, photo)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(0, 1), st.floats(0.5, 1.0))
 def test_an_object_leaves_the_ambient_light(share: float, scale: float) -> None:
     """Where it takes all light away, every pixel has the ambient light, whatever share the room let through."""

@@ -45,7 +45,7 @@ def built(program: Path, triangles: Any, materials: Any, *poses: Any) -> Built:
     rows = [np.array(numbers), np.column_stack([triangles, materials]).reshape(-1)]
     rows += [np.column_stack([pose, np.zeros((len(pose), 2), dtype=np.int64)]).reshape(-1) for pose in poses]
     text = " ".join(map(str, np.concatenate(rows).tolist()))
-    done = subprocess.run([program], input=text, capture_output=True, text=True, timeout=300)
+    done = subprocess.run([program], input=text, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     found = np.array(done.stdout.split(), dtype=np.int64)
     leaves, records, depth = found[:3].tolist()

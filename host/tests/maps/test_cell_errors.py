@@ -12,7 +12,7 @@ from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.tiles import sum_cells
 
 
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 @given(st.integers(0, 1000), st.sampled_from([2, 4, 8, 16]), st.sampled_from([16, 32]))
 def test_costs_are_errors_with_less_weight_on_detail_of_single_pixels(seed: int, cells: int, size: int) -> None:
     random = np.random.default_rng(seed)

@@ -90,7 +90,7 @@ def all_words(image: AttributeImage) -> bytes:
     return b"".join(words.tobytes() for _, words in memory_words(image))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.data())
 def test_maps_of_any_room_are_legal(data: st.DataObject) -> None:
     """Noise, constant maps, extreme depths and cameras that jump: two frames of them."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -78,7 +78,6 @@ def test_impossible_layouts_are_rejected(settings: dict[str, int | str], message
         AttributeLayout(**settings)  # type: ignore[arg-type]
 
 
-@settings(deadline=None)
 @given(st.lists(st.tuples(*[st.integers(-2048, 2047)] * 3), min_size=1), st.booleans())
 def test_words_hold_three_fields(fields: list[tuple[int, int, int]], signed: bool) -> None:
     values = np.array(fields) if signed else np.array(fields) + 2048

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -51,7 +51,6 @@ def boxes(width: int = 160, height: int = 120, steps: bool = True) -> Environmen
     return Environment("boxes", albedo, facing, depth, True, camera, None)
 
 
-@settings(deadline=None)
 @given(st.tuples(*[st.floats(-4000, 4000, allow_subnormal=False)] * 3), st.integers(0, 30))
 def test_planes_take_the_least_exponent(values: tuple[float, float, float], shrink: int) -> None:
     plane = np.ldexp(np.array([values]), -shrink)

@@ -23,7 +23,6 @@ from colonnade.maps.vectors import AlbedoSpace
 ALBEDO = AlbedoSpace(12)
 
 
-@settings(deadline=None)
 @given(st.lists(st.lists(st.lists(st.integers(0, 2), min_size=33, max_size=33), max_size=8), min_size=1, max_size=5))
 def test_pointers_find_their_words(content: list[list[list[int]]]) -> None:
     lengths = (1, 4, 16, 33, 2)
@@ -51,7 +50,7 @@ def test_overlapping_words_are_stored_once() -> None:
     )
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(0, 10_000), st.integers(1, 12), st.integers(1, 12), st.integers(0, 40))
 def test_sharing_keeps_the_budget_and_never_raises_the_error(seed: int, count: int, tiles: int, budget: int) -> None:
     random = np.random.default_rng(seed)
@@ -101,7 +100,7 @@ def loss(original: NDArray[np.float64], layout: AttributeLayout) -> float:
     return float((((pixels.points - decoded.points) ** 2).sum(axis=3) * pixels.weights).sum())
 
 
-@settings(deadline=None, max_examples=8)
+@settings(max_examples=8)
 @given(st.integers(0, 10_000), st.sampled_from([1500, 2000, 3000]), st.sampled_from([8, 16, 32]))
 def test_shared_maps_lose_less(seed: int, heap_bytes: int, tile_size: int) -> None:
     layout = AttributeLayout(112, 80, tile_size=tile_size, palette_size=16)

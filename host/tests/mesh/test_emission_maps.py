@@ -72,7 +72,7 @@ def edge_uses(faces: np.ndarray) -> np.ndarray:
     return np.asarray(np.unique(edges, axis=0, return_counts=True)[1])
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0]), st.sampled_from([1.0, 0.05]))
 def test_pieces_follow_a_map_and_leave_no_crack(seed: int, share: float, factor: float) -> None:
     """On a sphere whose faces share no vertices, as on both sides of a seam."""

@@ -109,7 +109,7 @@ def test_normals_of_obj_ply_off_and_gltf(tmp_path: Path) -> None:
     scale=st.tuples(*[st.floats(0.2, 5.0) | st.floats(-5.0, -0.2)] * 3),
     rotation=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: sum(c * c for c in q) > 0.1),
 )
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_normals_of_a_transformed_node_stay_normal(
     tmp_path_factory: pytest.TempPathFactory, scale: tuple[float, ...], rotation: tuple[float, ...]
 ) -> None:
@@ -291,7 +291,7 @@ def test_what_follows_the_last_triangle_is_noted(tmp_path: Path) -> None:
 
 
 @given(data=st.data())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_a_damaged_binary_file_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:

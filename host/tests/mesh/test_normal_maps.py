@@ -95,7 +95,7 @@ def slimness(corners: np.ndarray) -> float:
     return float(((edges**2).sum(axis=2).max(axis=1) / areas).max())
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([90, 500]), st.sampled_from([0.3, 1.0]))
 def test_split_faces_stay_closed(seed: int, budget: int, share: float) -> None:
     vertices, faces, normals, relief = bumpy(seed, share)

@@ -118,7 +118,7 @@ def test_a_negative_emission_is_refused(tmp_path: Path) -> None:
 
 
 @given(st.data())
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_odd_types_in_gltf_are_refused_in_plain_words(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
 ) -> None:

@@ -53,7 +53,6 @@ def test_an_l_shaped_face_has_its_area(tmp_path: Path, suffix: str, first: int) 
     tilt=st.floats(-3.0, 3.0),
     stretch=st.floats(1e-3, 1e3),
 )
-@settings(deadline=None)
 def test_a_star_shaped_polygon_is_covered_once(radii: list[float], tilt: float, stretch: float) -> None:
     """The triangles of a polygon have its area, and none is turned over."""
     angle = 2 * np.pi * np.arange(len(radii)) / len(radii)
@@ -98,7 +97,7 @@ def untangled(points: list[tuple[int, int]]) -> np.ndarray | None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 7)), min_size=5, max_size=13, unique=True))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_a_simple_polygon_is_covered_exactly_once(points: list[tuple[int, int]]) -> None:
     """Areas are positive, their sum is the polygon's, every corner is used, and the border is the polygon's."""
     flat = untangled(points)

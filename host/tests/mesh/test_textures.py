@@ -84,7 +84,7 @@ def test_hardware_without_textures_shows_their_mean(tmp_path: Path) -> None:
     assert replaced.texture is None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.sampled_from(["repeat", "mirror", "clamp"]),
     st.floats(-4, 4, allow_subnormal=False),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from colonnade.mesh.geometry.primitives import Geometry, cube, sphere, square
@@ -30,7 +30,6 @@ def moved(part: Geometry, scale: float, shift: float = 0.0, inverted: bool = Fal
 
 
 @given(choices=st.lists(st.booleans(), min_size=12, max_size=12))
-@settings(deadline=None)
 def test_any_winding_of_a_cube_is_repaired(choices: list[bool]) -> None:
     vertices, faces = cube()
     faces[choices] = faces[choices][:, ::-1]

@@ -26,7 +26,7 @@ def test_points_lie_on_the_sphere_and_are_spread_evenly() -> None:
     assert np.abs(points.T @ points / len(points) - np.eye(3) / 3).max() < 0.001
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: max(map(abs, v)) > 0.1))
 def test_directions_have_the_cosine_as_their_density(normal: list[float]) -> None:
     unit = unit_vectors(np.array([normal]))
@@ -38,7 +38,7 @@ def test_directions_have_the_cosine_as_their_density(normal: list[float]) -> Non
     assert abs((cosine**2).mean() - 1 / 2) < 0.001
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda v: max(map(abs, v)) > 0.1), st.floats(0.07, 0.6)
 )
@@ -62,7 +62,7 @@ def test_lobes_have_the_angles_of_microfacets(axis: list[float], alpha: float) -
     assert abs(2 * lobe_shares(x, np.full(len(x), alpha)).mean() - (cosine > 0).mean()) < 0.01
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(0, 120), st.integers(0, 120), st.sampled_from([4, 8]))
 def test_pixels_of_a_square_have_points_far_apart(column: int, row: int, edge: int) -> None:
     y, x = np.mgrid[row * edge : (row + 1) * edge, column * edge : (column + 1) * edge]

@@ -107,7 +107,7 @@ def test_the_light_is_relative_to_cube_and_camera() -> None:
     np.testing.assert_allclose(make_view(scene, extent, 64, 48).light, expected)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     position=st.tuples(*[st.floats(-12, 12)] * 3),
     target=st.tuples(*[st.floats(-3, 3)] * 3),

@@ -132,7 +132,7 @@ def hits_of_their_own_plane(precision: str, divisions: int, seed: int, share: fl
     return int((again >= 0).sum()), len(starts)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.sampled_from(PRECISIONS), st.sampled_from([1, 1, 2, 7, 30]), st.integers(0, 2**32 - 1))
 def test_no_ray_meets_the_plane_that_it_leaves(precision: str, divisions: int, seed: int) -> None:
     """Neither its own triangle nor one beside it, from anywhere, at five precisions."""

@@ -91,7 +91,7 @@ def test_frames_are_those_of_the_floats(any_design: Design) -> None:
 Move = st.tuples(st.sampled_from(["object", "camera", "light", "all"]), st.booleans(), st.integers(0, 99))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(moves=st.lists(Move, max_size=8), forgets=st.integers(0, 8))
 def test_changed_words_make_the_whole_frame(small_design: Design, moves: Any, forgets: int) -> None:
     """Whatever moves, and whatever the device has not taken: it has the registers of the last accepted frame."""

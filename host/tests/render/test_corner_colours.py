@@ -180,7 +180,7 @@ def test_records_hold_the_colours_of_their_face(tmp_path: Path, headroom: float)
         )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3), st.integers(0, 2**32 - 1))
 def test_the_reference_interpolates_between_the_corners(weights: list[float], seed: int) -> None:
     """At any point of a triangle the weighted mean of its corners; the albedo of faces without stays."""

@@ -138,7 +138,7 @@ def test_frames_are_evenly_spaced(frames: int, turn: float) -> None:
         assert shares[-1] == (1.0 if turn == 90.0 else (frames - 1) / frames)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(share=st.floats(0, 1), degrees=st.floats(-720, 720), up=st.sampled_from([(0, 1, 0), (0, 0, 1), (1, 2, -1)]))
 def test_a_turned_object_keeps_its_middle_and_its_vertical(
     share: float, degrees: float, up: tuple[float, float, float], tmp_path_factory: pytest.TempPathFactory

@@ -27,7 +27,6 @@ EXTENT = load_mesh("teapot:2").extent
 SIZE = (32, 24)
 
 
-@settings(deadline=None)
 @given(count=st.integers(1, 300), dimension=st.integers(0, 8))
 def test_each_interval_of_an_axis_has_one_point_in_its_middle(count: int, dimension: int) -> None:
     points = square_points(count, dimension)
@@ -129,7 +128,7 @@ def test_a_light_in_the_centre_of_the_object_faces_the_camera() -> None:
 
 
 @given(shutter=st.floats(0, 1), frames=st.integers(1, 20), turn=st.sampled_from([360.0, 90.0]))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_the_shutter_opens_for_a_part_of_the_interval(shutter: float, frames: int, turn: float) -> None:
     motion = Motion(turn=turn, shutter=shutter)
     scene = replace(TEAPOT, motion=motion).with_samples(8)

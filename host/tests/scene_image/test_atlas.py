@@ -45,7 +45,7 @@ def textured(textures: tuple[Texture, ...], positions: np.ndarray) -> Mesh:
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @example(3, 2539)  # a face less than a texel wide
 @given(st.integers(1, 6), st.integers(0, 2**32 - 1))
 def test_a_point_of_a_face_finds_the_colour_of_its_texture(count: int, seed: int) -> None:

@@ -85,7 +85,7 @@ def check_tree(tree: Bvh, vertices: Integers, faces: Integers, box_bits: int) ->
     assert (statistics.nodes, statistics.leaves) == (len(tree.kinds), len(tree.leaf_first))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32 - 1),
     count=st.integers(1, 300),
@@ -145,7 +145,7 @@ def check_nested(tree: Bvh, vertices: Integers, faces: Integers, box_bits: int) 
     np.testing.assert_array_equal(tree.high, np.where(present, -(-high >> shift) - corner, 0))
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     count=st.integers(1, 2000),
@@ -230,7 +230,7 @@ def least_area(subtree: Subtree, stack: int) -> float:
     return subtree.area + min(areas, default=math.inf)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),
     count=st.integers(2, 14),

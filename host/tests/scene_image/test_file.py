@@ -77,7 +77,7 @@ def test_appended_bytes_are_refused(tmp_path: Path, image: SceneImage) -> None:
         SceneImage.load(file)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(position=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_every_flipped_bit_is_detected(tmp_path: Path, image: SceneImage, position: float, bit: int) -> None:
     file = image.save(tmp_path)

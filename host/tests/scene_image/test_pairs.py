@@ -71,7 +71,7 @@ def test_most_leaves_of_a_mesh_are_pairs(manifest: Manifest) -> None:
     assert image.records.nbytes < 24 * image.header.triangles
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), kept=st.sampled_from([0.5, 0.8, 1.0]))
 def test_no_triangle_is_alone_beside_another_one_or_beside_a_pair_that_may_be_divided(seed: int, kept: float) -> None:
     """Triangles of a flat grid with holes, in any order, of which each may be a pair with up to three others."""

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 from playwright.sync_api import Browser, Page, expect
 
 from colonnade.viewer.server import ViewServer
@@ -49,6 +50,7 @@ window.onload = attack;
 @pytest.fixture
 def page(browser: Browser) -> Iterator[Page]:
     page = browser.new_page(viewport={"width": 900, "height": 560})
+    page.set_default_timeout(PATIENCE)
     yield page
     page.close()
 

@@ -20,7 +20,7 @@ from colonnade.common.machine_limits import limit_this_process
 #: normal, a texture coordinate and a colour takes 120 bytes, of 4 to 20 in the stream.
 _MEMORY, _MEMORY_OF_A_BYTE, _MOST_MEMORY = 1 << 29, 500, 1 << 33
 #: Its processor time, seconds, and bytes of the streams for one more. It decodes 30 MB in a second.
-_SECONDS, _BYTES_OF_A_SECOND = 5, 1 << 20
+_SECONDS, _BYTES_OF_A_SECOND = 60, 1 << 20
 
 
 @dataclass(frozen=True)

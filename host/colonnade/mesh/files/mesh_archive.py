@@ -35,9 +35,9 @@ class MeshArchive:
         """
         self._file, self._bytes, self._nodes = zipfile.ZipFile(io.BytesIO(data)), len(data), 0
         self.names = self._file.namelist()
-        size, most = sum(one.file_size for one in self._file.infolist()), _UNPACKED + _UNPACKED_OF_A_BYTE * len(data)
-        if size > most:
-            raise UserError(f"its archive unpacks to {size:,} bytes, one of its size to {most:,} at most: repair it")
+        size, limit = sum(one.file_size for one in self._file.infolist()), _UNPACKED + _UNPACKED_OF_A_BYTE * len(data)
+        if size > limit:
+            raise UserError(f"its archive unpacks to {size:,} bytes, one of its size to {limit:,} at most: repair it")
 
     def read(self, name: str) -> bytes:
         """A member, of which no more is unpacked than the directory states.
@@ -53,8 +53,8 @@ class MeshArchive:
             content = member.read(size)
         if is_text:
             self._nodes += content.count(b"<") + content.count(b"=")
-            if self._nodes > (most := _NODES + _NODES_OF_A_BYTE * self._bytes):
-                raise UserError(f"its XML has more than {most:,} elements and attributes: export it as glTF")
+            if self._nodes > (limit := _NODES + _NODES_OF_A_BYTE * self._bytes):
+                raise UserError(f"its XML has more than {limit:,} elements and attributes: export it as glTF")
         return content
 
 

@@ -42,9 +42,9 @@ def bound_parts(most_triangles: int) -> None:
     trimesh.exchange.dae._parse_node = parse_node
 
 
-def too_many_triangles(most: int) -> UserError:
+def too_many_triangles(limit: int) -> UserError:
     """The error of parts with more triangles than a mesh may have."""
-    return UserError(f"its parts have more than {most:,} triangles, the most of a mesh: leave some out")
+    return UserError(f"its parts have more than {limit:,} triangles, the most of a mesh: leave some out")
 
 
 def no_vertex(number: int) -> UserError:
