@@ -52,6 +52,7 @@ function* nodesOf(document, notes) {
   const children = new Set(nodes.flatMap((node) => node.children ?? []));
   const roots = scenes.length > 0 ? (document.entry("scenes", scene).nodes ?? []) : [...nodes.keys()].filter((index) => !children.has(index));
   const pending = roots.map((index) => ({ index, parent: EYE })).reverse();
+  let count = 0;
   while (pending.length > 0) {
     const { index, parent } = pending.pop();
     const node = document.entry("nodes", index);
@@ -61,10 +62,20 @@ function* nodesOf(document, notes) {
     };
     const matrix = finite(multiply(parent, matrixOf(document, node, index)));
     for (const child of [...(node.children ?? [])].reverse()) pending.push({ index: child, parent: matrix });
+    count += node.mesh === undefined ? 0 : copyCount(document, node);
+    if (count > MOST_COPIES) throw document.error(`it has more than ${grouped(MOST_COPIES)} copies of meshes: leave some out, or join them`);
     const copies = node.mesh === undefined ? [] : copiesOf(document, node, index);
     if (notes && copies.length > 1) notes.add("copies of an animated mesh are not shown: its node has one");
     for (const copy of notes ? copies.slice(0, 1).map(() => null) : copies) yield { index, node, matrix: copy ? finite(multiply(matrix, copy)) : matrix };
   }
+}
+
+/** The number of copies of a node's mesh that the first of their attributes states. */
+function copyCount(document, node) {
+  const extension = node.extensions?.[INSTANCING];
+  if (!extension) return 1;
+  const first = Object.keys(extension.attributes ?? {}).find((name) => name in OF_COPIES);
+  return first === undefined ? 0 : document.entry("accessors", extension.attributes[first]).count;
 }
 
 /** The transforms of copies of a mesh to their node, or null for the node alone. */
@@ -77,7 +88,6 @@ function copiesOf(document, node, index) {
   const count = arrays.reduce((largest, [, array]) => Math.max(largest, array.count), 0);
   if (count === 0 || !arrays.every(([name, array]) => array.count === count && array.width === OF_COPIES[name].length))
     throw document.error(`the copies of node ${index} (${INSTANCING}) are not valid: export it again`);
-  if (count > MOST_COPIES) throw document.error(`node ${index} has ${grouped(count)} copies of its mesh: at most ${grouped(MOST_COPIES)} are read`);
   const part = (name, copy) => {
     const width = OF_COPIES[name].length;
     return given[name] ? [...given[name].values.subarray(width * copy, width * (copy + 1))] : OF_COPIES[name];
