@@ -28,6 +28,11 @@ NEEDS_PAGE, NEEDS_MODULE = (
     pytest.mark.skipif(not file.is_file(), reason="the page is not built: run `make browser`")
     for file in (FILE, MODULE)
 )
+#: Stops the watch of the page's workers, each second: a slow machine may take longer than it allows.
+NO_WATCH = """{
+  const every = setInterval;
+  window.setInterval = (call, time) => (time === 1000 ? 0 : every(call, time));
+}"""
 #: A tetrahedron with a colour at each vertex.
 OBJ = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 1 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\nl 1 2\n"
 
@@ -55,6 +60,7 @@ class Tab:
     def __init__(self, context: BrowserContext, link: str = "") -> None:
         self.page: Page = context.new_page()
         self.page.set_default_timeout(PATIENCE)
+        self.page.add_init_script(NO_WATCH)
         self.requests: list[str] = []
         self.complaints: list[str] = []
         self.page.on("request", lambda request: self.requests.append(request.url))
