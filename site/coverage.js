@@ -20,17 +20,17 @@ const valuesOf = (values, faces, width) => {
   return found;
 };
 
-const facesOf = (mesh, number) => [...mesh.materialOf.keys()].filter((face) => mesh.materialOf[face] === number);
+const facesOf = (mesh, ...numbers) => [...mesh.materialOf.keys()].filter((face) => numbers.includes(mesh.materialOf[face]));
 
 /** The mesh of a file with materials, prepared for surfacesOf; another one is left. */
 export function prepared(library, mesh) {
   if (!mesh.materials) return mesh;
-  const mapped = withMaps(library, mesh.clip ? mesh : bisected(library, mesh));
-  const found = swatched(library, withoutAlpha(library, mesh.clip ? atRest(library, mapped) : mapped));
+  const placed = withMetal(library, mesh.clip ? atRest(library, mesh) : mesh);
+  const found = swatched(library, withoutAlpha(library, withMaps(library, bisected(library, placed))));
   return { ...found, notes: [...new Set(found.notes)] };
 }
 
-/** A mesh whose vertices are where its clip binds them, in its rest pose. */
+/** A mesh whose vertices are where its clip binds them, in its rest pose; `parts`: the faces of the file, and what each face is of one (Library.pack). */
 function atRest(library, mesh) {
   const { vertices, normals, isMirrored } = library.rest(mesh);
   /** Values of corners, so many each, backwards on mirrored faces. */
@@ -39,8 +39,23 @@ function atRest(library, mesh) {
       const [corner, part] = [Math.floor(at / width), at % width];
       return isMirrored[Math.floor(corner / 3)] ? values[width * (3 * Math.floor(corner / 3) + 2 - (corner % 3)) + part] : value;
     });
-  const widths = { faces: 1, normals: 3, colours: 3, alphas: 1, uvs: 2 };
-  return { ...mesh, vertices, ...Object.fromEntries(Object.entries(widths).map(([name, width]) => [name, ordered(name === "normals" ? normals : mesh[name], width)])) };
+  const widths = { faces: 1, normals: 3, colours: 3, alphas: 1, uvs: 2, emissiveUvs: 2 };
+  const found = Object.fromEntries(Object.entries(widths).map(([name, width]) => [name, ordered(name === "normals" ? normals : mesh[name], width)]));
+  const { faces } = found;
+  const parts = { faces, owners: Int32Array.from(mesh.materialOf.keys()), weights: Float64Array.from({ length: 3 * faces.length }, (_, at) => WHOLE_FACE[at % 9]) };
+  return { ...mesh, ...found, vertices, parts, relief: mesh.relief && { ...mesh.relief, uvs: ordered(mesh.relief.uvs, 2) } };
+}
+
+/** The mesh with `isMetal` and `roughness` of the faces that a map makes metal or not. */
+function withMetal(library, mesh) {
+  const [isMetal, roughness] = [new Int32Array(mesh.materialOf.length), new Float64Array(mesh.materialOf.length)];
+  mesh.materials.forEach(({ metal, kind, factors }, number) => {
+    if (!metal || kind !== "diffuse") return;
+    const own = facesOf(mesh, number);
+    const found = library.metal(mesh.textures[metal.texture], valuesOf(mesh.metalUvs, own, 6), factors);
+    own.forEach((face, i) => ([isMetal[face], roughness[face]] = [found.isMetal[i], found.roughness[i]]));
+  });
+  return { ...mesh, isMetal, roughness };
 }
 
 /** Whether faces of a material emit by a map. */
@@ -68,7 +83,7 @@ function cornersOf({ vertices, faces }) {
 
 /** The mesh with the materials that metallic-roughness and emission maps make of its faces, numbered as the host does. */
 function withMaps(library, mesh) {
-  const { materials, metalUvs, emissiveUvs, textures } = mesh;
+  const { materials, isMetal, roughness, emissiveUvs, textures } = mesh;
   const found = [...materials];
   const materialOf = Int32Array.from(mesh.materialOf);
   const areas = areasOf(mesh);
@@ -77,21 +92,20 @@ function withMaps(library, mesh) {
     const emits = emitsByMap(material);
     if (!hasMetal && !emits) return;
     const own = facesOf(mesh, number);
-    const metal = hasMetal && library.metal(textures[material.metal.texture], valuesOf(metalUvs, own, 6), material.factors);
     const shares = emits && library.emission(textures[material.emissive.texture], valuesOf(emissiveUvs, own, 6), valuesOf(areas, own, 1));
     const emissionOf = (i) => shownEmission(material.emission.map((value, channel) => value * (shares ? shares[3 * i + channel] : 1)));
     if (emits) found[number] = { ...material, emissive: null, emission: [0, 0, 0] };
-    const rows = own.map((_, i) => [...(metal ? [metal.isMetal[i], metal.roughness[i]] : []), ...(shares ? emissionOf(i) : [])]);
+    const rows = own.map((_, i) => [...(hasMetal ? [isMetal[own[i]], roughness[own[i]]] : []), ...(shares ? emissionOf(i) : [])]);
     const order = [...own.keys()].sort((a, b) => rows[a].map((value, column) => value - rows[b][column]).find(Boolean) ?? 0);
     const numbers = new Map();
     for (const i of order) {
-      const isMetal = Boolean(metal?.isMetal[i]);
-      const glows = isMetal && Math.max(...emissionOf(i)) >= GLOW;
-      const roughness = isMetal && (glows ? GLOWING_ROUGHNESS : metal.roughness[i]);
-      const emission = isMetal && roughness <= MIRROR_ROUGHNESS ? [0, 0, 0] : emissionOf(i);
-      if (!isMetal && !emission.some((value, channel) => value !== found[number].emission[channel])) continue;
-      const key = [roughness, ...emission].join();
-      if (!numbers.has(key)) numbers.set(key, found.push({ ...found[number], emission, ...(isMetal ? { kind: "mirror", roughness } : {}) }) - 1);
+      const isOfMetal = hasMetal && isMetal[own[i]] === 1;
+      const glows = isOfMetal && Math.max(...emissionOf(i)) >= GLOW;
+      const rough = isOfMetal && (glows ? GLOWING_ROUGHNESS : roughness[own[i]]);
+      const emission = isOfMetal && rough <= MIRROR_ROUGHNESS ? [0, 0, 0] : emissionOf(i);
+      if (!isOfMetal && !emission.some((value, channel) => value !== found[number].emission[channel])) continue;
+      const key = [rough, ...emission].join();
+      if (!numbers.has(key)) numbers.set(key, found.push({ ...found[number], emission, ...(isOfMetal ? { kind: "mirror", roughness: rough } : {}) }) - 1);
       materialOf[own[i]] = numbers.get(key);
     }
   });
@@ -102,7 +116,6 @@ function withMaps(library, mesh) {
 function withoutAlpha(library, mesh) {
   if (!mesh.materials.some(({ alpha }) => alpha)) return mesh;
   const materials = mesh.materials.map((material) => ({ ...material, alpha: null }));
-  if (mesh.clip) return { ...mesh, materials, notes: [...mesh.notes, "partly transparent materials of an animated mesh are opaque: alpha cuts only what does not bend"] };
   const textures = [...mesh.textures];
   const notes = [...mesh.notes];
   const whole = [];
@@ -111,17 +124,26 @@ function withoutAlpha(library, mesh) {
   const corners = cornersOf(mesh);
   const edge = SMALLEST_SPLIT * Math.max(...[0, 1, 2].map((axis) => extent(mesh.vertices, axis)));
   let budget = MOST_SPLIT_FACES - mesh.materialOf.length;
-  mesh.materials.forEach((material, number) => {
-    const faces = facesOf(mesh, number);
-    const { alpha, base } = material;
+  // Materials that differ in other than alpha and its picture share the faces that pieces may add
+  const groups = new Map();
+  mesh.materials.forEach(({ alpha, base }, number) => {
+    const key = JSON.stringify([alpha, alpha && base?.texture]);
+    groups.set(key, [...(groups.get(key) ?? []), number]);
+  });
+  for (const numbers of groups.values()) {
+    const faces = facesOf(mesh, ...numbers);
+    const { alpha, base } = mesh.materials[numbers[0]];
     const texture = base ? mesh.textures[base.texture] : null;
     const alphas = mesh.alphas ? valuesOf(mesh.alphas, faces, 3) : new Float64Array(3 * faces.length).fill(1);
-    if (!alpha || !faces.length) return void whole.push(...faces);
+    if (!alpha || !faces.length) {
+      for (const face of faces) whole.push(face);
+      continue;
+    }
     const isCovering = alpha.blends && alpha.factor > 0;
-    if (isCovering) materials[number].coverage = alpha.factor;
+    if (isCovering) for (const number of numbers) materials[number].coverage = alpha.factor;
     if (!texture?.alpha && alphas.every((value) => value === 1)) {
-      if (isCovering || alpha.factor >= alpha.cutoff) whole.push(...faces);
-      return;
+      if (isCovering || alpha.factor >= alpha.cutoff) for (const face of faces) whole.push(face);
+      continue;
     }
     const values = [isCovering ? 1 : alpha.factor, alpha.cutoff, alpha.blends ? alpha.factor : -1, edge];
     const cut = library.cut({ corners: valuesOf(corners, faces, 9), uvs: valuesOf(mesh.uvs, faces, 6), alphas, texture, values, budget: Math.max(0, budget) });
@@ -133,8 +155,11 @@ function withoutAlpha(library, mesh) {
     budget -= cut.owners.length - cut.kinds.filter((kind) => kind === 0).length;
     if (cut.isCoarse) notes.push("outlines of alpha have more detail than faces");
     if (cut.isBlended) notes.push("blended alpha is rounded: from one half on it is opaque");
-    if (cut.filled) materials[number].base = { ...base, texture: textures.push({ ...texture, pixels: cut.filled, alpha: null }) - 1 };
-  });
+    if (cut.filled) {
+      const filled = textures.push({ ...texture, pixels: cut.filled, alpha: null }) - 1;
+      for (const number of numbers) materials[number].base = { ...mesh.materials[number].base, texture: filled };
+    }
+  }
   const found = { ...mesh, materials, textures, notes, materialOf: Int32Array.from(mesh.materialOf) };
   const tints = new Map();
   for (const { face, alpha, colour } of panes) {
@@ -188,12 +213,14 @@ function split(mesh, corners, pieces) {
     normals: interpolated(mesh.normals, 3),
     colours: interpolated(mesh.colours, 3),
     uvs: interpolated(mesh.uvs, 2),
-    metalUvs: interpolated(mesh.metalUvs, 2),
+    isMetal: ofOwners(mesh.isMetal),
+    roughness: mesh.roughness && Float64Array.from(pieces, ({ owner }) => mesh.roughness[owner]),
     emissiveUvs: interpolated(mesh.emissiveUvs, 2),
     alphas: interpolated(mesh.alphas, 1),
     materialOf: ofOwners(mesh.materialOf),
     hasOwnColours: ofOwners(mesh.hasOwnColours),
     relief: relief && { ...relief, mapOf: ofOwners(relief.mapOf), uvs: interpolated(relief.uvs, 2), tangents: interpolated(relief.tangents, 4) },
+    parts: mesh.parts && { ...mesh.parts, owners: ofOwners(mesh.parts.owners), weights: interpolated(mesh.parts.weights, 3) },
   };
 }
 

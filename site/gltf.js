@@ -140,9 +140,7 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
     if (found?.some((uv) => !uv.every((value) => Math.abs(value) <= MOST_UV))) throw document.error(`a primitive has texture coordinates beyond ${grouped(MOST_UV)}, or not finite: export it again`);
     return found;
   };
-  const { base, metal, emissive, relief: ownRelief, alpha } = materials.materials[material];
-  const relief = isBent ? null : ownRelief;
-  if (isBent && ownRelief) corners.notes.add("normal maps of an animated mesh are not shown: its smooth normals are");
+  const { base, metal, emissive, relief, alpha } = materials.materials[material];
   const [uvs, metalUvs, emissiveUvs] = [base, metal, emissive].map(positionsIn);
   const reliefUvs = relief && attribute(relief.coordinates, 2);
   if (relief && !reliefUvs) corners.notes.add("faces with a normal map are smooth: they have no texture coordinates of the map");
@@ -154,7 +152,8 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
   const isMirrored = determinant(matrix) < 0;
   const normalOf = (vertex) => transform(normalMatrix, normalAt(vertex), 0).map((value) => (isMirrored ? -value : value));
   const side = isMirrored ? -1 : 1;
-  const tangentAt = reliefUvs && attribute("TANGENT", 4);
+  // Tangents of a mesh that bends are those of its surface
+  const tangentAt = reliefUvs && !isBent && attribute("TANGENT", 4);
   const tangentOf = (vertex) => (tangentAt ? [...transform(matrix, tangentAt(vertex), 0), side * Math.sign(tangentAt(vertex)[3])] : [0, 0, 0, 0]);
   const reliefOf = (face) => ({ map: relief.map, uvs: face.map((vertex) => relief.place(reliefUvs(vertex))), tangents: face.map(tangentOf) });
   // A face without positions has its plain colour, a textured one none of its vertices

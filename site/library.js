@@ -121,12 +121,12 @@ export class Library {
    * before. `surfaces` and `surfaceOf`, of each face, are those of surfacesOf (surfaces.js).
    */
   pack(mesh, { surfaces, surfaceOf } = { surfaces: [plainSurface(mesh)], surfaceOf: new Int32Array(mesh.faces.length / 3) }) {
-    const { name, vertices, faces, normals = null, colours = null, uvs = null, textures = [], relief = null, clip = null } = mesh;
+    const { name, vertices, faces, normals = null, colours = null, uvs = null, textures = [], relief = null, clip = null, parts = null } = mesh;
     const used = textures.map((texture) => (texture.pixels ? texture : BLANK));
-    const reliefs = [relief && mapBytes(relief.maps), relief?.mapOf ?? null, relief?.uvs ?? null, relief?.tangents ?? null];
-    return this.withArrays([vertices, faces, normals, colours, uvs, surfaceOf, surfaceBytes(surfaces), new Int32Array(PACKED.length), ...reliefs, ...used.map(({ pixels }) => pixels)], (v, f, n, c, u, of, s, out, maps, mapOf, mapUvs, tangents, ...pixels) =>
+    const reliefs = [relief && mapBytes(relief.maps), relief?.mapOf ?? null, relief?.uvs ?? null, relief?.tangents ?? null, parts?.faces ?? null, parts?.owners ?? null, parts?.weights ?? null];
+    return this.withArrays([vertices, faces, normals, colours, uvs, surfaceOf, surfaceBytes(surfaces), new Int32Array(PACKED.length), ...reliefs, ...used.map(({ pixels }) => pixels)], (v, f, n, c, u, of, s, out, maps, mapOf, mapUvs, tangents, whole, owners, weights, ...pixels) =>
       this.withArrays([Int32Array.from(used.flatMap((texture, i) => textureWords(texture, pixels[i])))], (t) => {
-        const given = (moved) => Uint32Array.of(v, vertices.length / 3, f, faces.length / 3, n, c, u, of, s, t, used.length, maps, relief?.maps.length ?? 0, mapOf, mapUvs, tangents, moved);
+        const given = (moved) => Uint32Array.of(v, vertices.length / 3, f, faces.length / 3, n, c, u, of, s, t, used.length, maps, relief?.maps.length ?? 0, mapOf, mapUvs, tangents, moved, whole, owners, weights);
         this.withClip(clip, (moved) => this.withArrays([given(moved)], (pointer) => this.check(this.wasm.colonnade_model_pack(pointer, out), name && `mesh ${name}`, clip?.name)));
         const values = new Int32Array(this.wasm.memory.buffer, out, PACKED.length);
         return Object.fromEntries(PACKED.map((name, index) => [name, values[index]]));

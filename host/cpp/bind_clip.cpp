@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "binding.hpp"
+#include "mesh/clip_faces.hpp"
 #include "packer/clip_file.hpp"
 
 using namespace nanobind::literals;
@@ -84,6 +85,25 @@ public:
         const std::vector<std::uint8_t> isMirrored(found.isMirrored.begin(), found.isMirrored.end());
         return nb::make_tuple(found.isFinite, arrayOf<double>(found.vertices, {found.vertices.size(), 3}),
                               normals ? arrayOf<double>(rotated, {rotated.size(), 3, 3}) : nb::none(), arrayOf<std::uint8_t>(isMirrored, {isMirrored.size()}));
+    }
+
+    /// Vertices and changes with vertices at the corners of parts of faces, and these.
+    nb::tuple parts(const Array<std::int32_t>& faces, const Whole& owners, const Numbers64& weights) const {
+        const std::vector<mesh::Face> rows = facesOf(faces, clip_.positions.size());
+        const std::vector<std::int64_t> own = rowsOf<std::int64_t>(owners);
+        const std::vector<mesh::Corners> points = rowsOf<mesh::Corners>(weights);
+        checkIndices(own, rows.size());
+        if (own.size() != points.size()) throw std::invalid_argument("a part of a face has no weights");
+        mesh::Clip clip = clip_;
+        mesh::ClipPoints added(clip);
+        std::vector<mesh::Face> corners;
+        for (std::size_t i = 0; i < own.size(); ++i) corners.push_back(added.part(rows[static_cast<std::size_t>(own[i])], points[i]));
+        const mesh::Morphs& morphs = clip.morphs;
+        const std::size_t count = clip.positions.size(), changes = morphs.targets.size();
+        return nb::make_tuple(arrayOf<double>(clip.positions, {count, 3}), arrayOf<std::int64_t>(clip.bones, {count, mesh::influences}),
+                              arrayOf<double>(clip.shares, {count, mesh::influences}), arrayOf<std::int64_t>(morphs.targets, {changes}),
+                              arrayOf<std::int64_t>(morphs.vertices, {changes}), arrayOf<double>(morphs.positions, {changes, 3}),
+                              arrayOf<double>(morphs.normals, {changes, 3}), arrayOf<std::int32_t>(corners, {corners.size(), 3}));
     }
 
     /// Times, matrices and weights of keys within a tolerance.
@@ -194,6 +214,7 @@ void bind_clip(nb::module_& module) {
         .def("pose", &Clip::pose, "time"_a, "before"_a)
         .def("vertices", &Clip::vertices, "matrices"_a, "weights"_a)
         .def("rest_surface", &Clip::restSurface, "faces"_a, "normals"_a.none())
+        .def("parts", &Clip::parts, "faces"_a, "owners"_a, "weights"_a)
         .def("keys", &Clip::keys, "tolerance"_a)
         .def("bake", &Clip::bake)
         .def("grid", &Clip::grid, "vertices"_a, "faces"_a, "normals"_a, "clip_corners"_a, "vertex_bits"_a);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 from itertools import pairwise
@@ -10,8 +11,9 @@ from typing import Any
 
 import numpy as np
 from gltf_documents import uri
+from textured_files import png
 
-_KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+_KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 _TYPES = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}
 
 
@@ -120,6 +122,48 @@ def arm() -> Document:
         (5, "rotation", "CUBICSPLINE", [0.0, 1.0], swing),
         (6, "weights", "LINEAR", [0.0, 1.0], [0.0, 1.0, 1.0, 0.25]),
     )
+    return document
+
+
+def painted(glows: bool = True) -> Document:
+    """`arm`, whose faces all show pictures: colours with a hole, bumps, and a glow, or a part that is thin."""
+    document, random = arm(), np.random.default_rng(3)
+    y, x = np.mgrid[:64, :64]
+    colours = random.integers(0, 256, (64, 64, 4)).astype(np.uint8)
+    colours[..., 3] = np.where((x - 14) ** 2 + (y - 34) ** 2 < 90, 0, np.where((y > 52) & (not glows), 60, 255))
+    colours[40:, :, :3] = (200, 40, 90)
+    bumps = np.full((64, 64, 3), 255, np.uint8)
+    bumps[..., :2] = np.repeat(np.repeat(random.integers(90, 166, (4, 4, 2)), 16, axis=0), 16, axis=1)
+    glow = np.zeros((64, 64, 3), np.uint8)
+    glow[8:20, 34:] = (40, 230, 250)
+    pictures = ["data:image/png;base64," + base64.b64encode(png(one)).decode() for one in (colours, bumps, glow)]
+    document.json |= {
+        "images": [{"uri": picture} for picture in pictures],
+        "textures": [{"source": number} for number in range(3)],
+        "materials": [
+            {
+                "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0.0},
+                "normalTexture": {"index": 1},
+                "emissiveTexture": {"index": 2},
+                "emissiveFactor": [1.0, 1.0, 1.0],
+                "alphaMode": "BLEND",
+            },
+            {"pbrMetallicRoughness": {"metallicFactor": 0.0, "baseColorFactor": [1, 1, 1, 0.4]}, "alphaMode": "BLEND"},
+        ],
+    }
+    if not glows:
+        del document.json["materials"][0]["emissiveTexture"]
+        document.json["materials"][0]["emissiveFactor"] = [0.0, 0.0, 0.0]
+    for mesh in document.json["meshes"]:
+        (primitive,) = mesh["primitives"]
+        positions = primitive["attributes"]["POSITION"]
+        count = document.json["accessors"][positions]["count"]
+        rows = np.arange(count) // (3 if count > 4 else 2) / (8 if count > 4 else 1)
+        columns = np.arange(count) % (3 if count > 4 else 2) / (2 if count > 4 else 1)
+        places = document.add(np.column_stack([0.05 + 0.9 * columns, 0.05 + 0.9 * rows]))
+        mesh["primitives"] = [
+            {**primitive, "material": 0, "attributes": primitive["attributes"] | {"TEXCOORD_0": places}}
+        ]
     return document
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Sequence
+
 from colonnade.common.limits import MAX_MESSAGE, MAX_WORD
 
 
@@ -10,6 +13,27 @@ def plain(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(char if char.isprintable() else _escaped(char) for char in text)
+
+
+def listed(names: Sequence[str], maximum: int = 240) -> str:
+    """Names in a line, of at most so many characters, and the number of those that are left out."""
+    words: list[str] = []
+    length = 0
+    for name in names:
+        word = _shortened(plain(name), MAX_WORD)
+        length += len(word) + 2
+        if words and length > maximum:
+            return f"{', '.join(words)} and {len(names) - len(words):,} more"
+        words.append(word)
+    return ", ".join(words)
+
+
+def meant(name: str, known: Sequence[str]) -> str | None:
+    """The known name that is nearest to another one, whatever its case, or begins with it; None: none is near."""
+    folded = {one.casefold(): one for one in sorted(known, key=len, reverse=True)}
+    near = difflib.get_close_matches(name.casefold(), folded, 1)
+    near = [one for one in sorted(folded) if name and one.startswith(name.casefold())][:1] or near
+    return folded[near[0]] if near else None
 
 
 def one_line(text: str) -> str:

@@ -20,7 +20,8 @@ from colonnade.common.input_files import is_file, require_regular
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import unit_vectors
 from colonnade.mesh import losses as lost
-from colonnade.mesh.clips.clip import Clip
+from colonnade.mesh.clips.faces import ClipFaces
+from colonnade.mesh.clips.tracks import Animation
 from colonnade.mesh.files import catalog, stated
 from colonnade.mesh.files.formats import SUFFIXES, read_surface
 from colonnade.mesh.geometry import primitives, teapot
@@ -47,7 +48,7 @@ def load_mesh(
     crease: float | None = None,
     corner_colours: bool = False,
     simplify: int | None = None,
-    animation: str | None = None,
+    animation: str | Animation | None = None,
 ) -> Mesh:
     """Load the mesh of a name or a file, and report its notes (`colonnade.common.notes`).
 
@@ -61,11 +62,13 @@ def load_mesh(
             without them the default angle.
         corner_colours: Keep the colours of the corners. Otherwise a face has one colour, the mean of its corners.
         simplify: Simplify a mesh of more triangles to about so many; a line tells both numbers. None: all of them.
-        animation: Name or number of an animation of a glTF file, whose clip the mesh gets. It cannot be simplified.
+        animation: An animation of a glTF file, or the name or number of one of the mesh's own file, whose clip the mesh
+            gets. It cannot be simplified.
 
     Raises:
         UserError: The mesh does not exist or cannot be rendered.
     """
+    animation = Animation(animation) if isinstance(animation, str) else animation
     mesh = _loaded(name_or_path, crease, corner_colours, animation)
     notes.report(mesh.notes)
     return mesh if simplify is None or len(mesh.faces) <= simplify else _simplified(mesh, simplify)
@@ -94,7 +97,7 @@ def _simplified(mesh: Mesh, triangles: int) -> Mesh:
     return replace(result, notes=mesh.notes)
 
 
-def _loaded(name_or_path: str | Path, crease: float | None, corner_colours: bool, animation: str | None) -> Mesh:
+def _loaded(name_or_path: str | Path, crease: float | None, corner_colours: bool, animation: Animation | None) -> Mesh:
     text = str(name_or_path)
     if isinstance(name_or_path, str) and (built := _built_in(text)) is not None:
         if animation is not None:
@@ -159,7 +162,9 @@ def _size(name: str, argument: str, default: int, minimum: int, maximum: int, gi
     return int(argument)
 
 
-def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: bool, animation: str | None) -> Mesh:
+def _read(
+    path: Path, subdivisions: int, crease: float | None, corner_colours: bool, animation: Animation | None
+) -> Mesh:
     """Read a mesh file and split each triangle into four ``subdivisions`` times."""
     require_regular(path, "mesh file")
     if path.suffix.lower() not in SUFFIXES:
@@ -220,7 +225,7 @@ def _read(path: Path, subdivisions: int, crease: float | None, corner_colours: b
         single_sided=None if surface.single_sided is None else np.repeat(surface.single_sided, 4**subdivisions),
         sources=None if surface.source_faces is None or subdivisions else (surface.source_faces, surface.source_count),
         relief=relief,
-        clip=surface.clip,
+        moves=surface.moves,
     )
 
 
@@ -240,7 +245,7 @@ def clean_mesh(
     single_sided: npt.NDArray[np.bool_] | None = None,
     sources: tuple[Indices, int] | None = None,
     relief: Relief | None = None,
-    clip: Clip | None = None,
+    moves: ClipFaces | None = None,
 ) -> Mesh:
     """Clean raw vertices and faces.
 
@@ -260,7 +265,7 @@ def clean_mesh(
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
         sources: The face of the file that each is a part of, int64 [m], and their number; None: themselves.
         relief: Normal maps, which are baked into the corner normals; None: none.
-        clip: What moves the vertices; None: nothing.
+        moves: What moves the faces; None: nothing.
 
     Raises:
         UserError: A vertex is not finite, the size is out of range, or no face has an area.
@@ -271,14 +276,15 @@ def clean_mesh(
     cleaned = clean(vertices, faces, normals, crease, source_count)
     if isinstance(cleaned, str):
         raise UserError(label + cleaned.removeprefix("the mesh"))
-    keep, clip_corners = cleaned.sources, None if clip is None else faces[cleaned.sources].astype(np.int64)
+    keep = cleaned.sources
     vertices, faces = cleaned.vertices, cleaned.faces
     colours, uvs = (None if values is None else values[keep] for values in (colours, uvs))
     has_backs = single_sided is not None and bool((single_sided[keep] & cleaned.is_open).any())
-    for values in (colours, uvs, clip_corners):
+    for values in (colours, uvs):
         if values is not None:
             values[cleaned.reversed] = values[cleaned.reversed][:, ::-1]
     relief = None if relief is None else relief.kept(keep).reversed(cleaned.reversed)
+    moves = None if moves is None else moves.kept(keep).reversed(cleaned.reversed)
     repairs = (lost.MIXED, lost.INVERTED, lost.FLIPPED, lost.REPLACED, lost.MISSING)
     for loss, number in zip(repairs, cleaned.repairs, strict=True):
         losses.add(loss, number)
@@ -290,6 +296,8 @@ def clean_mesh(
         colours, uvs = (None if values is None else parts.corners(values) for values in (colours, uvs))
         sources_kept, materials_kept = sources_kept[parts.owners], materials_kept[parts.owners]
         vertices, faces, corners_normals = parts.vertices, parts.faces, parts.normals
+        moves = None if moves is None else moves.pieces(parts.owners, parts.weights)
+    clip, clip_corners = (None, None) if moves is None else moves.with_vertices()
     return Mesh(
         vertices=vertices,
         faces=faces,

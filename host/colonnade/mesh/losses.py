@@ -75,23 +75,20 @@ MORPHS = Loss.of("morph target", "not applied", "meshes have their base shape")
 CHANNELS = Loss.of(
     "channel of an animation", "not played", "only those of nodes and morph targets are", "channels of an animation"
 )
+JOINTS = Loss.of(
+    "joint of the animation",
+    "missing in the mesh",
+    "only those of equal names are moved",
+    "joints of the animation",
+)
 INFLUENCES = Loss.of(
     "vertex with more than four joints",
     "moved by the largest four",
     "others count for little",
     "vertices with more than four joints",
 )
-BENT_RELIEF = Loss.of(
-    "normal map of an animated mesh", "not shown", "smooth normals are", "normal maps of an animated mesh"
-)
 BENT_COPIES = Loss.of(
     "copy of an animated mesh", "not shown", "a node has one: give each a node", "copies of an animated mesh"
-)
-BENT_ALPHA = Loss.of(
-    "partly transparent material of an animated mesh",
-    "opaque",
-    "alpha cuts only what does not bend",
-    "partly transparent materials of an animated mesh",
 )
 HOLES = Loss.of("polygon with holes", "not shown", "export triangles", "polygons with holes")
 BEAMS = Loss.of("beam lattice", "not shown", "only faces are rendered")

@@ -41,9 +41,9 @@ def joined_mesh(scene: Scene, environment: Environment | None, corner_colours: b
     taken: list[tuple[Floats, float]] = []
     for number, described in enumerate(scene.objects, 1):
         own = described.mesh
-        key = f"{own.source} {own.crease} {own.simplify} {own.animation}"
+        key = f"{own.source} {own.crease} {own.simplify} {own.played}"
         if key not in loaded:
-            loaded[key] = load_mesh(own.source, own.crease, corner_colours, own.simplify, own.animation)
+            loaded[key] = load_mesh(own.source, own.crease, corner_colours, own.simplify, own.played)
             report_replaced(loaded[key], described.material)
         mesh = replace(loaded[key], materials=with_overrides(loaded[key].materials, described.material))
         poses.append(_pose(described, mesh, environment, f"object {number}", taken))

@@ -69,9 +69,7 @@ def object_mesh(scene: Scene, environment: Environment | None = None, corner_col
     """
     if scene.objects:
         return joined_mesh(scene, environment, corner_colours)
-    mesh = load.load_mesh(
-        scene.mesh_source, scene.mesh.crease, corner_colours, scene.mesh.simplify, scene.mesh.animation
-    )
+    mesh = load.load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours, scene.mesh.simplify, scene.mesh.played)
     report_replaced(mesh, scene.material)
     return mesh
 

@@ -112,8 +112,9 @@ def scene_of(tables: Mapping[str, Any], where: str, folder: Path, in_room: bool 
 
 
 def _beside(mesh: MeshSource, folder: Path) -> MeshSource:
-    """The mesh with a path relative to the working directory, not to the scene's folder."""
-    return mesh if mesh.path is None else replace(mesh, path=folder / mesh.path)
+    """The mesh with paths relative to the working directory, not to the scene's folder."""
+    paths = {name: folder / path for name in ("path", "animation_file") if (path := getattr(mesh, name)) is not None}
+    return replace(mesh, **paths)
 
 
 def _as_schema(data: Mapping[str, Any]) -> dict[str, Any]:

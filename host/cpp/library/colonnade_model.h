@@ -66,7 +66,8 @@ struct colonnade_clip {
 /* `normals`: three for each face, of any length, 0 for none; or NULL. `colours`: linear red, green, blue at the corners, 0 to
  * 1; or NULL. `uvs`: two at each corner; NULL without textures. `surface_of`: of each face. With `map_count`, of each face: the number of
  * its normal map, -1 for none; at each corner two positions in it, and a tangent of the file, 0 for none, with the sign of the
- * bitangent. `clip`: what moves the vertices, which are in its rest pose, or NULL. */
+ * bitangent. `clip`: what moves the vertices, which are in its rest pose, or NULL; then of each face the face of the file that it is a part of,
+ * and the weights of that one's corners at each corner; `clip_faces` have the clip's vertices at the corners of the file's faces. */
 struct colonnade_mesh {
     const double *vertices;
     uint32_t vertex_count;
@@ -82,6 +83,8 @@ struct colonnade_mesh {
     const int32_t *map_of;
     const double *map_uvs, *tangents;
     const struct colonnade_clip *clip;
+    const int32_t *clip_faces, *clip_owners;
+    const double *clip_weights;
 };
 
 /* A mesh as it is packed: numbers of records, bounds in vertex units. */

@@ -5,6 +5,7 @@
 #include "live/vector_map.hpp"
 #include "mesh/atlas.hpp"
 #include "mesh/baking.hpp"
+#include "mesh/clip_faces.hpp"
 #include "packer/clip_file.hpp"
 #include "packer/surface_offset.hpp"
 #include "srgb.hpp"
@@ -123,14 +124,14 @@ std::vector<std::uint8_t> fileOf(packer::GridClip clip, std::vector<packer::Clip
 /// Puts a clean mesh, whose clip this is, in its rest pose on the grid of all poses; an error, or none.
 std::string bend(const colonnade_mesh& given, Packed& next, packer::GridClip& grid) {
     if (!library->format.bvh) return "the mesh is animated, which needs a tree: this design has none";
-    const mesh::Clip clip = clipOf(*given.clip);
+    mesh::Clip clip = clipOf(*given.clip);
     mesh::CleanMesh& clean = next.clean;
+    mesh::ClipPoints points(clip);
     std::vector<mesh::Face> corners;
     for (const Part& part : next.parts) {
         mesh::Face face;
-        std::memcpy(&face, given.faces + 3 * part.source, sizeof face);
-        if (part.isReversed) std::reverse(face.begin(), face.end());
-        corners.push_back(face);
+        std::memcpy(&face, given.clip_faces + 3 * given.clip_owners[part.source], sizeof face);
+        corners.push_back(points.part(face, part.corners<mesh::Vector>(given.clip_weights)));
     }
     const mesh::BakedClip baked = mesh::BakedClip::of(clip);
     grid = packer::GridClipMaker({clip, clean.vertices, clean.faces, clean.normals.normals, corners}, baked, library->format.vertexBits).make();

@@ -1,5 +1,5 @@
 // Reads and packs a glTF file with its materials, as the page does: node surfaces.mjs FOLDER, which has job.json and the file. The
-// first time it writes the pictures of textures, picture-N; then it reads them decoded, N.bin, and writes records.bin, the memories
+// first time it writes the pictures of textures, picture-N; then it reads them decoded, N.bin, and writes records.bin, clip.bin, the memories
 // of textures, entries.json, of the material table, and the colours of the job's frame.
 
 import { readFileSync, writeFileSync } from "node:fs";
@@ -15,7 +15,7 @@ const read = (name) => Uint8Array.from(readFileSync(name));
 const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
 const library = await Library.from(readFileSync(job.module));
 library.open(job.manifest);
-const found = readMesh(job.file, read(job.path), new Map(job.files.map((name) => [name, read(`${job.beside}/${name}`)])), null);
+const found = readMesh(job.file, read(job.path), new Map(job.files.map((name) => [name, read(`${job.beside}/${name}`)])), job.animation ?? null);
 let number = -1;
 await decodePictures(found, async (bytes) => {
   ++number;
@@ -31,6 +31,7 @@ function render(mesh) {
   const surfaces = surfacesOf(library, mesh, job);
   const packed = library.pack(mesh, surfaces);
   writeFileSync(`${folder}/records.bin`, library.records(packed));
+  writeFileSync(`${folder}/clip.bin`, library.clipFile());
   for (const { memory, words } of library.textureMemories()) writeFileSync(`${folder}/${memory}`, words);
   writeFileSync(`${folder}/entries.json`, JSON.stringify({ entries: surfaces.entries, packed, notes: [...mesh.notes, ...surfaces.notes] }));
   if (!job.frame) return;

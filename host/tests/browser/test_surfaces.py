@@ -5,12 +5,14 @@ from __future__ import annotations
 import base64
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from animated_documents import painted
 from built_page import MODULE, NEEDS_MODULE, ROOT, run_node
 from PIL import Image
 from textured_files import png
@@ -21,7 +23,9 @@ from colonnade.device.scene import DeviceScene
 from colonnade.mesh.files.catalog import VARIABLE
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import as_rendered, in_layer
+from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene.parser import load_scene
+from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.packer import pack
 
 pytestmark = NEEDS_MODULE
@@ -123,7 +127,6 @@ def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: floa
     """Records, texture memory and the material table, whose order is the tab's own: the largest first."""
     (tmp_path / "file").mkdir()
     file = textured_sheet(tmp_path / "file")
-    manifest = Manifest.load(ROOT / "configs" / "golden" / "small.json")
     found = beside_host(tmp_path, file, headroom)
     mesh = load_mesh(file, corner_colours=True)
     assert len(mesh.faces) > 1000  # split by the normal map
@@ -132,12 +135,37 @@ def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: floa
     order = [keys.index((one["kind"], one["roughness"], one["hasTexture"])) for one in found["entries"]]
     assert sorted(order) == list(range(len(mesh.materials))) and len(order) > 4
     assert found["notes"] == []
+    same_memories(tmp_path, mesh, order, headroom)
+
+
+def same_memories(folder: Path, mesh: Mesh, order: list[int], headroom: float = 1.0) -> None:
+    """Compare records, texture memories and the clip file of the tab, whose table has materials in an order."""
+    manifest = Manifest.load(ROOT / "configs" / "golden" / "small.json")
     numbers = np.argsort(order).astype(np.uint8)[mesh.face_materials]
     mesh = replace(mesh, materials=tuple(mesh.materials[number] for number in order), face_materials=numbers)
     image = pack(mesh, manifest, headroom=headroom, encoder="live")
     for section in image.attributes:
-        assert (tmp_path / section.memory).read_bytes() == section.words.tobytes(), section.memory
-    assert (tmp_path / "records.bin").read_bytes() == image.records.tobytes()
+        assert (folder / section.memory).read_bytes() == section.words.tobytes(), section.memory
+    assert (folder / "records.bin").read_bytes() == image.records.tobytes()
+    assert (folder / "clip.bin").read_bytes() == (image.moves.file if isinstance(image.moves, Bending) else b"")
+
+
+@pytest.mark.parametrize("glows", [False, True])
+def test_an_animated_file_with_alpha_bumps_and_a_glow_is_packed_as_by_the_host(tmp_path: Path, glows: bool) -> None:
+    """Faces of skins, of mirrored nodes and of morph targets, which are cut and split, and the clip of their pieces."""
+    (tmp_path / "file").mkdir()
+    file = painted(glows).write(tmp_path / "file" / "painted.gltf")
+    found = beside_host(tmp_path, file, animation=0)
+    mesh = load_mesh(file, corner_colours=True, animation="bend")
+    assert len(mesh.faces) > 2000 and any(one.kind == "glass" for one in mesh.materials) != glows
+
+    def key(kind: str, has_texture: bool, emission: Sequence[float], albedo: Sequence[float]) -> tuple[Any, ...]:
+        return kind, has_texture, *(round(value, 9) for value in (*emission, *(albedo if kind == "glass" else ())))
+
+    keys = [key(one.kind, one.texture is not None, one.emission, one.albedo) for one in mesh.materials]
+    names = ("kind", "hasTexture", "emission", "albedo")
+    order = [keys.index(key(*(entry[name] for name in names))) for entry in found["entries"]]
+    same_memories(tmp_path, mesh, order)
 
 
 @pytest.mark.parametrize("strength", [1.0, 4.0])

@@ -10,6 +10,7 @@ import pytest
 
 from colonnade.common.errors import UserError
 from colonnade.common.toml_files import parse_toml
+from colonnade.mesh.clips.tracks import Animation
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.model import MeshSource, Paths, Placement, Scene
 from colonnade.scene.parser import _TABLES, load_scene
@@ -158,6 +159,15 @@ def test_a_room_with_several_lights_is_read(tmp_path: Path) -> None:
     assert [light.falloff for light in scene.lights] == [1.5, None]
     assert scene.light.shadow_offset == 0.001 and scene.lights[1].position is None
     assert scene.with_environment(tmp_path).background.room == tmp_path
+
+
+def test_the_file_of_an_animation_is_beside_the_scene(tmp_path: Path) -> None:
+    text = '[[object]]\nmesh = {path = "a.glb", animation = 0, animation_file = "clips/b.glb"}'
+    for scene in (text, text.replace("[[object]]\nmesh =", "mesh =")):
+        mesh = load_scene(write(tmp_path, scene)).mesh
+        assert mesh.played == Animation("0", tmp_path / "clips" / "b.glb") and mesh.path == tmp_path / "a.glb"
+    with pytest.raises(UserError, match=r"mesh\.animation_file needs mesh\.animation: the name of one, or"):
+        load_scene(write(tmp_path, 'mesh = {name = "cube", animation_file = "b.glb"}'))
 
 
 def test_an_unreadable_file_is_named(tmp_path: Path) -> None:

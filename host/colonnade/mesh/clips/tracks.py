@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import Literal, get_args
 
 from colonnade.common.types import Floats
 
 Interpolation = Literal["STEP", "LINEAR", "CUBICSPLINE"]
 Path = Literal["translation", "rotation", "scale", "weights"]
+
+
+@dataclass(frozen=True)
+class Animation:
+    """An animation of a glTF file.
+
+    Attributes:
+        name: Its name, or its number from 0.
+        file: The file; None: that of the mesh.
+    """
+
+    name: str
+    file: FilePath | None = None
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import read_input
 from colonnade.common.limits import MAX_MESH_BYTES
+from colonnade.mesh.clips.tracks import Animation
 from colonnade.mesh.files.resolver import References
 from colonnade.mesh.losses import Losses
 from colonnade.mesh.materials.surface import RawSurface
@@ -25,12 +26,12 @@ class MeshFile:
     losses: Losses
 
 
-def read_surface(path: Path, animation: str | None = None) -> MeshFile:
+def read_surface(path: Path, animation: Animation | None = None) -> MeshFile:
     """Read a mesh file and join its parts.
 
     Args:
         path: The file.
-        animation: Name or number of an animation of a glTF file, which the surface plays. None: it does not move.
+        animation: An animation, which the surface plays. None: it does not move.
 
     Raises:
         UserError: The file is invalid, or has no such animation.

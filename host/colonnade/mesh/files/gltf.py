@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colonnade.common import fixed_order
-from colonnade.common.limits import MAX_TRIANGLES
+from colonnade.common.input_files import read_input, require_regular
+from colonnade.common.limits import MAX_MESH_BYTES, MAX_TRIANGLES
 from colonnade.common.types import Floats, Indices
 from colonnade.common.vectors import cofactors, unit_vectors
 from colonnade.mesh import losses as lost
+from colonnade.mesh.clips.tracks import Animation
 from colonnade.mesh.files.gltf_checks import DRACO, INSTANCING, READ_EXTENSIONS
 from colonnade.mesh.files.gltf_clip import ClipReader
 from colonnade.mesh.files.gltf_document import COMPRESSION, GltfDocument
@@ -53,7 +55,7 @@ _POINTS, _LINE_MODES = 0, (1, 2, 3)
 
 
 def read_gltf(
-    data: bytes, path: Path, references: References, losses: Losses, animation: str | None = None
+    data: bytes, path: Path, references: References, losses: Losses, animation: Animation | None = None
 ) -> RawSurface:
     """Read a glTF file, text or binary, with the transforms of its nodes.
 
@@ -62,8 +64,7 @@ def read_gltf(
         path: Its path, for messages.
         references: The files beside it.
         losses: Counts what is not read.
-        animation: Name or number of an animation, whose clip the surface gets. None: skins and morph targets are not
-            applied.
+        animation: An animation, whose clip the surface gets. None: skins and morph targets are not applied.
 
     Raises:
         UserError: The file is invalid, or requires an extension that is not supported.
@@ -71,8 +72,8 @@ def read_gltf(
     document = GltfDocument(data, path, references)
     _check_extensions(document)
     textures = GltfTextures(document, references, losses)
-    clip = None if animation is None else ClipReader(document, animation, losses)
-    parts = _parts(document, textures, losses, clip)
+    clip = None if animation is None else ClipReader(document, animation.name, losses, _source_of(animation))
+    surfaces, parts = _parts(document, textures, losses, clip)
     materials = (*(from_gltf(material) for material in document.json.get("materials", [])), PLAIN)
     found = list(materials)
     for index in sorted({part.material for part in parts} - {len(materials) - 1}):
@@ -87,17 +88,21 @@ def read_gltf(
     if not parts:
         if len(document.json.get("scenes", [])) > 1:
             raise document.error("its default scene has no faces: choose another one by scene in the file")
+        if document.json.get("animations"):
+            raise document.error("it has animations and no faces: give it as mesh.animation_file of a mesh")
         return RawSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-    if clip is None:
-        parts = _bisected(parts, document, materials, textures)
-    surface = joined([part.surface for part in parts])
-    surface = surface if clip is None else clip.surface(surface)
-    parts = _with_emission(parts, document, materials, textures, losses)
+    surface = joined(surfaces)
+    if clip is not None:
+        surface, is_mirrored = clip.surface(surface)
+        ends = np.cumsum([part.count for part in parts])[:-1]
+        parts = [part.reversed(own) for part, own in zip(parts, np.split(is_mirrored, ends), strict=True)]
+    surface, parts = _bisected(surface, parts, document, materials, textures)
+    parts = _with_emission(surface, parts, document, materials, textures, losses)
     materials, face_materials = _materials_of(tuple(found), parts, textures)
     areas = surface_areas(surface.vertices, surface.faces, face_materials, len(materials))
     materials, _ = merged_roughness(materials, areas, max(_MAPPED_MATERIALS, len(found)))
     two_sided = [bool(material.get("doubleSided", False)) for material in document.json.get("materials", [])] + [True]
-    single_sided = np.concatenate([np.full(len(part.surface.faces), not two_sided[part.material]) for part in parts])
+    single_sided = np.concatenate([np.full(part.count, not two_sided[part.material]) for part in parts])
     colours = surface.colours
     if colours is not None:
         colours = colours * np.array([material.albedo for material in materials])[face_materials][:, None]
@@ -111,20 +116,31 @@ def read_gltf(
     )
 
 
+def _source_of(animation: Animation) -> GltfDocument | None:
+    """The file of an animation; None: it is in that of the mesh."""
+    file = animation.file
+    if file is None:
+        return None
+    require_regular(file, "animation file")
+    return GltfDocument(read_input(file, "the animation", MAX_MESH_BYTES), file, References(file), "animation file")
+
+
 @dataclass(frozen=True)
 class _Part:
-    """A primitive.
+    """What the faces of a primitive are.
 
     Attributes:
-        surface: Its triangles, in the scene's space.
-        material: Its number in the file.
+        count: Their number.
+        material: The number of their material in the file.
+        is_textured: Whether they show its texture.
         metal: Faces that are metal by a map, bool [m], and their roughness, float64 [m]; None without a map.
         emission_uvs: Positions of the corners in an emission map, float64 [m, 3, 2]; None without them.
         emission: Of faces by a map, linear, float64 [m, 3]; None without a map.
     """
 
-    surface: RawSurface
+    count: int
     material: int
+    is_textured: bool
     metal: tuple[NDArray[np.bool_], Floats] | None = None
     emission_uvs: Floats | None = None
     emission: Floats | None = None
@@ -134,7 +150,7 @@ class _Part:
         metal = self.metal if material.kind == "diffuse" else None
         columns = [*(() if metal is None else metal), *(() if self.emission is None else self.emission.T)]
         if not columns:
-            return np.full(len(self.surface.faces), number)
+            return np.full(self.count, number)
         kinds, places = np.unique(np.column_stack(columns), axis=0, return_inverse=True)
         found = []
         for values in kinds.tolist():
@@ -147,21 +163,24 @@ class _Part:
         uvs, metal = self.emission_uvs, self.metal
         return replace(
             self,
-            surface=self.surface.pieces(pieces),
+            count=len(pieces.owners),
             metal=None if metal is None else (metal[0][pieces.owners], metal[1][pieces.owners]),
             emission_uvs=None if uvs is None else pieces.corners(uvs),
         )
 
-    @property
-    def has_one_colour(self) -> bool:
-        """Whether all of its faces, of which there are some, have the colour of the material."""
-        return self.surface.uvs is None and self.surface.colours is None and len(self.surface.faces) > 0
+    def reversed(self, faces: NDArray[np.bool_]) -> _Part:
+        """That of faces some of which have the other winding, bool [m]."""
+        uvs = self.emission_uvs
+        return self if uvs is None else replace(self, emission_uvs=np.where(faces[:, None, None], uvs[:, ::-1], uvs))
 
 
-def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip: ClipReader | None) -> list[_Part]:
+def _parts(
+    document: GltfDocument, textures: GltfTextures, losses: Losses, clip: ClipReader | None
+) -> tuple[list[RawSurface], list[_Part]]:
     """The primitives of the default scene, whose vertices a clip takes; refused if they have too many materials."""
     compressed, default = DracoPrimitives(document), len(document.json.get("materials", []))
     skins = lost.PLAYABLE_SKINS if document.json.get("animations") else lost.SKINS
+    surfaces: list[RawSurface] = []
     parts: list[_Part] = []
     # Of surfaces that no texture or corner colours; metal by a map keeps these, too
     plain: set[tuple[Vector, float]] = set()
@@ -172,38 +191,43 @@ def _parts(document: GltfDocument, textures: GltfTextures, losses: Losses, clip:
             losses.add(lost.MORPHS, 0 if clip is not None else len(matrices) * len(primitive.get("targets", [])))
             to_scene = matrices if clip is None else np.eye(4)[np.newaxis]
             left = MAX_TRIANGLES - triangles
-            part = _primitive(document, primitive, to_scene, default, losses, textures, compressed, left)
-            if part is None:
+            found = _primitive(document, primitive, to_scene, default, losses, textures, compressed, left)
+            if found is None:
                 continue
+            surface, part = found
             if clip is not None:
-                clip.add(index, primitive, compressed.arrays(primitive), part.surface.vertices)
-                losses.add(lost.BENT_RELIEF, part.surface.relief is not None)
-                part = replace(part, surface=replace(part.surface, relief=None))
+                clip.add(index, primitive, compressed.arrays(primitive), surface.vertices)
+                surface = replace(surface, relief=None if surface.relief is None else surface.relief.without_tangents)
+            surfaces.append(surface)
             parts.append(part)
-            triangles += len(part.surface.faces)
-            if part.material != default and part.has_one_colour:
+            triangles += part.count
+            if part.material != default and part.count and not part.is_textured and surface.colours is None:
                 material = from_gltf(document.entry("materials", part.material))
                 if material.alpha is None:
                     plain.add((material.albedo, material.ior))
             if len(plain) > MAX_MATERIALS:
                 raise document.error(f"it has more than {MAX_MATERIALS} materials: use at most {MAX_MATERIALS}")
-    return parts
+    return surfaces, parts
 
 
 def _bisected(
-    parts: list[_Part], document: GltfDocument, materials: tuple[MeshMaterial, ...], textures: GltfTextures
-) -> list[_Part]:
-    """The parts, with pieces of faces on which the emission by a map varies, and of their neighbours."""
+    surface: RawSurface,
+    parts: list[_Part],
+    document: GltfDocument,
+    materials: tuple[MeshMaterial, ...],
+    textures: GltfTextures,
+) -> tuple[RawSurface, list[_Part]]:
+    """A surface and its parts, with pieces of faces on which the emission by a map varies, and of their neighbours."""
     for number in sorted({part.material for part in parts if part.emission_uvs is not None}):
         use = textures.emission_of(number)
         if use is None or not any(materials[number].emission):
             continue
-        counts = [len(part.surface.faces) for part in parts]
+        counts = [part.count for part in parts]
         shows = [part.material == number and part.emission_uvs is not None for part in parts]
         found = emission_pieces(
             textures.reader.textures[use.texture],
             gltf_emission(document.entry("materials", number)),
-            joined([part.surface for part in parts]),
+            surface,
             np.repeat(shows, counts),
             np.concatenate(
                 [
@@ -214,39 +238,42 @@ def _bisected(
         )
         if len(found.owners) == sum(counts):
             continue
+        surface = surface.pieces(found)
         starts = np.cumsum([0, *counts])
         ends = np.searchsorted(found.owners, starts)
         parts = [
             part.pieces(Pieces(found.owners[first:last] - start, found.weights[first:last]))
             for part, start, first, last in zip(parts, starts[:-1], ends[:-1], ends[1:], strict=True)
         ]
-    return parts
+    return surface, parts
 
 
 def _with_emission(
+    surface: RawSurface,
     parts: list[_Part],
     document: GltfDocument,
     materials: tuple[MeshMaterial, ...],
     textures: GltfTextures,
     losses: Losses,
 ) -> list[_Part]:
-    """The parts with what their faces emit by the emission maps of their materials."""
+    """The parts of a surface with what their faces emit by the emission maps of their materials."""
     found = list(parts)
+    ends = np.cumsum([part.count for part in parts])
+    corners = np.split(surface.vertices[surface.faces], ends[:-1])
     for number in {part.material for part in parts} - {len(materials) - 1}:
         use, own = textures.emission_of(number), [i for i, part in enumerate(parts) if part.material == number]
         if use is None or not any(materials[number].emission):
             continue
         factor = np.array(gltf_emission(document.entry("materials", number)))
         texture, mapped = textures.reader.textures[use.texture], [i for i in own if parts[i].emission_uvs is not None]
-        colours = {i: np.tile(texture.mean * factor, (len(parts[i].surface.faces), 1)) for i in own}
+        colours = {i: np.tile(texture.mean * factor, (parts[i].count, 1)) for i in own}
         if mapped:
             emission = factor * emission_of(
                 texture,
                 np.concatenate([parts[i].emission_uvs for i in mapped]),  # type: ignore[misc]
-                np.concatenate([parts[i].surface.vertices[parts[i].surface.faces] for i in mapped]),
+                np.concatenate([corners[i] for i in mapped]),
             )
-            ends = np.cumsum([len(parts[i].surface.faces) for i in mapped])[:-1]
-            colours |= zip(mapped, np.split(emission, ends), strict=True)
+            colours |= zip(mapped, np.split(emission, np.cumsum([parts[i].count for i in mapped])[:-1]), strict=True)
         losses.add(lost.BRIGHT, any((values > 1.0).any() for values in colours.values()))
         for i, values in colours.items():
             found[i] = replace(parts[i], emission=values / values.max(axis=1, initial=1.0, keepdims=True))
@@ -267,7 +294,7 @@ def _materials_of(
         return number
 
     for part in parts:
-        use = None if part.surface.uvs is None else textures.uses[part.material]
+        use = textures.uses[part.material] if part.is_textured else None
         material, number = materials[part.material], part.material
         if use is not None:
             material = replace(material, texture=use.texture)
@@ -312,7 +339,7 @@ def _primitive(
     textures: GltfTextures,
     compressed: DracoPrimitives,
     left: int,
-) -> _Part | None:
+) -> tuple[RawSurface, _Part] | None:
     """The copies of a primitive, one after the other; None for points and lines.
 
     Args:
@@ -414,14 +441,14 @@ def _primitive(
         known = use is not None and found is not None and bool((np.abs(found) <= MAX_UV).all())
         return use.uvs(found)[places] if known and use is not None and found is not None else None
 
-    part = _Part(surface, int(material))
+    part = _Part(len(faces), int(material), uvs is not None)
     if material == default:
-        return part
+        return surface, part
     metal, emission = textures.metal_of(int(material)), textures.emission_of(int(material))
     if metal is not None and (at := positions_in(metal)) is not None:
         factors = metal_factors(document.entry("materials", material))
         part = replace(part, metal=metal_of(textures.reader.textures[metal.texture], at, factors))
-    return replace(part, emission_uvs=positions_in(emission))
+    return surface, replace(part, emission_uvs=positions_in(emission))
 
 
 def _corners(document: GltfDocument, arrays: PrimitiveArrays, count: int) -> Indices:

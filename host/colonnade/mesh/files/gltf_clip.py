@@ -7,12 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colonnade.common.errors import UserError
-from colonnade.common.terminal_text import plain
+from colonnade.common.terminal_text import listed, meant, plain
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh import losses as lost
 from colonnade.mesh.clips.clip import INFLUENCES, Clip, Morphs
+from colonnade.mesh.clips.faces import ClipFaces
 from colonnade.mesh.clips.tracks import Track
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.files.gltf_draco import PrimitiveArrays
@@ -26,20 +28,25 @@ _WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
 class ClipReader:
     """Collects the vertices of a file's primitives, and what moves them."""
 
-    def __init__(self, document: GltfDocument, animation: str, losses: Losses) -> None:
+    def __init__(
+        self, document: GltfDocument, animation: str, losses: Losses, source: GltfDocument | None = None
+    ) -> None:
         """Find an animation.
 
         Args:
             document: The file.
             animation: Its name, or its number from 0.
             losses: Counts what is left out of it.
+            source: A file that has the animation; nodes of both with one name are the same. None: the file itself.
 
         Raises:
-            UserError: There is no such animation, or it is not valid.
+            UserError: There is no such animation, it is not valid, or it moves nothing of the file.
         """
-        self._document, self._losses = document, losses
+        self._document, self._losses, self._source = document, losses, source or document
+        self._named = None if source is None else _nodes_by_name(document)
         self.name = animation
         self._nodes = all_nodes(document)
+        self._missing: dict[str, None] = {}
         self._tracks = self._read_tracks(self._chosen(animation))
         self._bones: dict[tuple[int, bytes], int] = {}
         self._positions: list[Floats] = []
@@ -60,8 +67,10 @@ class ClipReader:
         self._positions.append(positions)
         self._count += count
 
-    def surface(self, joined: RawSurface) -> RawSurface:
-        """The joined surface of the primitives, in the rest pose, with its clip. Its vertices are where they are bound.
+    def surface(self, joined: RawSurface) -> tuple[RawSurface, NDArray[np.bool_]]:
+        """The joined surface of the primitives, in the rest pose, with what moves it, and mirrored faces, bool [m].
+
+        Its vertices are where they are bound. The corners of mirrored faces go backwards.
 
         Raises:
             UserError: A transform is not finite.
@@ -71,19 +80,36 @@ class ClipReader:
         is_finite, vertices, normals, is_mirrored = clip.compiled.rest_surface(joined.faces.astype(np.int32), normals)
         if not is_finite:
             raise self._document.error("a transform of its rest pose is not finite, or too large: export it again")
-        surface = replace(joined, vertices=vertices, normals=normals, clip=clip)
-        return surface.reversed(is_mirrored != 0)
+        surface = replace(joined, vertices=vertices, normals=normals).reversed(is_mirrored != 0)
+        return replace(surface, moves=ClipFaces.whole(clip, surface.faces)), is_mirrored != 0
 
     def _chosen(self, name: str) -> Mapping[str, Any]:
-        animations = self._document.json.get("animations", [])
+        animations = self._source.json.get("animations", [])
         names = [str(animation.get("name", number)) for number, animation in enumerate(animations)]
         if name in names:
-            return self._document.entry("animations", names.index(name))
+            return self._source.entry("animations", names.index(name))
         if name.isdecimal() and int(name) < len(animations):
-            return self._document.entry("animations", int(name))
+            return self._source.entry("animations", int(name))
         count = f"{len(names)} animation{'s' * (len(names) > 1)}"
-        known = f"it has {count}, {', '.join(map(plain, names))}" if names else "it has none"
-        raise self._document.error(f"it has no animation {plain(name)}: {known}")
+        near = meant(name, names)
+        known = f"it has {count}, {listed(names)}" if names else "it has none"
+        hint = f": did you mean {listed([near])}? It has {count}, {listed(names)}" if near else f": {known}"
+        raise self._source.error(f"it has no animation {listed([name])}{hint}")
+
+    def _node_of(self, index: Any, path: str) -> int | None:
+        """The node of the mesh's file that one of the animation's is; None: there is none, or it has other targets."""
+        if self._named is None:
+            return int(index)
+        name = str(self._source.entry("nodes", index).get("name", f"node {index}"))
+        if name not in self._named:
+            self._missing[name] = None
+            return None
+        found = self._named[name]
+        own, other = self._document.entry("nodes", found), self._source.entry("nodes", index)
+        if path == "weights" and _targets_of(self._document, own) != _targets_of(self._source, other):
+            self._losses.add(lost.CHANNELS)
+            return None
+        return found
 
     def _read_tracks(self, animation: Mapping[str, Any]) -> tuple[Track, ...]:
         tracks, samplers = [], animation.get("samplers", [])
@@ -95,7 +121,14 @@ class ClipReader:
                 continue
             if not 0 <= number < len(samplers):
                 raise self._error(f"uses sampler {number}, which does not exist")
-            tracks.append(self._track(target["node"], path, samplers[number]))
+            node = self._node_of(target["node"], path)
+            if node is not None:
+                tracks.append(self._track(node, path, samplers[number]))
+        if self._missing and not tracks:
+            moved, own = (listed(list(names), 80) for names in (self._missing, self._named or ("no names",)))
+            raise self._error(f"moves {moved}, and no node of the mesh, which has {own}", "")
+        for name in self._missing:
+            self._losses.add(lost.JOINTS, name=name)
         if not tracks:
             raise self._error("moves no node and no morph target")
         places = [(track.node, track.path) for track in tracks]
@@ -108,14 +141,14 @@ class ClipReader:
         kind = sampler.get("interpolation", "LINEAR")
         if kind not in ("STEP", "LINEAR", "CUBICSPLINE"):
             raise self._error("has an unknown interpolation")
-        times = self._document.array(sampler.get("input"))[:, 0].astype(np.float64)
-        values = self._document.array(sampler.get("output")).astype(np.float64)
+        times = self._source.array(sampler.get("input"))[:, 0].astype(np.float64)
+        values = self._source.array(sampler.get("output")).astype(np.float64)
         if not (np.isfinite(times).all() and np.isfinite(values).all()):
             raise self._error("has a key that is not a finite number")
         if times[0] < 0 or (np.diff(times) <= 0).any():
             raise self._error("has keys whose times do not ascend from 0 on")
         if path == "weights":
-            width = self._targets_of(node)
+            width = _targets_of(self._document, node)
         else:
             width = _WIDTHS[path]
             if "matrix" in node:
@@ -124,10 +157,6 @@ class ClipReader:
         if values.size != np.prod(shape):
             raise self._error(f"has {values.size:,} numbers for {len(times):,} keys of a {path}")
         return Track(index, path, times, values.reshape(shape), kind)
-
-    def _targets_of(self, node: Mapping[str, Any]) -> int:
-        primitives = self._document.entry("meshes", node.get("mesh", -1)).get("primitives", [])
-        return max((len(primitive.get("targets", [])) for primitive in primitives), default=0)
 
     def _skinned(
         self, node: Mapping[str, Any], primitive: Mapping[str, Any], arrays: PrimitiveArrays, count: int
@@ -221,5 +250,22 @@ class ClipReader:
             ),
         )
 
-    def _error(self, reason: str) -> UserError:
-        return self._document.error(f"its animation {plain(self.name)} {reason}: export it again")
+    def _error(self, reason: str, advice: str = ": export it again") -> UserError:
+        return self._source.error(f"its animation {plain(self.name)} {reason}{advice}")
+
+
+def _targets_of(document: GltfDocument, node: Mapping[str, Any]) -> int:
+    """The number of a node's morph targets."""
+    primitives = document.entry("meshes", node.get("mesh", -1)).get("primitives", [])
+    return max((len(primitive.get("targets", [])) for primitive in primitives), default=0)
+
+
+def _nodes_by_name(document: GltfDocument) -> dict[str, int]:
+    """The first node of each name, those that are joints of skins before others."""
+    skins, nodes = document.json.get("skins", []), document.json.get("nodes", [])
+    joints = [joint for skin in skins for joint in skin.get("joints", []) if joint < len(nodes)]
+    found: dict[str, int] = {}
+    for index in (*joints, *range(len(nodes))):
+        if "name" in nodes[index]:
+            found.setdefault(str(nodes[index]["name"]), index)
+    return found

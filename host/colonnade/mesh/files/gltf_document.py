@@ -32,13 +32,13 @@ class GltfDocument:
         json: The checked JSON object.
     """
 
-    def __init__(self, data: bytes, path: Path, references: References) -> None:
-        """Parse the file.
+    def __init__(self, data: bytes, path: Path, references: References, kind: str = "mesh") -> None:
+        """Parse the file; ``kind`` names it in messages.
 
         Raises:
             UserError: The JSON or the container is invalid.
         """
-        self._path, self._references = path, references
+        self._path, self._references, self._kind = path, references, kind
         self._binary: bytes | None = None
         text = data
         if data[:4] == b"glTF":
@@ -50,7 +50,7 @@ class GltfDocument:
 
     def error(self, reason: str) -> UserError:
         """An error of this file."""
-        return UserError(f"mesh {self._path}: {reason}")
+        return UserError(f"{self._kind} {self._path}: {reason}")
 
     def compressed(self, name: str) -> UserError:
         """The error of a file whose meshes an extension compresses."""

@@ -89,43 +89,44 @@ def without_alpha(surface: RawSurface, losses: Losses) -> RawSurface:
     """
     if all(material.alpha is None for material in surface.materials):
         return surface
-    if surface.clip is not None:
-        losses.add(lost.BENT_ALPHA, sum(material.alpha is not None for material in surface.materials))
-        return replace(surface, materials=tuple(replace(material, alpha=None) for material in surface.materials))
     index = surface.material_index
     whole = [np.flatnonzero(np.array([material.alpha is None for material in surface.materials])[index])]
     textures, materials = list(surface.textures), [replace(material, alpha=None) for material in surface.materials]
     pieces, panes = [], []
     budget = MAX_SPLIT_FACES - len(index)
+    # Materials that differ in other than alpha and its picture share the faces that pieces may add
+    groups: dict[tuple[Alpha, int | None], list[int]] = {}
     for number, material in enumerate(surface.materials):
-        faces = np.flatnonzero(index == number)
-        if material.alpha is None or not len(faces):
+        if material.alpha is not None:
+            groups.setdefault((material.alpha, material.texture), []).append(number)
+    for (alpha, picture), numbers in groups.items():
+        faces = np.flatnonzero(np.isin(index, numbers))
+        if not len(faces):
             continue
-        texture = None if material.texture is None else surface.textures[material.texture]
+        texture = None if picture is None else surface.textures[picture]
+        factor, is_covering = alpha.factor, alpha.blends and alpha.factor > 0.0
+        if is_covering:
+            alpha = replace(alpha, factor=1.0)
+            for number in numbers:
+                materials[number] = replace(materials[number], coverage=factor)
         has_mask = texture is not None and texture.alpha is not None
         has_corners = surface.alphas is not None and bool((surface.alphas[faces] < 1.0).any())
         if not has_mask and not has_corners:
-            if material.alpha.blends and material.alpha.factor > 0.0:
-                materials[number] = replace(materials[number], coverage=material.alpha.factor)
-                whole.append(faces)
-            elif material.alpha.factor >= material.alpha.cutoff:
+            if is_covering or factor >= alpha.cutoff:
                 whole.append(faces)
             continue
-        alpha = material.alpha
-        if alpha.blends and alpha.factor > 0.0:
-            materials[number] = replace(materials[number], coverage=alpha.factor)
-            alpha = replace(alpha, factor=1.0)
-        cut = _cut(surface, faces, texture, alpha, material.alpha.factor, max(budget, 0))
+        cut = _cut(surface, faces, texture, alpha, factor, max(budget, 0))
         whole.append(faces[cut.kinds > 0])
         budget -= len(cut.pieces.owners) - int((cut.kinds == 0).sum())
         pieces.append(cut.pieces)
         losses.add(lost.COARSE_CUTS, cut.is_coarse)
-        if material.alpha.blends:
+        if alpha.blends:
             seen = (cut.kinds < 0) & (cut.panes[:, 0] >= _THIN)
             panes.append((faces[seen], cut.panes[seen]))
             losses.add(lost.BLENDED, cut.is_blended)
         if cut.filled is not None:
-            materials[number] = replace(materials[number], texture=len(textures))
+            for number in numbers:
+                materials[number] = replace(materials[number], texture=len(textures))
             textures.append(cut.filled)
     surface = replace(surface, materials=tuple(materials), textures=tuple(textures))
     surface, thin = _with_panes(surface, panes)

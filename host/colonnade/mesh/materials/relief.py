@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -58,6 +58,11 @@ class Relief:
             np.where(faces[:, None, None], values[:, ::-1], values) for values in (self.uvs, self.tangents)
         )
         return Relief(self.maps, self.index, uvs, tangents)
+
+    @property
+    def without_tangents(self) -> Relief:
+        """That without the tangents of the file: those of the surface stand for them."""
+        return replace(self, tangents=np.zeros_like(self.tangents))
 
     @staticmethod
     def joined(parts: Sequence[Relief | None], counts: Sequence[int]) -> Relief | None:

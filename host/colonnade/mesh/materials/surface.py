@@ -12,7 +12,7 @@ import numpy.typing as npt
 from colonnade.common import fixed_order
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
-from colonnade.mesh.clips.clip import Clip
+from colonnade.mesh.clips.faces import ClipFaces
 from colonnade.mesh.geometry.polygons import triangulate
 from colonnade.mesh.losses import CLIPPED_COLOURS, CROSSED, DARK_COLOURS, SHORT_FACES, TEXTURED_COLOURS, Losses
 from colonnade.mesh.materials.materials import PLAIN, MeshMaterial
@@ -71,7 +71,7 @@ class RawSurface:
         single_sided: Faces whose back viewers do not show, bool [m]; None: none.
         alphas: Alpha of the corners, which counts for materials with one, 0 to 1, float64 [m, 3]; None: all are opaque.
         relief: Normal maps of the faces; None: none.
-        clip: What moves the vertices, which are in its rest pose; None: nothing.
+        moves: What moves the faces, which are in the rest pose of its clip; None: nothing.
     """
 
     vertices: Floats
@@ -87,10 +87,10 @@ class RawSurface:
     single_sided: npt.NDArray[np.bool_] | None = None
     alphas: Floats | None = None
     relief: Relief | None = None
-    clip: Clip | None = None
+    moves: ClipFaces | None = None
 
     def reversed(self, faces: npt.NDArray[np.bool_]) -> RawSurface:
-        """The surface with the corners of some faces backwards, bool [m]. It has no relief."""
+        """The surface with the corners of some faces backwards, bool [m]. It has nothing that moves it."""
         names = ("faces", "normals", "colours", "uvs", "alphas")
         values = ((name, getattr(self, name)) for name in names)
         flipped = {
@@ -98,10 +98,10 @@ class RawSurface:
             for name, value in values
             if value is not None
         }
-        return replace(self, **flipped)
+        return replace(self, relief=None if self.relief is None else self.relief.reversed(faces), **flipped)
 
     def pieces(self, pieces: Pieces) -> RawSurface:
-        """The surface of parts of its faces, which name those of the file in `source_faces`. It has no clip."""
+        """The surface of parts of its faces, which name those of the file in `source_faces`."""
         owners, weights = pieces.owners, pieces.weights
         # Corners that are kept keep their vertex
         kept = weights.max(axis=2) == 1.0
@@ -122,6 +122,7 @@ class RawSurface:
             source_count=self.file_faces,
             single_sided=None if self.single_sided is None else self.single_sided[owners],
             relief=None if self.relief is None else self.relief.pieces(owners, weights),
+            moves=None if self.moves is None else self.moves.pieces(owners, weights),
             **at_corners,
         )
 

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, StrictBool, model_validator
 from pydantic.dataclasses import dataclass
 from typing_extensions import Self
 
+from colonnade.mesh.clips.tracks import Animation
 from colonnade.mesh.materials.materials import Kind
 from colonnade.scene.model.values import (
     STRICT,
@@ -37,7 +38,7 @@ def _as_text(value: object) -> object:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) and value >= 0 else value
 
 
-Animation = Annotated[Text, BeforeValidator(_as_text, json_schema_input_type=Text | Annotated[int, Interval(ge=0)])]
+AnimationName = Annotated[Text, BeforeValidator(_as_text, json_schema_input_type=Text | Annotated[int, Interval(ge=0)])]
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -50,6 +51,7 @@ class MeshSource:
             without them 60 degrees.
         simplify: Number of triangles to which a mesh of more is simplified. None: all are kept.
         animation: Name or number of an animation of a glTF file, which the frames of a motion play once.
+        animation_file: The glTF file of the animation, whose nodes have the names of the mesh's. None: the mesh's own.
         children: Most children of a node of the packer's tree: 2 is a binary tree, as in the source paper.
     """
 
@@ -57,7 +59,8 @@ class MeshSource:
     path: File | None = None
     crease: Annotated[Float, Interval(ge=0.0, le=180.0)] | None = None
     simplify: Triangles | None = None
-    animation: Animation | None = None
+    animation: AnimationName | None = None
+    animation_file: File | None = None
     children: Literal[2, 4] = 4
 
     @model_validator(mode="after")
@@ -66,7 +69,14 @@ class MeshSource:
             raise ValueError("[mesh] needs either a name or a path")
         if self.animation is not None and self.simplify is not None:
             raise ValueError("mesh.animation moves all triangles: leave out mesh.simplify")
+        if self.animation_file is not None and self.animation is None:
+            raise ValueError('mesh.animation_file needs mesh.animation: the name of one, or "0" for the first')
         return self
+
+    @property
+    def played(self) -> Animation | None:
+        """The argument for `colonnade.mesh.load.load_mesh`."""
+        return None if self.animation is None else Animation(self.animation, self.animation_file)
 
     @property
     def source(self) -> str | Path:
