@@ -131,8 +131,6 @@ def test_a_study_killed_in_the_middle_continues_gives_the_same_numbers_and_is_ex
         time.sleep(0.02)
     running.send_signal(signal.SIGKILL)
     running.wait()
-    partial = json.loads((again.parent / "out" / "study.json").read_text())
-    assert partial["jobs"]["run"] < 7
 
     continued, printed = explored(again)
     assert continued["jobs"]["cached"] >= 1

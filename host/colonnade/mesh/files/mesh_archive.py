@@ -63,8 +63,8 @@ class ArchivePictures(References):
 
     def __init__(self, mesh: Path, data: bytes) -> None:
         super().__init__(mesh)
-        self._data = data
+        self._archive = MeshArchive(data)
 
     def picture(self, name: str, losses: Losses) -> bytes | None:
         """The picture of a member that exists."""
-        return MeshArchive(self._data).read(name)
+        return self._archive.read(name)
