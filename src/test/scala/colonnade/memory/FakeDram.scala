@@ -28,11 +28,14 @@ class FakeDram(axi: AxiReadPort, config: ColonnadeConfig, random: Random, isShar
 
   val page: BigInt = 0x1234567
 
-  /** Lines, by their number in a bank, whose reads fail. */
-  var failing = Set.empty[Int]
+  /** Lines, by their number in a bank, whose reads fail; the banks where they do. */
+  var failing      = Set.empty[Int]
+  var failingBanks = (0 until banks).toSet
 
-  /** Lines whose read has been accepted; beats that have been taken. */
-  var reads, taken = 0
+  /** Lines whose read has been accepted, those of them that fail, and beats that have been taken. */
+  var reads, failed, taken = 0
+
+  def fails(bank: Int, line: Int): Boolean = failing(line) && failingBanks(bank)
 
   private def contentOf(bank: Int, line: Int): BigInt =
     contents.getOrElseUpdate((bank, line), BigInt(Lines.records * bits, random))
@@ -62,9 +65,10 @@ class FakeDram(axi: AxiReadPort, config: ColonnadeConfig, random: Random, isShar
       (1 << ar.bits.size.peekInt().toInt) shouldBe bus
       ar.bits.burst.expect(1)
       if (isShared) inFlight(bank).map(_.line) should not contain line
-      val failingBeat = if (failing(line)) random.nextInt(beats) else -1
+      val failingBeat = if (fails(bank, line)) random.nextInt(beats) else -1
       inFlight(bank).enqueue(Read(line, now + 1 + random.nextInt(60), failingBeat))
       reads += 1
+      if (failingBeat >= 0) failed += 1
     }
   }
 

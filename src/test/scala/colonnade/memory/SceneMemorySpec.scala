@@ -35,9 +35,7 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
         bench.run(requests = 60, range = 1)
         val held = bench.dram.reads
         held - warm should be <= 2 * banks // held after their first reads
-        dut.io.invalidate.poke(true)
-        dut.clock.step()
-        dut.io.invalidate.poke(false)
+        bench.invalidate()
         bench.run(requests = 40, range = 1)
         bench.dram.reads should be > held
       }
@@ -51,36 +49,31 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
         val bench = new Bench(dut, config, new Random(columns))
         bench.run(requests = 120)
         bench.dram.reads should be <= 120
-        bench.dram.failing = Set(1, 4)
-        bench.run(requests = 100)
-        bench.errors should be > 1
-        bench.dram.failing = Set()
+        bench.fail()
         bench.run(requests = 60)
       }
     }
 
   it should "announce zeros for a line whose read fails, report it, and read it again" in {
-    val config = TestConfigs.withCache(columns = 2)
+    val config = TestConfigs.withCache(columns = 2, banks = 4)
     test(new SceneMemory(config)).withAnnotations(Simulation.verilator) { dut =>
       val bench = new Bench(dut, config, new Random(1))
-      bench.dram.failing = Set(1, 4)
-      bench.run(requests = 100)
-      bench.errors should be > 1
-      bench.dram.failing = Set()
+      bench.fail()
       bench.run(requests = 100)
     }
   }
 
   private class Bench(dut: SceneMemory, config: ColonnadeConfig, random: Random) {
     private val lines = 1 << Lines.lineBits(config)
+    private val banks = 0 until config.columnBvhMemory.banks
     val dram          = new FakeDram(dut.io.axi, config, random, config.columnBvhMemory.cache.get.hasSharedCache)
-    var errors        = 0
+    private var reads, errors = 0 // of the events
 
     /** By bank; a line whose read fails may be known from a read before. */
-    private val columns = (0 until config.columnBvhMemory.banks).map { bank =>
+    private val columns = banks.map { bank =>
       def allowed(line: Int, word: Int) = {
         val record = dram.record(bank, line, word)
-        if (dram.failing(line)) Set(record, BigInt(0)) else Set(record)
+        if (dram.fails(bank, line)) Set(record, BigInt(0)) else Set(record)
       }
       new FakeColumns(config, dut.io.requests.map(_(bank)), dut.io.lines.map(_(bank)), allowed, random)
     }
@@ -93,12 +86,34 @@ class SceneMemorySpec extends AnyFlatSpec with ChiselScalatestTester with Matche
       while (left > 0 || columns.exists(_.isWaiting)) left -= step(left, range)
       for (_ <- 1 to 300) step(0, range)
       dut.io.isIdle.expect(true)
+      reads shouldBe dram.reads
+    }
+
+    /** Lines of each bank fail; each failure is reported. */
+    def fail(): Unit = {
+      dram.failing = Set(0, 1)
+      for (bank <- banks) {
+        val before = dram.failed
+        invalidate()
+        dram.failingBanks = Set(bank)
+        run(requests = 20 * banks.size)
+        dram.failed should be > before
+        errors shouldBe dram.failed
+      }
+      dram.failing = Set()
+    }
+
+    def invalidate(): Unit = {
+      dut.io.invalidate.poke(true)
+      dut.clock.step()
+      dut.io.invalidate.poke(false)
     }
 
     private def step(most: Int, range: Int): Int = {
       val issued = columns.foldLeft(0)((issued, bank) => issued + bank.offer(most - issued, range))
       dram.cycle()
       columns.foreach(_.take())
+      reads += dut.io.events.dramReads.peekInt().toInt
       if (dut.io.events.error.peekBoolean()) errors += 1
       dut.clock.step()
       issued

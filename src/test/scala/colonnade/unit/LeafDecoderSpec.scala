@@ -13,7 +13,10 @@ import scala.util.Random
 class LeafDecoderSpec extends AnyFlatSpec with OneSimulation with Matchers {
   behavior of "LeafDecoder"
 
-  inOneSimulation(new LeafDecoder(TestConfigs.tiny))(
+  /** More contexts than the queue has places. */
+  private val config = TestConfigs.tiny.copy(units = TestConfigs.tiny.units.copy(pathContexts = 24))
+
+  inOneSimulation(new LeafDecoder(config))(
     "find the attributes of hits at full rate" -> findAttributes(1, 1),
     "as leaves come"                           -> findAttributes(5, 1),
     "as the shader is ready"                   -> findAttributes(1, 9)
@@ -27,7 +30,7 @@ class LeafDecoderSpec extends AnyFlatSpec with OneSimulation with Matchers {
       val isPair = (record.last >> 30) != 1
       BigInt(if (isPair) random.nextInt(2) else 0) +: record
     }
-    val faces                  = Model.leaves(TestConfigs.tiny, leaves, "leafface")
+    val faces                  = Model.leaves(config, leaves, "leafface")
     val held                   = mutable.Queue.empty[(Int, Seq[BigInt])] // contexts and faces of leaves that wait
     val free                   = mutable.Queue.from(0 until 1 << dut.io.leaf.bits.context.getWidth)
     var (next, taken, cycle)   = (0, 0, 0)
