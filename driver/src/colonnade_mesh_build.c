@@ -83,10 +83,11 @@ uint32_t colonnade_mesh_pairs(const struct colonnade_mesh *layout, const struct 
         for (uint32_t corner = 0; corner < 3; ++corner) {
             const uint32_t a = own->vertices[corner], b = own->vertices[(corner + 1) % 3], c = own->vertices[(corner + 2) % 3];
             const uint32_t begin = b == 0 ? 0 : ends[b - 1], end = end_of(triangles, sorted, begin, ends[b], a);
-            for (uint32_t k = end; k-- > begin && end - k <= MOST_NEIGHBOURS && at_edge(triangles, sorted[k], 1) == a;) {
-                const uint32_t other = sorted[k] / 3, pair[4] = {a, b, c, at_edge(triangles, sorted[k], 2)};
+            for (uint32_t k = end; k > begin && end - k < MOST_NEIGHBOURS; --k) {
+                const uint32_t edge = sorted[k - 1], other = edge / 3, pair[4] = {a, b, c, at_edge(triangles, edge, 2)};
                 const struct colonnade_triangle *its = &triangles[other];
                 int32_t low[3], high[3];
+                if (at_edge(triangles, edge, 1) != a) break;
                 if (is_taken[other] || other == i) continue;
                 if (its->material != own->material || its->is_clear != own->is_clear) continue;
                 bounds(vertices, pair, low, high);
