@@ -56,6 +56,27 @@ def test_a_mask_is_cut_along_its_outline(tmp_path: Path) -> None:
     assert all(material.alpha is None for material in mesh.materials)
 
 
+def test_materials_that_differ_in_emission_share_the_faces_of_their_alpha(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(coverage, "MAX_SPLIT_FACES", 400)
+    surface = {"baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    dark = {"pbrMetallicRoughness": surface, "alphaMode": "BLEND", "doubleSided": True}
+    primitives = [[{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": material}] for material in range(2)]
+    file = gltf(
+        tmp_path,
+        np.tile(disc(32), (4, 4, 1)),
+        materials=[dark, dark | {"emissiveFactor": [0, 1, 0]}],
+        meshes=[{"primitives": one} for one in primitives],
+        nodes=[{"mesh": 0}, {"mesh": 1, "translation": [2, 0, 0]}],
+    )
+    mesh = load_mesh(file, corner_colours=True)
+    glows = np.array([any(material.emission) for material in mesh.materials])[mesh.face_materials]
+    assert len(glows) > 150 and 0.3 < glows.mean() < 0.7
+    assert any("1 alpha mask is cut coarsely" in note for note in mesh.notes)
+    assert len({one.texture for one in mesh.materials if one.texture is not None}) <= 1
+
+
 @pytest.mark.parametrize(("cutoff", "factor", "share"), [(0.5, 1.0, 1.0), (0.2, 0.3, 1.0), (0.9, 1.0, 0.0)])
 def test_the_cutoff_is_that_of_the_file(tmp_path: Path, cutoff: float, factor: float, share: float) -> None:
     picture = disc(64, alpha_inside=200, alpha_outside=200)
