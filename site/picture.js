@@ -129,6 +129,8 @@ export class Picture {
       whole.triangles.set(triangles, width * first);
     });
     if (frame === null) return false;
+    showFigures({ width, height, workers: renderer.workers.length, packed: this.now().scene.packed, packTime: page.packTime }, frame);
+    element("samples").textContent = "one sample a pixel";
     if (isCoarse) {
       this.resize(width, height);
       context.drawImage(target.canvas, 0, 0);
@@ -136,9 +138,7 @@ export class Picture {
     } else {
       page.picture = whole;
       this.now().scene.packed.flatPairs = frame.flatPairs;
-      showFigures({ width, height, workers: renderer.workers.length, packed: this.now().scene.packed, packTime: page.packTime }, frame);
       page.samples = 0;
-      element("samples").textContent = "one sample a pixel";
       document.body.dataset.frames = page.frames += 1;
     }
     this.drawn();

@@ -173,13 +173,16 @@ def test_an_animated_file_plays_and_equals_the_host(context: BrowserContext, tmp
     expect(page.locator("#animations")).to_be_hidden()
     tab.drop("arm.gltf", path.read_text())
     expect(page.locator("#play")).to_have_text("Pause")
-    shots = set()
+    shots, tables = set(), set()
     for _ in range(3):
         before = int(page.evaluate("colonnade.played ?? 0"))
         while page.evaluate("colonnade.played ?? 0") < before + 3:
             time.sleep(0.02)
         shots.add(page.evaluate("document.getElementById('picture').toDataURL()"))
-    assert len(shots) == 3
+        tables.add(page.inner_text("#figures"))
+    assert len(shots) == len(tables) == 3
+    # Of the mesh that plays, not of the picture before it
+    assert all("one sample a pixel" in table and "triangles, records\t36, " in table for table in tables), tables
     with tab.another_frame():
         page.click("#play")
     expect(page.locator("#play")).to_have_text("Play")
