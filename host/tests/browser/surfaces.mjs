@@ -1,6 +1,6 @@
 // Reads and packs a glTF file with its materials, as the page does: node surfaces.mjs FOLDER, which has job.json and the file. The
 // first time it writes the pictures of textures, picture-N; then it reads them decoded, N.bin, and writes records.bin, clip.bin, the memories
-// of textures, entries.json, of the material table, and the colours of the job's frame.
+// of textures, entries.json, of the material table and with the kinds of faces, and the colours of the job's frame.
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { prepared } from "../../../site/coverage.js";
@@ -33,7 +33,7 @@ function render(mesh) {
   writeFileSync(`${folder}/records.bin`, library.records(packed));
   writeFileSync(`${folder}/clip.bin`, library.clipFile());
   for (const { memory, words } of library.textureMemories()) writeFileSync(`${folder}/${memory}`, words);
-  writeFileSync(`${folder}/entries.json`, JSON.stringify({ entries: surfaces.entries, packed, notes: [...mesh.notes, ...surfaces.notes] }));
+  writeFileSync(`${folder}/entries.json`, JSON.stringify({ entries: surfaces.entries, kinds: [...mesh.materialOf].map((number) => mesh.materials[number].kind), packed, notes: [...mesh.notes, ...surfaces.notes] }));
   if (!job.frame) return;
   const { writes, width, height, threshold } = job.frame;
   const frame = { headroom: job.headroom, exposure: 1, numbers: job.manifest.numbers };

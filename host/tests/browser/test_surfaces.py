@@ -138,6 +138,21 @@ def test_a_textured_file_is_packed_as_by_the_host(tmp_path: Path, headroom: floa
     same_memories(tmp_path, mesh, order, headroom)
 
 
+def test_metal_that_glows_is_that_of_the_host(tmp_path: Path) -> None:
+    """Faces are metal or not as a whole, also where the emission splits them."""
+    (tmp_path / "file").mkdir()
+    file = textured_sheet(tmp_path / "file")
+    document = json.loads(file.read_text())
+    document["materials"][0] |= {"emissiveTexture": {"index": 1}, "emissiveFactor": [0.0, 0.0, 1.0]}
+    del document["materials"][0]["normalTexture"]
+    file.write_text(json.dumps(document))
+    found = beside_host(tmp_path, file)
+    mesh = load_mesh(file, corner_colours=True)
+    mirrors = np.array([one.kind == "mirror" for one in mesh.materials])[mesh.face_materials]
+    assert mirrors.sum() > 1000
+    assert found["kinds"].count("mirror") == mirrors.sum() and len(found["kinds"]) == len(mirrors)
+
+
 def same_memories(folder: Path, mesh: Mesh, order: list[int], headroom: float = 1.0) -> None:
     """Compare records, texture memories and the clip file of the tab, whose table has materials in an order."""
     manifest = Manifest.load(ROOT / "configs" / "golden" / "small.json")
