@@ -95,7 +95,7 @@ public:
         checkIndices(own, rows.size());
         if (own.size() != points.size()) throw std::invalid_argument("a part of a face has no weights");
         mesh::Clip clip = clip_;
-        mesh::ClipPoints added(clip);
+        mesh::ClipPoints added(clip, own.size());
         std::vector<mesh::Face> corners;
         for (std::size_t i = 0; i < own.size(); ++i) corners.push_back(added.part(rows[static_cast<std::size_t>(own[i])], points[i]));
         const mesh::Morphs& morphs = clip.morphs;

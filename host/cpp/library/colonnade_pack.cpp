@@ -126,7 +126,7 @@ std::string bend(const colonnade_mesh& given, Packed& next, packer::GridClip& gr
     if (!library->format.bvh) return "the mesh is animated, which needs a tree: this design has none";
     mesh::Clip clip = clipOf(*given.clip);
     mesh::CleanMesh& clean = next.clean;
-    mesh::ClipPoints points(clip);
+    mesh::ClipPoints points(clip, next.parts.size());
     std::vector<mesh::Face> corners;
     for (const Part& part : next.parts) {
         mesh::Face face;

@@ -1,18 +1,21 @@
 /// Parts of the faces that a clip moves: their corners follow what moves the corners of the faces.
 #pragma once
 
-#include <map>
-#include <utility>
+#include <cstring>
 
 #include "clip.hpp"
-#include "relief.hpp"
 
 namespace colonnade::mesh {
 
 /// Gives a clip vertices at points of faces: each point one, also where several faces have it.
 class ClipPoints {
 public:
-    explicit ClipPoints(Clip& clip) : clip_(clip) {}
+    /// For at most so many parts of faces.
+    ClipPoints(Clip& clip, std::size_t parts) : clip_(clip), first_(clip.positions.size()) {
+        std::size_t size = 16;
+        while (size < 6 * parts) size *= 2;
+        slots_.assign(size, -1);
+    }
 
     /// The vertices at the corners of a part of a face, by the weights of the face's corners at each.
     Face part(const Face& face, const Corners& weights) {
@@ -22,60 +25,101 @@ public:
     }
 
 private:
-    /// Corners of a face, ascending, and their weights; unused ones come first.
-    using Point = std::array<std::pair<std::int32_t, double>, 3>;
+    struct Share {
+        std::int64_t of; ///< a bone
+        double value;
+    };
+    /// Corners of a face, descending, and their weights; -1 for those that are not used.
+    struct Point {
+        Face corners{-1, -1, -1};
+        Vector weights{};
+    };
 
     std::int32_t at(const Face& face, const Vector& weights) {
         Point point;
         for (int corner = 0; corner < 3; ++corner) {
             if (weights[corner] == 1) return face[corner];
-            point[corner] = weights[corner] == 0 ? std::pair(-1, 0.0) : std::pair(face[corner], weights[corner]);
+            if (weights[corner] == 0) continue;
+            int place = corner;
+            for (; place > 0 && point.corners[place - 1] < face[corner]; --place) {
+                point.corners[place] = point.corners[place - 1];
+                point.weights[place] = point.weights[place - 1];
+            }
+            point.corners[place] = face[corner];
+            point.weights[place] = weights[corner];
         }
-        std::sort(point.begin(), point.end());
-        const auto [found, isNew] = numbers_.try_emplace(point, static_cast<std::int32_t>(clip_.positions.size()));
-        if (isNew) add(point);
-        return found->second;
+        std::uint64_t hash = 0;
+        for (int corner = 0; corner < 3; ++corner) {
+            std::uint64_t bits;
+            std::memcpy(&bits, &point.weights[corner], sizeof bits);
+            hash = (hash ^ bits ^ static_cast<std::uint32_t>(point.corners[corner])) * 0x9e3779b97f4a7c15;
+            hash ^= hash >> 29;
+        }
+        for (std::size_t slot = hash & (slots_.size() - 1);; slot = (slot + 1) & (slots_.size() - 1)) {
+            std::int32_t& vertex = slots_[slot];
+            if (vertex < 0) {
+                vertex = static_cast<std::int32_t>(clip_.positions.size());
+                points_.push_back(point);
+                add(point);
+                return vertex;
+            }
+            const Point& known = points_[static_cast<std::size_t>(vertex) - first_];
+            if (known.corners == point.corners && known.weights == point.weights) return vertex;
+        }
     }
 
     /// Adds the mean of corners. Of their joints the four with the largest share move it.
     void add(const Point& point) {
         Morphs& morphs = clip_.morphs;
+        const auto vertex = static_cast<std::int64_t>(clip_.positions.size());
+        const std::size_t firstChange = morphs.targets.size();
         Vector position{};
-        std::map<std::int64_t, double> shares;
-        std::map<std::int64_t, std::array<Vector, 2>> changes;
-        for (const auto& [corner, weight] : point) {
-            if (corner < 0) continue;
-            const auto vertex = static_cast<std::size_t>(corner);
-            for (int axis = 0; axis < 3; ++axis) position[axis] += weight * clip_.positions[vertex][axis];
-            for (int influence = 0; influence < influences; ++influence)
-                if (const double share = clip_.shares[vertex][influence]; share > 0) shares[clip_.bones[vertex][influence]] += weight * share;
-            const auto first = std::lower_bound(morphs.vertices.begin(), morphs.vertices.end(), corner) - morphs.vertices.begin();
-            for (auto change = static_cast<std::size_t>(first); change < morphs.vertices.size() && morphs.vertices[change] == corner; ++change) {
-                std::array<Vector, 2>& added = changes[morphs.targets[change]];
+        std::array<Share, 3 * influences> shares;
+        std::size_t count = 0;
+        for (int corner = 0; corner < 3 && point.corners[corner] >= 0; ++corner) {
+            const auto of = static_cast<std::size_t>(point.corners[corner]);
+            const double weight = point.weights[corner];
+            for (int axis = 0; axis < 3; ++axis) position[axis] += weight * clip_.positions[of][axis];
+            for (int influence = 0; influence < influences; ++influence) {
+                if (!(clip_.shares[of][influence] > 0)) continue;
+                const std::int64_t bone = clip_.bones[of][influence];
+                std::size_t i = 0;
+                while (i < count && shares[i].of != bone) ++i;
+                if (i == count) shares[count++] = {bone, 0};
+                shares[i].value += weight * clip_.shares[of][influence];
+            }
+            const auto found = std::lower_bound(morphs.vertices.begin(), morphs.vertices.end(), point.corners[corner]) - morphs.vertices.begin();
+            for (auto change = static_cast<std::size_t>(found); change < firstChange && morphs.vertices[change] == point.corners[corner]; ++change) {
+                std::size_t i = firstChange;
+                while (i < morphs.targets.size() && morphs.targets[i] != morphs.targets[change]) ++i;
+                if (i == morphs.targets.size()) {
+                    morphs.targets.push_back(morphs.targets[change]);
+                    morphs.vertices.push_back(vertex);
+                    morphs.positions.emplace_back();
+                    morphs.normals.emplace_back();
+                }
                 for (int axis = 0; axis < 3; ++axis) {
-                    added[0][axis] += weight * morphs.positions[change][axis];
-                    added[1][axis] += weight * morphs.normals[change][axis];
+                    morphs.positions[i][axis] += weight * morphs.positions[change][axis];
+                    morphs.normals[i][axis] += weight * morphs.normals[change][axis];
                 }
             }
         }
-        std::vector<std::pair<double, std::int64_t>> order; // the largest share first
-        for (const auto& [bone, share] : shares) order.push_back({-share, bone});
-        std::sort(order.begin(), order.end());
-        order.resize(std::min<std::size_t>(order.size(), influences));
+        std::array<Share, influences> kept{};
         double total = 0;
-        for (const auto& [share, bone] : order) total -= share;
-        std::array<std::int64_t, influences> bones;
-        std::array<double, influences> own{};
-        bones.fill(order[0].second);
-        for (std::size_t i = 0; i < order.size(); ++i) {
-            bones[i] = order[i].second;
-            own[i] = -order[i].first / total;
+        for (Share& own : kept) {
+            // Of equal shares that of the first bone
+            Share* largest = &shares[0];
+            for (std::size_t i = 1; i < count; ++i)
+                if (shares[i].value > largest->value || (shares[i].value == largest->value && shares[i].of < largest->of)) largest = &shares[i];
+            own = {largest->value > 0 ? largest->of : kept[0].of, largest->value};
+            largest->value = 0;
+            total += own.value;
         }
-        for (const auto& [target, added] : changes) {
-            morphs.targets.push_back(target);
-            morphs.vertices.push_back(static_cast<std::int64_t>(clip_.positions.size()));
-            morphs.positions.push_back(added[0]);
-            morphs.normals.push_back(added[1]);
+        std::array<std::int64_t, influences> bones;
+        std::array<double, influences> own;
+        for (int i = 0; i < influences; ++i) {
+            bones[i] = kept[i].of;
+            own[i] = kept[i].value / total;
         }
         clip_.positions.push_back(position);
         clip_.bones.push_back(bones);
@@ -83,7 +127,9 @@ private:
     }
 
     Clip& clip_;
-    std::map<Point, std::int32_t> numbers_;
+    const std::size_t first_;
+    std::vector<std::int32_t> slots_; ///< the vertices of points by their hash, -1 for none
+    std::vector<Point> points_;
 };
 
 } // namespace colonnade::mesh
