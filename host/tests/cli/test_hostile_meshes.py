@@ -96,7 +96,7 @@ DOUBLED_NODES = (
     )
     + "</library_nodes>"
 )
-MANY_PARTS = "it has more than 32,768 parts and copies of parts: join them, or export it as glTF"
+MANY_PARTS = "it has more than 16,384 parts and copies of parts: join them, or export it as glTF"
 #: 200,000 triangles.
 MANY = MESH.replace("<triangles>", "<triangles>" + '<triangle v1="0" v2="1" v3="2"/>' * 200_000)
 

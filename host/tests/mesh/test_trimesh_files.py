@@ -22,7 +22,7 @@ from textured_files import FOUR, png
 from colonnade.common import decoder_process
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
-from colonnade.mesh.files import trimesh_files, trimesh_program
+from colonnade.mesh.files import trimesh_counts, trimesh_files, trimesh_program
 from colonnade.mesh.files.mesh_archive import MeshArchive
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
@@ -273,6 +273,21 @@ def test_invalid_files_are_one_line(name: str, content: bytes | str, message: st
     with pytest.raises(UserError, match=message) as refused:
         loaded(tmp_path, name, content)
     assert str(tmp_path / name) in str(refused.value)
+
+
+def test_names_of_equal_parts_are_found_in_proportion_to_their_number() -> None:
+    class Names(set[str]):
+        asked = 0
+
+        def __contains__(self, name: object) -> bool:
+            self.asked += 1
+            return super().__contains__(name)
+
+    names = Names()
+    trimesh_counts.bound_parts(1)
+    for _ in range(300):
+        names.add(trimesh.exchange.threemf.unique_name("part", names))
+    assert (len(names), names.asked) == (300, 600 - 1)
 
 
 def test_a_member_is_unpacked_to_the_size_that_its_archive_states() -> None:

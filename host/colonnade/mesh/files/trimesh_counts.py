@@ -7,6 +7,7 @@ from typing import Any
 import networkx
 import trimesh.exchange.dae
 import trimesh.exchange.threedxml
+import trimesh.exchange.threemf
 import trimesh.graph
 from collada.polylist import Polylist
 from collada.triangleset import TriangleSet
@@ -14,9 +15,10 @@ from collada.triangleset import TriangleSet
 from colonnade.common.errors import UserError
 
 #: Parts of a file, each with those that it consists of: objects in their places, nodes.
-MAX_PARTS = 1 << 15
+MAX_PARTS = 1 << 14
 
 _multigraph_paths, _all_simple_paths = trimesh.graph.multigraph_paths, networkx.all_simple_paths
+_unique_name = trimesh.exchange.threemf.unique_name
 _parse_node, _ROOT = trimesh.exchange.dae._parse_node, trimesh.exchange.dae._EYE
 
 
@@ -37,6 +39,11 @@ def bound_parts(most_triangles: int) -> None:
             nodes.add(node)
         _parse_node(node=node, **others)
 
+    # Without counts it tries all numbers that a name has had before
+    counts: dict[str, int] = {}
+    trimesh.exchange.threemf.unique_name = lambda name, taken, known=None: _unique_name(
+        name, taken, counts if known is None else known
+    )
     trimesh.graph.multigraph_paths = multigraph_paths
     networkx.all_simple_paths = all_simple_paths
     trimesh.exchange.dae._parse_node = parse_node
