@@ -1,7 +1,9 @@
 """Levels the world of a capture: y up, the floor at 0.
 
 The floor is the largest low plane: one that many surface points lie on, whose normal points up, and that few points lie
-below. Where the vertical is known, only its height is found.
+below. Without it the vertical is that of the largest level plane, such as a table, and without one that of the walls.
+Cameras tell less: their pictures are nearly free of roll, but look down by any angle. Where the vertical is known, only
+the height of the floor is found.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colonnade.capture.source import Frame
 from colonnade.common.errors import UserError
@@ -19,17 +22,25 @@ from colonnade.environment.depth_normals import normals_of_depth
 from colonnade.environment.model import EnvironmentCamera
 from colonnade.environment.repair import holes_of
 
-#: Points of each frame, and hypotheses for the floor.
+#: Points of each frame, and hypotheses for a plane.
 _POINTS, _HYPOTHESES = 3000, 600
 #: Cosines of the largest angle between the floor's normal and an uncertain, and a known vertical, and within a plane.
 _UNCERTAIN, _KNOWN, _PARALLEL = 0.5, 0.97, 0.985
 #: Thickness of a plane as a share of the distance, and at least, metres.
 _THICKNESS, _LEAST_THICKNESS = 0.01, 0.02
-#: A low plane has this share of the points more than so many metres below it, at most; and at least this share on it.
+#: A low plane has this share of the points more than so many metres below it, at most; a plane at least this one on it.
 _BELOW, _DEPTH_BELOW = 0.03, 0.15
 _LEAST_SHARE = 0.02
 #: Without a plane the floor is below this share of the points.
 _LOWEST = 0.01
+#: Sines of the largest roll of cameras whose recording shows a level plane, and of how far they look up, and down.
+_ROLL, _UPWARDS, _DOWNWARDS = 0.34, 0.26, 0.94
+#: Length of the mean of the cameras' up vectors from which on they have a common one.
+_COMMON_UP = 0.25
+#: Weights of the cameras' roll against the normals of walls, and of their mean up against their roll.
+_ROLL_WEIGHT, _UP_WEIGHT = 0.02, 0.05
+#: Sines of the largest angle between a wall and the vertical, in each step of the search.
+_UPRIGHT = (0.64, 0.5, 0.34, 0.17, 0.17, 0.17)
 
 
 @dataclass(frozen=True)
@@ -53,8 +64,33 @@ class Levelling:
         return turned
 
 
+@dataclass(frozen=True)
+class _Surface:
+    """What frames show, in the capture's world.
+
+    Attributes:
+        points, normals: float64 [n, 3].
+        distances: From the camera, metres, float64 [n].
+        cameras: The axes of each camera are its columns, right, down and forward, float64 [frames, 3, 3].
+    """
+
+    points: Floats
+    normals: Floats
+    distances: Floats
+    cameras: Floats
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """A plane with the unit normal ``normal`` at a height along it, and the share of all points that lie on it."""
+
+    normal: Floats
+    height: float
+    share: float
+
+
 def level(frames: Iterable[Frame], up: Floats | None, where: str) -> Levelling:
-    """Find the floor.
+    """Find the vertical and the floor.
 
     Args:
         frames: Some frames of the capture; one at a time is in memory.
@@ -62,56 +98,126 @@ def level(frames: Iterable[Frame], up: Floats | None, where: str) -> Levelling:
         where: The capture, for messages.
 
     Raises:
-        UserError: The vertical is unknown, and there is no floor.
+        UserError: The vertical is unknown, there is no floor, and the cameras have no common up.
     """
     surfaces = list(map(_surface, frames))
-    points, normals, distances = (np.concatenate([surface[part] for surface in surfaces]) for part in range(3))
-    thickness = np.maximum(_THICKNESS * distances, _LEAST_THICKNESS)
-    towards = unit_vectors(up if up is not None else np.mean([surface[3] for surface in surfaces], axis=0))
-    level_points = np.flatnonzero(normals @ towards > (_UNCERTAIN if up is None else _KNOWN))
-    best: tuple[int, Floats, float] | None = None
-    for index in level_points[:: max(1, len(level_points) // _HYPOTHESES)]:
-        normal = normals[index] if up is None else towards
-        heights = points @ normal
-        on = (np.abs(heights - heights[index]) < thickness) & (normals @ normal > _PARALLEL)
-        count = int(on.sum())
-        is_low = (heights < heights[index] - _DEPTH_BELOW).mean() <= _BELOW
-        if is_low and count >= _LEAST_SHARE * len(points) and (best is None or count > best[0]):
-            best = count, normal, float(np.median(heights[on]))
-    if best is None:
-        if up is None:
-            raise UserError(f"{where} shows no floor, so its vertical is unknown: give what points up with --up X,Y,Z")
-        height = float(np.quantile(points @ towards, _LOWEST))
-        note = "no floor was found: the lowest point that was seen is at height 0"
-        return Levelling(_rotation_to_y(towards), -height, note)
-    count, normal, height = best
+    seen = _Surface(*(np.concatenate([getattr(one, part) for one in surfaces]) for part in _Surface.__annotations__))
+    source = ""
     if up is None:
-        for _ in range(3):
-            on = (np.abs(points @ normal - height) < thickness) & (normals @ normal > _PARALLEL)
-            centre = points[on].mean(axis=0)
-            _, axes = np.linalg.eigh((points[on] - centre).T @ (points[on] - centre))
-            normal = axes[:, 0] * np.sign(axes[:, 0] @ normal)
-            height = float(centre @ normal)
-        angle = float(np.degrees(np.arccos(np.clip(normal[1], -1.0, 1.0))))
-        what = f"the vertical and the floor are those of the largest low plane, {angle:.1f}° from the capture's y"
-    else:
-        what = "the floor is the largest low level plane"
-    return Levelling(_rotation_to_y(normal), -height, f"{what}; {count / len(points):.0%} of the surface lie on it")
+        overhead = -seen.cameras[:, :, 1].mean(axis=0)
+        floor = _largest_plane(seen, seen.normals @ overhead > _UNCERTAIN * np.linalg.norm(overhead), is_low=True)
+        if floor is not None:
+            what = f"the vertical and the floor are those of the largest low plane, {_from_y(floor.normal)}"
+            return Levelling(_rotation_to_y(floor.normal), -floor.height, f"{what}; {_on(floor)}")
+        if not np.linalg.norm(overhead) > _COMMON_UP:
+            raise UserError(
+                f"{where} shows no floor, and no direction is up in the pictures of all its frames: give what points up"
+                " with --up X,Y,Z"
+            )
+        up, source = _without_floor(seen, overhead)
+        source = f"the vertical is that of {source}, {_from_y(up)}: --up X,Y,Z gives another; "
+    up = unit_vectors(up)
+    floor = _largest_plane(seen, seen.normals @ up > _KNOWN, is_low=True, normal=up)
+    if floor is not None:
+        note = f"the floor is the largest low level plane; {_on(floor)}"
+        return Levelling(_rotation_to_y(up), -floor.height, source + note)
+    height = float(np.quantile(seen.points @ up, _LOWEST)) if len(seen.points) else 0.0
+    note = "no floor was found: the lowest point that was seen is at height 0"
+    return Levelling(_rotation_to_y(up), -height, source + note)
 
 
-def _surface(frame: Frame) -> tuple[Floats, Floats, Floats, Floats]:
-    """What a frame shows, in the capture's world.
+def _from_y(up: Floats) -> str:
+    return f"{np.degrees(np.arccos(np.clip(up[1], -1.0, 1.0))):.1f}° from the capture's y"
+
+
+def _on(plane: _Plane) -> str:
+    return f"{plane.share:.0%} of the surface lie on it"
+
+
+def _without_floor(seen: _Surface, overhead: Floats) -> tuple[Floats, str]:
+    """The vertical of the largest level plane that cameras without much roll see from above, or that of the walls.
+
+    A wall in front of a camera that looks down has a normal that points down in the picture, and one at its side is
+    out of the allowed roll, so neither is taken for a level plane.
+
+    Args:
+        seen: What the frames show.
+        overhead: Mean of the cameras' up vectors, float64 [3].
 
     Returns:
-        Points and normals, float64 [n, 3], their distances from the camera, float64 [n], and up in its picture, [3].
+        A unit vector, and what it is from.
     """
-    upwards = -frame.to_world[:, 1]
+    rolls, pitches = (seen.normals @ seen.cameras[:, :, axis].T for axis in (0, 2))
+    pitch = pitches.mean(axis=1)
+    is_level = (np.square(rolls).mean(axis=1) < _ROLL**2) & (pitch > -_DOWNWARDS) & (pitch < _UPWARDS)
+    plane = _largest_plane(seen, is_level & (seen.normals @ overhead > 0), is_low=False)
+    if plane is not None:
+        return plane.normal, f"the largest level plane, on which {plane.share:.0%} of the surface lie"
+    rights = seen.cameras[:, :, 0]
+    held = rights.T @ rights / len(rights) - _UP_WEIGHT * np.outer(overhead, overhead)
+    up, share = _least(held, overhead), 0.0
+    for sine in _UPRIGHT:
+        walls = seen.normals[np.abs(seen.normals @ up) < sine]
+        up = _least(walls.T @ walls / max(len(seen.normals), 1) + _ROLL_WEIGHT * held, overhead)
+        share = len(walls) / max(len(seen.normals), 1)
+    return up, f"cameras without roll, to which {share:.0%} of the surface are upright"
+
+
+def _least(form: Floats, towards: Floats) -> Floats:
+    """The unit vector [3] on the side of another one with the least value of a quadratic form [3, 3]."""
+    axis = np.linalg.eigh(form)[1][:, 0]
+    return np.asarray(axis if axis @ towards >= 0 else -axis)
+
+
+def _largest_plane(
+    seen: _Surface, is_candidate: NDArray[np.bool_], is_low: bool, normal: Floats | None = None
+) -> _Plane | None:
+    """The plane of candidates with the most points; None if none has enough.
+
+    Args:
+        seen: What the frames show.
+        is_candidate: Points whose normals are tried, bool [n].
+        is_low: Few points may lie below it. Otherwise surfaces that are upright to it count, too, so that the vertical
+            is that of the walls.
+        normal: Its normal, if that is known.
+    """
+    points, normals = seen.points, seen.normals
+    thickness = np.maximum(_THICKNESS * seen.distances, _LEAST_THICKNESS)
+    candidates = np.flatnonzero(is_candidate)
+    best: tuple[int, int] | None = None
+    for index in candidates[:: max(1, len(candidates) // _HYPOTHESES)]:
+        towards = normals[index] if normal is None else normal
+        heights, cosines = points @ towards - points[index] @ towards, normals @ towards
+        count = int(((np.abs(heights) < thickness) & (cosines > _PARALLEL)).sum())
+        if count < _LEAST_SHARE * len(points) or (is_low and (heights < -_DEPTH_BELOW).mean() > _BELOW):
+            continue
+        if not is_low:
+            count += int((np.abs(cosines) < _UPRIGHT[-1]).sum())
+        if best is None or count > best[0]:
+            best = count, index
+    if best is None:
+        return None
+    towards = normals[best[1]] if normal is None else normal
+    height = float(points[best[1]] @ towards)
+    on = (np.abs(points @ towards - height) < thickness) & (normals @ towards > _PARALLEL)
+    share, height = float(on.mean()), float(np.median(points[on] @ towards))
+    for _ in range(0 if normal is not None else 3):
+        on = (np.abs(points @ towards - height) < thickness) & (normals @ towards > _PARALLEL)
+        centre = points[on].mean(axis=0)
+        towards = _least((points[on] - centre).T @ (points[on] - centre), towards)
+        height = float(centre @ towards)
+    return _Plane(towards, height, share)
+
+
+def _surface(frame: Frame) -> _Surface:
+    """What a frame shows."""
+    axes = frame.to_world[:, :3]
     rows, columns = frame.depth.shape
     step = max(1, round(float(np.sqrt(frame.depth.size / (256 * 192)))))
     depth = frame.depth[::step, ::step]
     holes = holes_of(depth)
     if holes.all():
-        return np.empty((0, 3)), np.empty((0, 3)), np.empty(0), upwards
+        return _Surface(np.empty((0, 3)), np.empty((0, 3)), np.empty(0), axes[np.newaxis])
     across, down = columns / frame.photo.shape[1] / step, rows / frame.photo.shape[0] / step
     lens = frame.lens
     camera = EnvironmentCamera(lens.fx * across, lens.fy * down, lens.cx * across, lens.cy * down, np.eye(3, 4))
@@ -119,10 +225,9 @@ def _surface(frame: Frame) -> tuple[Floats, Floats, Floats, Floats]:
     normals = normals_of_depth(filled, holes, camera).normals[~holes]
     points = (camera.directions(depth.shape[1], depth.shape[0]) * depth[..., np.newaxis])[~holes]
     chosen = np.s_[:: max(1, len(points) // _POINTS)]
-    rotation = frame.to_world[:, :3].T
     points = points[chosen]
-    world = points @ rotation + frame.to_world[:, 3]
-    return world, normals[chosen] @ rotation, np.linalg.norm(points, axis=1), upwards
+    world = points @ axes.T + frame.to_world[:, 3]
+    return _Surface(world, normals[chosen] @ axes.T, np.linalg.norm(points, axis=1), axes[np.newaxis])
 
 
 def _rotation_to_y(up: Floats) -> Floats:
