@@ -180,7 +180,8 @@ def convert(
         notes.append(
             f"{len(left_out)} of {len(numbers)} frames were left out: less than half of their depth is certain"
         )
-    notes += [f"{ROOM}: {note}" for note in room.notes]
+    if room.notes:
+        notes.append(f"room {ROOM}: {'; '.join(room.notes)}")
     return Conversion(outline.format, len(times), seconds, (WIDTH, HEIGHT), noise, tuple(notes))
 
 

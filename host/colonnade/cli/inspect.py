@@ -95,7 +95,7 @@ def _inspect_environment(
     with_dists: bool,
     json_file: Path | None,
 ) -> None:
-    from colonnade.common import progress
+    from colonnade.common import notes, progress
     from colonnade.common.extras import require_extra
     from colonnade.environment.load import load_environment
     from colonnade.maps.cache import encoded_environment
@@ -105,8 +105,8 @@ def _inspect_environment(
 
     require_extra("quality", "inspect --background")
     environment = load_environment(background)
-    for note in environment.notes:
-        echo(f"colonnade: note: {environment.name}: {note}", err=True)
+    environment.tell_notes()
+    notes.flush()
     with progress.for_terminal().step("encoding the room"):
         layout = AttributeLayout(environment.width, environment.height, encoding)
         image = encoded_environment(environment, layout, encoder=encoder)

@@ -30,7 +30,7 @@ def light(room: Path, count: int, output: Path | None, json_file: Path | None) -
     """
     require_outputs(json_file, folders=[output])
 
-    from colonnade.common import progress
+    from colonnade.common import notes, progress
     from colonnade.common.atomic_files import made_folder
     from colonnade.common.image_io import write_png
     from colonnade.environment.fitted_lights import fitted_lights
@@ -42,8 +42,8 @@ def light(room: Path, count: int, output: Path | None, json_file: Path | None) -
     from colonnade.scene.room_lights import lights_of, scene_text
 
     environment = load_environment(room)
-    for note in environment.notes:
-        echo(f"colonnade: note: {environment.name}: {note}", err=True)
+    environment.tell_notes()
+    notes.flush()
     with progress.for_terminal().step("fitting lights to the photo"):
         fit = fitted_lights(environment, count)
     colours = photo_colours(environment, fit.lights)

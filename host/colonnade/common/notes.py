@@ -22,11 +22,14 @@ class Notes:
         show: Shows a line.
         is_strict: Notes are errors.
         lines: Those so far; each is shown once.
+        subject, parts: A line that is not yet complete: what it is on, and its parts.
     """
 
     show: Callable[[str], None]
     is_strict: bool = False
     lines: set[str] = field(default_factory=set)
+    subject: str = ""
+    parts: list[str] = field(default_factory=list)
 
 
 _current: Notes | None = None
@@ -45,6 +48,7 @@ def opened(show: Callable[[str], None], earlier: set[str] | None = None) -> Iter
     try:
         yield
     finally:
+        flush()
         _current = before
 
 
@@ -70,4 +74,25 @@ def tell(line: str) -> None:
     """Show a line on what was chosen, unless it was shown before; no error of a strict command."""
     if _current is not None and line not in _current.lines:
         _current.lines.add(line)
+        _current.show(line)
+
+
+def add(subject: str, what: str, words: str) -> None:
+    """Add words to the line on a subject; of each kind, which ``what`` names, the first ones of a command are shown.
+
+    `flush`, the end of the block, and words on another subject complete the line.
+    """
+    if _current is None or (kind := f"{subject}: {what}") in _current.lines:
+        return
+    if subject != _current.subject:
+        flush()
+    _current.lines.add(kind)
+    _current.subject = subject
+    _current.parts.append(words)
+
+
+def flush() -> None:
+    """Show the line of `add`, if there is one."""
+    if _current is not None and _current.parts:
+        line, _current.parts = f"{_current.subject}: {'; '.join(_current.parts)}", []
         _current.show(line)

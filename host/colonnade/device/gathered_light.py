@@ -69,12 +69,9 @@ def scene_cube(
     if room is not None and image is not None:
         light = room_light(room, image, lights.brighter(scene.headroom), point, not relit, unseen, second)
         if is_noted and not isinstance(unseen, Panorama):
-            others = "walls under the scene's lights" if unseen is None else "walls that were fitted"
-            more = "background.panorama" + (" or background.second_view" if second is None else "")
-            notes.tell(
-                f"room {room.name} shows {light.seen:.0%} of the directions from which light comes, the others have"
-                f" that of {others}: {more} shows more"
-            )
+            others = "walls under the scene's lights" if unseen is None else "fitted walls"
+            more = "background.panorama" + (", background.second_view" if second is None else "")
+            room.tell("seen", f"{light.seen:.0%} of the directions of light seen, {others} in the others ({more})")
         cube, distance = light.cube, light.distance / pose.scale
     elif isinstance(unseen, Panorama):
         cube = unseen.cube(FINE)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from colonnade.common.notes import add
+
 
 @dataclass(frozen=True)
 class EnvironmentCamera:
@@ -102,3 +104,12 @@ class Environment:
         """Surface point of each pixel, view space, metres: float64 [height, width, 3]."""
         points: NDArray[np.float64] = self.camera.directions(self.width, self.height) * self.depth[..., np.newaxis]
         return points
+
+    def tell(self, what: str, words: str) -> None:
+        """Add words to the one line of notes on the room (`colonnade.common.notes.add`)."""
+        add(f"room {self.name}", what, words)
+
+    def tell_notes(self) -> None:
+        """Add `notes` to that line."""
+        for note in self.notes:
+            self.tell(note, note)

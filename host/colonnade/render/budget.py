@@ -68,12 +68,10 @@ class Budget:
     def note(self) -> str:
         """The line that names the number and where it comes from."""
         what = f"{self.samples} sample{'s' if self.samples > 1 else ''} a pixel"
-        why, allows = (
-            ("what", "allows") if self.cycles <= self.seconds * CLOCK else ("the least, although", "allows less")
-        )
+        why = "within" if self.cycles <= self.seconds * CLOCK else "the least, beyond"
         return (
-            f"{what}, {why} frame.budget = {self.seconds:.3g} s {allows} at {CLOCK / 1e6:.0f} MHz: a pass has about"
-            f" {rounded(self.cycles):,} cycles; --samples N gives another number"
+            f"{what}, {why} frame.budget = {self.seconds:.3g} s at {CLOCK / 1e6:.0f} MHz and about"
+            f" {rounded(self.cycles):,} cycles a pass (--samples)"
         )
 
 

@@ -12,6 +12,7 @@ from colonnade.common.accumulation import Accumulation
 from colonnade.common.image_io import resized_photo
 from colonnade.common.srgb import linear_from_srgb, srgb_from_linear
 from colonnade.common.types import Floats
+from colonnade.environment.model import Environment
 from colonnade.environment.photo_blur import measured_blur
 from colonnade.environment.photo_grain import Grain
 from colonnade.scene.model import Scene
@@ -50,12 +51,15 @@ class CameraLook:
 
     @property
     def note(self) -> str | None:
-        """A line that names what the object gets; None if that is nothing."""
-        parts = [f"grain, {self.grain.grey:.1f} codes"] if self.grain is not None else []
-        parts += [f"blur, {self.blur:.1f} pixels"] if self.blur else []
-        if not parts:
-            return None
-        return f"the object has the photo's {' and '.join(parts)}: camera.grain = false leaves out both"
+        """Words that name what the object gets; None if that is nothing."""
+        parts = [f"grain of {self.grain.grey:.1f} codes"] if self.grain is not None else []
+        parts += [f"blur of {self.blur:.1f} pixels"] if self.blur else []
+        return f"the photo's {' and '.join(parts)} added (camera.grain)" if parts else None
+
+    def tell(self, room: Environment | None) -> None:
+        """Add `note` to the notes on a room."""
+        if room is not None and self.note is not None:
+            room.tell("look", self.note)
 
     def blurred(self, sums: Accumulation) -> Accumulation:
         """The sums of a frame in a room with blurred objects, outlines and shadows."""

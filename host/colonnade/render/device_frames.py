@@ -22,7 +22,7 @@ from colonnade.render.passes import Registers, model_passes, rtl_passes
 from colonnade.render.report import frame_report
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
-from colonnade.render.samples import within_budget
+from colonnade.render.samples import tell_defaults, within_budget
 from colonnade.scene.model import Scene
 from colonnade.scene_image.inspect import coarse_line, dense_line, lost_line
 
@@ -55,8 +55,7 @@ def device_frames(
         exposure, history = scene.opening(request.frames), History.of(request.denoise or False, request.frames)
         frames = host_frames(request, prepared, size, poses, exposure, progress, history=history)
         registers = [[frame.registers(one) for one in frame.passes] for frame in frames]
-        if note is not None:
-            notes.tell(note)
+        tell_defaults(note, prepared.environment)
     seconds = {"pack": time.perf_counter() - begun, "build": None}
     results, has_places = rendered(request, frames, registers, progress), bool(prepared.image.header.instances)
     # Each has a light cube, or records, of its own, and instances their places in the registers
@@ -84,8 +83,8 @@ def host_frames(
     """The frames of poses of a scene, numbered from ``first``; the first of all notes what the object gets."""
     denoise = request.denoise or False
     look = None if request.relit else CameraLook.of(prepared.scene, prepared.photo, size)
-    if look is not None and look.note is not None and first == 0:
-        notes.tell(look.note)
+    if look is not None and first == 0:
+        look.tell(prepared.environment)
     found = []
     for number, pose in enumerate(poses, first):
         passes = prepared.passes(pose, exposure, number if history is not None else 0)

@@ -127,10 +127,7 @@ def _reference_frames(
 ) -> Iterator[RenderResult]:
     from colonnade.render.reference_frames import ReferenceOptions, reference_frames
 
-    options = ReferenceOptions(scene.opening(request.frames), request.relit, request.truth)
+    options = ReferenceOptions(scene.opening(request.frames), request.relit, request.truth, note)
     poses = [scene.at(fraction) for fraction in scene.frame_progress(request.frames)]
     mesh = None if isinstance(request.mesh, str) else request.mesh
-    for index, result in enumerate(reference_frames(poses, manifest, size, progress, options, mesh)):
-        if note is not None and index == 0:
-            notes.tell(note)
-        yield result
+    yield from reference_frames(poses, manifest, size, progress, options, mesh)

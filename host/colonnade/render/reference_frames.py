@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colonnade.common import notes
 from colonnade.common.accumulation import Accumulation
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
@@ -28,6 +27,7 @@ from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
 from colonnade.render.report import FrameReport, MeshReport
 from colonnade.render.result import RenderResult
+from colonnade.render.samples import tell_defaults
 from colonnade.render.sky import sky_of
 from colonnade.scene.cameras import check_camera
 from colonnade.scene.lit_room import LitRoom, lit_room, scene_room, view_photo
@@ -50,11 +50,13 @@ class ReferenceOptions:
         exposure: Progress of the motion during a frame (`Scene.opening`).
         relit: Show the room under the scene's lights, not its photo.
         truth: Mesh file of the room's real geometry, which replaces its depth map.
+        note: The line that names defaults; None without any.
     """
 
     exposure: float = 0.0
     relit: bool = False
     truth: Path | None = None
+    note: str | None = None
 
 
 def reference_frames(
@@ -134,8 +136,8 @@ def traced_frames(
     check_camera(poses[0], maps, size)
     photo = None if options.relit else view_photo(poses[0], maps, size)
     look = CameraLook.of(poses[0], photo, size)
-    if look is not None and look.note is not None:
-        notes.tell(look.note)
+    if look is not None:
+        look.tell(maps)
     surfaces = rendered_materials(mesh.materials, poses[0])
     room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress, surfaces)
     backdrop = room_backdrop(room, layout, options.truth, progress)
@@ -143,6 +145,8 @@ def traced_frames(
         begun = time.perf_counter()
         lit = replace(room, scene=room.scene.at(pose.motion_progress))
         cube = _light_cube(lit, mesh, layout, options.relit, number == 0)
+        if number == 0:
+            tell_defaults(options.note, maps)
         materials = with_overrides(mesh.materials, lit.scene.material)
         passes = frame_passes(lit.scene, materials, options.exposure)
         first: ReferenceResult | None = None

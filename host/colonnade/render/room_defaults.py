@@ -27,8 +27,8 @@ def with_room_defaults(
     if denoise is None and manifest.config["frame"]["hits"]:
         denoise = True
     gathering = replace(scene, paths=replace(scene.paths, gather=1), frame=replace(scene.frame, denoise=denoise))
-    filtered = " and filters its noise" if denoise else ""
-    return gathering, f"{config} gathers the room's light{filtered}, unless paths.gather = 0 or --denoise none"
+    filtered, keys = (" and noise filtered", ", --denoise") if denoise else ("", "")
+    return gathering, f"light gathered{filtered} by {config} (paths.gather{keys})"
 
 
 def tell_without_defaults(scene: Scene, config: str, manifest: Manifest) -> None:

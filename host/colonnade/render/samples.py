@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import Progress
 from colonnade.device.scene import DeviceScene
+from colonnade.environment.model import Environment
 from colonnade.render.budget import MAX_BUDGET_SAMPLES, Budget
 from colonnade.render.request import RenderRequest
 from colonnade.scene.model import Scene
@@ -14,10 +16,7 @@ from colonnade.scene.samples import PHOTO_SAMPLES
 
 #: Name the defaults to who has not chosen.
 _PHOTO = f"{PHOTO_SAMPLES} samples a pixel, the default in a room: --samples 1 takes a quarter of the time"
-_REFERENCE = (
-    f"{MAX_BUDGET_SAMPLES} samples a pixel, the most that a budget gives: the reference has no clock;"
-    " --samples N gives another number"
-)
+_REFERENCE = f"{MAX_BUDGET_SAMPLES} samples a pixel, the most of a budget, as the reference has no clock (--samples)"
 #: Seconds of a frame unless the scene names them: thirty frames a second.
 _SECONDS = 1 / 30
 
@@ -80,6 +79,15 @@ def within_budget(
     hidden += f"; {missing} of {len(scene.lights)} lights do not show" if missing > 0 else ""
     note = joined(note, budget.note + (hidden if budget.samples == 1 else ""))
     return replace(prepared, scene=scene.with_samples(budget.samples)), note
+
+
+def tell_defaults(line: str | None, room: Environment | None) -> None:
+    """Note the line that names defaults, with the other notes on a room, and show these."""
+    if line is not None and room is not None:
+        room.tell("defaults", line)
+    elif line is not None:
+        notes.tell(line)
+    notes.flush()
 
 
 def joined(*lines: str | None) -> str | None:

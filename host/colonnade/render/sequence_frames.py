@@ -25,7 +25,7 @@ from colonnade.render.device_frames import host_frames, rendered
 from colonnade.render.history import History
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
-from colonnade.render.samples import within_budget
+from colonnade.render.samples import tell_defaults, within_budget
 from colonnade.scene.model import Scene
 
 #: What keyframes cost.
@@ -89,9 +89,10 @@ def sequence_frames(
                     request, lit, size, [pose], scene.opening(request.frames), progress, number, history
                 )
                 registers = [frames[0].registers(one) for one in frames[0].passes]
-            for line in (note, _BETWEEN if every > 1 else None):
-                if line is not None:
-                    notes.tell(line)
+            if number == 0:
+                tell_defaults(note, prepared.environment)
+            if every > 1:
+                notes.tell(_BETWEEN)
             seconds = {"maps": time.perf_counter() - begun}
             (result,) = rendered(request, frames, [registers], progress.of(title))
         except UserError as error:

@@ -42,6 +42,8 @@ _REPORTED_CLAMPED = 0.02
 _OPEN = 0.85
 #: Radius of a fitted light, as a share of its distance from the object.
 _AREA = 0.2
+#: What names other lights.
+_KEYS = "([[light]], [ambient])"
 
 
 @dataclass(frozen=True)
@@ -134,8 +136,7 @@ def lit_room(
     scene = with_free_placement(scene, extent, room)
     object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
     if room is not None:
-        for note in room.notes:
-            notes.tell(f"room {room.name}: {note}")
+        room.tell_notes()
     around = panorama_light(scene, extent, room, max_lights)
     second = _second_view(scene)
     unseen: Panorama | Surround | None = None
@@ -259,24 +260,15 @@ def _with_fitted_lights(
     from colonnade.environment.light_fit import DEFAULT_LIGHTS
 
     if room.photo is None:
-        notes.tell(
-            f"the scene names no light, and room {room.name} has no photo to fit lights to: one light beside the object"
-            " and ambient light 0.1 are used; [[light]] and [ambient] name others"
-        )
+        room.tell("lights", f"no photo to fit lights to, one beside the object and ambient light 0.1 {_KEYS}")
         return scene, None
     if (sunny := sun_alone(scene, extent, room)) is not None:
-        notes.tell(
-            f"the scene names no light: the photo of room {room.name} shows sun and shade, so the sun is overhead;"
-            " [[light]] and [ambient] name others"
-        )
+        room.tell("lights", f"the sun overhead, as the photo shows sun and shade {_KEYS}")
         return replace(with_lights(scene, sunny), fits_lights=scene.paths.gather > 0), None
     with progress.step("fitting lights to the photo"):
         fit = fitted_lights(room, min(DEFAULT_LIGHTS, max_lights), walls=scene.paths.gather > 0)
     count = len(fit.lights.lights)
-    notes.tell(
-        f"the scene names no light: ambient light and {count} point light{'' if count == 1 else 's'} were fitted to the"
-        f" photo of room {room.name}; [[light]] and [ambient] name others"
-    )
+    room.tell("lights", f"ambient light and {count} point light{'' if count == 1 else 's'} fitted to the photo {_KEYS}")
     lights = fit.lights
     if scene.paths.gather:
         middle = object_pose(scene, extent, room).to_world(extent.centre)

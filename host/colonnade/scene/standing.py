@@ -63,8 +63,9 @@ def surface_point(pixel: tuple[float, float], environment: Environment, key: str
     if upward < _STANDABLE:
         what = "a ceiling" if upward < -_STANDABLE else "a wall or another steep surface"
         raise UserError(
-            f"{key} is ({u:g}, {v:g}), on {what} of room {environment.name}: choose a pixel of a floor or a table, or"
-            f" leave it out, and a level surface is chosen"
+            f"{key} is ({u:g}, {v:g}) in the {environment.width}x{environment.height} pixels of room"
+            f" {environment.name}, on {what}: choose a pixel of a floor or a table, or leave it out, and a level"
+            " surface is chosen"
         )
     depth = environment.depth[y, x]
     seen = np.array([(u - environment.cx) / environment.fx, (v - environment.cy) / environment.fy, 1.0]) * depth

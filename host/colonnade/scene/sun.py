@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colonnade.common import notes
 from colonnade.common.accumulation import LUMINANCE
 from colonnade.environment.lights import RoomLight, RoomLights
 from colonnade.environment.panorama_lights import DistantLight
@@ -44,9 +43,7 @@ def with_sun(
     share = _share(sun, scene, extent, room, first.direction)
     colour = sun.colour(rest.on_ground()) * share / first.direction[1]
     where = "where the panorama has it" if high else "overhead, as the panorama has none"
-    notes.tell(
-        f"the photo of room {room.name} shows sun and shade: the sun is {where}, and {share:.0%} of the object is in it"
-    )
+    room.tell("sun", f"the photo shows sun and shade, the sun is {where}, and {share:.0%} of the object is in it")
     return [replace(first, colour=colour, is_far=True), *(light for light in found if light is not first)]
 
 

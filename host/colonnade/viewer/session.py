@@ -26,6 +26,7 @@ from colonnade.render.camera_look import CameraLook
 from colonnade.render.history import History
 from colonnade.render.host_frame import HostFrame, require_filter
 from colonnade.render.room_defaults import with_room_defaults
+from colonnade.render.samples import tell_defaults
 from colonnade.scene.model import Camera, Scene
 from colonnade.scene.model.values import WorldVector
 from colonnade.scene.parser import load_scene
@@ -293,15 +294,14 @@ class Session:
         with ledger.opened() as files, notes.opened(lines.append):
             self._lookups = files.lookups  # up to an error, if there is one
             description, line = with_room_defaults(load_scene(self.file), self._config, self._manifest)
-            if line is not None:
-                notes.tell(line)
             description = exposed(description)
             samples = description.frame.samples or 1
             description = description.with_samples(samples if samples > 1 else STILL_SAMPLES)
             scene = DeviceScene.of(description, self._manifest, size=self.size, encoder=self._encoder)
             look = CameraLook.of(scene.scene, scene.photo, self.size)
-            if look is not None and look.note is not None:
-                notes.tell(look.note)
+            if look is not None:
+                look.tell(scene.environment)
+            tell_defaults(line, scene.environment)
         if description.frame.denoise:
             require_filter(description, self._manifest, description.frame.denoise)
         # It is refused here if the hardware cannot show it, and not in every frame

@@ -134,8 +134,8 @@ def test_what_a_scene_leaves_open_is_a_warning_once_for_it(tmp_path: Path) -> No
         said = [str(one.message) for one in caught]
         assert len(list(scene.frames(2, **options))) == 2
         scene.with_tables(material={"kind": "mirror"}).render(**options)
-    assert any("were fitted to the photo of room attic" in line for line in said)
-    assert any("small gathers the room's light and filters its noise" in line for line in said)
+    (line,) = [line for line in said if line.startswith("room attic: ")]
+    assert "fitted to the photo" in line and "light gathered and noise filtered by small" in line
     assert [str(one.message) for one in caught] == said
 
 

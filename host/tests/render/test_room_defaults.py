@@ -57,7 +57,7 @@ def test_a_named_filter_stays(tmp_path: Path) -> None:
     scene = scene_of(tables(tmp_path, frame={"denoise": False}), "the scene", tmp_path)
     found, line = with_room_defaults(scene, "small", manifest_for("small").manifest)
     assert (found.paths.gather, found.frame.denoise) == (1, False)
-    assert line is not None and "filters" not in line
+    assert line is not None and "filtered" not in line
 
 
 def test_the_picture_is_that_of_the_named_keys(tmp_path: Path) -> None:
@@ -66,7 +66,7 @@ def test_the_picture_is_that_of_the_named_keys(tmp_path: Path) -> None:
     light = {"position": (0.9, 1.9, 0.2), "falloff": 1.5}
     scene = colonnade.Scene("cube", background={"room": "room"}, light=light, folder=tmp_path)
     size = (48, 36)
-    with pytest.warns(UserWarning, match="small gathers the room's light and filters its noise.*16 samples a pixel"):
+    with pytest.warns(UserWarning, match="light gathered and noise filtered by small.*16 samples a pixel"):
         default = scene.render(overrides=SMALL_MAPS, size=size)
     named = scene.with_tables(paths={"gather": 1}, frame={"samples": 16, "denoise": True})
     assert np.array_equal(default.pixels, named.render(overrides=SMALL_MAPS, size=size).pixels)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from colonnade_lab.evaluation.studies.synthetic_attic import attic, write_attic
 from live_maps import SMALL_MAPS
 
 from colonnade.cli.main import cli
+from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.design.generator import manifest_for
@@ -23,7 +25,7 @@ from colonnade.environment.load import load_environment
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.composite import composited
-from colonnade.render.frames import render
+from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.lit_room import lit_room
@@ -66,12 +68,11 @@ def decibels(one: RenderResult, other: RenderResult, mask: np.ndarray | None = N
 
 def test_a_scene_without_lights_gets_those_of_the_photo(folder: Path, told: list[str]) -> None:
     frame(folder, MIRROR + UNGATHERED)
-    fitted = "the scene names no light: ambient light and 1 point light were fitted to the photo of room attic;"
-    assert told == [f"{fitted} [[light]] and [ambient] name others"]
+    assert told == ["room attic: ambient light and 1 point light fitted to the photo ([[light]], [ambient])"]
     for named in (LAMP, "ambient.colour = [0.3, 0.3, 0.3]\n"):
         frame(folder, MIRROR + named + UNGATHERED)
     frame(folder, MIRROR.replace("attic", "dark"))
-    assert len(told) == 2 and "room dark has no photo to fit lights to: one light beside the object" in told[1]
+    assert len(told) == 2 and "room dark: no photo to fit lights to, one beside the object and ambient" in told[1]
 
 
 def test_found_lights_cast_no_shadow_where_the_photo_has_one(folder: Path) -> None:
@@ -127,11 +128,30 @@ def test_a_photo_that_is_too_bright_for_the_lights_of_a_scene_is_noted(folder: P
 
 
 def test_what_a_room_lacks_is_noted(folder: Path, told: list[str]) -> None:
-    room = replace(load_environment(folder / "dark"), notes=("its depth is estimated",))
+    room = replace(load_environment(folder / "dark"), notes=("its depth is estimated", "its albedo is derived"))
     lit_room(
         Scene(MeshSource("cube"), background=Background(room=folder / "dark")), room, load_mesh("cube").extent, 1, False
     )
-    assert told[0] == "room dark: its depth is estimated"
+    notes.flush()
+    assert told == ["room dark: its depth is estimated; its albedo is derived"]
+
+
+@pytest.mark.parametrize("backend", ["model", "reference"])
+def test_notes_on_a_room_are_one_line_of_a_command(folder: Path, told: list[str], backend: str) -> None:
+    """Whatever the number of frames and scenes: lights, directions, look, gathered light, filter and samples."""
+    for frames in (1, 2):
+        (folder / "scene.toml").write_text(MIRROR + "motion.turn = 40.0\n")
+        request = RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, backend, SIZE, frames=frames)
+        assert len(list(render_frames(request))) == frames
+    (line,) = told
+    lights, seen, gathered, samples = line.split("; ")
+    assert lights == "room attic: ambient light and 1 point light fitted to the photo ([[light]], [ambient])"
+    assert re.fullmatch(
+        r"\d\d% of the directions of light seen, .* \(background.panorama, background.second_view\)", seen
+    )
+    filtered = ("", "") if backend == "reference" else (" and noise filtered", ", --denoise")
+    assert gathered == f"light gathered{filtered[0]} by small (paths.gather{filtered[1]})"
+    assert samples.startswith("16 samples a pixel, ") and samples.endswith(" (--samples)")
 
 
 def test_the_colours_of_a_room_can_be_chosen(folder: Path) -> None:

@@ -228,5 +228,8 @@ def test_walls_and_ceilings_are_refused(room: Environment, is_steep: str) -> Non
     if not kernel.any():
         pytest.skip("the room has no such surface")
     y, x = np.argwhere(kernel)[0] + 3
-    with pytest.raises(UserError, match=rf"object 1.stand_at is .*, on a {is_steep}.*choose a pixel of a floor"):
+    with pytest.raises(
+        UserError,
+        match=rf"stand_at is .* in the 320x240 pixels of room attic, on a {is_steep}.*choose a pixel of a floor",
+    ):
         joined_mesh(objects(SceneObject((float(x), float(y)), mesh=MeshSource("cube"))), room)

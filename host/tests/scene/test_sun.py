@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from sunny_yard import SHADE, SUN, WALL, yard
 
+from colonnade.common import notes
 from colonnade.common.accumulation import WHOLE
 from colonnade.environment.lights import world_surface
 from colonnade.environment.panorama import Panorama
@@ -36,6 +37,7 @@ def test_a_panorama_in_the_shade_has_the_sun_overhead(x: float, share: float, to
     np.testing.assert_array_equal(sun.direction, UP)
     np.testing.assert_allclose(sun.colour, share * SUN, rtol=0.15)
     assert sun.is_far
+    notes.flush()
     assert told[-1].endswith(f"the sun is overhead, as the panorama has none, and {share:.0%} of the object is in it")
 
 
