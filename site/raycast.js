@@ -5,8 +5,9 @@ import { Library } from "./library.js";
 /** Bytes of a hit, and where its face is (driver/include/colonnade_rays.h). */
 const [HIT_BYTES, FACE_BYTE] = [40, 28];
 const MISS = 0xffffffff;
-/** The mode of each `side` of three.js: faces seen from the front, from the back, or both; all masks. */
-const SIDES = [0xff000200, 0xff000100, 0xff000000];
+/** The mode of each `side` of three.js: faces seen from the front, from the back, or both. */
+const SIDES = [0x200, 0x100, 0];
+const ALL_MASKS = 0xffffffff;
 
 /** The calls of colonnade_rays.h. A refusal ends the call, and its text is the error's. */
 class RayLibrary extends Library {
@@ -29,10 +30,10 @@ class RayLibrary extends Library {
   }
 }
 
-/** A class as three-mesh-bvh's `MeshBVH`: code is that of rays.wasm, `design` the text for colonnade_rays_open. */
-export async function meshTrees(code, design) {
+/** A class as three-mesh-bvh's `MeshBVH`: code is that of rays.wasm. */
+export async function meshTrees(code) {
   const library = /** @type {RayLibrary} */ (await RayLibrary.from(code)), { wasm } = library;
-  const device = library.word([new TextEncoder().encode(design + "\0")], (text, out) => wasm.colonnade_rays_open(text, 0, out));
+  const device = library.word([], (out) => wasm.colonnade_rays_open(0, 0, out));
 
   return class MeshBVH {
     /** Packs a geometry: its `position` and `index`, or three vertices a face without one. */
@@ -61,13 +62,13 @@ export async function meshTrees(code, design) {
     /** All hits from near to far; `near` and `far` are distances, a side is three's number or a material with it. */
     raycast(ray, side = 0, near = 0, far = Infinity) {
       return this.hits(ray, side, near, far, 64, (rays, mode, hits, capacity) =>
-        library.word([], (found) => wasm.colonnade_rays_all(this.scene, rays, 1, mode, MISS, hits, capacity, found)),
+        library.word([], (found) => wasm.colonnade_rays_all(this.scene, rays, 1, mode, ALL_MASKS, MISS, hits, capacity, found)),
       );
     }
 
     /** The nearest hit, or null. */
     raycastFirst(ray, side = 0, near = 0, far = Infinity) {
-      const closest = (rays, mode, hits) => library.refusing(() => wasm.colonnade_rays_closest(this.scene, rays, 1, mode, hits)) + 1;
+      const closest = (rays, mode, hits) => library.refusing(() => wasm.colonnade_rays_closest(this.scene, rays, 1, mode, ALL_MASKS, hits)) + 1;
       return this.hits(ray, side, near, far, 1, closest)[0] ?? null;
     }
 

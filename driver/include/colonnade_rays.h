@@ -3,7 +3,9 @@
  *
  * Unlike the driver below it, this library allocates, and computes in double. Positions and distances are in the
  * application's unit; t counts lengths of a ray's direction, which may have any. A call that fails changes nothing;
- * `colonnade_rays_error` says what to do. A device's calls are of one thread at a time; the model uses several. */
+ * `colonnade_rays_error` says what to do. Calls may come from any thread, but while a call changes or commits a scene no
+ * other one of that scene runs. Queries of a scene run at the same time on the model, one after the other on a device;
+ * the model traces thousands of rays in several threads. */
 #ifndef COLONNADE_RAYS_H
 #define COLONNADE_RAYS_H
 
@@ -17,7 +19,7 @@ extern "C" {
 enum colonnade_rays_status {
     COLONNADE_RAYS_OK,
     COLONNADE_RAYS_BAD_DESIGN,    /* the design has a line that is none, or lacks one */
-    COLONNADE_RAYS_BAD_MESH,      /* a vertex is not finite, an index has no vertex, no face has an area */
+    COLONNADE_RAYS_BAD_MESH,      /* a vertex is not finite, an index has no vertex, a wrong count, no face has an area, too many vanish */
     COLONNADE_RAYS_NO_MESH,       /* the scene has no mesh of this number */
     COLONNADE_RAYS_DOES_NOT_FIT,  /* more records, triangles or stack entries than the design has */
     COLONNADE_RAYS_NOT_COMMITTED, /* a scene changed after its last commit */
@@ -116,16 +118,17 @@ struct colonnade_rays_device;
 struct colonnade_rays_scene;
 
 /* Opens a device of a design: lines "number NAME VALUE" and "layout RECORD FIELD OFFSET WIDTH SIGNED" of its manifest.
+ * `design` NULL: `edge`, and for a scene of which it drops more than one face in a hundred `edge` with vertices of 24 bits.
  * `backend` NULL: the model. The device is NULL if there is no memory, and otherwise has the error. */
 int colonnade_rays_open(const char *design, const struct colonnade_rays_backend *backend,
                         struct colonnade_rays_device **device);
-/* Opens the device that the environment names (simulated.cpp). COLONNADE_RAYS_DESIGN is a file with the design.
+/* Opens the device that the environment names (simulated.cpp). COLONNADE_RAYS_DESIGN is a file with the design, or not set.
  * COLONNADE_RAYS_DEVICE is one with a simulated device: lines "program PATH" and "argument WORD", then "register NAME
  * ADDRESS BITS SIGNED ACCESS"; without it the model answers. A failure prints a line on stderr, and `*device` is NULL. */
 int colonnade_rays_open_environment(struct colonnade_rays_device **device);
 /* Closes a device, after its scenes. */
 void colonnade_rays_close(struct colonnade_rays_device *device);
-/* Text of the last call that failed, until the next call. */
+/* Text of the calling thread's last call, if it failed, until its next call. NULL: of a call without a device. */
 const char *colonnade_rays_error(const struct colonnade_rays_device *device);
 /* A number of the design, such as "vertexBits"; -1 without it. */
 int64_t colonnade_rays_design(const struct colonnade_rays_device *device, const char *name);
@@ -139,40 +142,46 @@ void colonnade_rays_scene_free(struct colonnade_rays_scene *scene);
 /* Adds a mesh, which is copied: `vertices` [vertex_count][3], `faces` [face_count][3]. `*mesh` is its number. */
 int colonnade_rays_mesh_add(struct colonnade_rays_scene *scene, const double *vertices, size_t vertex_count,
                             const uint32_t *faces, size_t face_count, uint32_t *mesh);
-/* Moves the vertices of a mesh, as many as it has. */
-int colonnade_rays_mesh_update(struct colonnade_rays_scene *scene, uint32_t mesh, const double *vertices);
+/* Moves the vertices of a mesh: `vertex_count` is what it has. */
+int colonnade_rays_mesh_update(struct colonnade_rays_scene *scene, uint32_t mesh, const double *vertices,
+                               size_t vertex_count);
 /* Removes a mesh; its number is not used again. */
 int colonnade_rays_mesh_remove(struct colonnade_rays_scene *scene, uint32_t mesh);
 /* Leaves a mesh out of the scene, or takes it in. */
 int colonnade_rays_mesh_enable(struct colonnade_rays_scene *scene, uint32_t mesh, int is_enabled);
 /* Rays with a bit in common with the mask, at first all ones, may hit the mesh. */
-int colonnade_rays_mesh_mask(struct colonnade_rays_scene *scene, uint32_t mesh, uint8_t mask);
-/* `is_opaque` [face_count]; NULL: all are. */
-int colonnade_rays_mesh_opacity(struct colonnade_rays_scene *scene, uint32_t mesh, const uint8_t *is_opaque);
-/* Packs the scene and loads it. A scene without faces has no hits. */
+int colonnade_rays_mesh_mask(struct colonnade_rays_scene *scene, uint32_t mesh, uint32_t mask);
+/* `is_opaque` [face_count], which is what the mesh has; NULL, 0: all are. */
+int colonnade_rays_mesh_opacity(struct colonnade_rays_scene *scene, uint32_t mesh, const uint8_t *is_opaque,
+                                size_t face_count);
+/* Packs the scene and loads it. A scene without faces has no hits. One in which more than one face in a hundred vanishes
+ * on the device's grid is refused. */
 int colonnade_rays_commit(struct colonnade_rays_scene *scene);
+/* Faces with an area that vanish on the grid of the committed scene: no ray hits them. */
+int colonnade_rays_dropped(const struct colonnade_rays_scene *scene, size_t *faces);
 /* The box of the committed scene. */
 int colonnade_rays_bounds(const struct colonnade_rays_scene *scene, double low[3], double high[3]);
 /* A vertex unit, and the corner that local origins count from. */
 int colonnade_rays_grid(const struct colonnade_rays_scene *scene, double *unit, double corner[3]);
 
-/* Rays. `mode` has the bits of CULL_FRONT, CULL_BACK, OPAQUE_ONLY, and a mask. */
+/* Rays. `mode` has the bits of CULL_FRONT, CULL_BACK, OPAQUE_ONLY; `mask` is that of all rays of a call. */
 
 /* The closest hit of each ray. With `colonnade_rays_refine` it is that of the meshes as the application has them. */
 int colonnade_rays_closest(struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
-                           uint32_t mode, struct colonnade_rays_hit *hits);
+                           uint32_t mode, uint32_t mask, struct colonnade_rays_hit *hits);
 /* 1 for each ray with a hit, else 0. */
 int colonnade_rays_occluded(struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
-                            uint32_t mode, uint8_t *is_occluded);
+                            uint32_t mode, uint32_t mask, uint8_t *is_occluded);
 /* All hits of all rays, by ray and t, at most `most` a ray. `hits` has room for `capacity`; `*found` may be more. */
 int colonnade_rays_all(struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count, uint32_t mode,
-                       size_t most, struct colonnade_rays_hit *hits, size_t capacity, size_t *found);
+                       uint32_t mask, size_t most, struct colonnade_rays_hit *hits, size_t capacity, size_t *found);
 /* t, u, v of hits in double, from the meshes' own vertices, or those of a neighbour where these say no: 1, as at first. */
 void colonnade_rays_refine(struct colonnade_rays_scene *scene, int is_refined);
 /* An order of the rays in which near ones follow each other: origins in Morton order, then the octant of the direction. */
 int colonnade_rays_order(const struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
                          uint32_t *order);
-/* Hands over a batch as it is. */
+/* Hands over a batch as it is. The mask of its mode is the device's: that of the low 8 bits of the meshes' masks, if no
+ * other bits tell meshes apart. */
 int colonnade_rays_submit(struct colonnade_rays_scene *scene, const struct colonnade_rays_batch *batch);
 /* Waits until all batches are done. */
 int colonnade_rays_wait(struct colonnade_rays_scene *scene);

@@ -24,7 +24,7 @@ from colonnade.design.generator import manifest_for
 from colonnade.mesh.geometry import primitives
 from colonnade.rays import Scene, Sensor
 from colonnade.rays.recorded import RecordedRays
-from colonnade.rays.scene import ALL_MASKS, CULL_BACK, FAN, OCCLUDED, RANGES, SENSOR
+from colonnade.rays.scene import ALL_DEVICE_MASKS, CULL_BACK, FAN, OCCLUDED, RANGES, SENSOR
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.dram_image import dram_image
 from numpy.typing import NDArray
@@ -59,7 +59,7 @@ def rays_of(vertices: NDArray[np.float64], count: int) -> NDArray[np.float32]:
 
 def submissions(rays: NDArray[np.float32]) -> dict[str, tuple[Any, ...]]:
     """Arguments of `Scene.submit`, by form. Most numbers of rays fill no whole line of hits."""
-    count, masks = len(rays), ALL_MASKS << 24
+    count, masks = len(rays), ALL_DEVICE_MASKS
     sensor = Sensor(
         (0.2, 0.3, 4),
         (-1.6, 1.2, -4),

@@ -130,10 +130,10 @@ public:
             Node node{};
             node.leaves = 1;
             for (std::size_t a = 0; a < 3; ++a) {
-                node.origin[a] = corners(i, a);
-                node.exponent[a] = static_cast<int>(exponents(i, a));
-                node.low[0][a] = static_cast<std::int32_t>(low(i, a));
-                node.high[0][a] = static_cast<std::int32_t>(high(i, a));
+                node.origin[a] = static_cast<std::int32_t>(corners(i, a));
+                node.exponent[a] = static_cast<std::int8_t>(exponents(i, a));
+                node.low[a][0] = static_cast<std::uint8_t>(low(i, a));
+                node.high[a][0] = static_cast<std::uint8_t>(high(i, a));
                 heading[4 * i + 1 + a] = ray.negative[a];
                 origin[3 * i + a] = ray.origin[a];
             }
@@ -143,7 +143,7 @@ public:
             std::array<Entered, 4> entered;
             std::uint64_t tests = 0;
             enters[i] = ray.enters;
-            isHit[i] = ray.enters && colonnade::testBoxes(ray, node, ray.tMax, numbers_, entered, tests) > 0;
+            isHit[i] = ray.enters && BoxTests(ray, numbers_).test(node, ray.tMax, entered, tests) > 0;
         }
         return result;
     }

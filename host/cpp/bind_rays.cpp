@@ -3,14 +3,14 @@
 #include <nanobind/stl/optional.h>
 
 #include <cstring>
-#include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "binding.hpp"
 #include "rays/batch_bytes.hpp"
-#include "rays/design.hpp"
+#include "rays/conversion.hpp"
 #include "rays/device_registers.hpp"
 #include "rays/traffic.hpp"
 
@@ -66,6 +66,7 @@ private:
         const nb::tuple found =
             nb::cast<nb::tuple>(device_.attr("submit")(nb::bytes(&batch, sizeof batch), nb::bytes(rays, rays::rayBytes(batch)), rays::responseBytes(batch)));
         const auto hits = nb::cast<nb::bytes>(found[1]);
+        if (hits.size() != rays::responseBytes(batch)) throw std::invalid_argument("the device answers " + std::to_string(hits.size()) + " bytes in place of " + std::to_string(rays::responseBytes(batch)));
         std::memcpy(reinterpret_cast<void*>(batch.hits), hits.data(), hits.size());
         const auto tag = nb::cast<std::uint32_t>(found[0]);
         if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = tag;
@@ -85,13 +86,14 @@ private:
 
 class Rays {
 public:
-    /// `device` None: the model.
-    Rays(const std::string& design, nb::object device) {
-        const rays::Design parts(design);
-        if (device.is_none()) model_ = std::make_unique<rays::ReadingModel>(Numbers(parts.numbers), parts.number("directionBits"), parts.format.layouts);
-        else python_ = std::make_unique<PythonDevice>(std::move(device));
-        const colonnade_rays_backend backend = model_ ? model_->backend() : python_->backend();
-        check(colonnade_rays_open(design.c_str(), &backend, &device_));
+    /// `design` None: those of the library. `device` None: the model.
+    Rays(const std::optional<std::string>& design, nb::object device) {
+        colonnade_rays_backend backend{};
+        if (!device.is_none()) {
+            python_ = std::make_unique<PythonDevice>(std::move(device));
+            backend = python_->backend();
+        }
+        check(colonnade_rays_open(design ? design->c_str() : nullptr, python_ ? &backend : nullptr, &device_));
         check(colonnade_rays_scene_new(device_, &scene_));
     }
     ~Rays() {
@@ -105,18 +107,23 @@ public:
         check(colonnade_rays_mesh_add(scene_, vertices.data(), vertices.shape(0), faces.data(), faces.shape(0), &mesh));
         return mesh;
     }
-    void update(std::uint32_t mesh, const Threes<double>& vertices) { check(colonnade_rays_mesh_update(scene_, mesh, vertices.data())); }
+    void update(std::uint32_t mesh, const Threes<double>& vertices) { check(colonnade_rays_mesh_update(scene_, mesh, vertices.data(), vertices.shape(0))); }
     void remove(std::uint32_t mesh) { check(colonnade_rays_mesh_remove(scene_, mesh)); }
     void enable(std::uint32_t mesh, bool isEnabled) { check(colonnade_rays_mesh_enable(scene_, mesh, isEnabled)); }
-    void mask(std::uint32_t mesh, std::uint8_t mask) { check(colonnade_rays_mesh_mask(scene_, mesh, mask)); }
+    void mask(std::uint32_t mesh, std::uint32_t mask) { check(colonnade_rays_mesh_mask(scene_, mesh, mask)); }
     void opacity(std::uint32_t mesh, const std::optional<Column<std::uint8_t>>& isOpaque) {
-        check(colonnade_rays_mesh_opacity(scene_, mesh, isOpaque ? isOpaque->data() : nullptr));
+        check(colonnade_rays_mesh_opacity(scene_, mesh, isOpaque ? isOpaque->data() : nullptr, isOpaque ? isOpaque->size() : 0));
     }
     void refine(bool isRefined) { colonnade_rays_refine(scene_, isRefined); }
     void commit() {
         check(released([&] { return colonnade_rays_commit(scene_); }));
     }
 
+    std::size_t dropped() const {
+        std::size_t faces;
+        check(colonnade_rays_dropped(scene_, &faces));
+        return faces;
+    }
     nb::tuple bounds() const {
         std::array<double, 3> low, high;
         check(colonnade_rays_bounds(scene_, low.data(), high.data()));
@@ -129,25 +136,36 @@ public:
         return nb::make_tuple(unit, corner);
     }
 
-    nb::dict closest(const Eights<double>& rays, std::uint32_t mode) {
+    nb::dict closest(const Eights<double>& rays, std::uint32_t mode, std::uint32_t mask) {
         std::vector<colonnade_rays_hit> hits(rays.shape(0));
-        check(released([&] { return colonnade_rays_closest(scene_, raysOf(rays), hits.size(), mode, hits.data()); }));
+        inParts(rays.shape(0), [&](std::size_t first, std::size_t count) {
+            check(released([&] { return colonnade_rays_closest(scene_, raysOf(rays) + first, count, mode, mask, hits.data() + first); }));
+            number(hits.data() + first, count, first);
+        });
         return columns(hits);
     }
-    nb::dict all(const Eights<double>& rays, std::uint32_t mode, std::size_t most) {
-        std::vector<colonnade_rays_hit> hits(2 * rays.shape(0));
-        std::size_t found = 0;
-        const auto call = [&] { return colonnade_rays_all(scene_, raysOf(rays), rays.shape(0), mode, most, hits.data(), hits.size(), &found); };
-        check(released(call));
-        const bool isShort = found > hits.size();
-        hits.resize(found);
-        if (isShort) check(released(call));
+    nb::dict all(const Eights<double>& rays, std::uint32_t mode, std::uint32_t mask, std::size_t most) {
+        std::vector<colonnade_rays_hit> hits;
+        inParts(rays.shape(0), [&](std::size_t first, std::size_t rayCount) {
+            const std::size_t before = hits.size();
+            std::size_t found = 2 * rayCount;
+            for (bool isShort = true; isShort;) {
+                hits.resize(before + found);
+                const std::size_t capacity = found;
+                check(released([&] { return colonnade_rays_all(scene_, raysOf(rays) + first, rayCount, mode, mask, most, hits.data() + before, capacity, &found); }));
+                isShort = found > capacity;
+            }
+            hits.resize(before + found);
+            number(hits.data() + before, found, first);
+        });
         return columns(hits);
     }
-    Pixels<bool> occluded(const Eights<double>& rays, std::uint32_t mode) {
+    Pixels<bool> occluded(const Eights<double>& rays, std::uint32_t mode, std::uint32_t mask) {
         bool* isOccluded;
         auto result = makeArray<bool>({rays.shape(0)}, isOccluded);
-        check(released([&] { return colonnade_rays_occluded(scene_, raysOf(rays), rays.shape(0), mode, reinterpret_cast<std::uint8_t*>(isOccluded)); }));
+        inParts(rays.shape(0), [&](std::size_t first, std::size_t count) {
+            check(released([&] { return colonnade_rays_occluded(scene_, raysOf(rays) + first, count, mode, mask, reinterpret_cast<std::uint8_t*>(isOccluded) + first); }));
+        });
         return result;
     }
     Pixels<std::uint32_t> order(const Eights<double>& rays) const {
@@ -158,21 +176,11 @@ public:
     }
 
     /// What the caches of an array read for rays: records, and lines from DRAM.
-    Values traffic(const Eights<double>& rays, std::uint32_t mode, bool isOcclusion, const std::array<std::size_t, 7>& shape) {
-        if (!model_) throw std::invalid_argument("the traffic is that of the model");
-        std::vector<std::vector<std::uint32_t>> reads;
-        rays::Traffic found;
-        model_->writeTo(&reads);
-        const int status = released([&] {
-            std::vector<colonnade_rays_hit> hits(isOcclusion ? 0 : rays.shape(0));
-            std::vector<std::uint8_t> occluded(isOcclusion ? rays.shape(0) : 0);
-            const int done = isOcclusion ? colonnade_rays_occluded(scene_, raysOf(rays), occluded.size(), mode, occluded.data())
-                                         : colonnade_rays_closest(scene_, raysOf(rays), hits.size(), mode, hits.data());
-            found = rays::trafficOf(reads, {shape[0], shape[1], shape[2], shape[3], shape[4], shape[5], shape[6]});
-            return done;
+    Values traffic(const Eights<double>& rays, std::uint32_t mode, std::uint32_t mask, bool isOcclusion, const std::array<std::size_t, 7>& shape) {
+        const rays::Traffic found = released([&] {
+            const auto reads = rays::readsOf(*scene_, raysOf(rays), rays.shape(0), mode, mask, isOcclusion);
+            return rays::trafficOf(reads, {shape[0], shape[1], shape[2], shape[3], shape[4], shape[5], shape[6]});
         });
-        model_->writeTo(nullptr);
-        check(status);
         return {{"reads", static_cast<std::int64_t>(found.reads)}, {"lines", static_cast<std::int64_t>(found.lines)}};
     }
 
@@ -221,6 +229,20 @@ public:
     }
 
 private:
+    /// Calls `part` with parts of the rays, between which the interpreter handles signals.
+    template <class Part> static void inParts(std::size_t count, const Part& part) {
+        constexpr std::size_t most = 1 << 16;
+        for (std::size_t first = 0; first < count; first += most) {
+            if (first != 0 && PyErr_CheckSignals() != 0) throw nb::python_error();
+            part(first, std::min(most, count - first));
+        }
+    }
+
+    /// Numbers the rays of hits of a part from its first one.
+    static void number(colonnade_rays_hit* hits, std::size_t count, std::size_t first) {
+        for (std::size_t i = 0; i < count; ++i) hits[i].ray += static_cast<std::uint32_t>(first);
+    }
+
     void check(int status) const {
         if (python_) python_->raise();
         if (status == COLONNADE_RAYS_NO_MEMORY) throw std::bad_alloc();
@@ -256,7 +278,6 @@ private:
         return result;
     }
 
-    std::unique_ptr<rays::ReadingModel> model_;
     std::unique_ptr<PythonDevice> python_;
     colonnade_rays_device* device_ = nullptr;
     colonnade_rays_scene* scene_ = nullptr;
@@ -286,7 +307,7 @@ nb::list converted(const Values& numbers, const Eights<float>& rays, bool isLoca
 
 void bind_rays(nb::module_& module) {
     nb::class_<Rays>(module, "Rays", "A device that traces rays, with one scene: the calls of colonnade_rays.h, on the bit-exact model or a device.")
-        .def(nb::init<const std::string&, nb::object>(), "design"_a, "device"_a = nb::none())
+        .def(nb::init<const std::optional<std::string>&, nb::object>(), "design"_a.none(), "device"_a = nb::none())
         .def("add", &Rays::add, "vertices"_a, "faces"_a)
         .def("update", &Rays::update, "mesh"_a, "vertices"_a)
         .def("remove", &Rays::remove, "mesh"_a)
@@ -296,12 +317,13 @@ void bind_rays(nb::module_& module) {
         .def("refine", &Rays::refine, "is_refined"_a)
         .def("commit", &Rays::commit)
         .def("bounds", &Rays::bounds)
+        .def("dropped", &Rays::dropped)
         .def("grid", &Rays::grid)
-        .def("closest", &Rays::closest, "rays"_a, "mode"_a)
-        .def("all", &Rays::all, "rays"_a, "mode"_a, "most"_a)
-        .def("occluded", &Rays::occluded, "rays"_a, "mode"_a)
+        .def("closest", &Rays::closest, "rays"_a, "mode"_a, "mask"_a)
+        .def("all", &Rays::all, "rays"_a, "mode"_a, "mask"_a, "most"_a)
+        .def("occluded", &Rays::occluded, "rays"_a, "mode"_a, "mask"_a)
         .def("order", &Rays::order, "rays"_a)
-        .def("traffic", &Rays::traffic, "rays"_a, "mode"_a, "is_occlusion"_a, "shape"_a)
+        .def("traffic", &Rays::traffic, "rays"_a, "mode"_a, "mask"_a, "is_occlusion"_a, "shape"_a)
         .def("submit", &Rays::submit, "rays"_a, "count"_a, "mode"_a, "origin"_a = std::array<float, 3>{}, "tnear"_a = 0.0f,
              "tfar"_a = std::numeric_limits<float>::infinity())
         .def("face", &Rays::face, "id"_a)

@@ -61,19 +61,18 @@ inline void replyHit(Query& query, const Numbers& n, int directionBits) {
 /// Batches of rays in a scene.
 class RayBatches {
 public:
-    void load(Query& query, std::istream& words, const rays::Model& model) {
-        model_ = std::make_unique<rays::Model>(model);
-        image_ = {};
-        for (auto* bounds : {image_.bounds_low, image_.bounds_high})
+    void load(Query& query, std::istream& words, const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts) {
+        colonnade_rays_image image{};
+        for (auto* bounds : {image.bounds_low, image.bounds_high})
             for (int a = 0; a < 3; ++a) bounds[a] = static_cast<std::int32_t>(query.number());
-        image_.scale_mantissa = static_cast<std::uint32_t>(query.number());
-        image_.scale_exponent = static_cast<std::int32_t>(query.number());
-        for (std::int64_t& base : image_.base) base = query.number();
-        std::tie(records_, image_.record_count) = readRecordBytes(words);
-        image_.records = records_.data();
-        image_.record_bytes = records_.size() / image_.record_count;
-        const colonnade_rays_backend backend = model_->backend();
-        backend.load(backend.context, &image_);
+        image.scale_mantissa = static_cast<std::uint32_t>(query.number());
+        image.scale_exponent = static_cast<std::int32_t>(query.number());
+        for (std::int64_t& base : image.base) base = query.number();
+        std::vector<std::uint8_t> records;
+        std::tie(records, image.record_count) = readRecordBytes(words);
+        image.records = records.data();
+        image.record_bytes = records.size() / image.record_count;
+        model_ = std::make_unique<rays::RayModel>(numbers, directionBits, layouts, image);
     }
 
     void reply(Query& query) {
@@ -90,8 +89,8 @@ public:
         for (std::size_t i = 0; i < words; ++i) rays[i / 16].words[i % 16] = static_cast<std::uint32_t>(query.number());
         batch.rays = reinterpret_cast<std::uintptr_t>(rays.data());
         batch.hits = reinterpret_cast<std::uintptr_t>(hits.data());
-        const colonnade_rays_backend backend = model_->backend();
-        if (backend.submit(backend.context, &batch) != COLONNADE_RAYS_OK) throw std::invalid_argument("the model refuses the batch");
+        rays::Sums sums;
+        if (model_->run(batch, sums) == COLONNADE_RAYS_BAD_BATCH) throw std::invalid_argument("the model refuses the batch");
         Reply reply;
         for (std::size_t i = 0; i < hitWords; ++i) reply << hits[i / 16].words[i % 16];
         reply.print();
@@ -102,9 +101,7 @@ private:
         std::uint32_t words[16];
     };
 
-    std::unique_ptr<rays::Model> model_;
-    colonnade_rays_image image_{};
-    std::vector<std::uint8_t> records_;
+    std::unique_ptr<rays::RayModel> model_;
 };
 
 } // namespace colonnade

@@ -67,17 +67,16 @@ void replyBox(Query& query, const Numbers& n) {
     for (auto& exponent : ray.exponent) exponent = static_cast<int>(query.number());
     const std::int64_t limit = query.number();
     Node node{};
-    node.origin = query.vector();
-    for (auto& exponent : node.exponent) exponent = static_cast<int>(query.number());
-    node.nodes = static_cast<int>(query.number());
-    node.leaves = static_cast<int>(query.number());
-    for (int child = 0; child < nodeChildren; ++child) {
-        for (auto& low : node.low[child]) low = static_cast<std::int32_t>(query.number());
-        for (auto& high : node.high[child]) high = static_cast<std::int32_t>(query.number());
-    }
+    for (auto& origin : node.origin) origin = static_cast<std::int32_t>(query.number());
+    for (auto& exponent : node.exponent) exponent = static_cast<std::int8_t>(query.number());
+    node.nodes = static_cast<std::uint8_t>(query.number());
+    node.leaves = static_cast<std::uint8_t>(query.number());
+    for (int child = 0; child < nodeChildren; ++child)
+        for (auto* planes : {&node.low, &node.high})
+            for (auto& axis : *planes) axis[child] = static_cast<std::uint8_t>(query.number());
     std::array<Entered, 4> entered;
     std::uint64_t tests = 0;
-    const int count = testBoxes(ray, node, limit, n, entered, tests);
+    const int count = BoxTests(ray, n).test(node, limit, entered, tests);
     Reply reply;
     reply << static_cast<Wide>(tests) << count;
     for (int i = 0; i < count; ++i) reply << entered[i].slot << entered[i].tNear;
@@ -322,7 +321,7 @@ int main() try {
         else if (kind == "lightenvironment") replyEnvironmentLight(query, numbers);
         else if (kind == "ray") replyRay(query, numbers, directionBits);
         else if (kind == "hit") replyHit(query, numbers, directionBits);
-        else if (kind == "image") batches.load(query, words, rays::Model(numbers, directionBits, scene.layouts()));
+        else if (kind == "image") batches.load(query, words, numbers, directionBits, scene.layouts());
         else if (kind == "batch") batches.reply(query);
         else if (kind == "instanceray") replyInstanceRay(query, numbers);
         else if (kind == "instancebox") replyInstanceBox(query, numbers);

@@ -22,7 +22,6 @@ from colonnade.common.atomic_files import replacing
 from colonnade.design.manifest import Manifest
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
-from colonnade.rays.scene import design_text
 
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT = ROOT / "out" / "browser"
@@ -74,10 +73,9 @@ def main() -> None:
         "rtl": rtl_code.read_bytes(),
         "teapot": ply(load_mesh("teapot")),
     }
-    design = design_text(manifests["edge"])
     for name, text in (
         ("index.html", bundle.page(contents)),
-        ("rays.js", bundle.ray_module(ray_code.read_bytes(), design)),
+        ("rays.js", bundle.ray_module(ray_code.read_bytes())),
     ):
         with replacing(OUTPUT / name) as stream:
             stream.write(text.encode())

@@ -64,12 +64,12 @@ def page(contents: Mapping[str, bytes]) -> str:
     return html
 
 
-def ray_module(code: bytes, design: str) -> str:
-    """An ES module that exports `MeshBVH`, with its WebAssembly and design."""
+def ray_module(code: bytes) -> str:
+    """An ES module that exports `MeshBVH`, with its WebAssembly."""
     inflated = "new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'))).arrayBuffer()"
     return f"""{joined(("design", "library", "raycast"))}
 const bytes = Uint8Array.from(atob("{base64_text(gzip.compress(code, 9, mtime=0))}"), (each) => each.charCodeAt(0));
-export const MeshBVH = await meshTrees(await {inflated}, {json.dumps(design)});
+export const MeshBVH = await meshTrees(await {inflated});
 """
 
 

@@ -12,10 +12,10 @@ const newScene = declared("int colonnade_rays_scene_new(void *device, _Out_ void
 const add = declared("int colonnade_rays_mesh_add(void *scene, const double *v, size_t nv, const uint32_t *f, size_t nf, _Out_ uint32_t *mesh)");
 const commit = declared("int colonnade_rays_commit(void *scene)");
 const all = declared(
-  "int colonnade_rays_all(void *scene, const double *rays, size_t count, uint32_t mode, size_t most, void *hits, size_t capacity, _Out_ size_t *found)",
+  "int colonnade_rays_all(void *scene, const double *rays, size_t count, uint32_t mode, uint32_t mask, size_t most, void *hits, size_t capacity, _Out_ size_t *found)",
 );
 
-const HIT_BYTES = 40, FACE_OFFSET = 28, ALL_MASKS = 0xff000000, CAPACITY = 4096;
+const HIT_BYTES = 40, FACE_OFFSET = 28, ALL_MASKS = 0xffffffff, CAPACITY = 4096;
 export const counts = { rays: 0, faces: 0 };
 const opened = [null];
 if (open(opened)) throw new Error("the library of rays has no device");
@@ -50,7 +50,7 @@ bvh.MeshBVH.prototype.raycast = function (ray, side, near = 0, far = Infinity) {
   const { scene, triangles } = sceneOf(this), { origin, direction } = ray, hits = new DataView(new ArrayBuffer(HIT_BYTES * CAPACITY));
   const found = [0], slack = 1e-6;
   const rays = new Float64Array([...origin.toArray(), Math.max(0, near - slack), ...direction.toArray(), far + slack]);
-  checked(all(scene, rays, 1, ALL_MASKS, CAPACITY, new Uint8Array(hits.buffer), CAPACITY, found));
+  checked(all(scene, rays, 1, 0, ALL_MASKS, CAPACITY, new Uint8Array(hits.buffer), CAPACITY, found));
   counts.rays++;
   counts.faces += Number(found[0]);
   const faces = Array.from({ length: Number(found[0]) }, (_, i) => triangles[hits.getUint32(i * HIT_BYTES + FACE_OFFSET, true)]);

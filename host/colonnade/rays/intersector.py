@@ -29,7 +29,7 @@ class RayMeshIntersector:
     def __init__(
         self,
         geometry: Any,
-        config: str = "edge",
+        config: str | None = None,
         overrides: Overrides = (),
         scale_to_box: bool = True,
         backend: Backend = "model",

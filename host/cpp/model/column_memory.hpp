@@ -27,12 +27,10 @@ public:
         given_ = given;
         roots_ = roots;
         recordCount_ = recordCount;
-        nodes_.clear();
         leaves_.clear();
-        nodeAt_.assign(recordCount, none);
+        slots_.assign(recordCount, Slot());
         leafAt_.assign(recordCount, none);
-        if (bvh)
-            for (const std::size_t root : roots) reach(root, leafRecords);
+        if (bvh) reach(roots, leafRecords);
         else
             for (std::size_t address = 0; address < recordCount; address += leafRecords) addLeaf(address);
         isDecoded_ = true;
@@ -40,11 +38,28 @@ public:
 
     std::uint32_t addressMask() const { return nodeDecoder_.addressMask(); }
 
-    const Node* nodeAt(std::size_t address) const { return address < recordCount_ ? &nodes_[nodeAt_[address]] : nullptr; }
-    const Leaf* leafAt(std::size_t address) const { return address < recordCount_ ? &leaves_[leafAt_[address]] : nullptr; }
+    /// `other` is where a record is decoded that the tree reads as a leaf, too.
+    const Node* nodeAt(std::size_t address, Node& other) const {
+        if (address >= recordCount_) return nullptr;
+        const Slot& slot = slots_[address];
+        if (slot.kind == Slot::Kind::node) return &slot.node;
+        other = nodeDecoder_.node(at(address), address);
+        return &other;
+    }
+
+    /// `other` is where a record is decoded that the tree reads as a node, too.
+    const LeafTriangles* leafAt(std::size_t address, std::optional<LeafTriangles>& other) const {
+        if (address >= recordCount_) return nullptr;
+        const Slot& slot = slots_[address];
+        if (slot.kind == Slot::Kind::leaf) return &slot.leaf;
+        return &other.emplace(leaves_[leafAt_[address]]);
+    }
+
+    /// Fetches a record that is read soon.
+    void prefetch(std::size_t address) const { __builtin_prefetch(slots_.data() + std::min(address, recordCount_)); }
 
     /// The attributes of a hit triangle, without colours.
-    Face faceOf(std::uint64_t id) const { return colonnade::faceOf(*leafAt(id / leafTriangles), static_cast<int>(id % leafTriangles), normalFraction_); }
+    Face faceOf(std::uint64_t id) const { return colonnade::faceOf(leaves_[leafAt_[id / leafTriangles]], static_cast<int>(id % leafTriangles), normalFraction_); }
 
     /// Reads the colours of a hit triangle; false if they are outside the scene.
     bool readColours(std::uint64_t id, Face& face) const {
@@ -57,27 +72,47 @@ public:
 private:
     static constexpr std::uint32_t none = UINT32_MAX;
 
+    /// A record as what it is reached for first, in a line of a processor's cache.
+    struct alignas(64) Slot {
+        enum class Kind : std::uint8_t { none, node, leaf };
+
+        Slot() : node{} {}
+        union {
+            Node node;
+            LeafTriangles leaf;
+        };
+        Kind kind = Kind::none;
+    };
+    static_assert(sizeof(Slot) == 64);
+
     const std::uint8_t* at(std::size_t address) const { return (address + 1) * recordBytes_ <= bytes_.size() ? bytes_.data() + address * recordBytes_ : zero_.data(); }
 
     void addLeaf(std::size_t address) {
         if (address >= recordCount_ || leafAt_[address] != none) return;
         leafAt_[address] = static_cast<std::uint32_t>(leaves_.size());
         leaves_.push_back(readLeaf(leafFields_, at(address)));
+        Slot& slot = slots_[address];
+        if (slot.kind != Slot::Kind::none) return;
+        slot.leaf = LeafTriangles(leaves_.back());
+        slot.kind = Slot::Kind::leaf;
     }
 
-    void reach(std::size_t root, std::size_t leafRecords) {
-        std::vector<std::size_t> waiting{root};
+    void reach(const std::vector<std::size_t>& roots, std::size_t leafRecords) {
+        std::vector<std::size_t> waiting(roots);
+        std::vector<bool> isReached(recordCount_);
         while (!waiting.empty()) {
             const std::size_t address = waiting.back();
             waiting.pop_back();
-            if (address >= recordCount_ || nodeAt_[address] != none) continue;
-            nodeAt_[address] = static_cast<std::uint32_t>(nodes_.size());
+            if (address >= recordCount_ || isReached[address]) continue;
+            isReached[address] = true;
             const Node node = nodeDecoder_.node(at(address), address);
-            nodes_.push_back(node);
+            if (Slot& slot = slots_[address]; slot.kind == Slot::Kind::none) {
+                slot.node = node;
+                slot.kind = Slot::Kind::node;
+            }
             if (!node.isLegal) continue;
-            for (int i = 0; i < node.nodes; ++i) waiting.push_back(node.first + static_cast<std::size_t>(i));
-            for (int i = 0; i < node.leaves; ++i)
-                addLeaf((node.first + static_cast<std::size_t>(node.nodes) + static_cast<std::size_t>(i) * leafRecords) & addressMask());
+            for (std::size_t i = 0; i < node.nodes; ++i) waiting.push_back(node.first + i);
+            for (std::size_t i = 0; i < node.leaves; ++i) addLeaf((node.first + node.nodes + i * leafRecords) & addressMask());
         }
     }
 
@@ -89,8 +124,8 @@ private:
     std::array<std::size_t, 3> given_{};
     std::vector<std::size_t> roots_;
     bool isDecoded_ = false;
-    std::vector<std::uint32_t> nodeAt_, leafAt_; ///< by address: index of what was decoded
-    std::vector<Node> nodes_;
+    std::vector<Slot> slots_;           ///< by address
+    std::vector<std::uint32_t> leafAt_; ///< by address: index of a leaf
     std::vector<Leaf> leaves_;
 };
 

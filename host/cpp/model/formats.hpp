@@ -116,12 +116,12 @@ using Layout = std::map<std::string, Field>;
 
 /// A node record. Illegal records (docs/errors.md) count as empty.
 struct Node {
-    bool isLegal;
-    Vector origin;
-    std::array<int, 3> exponent;
-    int nodes, leaves; ///< children of each kind, in this order, at consecutive records from `first`
-    std::array<std::array<std::int32_t, 3>, nodeChildren> low, high;
+    std::array<std::array<std::uint8_t, nodeChildren>, 3> low, high; ///< planes of the children, by axis
+    std::array<std::int32_t, 3> origin;
     std::uint32_t first;
+    std::array<std::int8_t, 3> exponent;
+    bool isLegal;
+    std::uint8_t nodes, leaves; ///< children of each kind, in this order, at consecutive records from `first`
 
     int children() const { return nodes + leaves; }
 };
@@ -160,18 +160,18 @@ public:
         bool isMarked = true;
         for (int axis = 0; axis < 3; ++axis) {
             // 2 · origin + 2^exponent: the lowest set bit is the exponent's
-            result.exponent[axis] = corner[axis] == 0 ? 0 : bitLength(static_cast<UnsignedWide>(corner[axis] & -corner[axis])) - 1;
-            result.origin[axis] = (corner[axis] & (corner[axis] - 1)) >> 1;
+            result.exponent[axis] = static_cast<std::int8_t>(corner[axis] == 0 ? 0 : bitLength(static_cast<UnsignedWide>(corner[axis] & -corner[axis])) - 1);
+            result.origin[axis] = static_cast<std::int32_t>((corner[axis] & (corner[axis] - 1)) >> 1);
             isMarked = isMarked && corner[axis] != 0 && result.exponent[axis] <= maxExponent_;
         }
         result.first = static_cast<std::uint32_t>(first_.read(record));
-        result.nodes = static_cast<int>(nodes_.read(record));
-        result.leaves = static_cast<int>(leaves_.read(record));
+        result.nodes = static_cast<std::uint8_t>(nodes_.read(record));
+        result.leaves = static_cast<std::uint8_t>(leaves_.read(record));
         for (int child = 0; child < nodeChildren; ++child) {
             const Vector low = read(low_[child], record), high = read(high_[child], record);
             for (int axis = 0; axis < 3; ++axis) {
-                result.low[child][axis] = static_cast<std::int32_t>(low[axis]);
-                result.high[child][axis] = static_cast<std::int32_t>(high[axis]);
+                result.low[axis][child] = static_cast<std::uint8_t>(low[axis]);
+                result.high[axis][child] = static_cast<std::uint8_t>(high[axis]);
             }
         }
         const bool isBelow = result.first > at && result.first + static_cast<std::uint64_t>(result.children()) <= addressMask() + std::uint64_t{1};

@@ -29,6 +29,29 @@ struct Leaf {
     }
 };
 
+/// What rays test of a leaf.
+struct LeafTriangles {
+    std::array<std::array<std::int32_t, 3>, 4> vertices;
+    std::uint8_t material;
+    bool isClear;
+    std::uint8_t count;
+
+    explicit LeafTriangles(const Leaf& leaf)
+        : vertices{}, material(static_cast<std::uint8_t>(leaf.material)), isClear(leaf.isClear), count(static_cast<std::uint8_t>(leaf.triangles())) {
+        for (int i = 0; i < leaf.corners(); ++i)
+            for (int a = 0; a < 3; ++a) vertices[i][a] = static_cast<std::int32_t>(leaf.vertices[i][a]);
+    }
+
+    std::array<Vector, 3> verticesOf(int triangle) const {
+        std::array<Vector, 3> result;
+        for (int i = 0; i < 3; ++i) {
+            const std::array<std::int32_t, 3>& vertex = vertices[Leaf::cornersOf(triangle)[i]];
+            result[i] = {vertex[0], vertex[1], vertex[2]};
+        }
+        return result;
+    }
+};
+
 /// The fields of leaf records, by the layouts of their formats.
 class LeafFields {
 public:

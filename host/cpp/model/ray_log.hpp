@@ -49,8 +49,8 @@ public:
     void addChild(const Node& node, int slot, std::uint32_t address, bool isHit) const {
         RayStep step{RayStep::Kind::child, static_cast<std::int32_t>(address), isHit, slot >= node.nodes, {}};
         for (int axis = 0; axis < 3; ++axis) {
-            step.values[axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.low[slot][axis]) << node.exponent[axis]));
-            step.values[3 + axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.high[slot][axis]) << node.exponent[axis]));
+            step.values[axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.low[axis][slot]) << node.exponent[axis]));
+            step.values[3 + axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.high[axis][slot]) << node.exponent[axis]));
         }
         add(step);
     }

@@ -28,39 +28,41 @@ struct RayFilter {
     bool cullsFront, cullsBack, refusesClear;
     int mask; ///< of leaves, in place of their material
 
-    bool accepts(const Hit& hit, const Leaf& leaf) const {
+    bool accepts(const Hit& hit, const LeafTriangles& leaf) const {
         return !(hit.backSide ? cullsBack : cullsFront) && !(refusesClear && hit.isClear) && (leaf.material & mask) != 0;
     }
 };
 
-/// Finds the hits of prepared rays. Copies share the column memory.
-class Tracer {
+/// What the rays of a scene do: counters, errors and steps of one thread.
+struct TraceRecord {
+    Counters counters{};
+    Errors errors{};
+    RayLog log;
+};
+
+/// Finds the hits of prepared rays in a scene that does not change, and notes what it did. It only refers to its arguments.
+class SceneSearch {
 public:
+    SceneSearch(const Numbers& numbers, const ColumnMemory& memory, const Frame& frame, TraceRecord& record)
+        : numbers_(numbers), memory_(memory), frame_(frame), record_(record) {}
+
     /// The closest hit of a prepared ray.
-    Hit trace(const Ray& ray, const RayFilter* filter = nullptr) {
+    Hit trace(const Ray& ray, const RayFilter* filter = nullptr) const {
         const Hit best = Hit::none(ray.tMax);
         if (!ray.enters) return best;
         const Hit hit = frame_.instances.empty() ? search(ray, filter, false).best : nearestOfInstances(ray, best);
-        if (hit.found) log.addHit(hit.id, static_cast<double>(hit.t));
+        if (hit.found) record_.log.addHit(hit.id, static_cast<double>(hit.t));
         return hit;
     }
 
     /// The occluders of a prepared shadow ray; the first opaque triangle ends the search.
-    Occlusion occlusion(const Ray& ray, const RayFilter* filter = nullptr) {
+    Occlusion occlusion(const Ray& ray, const RayFilter* filter = nullptr) const {
         if (!ray.enters) return Occlusion::none;
         return frame_.instances.empty() ? search(ray, filter, true).occlusion : occlusionByInstances(ray);
     }
 
-    Counters counters{};
-    Errors errors{};
-    RayLog log;
-
-protected:
-    Tracer(const Numbers& numbers, const std::map<std::string, Layout>& layouts) : numbers_(numbers), memory_(std::make_shared<ColumnMemory>(layouts, numbers)) {}
-
-    Numbers numbers_;
-    std::shared_ptr<ColumnMemory> memory_;
-    Frame frame_;
+    /// The first triangle that a traversal meets, not the closest one.
+    Hit anyHit(const Ray& ray, const RayFilter& filter) const { return ray.enters ? search(ray, &filter, true).occluder : Hit::none(ray.tMax); }
 
 private:
     struct StackEntry {
@@ -77,20 +79,21 @@ private:
         bool isShadow;
         const RayFilter* filter;
         Occlusion occlusion;
+        Hit occluder; ///< that ended the search of a shadow ray
 
         bool isOver() const { return occlusion == Occlusion::opaque; }
     };
 
     /// Traces a prepared ray from a root, by default that of the scene.
-    TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0) {
-        ++counters.raysInBox;
-        TraceState state{ray, frame_.roots[instance], Hit::none(ray.tMax), isShadow, filter, Occlusion::none};
+    TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0) const {
+        ++record_.counters.raysInBox;
+        TraceState state{ray, frame_.roots[instance], Hit::none(ray.tMax), isShadow, filter, Occlusion::none, Hit::none(ray.tMax)};
         run(state);
         return state;
     }
 
     /// The nearest hit of a ray of the world: the least (t, instance, id), t along that ray.
-    Hit nearestOfInstances(const Ray& world, Hit best) {
+    Hit nearestOfInstances(const Ray& world, Hit best) const {
         for (std::size_t i = 0; i < frame_.instances.size(); ++i) {
             if (!instances::mayEnter(world, world.tMax, frame_.instances[i].box, numbers_)) continue;
             const ObjectRay object = instances::toObject(world, best.t, frame_.instances[i], numbers_);
@@ -106,7 +109,7 @@ private:
     }
 
     /// What a shadow ray of the world meets; the first opaque triangle ends the search.
-    Occlusion occlusionByInstances(const Ray& world) {
+    Occlusion occlusionByInstances(const Ray& world) const {
         Occlusion occlusion = Occlusion::none;
         for (std::size_t i = 0; i < frame_.instances.size() && occlusion != Occlusion::opaque; ++i) {
             if (!instances::mayEnter(world, world.tMax, frame_.instances[i].box, numbers_)) continue;
@@ -117,66 +120,75 @@ private:
         return occlusion;
     }
 
-    void run(TraceState& state) {
+    void run(TraceState& state) const {
         if (numbers_.bvh) traverse(state);
         else
             for (std::size_t i = 0; (i == 0 || i < frame_.recordCount) && !state.isOver(); i += frame_.leafRecords()) testRecord(state, i);
     }
 
-    void testRecord(TraceState& state, std::size_t address) {
-        address &= memory_->addressMask();
-        const Leaf* const found = memory_->leafAt(address);
+    void testRecord(TraceState& state, std::size_t address) const {
+        address &= memory_.addressMask();
+        std::optional<LeafTriangles> other;
+        const LeafTriangles* const found = memory_.leafAt(address, other);
         if (!found) {
-            errors.illegalRecord = true;
+            record_.errors.illegalRecord = true;
             return;
         }
-        const Leaf& leaf = *found;
-        log.addRead(RayStep::Kind::record, address);
-        for (int i = 0; i < leaf.triangles(); ++i) {
-            ++counters.triangleTests;
+        const LeafTriangles& leaf = *found;
+        record_.log.addRead(RayStep::Kind::record, address);
+        for (int i = 0; i < leaf.count; ++i) {
+            ++record_.counters.triangleTests;
             Hit hit = state.best;
             const std::uint64_t id = leafTriangles * address + static_cast<std::uint64_t>(i);
-            const bool isHit = testTriangle(state.ray, leaf.verticesOf(i), id, numbers_, hit);
-            log.addTriangle(leaf.verticesOf(i), id, isHit);
+            const std::array<Vector, 3> vertices = leaf.verticesOf(i);
+            const bool isHit = testTriangle(state.ray, vertices, id, numbers_, hit);
+            record_.log.addTriangle(vertices, id, isHit);
             hit.isClear = leaf.isClear;
             if (!isHit || (state.filter && !state.filter->accepts(hit, leaf))) continue;
-            if (state.isShadow)
-                state.occlusion = std::max(state.occlusion, hit.isClear && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
-            else state.best = hit;
+            if (!state.isShadow) {
+                state.best = hit;
+                continue;
+            }
+            if (!state.isOver()) state.occluder = hit;
+            state.occlusion = std::max(state.occlusion, hit.isClear && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
         }
     }
 
-    void traverse(TraceState& state) {
+    void traverse(TraceState& state) const {
         const Hit& best = state.best;
+        const BoxTests boxes(state.ray, numbers_);
         std::array<StackEntry, 256> stack;
         std::size_t depth = 0;
+        Node other;
         std::uint64_t nodeVisits = 0;
         StackEntry next{false, static_cast<std::uint32_t>(state.root), 0};
-        for (bool busy = !errors.watchdog; busy;) {
+        for (bool busy = !record_.errors.watchdog; busy;) {
             busy = false;
             if (next.isLeaf) {
                 testRecord(state, next.address);
                 if (state.isOver()) return;
-            } else if (const Node* const found = memory_->nodeAt(next.address); !found) {
-                errors.illegalRecord = true;
+            } else if (const Node* const found = memory_.nodeAt(next.address, other); !found) {
+                record_.errors.illegalRecord = true;
             } else {
                 // A node visit takes at least one cycle
                 if (frame_.watchdogCycles != 0 && ++nodeVisits > frame_.watchdogCycles) {
-                    errors.watchdog = true;
+                    record_.errors.watchdog = true;
                     return;
                 }
-                ++counters.nodeReads;
+                ++record_.counters.nodeReads;
                 const Node& node = *found;
                 std::array<Entered, nodeChildren> entered;
                 int count = 0;
-                if (node.isLegal) count = testBoxes(state.ray, node, best.t, numbers_, entered, counters.boxTests);
-                else errors.illegalRecord = true;
-                if (log.isOn()) logNode(next.address, node, entered, count);
+                if (node.isLegal) count = boxes.test(node, best.t, entered, record_.counters.boxTests);
+                else record_.errors.illegalRecord = true;
+                if (record_.log.isOn()) logNode(next.address, node, entered, count);
                 for (int i = count - 1; i > 0; --i) {
-                    if (depth < static_cast<std::size_t>(numbers_.stackDepth)) stack[depth++] = entryOf(node, entered[i]);
-                    else errors.stackOverflow = true;
+                    const StackEntry entry = entryOf(node, entered[i]);
+                    memory_.prefetch(entry.address);
+                    if (depth < static_cast<std::size_t>(numbers_.stackDepth)) stack[depth++] = entry;
+                    else record_.errors.stackOverflow = true;
                 }
-                counters.deepestStack = std::max<std::uint64_t>(counters.deepestStack, depth);
+                record_.counters.deepestStack = std::max<std::uint64_t>(record_.counters.deepestStack, depth);
                 if (count > 0) {
                     next = entryOf(node, entered[0]);
                     busy = true;
@@ -190,19 +202,42 @@ private:
     }
 
     void logNode(std::uint32_t address, const Node& node, const std::array<Entered, nodeChildren>& entered, int count) const {
-        log.addRead(RayStep::Kind::node, address);
+        record_.log.addRead(RayStep::Kind::node, address);
         for (int slot = 0; node.isLegal && slot < node.children(); ++slot) {
             const bool isHit = std::any_of(entered.begin(), entered.begin() + count, [slot](const Entered& child) { return child.slot == slot; });
-            log.addChild(node, slot, entryOf(node, {slot, 0}).address, isHit);
+            record_.log.addChild(node, slot, entryOf(node, {slot, 0}).address, isHit);
         }
     }
 
     StackEntry entryOf(const Node& node, const Entered& child) const {
-        const auto slot = static_cast<std::uint32_t>(child.slot), nodes = static_cast<std::uint32_t>(node.nodes);
+        const auto slot = static_cast<std::uint32_t>(child.slot), nodes = std::uint32_t{node.nodes};
         const bool isLeaf = slot >= nodes;
         const std::uint32_t offset = isLeaf ? nodes + (slot - nodes) * static_cast<std::uint32_t>(frame_.leafRecords()) : slot;
-        return {isLeaf, (node.first + offset) & memory_->addressMask(), child.tNear};
+        return {isLeaf, (node.first + offset) & memory_.addressMask(), child.tNear};
     }
+
+    const Numbers& numbers_;
+    const ColumnMemory& memory_;
+    const Frame& frame_;
+    TraceRecord& record_;
+};
+
+/// Finds the hits of prepared rays. Copies share the column memory.
+class Tracer : public TraceRecord {
+public:
+    /// See `SceneSearch`.
+    Hit trace(const Ray& ray) { return search().trace(ray); }
+    Occlusion occlusion(const Ray& ray) { return search().occlusion(ray); }
+
+protected:
+    Tracer(const Numbers& numbers, const std::map<std::string, Layout>& layouts) : numbers_(numbers), memory_(std::make_shared<ColumnMemory>(layouts, numbers)) {}
+
+    Numbers numbers_;
+    std::shared_ptr<ColumnMemory> memory_;
+    Frame frame_;
+
+private:
+    SceneSearch search() { return {numbers_, *memory_, frame_, *this}; }
 };
 
 } // namespace colonnade

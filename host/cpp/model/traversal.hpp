@@ -1,5 +1,7 @@
 // BoxUnit and TriangleUnit (docs/numbers.md, sections 3 and 4).
 #pragma once
+#include <cstring>
+
 #include "ray_setup.hpp"
 
 namespace colonnade {
@@ -35,89 +37,133 @@ struct Entered {
     std::int64_t tNear;
 };
 
-/// A node as a ray sees it: everything that the box tests of its children share (docs/numbers.md, section 3).
-struct RelativeNode {
-    /// The distance along z' at which the ray reaches the node's first z plane, vertex units, and the exponent of the node there.
-    std::int64_t z;
-    int exponent;
-    /// By axis x', y': a floored and a raised plane's step, the first planes' near and far t, and the left shift of a sum of these to the children's t.
-    std::array<std::int64_t, 2> step, near, far;
-    std::array<int, 2> scale;
-    /// The pad along z', the ray's origin and its tMax, in the children's t.
-    std::int64_t pad, origin, tMax;
+/// A value of each child of a node. The widths of docs/numbers.md, section 3, fit 32 bits in all formats.
+using Lanes = std::int32_t __attribute__((vector_size(4 * nodeChildren)));
 
-    RelativeNode(const Ray& ray, const Node& node, std::int64_t tMaxInUnits, const Numbers& n) {
-        const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1, maxBase = (std::int64_t(1) << (n.nodeBits - 1)) - 1;
-        std::array<std::int64_t, 3> corner, span;
+/// Box tests of a ray (docs/numbers.md, section 3).
+class BoxTests {
+public:
+    BoxTests(const Ray& ray, const Numbers& n)
+        : n_(n), maxPlane_((std::int64_t(1) << n.boxBits) - 1), maxBase_((std::int64_t(1) << (n.nodeBits - 1)) - 1), maxNear_((std::int64_t(1) << (n.nearBits - 1)) - 1) {
         for (int a = 0; a < 3; ++a) {
-            const int axis = ray.objectAxis(a);
-            corner[a] = node.origin[axis] - ray.boxOrigin[a];
-            span[a] = maxPlane << node.exponent[axis];
+            axis_[a] = ray.objectAxis(a);
+            negative_[a] = ray.negative[a];
+            origin_[a] = ray.boxOrigin[a];
         }
-        exponent = node.exponent[ray.objectAxis(2)];
-        z = ray.negative[2] ? -(corner[2] + span[2]) : corner[2];
         for (int a = 0; a < 2; ++a) {
-            const int axisExponent = node.exponent[ray.objectAxis(a)], drop = n.reciprocalFraction - ray.exponent[a];
-            const int finest = axisExponent + ray.exponent[a] - n.stepFraction, lowest = std::max(finest, exponent - n.stepReach);
-            step[a] = ray.reciprocal[a] >> (n.reciprocalFraction - n.stepFraction + lowest - finest);
-            const std::int64_t product = corner[a] * ray.reciprocal[a];
-            const std::int64_t exact = (ray.negative[a] ? -product : product) - shiftLeft(z, drop);
-            const std::int64_t base = clamp(floorShift(exact, lowest + drop), -maxBase - 1, maxBase);
-            const std::int64_t pad = (((step[a] + 1) << n.boxPadLog) >> axisExponent) + 1;
-            scale[a] = lowest - (exponent - n.nearFraction);
-            const std::int64_t roundUp = scale[a] < 0 ? (std::int64_t(1) << -scale[a]) - 1 : 0;
-            near[a] = base - pad - (ray.negative[a] ? maxPlane * (step[a] + 1) : 0);
-            far[a] = base + pad + 1 + roundUp - (ray.negative[a] ? maxPlane * step[a] : 0);
+            reciprocal_[a] = ray.reciprocal[a];
+            exponent_[a] = ray.exponent[a];
         }
-        pad = std::int64_t(1) << std::max(0, n.boxPadLog + n.nearFraction - exponent);
-        const std::int64_t maxNear = (std::int64_t(1) << (n.nearBits - 1)) - 1;
-        origin = scaled(-z, n.nearFraction - exponent, maxNear);
-        tMax = scaled(tMaxInUnits - z, n.nearFraction - exponent, maxNear);
     }
 
-    /// t · 2^scale, rounded down and saturated to −high − 1 … high.
-    static std::int64_t scaled(std::int64_t t, int scale, std::int64_t high) {
-        const std::int64_t low = -high - 1;
-        if (scale <= 0) return clamp(t >> std::min(-scale, 63), low, high);
-        const int shift = std::min(scale, 62);
-        if (t > high >> shift) return high;
-        if (t < low >> shift) return low;
-        return std::max(t * (std::int64_t(1) << shift), low);
+    /// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
+    int test(const Node& node, std::int64_t tMax, std::array<Entered, nodeChildren>& entered, std::uint64_t& tests) const {
+        tests += static_cast<std::uint64_t>(node.children());
+        // The distance along z' at which the ray reaches the node's first z plane, vertex units, and the exponent of the node there
+        const int exponent = node.exponent[axis_[2]];
+        const std::int64_t cornerZ = node.origin[axis_[2]] - origin_[2], z = negative_[2] ? -(cornerZ + (maxPlane_ << exponent)) : cornerZ;
+        // The planes along z', the ray's origin and its tMax, in the children's t
+        const int toNear = n_.nearFraction - exponent;
+        const Lanes pad = all(std::int64_t(1) << std::max(0, n_.boxPadLog + toNear));
+        const Planes along = planesOf(node, 2);
+        Lanes tNear = greatest(all(scaled(-z, toNear)), along.first * (1 << n_.nearFraction) - pad);
+        Lanes tFar = least(all(scaled(tMaxUnits(tMax, n_) - z, toNear)), along.last * (1 << n_.nearFraction) + pad);
+        for (int a = 0; a < 2; ++a) {
+            const Side side(*this, a, node.origin[axis_[a]] - origin_[a], node.exponent[axis_[a]], z, exponent);
+            const Planes planes = planesOf(node, a);
+            const Lanes step = all(side.step);
+            tNear = greatest(tNear, scaled(all(side.near) + planes.first * step, side.scale));
+            tFar = least(tFar, scaled(all(side.far) + planes.last * (step + 1), side.scale));
+        }
+        const Lanes misses = tNear > tFar;
+        int count = 0;
+        for (int slot = 0; slot < node.children(); ++slot) {
+            if (misses[slot]) continue;
+            const std::int64_t t = tNear[slot];
+            int position = count++;
+            for (; position > 0 && entered[position - 1].tNear > t; --position) entered[position] = entered[position - 1];
+            entered[position] = {slot, t};
+        }
+        // A child's t in vertex units, rounded down
+        for (int i = 0; i < count; ++i) entered[i].tNear = std::max<std::int64_t>(0, z + floorShift(entered[i].tNear, toNear));
+        return count;
     }
 
-    /// A child's t in vertex units, rounded down.
-    std::int64_t units(std::int64_t t, const Numbers& n) const { return std::max<std::int64_t>(0, z + floorShift(t, n.nearFraction - exponent)); }
+private:
+    /// The first and the last plane of each child that the ray crosses along an axis, from the node's first one.
+    struct Planes {
+        Lanes first, last;
+    };
+
+    /// What the children of a node share along axis x' or y': a floored and, plus 1, a raised plane's step, the first planes' near and far t,
+    /// and the left shift of a sum of these to the children's t.
+    struct Side {
+        std::int64_t step, near, far;
+        int scale;
+
+        Side(const BoxTests& of, int a, std::int64_t corner, int axisExponent, std::int64_t z, int exponent) {
+            const Numbers& n = of.n_;
+            const int drop = n.reciprocalFraction - of.exponent_[a], finest = axisExponent + of.exponent_[a] - n.stepFraction;
+            // Not below 0 and at least `finest`, so no shift is negative, and those to the children's t are short
+            const int lowest = std::max(finest, exponent - n.stepReach);
+            step = of.reciprocal_[a] >> std::min(63, n.reciprocalFraction - n.stepFraction + lowest - finest);
+            const std::int64_t product = corner * of.reciprocal_[a], exact = (of.negative_[a] ? -product : product) - (z << drop);
+            const std::int64_t base = clamp(exact >> std::min(63, lowest + drop), -of.maxBase_ - 1, of.maxBase_);
+            const std::int64_t pad = (((step + 1) << n.boxPadLog) >> axisExponent) + 1;
+            scale = lowest - (exponent - n.nearFraction);
+            const std::int64_t roundUp = (std::int64_t(1) << std::max(0, -scale)) - 1;
+            near = base - pad - (of.negative_[a] ? of.maxPlane_ * (step + 1) : 0);
+            far = base + pad + 1 + roundUp - (of.negative_[a] ? of.maxPlane_ * step : 0);
+        }
+    };
+
+    static Lanes least(Lanes one, Lanes other) { return one < other ? one : other; }
+    static Lanes greatest(Lanes one, Lanes other) { return one > other ? one : other; }
+    static Lanes all(std::int64_t value) {
+        const auto each = static_cast<std::int32_t>(value);
+        return Lanes{each, each, each, each};
+    }
+
+    static Lanes lanesOf(std::uint32_t bytes) {
+        using Bytes = std::uint8_t __attribute__((vector_size(nodeChildren)));
+        Bytes each;
+        std::memcpy(&each, &bytes, sizeof each);
+        return __builtin_convertvector(each, Lanes);
+    }
+
+    Planes planesOf(const Node& node, int a) const {
+        std::uint32_t low, high;
+        std::memcpy(&low, node.low[axis_[a]].data(), sizeof low);
+        std::memcpy(&high, node.high[axis_[a]].data(), sizeof high);
+        if (!negative_[a]) return {lanesOf(low), lanesOf(high)};
+        // Counted from the other side: all bits of a plane change
+        const std::uint32_t flip = static_cast<std::uint32_t>(maxPlane_) * 0x01010101u;
+        return {lanesOf(high ^ flip), lanesOf(low ^ flip)};
+    }
+
+    /// t · 2^scale, rounded down and saturated to `nearBits` bits.
+    std::int64_t scaled(std::int64_t t, int scale) const {
+        if (scale <= 0) return clamp(t >> std::min(-scale, 63), -maxNear_ - 1, maxNear_);
+        // All but 0 saturate by `nearBits` places
+        const int shift = std::min(scale, n_.nearBits);
+        return clamp(clamp(t, -maxNear_ - 1, maxNear_) * (std::int64_t(1) << shift), -maxNear_ - 1, maxNear_);
+    }
+
+    Lanes scaled(Lanes t, int scale) const {
+        const Lanes high = all(maxNear_), low = ~high;
+        if (scale <= 0) t = t >> -scale;
+        else t = least(greatest(t, low), high) * (1 << std::min(scale, n_.nearBits));
+        return least(greatest(t, low), high);
+    }
+
+    const Numbers& n_;
+    std::int64_t maxPlane_, maxBase_, maxNear_;
+    std::array<int, 3> axis_;
+    std::array<bool, 3> negative_;
+    std::array<std::int64_t, 3> origin_;
+    std::array<std::int64_t, 2> reciprocal_;
+    std::array<int, 2> exponent_;
 };
-
-/// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
-inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, nodeChildren>& entered, std::uint64_t& tests) {
-    const RelativeNode relative(ray, node, tMaxUnits(tMax, n), n);
-    const std::int64_t maxPlane = (std::int64_t(1) << n.boxBits) - 1, high = (std::int64_t(1) << (n.nearBits - 1)) - 1;
-    const std::array<int, 3> axes = {ray.objectAxis(0), ray.objectAxis(1), ray.objectAxis(2)};
-    int count = 0;
-    for (int slot = 0; slot < node.children(); ++slot) {
-        ++tests;
-        std::int64_t tNear = relative.origin, tFar = relative.tMax;
-        for (int a = 0; a < 3; ++a) {
-            const std::int64_t lower = node.low[slot][axes[a]], upper = node.high[slot][axes[a]];
-            const std::int64_t first = ray.negative[a] ? maxPlane - upper : lower, last = ray.negative[a] ? maxPlane - lower : upper;
-            if (a < 2) {
-                const std::int64_t near = relative.near[a] + first * relative.step[a], far = relative.far[a] + last * (relative.step[a] + 1);
-                tNear = std::max(tNear, RelativeNode::scaled(near, relative.scale[a], high));
-                tFar = std::min(tFar, RelativeNode::scaled(far, relative.scale[a], high));
-            } else {
-                tNear = std::max(tNear, (first << n.nearFraction) - relative.pad);
-                tFar = std::min(tFar, (last << n.nearFraction) + relative.pad);
-            }
-        }
-        if (tNear > tFar) continue;
-        int position = count++;
-        for (; position > 0 && entered[position - 1].tNear > tNear; --position) entered[position] = entered[position - 1];
-        entered[position] = {slot, tNear};
-    }
-    for (int i = 0; i < count; ++i) entered[i].tNear = relative.units(entered[i].tNear, n);
-    return count;
-}
 
 /// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which begins as `Hit::none`.
 template <class Product> bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best) {

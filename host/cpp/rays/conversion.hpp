@@ -34,8 +34,14 @@ inline float nearestFloat(std::uint64_t numerator, std::uint64_t denominator, in
     if (numerator == 0) return 0;
     // A quotient of 26 or 27 digits, and a bit for the rest
     const int shift = 26 + bitLength(denominator) - bitLength(numerator);
-    const UnsignedWide dividend = shift >= 0 ? UnsignedWide(numerator) << shift : numerator, divisor = shift >= 0 ? denominator : UnsignedWide(denominator) << -shift;
-    const auto digits = static_cast<std::int64_t>(dividend / divisor << 1 | (dividend % divisor != 0));
+    std::int64_t digits;
+    if (shift >= 0 && bitLength(numerator) + shift <= 64) {
+        const std::uint64_t dividend = numerator << shift;
+        digits = static_cast<std::int64_t>(dividend / denominator << 1 | (dividend % denominator != 0));
+    } else {
+        const UnsignedWide dividend = shift >= 0 ? UnsignedWide(numerator) << shift : numerator, divisor = shift >= 0 ? denominator : UnsignedWide(denominator) << -shift;
+        digits = static_cast<std::int64_t>(dividend / divisor << 1 | (dividend % divisor != 0));
+    }
     const int drop = bitLength(digits) - 24;
     const double nearest = std::ldexp(static_cast<double>(nearestEven(digits, drop)), drop - 1 - shift + exponent);
     if (nearest < std::numeric_limits<float>::min()) return 0;
@@ -84,9 +90,10 @@ public:
         }
         if (largest == std::numeric_limits<int>::min()) return result;
         for (int a = 0; a < 3; ++a) {
-            Wide& component = result.request.direction[a];
-            if (component != 0 && exponents[a] == largest) dominant = std::max(dominant, static_cast<int>(magnitude(component)));
-            component = nearestEven(component, std::min(largest - exponents[a] - (directionBits_ - 2 - 24), 100));
+            // At most directionBits, 64
+            const auto mantissa = static_cast<std::int64_t>(result.request.direction[a]);
+            if (mantissa != 0 && exponents[a] == largest) dominant = std::max(dominant, static_cast<int>(magnitude(mantissa)));
+            result.request.direction[a] = nearestEven(mantissa, std::min(largest - exponents[a] - (directionBits_ - 2 - 24), 62));
         }
         setStep(result, dominant, largest);
         result.request.tMin = near.mantissa > 0 ? std::min<Wide>(steps(near, result, true), n_.unlimited()) : 0;
@@ -103,12 +110,16 @@ public:
         ray.exponent = 48 - exponent - placement_.exponent - n_.gridFraction;
     }
 
+    /// The id of a hit, with its bits.
+    static std::uint32_t idOf(const Hit& hit) {
+        return static_cast<std::uint32_t>(hit.id) | (hit.backSide ? COLONNADE_RAYS_BACK_SIDE : 0) | (hit.isClear ? COLONNADE_RAYS_NON_OPAQUE : 0);
+    }
+
     /// A hit in the application's numbers.
     colonnade_rays_response hitOf(const ConvertedRay& converted, const Ray& ray, const Hit& hit) const {
         const auto steps = static_cast<std::uint64_t>(floorShift<Wide>(ray.tEntry, -n_.gridFraction) + hit.t);
         const auto sum = static_cast<std::uint64_t>(hit.weights[0] + hit.weights[1] + hit.weights[2]);
-        const std::uint32_t flags = (hit.backSide ? COLONNADE_RAYS_BACK_SIDE : 0) | (hit.isClear ? COLONNADE_RAYS_NON_OPAQUE : 0);
-        return {nearestFloat(steps, converted.product, converted.exponent), static_cast<std::uint32_t>(hit.id) | flags,
+        return {nearestFloat(steps, converted.product, converted.exponent), idOf(hit),
                 nearestFloat(static_cast<std::uint64_t>(hit.weights[1]), sum, 0), nearestFloat(static_cast<std::uint64_t>(hit.weights[2]), sum, 0)};
     }
 
@@ -128,8 +139,11 @@ private:
         const Float value(coordinate);
         const int left = value.exponent - 24 + n_.gridFraction + placement_.exponent + Placement::fractionBits;
         if (value.mantissa != 0 && left > 62 - 24) return false;
-        const Wide fixed = nearestEven<Wide>(value.mantissa, std::min(-left, 100));
-        position = nearestEven<Wide>((fixed - base) * placement_.mantissa, Placement::scaleBits + Placement::fractionBits);
+        constexpr int shift = Placement::scaleBits + Placement::fractionBits;
+        const std::int64_t fixed = nearestEven<std::int64_t>(value.mantissa, std::min(-left, 62));
+        const Wide distance = Wide(fixed) - base;
+        if (magnitude(distance) >> (62 - Placement::scaleBits) == 0) position = nearestEven(static_cast<std::int64_t>(distance) * placement_.mantissa, shift);
+        else position = nearestEven(distance * placement_.mantissa, shift);
         return magnitude(position) >> (n_.gridBits + 1) == 0;
     }
 

@@ -89,9 +89,7 @@ void rtcDisableGeometry(void* handle) { geometry(handle).isEnabled = false; }
 void rtcSetGeometryUserData(void* handle, void* user) { geometry(handle).user = user; }
 void* rtcGetGeometryUserData(void* handle) { return geometry(handle).user; }
 void rtcSetGeometryMask(void* handle, unsigned mask) {
-    // Masks of the device have 8 bits
-    if (mask != 0xffffffff && mask > 0xff) geometry(handle).device->fail(invalidArgument, "a mask has more than 8 bits");
-    else geometry(handle).mask = mask;
+    geometry(handle).mask = mask;
 }
 void rtcSetSharedGeometryBuffer(void* handle, int type, unsigned slot, int format, void* data, std::size_t offset, std::size_t stride, std::size_t count) {
     Device& device = *geometry(handle).device;
@@ -151,7 +149,7 @@ void rtcCommitScene(void* handle) {
         const int status = colonnade_rays_mesh_add(to.rays, to.vertices.back().data(), vertices.size() / 3, to.faces.back().data(), to.faces.back().size() / 3, &mesh);
         if (status == COLONNADE_RAYS_OK) {
             to.ids.push_back(id);
-            to.device->check(colonnade_rays_mesh_mask(to.rays, mesh, static_cast<std::uint8_t>(each->mask)));
+            to.device->check(colonnade_rays_mesh_mask(to.rays, mesh, each->mask));
             continue;
         }
         to.device->check(status);

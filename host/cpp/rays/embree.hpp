@@ -116,7 +116,6 @@ inline void release(Geometry* geometry) {
 }
 
 inline colonnade_rays_ray rayOf(const RTCRay& r) { return {{r.org[0], r.org[1], r.org[2]}, r.tnear, {r.dir[0], r.dir[1], r.dir[2]}, r.tfar}; }
-inline unsigned modeOf(const RTCRay& ray) { return ray.mask << COLONNADE_RAYS_MASK_SHIFT; }
 
 /// A ray without an interval is not active, and keeps its bytes.
 inline bool isActive(const RTCRay& ray) { return ray.tnear <= ray.tfar && ray.tfar >= 0; }
@@ -153,7 +152,7 @@ inline bool takeFiltered(Scene& scene, RTCRayHit& query, bool isOcclusion, const
     std::vector<colonnade_rays_hit> hits(16);
     for (std::size_t count = 0;; hits.resize(count)) {
         const std::lock_guard lock(scene.device->calls);
-        scene.device->check(colonnade_rays_all(scene.rays, &ray, 1, modeOf(query.ray), SIZE_MAX, hits.data(), hits.size(), &count));
+        scene.device->check(colonnade_rays_all(scene.rays, &ray, 1, 0, query.ray.mask, SIZE_MAX, hits.data(), hits.size(), &count));
         if (count > hits.size()) continue;
         hits.resize(count);
         break;
@@ -168,22 +167,22 @@ inline bool takeFiltered(Scene& scene, RTCRayHit& query, bool isOcclusion, const
     return false;
 }
 
-/// Calls `trace` with the active rays of a packet that follow each other and have the same mask: rays, their queries, count and mode.
+/// Calls `trace` with the active rays of a packet that follow each other and have the same mask: rays, their queries, count and mask.
 template <class Trace> void eachBatch(RTCRayHit* queries, std::size_t count, const Trace& trace) {
     for (std::size_t next = 0; next < count;) {
         colonnade_rays_ray rays[packetRays];
         RTCRayHit* of[packetRays];
         std::size_t active = 0;
-        unsigned mode = 0;
+        unsigned mask = 0;
         for (; next < count; ++next) {
             const RTCRay& ray = queries[next].ray;
             if (!isActive(ray)) continue;
-            if (active != 0 && modeOf(ray) != mode) break;
-            mode = modeOf(ray);
+            if (active != 0 && ray.mask != mask) break;
+            mask = ray.mask;
             rays[active] = rayOf(ray);
             of[active++] = &queries[next];
         }
-        if (active != 0) trace(rays, of, active, mode);
+        if (active != 0) trace(rays, of, active, mask);
     }
 }
 
@@ -193,12 +192,12 @@ inline void intersect(Scene& scene, RTCRayHit* queries, std::size_t count, const
     for (std::size_t i = 0; hasFilters && i < count; ++i)
         if (isActive(queries[i].ray)) takeFiltered(scene, queries[i], false, arguments);
     if (hasFilters) return;
-    eachBatch(queries, count, [&](const colonnade_rays_ray* rays, RTCRayHit* const* of, std::size_t active, unsigned mode) {
+    eachBatch(queries, count, [&](const colonnade_rays_ray* rays, RTCRayHit* const* of, std::size_t active, unsigned mask) {
         colonnade_rays_hit hits[packetRays];
         std::fill_n(hits, active, colonnade_rays_hit{0, 0, 0, UINT32_MAX, UINT32_MAX, 0, 0});
         {
             const std::lock_guard lock(scene.device->calls);
-            scene.device->check(colonnade_rays_closest(scene.rays, rays, active, mode, hits));
+            scene.device->check(colonnade_rays_closest(scene.rays, rays, active, 0, mask, hits));
         }
         for (std::size_t i = 0; i < active; ++i)
             if (hits[i].face != UINT32_MAX) take(scene, hits[i], *of[i]);
@@ -214,11 +213,11 @@ inline void occlude(Scene& scene, RTCRayHit* queries, std::size_t count, const Q
         if (isActive(candidate.ray) && takeFiltered(scene, candidate, true, arguments)) end(queries[i]);
     }
     if (hasFilters) return;
-    eachBatch(queries, count, [&](const colonnade_rays_ray* rays, RTCRayHit* const* of, std::size_t active, unsigned mode) {
+    eachBatch(queries, count, [&](const colonnade_rays_ray* rays, RTCRayHit* const* of, std::size_t active, unsigned mask) {
         std::uint8_t isOccluded[packetRays] = {};
         {
             const std::lock_guard lock(scene.device->calls);
-            scene.device->check(colonnade_rays_occluded(scene.rays, rays, active, mode, isOccluded));
+            scene.device->check(colonnade_rays_occluded(scene.rays, rays, active, 0, mask, isOccluded));
         }
         for (std::size_t i = 0; i < active; ++i)
             if (isOccluded[i]) end(*of[i]);

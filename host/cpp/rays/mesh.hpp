@@ -1,5 +1,9 @@
 // The faces of a scene as the application has them: hits in double, and the faces around a face.
 #pragma once
+#include <atomic>
+#include <cmath>
+#include <memory>
+#include <mutex>
 #include <optional>
 
 #include "mesh/topology.hpp"
@@ -20,47 +24,70 @@ public:
     const std::vector<mesh::Vector>& vertices() const { return vertices_; }
     const std::vector<mesh::Face>& faces() const { return faces_; }
 
-    /// Nothing for a ray along the face's plane.
+    bool hasArea(std::size_t index) const {
+        const mesh::Face& face = faces_[index];
+        const mesh::Vector& corner = vertices_[face[0]];
+        const mesh::Vector area = mesh::cross(mesh::difference(vertices_[face[1]], corner), mesh::difference(vertices_[face[2]], corner));
+        return area[0] != 0 || area[1] != 0 || area[2] != 0;
+    }
+
+    /// Nothing for a ray along the face's plane, or one whose numbers overflow.
     std::optional<PlaneHit> hit(std::size_t index, const double* origin, const double* direction) const {
         const mesh::Face& face = faces_[index];
         const mesh::Vector &corner = vertices_[face[0]], d{direction[0], direction[1], direction[2]};
         const mesh::Vector e1 = mesh::difference(vertices_[face[1]], corner), e2 = mesh::difference(vertices_[face[2]], corner);
         const mesh::Vector s = mesh::difference({origin[0], origin[1], origin[2]}, corner), p = mesh::cross(d, e2), q = mesh::cross(s, e1);
         const double determinant = dot(e1, p);
-        if (determinant == 0) return std::nullopt;
+        if (determinant == 0 || !std::isfinite(determinant)) return std::nullopt;
         const double u = dot(s, p) / determinant, v = dot(d, q) / determinant;
-        return PlaneHit{dot(e2, q) / determinant, u, v, std::min({u, v, 1 - u - v}), determinant < 0};
+        const PlaneHit hit{dot(e2, q) / determinant, u, v, std::min({u, v, 1 - u - v}), determinant < 0};
+        return std::isfinite(hit.t) && std::isfinite(hit.u) && std::isfinite(hit.v) ? std::optional(hit) : std::nullopt;
     }
 
     /// The faces with a corner at the place of one of this face's, itself among them. `function` is called once or more for each.
-    template <class Function> void around(std::size_t index, const Function& function) {
-        if (first_.empty()) findNeighbours();
+    template <class Function> void around(std::size_t index, const Function& function) const {
+        const Neighbours& near = neighbours();
         for (int corner = 0; corner < 3; ++corner) {
-            const std::int64_t position = positions_[faces_[index][corner]];
-            for (std::size_t i = first_[position]; i < first_[position + 1]; ++i) function(at_[i]);
+            const std::int64_t position = near.positions[faces_[index][corner]];
+            for (std::size_t i = near.first[position]; i < near.first[position + 1]; ++i) function(near.at[i]);
         }
     }
 
 private:
     static double dot(const mesh::Vector& a, const mesh::Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-    void findNeighbours() {
+    /// Faces by the places of their corners: those of place p are at[first[p]] … at[first[p + 1] - 1].
+    struct Neighbours {
+        std::vector<std::int64_t> positions; ///< of the vertices
+        std::vector<std::size_t> first, at;
+        std::mutex finding;
+        std::atomic<bool> areFound{false};
+    };
+
+    const Neighbours& neighbours() const {
+        if (neighbours_->areFound.load(std::memory_order_acquire)) return *neighbours_;
+        const std::lock_guard<std::mutex> lock(neighbours_->finding);
+        if (!neighbours_->areFound) findNeighbours(*neighbours_);
+        neighbours_->areFound.store(true, std::memory_order_release);
+        return *neighbours_;
+    }
+
+    void findNeighbours(Neighbours& to) const {
         const mesh::MergedRows<double> merged = mesh::mergeRows(vertices_.data(), vertices_.size());
-        positions_ = merged.index;
-        first_.assign(merged.rows.size() + 1, 0);
+        to.positions = merged.index;
+        to.first.assign(merged.rows.size() + 1, 0);
         for (const mesh::Face& face : faces_)
-            for (int corner = 0; corner < 3; ++corner) ++first_[positions_[face[corner]] + 1];
-        for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-        at_.resize(first_.back());
-        std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
+            for (int corner = 0; corner < 3; ++corner) ++to.first[to.positions[face[corner]] + 1];
+        for (std::size_t i = 1; i < to.first.size(); ++i) to.first[i] += to.first[i - 1];
+        to.at.resize(to.first.back());
+        std::vector<std::size_t> next(to.first.begin(), to.first.end() - 1);
         for (std::size_t i = 0; i < faces_.size(); ++i)
-            for (int corner = 0; corner < 3; ++corner) at_[next[positions_[faces_[i][corner]]]++] = i;
+            for (int corner = 0; corner < 3; ++corner) to.at[next[to.positions[faces_[i][corner]]]++] = i;
     }
 
     std::vector<mesh::Vector> vertices_;
     std::vector<mesh::Face> faces_;
-    std::vector<std::int64_t> positions_;
-    std::vector<std::size_t> first_, at_;
+    std::unique_ptr<Neighbours> neighbours_ = std::make_unique<Neighbours>();
 };
 
 } // namespace colonnade::rays

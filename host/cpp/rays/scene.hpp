@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "design.hpp"
+#include "masks.hpp"
 #include "mesh.hpp"
 #include "tracer.hpp"
 
@@ -19,62 +20,108 @@ struct MeshPart {
     std::vector<mesh::Vector> vertices;
     std::vector<mesh::Face> faces;
     std::vector<std::uint8_t> isOpaque; ///< empty: all
-    std::uint8_t mask = 0xff;
+    std::uint32_t mask = UINT32_MAX;
     bool isEnabled = true;
 };
 
-/// What a committed scene is to the device and to the library.
+/// What a committed scene is to the device and to the library. After `pack` it does not change, but for the neighbours of faces,
+/// which the first thread that needs them finds.
 class PackedScene {
 public:
-    /// The faces of the enabled meshes, joined.
-    PackedScene(const Design& design, const std::vector<std::unique_ptr<MeshPart>>& meshes) : gridFraction_(design.number("gridFraction")) {
+    /// Rounds the faces of the enabled meshes, joined, to the grid of a design.
+    PackedScene(const Design& design, const std::vector<std::unique_ptr<MeshPart>>& meshes) : design_(design) {
         join(meshes);
-        if (faces_.faces().empty()) return;
+        if (isEmpty()) return;
         const packer::QuantiseOptions options{Placement::scaleBits, true};
         quantised_ =
             packer::quantise(faces_.vertices().data(), faces_.vertices().size(), faces_.faces().data(), faces_.faces().size(), design.format.vertexBits, options);
-        if (quantised_.faces.empty())
-            throw Failure(COLONNADE_RAYS_BAD_MESH, "no face keeps an area at " + std::to_string(design.format.vertexBits) + " bits a coordinate: use a design with more");
+        unit_ = 1 / quantised_.scale;
+        edge_ = std::ldexp(unit_, design.format.vertexBits);
+        std::size_t whole = 0;
+        for (std::size_t i = 0; i < faces_.faces().size(); ++i) whole += faces_.hasArea(i);
+        dropped_ = whole - std::min(whole, quantised_.faces.size());
+    }
+
+    /// Faces with an area that the grid drops: their corners become one line.
+    std::size_t dropped() const { return dropped_; }
+
+    /// Why the grid is too coarse; nothing if it is not.
+    std::string whyTooCoarse() const {
+        const std::size_t count = faces_.faces().size();
+        const bool isLost = count != 0 && quantised_.faces.empty();
+        if (!isLost && dropped_ <= count / mostDropped) return {};
+        return (isLost ? "no face keeps an area at " : std::to_string(dropped_) + " of " + std::to_string(count) + " faces vanish at ") +
+               std::to_string(design_.format.vertexBits) + " bits a coordinate: " + (design_.format.vertexBits < mostBits ? "use a design with more, or " : "") +
+               "leave out what widens the box";
+    }
+
+    /// Makes the records; with a model, what traces them.
+    void pack(bool hasModel) {
+        if (isEmpty()) return;
         const std::size_t count = faces_.faces().size();
         const std::vector<std::array<mesh::Vector, 3>> normals(count);
         const packer::FaceAttributes attributes{normals.data(), masks_.data(), isClear_.data(), nullptr};
-        tree_ = packer::buildTree(quantised_, attributes, design.format);
-        packer_ = std::make_unique<packer::RecordPacker>(quantised_, attributes, tree_, design.format);
-        checkFit(design);
-        indices_ = packer_->indices();
-        rotations_ = packer_->rotations();
-        records_ = packer_->records();
-        describe(design);
+        tree_ = packer::buildTree(quantised_, attributes, design_.format);
+        const packer::RecordPacker packer(quantised_, attributes, tree_, design_.format);
+        checkFit(packer.sections());
+        const std::vector<std::int64_t> indices = packer.indices();
+        const std::vector<std::uint8_t> rotations = packer.rotations();
+        faceOfId_.assign(indices.size(), noFace);
+        rotationOfId_.assign(indices.size(), 0);
+        for (std::size_t id = 0; id < indices.size(); ++id) {
+            if (indices[id] < 0) continue;
+            faceOfId_[id] = static_cast<std::uint32_t>(quantised_.meshFaces[tree_.order[static_cast<std::size_t>(indices[id])]]);
+            rotationOfId_[id] = rotations[static_cast<std::size_t>(indices[id])];
+        }
+        records_ = packer.records();
+        describe(packer.sections());
+        if (hasModel) model_ = std::make_unique<RayModel>(Numbers(design_.numbers), design_.number("directionBits"), design_.format.layouts, image_);
     }
 
     bool isEmpty() const { return faces_.faces().empty(); }
+    const RayModel* model() const { return model_.get(); }
+    const Design& design() const { return design_; }
+    const MaskMap& masks() const { return maskMap_; }
     Faces& faces() { return faces_; }
     const Faces& faces() const { return faces_; }
     const colonnade_rays_image& image() const { return image_; }
     const std::array<double, 3>& corner() const { return corner_; }
-    double unit() const { return 1 / quantised_.scale; }
+    double unit() const { return unit_; }
+    /// That of the cube of all vertex units.
+    double edge() const { return edge_; }
 
     std::uint32_t meshOf(std::size_t face) const { return owners_[face].first; }
     std::uint32_t faceOf(std::size_t face) const { return owners_[face].second; }
-    std::uint8_t maskOf(std::size_t face) const { return masks_[face]; }
+    std::uint32_t maskOf(std::size_t face) const { return meshMasks_[owners_[face].first]; }
     bool isOpaque(std::size_t face) const { return isClear_[face] == 0; }
 
     /// The face of a packed id; all ones for an id of none.
     std::size_t faceOfId(std::uint32_t id) const {
-        return id < indices_.size() && indices_[id] >= 0 ? static_cast<std::size_t>(quantised_.meshFaces[tree_.order[indices_[id]]]) : ~std::size_t{0};
+        return id < faceOfId_.size() && faceOfId_[id] != noFace ? faceOfId_[id] : ~std::size_t{0};
     }
 
-    /// u, v of an response by the corners of the face.
+    /// u, v of a response by the corners of the face.
     std::array<double, 2> weightsOf(const colonnade_rays_response& response) const {
         const std::uint32_t id = response.id & ~(COLONNADE_RAYS_BACK_SIDE | COLONNADE_RAYS_NON_OPAQUE);
         const double packed[3] = {std::max(0.0, 1.0 - response.u - response.v), response.u, response.v};
         double weights[3];
-        for (int i = 0; i < 3; ++i) weights[(rotations_[static_cast<std::size_t>(indices_[id])] + i) % 3] = packed[i];
+        for (int i = 0; i < 3; ++i) weights[(rotationOfId_[id] + i) % 3] = packed[i];
         return {weights[1], weights[2]};
     }
 
 private:
+    static constexpr std::uint32_t noFace = UINT32_MAX;
+    /// Of the faces, one in so many may vanish.
+    static constexpr std::size_t mostDropped = 100;
+    static constexpr int mostBits = 24;
+
     void join(const std::vector<std::unique_ptr<MeshPart>>& meshes) {
+        std::vector<std::uint32_t> enabledMasks;
+        for (const auto& each : meshes) {
+            meshMasks_.push_back(each ? each->mask : 0);
+            if (each && each->isEnabled) enabledMasks.push_back(each->mask);
+        }
+        maskMap_ = MaskMap(enabledMasks);
         std::vector<mesh::Vector> vertices;
         std::vector<mesh::Face> faces;
         for (std::size_t number = 0; number < meshes.size(); ++number) {
@@ -94,30 +141,28 @@ private:
                 }
                 faces.push_back(face);
                 owners_.push_back({static_cast<std::uint32_t>(number), static_cast<std::uint32_t>(i)});
-                masks_.push_back(part.mask);
+                masks_.push_back(maskMap_.of(part.mask));
                 isClear_.push_back(!part.isOpaque.empty() && !part.isOpaque[i]);
             }
         }
         faces_ = Faces(std::move(vertices), std::move(faces));
     }
 
-    void checkFit(const Design& design) const {
-        const packer::Sections& sections = packer_->sections();
+    void checkFit(const packer::Sections& sections) const {
         const auto refuse = [](const char* what, std::size_t needs, std::size_t has) {
             if (needs > has)
                 throw Failure(COLONNADE_RAYS_DOES_NOT_FIT, "the scene needs " + std::to_string(needs) + " " + what + ", the design has " + std::to_string(has) +
                                                                ": use one with more, or fewer faces");
         };
-        refuse("records", sections.recordCount, static_cast<std::size_t>(design.number("depth")));
-        if (design.format.bvh) refuse("stack entries", tree_.tree.stackBound, static_cast<std::size_t>(design.format.stackDepth));
+        refuse("records", sections.recordCount, static_cast<std::size_t>(design_.number("depth")));
+        if (design_.format.bvh) refuse("stack entries", tree_.tree.stackBound, static_cast<std::size_t>(design_.format.stackDepth));
     }
 
-    void describe(const Design& design) {
-        const packer::Sections& s = packer_->sections();
-        image_ = {records_.data(), s.recordCount, design.format.recordBytes(), {}, {}, 0, 0, {}};
+    void describe(const packer::Sections& s) {
+        image_ = {records_.data(), s.recordCount, design_.format.recordBytes(), {}, {}, 0, 0, {}};
         const double mantissa = std::frexp(quantised_.scale, &image_.scale_exponent);
         image_.scale_mantissa = static_cast<std::uint32_t>(std::ldexp(mantissa, Placement::scaleBits));
-        const int fraction = gridFraction_ + image_.scale_exponent + Placement::fractionBits;
+        const int fraction = design_.number("gridFraction") + image_.scale_exponent + Placement::fractionBits;
         for (int a = 0; a < 3; ++a) {
             image_.bounds_low[a] = s.boundsLow[a];
             image_.bounds_high[a] = s.boundsHigh[a];
@@ -129,18 +174,22 @@ private:
         }
     }
 
-    int gridFraction_;
+    const Design& design_;
     Faces faces_;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> owners_;
-    std::vector<std::uint8_t> masks_, isClear_; // of the faces; a leaf has the mask in place of a material
+    std::vector<std::uint32_t> meshMasks_;
+    MaskMap maskMap_;
+    std::vector<std::uint8_t> masks_, isClear_; ///< of the faces; a leaf has the device's mask in place of a material
+    std::size_t dropped_ = 0;
+    double unit_ = 0, edge_ = 0;
     packer::QuantisedMesh quantised_;
     bvh::Bvh tree_;
-    std::unique_ptr<packer::RecordPacker> packer_;
-    std::vector<std::int64_t> indices_;
-    std::vector<std::uint8_t> rotations_;
+    std::vector<std::uint32_t> faceOfId_;     ///< of each packed id
+    std::vector<std::uint8_t> rotationOfId_; ///< the corner of its face that is corner 0
     std::vector<std::uint8_t> records_;
     colonnade_rays_image image_{};
     std::array<double, 3> corner_{};
+    std::unique_ptr<RayModel> model_;
 };
 
 } // namespace colonnade::rays

@@ -1,8 +1,10 @@
-// Batches of rays through the bit-exact model.
+// Rays through the bit-exact model of a scene.
 #pragma once
+#include <atomic>
+#include <system_error>
 #include <thread>
 
-#include "colonnade_rays.h"
+#include "batch_bytes.hpp"
 #include "conversion.hpp"
 #include "model/tracer.hpp"
 
@@ -11,123 +13,162 @@ namespace colonnade::rays {
 static_assert(sizeof(colonnade_rays_batch) == 64 && sizeof(colonnade_rays_record) == 32 && sizeof(colonnade_rays_sensor) == 64 && sizeof(colonnade_rays_response) == 16,
               "formats in memory");
 
-/// Traces single rays. Copies share the scene, and may run at the same time.
-class RayTracer : public Tracer {
+/// Sums of what rays did, which threads add to.
+class Sums {
 public:
-    /// Weights are whole, as `HitConverter` reads them.
-    RayTracer(Numbers numbers, int directionBits, const std::map<std::string, Layout>& layouts) : Tracer(whole(numbers), layouts), directionBits_(directionBits) {
-        frame_ = {};
+    void add(std::uint64_t rays, std::uint64_t refused, const Counters& c) {
+        static std::atomic<unsigned> threads{0};
+        thread_local const unsigned thread = threads++;
+        Part& part = parts_[thread % parts_.size()];
+        const std::uint64_t values[] = {rays, refused, c.raysInBox, c.nodeReads, c.boxTests, c.triangleTests};
+        for (std::size_t i = 0; i < part.sums.size(); ++i)
+            if (values[i] != 0) part.sums[i].fetch_add(values[i], std::memory_order_relaxed);
+        std::uint64_t deepest = part.deepest.load(std::memory_order_relaxed);
+        while (deepest < c.deepestStack && !part.deepest.compare_exchange_weak(deepest, c.deepestStack, std::memory_order_relaxed)) {}
     }
 
-    void load(const colonnade_rays_image& image) {
-        memory_->load(image.records, image.record_count, image.record_bytes);
+    colonnade_rays_sums total() const {
+        std::array<std::uint64_t, 6> sums{};
+        std::uint64_t deepest = 0;
+        for (const Part& part : parts_) {
+            for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += part.sums[i];
+            deepest = std::max<std::uint64_t>(deepest, part.deepest);
+        }
+        return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], deepest};
+    }
+
+private:
+    /// Threads that count at the same time should not share a line of a cache.
+    struct alignas(64) Part {
+        std::array<std::atomic<std::uint64_t>, 6> sums{};
+        std::atomic<std::uint64_t> deepest{0};
+    };
+    std::array<Part, 16> parts_;
+};
+
+/// What the rays of a thread do until their sums are added.
+struct RayRecord : TraceRecord {
+    std::uint64_t refused = 0;
+};
+
+/// A loaded scene. It does not change: any number of threads may trace at the same time.
+class RayModel {
+public:
+    RayModel(const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts, const colonnade_rays_image& image)
+        : numbers_(whole(numbers)), memory_(layouts, numbers_),
+          converter_(numbers_, directionBits, {image.scale_mantissa, image.scale_exponent, {image.base[0], image.base[1], image.base[2]}}) {
+        memory_.load(image.records, image.record_count, image.record_bytes);
+        frame_ = {};
         frame_.recordCount = image.record_count;
-        memory_->divide(frame_.recordCount, frame_.roots, numbers_.bvh, frame_.leafRecords());
-        placement_ = {image.scale_mantissa, image.scale_exponent, {}};
+        memory_.divide(frame_.recordCount, frame_.roots, numbers_.bvh, frame_.leafRecords());
         for (int a = 0; a < 3; ++a) {
             frame_.bounds.low[a] = image.bounds_low[a];
             frame_.bounds.high[a] = image.bounds_high[a];
-            placement_.base[a] = image.base[a];
         }
     }
 
-    bool isEmpty() const { return frame_.recordCount == 0; }
+    /// What a ray hits: the id of a response, and what `response` makes the rest of.
+    struct Answer {
+        std::uint32_t id;
+        float tfar;
+        ConvertedRay converted;
+        Ray prepared;
+        Hit hit;
+    };
 
-    /// A ray in the device's integers.
-    ConvertedRay converted(const colonnade_rays_record& ray, bool isLocal) const { return RayConverter(numbers_, directionBits_, placement_).convert(ray, isLocal); }
-
-    /// The response to a ray. With `COLONNADE_RAYS_OCCLUDED` only whether it is a miss.
-    colonnade_rays_response response(const colonnade_rays_record& ray, std::uint32_t mode) {
-        const RayConverter converter(numbers_, directionBits_, placement_);
-        const ConvertedRay converted = converter.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0);
-        colonnade_rays_response miss{ray.tfar, COLONNADE_RAYS_MISS, 0, 0};
-        if (converted.kind == ConvertedRay::Kind::outOfRange) miss.id = COLONNADE_RAYS_OUT_OF_RANGE;
-        refused += converted.kind == ConvertedRay::Kind::refused;
-        if (converted.kind != ConvertedRay::Kind::legal || isEmpty()) return miss;
+    /// The answer to a ray of the mode HITS or OCCLUDED; in the latter any triangle on the way.
+    Answer answer(const colonnade_rays_record& ray, std::uint32_t mode, RayRecord& record) const {
+        Answer answer{COLONNADE_RAYS_MISS, ray.tfar, converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0), {}, Hit::none(0)};
+        const ConvertedRay& converted = answer.converted;
+        if (converted.kind == ConvertedRay::Kind::outOfRange) answer.id = COLONNADE_RAYS_OUT_OF_RANGE;
+        record.refused += converted.kind == ConvertedRay::Kind::refused;
+        if (converted.kind != ConvertedRay::Kind::legal) return answer;
         const RayFilter filter{(mode & COLONNADE_RAYS_CULL_FRONT) != 0, (mode & COLONNADE_RAYS_CULL_BACK) != 0, (mode & COLONNADE_RAYS_OPAQUE_ONLY) != 0,
                                static_cast<int>(mode >> COLONNADE_RAYS_MASK_SHIFT)};
-        const Ray prepared = prepareRay(converted.request, frame_.bounds, numbers_);
-        if ((mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_OCCLUDED) {
-            if (occlusion(prepared, &filter) != Occlusion::none) miss.id = 0;
-            return miss;
+        answer.prepared = prepareRay(converted.request, frame_.bounds, numbers_);
+        const SceneSearch search(numbers_, memory_, frame_, record);
+        const bool isOcclusion = (mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_OCCLUDED;
+        answer.hit = isOcclusion ? search.anyHit(answer.prepared, filter) : search.trace(answer.prepared, &filter);
+        if (answer.hit.found) answer.id = converter_.idOf(answer.hit);
+        return answer;
+    }
+
+    /// An answer in the application's numbers.
+    colonnade_rays_response response(const Answer& answer) const {
+        if (!answer.hit.found) return {answer.tfar, answer.id, 0, 0};
+        return converter_.hitOf(answer.converted, answer.prepared, answer.hit);
+    }
+
+    /// Runs a batch in several threads; a status.
+    int run(const colonnade_rays_batch& batch, Sums& sums) const {
+        if (!isLegal(batch)) return COLONNADE_RAYS_BAD_BATCH;
+        // Runs of whole words of occluded rays
+        const bool isValid = inThreads(batch.count, 64, [&](std::size_t first, std::size_t last) { return runPart(batch, first, last, sums); });
+        if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = batch.tag;
+        return isValid ? COLONNADE_RAYS_OK : COLONNADE_RAYS_DEVICE;
+    }
+
+    /// Calls `part` with parts of a range, multiples of `multiple` but for the last, in several threads if it is long; whether all return true.
+    /// A part whose thread does not start is run by the caller.
+    template <class Part> static bool inThreads(std::size_t count, std::size_t multiple, const Part& part) {
+        static const std::size_t processors = std::max(1u, std::thread::hardware_concurrency());
+        const std::size_t most = std::min(processors, count / raysOfAThread);
+        if (most <= 1) return part(std::size_t{0}, count);
+        const std::size_t run = (count / most + multiple) / multiple * multiple;
+        std::vector<std::thread> threads;
+        std::atomic<bool> isValid{true};
+        std::size_t first = 0;
+        for (; first + run < count; first += run) {
+            const auto each = [&isValid, &part, first, last = first + run] {
+                if (!part(first, last)) isValid = false;
+            };
+            if (!started(threads, each)) break;
         }
-        const Hit hit = trace(prepared, &filter);
-        return hit.found ? converter.hitOf(converted, prepared, hit) : miss;
+        const bool isLastValid = part(first, count);
+        for (std::thread& thread : threads) thread.join();
+        return isLastValid && isValid;
     }
-
-    /// Rays that miss because they are none.
-    std::uint64_t refused = 0;
-
-private:
-    static Numbers whole(Numbers numbers) {
-        numbers.barycentricBits = numbers.weightBits;
-        return numbers;
-    }
-
-    int directionBits_;
-    Placement placement_{};
-};
-
-/// The model as a backend: it traces a batch in several threads, before `submit` returns.
-class Model {
-public:
-    Model(const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts) : tracer_(numbers, directionBits, layouts) {}
-
-    colonnade_rays_backend backend() {
-        return {this,
-                [](void* model, const colonnade_rays_image* image) { return static_cast<Model*>(model)->load(*image); },
-                [](void* model, const colonnade_rays_batch* batch) { return static_cast<Model*>(model)->submit(*batch); },
-                [](void* model) { return static_cast<Model*>(model)->wait(); },
-                [](void* model, colonnade_rays_sums* counters) { *counters = static_cast<Model*>(model)->counters_; },
-                [](void* model) { delete static_cast<Model*>(model); }};
-    }
-
-    const RayTracer& tracer() const { return tracer_; }
 
 private:
     static constexpr std::size_t raysOfAThread = 512;
     static constexpr std::uint32_t forms = COLONNADE_RAYS_FAN | COLONNADE_RAYS_SENSOR;
 
-    int load(const colonnade_rays_image& image) {
-        tracer_.load(image);
-        return COLONNADE_RAYS_OK;
+    /// Weights are whole, as `RayConverter::hitOf` reads them.
+    static Numbers whole(Numbers numbers) {
+        numbers.barycentricBits = numbers.weightBits;
+        return numbers;
     }
 
-    int submit(const colonnade_rays_batch& batch) {
+    template <class Call> static bool started(std::vector<std::thread>& threads, const Call& call) {
+#ifdef __cpp_exceptions
+        try {
+            threads.emplace_back(call);
+        } catch (const std::system_error&) {
+            return false;
+        }
+        return true;
+#else
+        (void)threads, (void)call;
+        return false;
+#endif
+    }
+
+    static bool isLegal(const colonnade_rays_batch& batch) {
         constexpr std::uint32_t known = COLONNADE_RAYS_RESPONSE | forms | COLONNADE_RAYS_CULL_FRONT | COLONNADE_RAYS_CULL_BACK | COLONNADE_RAYS_OPAQUE_ONLY |
                                         COLONNADE_RAYS_LOCAL | 0xffu << COLONNADE_RAYS_MASK_SHIFT;
         if ((batch.rays | batch.hits) % 64 != 0 || batch.done % 4 != 0 || batch.count == 0 || batch.count > 1u << 24 || (batch.mode & ~known) != 0 ||
             (batch.mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_RESPONSE || (batch.mode & forms) == forms)
-            return COLONNADE_RAYS_BAD_BATCH;
-        if (batch.mode & COLONNADE_RAYS_SENSOR) {
-            const std::uint32_t width = reinterpret_cast<const colonnade_rays_sensor*>(batch.rays)->width;
-            if (width % 64 != 0 || width == 0 || width > 1u << 24) return COLONNADE_RAYS_BAD_BATCH;
-        }
-        // Runs of whole words of occluded rays
-        const std::size_t most = std::max<std::size_t>(1, std::min<std::size_t>(std::thread::hardware_concurrency(), batch.count / raysOfAThread));
-        const std::size_t run = (batch.count / most + 64) / 64 * 64;
-        std::vector<RayTracer> tracers(most, tracer_);
-        std::vector<std::thread> threads;
-        const auto trace = [&](std::size_t part) { traceRun(tracers[part], batch, part * run, std::min<std::size_t>(batch.count, (part + 1) * run)); };
-        for (std::size_t part = 1; part < most; ++part) threads.emplace_back(trace, part);
-        trace(0);
-        for (std::thread& thread : threads) thread.join();
-        for (const RayTracer& tracer : tracers) add(tracer);
-        counters_.rays += batch.count;
-        if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = batch.tag;
-        return COLONNADE_RAYS_OK;
+            return false;
+        if (!(batch.mode & COLONNADE_RAYS_SENSOR)) return true;
+        const std::uint32_t width = reinterpret_cast<const colonnade_rays_sensor*>(batch.rays)->width;
+        return width % 64 == 0 && width != 0 && width <= 1u << 24;
     }
 
-    int wait() {
-        const bool isValid = !hasFailed_;
-        hasFailed_ = false;
-        return isValid ? COLONNADE_RAYS_OK : COLONNADE_RAYS_DEVICE;
-    }
-
-    static void traceRun(RayTracer& tracer, const colonnade_rays_batch& batch, std::size_t first, std::size_t last) {
+    bool runPart(const colonnade_rays_batch& batch, std::size_t first, std::size_t last, Sums& sums) const {
         const auto* const rays = reinterpret_cast<const std::uint8_t*>(batch.rays);
         auto* const hits = reinterpret_cast<std::uint8_t*>(batch.hits);
         const std::uint32_t form = batch.mode & COLONNADE_RAYS_RESPONSE;
+        RayRecord record;
         std::uint64_t word = 0;
         for (std::size_t i = first; i < last; ++i) {
             colonnade_rays_record ray;
@@ -137,16 +178,20 @@ private:
                 if (batch.mode & COLONNADE_RAYS_FAN) std::memcpy(ray.direction, rays + 16 * i, 16);
                 else setSensorRay(ray, *reinterpret_cast<const colonnade_rays_sensor*>(rays), static_cast<std::uint32_t>(i), batch.tfar);
             } else std::memcpy(&ray, rays + sizeof ray * i, sizeof ray);
-            const colonnade_rays_response response = tracer.response(ray, batch.mode);
-            if (form == COLONNADE_RAYS_HITS) std::memcpy(hits + 16 * i, &response, 16);
-            else if (form == COLONNADE_RAYS_RANGES) std::memcpy(hits + 8 * i, &response, 8);
-            else {
-                word |= static_cast<std::uint64_t>(response.id == 0) << i % 64;
+            const Answer found = answer(ray, batch.mode, record);
+            if (form == COLONNADE_RAYS_OCCLUDED) {
+                word |= static_cast<std::uint64_t>(found.hit.found) << i % 64;
                 if (i % 64 != 63 && i + 1 != last) continue;
                 std::memcpy(hits + i / 64 * 8, &word, 8);
                 word = 0;
+                continue;
             }
+            const colonnade_rays_response whole = response(found);
+            if (form == COLONNADE_RAYS_HITS) std::memcpy(hits + 16 * i, &whole, 16);
+            else std::memcpy(hits + 8 * i, &whole, 8);
         }
+        sums.add(last - first, record.refused, record.counters);
+        return !record.errors.stackOverflow && !record.errors.illegalRecord;
     }
 
     static void setSensorRay(colonnade_rays_record& ray, const colonnade_rays_sensor& sensor, std::uint32_t i, float tfar) {
@@ -157,20 +202,10 @@ private:
         ray.tfar = tfar;
     }
 
-    void add(const RayTracer& from) {
-        const Counters& c = from.counters;
-        counters_.rays_refused += from.refused;
-        counters_.rays_in_box += c.raysInBox;
-        counters_.node_reads += c.nodeReads;
-        counters_.box_tests += c.boxTests;
-        counters_.triangle_tests += c.triangleTests;
-        counters_.deepest_stack = std::max<std::uint64_t>(counters_.deepest_stack, c.deepestStack);
-        hasFailed_ = hasFailed_ || from.errors.stackOverflow || from.errors.illegalRecord;
-    }
-
-    RayTracer tracer_;
-    colonnade_rays_sums counters_{};
-    bool hasFailed_ = false;
+    Numbers numbers_;
+    ColumnMemory memory_;
+    RayConverter converter_;
+    Frame frame_;
 };
 
 } // namespace colonnade::rays

@@ -1,8 +1,10 @@
 // Records that rays read, in their order, and the lines of them that the caches of an array read from DRAM.
 #pragma once
 #include <algorithm>
+#include <cstdint>
+#include <vector>
 
-#include "tracer.hpp"
+#include "colonnade_rays.h"
 
 namespace colonnade::rays {
 
@@ -16,49 +18,9 @@ struct Traffic {
     std::size_t reads = 0, lines = 0;
 };
 
-/// The model as a backend that can also keep the addresses of the records which each ray reads.
-class ReadingModel {
-public:
-    ReadingModel(const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts)
-        : model_(*new Model(numbers, directionBits, layouts)), calls_(model_.backend()) {}
-    ~ReadingModel() { calls_.close(calls_.context); }
-    ReadingModel(const ReadingModel&) = delete;
-
-    /// It does not own this object.
-    colonnade_rays_backend backend() {
-        return {this,
-                [](void* own, const colonnade_rays_image* image) { return of(own).calls_.load(of(own).calls_.context, image); },
-                [](void* own, const colonnade_rays_batch* batch) { return of(own).submit(*batch); },
-                [](void* own) { return of(own).calls_.wait(of(own).calls_.context); },
-                [](void* own, colonnade_rays_sums* sums) { of(own).calls_.counters(of(own).calls_.context, sums); },
-                nullptr};
-    }
-
-    /// Reads of the rays of batches go to the end of `reads`; null: nowhere. These batches have whole rays.
-    void writeTo(std::vector<std::vector<std::uint32_t>>* reads) { reads_ = reads; }
-
-private:
-    static ReadingModel& of(void* own) { return *static_cast<ReadingModel*>(own); }
-
-    int submit(const colonnade_rays_batch& batch) {
-        if (const int status = calls_.submit(calls_.context, &batch); status != COLONNADE_RAYS_OK || !reads_) return status;
-        RayTracer tracer(model_.tracer());
-        std::vector<RayStep> steps;
-        tracer.log.writeTo(&steps);
-        for (std::size_t i = 0; i < batch.count; ++i) {
-            steps.clear();
-            tracer.response(reinterpret_cast<const colonnade_rays_record*>(batch.rays)[i], batch.mode);
-            reads_->emplace_back();
-            for (const RayStep& step : steps)
-                if (step.kind == RayStep::Kind::node || step.kind == RayStep::Kind::record) reads_->back().push_back(static_cast<std::uint32_t>(step.value));
-        }
-        return COLONNADE_RAYS_OK;
-    }
-
-    Model& model_;
-    colonnade_rays_backend calls_;
-    std::vector<std::vector<std::uint32_t>>* reads_ = nullptr;
-};
+/// The records that each ray reads in the model of a committed scene, in their order. Throws Failure.
+std::vector<std::vector<std::uint32_t>> readsOf(const colonnade_rays_scene& scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t mode, std::uint32_t mask,
+                                                bool isOcclusion);
 
 /// Tags of a cache whose sets replace the line that was least recently used.
 class LineCache {

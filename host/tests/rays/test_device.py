@@ -14,7 +14,7 @@ from colonnade import UserError
 from colonnade.design.config_name import Overrides
 from colonnade.rays import RayShell, Scene, Sensor
 from colonnade.rays.device import RayBackend, RayDevice
-from colonnade.rays.scene import ALL_MASKS, FAN, OCCLUDED, RANGES
+from colonnade.rays.scene import ALL_DEVICE_MASKS, FAN, OCCLUDED, RANGES
 
 #: The smallest design, and one of two columns and rows whose scene is in DRAM.
 RAYS = ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=256")
@@ -47,7 +47,7 @@ def test_hits_of_the_device_are_those_of_the_model(
     both(lambda scene: scene.ranges(Sensor((0, 0, 5), (-3, 2, -10), (0.06, 0, 0), (0, -0.5, 0), 100, 8)))
     for mode in (0, RANGES, OCCLUDED, FAN):
         records = rays.astype(np.float32)[:, 4 if mode == FAN else 0 :]
-        both(lambda scene, r=records, m=mode: scene.submit(r, len(r), m | ALL_MASKS << 24, rays[0, :3]))
+        both(lambda scene, r=records, m=mode: scene.submit(r, len(r), m | ALL_DEVICE_MASKS, rays[0, :3]))
     for scene in scenes:
         scene.set_mask(scene.add(vertices + 0.1, faces), 2)
     both(lambda scene: scene.closest(rays, mask=2).t)
@@ -62,11 +62,11 @@ def test_refused_batches_stop_no_later_ones() -> None:
     rays = outside_rays(vertices, 200, seed=4).astype(np.float32)
     device = RayShell.simulated("tiny", RAYS)
     scenes = [Scene(vertices, faces, "tiny", RAYS, backend=backend) for backend in ("model", device)]
-    wanted, found = (scene.submit(rays, len(rays), ALL_MASKS << 24) for scene in scenes)
+    wanted, found = (scene.submit(rays, len(rays), ALL_DEVICE_MASKS) for scene in scenes)
     assert (wanted == found).all()
 
     def batch(mode: int, count: int) -> tuple[bytes, bytes, int]:
-        words = struct.pack("<QQII5fIQQ", 0, 0, count, mode | ALL_MASKS << 24, 0, 0, 0, 0, 0, count, 0, 0)
+        words = struct.pack("<QQII5fIQQ", 0, 0, count, mode | ALL_DEVICE_MASKS, 0, 0, 0, 0, 0, count, 0, 0)
         return words, rays.tobytes(), 16 * len(rays)
 
     refused = [batch(3, 199), batch(0, 0), batch(1 << 12, 198)]

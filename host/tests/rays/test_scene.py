@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import pytest
 from exact_rays import EXACT, mesh_of, outside_rays, plane_hits, rays_of, truth
+from numpy.typing import NDArray
 
 from colonnade import UserError
 from colonnade.rays import Hits, Scene, Sensor
-from colonnade.rays.scene import ALL_MASKS, CULL_BACK, CULL_FRONT, FAN, OCCLUDED, OPAQUE_ONLY, RANGES, SENSOR
+from colonnade.rays.device import RayBackend
+from colonnade.rays.scene import ALL_DEVICE_MASKS, CULL_BACK, CULL_FRONT, FAN, OCCLUDED, OPAQUE_ONLY, RANGES, SENSOR
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
 #: From above and from below through the first face of `SQUARE`.
 DOWN, UP = [0.7, 0.2, 2, 0, 0, 0, -1, np.inf], [0.7, 0.2, -2, 0, 0, 0, 1, np.inf]
 #: A batch's mode of all masks, and answers of 16 bytes.
-MASKS = ALL_MASKS << 24
+MASKS = ALL_DEVICE_MASKS
 ANSWER = np.dtype([("t", "f4"), ("id", "u4"), ("u", "f4"), ("v", "f4")])
 
 
@@ -247,9 +250,160 @@ def test_sensors_that_are_none_are_refused(changes: dict[str, Any], message: str
 )
 def test_wrong_meshes_are_refused(vertices: Any, faces: Any, message: str) -> None:
     with pytest.raises(UserError) as error:
-        Scene(vertices, faces).closest([DOWN])
+        Scene(vertices, faces, "edge").closest([DOWN])
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("count", (0, 3, 5))
+def test_arrays_of_another_length_than_the_mesh_are_refused(count: int) -> None:
+    """They would be read beyond their end."""
+    scene = Scene(*SQUARE)
+    with pytest.raises(UserError, match=f"the mesh has 4 vertices, {count} are given"):
+        scene.update(0, np.resize(SQUARE[0], (count, 3)))
+    with pytest.raises(UserError, match=f"the mesh has 2 faces, {count} are given"):
+        scene.set_opaque(0, np.ones(count, bool))
+    assert scene.closest([DOWN]).t.tolist() == [2] and scene.closest([DOWN]).is_opaque.all()
+
+
+class Answers(RayBackend):
+    """Answers each batch with the same bytes."""
+
+    def __init__(self, answer: bytes) -> None:
+        self.answer, self.scene = answer, None
+
+    def load(self, values: Mapping[str, int], records: bytes, count: int) -> None:
+        pass
+
+    def submit(self, batch: bytes, rays: bytes, size: int) -> tuple[int, bytes]:
+        if self.scene:
+            self.scene.closest([DOWN])
+        return 1, self.answer
+
+    def counters(self) -> dict[str, int]:
+        return {}
+
+
+@pytest.mark.parametrize("size", (0, 15, 17, 1 << 20))
+def test_a_device_that_answers_other_bytes_than_it_is_asked_for_is_refused(size: int) -> None:
+    with pytest.raises(UserError, match=f"the device answers {size} bytes in place of 16"):
+        Scene(*SQUARE, backend=Answers(bytes(size))).closest([DOWN])
+
+
+def test_a_device_that_asks_its_own_scene_is_told() -> None:
+    device = Answers(bytes(16))
+    scene = device.scene = Scene(*SQUARE, backend=device)
+    with pytest.raises(RuntimeError, match="it would wait for itself"):
+        scene.closest([DOWN])
+    device.scene = None
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    (
+        (lambda scene: scene.closest([DOWN], mode=RANGES), "other bits than those of CULL_FRONT"),
+        (lambda scene: scene.closest([DOWN], mode="none"), "mode is 'none'"),
+        (lambda scene: scene.closest([DOWN], mask=-1), "mask is -1: give 0 to 4294967295"),
+        (lambda scene: scene.occluded([DOWN], mask=1 << 32), "mask is 4294967296"),
+        (lambda scene: scene.ranges(Sensor((0, 0, 1), (0, 0, -1), (1, 0, 0), (0, 1, 0), 3, 4), mask=256), "0 to 255"),
+        (lambda scene: scene.all([DOWN], max_hits=-1), "max_hits is -1"),
+        (lambda scene: scene.set_mask(0, 1 << 40), "mask is"),
+        (lambda scene: scene.remove(-1), "mesh is -1"),
+        (lambda scene: scene.set_opaque(0, [[True, False]]), "no list of Booleans"),
+        (lambda scene: scene.set_opaque(0, ["yes", "no"]), "no list of Booleans"),
+        (lambda scene: scene.update(0, SQUARE[0] + 1j), "no array of numbers"),
+        (lambda scene: scene.submit(np.zeros((1, 8), np.float32), 1, MASKS, "nowhere"), "origin are no array"),
+    ),
+)
+def test_wrong_arguments_are_refused_in_a_line(call: Callable[[Scene], Any], message: str) -> None:
+    scene = Scene(*SQUARE)
+    with pytest.raises(UserError, match=message):
+        call(scene)
+    assert scene.closest([DOWN]).t.tolist() == [2]
+
+
+@pytest.mark.parametrize("count", (3, 9, 12))
+def test_masks_have_32_bits(count: int) -> None:
+    """Also of more sets of meshes than a device has bits, 8."""
+    scene, random = Scene(), np.random.default_rng(count)
+    masks = random.integers(1 << 32, size=count, dtype=np.uint32) & random.integers(
+        1 << 32, size=count, dtype=np.uint32
+    )
+    for level, mask in enumerate(masks):
+        scene.set_mask(scene.add(SQUARE[0] - [0, 0, level], SQUARE[1]), int(mask))
+    for refine in (True, False):
+        scene._rays.refine(refine)
+        for mask in (*(1 << bit for bit in range(32)), 0, 0xFFFFFFFF, int(masks[0]), 0xFF00):
+            meant = [level for level in range(count) if int(masks[level]) & mask]
+            hits = scene.closest([DOWN], mask=mask)
+            assert hits.mesh.tolist() == (meant[:1] or [-1])
+            assert scene.occluded([DOWN], mask=mask).tolist() == [bool(meant)]
+            assert scene.all([DOWN], mask=mask).mesh.tolist() == meant
+
+
+def with_far_triangle(distance: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """A torus and a triangle so far away, as a stray vertex of a scan makes one."""
+    vertices, faces = mesh_of("torus")
+    far = distance * np.array([[1, 0, 0], [1.001, 0, 0], [1, 0.001, 0]])
+    return np.vstack([vertices, far]), np.vstack([faces, len(vertices) + np.arange(3)])
+
+
+def test_a_scene_gets_the_bits_that_it_needs_or_is_refused() -> None:
+    """Faces that a grid drops are counted, and told."""
+    rays = outside_rays(mesh_of("torus")[0], 300, seed=1)
+    wanted = Scene(*mesh_of("torus")).closest(rays).face
+    vertices, faces = with_far_triangle(1e4)
+    with pytest.raises(UserError, match=r"faces vanish at 16 bits a coordinate: use a design with more, or leave out"):
+        Scene(vertices, faces, "edge").closest(rays)
+    scene = Scene(vertices, faces)
+    assert scene.unit < 1e4 / 2**23
+    assert (scene.closest(rays).face == wanted).mean() > 0.99
+    with pytest.raises(UserError, match=r"24 bits a coordinate: leave out what widens the box"):
+        Scene(*with_far_triangle(1e8)).closest(rays)
+
+
+def test_faces_that_vanish_are_told() -> None:
+    vertices, faces = mesh_of("sphere:4")
+    thin = np.array([[0, 0, 0], [1, 0, 0], [1, 1e-9, 0]])
+    scene = Scene(np.vstack([vertices, thin]), np.vstack([faces, len(vertices) + np.arange(3), [0, 0, 1]]))
+    with pytest.warns(UserWarning, match="1 face vanishes on the design's grid"):
+        scene.closest([DOWN])
+    assert scene.dropped == 1
+    assert Scene(*SQUARE).dropped == 0
+
+
+@pytest.mark.parametrize(("distance", "length"), ((1e9, 1), (4e11, 1), (3, 1e200), (3, 1e-200), (1e15, 1e-30)))
+@pytest.mark.parametrize("settings", ((), EXACT))
+def test_all_hits_end_where_a_step_is_below_a_digit(distance: float, length: float, settings: tuple[str, ...]) -> None:
+    vertices, faces = mesh_of("sphere:3")
+    scene = Scene(vertices, faces, "edge", settings)
+    ray = [0.1, 0.2, distance, 0, 0, 0, -length, np.inf]
+    hits = scene.all([ray])
+    assert len(hits.t) == 2 if distance < 1e12 else len(hits.t) <= 2
+    assert scene.closest([ray]).face[0] == hits.face[0]
+
+
+def test_origins_beyond_all_numbers_miss() -> None:
+    rays = np.array([DOWN] * 4)
+    rays[0, 2], rays[1, 0], rays[2, :3], rays[3, 4:7] = 1e208, -1e300, 1e308, 1e-320
+    hits = Scene(*SQUARE).closest(rays)
+    assert np.isfinite(hits.uv).all() and not np.isnan(hits.t).any()
+
+
+def test_rays_are_occluded_where_they_have_a_closest_hit() -> None:
+    """Slivers: what the device hits is often beside them."""
+    random = np.random.default_rng(5)
+    start = random.uniform(-1, 1, (200, 1, 3))
+    ends = start + random.normal(size=(200, 1, 3)) + random.normal(size=(200, 2, 3)) * 1e-3
+    vertices = np.concatenate([start, ends], axis=1).reshape(-1, 3)
+    scene = Scene(vertices, np.arange(600).reshape(-1, 3), "edge")
+    rays = rays_of(
+        random.normal(size=(4000, 3)) * 3, vertices.reshape(-1, 3, 3)[random.integers(200, size=4000)].mean(axis=1)
+    )
+    rays[:, 4:7] -= rays[:, :3]
+    found = scene.closest(rays).face >= 0
+    assert 0.2 < found.mean() < 1
+    assert (scene.occluded(rays) == found).all()
 
 
 def test_scenes_beyond_the_design_are_refused() -> None:

@@ -15,12 +15,12 @@ from rays_library import compiled_library
 from colonnade.design.generator import manifest_for
 from colonnade.rays import Scene
 from colonnade.rays.device import device_text, registers_text
-from colonnade.rays.scene import ALL_MASKS, design_text
+from colonnade.rays.scene import ALL_DEVICE_MASKS, design_text
 
 pytestmark = pytest.mark.matrix
 DESIGN = "tiny", ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=256")
 HIT = np.dtype([("t", "f8"), ("uv", "f8", 2), ("mesh", "u4"), ("face", "u4"), ("flags", "u4"), ("ray", "u4")])
-ALL = ALL_MASKS << 24
+ALL = ALL_DEVICE_MASKS
 
 #: Two commits of a triangle, in a process that SIGPIPE would end; prints the statuses of its calls.
 _COMMITS = """

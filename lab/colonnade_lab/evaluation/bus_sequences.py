@@ -23,7 +23,7 @@ from colonnade.device.verilator import run_program
 from colonnade.mesh.load import load_mesh
 from colonnade.rays import Scene, Sensor
 from colonnade.rays.recorded import RecordedRays
-from colonnade.rays.scene import ALL_MASKS, FAN, OCCLUDED, SENSOR
+from colonnade.rays.scene import ALL_DEVICE_MASKS, FAN, OCCLUDED, SENSOR
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.device_image import device_image
@@ -162,7 +162,7 @@ def _write_batches(
         target = random.uniform(-1.2, 1.2, start.shape) * np.abs(mesh.vertices).max(axis=0)
         limits = np.zeros((len(way), 1)), np.full((len(way), 1), np.inf)
         rays = np.hstack([start, limits[0], target - start, limits[1]]).astype(np.float32)
-        mode, origin = number // 9 % 3 | ALL_MASKS << 24, start[0]
+        mode, origin = number // 9 % 3 | ALL_DEVICE_MASKS, start[0]
         form, count = SENSOR if number % 9 == 8 else (0, FAN)[number % 2], len(way)
         records = np.ascontiguousarray(rays[:, 4:] if form == FAN else rays)
         if form == SENSOR:

@@ -9,7 +9,7 @@ import numpy as np
 from colonnade.common.progress import QUIET, Progress
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.rays import Scene, Sensor
-from colonnade.rays.scene import ALL_MASKS, OCCLUDED, RANGES, SENSOR
+from colonnade.rays.scene import ALL_DEVICE_MASKS, OCCLUDED, RANGES, SENSOR
 from numpy.typing import NDArray
 
 from colonnade_lab.evaluation.rays import rays_of_kind
@@ -70,7 +70,7 @@ def batches_of(mesh: Mesh, scene: Scene, count: int) -> dict[str, tuple[Callable
     ends = np.zeros((len(ways), 1))
     camera = np.hstack([np.zeros_like(ways) + sensor.origin, ends, ways, ends + np.inf])
     occlusion = rays_of_kind("occlusion", mesh, count)
-    masks = ALL_MASKS << 24
+    masks = ALL_DEVICE_MASKS
 
     def of_memory(rays: np.ndarray, mode: int = 0) -> Callable[[Scene], NDArray[np.uint8]]:
         return lambda scene: scene.submit(rays.astype(np.float32), len(rays), mode | masks)
