@@ -36,7 +36,9 @@ def main(arguments: list[str]) -> None:
         shutil.copy(jar, files / f"colonnade-generator-{version}.jar")
         for preset in sorted(path.stem for path in (ROOT / "configs").glob("*.json")):
             _say(f"the design of preset {preset}")
-            designs.write(preset, jar, work / "designs", files / f"colonnade-{preset}-{version}.tar.gz", time)
+            designs.write(
+                preset, designs.by_jar(jar), work / "designs", files / f"colonnade-{preset}-{version}.tar.gz", time
+            )
         archives.write_tar(site, "colonnade-docs", files / f"colonnade-docs-{version}.tar.gz", time)
         materials = subprocess.check_output([sys.executable, ROOT / "tools" / "supply_chain", "sbom"])
         (files / f"colonnade-{version}.cdx.json").write_bytes(materials)

@@ -5,27 +5,37 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import archives
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Bytes of the shell's bus.
-_BUS = "16"
 
 
-def write(preset: str, jar: Path, work: Path, archive: Path, time: int) -> None:
+#: Runs a command, `generate` or `registers`, with arguments.
+Run = Callable[..., None]
+
+
+def write(preset: str, run: Run, work: Path, archive: Path, time: int) -> None:
     """Generate a preset and pack it as ``colonnade-PRESET/``: ``device``, ``shell``, ``registers`` and ``driver``."""
     folder = work / preset
-    generator = ["java", "-Xss16m", "-jar", str(jar), "--config", preset, "--output"]
-    _run([*generator, str(folder / "device")])
-    _run([*generator, str(folder / "shell"), "--axi", _BUS])
-    colonnade = ROOT / ".venv" / "bin" / "colonnade"
-    _run([str(colonnade), "registers", "--config", preset, "--output", str(folder / "registers")])
+    run("generate", "--config", preset, "--output", str(folder / "device"))
+    run("generate", "--config", preset, "--output", str(folder / "shell"), "--axi", "auto")
+    run("registers", "--config", preset, "--output", str(folder / "registers"))
     for part in ("include", "src"):
         shutil.copytree(ROOT / "driver" / part, folder / "driver" / part)
     shutil.copy(ROOT / "LICENSE", folder)
     archives.write_tar(folder, f"colonnade-{preset}", archive, time)
+
+
+def by_jar(jar: Path) -> Run:
+    """The generator of a jar, and the installed host."""
+    programs = {
+        "generate": ["java", "-Xss16m", "-jar", str(jar)],
+        "registers": [str(ROOT / ".venv" / "bin" / "colonnade"), "registers"],
+    }
+    return lambda command, *arguments: _run([*programs[command], *arguments])
 
 
 def _run(command: list[str]) -> None:

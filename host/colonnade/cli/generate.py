@@ -4,22 +4,37 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from colonnade.cli.options import FILE, configuration_options, echo, echo_lines, finish, json_option, require_outputs
+from colonnade.cli.options import (
+    FILE,
+    Command,
+    bus_option,
+    configuration_options,
+    echo,
+    echo_lines,
+    finish,
+    json_option,
+    refit_option,
+    require_outputs,
+)
 from colonnade.common.errors import UserError
 
+if TYPE_CHECKING:
+    from colonnade.design.generator import BusBytes
 
-@click.command(short_help="Write the Verilog and the manifest of a configuration.")
+
+@click.command(cls=Command, short_help="Write the Verilog and the manifest of a configuration.")
 @configuration_options
 @click.option("--output", type=FILE, metavar="DIR", help="Output folder. An unmodified earlier output is replaced.")
 @click.option("--manifest-only", is_flag=True, help="Write only manifest.json, which is much faster.")
 @click.option("--print", "print_manifest", is_flag=True, help="Print the manifest instead of writing files.")
 @click.option("--black-box-memories", is_flag=True, help="Emit memories as black boxes, for SRAM macros.")
-@click.option("--axi", "bus_bytes", type=int, metavar="BYTES", help="Add the AXI4 shell, with a bus of 4 to 128 BYTES.")
+@bus_option("Add the AXI4 shell, with a bus of 4 to 128 BYTES; auto: 64 for rays, else 16.")
 @click.option("--pixel-stream", is_flag=True, help="Add an AXI4-Stream of pixels to the shell of --axi.")
-@click.option("--refit", is_flag=True, help="Add a unit that bends meshes to the shell of --axi.")
+@refit_option
 @json_option
 def generate(
     config: str,
@@ -28,7 +43,7 @@ def generate(
     manifest_only: bool,
     print_manifest: bool,
     black_box_memories: bool,
-    bus_bytes: int | None,
+    bus_bytes: BusBytes | None,
     pixel_stream: bool,
     refit: bool,
     json_file: Path | None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import click
 
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     _NumberType = click.ParamType[float]
     _TextType = click.ParamType[str]
     _PathType = click.ParamType[Path]
+    _BusType = click.ParamType[int | Literal["auto"]]
 else:
-    _NumberType = _TextType = _PathType = click.ParamType
+    _NumberType = _TextType = _PathType = _BusType = click.ParamType
 
 
 class PositiveNumber(_NumberType):
@@ -37,7 +38,37 @@ class PositiveNumber(_NumberType):
         return number
 
 
-Command = TypeVar("Command", bound=Callable[..., Any])
+class Command(click.Command):
+    """A command that refuses an option with one value if it is given twice; click would take the last in silence."""
+
+    def make_parser(self, ctx: click.Context) -> click.parser._OptionParser:
+        """A parser that looks for options that come again."""
+        parser = super().make_parser(ctx)
+        parse = parser.parse_args
+
+        def parse_args(args: list[str]) -> tuple[dict[str, Any], list[str], list[click.Parameter]]:
+            values, rest, order = parse(args)
+            for option in order:
+                if isinstance(option, click.Option) and takes_one(option) and order.count(option) > 1:
+                    raise click.UsageError(f"{'/'.join(option.opts)} is given twice", ctx)
+            return values, rest, order
+
+        parser.parse_args = parse_args  # type: ignore[method-assign]
+        return parser
+
+
+class Commands(click.Group):
+    """A group of such commands."""
+
+    command_class = Command
+
+
+def takes_one(option: click.Option) -> bool:
+    """Whether an option has one value, of which there can be no second one; a flag that is repeated says the same."""
+    return not option.multiple and not option.count and not (option.is_flag and not option.secondary_opts)
+
+
+Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
 #: A path argument. The code that reads the file checks that it exists and names the expected content.
 FILE = click.Path(path_type=Path)
@@ -58,7 +89,7 @@ class SceneName(_PathType):
 SCENE = SceneName()
 
 
-def configuration_options(command: Command) -> Command:
+def configuration_options(command: Decorated) -> Decorated:
     """Add ``--config`` and ``--set``, which choose the hardware configuration."""
     command = click.option(
         "--set",
@@ -77,7 +108,32 @@ def configuration_options(command: Command) -> Command:
     )(command)
 
 
-def size_option(text: str) -> Callable[[Command], Command]:
+class BusBytes(_BusType):
+    """The bytes of a bus, or ``auto``; the generator checks the number."""
+
+    name = "bytes"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int | Literal["auto"]:
+        """Parse the number."""
+        if value == "auto":
+            return "auto"
+        try:
+            return int(value)
+        except ValueError:
+            self.fail(f"{value!r} is neither auto nor a number of bytes", param, ctx)
+
+
+def bus_option(text: str, **settings: Any) -> Callable[[Decorated], Decorated]:
+    """Add ``--axi``, the bus of the AXI4 shell, with a help text."""
+    return click.option("--axi", "bus_bytes", type=BusBytes(), metavar="BYTES", help=text, **settings)
+
+
+def refit_option(command: Decorated) -> Decorated:
+    """Add ``--refit``, a part of the AXI4 shell."""
+    return click.option("--refit", is_flag=True, help="Add a unit that bends meshes to the shell of --axi.")(command)
+
+
+def size_option(text: str) -> Callable[[Decorated], Decorated]:
     """Add ``--size`` with a help text."""
     return click.option("--size", metavar="WxH", help=text)
 
@@ -102,14 +158,14 @@ class MeshName(_TextType):
 MESH = MeshName()
 
 
-def mesh_option(command: Command) -> Command:
+def mesh_option(command: Decorated) -> Decorated:
     """Add ``--mesh``, which replaces the scene's mesh."""
     return click.option(
         "--mesh", type=MESH, metavar="MESH", help="Replace the scene's mesh by this one: a name or a file."
     )(command)
 
 
-def simplify_option(command: Command) -> Command:
+def simplify_option(command: Decorated) -> Decorated:
     """Add ``--simplify``, the number of triangles of a large mesh."""
     return click.option(
         "--simplify",
@@ -119,7 +175,7 @@ def simplify_option(command: Command) -> Command:
     )(command)
 
 
-def strict_option(command: Command) -> Command:
+def strict_option(command: Decorated) -> Decorated:
     """Add ``--strict``, which makes a note on a mesh or a configuration an error."""
 
     def apply(context: click.Context, parameter: click.Parameter, value: bool) -> None:
@@ -138,14 +194,14 @@ def strict_option(command: Command) -> Command:
     )(command)
 
 
-def background_option(command: Command) -> Command:
+def background_option(command: Decorated) -> Decorated:
     """Add ``--background``, which replaces the scene's background by a room."""
     return click.option(
         "--background", type=FILE, metavar="DIR", help="Replace the scene's background by the room in this folder."
     )(command)
 
 
-def encoder_option(command: Command) -> Command:
+def encoder_option(command: Decorated) -> Decorated:
     """Add ``--encoder``."""
     return click.option(
         "--encoder",
@@ -155,14 +211,14 @@ def encoder_option(command: Command) -> Command:
     )(command)
 
 
-def dists_option(command: Command) -> Command:
+def dists_option(command: Decorated) -> Decorated:
     """Add ``--no-dists``, which skips the metric whose weights are a download."""
     return click.option(
         "--no-dists", is_flag=True, help="Skip DISTS, whose weights (64 MB) are downloaded at first use."
     )(command)
 
 
-def json_option(command: Command) -> Command:
+def json_option(command: Decorated) -> Decorated:
     """Add ``--json``, the file for the machine-readable report."""
     return click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the report as JSON.")(command)
 

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from colonnade.cli.options import FILE, configuration_options, echo, require_outputs
+from colonnade.cli.options import FILE, Command, bus_option, configuration_options, echo, refit_option, require_outputs
+
+if TYPE_CHECKING:
+    from colonnade.design.generator import BusBytes
 
 
 def _address(context: click.Context, parameter: click.Parameter, value: str) -> int:
@@ -31,11 +35,10 @@ def _framebuffer(context: click.Context, parameter: click.Parameter, value: str 
     return int(found[1]), int(found[2]), address
 
 
-@click.command(short_help="Describe the registers: SystemRDL, C, HTML, IP-XACT, SVD, device tree.")
+@click.command(cls=Command, short_help="Describe the registers: SystemRDL, C, HTML, IP-XACT, SVD, device tree.")
 @configuration_options
-@click.option(
-    "--axi", "bus_bytes", type=int, default=16, show_default=True, metavar="BYTES", help="The bus of the AXI4 shell."
-)
+@bus_option("The bus of the AXI4 shell; auto: 64 for rays, else 16.", default="auto", show_default=True)
+@refit_option
 @click.option("--output", type=FILE, metavar="DIR", help="Output folder. An unmodified earlier output is replaced.")
 @click.option(
     "--base", callback=_address, default="0", metavar="ADDRESS", help="Where the device is, for SVD and device tree."
@@ -64,7 +67,8 @@ def _framebuffer(context: click.Context, parameter: click.Parameter, value: str 
 def registers(
     config: str,
     overrides: tuple[str, ...],
-    bus_bytes: int,
+    bus_bytes: BusBytes,
+    refit: bool,
     output: Path | None,
     base: int,
     interrupt: int,
@@ -92,7 +96,7 @@ def registers(
     if output is not None:
         check_replaceable(output)
     terminal = progress.for_terminal()
-    design = generator.shell_manifest_for(config, overrides, bus_bytes, terminal)
+    design = generator.shell_manifest_for(config, overrides, bus_bytes, terminal, refit)
     if shell_header is not None:
         with replacing(shell_header) as stream:
             stream.write(files.shell_header(design).encode())

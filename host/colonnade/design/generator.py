@@ -19,6 +19,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 from colonnade.common import cache, machine_limits, notes, processes
 from colonnade.common.arguments import checked
@@ -50,6 +51,9 @@ JAVA_OPTIONS = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-XX:ErrorFile=/d
 
 #: What Java prints of an exception that a program does not handle: it is one of the generator.
 _CRASH = "Exception in thread"
+
+#: Bytes of the shell's bus; auto: as the generator chooses for the design.
+BusBytes: TypeAlias = int | Literal["auto"]
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
@@ -97,23 +101,26 @@ def black_boxed_design_for(config: str, overrides: Sequence[str] = (), progress:
 
 
 def shell_manifest_for(
-    config: str, overrides: Sequence[str] = (), bus_bytes: int = 16, progress: Progress = QUIET
+    config: str,
+    overrides: Sequence[str] = (),
+    bus_bytes: BusBytes = "auto",
+    progress: Progress = QUIET,
+    refit: bool = False,
 ) -> GeneratedDesign:
     """Generate only ``manifest.json`` and ``shell.json``, enough for register descriptions."""
-    return _cached(config, overrides, (MANIFEST_ONLY, *_shell_options(bus_bytes)), progress)
+    return _cached(config, overrides, (MANIFEST_ONLY, *_shell_options(bus_bytes, refit=refit)), progress)
 
 
 def shell_design_for(
     config: str,
     overrides: Sequence[str] = (),
-    bus_bytes: int = 16,
+    bus_bytes: BusBytes = "auto",
     progress: Progress = QUIET,
     pixel_stream: bool = False,
     refit: bool = False,
 ) -> GeneratedDesign:
     """Generate the device in its AXI4 shell, for simulation; ``shell.json`` has the shell's registers."""
-    options = (*_shell_options(bus_bytes), *("--pixel-stream",) * pixel_stream, *("--refit",) * refit)
-    return _cached(config, overrides, options, progress)
+    return _cached(config, overrides, _shell_options(bus_bytes, pixel_stream, refit), progress)
 
 
 def generate(
@@ -123,7 +130,7 @@ def generate(
     manifest_only: bool = False,
     black_box_memories: bool = False,
     progress: Progress = QUIET,
-    bus_bytes: int | None = None,
+    bus_bytes: BusBytes | None = None,
     pixel_stream: bool = False,
     refit: bool = False,
 ) -> GeneratedDesign:
@@ -142,8 +149,7 @@ def generate(
     """
     check_replaceable(output)
     options = (MANIFEST_ONLY,) * manifest_only + ("--black-box-memories",) * black_box_memories
-    options += () if bus_bytes is None else _shell_options(bus_bytes)
-    options += ("--pixel-stream",) * pixel_stream + ("--refit",) * refit
+    options += _shell_options(bus_bytes, pixel_stream, refit)
     design = _cached(config, overrides, options, progress)
     replace_folder(design.dir, output)
     return GeneratedDesign(output, design.manifest)
@@ -194,8 +200,9 @@ def _released(root: Path, source: ConfigurationSource) -> GeneratedDesign | None
     return GeneratedDesign(folder, Manifest.load(folder / "manifest.json"))
 
 
-def _shell_options(bus_bytes: int) -> tuple[str, ...]:
-    return ("--axi", str(bus_bytes))
+def _shell_options(bus_bytes: BusBytes | None, pixel_stream: bool = False, refit: bool = False) -> tuple[str, ...]:
+    bus = () if bus_bytes is None else ("--axi", str(bus_bytes))
+    return (*bus, *("--pixel-stream",) * pixel_stream, *("--refit",) * refit)
 
 
 def _key(source: ConfigurationSource, options: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import ExitStack
-from typing import Any, ClassVar
+from typing import Any
 
 from typing_extensions import Self
 
@@ -49,9 +49,6 @@ class Shell:
         UserError: There is no device, or one of another design.
     """
 
-    #: Of the shell's bus.
-    BUS_BYTES: ClassVar[int] = 16
-
     def __init__(self, transport: Transport, design: GeneratedDesign) -> None:
         from colonnade import _core
 
@@ -87,7 +84,7 @@ class Shell:
         """
         if not PAGE_BYTES <= memory <= 1 << 32:
             raise UserError(f"memory is {memory}: it must be from {PAGE_BYTES:,} to {1 << 32:,} bytes")
-        design = shell_design_for(config, overrides, cls.BUS_BYTES, progress)
+        design = shell_design_for(config, overrides, progress=progress)
         return cls(SimulatedTransport(design, memory, progress=progress), design)
 
     @classmethod
@@ -104,7 +101,7 @@ class Shell:
         Raises:
             UserError: There is no device, or one of another design.
         """
-        design = shell_manifest_for(config, overrides, cls.BUS_BYTES)
+        design = shell_manifest_for(config, overrides)
         return cls(UioTransport(path), design)
 
     @classmethod
@@ -129,7 +126,7 @@ class Shell:
         Raises:
             UserError: There is no device, or one of another design.
         """
-        return cls(LitexTransport(client, registers, *memory), shell_manifest_for(config, overrides, cls.BUS_BYTES))
+        return cls(LitexTransport(client, registers, *memory), shell_manifest_for(config, overrides))
 
     def _begin(self, timeout: float | None) -> None:
         self._paced.deadline = time.monotonic() + (self.transport.patience if timeout is None else timeout)

@@ -33,8 +33,6 @@ class RayShell(Shell, RayBackend):
         UserError: There is no device, or one of another design; of any call: the memory is too small.
     """
 
-    BUS_BYTES = 64
-
     @checked
     def __init__(self, transport: Transport, design: GeneratedDesign) -> None:
         from colonnade import _core

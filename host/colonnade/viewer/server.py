@@ -16,7 +16,7 @@ from colonnade.viewer.private_server import PrivateServer, Refused
 from colonnade.viewer.session import Session, ViewCamera
 
 #: Files of the page by request, and their types.
-_FILES = {
+FILES = {
     "GET ": ("live.html", "text/html"),
     "GET live.js": ("live.js", "text/javascript"),
     "GET orbit.js": ("orbit.js", "text/javascript"),
@@ -60,8 +60,8 @@ class _Handler(PrivateHandler):
 
     def respond(self, target: str, query: str, body: bytes) -> None:
         """The page, a frame, the changes of the scene; or save the camera of a JSON object."""
-        if target in _FILES:
-            name, kind = _FILES[target]
+        if target in FILES:
+            name, kind = FILES[target]
             return self.answer(200, (self.server.folder / name).read_bytes(), kind)
         if target == "GET events":
             self._events()

@@ -160,6 +160,15 @@ def test_the_shell_is_the_same_in_every_design(design: GeneratedDesign) -> None:
     assert re.search(r"STATUS__ISLOADING_bm 0x4$", header, re.MULTILINE)
 
 
+@pytest.mark.parametrize("command", [["registers"], ["generate", "--axi", "auto", "--manifest-only"]])
+def test_a_shell_that_refits_is_legal_as_for_generate(command: list[str], tmp_path: Path) -> None:
+    arguments = [*command, "--refit", "--output", str(tmp_path / "out"), "--config", "tiny"]
+    done = CliRunner().invoke(cli, arguments)
+    assert done.exit_code == 2
+    assert done.stderr == "colonnade: error: --refit needs columnBvhMemory.cache={}\n"
+    assert CliRunner().invoke(cli, [*arguments, "--set", "columnBvhMemory.cache={}"]).exit_code == 0
+
+
 def test_a_foreign_folder_is_not_replaced(design: GeneratedDesign, tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("irreplaceable")
     with pytest.raises(UserError, match="holds files"):

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+from click.testing import CliRunner
 
+from colonnade.cli.main import cli
 from colonnade.cli.options import SCENE
 from colonnade.common.errors import UserError
 from colonnade.design import toolchain
+from colonnade.design.generator import manifest_for
 from colonnade.scene.parser import load_scene
+from colonnade.viewer import server
 
 ROOT = Path(__file__).resolve().parents[3]
+PRESETS = sorted(path.stem for path in (ROOT / "configs").glob("*.json"))
 
 
 @pytest.fixture
@@ -107,9 +115,8 @@ def data(module: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytes
 
 def test_a_wheel_has_presets_scenes_and_tools(data: Path, tmp_path: Path) -> None:
     assert toolchain.project_root() == data
-    presets = {path.stem for path in (ROOT / "configs").glob("*.json")}
-    assert {path.stem for path in (data / "configs").iterdir()} == presets
-    assert {path.parent.name for path in (data / "manifests").glob("*/manifest.json")} == presets
+    assert {path.stem for path in (data / "configs").iterdir()} == {*PRESETS}
+    assert {path.parent.name for path in (data / "manifests").glob("*/manifest.json")} == {*PRESETS}
     assert {path.name for path in (data / "scenes").glob("*.toml")} == {
         path.name for path in (ROOT / "scenes").glob("*.toml")
     }
@@ -118,6 +125,63 @@ def test_a_wheel_has_presets_scenes_and_tools(data: Path, tmp_path: Path) -> Non
         assert room is None or (path.parent / room / "meta.json").is_file()
     for needed in (".jvmopts", "LICENSE", "tools/verilated-object"):
         assert (data / needed).read_bytes() == (ROOT / needed).read_bytes()
+
+    assert {name for name, _ in server.FILES.values()} == {path.name for path in (data / "site").iterdir()}
+
+
+def test_a_wheel_has_the_package_its_data_and_three_modules(
+    module: Callable[[str], ModuleType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The modules are empty here: compiling them takes minutes."""
+    wheels, (work, output) = module("wheels"), (tmp_path / "work", tmp_path / "output")
+
+    def compiled(target: object, python: str, toolchain: Path, folder: Path) -> Path:
+        folder.mkdir()
+        (folder / f"_core.{python}.so").touch()
+        return folder / f"_core.{python}.so"
+
+    monkeypatch.setattr(wheels, "_compile", compiled)
+    output.mkdir()
+    wheel = wheels.build(wheels.TARGETS[1], a_jar(tmp_path / "colonnade-generator.jar"), ["a", "b", "c"], work, output)
+    assert re.fullmatch(r"colonnade-[\d.]+-cp310-abi3-manylinux_2_28_aarch64\.whl", wheel.name)
+    names = {name for name in zipfile.ZipFile(wheel).namelist() if not name.endswith("/")}
+    tracked = subprocess.check_output(["git", "ls-files", "colonnade"], cwd=ROOT / "host", text=True).splitlines()
+    gathered = {
+        f"colonnade/{path.relative_to(work / 'files')}" for path in (work / "files").rglob("*") if path.is_file()
+    }
+    assert {"colonnade/data/colonnade-generator.jar", "colonnade/data/configs/edge.json"} <= gathered
+    assert {name for name in names if ".dist-info/" not in name} == {*tracked} | gathered
+    assert {name.split("/", 1)[1] for name in names if ".dist-info/" in name} >= {"METADATA", "entry_points.txt"}
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_manifest_of_a_preset_needs_no_java(preset: str, data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    assert manifest_for(preset).manifest.config["array"]["rows"] >= 1
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_an_archive_has_the_designs_of_a_preset(
+    preset: str, module: Callable[[str], ModuleType], tmp_path: Path
+) -> None:
+    """Of each its manifest: their Verilog takes minutes."""
+
+    def run(command: str, *arguments: str) -> None:
+        options = ["--manifest-only"] if command == "generate" else []
+        done = CliRunner().invoke(cli, [command, *arguments, *options])
+        assert done.exit_code == 0, done.output
+
+    archive = tmp_path / "design.tar.gz"
+    module("designs").write(preset, run, tmp_path, archive, time=0)
+    with tarfile.open(archive) as tar:
+        names = {name.removeprefix(f"colonnade-{preset}/") for name in tar.getnames()}
+    assert {
+        *("LICENSE", "device/manifest.json", "shell/manifest.json", "shell/shell.json", "registers/colonnade.rdl"),
+        *("driver/include/colonnade.h", "driver/src/colonnade.c"),
+    } <= names
+    assert "device/shell.json" not in names
+    shell = json.loads((tmp_path / preset / "shell" / "shell.json").read_text())
+    assert shell["busBytes"] == (64 if preset == "traversal" else 16)
 
 
 def test_a_scene_has_a_name(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,7 @@ package colonnade
 
 import chisel3.RawModule
 import colonnade.bus.ShellMap
-import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO, ShellConfig}
+import colonnade.config.{ColonnadeConfig, ConfigError, ConfigIO, Require, ShellConfig}
 import colonnade.formats.{FormatsPage, Manifest, RayBatch, RecordFormats}
 
 import java.io.IOException
@@ -19,7 +19,8 @@ object Generate {
        |  --set KEY=VALUE       overrides one field, as in array.rows=4; may be repeated
        |  --output DIR          takes the place of an earlier output that nobody changed; never half-written
        |  --manifest-only       writes no Verilog
-       |  --axi BYTES           puts the device into its AXI4 shell, with a bus of 4 to 128 BYTES; shell.json has its registers
+       |  --axi BYTES           puts the device into its AXI4 shell, with a bus of 4 to 128 BYTES, or of auto: 64 for rays,
+       |                        else 16; shell.json has its registers
        |  --pixel-stream        gives the shell an AXI4-Stream of pixels, to which frames can go
        |  --refit               gives the shell a unit that bends meshes in DRAM
        |  --black-box-memories  leaves memories to be filled in; memories.json lists their shapes
@@ -32,7 +33,7 @@ object Generate {
       overrides:        Vector[String] = Vector.empty,
       output:           Option[String] = None,
       formatsPage:      Option[String] = None,
-      axi:              Option[ShellConfig] = None,
+      axi:              Option[Option[Int]] = None, // bytes; none: auto
       pixelStream:      Boolean = false,
       refit:            Boolean = false,
       manifestOnly:     Boolean = false,
@@ -61,21 +62,11 @@ object Generate {
     else axi.fold[RawModule](new Colonnade(config))(new ColonnadeAxi(config, _))
 
   private def generate(options: Options): Unit = {
-    if (options.pixelStream && options.axi.isEmpty)
-      throw new ConfigError("--pixel-stream is a port of the AXI4 shell: it needs --axi")
-    if (options.refit && options.axi.isEmpty)
-      throw new ConfigError("--refit is a unit of the AXI4 shell: it needs --axi")
-    val axi    = options.axi.map(_.copy(pixelStream = options.pixelStream, refit = options.refit))
-    val name   = options.config.getOrElse(throw new ConfigError("--config is missing; see --help"))
-    val config = ConfigIO.load(name, options.overrides)
-    if (options.refit && (config.columnBvhMemory.cache.isEmpty || new RecordFormats(config).recordBits != 256))
-      throw new ConfigError(
-        "--refit bends records of 256 bits in DRAM: it needs columnBvhMemory.cache, and geometry.vertexBits up to 19"
-      )
-    if (config.frame.rays && axi.exists(_ != ShellConfig(RayBatch.bytes)))
-      throw new ConfigError(
-        s"a device with frame.rays has a bus of ${RayBatch.bytes} bytes: give --axi ${RayBatch.bytes} alone"
-      )
+    val name          = options.config.getOrElse(throw new ConfigError("--config is missing; see --help"))
+    val (config, axi) = Require.all {
+      val config = ConfigIO.load(name, options.overrides)
+      (config, shell(options, config))
+    }
     if (options.output.isEmpty && options.formatsPage.isEmpty)
       throw new ConfigError("--output is missing; see --help")
 
@@ -93,6 +84,24 @@ object Generate {
     }
   }
 
+  /** The shell of `--axi`, with what the other options add to it. */
+  private def shell(options: Options, config: ColonnadeConfig): Option[ShellConfig] = {
+    import config.frame.rays
+    for ((name, isGiven) <- Seq("--pixel-stream" -> options.pixelStream, "--refit" -> options.refit) if isGiven) {
+      Require(name, options.axi.nonEmpty, "needs --axi BYTES")
+      Require(name, !rays, "is for frames: it does not go with frame.rays")
+    }
+    if (options.refit && !rays) {
+      Require("--refit", config.columnBvhMemory.cache.nonEmpty, "needs columnBvhMemory.cache={}")
+      Require("--refit", new RecordFormats(config).recordBits == 256, "needs geometry.vertexBits=19")
+    }
+    val ownBytes = if (rays) RayBatch.bytes else 16
+    options.axi.map(_.getOrElse(ownBytes)).map { bytes =>
+      Require("frame.rays", !rays || bytes == RayBatch.bytes, s"needs --axi ${RayBatch.bytes}")
+      ShellConfig(bytes, pixelStream = options.pixelStream, refit = options.refit)
+    }
+  }
+
   private def parse(arguments: List[String], options: Options): Options = arguments match {
     case Nil                             => options
     case "--help" :: rest                => parse(rest, options.copy(help = true))
@@ -105,8 +114,9 @@ object Generate {
     case Valued("--set", value, rest)    => parse(rest, options.copy(overrides = options.overrides :+ value))
     case Valued("--output", value, rest) => parse(rest, options.copy(output = Some(value)))
     case Valued("--axi", value, rest)    =>
-      val bytes = value.toIntOption.getOrElse(throw new ConfigError(s"--axi is '$value'; it must be a number of bytes"))
-      parse(rest, options.copy(axi = Some(ShellConfig(bytes))))
+      if (value != "auto" && value.toIntOption.isEmpty)
+        throw new ConfigError(s"--axi is '$value'; it must be auto or a number of bytes")
+      parse(rest, options.copy(axi = Some(value.toIntOption)))
     case Valued("--formats-page", value, rest) => parse(rest, options.copy(formatsPage = Some(value)))
     case unknown :: _                          => throw new ConfigError(s"unknown option $unknown; see --help")
   }

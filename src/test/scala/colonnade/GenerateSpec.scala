@@ -52,25 +52,37 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
 
   it should "refuse a pixel stream without the shell" in Scratch { scratch =>
     val output = scratch.resolve("out").toString
-    refused("--config", "tiny", "--output", output, "--manifest-only", "--pixel-stream")("it needs --axi")
+    refused("--config", "tiny", "--output", output, "--manifest-only", "--pixel-stream")("--pixel-stream needs --axi BYTES")
     run("--config", "tiny", "--output", output, "--manifest-only", "--axi", "16", "--pixel-stream")._1 shouldBe 0
   }
 
-  it should "refuse a refit unit without the shell, or a scene in DRAM" in Scratch { scratch =>
-    val output = scratch.resolve("out").toString
-    refused("--config", "edge", "--output", output, "--manifest-only", "--refit")("it needs --axi")
-    refused(
-      "--config",
-      "tiny",
-      "--output",
-      output,
-      "--manifest-only",
-      "--axi",
-      "16",
-      "--refit"
-    )("columnBvhMemory.cache")
-    refused("--config", "edge", "--output", output, "--manifest-only", "--axi", "128", "--refit")("--axi with --refit")
-    run("--config", "edge", "--output", output, "--manifest-only", "--axi", "64", "--refit")._1 shouldBe 0
+  it should "refuse a refit unit without the shell, a scene in DRAM and records of 256 bits" in Scratch { scratch =>
+    val output                                  = scratch.resolve("out").toString
+    def shell(config: String, more: String*)    = Seq("--config", config, "--output", output, "--manifest-only") ++ more
+    def needs(options: Seq[String], needed: String) = refused(options: _*)(s"error: $needed\n")
+    needs(shell("edge", "--refit"), "--refit needs --axi BYTES")
+    needs(
+      shell("tiny", "--set", "geometry.vertexBits=24", "--refit"),
+      "--refit needs --axi BYTES, columnBvhMemory.cache={}, geometry.vertexBits=19"
+    )
+    refused(shell("edge", "--axi", "128", "--refit"): _*)("--axi with --refit is 128")
+    run(shell("edge", "--axi", "64", "--refit"): _*)._1 shouldBe 0
+    val needed = Seq("--set", "columnBvhMemory.cache={}", "--set", "geometry.vertexBits=19")
+    run(shell("tiny", "--axi" +: "16" +: "--refit" +: needed: _*): _*)._1 shouldBe 0
+    for (option <- Seq("--refit", "--pixel-stream"))
+      needs(shell("traversal", "--axi", "64", option), s"$option is for frames: it does not go with frame.rays")
+  }
+
+  it should "give a device for rays the bus of a batch" in Scratch { scratch =>
+    val output = scratch.resolve("out")
+    refused("--config", "traversal", "--axi", "16", "--output", output.toString)("frame.rays needs --axi 64")
+    refused("--config", "tiny", "--set", "frame.rays=true", "--axi=16", "--output", output.toString)(
+      "frame.rays needs units.rayInterval=1, units.pathContexts=64, --axi 64"
+    )
+    for ((preset, bytes) <- Seq("tiny" -> 16, "traversal" -> 64)) {
+      run("--config", preset, "--axi", "auto", "--output", output.toString, "--manifest-only") shouldBe ((0, ""))
+      ujson.read(Files.readString(output.resolve("shell.json")))("busBytes").num shouldBe bytes
+    }
   }
 
   it should "replace an earlier output, but no other directory" in Scratch { scratch =>

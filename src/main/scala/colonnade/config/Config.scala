@@ -1,6 +1,6 @@
 package colonnade.config
 
-import chisel3.util.isPow2
+import chisel3.util.log2Ceil
 
 /** Shape of the array.
   *
@@ -146,7 +146,7 @@ final case class ColumnBvhMemoryConfig(
   Require.within("columnBvhMemory.stackDepth", stackDepth, 4, 256)
   Require.within("columnBvhMemory.recordBuffers", recordBuffers, 1, 8)
   Require.within("columnBvhMemory.readLatency", readLatency, 1, 16)
-  cache.foreach(_.check(this))
+  cache.foreach(each => Require.ifSound(each.check(this)))
 }
 
 /** Limits of a frame.
@@ -184,7 +184,6 @@ final case class FrameConfig(
   Require.within("frame.maxBounces", maxBounces, 0, 15)
   Require.within("frame.instances", instances, 0, FrameConfig.maxInstances)
   Require("frame.instances", instances != 1, "is 0 or at least 2: one object moves by the registers of the camera")
-  Require("frame.gather", !gather || maxBounces > 0, "needs frame.maxBounces of at least 1")
 
   /** The device supports mirrors and glass. */
   val hasBounces: Boolean = maxBounces > 0
@@ -211,33 +210,35 @@ final case class ColonnadeConfig(
     physicalAttributeMemory: Option[PhysicalAttributeMemoryConfig] = None,
     frame:                   FrameConfig = FrameConfig()
 ) {
-  Require(
-    "frame.gather",
-    !frame.gather || units.shadeInterval < UnitsConfig.sequentialShadeInterval,
-    s"needs units.shadeInterval below ${UnitsConfig.sequentialShadeInterval}"
-  )
-
-  Require("frame.instances", !frame.hasInstances || geometry.bvh, "needs geometry.bvh=true")
-
   val numbers: NumberFormats = NumberFormats(geometry, precision, frame)
 
-  Require(
-    "units.pathContexts",
-    frame.rays || units.pathContexts <= UnitsConfig.maxPathContexts,
-    s"must be at most ${UnitsConfig.maxPathContexts} without frame.rays"
-  )
-  if (frame.rays) {
-    Require("frame.rays", !frame.hasInstances, "needs frame.instances=0")
-    Require("frame.rays", frame.maxBounces == 0, "needs frame.maxBounces=0")
-    Require("frame.rays", physicalAttributeMemory.isEmpty, "needs physicalAttributeMemory=null")
-    Require("frame.rays", units.rayInterval == 1, "needs units.rayInterval=1")
+  Require("frame.instances", !frame.hasInstances || geometry.bvh, "needs geometry.bvh=true")
+  if (frame.rays) requireForRays()
+  else {
+    val hasPipeline = units.shadeInterval < UnitsConfig.sequentialShadeInterval
+    Require("frame.gather", !frame.gather || frame.hasBounces, "needs frame.maxBounces=1")
+    Require("frame.gather", !frame.gather || hasPipeline, s"needs units.shadeInterval=${UnitsConfig.shadeIntervals.min}")
     Require(
-      "frame.rays",
-      units.pathContexts >= 64 && isPow2(units.pathContexts),
-      "needs units.pathContexts as a power of two from 64 on"
+      "units.pathContexts",
+      units.pathContexts <= UnitsConfig.maxPathContexts,
+      s"must be at most ${UnitsConfig.maxPathContexts} without frame.rays"
     )
-    Require("frame.rays", numbers.gridBits <= 38, "needs geometry.triangleBits of at most 38")
-    Require("frame.rays", numbers.directionBits <= 64, "needs precision.mac and frame.maxWidth for 64-bit directions")
+  }
+
+  /** Each rule is a setting with which it holds. */
+  private def requireForRays(): Unit = {
+    val contexts = (1 << log2Ceil(units.pathContexts)).max(64)
+    val macBits  = 64 - 2 - numbers.coordinateBits
+    Seq(
+      (!frame.hasInstances, "frame.instances=0"),
+      (!frame.hasBounces, "frame.maxBounces=0"),
+      (!frame.gather, "frame.gather=false"),
+      (physicalAttributeMemory.isEmpty, "physicalAttributeMemory=null"),
+      (units.rayInterval == 1, "units.rayInterval=1"),
+      (units.pathContexts == contexts, s"units.pathContexts=$contexts"),
+      (numbers.gridBits <= 38, "geometry.triangleBits=38"),
+      (precision.mac <= macBits, s"precision.mac=$macBits")
+    ).foreach { case (holds, setting) => Require("frame.rays", holds, s"needs $setting") }
   }
 
   /** Rows share triangle units. */

@@ -37,7 +37,7 @@ object ConfigIO {
   private def completed(json: ujson.Value): ujson.Value =
     ConfigSchema.completed(json, ColonnadeConfig.complete, ColonnadeConfig())
 
-  private def built(json: ujson.Value): ColonnadeConfig = ConfigPickler.read[ColonnadeConfig](json)
+  private def built(json: ujson.Value): ColonnadeConfig = Require.all(ConfigPickler.read[ColonnadeConfig](json))
 
   private def withOverride(json: ujson.Value, setting: String): ujson.Value = {
     val (path, value) = setting.split("=", 2) match {

@@ -201,6 +201,32 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
     refusal("tiny", "frame.tileSize=5") shouldBe "frame.tileSize is 5; it must be one of 4, 8, 16, 32"
   }
 
+  it should "refuse all that is illegal at once, and nothing that only follows" in {
+    refusal("tiny", "array.rows=0", "frame.lights=9") shouldBe
+      "array.rows is 0; it must be from 1 to 256. frame.lights is 9; it must be from 1 to 8"
+    refusal("edge", "precision.div=8", "columnBvhMemory.banks=3", "frame.rays=true") should startWith(
+      "precision.div is 8; it must be from 16 to 64. columnBvhMemory.banks is 3; it must be one of 1, 2, 4. frame.rays"
+    )
+    refusal("edge", "physicalAttributeMemory.tileSize=0", "units.marches=17") shouldBe
+      "units.marches is 17; it must be from 1 to 16. physicalAttributeMemory.tileSize is 0; it must be one of 16, 32"
+  }
+
+  it should "name settings that make a feature legal, all of them at once" in {
+    refusal("tiny", "frame.rays=true") shouldBe "frame.rays needs units.rayInterval=1, units.pathContexts=64"
+    refusal("edge", "frame.rays=true") shouldBe "frame.rays needs frame.maxBounces=0, frame.gather=false, " +
+      "physicalAttributeMemory=null, units.pathContexts=256"
+    refusal("tiny", "frame.gather=true") shouldBe "frame.gather needs frame.maxBounces=1, units.shadeInterval=3"
+    val designs = ConfigIO.presets.map(_ -> "frame.instances=0") ++
+      Seq("64b64s64d" -> "frame.maxWidth=4096", "small" -> "frame.instances=4", "edge" -> "units.pathContexts=1")
+    for ((name, other) <- designs; feature <- Seq("frame.rays", "frame.gather") if name != "traversal") {
+      val settings = Seq(other, s"$feature=true")
+      val needed =
+        try { ConfigIO.load(name, settings); Nil }
+        catch { case error: ConfigError => error.getMessage.stripPrefix(s"$feature needs ").split(", ").toSeq }
+      noException should be thrownBy ConfigIO.load(name, settings ++ needed)
+    }
+  }
+
   private def environment(changes: String*): Seq[String] =
     s"physicalAttributeMemory=${ConfigIO.write(TestConfigs.withEnvironment(TestConfigs.environment))("physicalAttributeMemory").render()}" +:
       changes.map(change => s"physicalAttributeMemory.$change")
