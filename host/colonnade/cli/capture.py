@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from colonnade.cli.options import FILE, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, Command, echo, finish, json_option, require_outputs
 from colonnade.common.errors import UserError
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Direction(_VectorType):
         return x, y, z
 
 
-@click.command(short_help="Convert a phone's or depth camera's recording to a sequence and a room.")
+@click.command(cls=Command, short_help="Convert a phone's or depth camera's recording to a sequence and a room.")
 @click.argument("source", type=FILE)
 @click.option("--output", type=FILE, required=True, metavar="DIR", help="New or empty folder for the result.")
 @click.option(

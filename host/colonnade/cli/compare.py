@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import FILE, dists_option, echo, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, Command, dists_option, echo, finish, json_option, require_outputs
 
 #: The printed label of each metric, in printing order.
 LABELS = {
@@ -21,7 +21,7 @@ LABELS = {
 }
 
 
-@click.command(short_help="Compare two pictures and their hits.")
+@click.command(cls=Command, short_help="Compare two pictures and their hits.")
 @click.argument("a", type=FILE)
 @click.argument("b", type=FILE)
 @click.option("--hits-a", type=FILE, metavar="FILE", help="Hits of frame A, written by colonnade render --hits.")

@@ -8,6 +8,7 @@ import click
 
 from colonnade.cli.options import (
     FILE,
+    Command,
     dists_option,
     echo,
     encoder_option,
@@ -18,7 +19,7 @@ from colonnade.cli.options import (
 from colonnade.maps.encoders import Encoder
 
 
-@click.command(short_help="Describe a scene image, or the encoded maps of a room.")
+@click.command(cls=Command, short_help="Describe a scene image, or the encoded maps of a room.")
 @click.argument("directory", metavar="[DIR]", type=FILE, required=False)
 @click.option(
     "--config",

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import FILE, echo, echo_lines, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, Command, echo, echo_lines, finish, json_option, require_outputs
 
 
-@click.command(short_help="Fit lights to the photo of a room.")
+@click.command(cls=Command, short_help="Fit lights to the photo of a room.")
 @click.argument("room", type=FILE)
 @click.option(
     "--lights",

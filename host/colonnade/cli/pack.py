@@ -9,6 +9,7 @@ import click
 from colonnade.cli.options import (
     FILE,
     SCENE,
+    Command,
     background_option,
     configuration_options,
     echo,
@@ -24,7 +25,7 @@ from colonnade.cli.options import (
 from colonnade.maps.encoders import Encoder
 
 
-@click.command(short_help="Pack a scene into the image that the hardware loads.")
+@click.command(cls=Command, short_help="Pack a scene into the image that the hardware loads.")
 @click.argument("scene", type=SCENE)
 @configuration_options
 @mesh_option

@@ -12,6 +12,7 @@ import click
 from colonnade.cli.options import (
     FILE,
     SCENE,
+    Command,
     background_option,
     configuration_options,
     echo,
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from colonnade.scene.model import Denoiser
 
 
-class _Render(click.Command):
+class _Render(Command):
     """``--denoise`` has an optional value: the word after it is no value if it is the scene."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import configuration_options, echo, encoder_option, size_option
+from colonnade.cli.options import Command, configuration_options, echo, encoder_option, size_option
 from colonnade.maps.encoders import Encoder
 
 
-@click.command(short_help="Show a scene in the browser, while it is edited.")
+@click.command(cls=Command, short_help="Show a scene in the browser, while it is edited.")
 @click.argument("scene", type=click.Path())
 @configuration_options
 @size_option("Frame size in pixels.  [default: 320x240]")

@@ -15,7 +15,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.config_name import Overrides
 from colonnade.design.generator import GeneratedDesign, design_for
-from colonnade.design.manifest import Register
+from colonnade.design.manifest import Manifest, Register
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import HUGE_PAGES
 
@@ -106,6 +106,16 @@ def device_text(config: str, overrides: Overrides = (), options: Sequence[str] =
     return "\n".join([f"program {program}", *(f"argument {each}" for each in options), registers])
 
 
+def require_rays(manifest: Manifest) -> None:
+    """Refuse a design that renders.
+
+    Raises:
+        UserError: The design has no frame.rays.
+    """
+    if not manifest.config["frame"]["rays"]:
+        raise UserError("the design traces no rays of applications: choose one with frame.rays, such as traversal")
+
+
 def registers_text(registers: Mapping[str, Register]) -> str:
     """Registers for the library in C, one a line."""
     lines = (f"register {name} {r.address} {r.width} {int(r.signed)} {r.access}\n" for name, r in registers.items())
@@ -114,6 +124,5 @@ def registers_text(registers: Mapping[str, Register]) -> str:
 
 def _simulator(design: GeneratedDesign, progress: Progress) -> tuple[Path, str]:
     """The simulator of a design, and its registers."""
-    if not design.manifest.config["frame"]["rays"]:
-        raise UserError("the design traces no rays of applications: choose one with frame.rays, such as traversal")
+    require_rays(design.manifest)
     return build_simulator(design, progress), registers_text(design.manifest.registers)

@@ -199,6 +199,8 @@ CASES |= {
     "frames-digits": Case(f"{RENDER} --frames {NINES} --output f.png", "--frames"),
     "size-digits": Case(f"{RENDER} --size {NINES}x8", "WIDTHxHEIGHT"),
     "hardware-without-frames": Case("render s.toml --config traversal --backend model", "(frame.rays)"),
+    "rays-of-hardware-for-frames": Case("bench --rays 1 --config tiny --mesh none", "choose one with frame.rays"),
+    "rays-of-two-meshes": Case("bench --rays 1 --config traversal --mesh none --mesh none", "one --mesh"),
     "size-too-wide": Case("render s.toml --config tiny --backend model --size 999999999x8", "frame.maxWidth"),
     "delay-nan": Case("ppa --delay nan", "finite"),
     "clock-inf": Case("ppa --clock inf", "finite"),

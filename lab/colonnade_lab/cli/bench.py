@@ -11,6 +11,7 @@ import click
 from colonnade.cli.options import (
     FILE,
     MESH,
+    Command,
     configuration_options,
     echo,
     echo_lines,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from colonnade_lab.common.text_table import Table
 
 
-@click.command()
+@click.command(cls=Command)
 @configuration_options
 @click.option("--mesh", "meshes", multiple=True, type=MESH, metavar="MESH", help="Render only this mesh. Repeatable.")
 @size_option("Frame size in pixels.  [default: that of the benchmark scene]")
@@ -109,6 +110,8 @@ def bench(
 
     terminal = progress.for_terminal()
     if rays is not None:
+        if len(meshes) > 1:
+            raise click.UsageError("--rays is with one --mesh", click.get_current_context())
         finish(_batches(config, overrides, meshes[0] if meshes else "armadillo", rays, terminal), json_file)
         return
     names = meshes or MESHES
@@ -155,6 +158,7 @@ def _batches(config: str, overrides: tuple[str, ...], mesh: str, rays: int, term
 
     from colonnade.design.generator import manifest_for
     from colonnade.mesh.load import load_mesh
+    from colonnade.rays.device import require_rays
 
     from colonnade_lab.common.text_table import Column, Table
     from colonnade_lab.evaluation.ray_bench import measured
@@ -170,12 +174,13 @@ def _batches(config: str, overrides: tuple[str, ...], mesh: str, rays: int, term
         ),
         echo,
     )
+    manifest = manifest_for(config, overrides, terminal).manifest
+    require_rays(manifest)
     kinds = []
     for each in measured(load_mesh(mesh), config, overrides, rays, progress=terminal):
         kinds.append(asdict(each))
         table.print(*astuple(each))
-    full = manifest_for(config, overrides, terminal).manifest.config
-    return {"config": full, "mesh": mesh, "rays": rays, "kinds": kinds}
+    return {"config": manifest.config, "mesh": mesh, "rays": rays, "kinds": kinds}
 
 
 def _table() -> Table:

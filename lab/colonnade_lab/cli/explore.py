@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import click
-from colonnade.cli.options import FILE, echo, strict_option
+from colonnade.cli.options import FILE, Command, echo, strict_option
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("study", type=FILE)
 @click.option("--output", type=FILE, metavar="DIR", help="Folder for tables, pictures and report; not for --check.")
 @click.option(

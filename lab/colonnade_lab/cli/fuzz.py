@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from colonnade.cli.options import configuration_options, finish, json_option, require_outputs
+from colonnade.cli.options import Command, configuration_options, finish, json_option, require_outputs
 
 if TYPE_CHECKING:
     from colonnade_lab.evaluation.fuzz.campaign import Disagreement
 
 
-@click.command()
+@click.command(cls=Command)
 @configuration_options
 @click.option(
     "--frames",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from colonnade.cli.options import (
     FILE,
+    Command,
     PositiveNumber,
     configuration_options,
     echo,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from colonnade_lab.ppa.power.workload import Workload
 
 
-@click.command()
+@click.command(cls=Command)
 @configuration_options
 @click.option(
     "--liberty",

@@ -6,10 +6,10 @@ from dataclasses import astuple
 from pathlib import Path
 
 import click
-from colonnade.cli.options import MESH, configuration_options, echo, finish, json_option, require_outputs
+from colonnade.cli.options import MESH, Command, configuration_options, echo, finish, json_option, require_outputs
 
 
-@click.command()
+@click.command(cls=Command)
 @configuration_options
 @click.option("--mesh", type=MESH, metavar="MESH", default="teapot", show_default=True, help="Mesh that the rays hit.")
 @click.option("--rays", "count", type=click.IntRange(1), default=100_000, show_default=True, help="Rays of each kind.")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import click
-from colonnade.cli.options import FILE, dists_option, echo_lines, finish, json_option, require_outputs
+from colonnade.cli.options import FILE, Commands, dists_option, echo_lines, finish, json_option, require_outputs
 
 rooms_argument = click.argument("rooms", type=FILE, nargs=-1, required=True)
 seeds_argument = click.argument("seeds", metavar="SEEDS", callback=lambda *given: _seeds(given[-1]))
@@ -24,7 +24,7 @@ seeds_option = click.option(
 output_option = click.option("--output", type=FILE, metavar="DIR", help="Write the frames as pictures.")
 
 
-@click.group()
+@click.group(cls=Commands)
 def study() -> None:
     """Measure reconstructed rooms against their depth maps, and AR frames in them.
 

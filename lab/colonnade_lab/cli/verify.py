@@ -9,6 +9,7 @@ import click
 from colonnade.cli.options import (
     FILE,
     MESH,
+    Command,
     configuration_options,
     echo,
     finish,
@@ -19,7 +20,7 @@ from colonnade.cli.options import (
 )
 
 
-@click.command()
+@click.command(cls=Command)
 @configuration_options
 @click.option("--mesh", "meshes", multiple=True, type=MESH, metavar="MESH", help="Render only this mesh. Repeatable.")
 @click.option(
