@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from colonnade_lab.common import paper
 from colonnade_lab.common.markdown import markdown
@@ -82,9 +83,19 @@ def _relit(data: Data, encoding: str) -> str:
 
 def _marched(data: Data) -> str:
     """Mirror rays that find the right place of a room, %: the lowest and the highest of the rooms."""
-    accuracy = data.result("environments")["accuracy"]
-    found = [100 * each["mirror"]["ok"] for name, each in accuracy.items() if name.endswith(", device")]
+    found = [100 * each["mirror"]["ok"] for each in _marches(data)]
     return " to ".join(f"{share:.1f}" for share in sorted({min(found), max(found)}))
+
+
+def _march_steps(data: Data) -> str:
+    """Steps of a ray in the rooms, mean: the lowest and the highest."""
+    return " to ".join(f"{steps:.0f}" for steps in sorted({round(each["mean_steps"]) for each in _marches(data)}))
+
+
+def _marches(data: Data) -> list[Mapping[str, Any]]:
+    """The device's marches in each room."""
+    accuracy = data.result("environments")["accuracy"]
+    return [each for name, each in accuracy.items() if name.endswith(", device")]
 
 
 def _against_rivals(_: Data) -> str:
@@ -107,6 +118,7 @@ FACTS: Mapping[str, Callable[[Data], str]] = {
     "slicDists": lambda data: _relit(data, "slic"),
     "twoLevelDists": lambda data: _relit(data, "twoLevel"),
     "marched": _marched,
+    "marchSteps": _march_steps,
     "nj": lambda _: f"{paper.MILLIWATTS / paper.MRAYS:.2f}",
     "raysAFrame": lambda _: f"{round(paper.RAYS_A_FRAME, -3):,.0f}",
     "againstRivals": _against_rivals,
