@@ -40,13 +40,13 @@ private:
         for (int corner = 0; corner < 3; ++corner) {
             if (weights[corner] == 1) return face[corner];
             if (weights[corner] == 0) continue;
-            int place = corner;
-            for (; place > 0 && point.corners[place - 1] < face[corner]; --place) {
-                point.corners[place] = point.corners[place - 1];
-                point.weights[place] = point.weights[place - 1];
+            int i = corner;
+            for (; i > 0 && point.corners[i - 1] < face[corner]; --i) {
+                point.corners[i] = point.corners[i - 1];
+                point.weights[i] = point.weights[i - 1];
             }
-            point.corners[place] = face[corner];
-            point.weights[place] = weights[corner];
+            point.corners[i] = face[corner];
+            point.weights[i] = weights[corner];
         }
         std::uint64_t hash = 0;
         for (int corner = 0; corner < 3; ++corner) {
