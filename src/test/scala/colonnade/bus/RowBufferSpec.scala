@@ -42,4 +42,24 @@ class RowBufferSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.isIdle.expect(true)
       }
     }
+
+  it should "join each pixel to the row before it, in all of its rows" in
+    test(new RowBuffer(config, ShellConfig(busBytes = 16, rows = 8))) { dut =>
+      for (y <- 0 until 8; x <- 0 until 2) {
+        dut.pixels.valid.poke(true)
+        dut.pixels.bits.x.poke(x)
+        dut.pixels.bits.y.poke(y)
+        dut.pixels.ready.expect(true)
+        dut.clock.step()
+      }
+      dut.pixels.valid.poke(false)
+      dut.out.ready.poke(true)
+      dut.flush.poke(true)
+      val masks = (0 until 60).flatMap { _ =>
+        val row = Option.when(dut.out.valid.peekBoolean())(dut.out.bits.y.peekInt() -> dut.out.bits.mask.peekInt())
+        dut.clock.step()
+        row
+      }
+      assert(masks.sorted == (0 until 8).map(y => BigInt(y) -> BigInt(3)))
+    }
 }

@@ -31,6 +31,7 @@ class TriangleGroupSpec extends AnyFlatSpec with ChiselScalatestTester with Matc
         val awaited        = Seq.fill(rows)(mutable.Map.empty[Int, mutable.Queue[(Boolean, ExpectedHit)]])
         val mayOpen        = Array.fill(rows)(false)
         var (cycles, hits) = (0, 0)
+        var busiest        = 0
         while (waiting.exists(_.nonEmpty) || awaited.exists(_.nonEmpty)) {
           cycles should be < 6000
           for (row <- 0 until rows) {
@@ -61,11 +62,13 @@ class TriangleGroupSpec extends AnyFlatSpec with ChiselScalatestTester with Matc
               if (isLast) awaited(row).remove(context)
             }
           }
+          busiest = busiest.max(shared.io.rows.head.busy.peekInt().toInt)
           for (row <- 0 until rows) mayOpen(row) = shared.io.rows(row).readyNext.peekBoolean()
           shared.clock.step()
           cycles += 1
         }
         hits should be > 20 * rows
+        busiest shouldBe lanes
       }
     }
 }

@@ -63,6 +63,28 @@ class BackgroundWalkerSpec extends AnyFlatSpec with ChiselScalatestTester {
     }
   }
 
+  it should "colour pixels of other tiles by their priority, each once" in {
+    test(new BackgroundWalker(TestConfigs.withEnvironment(TestConfigs.environment))) { dut =>
+      val random = new Random(5)
+      val others = dut.io.others
+      assert(others.size == 2)
+      for (_ <- 0 until 100) {
+        val offers = others.map(_ => random.nextBoolean())
+        val ready  = random.nextBoolean()
+        dut.io.rejected.ready.poke(ready)
+        for (((port, offer), source) <- others.zip(offers).zipWithIndex) {
+          port.valid.poke(offer)
+          port.bits.x.poke(10 + source)
+        }
+        val first = offers.indexOf(true)
+        dut.io.rejected.valid.expect(first >= 0)
+        if (first >= 0) dut.io.rejected.bits.x.expect(10 + first)
+        for ((port, source) <- others.zipWithIndex if offers(source)) port.ready.expect(ready && source == first)
+        dut.clock.step()
+      }
+    }
+  }
+
   it should "give one pixel per cycle, and be idle before the first and after the last" in {
     val config = TileScanSpec.config(tileSize = 8)
     test(new BackgroundWalker(config)) { dut =>

@@ -13,7 +13,7 @@ class PipelinedDividerSpec extends AnyFlatSpec with ChiselScalatestTester with M
 
   /** A division a cycle, but when nothing loads: two lanes, the second one divides the numerators in reverse. */
   private def check(mantissaBits: Int, digits: Int, bitsPerStage: Int, operands: Seq[Operands]): Unit =
-    test(new PipelinedDivider(mantissaBits, digits, lanes = 2, bitsPerStage = bitsPerStage)) { divider =>
+    test(new PipelinedDivider(mantissaBits, digits, lanes = 2, hasRest = true, bitsPerStage)) { divider =>
       divider.io.loads.foreach(_.poke(true))
       val random  = new Random(2)
       val latency = PipelinedDivider.stages(digits, bitsPerStage)
@@ -26,8 +26,11 @@ class PipelinedDividerSpec extends AnyFlatSpec with ChiselScalatestTester with M
         }
         if (cycle >= latency) {
           val ((one, other), (_, denominator)) = (lanes(cycle - latency), operands(cycle - latency))
-          divider.io.quotients(0).expect((one << digits) / denominator)
-          divider.io.quotients(1).expect((other << digits) / denominator)
+          for ((numerator, lane) <- Seq(one, other).zipWithIndex) {
+            val (quotient, rest) = (numerator << digits) /% denominator
+            divider.io.quotients(lane).expect(quotient)
+            divider.io.rests.get(lane).expect(rest != 0)
+          }
         }
         if (random.nextInt(4) == 0) {
           divider.io.loads.foreach(_.poke(false))
