@@ -81,6 +81,33 @@ final class BatchStimulus(config: ColonnadeConfig, random: Random) {
     TestBatch(mode, count, shared, rays)
   }
 
+  /** The same, of rays that all enter the cube, but for some that are refused or begin out of range. */
+  def aimed(count: Int, response: Int, form: Int): TestBatch = {
+    val batch   = this.batch(1, response, 0)
+    val isLocal = batch.mode.testBit(11)
+    def aim()   = {
+      val reach = Seq(1.0, 4.0, 4.0, if (form == 0) 40.0 else 4.0)(random.nextInt(4))
+      val from  = corner.map(_ + edge * (0.5 + reach * (random.nextDouble() - 0.5)))
+      (from, corner.zip(from).map { case (low, at) => low + edge * (0.3 + 0.4 * random.nextDouble()) - at })
+    }
+    def placed(at: Seq[Double]) = if (isLocal) at.zip(corner).map { case (at, low) => at - low } else at
+    val (from, look)            = aim()
+    val scale                   = math.pow(2, 29) / look.map(_.abs).max
+    val rays                    = form match {
+      case 0 => Seq.fill(count) {
+          val (from, to) = aim()
+          (placed(from) :+ 0.0) ++ (if (random.nextInt(20) == 0) Seq(0.0, 0.0, 0.0) else to) :+ Double.PositiveInfinity
+        }.flatten.map(word)
+      case 1 =>
+        Seq.fill(count)(look.map(_ * (1 + 0.02 * random.nextDouble())) :+ Double.PositiveInfinity).flatten.map(word)
+      case _ =>
+        val steps = Seq.fill(2)(Seq.fill(3)(edge / 2000 * (random.nextDouble() - 0.5)))
+        (look +: steps).flatten.map(value => BigInt(math.round(value * scale)) & 0xffffffffL)
+    }
+    val shared = (placed(from) ++ Seq(0.0, Double.PositiveInfinity)).map(word)
+    batch.copy(mode = batch.mode + (if (form == 0) 0 else 8 << form), count = count, shared = shared, rays = rays)
+  }
+
   /** Words of a sensor that looks at the cube: directions of any length, down to those of a few digits. */
   private def sensor(from: Seq[Double], width: Int): Seq[BigInt] = {
     val scale                        = math.pow(2, random.nextInt(30))

@@ -5,7 +5,7 @@ import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.RayPlacement
-import colonnade.{Model, Packed, PackedStreams, PackedUnit, Simulation}
+import colonnade.{Packed, PackedStreams, PackedUnit, Simulation}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -37,7 +37,7 @@ class RayConverterSpec extends AnyFlatSpec with ChiselScalatestTester with Match
           val records =
             Seq.fill(20)(stimulus.ray(placed, isLocal)) ++ Seq.fill(10)(stimulus.anyLimits()) :+ stimulus.anyRay()
           val queries  = records.map(placed.scale ++ placed.base ++ Seq(BigInt(if (isLocal) 1 else 0)) ++ _)
-          val expected = Model.answers(config, queries, "ray")
+          val expected = RayConfigs.model(config, "ray", queries)
           dut.placement.poke(placed.packed)
           val payloads = records.zipWithIndex.map { case (record, i) =>
             ray.pack(Map("context" -> BigInt(i % 4), "isLocal" -> BigInt(if (isLocal) 1 else 0))) + recordOf(record)
