@@ -77,6 +77,18 @@ public:
         return std::make_tuple(Corner{found.low[0], found.low[1], found.low[2]}, Corner{found.high[0], found.high[1], found.high[2]}, found.flat_pairs);
     }
 
+    auto plan(const Given<std::uint32_t, nb::shape<-1, recordWords>>& copy, std::uint32_t root) const {
+        if (copy.shape(0) < mesh_.records) throw std::invalid_argument("records of another clip");
+        std::vector<colonnade_mesh_node> path(mesh_.depth);
+        std::vector<std::uint32_t> lines(mesh_.vertices / COLONNADE_LINE_VERTICES + 1);
+        std::uint32_t entries;
+        check(colonnade_mesh_plan(&mesh_, copy.data(), root, path.data(), lines.data(), nullptr, &entries));
+        std::uint32_t* words;
+        auto result = makeRows<std::uint32_t>(entries, COLONNADE_PLAN_WORDS, words);
+        check(colonnade_mesh_plan(&mesh_, copy.data(), root, path.data(), lines.data(), words, &entries));
+        return result;
+    }
+
 private:
     std::string file_;
     colonnade_mesh mesh_;
@@ -89,5 +101,6 @@ void bind_mesh(nb::module_& module) {
         .def(nb::init<const std::array<std::uint32_t, 8>&, const nb::bytes&>(), "format_hash"_a, "file"_a)
         .def("pose", &TargetMesh::pose, "time"_a)
         .def("skin", &TargetMesh::skin, "pose"_a)
-        .def("refit", &TargetMesh::refit, "positions"_a, "normals"_a, "copy"_a, "root"_a);
+        .def("refit", &TargetMesh::refit, "positions"_a, "normals"_a, "copy"_a, "root"_a)
+        .def("plan", &TargetMesh::plan, "copy"_a, "root"_a);
 }

@@ -31,12 +31,14 @@ class Bus:
         stall: Percentage of cycles in which a channel does not move, 0 to 99.
         order: When the address and the data of a write are taken, a number of `WriteOrder` of the testbench, 0 to 4.
         seed: Random seed of the stalls, and of the registers' values at power-up.
+        errors: So many of 1024 answers to the masters are errors, after `SimulatedTransport.set_bus`.
     """
 
     latency: int = 1
     stall: int = 0
     order: int = 0
     seed: int = 1
+    errors: int = 0
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,10 @@ class SimulatedTransport:
         self._send(f"dump {_FILE} {address} {size}")
         self.read32(0)  # it has written the file
         return (self._folder / _FILE).read_bytes()
+
+    def set_bus(self, bus: Bus) -> None:
+        """Set the memory behind the masters from now on; that of a scene in DRAM stays as it is."""
+        self._send(f"bus {bus.latency} {bus.stall} {bus.order} {bus.errors} {bus.seed}")
 
     def fail(self, beats: int) -> None:
         """Answer so many of 1024 beats of the scene's reads with an error, in a design with a scene in DRAM."""

@@ -1,4 +1,4 @@
-"""``colonnade fuzz``: corrupt frames rendered by the RTL and by its model."""
+"""``colonnade fuzz``: corrupt frames and refits, by the RTL and by its model."""
 
 from __future__ import annotations
 
@@ -15,12 +15,28 @@ if TYPE_CHECKING:
 @click.command(cls=Command)
 @configuration_options
 @click.option(
+    "--refit",
+    is_flag=True,
+    help="Bend meshes by the refit unit of the AXI4 shell, in place of frames.",
+)
+@click.option(
+    "--axi",
+    "bus_bytes",
+    type=click.IntRange(4, 64),
+    default=16,
+    show_default=True,
+    metavar="BYTES",
+    help="With --refit: width of the shell's data bus.",
+)
+@click.option(
+    "--cases",
     "--frames",
+    "cases",
     type=click.IntRange(1, 1_000_000),
     default=200,
     show_default=True,
     metavar="N",
-    help="Number of corrupt frames.",
+    help="Number of cases: corrupt frames, or refits.",
 )
 @click.option(
     "--seed",
@@ -28,14 +44,15 @@ if TYPE_CHECKING:
     default=1,
     show_default=True,
     metavar="N",
-    help="Seed of the first frame; each later frame adds one.",
+    help="Seed of the first case; each later one adds one.",
 )
 @click.option(
     "--kind",
     "kinds",
     multiple=True,
     metavar="KIND",
-    help="Kind of corruption: records, registers, both, maps or gather. Repeatable.  [default: all]",
+    help="Kind of case. Frames: records, registers, both, maps, gather, instances; refits: vertices, "
+    "plans, bus. Repeatable.  [default: all]",
 )
 @json_option
 @click.pass_context
@@ -43,28 +60,33 @@ def fuzz(
     context: click.Context,
     config: str,
     overrides: tuple[str, ...],
-    frames: int,
+    refit: bool,
+    bus_bytes: int,
+    cases: int,
     seed: int,
     kinds: tuple[str, ...],
     json_file: Path | None,
 ) -> None:
-    """Corrupt records and registers of small legal frames, and render them with the RTL and the model.
+    """Corrupt small legal frames, or refits, and run them with the RTL and the model.
 
-    Pixels, hits, error bits and counters must be equal, also in the legal frame that follows each corrupt one. The
-    table counts frames by kind and outcome: legal picture, changed picture, error bit, watchdog. The exit status is 1
-    if any frame differs.
+    Pixels, hits, records, error bits and counters must be equal, also in the legal work that follows each case. The
+    table counts cases by kind and outcome: the legal result, another one, an error bit, the watchdog. The exit status
+    is 1 if any case differs.
     """
     from colonnade.common import progress
     from colonnade.common.errors import UserError
-    from colonnade.design.generator import design_for
 
     from colonnade_lab.common.text_table import Column, Table
     from colonnade_lab.evaluation.fuzz import campaign
-    from colonnade_lab.evaluation.fuzz.corruption import KINDS
+    from colonnade_lab.evaluation.fuzz.bench import OUTCOMES
 
     for kind in kinds:
-        if kind not in KINDS:
-            raise UserError(f"no kind of corruption {kind}: choose from {', '.join(KINDS)}")
+        if kind not in campaign.ALL_KINDS:
+            raise UserError(f"no kind of case {kind}: choose from {', '.join(campaign.ALL_KINDS)}")
+    if bus_bytes & (bus_bytes - 1):
+        raise UserError(f"--axi is {bus_bytes}: give a power of two from 4 to 64")
+    if not refit and context.get_parameter_source("bus_bytes") is not click.core.ParameterSource.DEFAULT:
+        raise UserError("--axi is the bus of the refit unit's shell: give --refit, too")
     require_outputs(json_file)
     terminal = progress.for_terminal()
 
@@ -72,15 +94,14 @@ def fuzz(
         with terminal.paused():
             click.echo(f"seed {failed.seed}, {failed.kind}, {failed.change}: {'; '.join(failed.differences)}")
 
-    report = campaign.fuzz(design_for(config, overrides, terminal), frames, seed, kinds, terminal, show)
-    table = Table(
-        (Column("kind", 10, is_text=True), *(Column(outcome, 8, ",") for outcome in campaign.OUTCOMES)), click.echo
-    )
+    design = campaign.fuzzed_design(config, overrides, refit, bus_bytes, terminal)
+    report = campaign.fuzz(design, cases, seed, kinds, terminal, show)
+    table = Table((Column("kind", 10, is_text=True), *(Column(outcome, 8, ",") for outcome in OUTCOMES)), click.echo)
     for name, counts in report["kinds"].items():
         table.print(name, *counts.values())
-    click.echo(f"{frames:,} corrupt frames; {report['legal_failures']} of the legal frames after them differ")
-    if (gathered := report["gathered"]) is not None:
-        click.echo(f"{gathered['corrupt']:,} corrupt and {gathered['legal']:,} legal frames gathered light")
-    finish({"config": config, "overrides": list(overrides), **report}, json_file)
+    click.echo(f"{cases:,} cases; the legal work after {report['legal_failures']} of them differs")
+    if report["sums"]:
+        click.echo(", ".join(f"{number:,} {name}" for name, number in report["sums"].items()))
+    finish({"config": config, "overrides": list(overrides), "refit": refit, **report}, json_file)
     if report["disagreements"]:
         context.exit(1)

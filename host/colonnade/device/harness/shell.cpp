@@ -8,6 +8,8 @@
 //   run CYCLES                 goes on for so many cycles, or until the interrupt; prints "ran CYCLES"
 //   dump FILE ADDRESS BYTES    writes a range of the memory to a file; bytes that were never written are 0xA5
 //   fail BEATS                 so many of 1024 beats of the scene's reads are answered with an error from now on
+//   bus LATENCY STALL ORDER ERRORS SEED    the memory of the masters, not of the scene, from now on: as the options, and so many of
+//                              1024 of its answers are errors
 //
 // Options: --bus BYTES of the data bus; --memory BYTES of memory, from address --base N (0); --shared FILE, which is the
 // memory, and which other programs may map, too; --latency CYCLES of an answer; --stall
@@ -92,6 +94,8 @@ public:
 
     void fail(unsigned errorsPer1024) { memory_.failScene(errorsPer1024); }
 
+    void setBus(const MasterTiming& timing) { memory_.set(timing); }
+
     std::uint64_t wait(std::uint64_t most) {
         std::uint64_t cycles = 0;
         for (; !top_.irq; ++cycles) {
@@ -133,6 +137,12 @@ void run(const std::string& job, std::map<std::string, unsigned>& options, const
         std::string command, name;
         std::uint64_t first = 0, second = 0;
         words >> command;
+        if (command == "bus") {
+            MasterTiming timing;
+            if (!(words >> timing.latency >> timing.stall >> timing.order >> timing.errorsPer1024 >> timing.seed)) throw std::runtime_error("cannot parse: " + line);
+            harness.setBus(timing);
+            continue;
+        }
         const bool isNumber = command == "wait" || command == "run" || command == "fail";
         if (command != "write" && !isNumber) words >> name;
         words >> first;

@@ -55,6 +55,11 @@ struct Scene {
 /// When a memory takes the address and the data of a write; AXI4 allows all of these.
 enum class WriteOrder : unsigned { any, addressAfterDataValid, dataAfterAddress, together, addressAfterLastBeat, count };
 
+/// How the memory behind a master behaves.
+struct MasterTiming {
+    unsigned latency = 1, stall = 0, order = 0, errorsPer1024 = 0, seed = 1;
+};
+
 // clang-format off
 #define EACH_MASTER_PIN(DO, prefix) \
     DO(prefix, awvalid) DO(prefix, awready) DO(prefix, awaddr) DO(prefix, awlen) DO(prefix, awid) \
@@ -81,10 +86,16 @@ MASTER(RefitPins, m_axi_refit)
 /// The memory behind a master, whose answers come in order.
 template <class Pins> class MemoryPort {
 public:
-    MemoryPort(VColonnadeAxi& top, std::map<std::string, unsigned>& options, BusBytes& bytes)
-        : pins_(top), bus_(options["--bus"]), latency_(options["--latency"]), stall_(options["--stall"]),
-          order_(static_cast<WriteOrder>(options["--order"] % static_cast<unsigned>(WriteOrder::count))), random_(options["--seed"]), bytes_(bytes) {
+    MemoryPort(VColonnadeAxi& top, unsigned busBytes, const MasterTiming& timing, BusBytes& bytes) : pins_(top), bus_(busBytes), bytes_(bytes) {
+        set(timing);
         pins_.bvalid = pins_.rvalid = pins_.bresp = pins_.rresp = pins_.bid = pins_.rid = 0;
+    }
+
+    /// From now on.
+    void set(const MasterTiming& timing) {
+        timing_ = timing;
+        order_ = static_cast<WriteOrder>(timing.order % static_cast<unsigned>(WriteOrder::count));
+        random_.seed(timing.seed);
     }
 
     /// Sets the inputs for this cycle. What is offered stays.
@@ -92,15 +103,12 @@ public:
         ++now_;
         offerWrites();
         pins_.arready = moves();
-        pins_.bvalid = pins_.bvalid ? 1 : !answers_.empty() && answers_.front().due <= now_ && moves();
-        if (pins_.bvalid) pins_.bid = static_cast<CData>(answers_.front().id);
-        pins_.rvalid = pins_.rvalid ? 1 : !reads_.empty() && reads_.front().due <= now_ && moves();
-        if (pins_.rvalid) {
-            const Burst& read = reads_.front();
-            std::memcpy(&pins_.rdata, bytes_.range(read.address + read.done * bus_, bus_), bus_);
-            pins_.rid = static_cast<CData>(read.id);
-            pins_.rlast = read.done + 1 == read.beats;
+        if (!pins_.bvalid && !answers_.empty() && answers_.front().due <= now_ && moves()) {
+            pins_.bvalid = 1;
+            pins_.bresp = response();
+            pins_.bid = static_cast<CData>(answers_.front().id);
         }
+        if (!pins_.rvalid && !reads_.empty() && reads_.front().due <= now_ && moves()) offerBeat(reads_.front());
     }
 
     /// Takes the transfers of this cycle; afterwards `offer` may change what was taken.
@@ -138,13 +146,28 @@ private:
         bool isLast = false;
     };
 
-    bool moves() { return stall_ == 0 || random_() % 100 >= stall_; }
+    bool moves() { return timing_.stall == 0 || random_() % 100 >= timing_.stall; }
+
+    /// SLVERR or DECERR for some answers.
+    CData response() { return timing_.errorsPer1024 != 0 && random_() % 1024 < timing_.errorsPer1024 ? 2 + random_() % 2 : 0; }
+
+    /// Offers the next beat of a read, whose data are other ones if it fails.
+    void offerBeat(const Burst& read) {
+        std::uint8_t data[128];
+        std::memcpy(data, bytes_.range(read.address + read.done * bus_, bus_), bus_);
+        pins_.rvalid = 1;
+        pins_.rresp = response();
+        for (unsigned i = 0; i < bus_ && pins_.rresp != 0; ++i) data[i] = ~data[i];
+        std::memcpy(&pins_.rdata, data, bus_);
+        pins_.rid = static_cast<CData>(read.id);
+        pins_.rlast = read.done + 1 == read.beats;
+    }
 
     Burst burst(std::uint64_t address, unsigned length, unsigned id) {
         const std::uint64_t first = address / bus_ * bus_, end = first + (length + 1ull) * bus_;
         if (first / 4096 != (end - 1) / 4096) throw std::runtime_error("a burst crosses a page of 4 KB");
         bytes_.range(first, end - first);
-        return {first, now_ + latency_, length + 1, 0, id};
+        return {first, now_ + timing_.latency, length + 1, 0, id};
     }
 
     void offerWrites() {
@@ -195,13 +218,14 @@ private:
         if (beat.isLast != (burst.done == burst.beats)) throw std::runtime_error("a burst does not end with its last beat");
         if (burst.done < burst.beats) return;
         answers_.push_back(burst);
-        answers_.back().due = now_ + latency_;
+        answers_.back().due = now_ + timing_.latency;
         writes_.pop_front();
     }
 
     Pins pins_;
-    unsigned bus_, latency_, stall_;
-    WriteOrder order_;
+    unsigned bus_;
+    MasterTiming timing_;
+    WriteOrder order_ = WriteOrder::any;
     std::mt19937 random_;
     BusBytes& bytes_;
     std::deque<Burst> writes_, reads_, answers_;
@@ -215,8 +239,7 @@ private:
 class Memory {
 public:
     Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options, const std::string& shared)
-        : top_(top), bytes_(options["--base"], options["--memory"], shared), master_(top, options, bytes_), refit_(top, options, bytes_),
-          scene_(top, {options["--latency"], options["--stall"], 0, 0, options["--seed"]}, bytes_) {}
+        : Memory(top, options, {options["--latency"], options["--stall"], options["--order"], 0, options["--seed"]}, shared) {}
 
     std::uint8_t* range(std::uint64_t address, std::uint64_t size) { return bytes_.range(address, size); }
 
@@ -235,6 +258,12 @@ public:
         scene_.take();
     }
 
+    /// The memory behind the masters, not that of the scene, from now on.
+    void set(const MasterTiming& timing) {
+        master_.set(timing);
+        refit_.set(timing);
+    }
+
     /// So many of 1024 beats of the scene's reads fail from now on.
     void failScene(unsigned errorsPer1024) { scene_.fail(errorsPer1024); }
 
@@ -245,6 +274,10 @@ public:
     }
 
 private:
+    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options, const MasterTiming& timing, const std::string& shared)
+        : top_(top), bytes_(options["--base"], options["--memory"], shared), master_(top, options["--bus"], timing, bytes_),
+          refit_(top, options["--bus"], timing, bytes_), scene_(top, {timing.latency, timing.stall, 0, 0, timing.seed}, bytes_) {}
+
     VColonnadeAxi& top_;
     BusBytes bytes_;
     MemoryPort<MasterPins> master_;
@@ -253,7 +286,8 @@ private:
 #else
     /// A shell without the unit.
     struct Nothing {
-        Nothing(VColonnadeAxi&, std::map<std::string, unsigned>&, BusBytes&) {}
+        Nothing(VColonnadeAxi&, unsigned, const MasterTiming&, BusBytes&) {}
+        void set(const MasterTiming&) {}
         void offer() {}
         void take() {}
         void finish() {}

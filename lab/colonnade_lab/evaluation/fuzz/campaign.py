@@ -1,4 +1,4 @@
-"""Fuzz campaign: renders corrupt frames, each followed by a legal one, with RTL and model, and compares them."""
+"""Fuzz campaign: runs cases of a design, each followed by legal work, with RTL and model, and compares them."""
 
 from __future__ import annotations
 
@@ -9,37 +9,33 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from colonnade.common.errors import UserError
-from colonnade.common.framebuffer import Frame
 from colonnade.common.progress import QUIET, Progress
-from colonnade.design.generator import GeneratedDesign
-from colonnade.design.manifest import Manifest
-from colonnade.device.bit_exact import loaded_model, model_frame
-from colonnade.device.simulator_build import build_simulator
+from colonnade.design.generator import GeneratedDesign, design_for, shell_design_for
 
-from colonnade_lab.evaluation.fuzz.cases import Case, legal_cases
-from colonnade_lab.evaluation.fuzz.compare import differences
-from colonnade_lab.evaluation.fuzz.corruption import KINDS, Kind, corrupt_case
-from colonnade_lab.evaluation.fuzz.dram import as_read, with_failed_reads
-from colonnade_lab.evaluation.fuzz.environments import environment_cases
-from colonnade_lab.evaluation.fuzz.gathered import with_any_light
-from colonnade_lab.evaluation.fuzz.simulator import SimulatedFrame, run_cases
+from colonnade_lab.evaluation.fuzz.bench import OUTCOMES, Bench
+from colonnade_lab.evaluation.fuzz.corruption import KINDS
+from colonnade_lab.evaluation.fuzz.frames import FrameBench
+from colonnade_lab.evaluation.fuzz.refits import RefitBench
 
-#: Corrupt frames per simulator run.
+#: Cases per run of a bench.
 BATCH = 100
 
-#: Outcomes of a corrupt frame. The last one is a failure.
-OUTCOMES = ("same", "changed", "flagged", "watchdog", "disagree")
+#: Names of all kinds: of frames, of refits.
+ALL_KINDS = (*KINDS, *RefitBench.kinds)
+
+#: The data bus of a shell with a refit unit, bytes.
+REFIT_BUS = 16
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """A corrupt frame that failed. ``colonnade fuzz --frames 1 --seed SEED --kind KIND`` reproduces it.
+    """A case that failed. ``colonnade fuzz --cases 1 --seed SEED --kind KIND`` reproduces it.
 
     Attributes:
-        seed: Seed of the frame.
-        kind: Kind of corruption.
-        change: Description of the corruption.
-        differences: Differences between RTL and model, in this frame or in the legal frame after it.
+        seed: Seed of the case.
+        kind: Its kind.
+        change: Description of it.
+        differences: Differences between RTL and model, in this case or in the legal work after it.
     """
 
     seed: int
@@ -48,137 +44,82 @@ class Disagreement:
     differences: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class _Planned:
-    seed: int
-    kind: Kind
-    legal: Case
-    corrupt: Case
-    change: str
+def fuzzed_design(
+    config: str,
+    overrides: Sequence[str] = (),
+    refit: bool = False,
+    bus_bytes: int = REFIT_BUS,
+    progress: Progress = QUIET,
+) -> GeneratedDesign:
+    """The design of a campaign: the device, or its AXI4 shell.
+
+    Args:
+        config: The configuration.
+        overrides: Fields that replace some of it.
+        refit: The shell with its unit that bends meshes.
+        bus_bytes: Width of the data bus of that shell.
+        progress: Shows the steps.
+    """
+    if refit:
+        return shell_design_for(config, overrides, bus_bytes, progress, refit=True)
+    return design_for(config, overrides, progress)
 
 
-class _Campaign:
-    def __init__(self, design: GeneratedDesign, cases: tuple[Case, ...], progress: Progress) -> None:
-        self.manifest: Manifest = design.manifest
-        self.program = build_simulator(design, progress)
-        self.cases = cases
-        self.rows = max(len(case.image.records) for case in self.cases)
-        self._expected: dict[str, Frame] = {}
-        self.legal_failures = 0
-        self.gathered = Counter[str]()
-
-    def plan(self, seed: int, kind: Kind) -> _Planned:
-        return _Planned(seed, kind, *corrupt_case(seed, kind, self.cases, self.manifest))
-
-    def model(self, case: Case) -> Frame:
-        read = as_read(case, self.manifest)
-        frame = model_frame(loaded_model(self.manifest, read.image), read.registers)
-        return with_failed_reads(frame, case, self.manifest)
-
-    def expected(self, legal: Case) -> Frame:
-        if legal.name not in self._expected:
-            self._expected[legal.name] = self.model(legal)
-        return self._expected[legal.name]
-
-    def run(self, planned: Sequence[_Planned]) -> list[tuple[str, Disagreement | None]]:
-        """Outcomes of corrupt frames, in order. After a frame at which the harness fails, a new run continues."""
-        results: list[tuple[str, Disagreement | None]] = []
-        while len(results) < len(planned):
-            remaining = planned[len(results) :]
-            cases = [case for plan in remaining for case in (plan.corrupt, plan.legal)]
-            frames, failure = run_cases(self.program, self.manifest, cases, self.rows)
-            complete = len(frames) // 2
-            for plan, corrupt, legal in zip(remaining[:complete], frames[0::2], frames[1::2], strict=False):
-                results.append(self._outcome(plan, corrupt, legal))
-            if failure is not None and complete < len(remaining):
-                results.append(_failed(remaining[complete], (failure,)))
-        return results
-
-    def _outcome(
-        self, plan: _Planned, corrupt: SimulatedFrame, legal: SimulatedFrame
-    ) -> tuple[str, Disagreement | None]:
-        for name, frame in (("corrupt", corrupt.frame), ("legal", legal.frame)):
-            self.gathered[name] += frame.counters.get("raysGather", 0) > 0
-        expected = self.expected(plan.legal)
-        found = [f"the next frame: {difference}" for difference in differences(legal, expected)]
-        self.legal_failures += bool(found)
-        if corrupt.frame.colour.size:
-            found = differences(corrupt, self.model(plan.corrupt)) + found
-        if found:
-            return _failed(plan, tuple(found))
-        errors = corrupt.frame.errors
-        if errors:
-            return ("watchdog" if "watchdog" in errors else "flagged"), None
-        same = corrupt.frame.colour.shape == expected.colour.shape and (corrupt.frame.colour == expected.colour).all()
-        return ("same" if same else "changed"), None
-
-
-def _failed(plan: _Planned, found: tuple[str, ...]) -> tuple[str, Disagreement]:
-    return "disagree", Disagreement(plan.seed, plan.kind.name, plan.change, found)
-
-
-def all_cases(manifest: Manifest) -> tuple[Case, ...]:
-    """The legal frames of a design, with and without a room."""
-    return with_any_light(legal_cases(manifest) + environment_cases(manifest), manifest)
+def bench_of(design: GeneratedDesign, progress: Progress = QUIET) -> Bench[Any]:
+    """What runs the cases of a design that `fuzzed_design` answers."""
+    return RefitBench(design, progress) if (design.dir / "shell.json").exists() else FrameBench(design, progress)
 
 
 def fuzz(
     design: GeneratedDesign,
-    frames: int,
+    cases: int,
     seed: int = 1,
     kinds: Sequence[str] = (),
     progress: Progress = QUIET,
     found: Callable[[Disagreement], None] = lambda disagreement: None,
 ) -> dict[str, Any]:
-    """Render corrupt frames with RTL and model, and compare them.
+    """Run cases with RTL and model, and compare them.
 
     Args:
-        design: The design.
-        frames: Number of corrupt frames.
-        seed: Seed of the first frame; each later frame adds one.
-        kinds: Names of `KINDS`, selected by the seed in rotation; empty: all that apply to the design.
+        design: The design, of `fuzzed_design`.
+        cases: Number of cases.
+        seed: Seed of the first case; each later one adds one.
+        kinds: Names of `ALL_KINDS`, selected by the seed in rotation; empty: all that the design has.
         progress: Shows the progress.
         found: Called with each disagreement.
 
     Returns:
-        ``{"seed", "frames", "kinds": {name: {outcome: frames}}, "gathered": {"corrupt": frames, "legal": frames},
-        "legal_failures", "disagreements", "seconds"}``, where ``gathered`` counts frames that trace gathered rays; it
-        is None if the design cannot.
+        ``{"seed", "cases", "kinds": {name: {outcome: cases}}, "sums": {what: number}, "legal_failures",
+        "disagreements", "seconds"}``.
 
     Raises:
         UserError: The design has nothing of these kinds.
     """
     begun = time.perf_counter()
-    cases = all_cases(design.manifest)
-    selected = [
-        kind
-        for name, kind in KINDS.items()
-        if (not kinds or name in kinds) and any(kind.applies(case) for case in cases)
-    ]
+    bench = bench_of(design, progress)
+    selected = [kind for kind in bench.kinds if not kinds or kind in kinds]
     if not selected:
-        need = "maps need a room or textures, gather needs frame.gather=true"
-        raise UserError(f"the design has no {' or '.join(kinds)} to corrupt: {need}")
-    campaign = _Campaign(design, cases, progress)
-    counts = {kind.name: Counter[str]() for kind in selected}
+        raise UserError(f"the design has no {' or '.join(kinds)} to corrupt: choose from {', '.join(bench.kinds)}")
+    counts = {kind: Counter[str]() for kind in selected}
     failed: list[Disagreement] = []
-    with progress.step("rendering corrupt frames") as report:
-        for first in range(seed, seed + frames, BATCH):
-            seeds = range(first, min(first + BATCH, seed + frames))
-            planned = [campaign.plan(number, selected[number % len(selected)]) for number in seeds]
-            for plan, (outcome, disagreement) in zip(planned, campaign.run(planned), strict=True):
-                counts[plan.kind.name][outcome] += 1
-                if disagreement is not None:
-                    failed.append(disagreement)
-                    found(disagreement)
-            report((seeds.stop - seed) / frames)
+    legal_failures = 0
+    with progress.step("running cases") as report:
+        for first in range(seed, seed + cases, BATCH):
+            seeds = range(first, min(first + BATCH, seed + cases))
+            planned = [bench.plan(number, selected[number % len(selected)]) for number in seeds]
+            for plan, result in zip(planned, bench.run(planned), strict=True):
+                counts[plan.kind][result.outcome] += 1
+                legal_failures += not result.is_legal_right
+                if result.differences:
+                    failed.append(Disagreement(plan.seed, plan.kind, plan.change, result.differences))
+                    found(failed[-1])
+            report((seeds.stop - seed) / cases)
     return {
         "seed": seed,
-        "frames": frames,
+        "cases": cases,
         "kinds": {name: {outcome: count[outcome] for outcome in OUTCOMES} for name, count in counts.items()},
-        "gathered": {name: campaign.gathered[name] for name in ("corrupt", "legal")}
-        if design.manifest.gathers
-        else None,
-        "legal_failures": campaign.legal_failures,
+        "sums": bench.sums(),
+        "legal_failures": legal_failures,
         "disagreements": [asdict(disagreement) for disagreement in failed],
         "seconds": time.perf_counter() - begun,
     }

@@ -45,6 +45,11 @@ class Case:
         """Whether the frame gathers light (docs/gather.md)."""
         return self.registers.get("gather.bounces", 0) > 0
 
+    @property
+    def has_instances(self) -> bool:
+        """Whether the frame has instances (docs/path-tracer.md)."""
+        return self.registers.get("scene.instances", 0) > 0
+
 
 def legal_cases(manifest: Manifest) -> tuple[Case, ...]:
     """The legal frames that a design can render."""

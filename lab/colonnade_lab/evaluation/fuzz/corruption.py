@@ -13,6 +13,7 @@ from colonnade.scene_image.file import LoadSection
 from colonnade_lab.evaluation.fuzz.cases import Case
 from colonnade_lab.evaluation.fuzz.environments import corrupt_maps
 from colonnade_lab.evaluation.fuzz.gathered import corrupt_gathered
+from colonnade_lab.evaluation.fuzz.instances import corrupt_instances
 from colonnade_lab.evaluation.fuzz.records import corrupt_records
 from colonnade_lab.evaluation.fuzz.registers import corrupt_registers
 
@@ -54,6 +55,7 @@ KINDS = {
         Kind("both", corrupt_both),
         Kind("maps", corrupt_maps, lambda case: any(map(_is_map, case.image.attributes))),
         Kind("gather", corrupt_gathered, lambda case: case.gathers),
+        Kind("instances", corrupt_instances, lambda case: case.has_instances),
     )
 }
 

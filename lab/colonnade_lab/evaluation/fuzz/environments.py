@@ -13,7 +13,8 @@ from colonnade.design.toolchain import project_root
 from colonnade.device.gathered_light import MEMORY as LIGHT_CUBE
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
-from colonnade.scene.model import Background, Light, Material, MeshSource, Paths, Placement, Scene
+from colonnade.mesh.materials.mesh import Mesh
+from colonnade.scene.model import Background, Light, Material, MeshSource, Paths, Placement, Scene, SceneObject
 from colonnade.scene_image.file import LoadSection
 
 from colonnade_lab.evaluation.fuzz.cases import GATHERED, Case, patchwork
@@ -22,6 +23,9 @@ from colonnade_lab.evaluation.fuzz.values import random_value
 
 #: About a hundred times the cycles of a legal frame, since corrupt rays may take all of their march steps.
 WATCHDOG_CYCLES = 8_000_000
+
+#: Where two cubes stand on the table of the room, beside each other.
+_PLACES = ((322.0, 306.0), (334.0, 306.0))
 
 #: Width and height of the project's rooms, and of a legal frame in one, pixels.
 _ROOM_SIZE, _SIZE = (640, 480), (16, 12)
@@ -44,11 +48,15 @@ def environment_cases(manifest: Manifest) -> tuple[Case, ...]:
     if int(manifest.config["frame"]["maxBounces"]) > 0:
         materials += [Material(kind="mirror", albedo=(0.9, 0.8, 0.7)), Material(kind="glass")]
     paths = Paths(bounces=2)
+    scenes: list[tuple[str, Scene, Mesh | None]]
     scenes = [(str(material.kind), replace(scene, material=material, paths=paths), mesh) for material in materials]
     if manifest.gathers:
         # Larger, since its surfaces are to gather light, too
         large = replace(scene, placement=replace(place, size=1.4), paths=replace(paths, gather=2))
         scenes.append((GATHERED, large, patchwork(mesh, manifest)))
+    if int(manifest.config["frame"]["instances"]):
+        cubes = tuple(_cube(*placed) for placed in zip(_PLACES, materials * 2, strict=False))
+        scenes.append(("instances", replace(scene, objects=cubes, paths=paths), None))
     cases, shared = [], dict[tuple[str, bytes], LoadSection]()
     for name, lit, surfaces in scenes:
         prepared = DeviceScene.of(lit, manifest, surfaces)
@@ -58,6 +66,10 @@ def environment_cases(manifest: Manifest) -> tuple[Case, ...]:
         registers = prepared.registers(_SIZE) | {"frame.watchdogCycles": WATCHDOG_CYCLES}
         cases.append(Case(f"{name} in a room", replace(prepared.image, attributes=sections), registers))
     return tuple(cases)
+
+
+def _cube(stand_at: tuple[float, float], material: Material) -> SceneObject:
+    return SceneObject(stand_at=stand_at, size=0.5, turn=20.0, mesh=MeshSource(name="cube"), material=material)
 
 
 def corrupt_maps(random: np.random.Generator, case: Case, manifest: Manifest) -> tuple[Case, str]:

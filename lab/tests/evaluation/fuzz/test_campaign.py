@@ -20,7 +20,8 @@ from colonnade.device.verilator import render_rtl
 from colonnade.scene_image.dram_image import dram_image, line_layout
 from equal_frames import PIPELINED
 
-from colonnade_lab.evaluation.fuzz import campaign
+from colonnade_lab.evaluation.fuzz import campaign, frames
+from colonnade_lab.evaluation.fuzz.bench import OUTCOMES
 from colonnade_lab.evaluation.fuzz.cases import legal_cases
 from colonnade_lab.evaluation.fuzz.compare import differences
 from colonnade_lab.evaluation.fuzz.corruption import KINDS, corrupt_case
@@ -37,24 +38,24 @@ SHAPES = tuple((config, ("array.columns=1",), 240) for config in ("tiny", "small
 
 
 @pytest.mark.verilator
-@pytest.mark.parametrize(("config", "frames"), DESIGNS)
-def test_corrupt_frames_equal_the_models_and_leave_no_state(config: str, frames: int) -> None:
-    report = campaign.fuzz(design_for(config, ()), frames, seed=1)
+@pytest.mark.parametrize(("config", "count"), DESIGNS)
+def test_corrupt_frames_equal_the_models_and_leave_no_state(config: str, count: int) -> None:
+    report = campaign.fuzz(design_for(config, ()), count, seed=1)
     assert report["disagreements"] == []
     assert report["legal_failures"] == 0
     counts = report["kinds"]
-    assert sum(sum(outcomes.values()) for outcomes in counts.values()) == frames
+    assert sum(sum(outcomes.values()) for outcomes in counts.values()) == count
     assert all(counts["records"][outcome] > 0 for outcome in ("same", "changed", "flagged"))
     assert counts["registers"]["changed"] > 0
 
 
 @pytest.mark.verilator
 @pytest.mark.matrix
-@pytest.mark.parametrize(("config", "overrides", "frames"), SHAPES)
+@pytest.mark.parametrize(("config", "overrides", "count"), SHAPES)
 def test_every_preset_agrees_with_its_model_on_corrupt_frames(
-    config: str, overrides: tuple[str, ...], frames: int
+    config: str, overrides: tuple[str, ...], count: int
 ) -> None:
-    report = campaign.fuzz(design_for(config, overrides), frames, seed=1)
+    report = campaign.fuzz(design_for(config, overrides), count, seed=1)
     assert report["disagreements"] == []
     assert report["legal_failures"] == 0
 
@@ -73,15 +74,15 @@ def test_inverted_bounds_are_as_empty_for_a_pipeline_as_for_the_model() -> None:
     design = design_for("tiny", PIPELINED)
     legal = next(case for case in legal_cases(design.manifest) if case.name == "torus")
     highest = (1 << design.manifest.registers["bounds.low.x"].width) - 1
-    frames = [legal.registers]
+    settings = [legal.registers]
     for axis in "xyz":
         low, high = f"bounds.low.{axis}", f"bounds.high.{axis}"
         middle = (legal.registers[low] + legal.registers[high]) // 2
         for bounds in ((highest, legal.registers[high]), (legal.registers[low], 0), (middle + 9, middle), (highest, 0)):
-            frames.append({**legal.registers, low: bounds[0], high: bounds[1]})
+            settings.append({**legal.registers, low: bounds[0], high: bounds[1]})
     model = loaded_model(design.manifest, legal.image)
-    simulated = render_rtl(design, legal.image, frames).frames
-    for registers, frame in zip(frames, simulated, strict=True):
+    simulated = render_rtl(design, legal.image, settings).frames
+    for registers, frame in zip(settings, simulated, strict=True):
         assert differences(SimulatedFrame(frame, 0), model_frame(model, registers)) == []
     assert simulated[0].counters["hits"] > 0 and simulated[1].counters["hits"] == 0
 
@@ -129,13 +130,13 @@ def test_records_of_another_page_are_those_of_its_lines() -> None:
 
 @pytest.mark.verilator
 def test_a_wrong_model_is_found_and_its_frame_is_reproducible(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = campaign.model_frame
+    honest = frames.model_frame
 
     def wrong(model: Any, registers: dict[str, int]) -> Frame:
         frame = honest(model, registers)
         return replace(frame, colour=frame.colour ^ 1) if frame.errors else frame
 
-    monkeypatch.setattr(campaign, "model_frame", wrong)
+    monkeypatch.setattr(frames, "model_frame", wrong)
     design = design_for("tiny", ())
     found = campaign.fuzz(design, 20, seed=300, kinds=("records",))["disagreements"]
     assert found and all("108 colours" in " ".join(one["differences"]) for one in found)
@@ -193,29 +194,37 @@ def test_every_difference_is_described() -> None:
 def test_the_command_reports_and_fails_on_a_disagreement(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     disagreement = campaign.Disagreement(7, "records", "cube: record 1 is zeros", ("3 colours",))
     report = {
-        "kinds": {"records": dict.fromkeys(campaign.OUTCOMES, 1)},
-        "gathered": {"corrupt": 2, "legal": 3},
+        "kinds": {"records": dict.fromkeys(OUTCOMES, 1)},
+        "sums": {"corrupt frames gathered light": 2, "legal frames gathered light": 3},
         "legal_failures": 0,
         "disagreements": [disagreement],
     }
 
-    def fuzz(design: object, frames: int, seed: int, kinds: object, progress: object, found: Any) -> dict[str, Any]:
+    def fuzz(design: object, cases: int, seed: int, kinds: object, progress: object, found: Any) -> dict[str, Any]:
         found(disagreement)
         return {**report, "disagreements": [vars(disagreement)]}
 
-    monkeypatch.setattr("colonnade.design.generator.design_for", lambda *_: None)
+    monkeypatch.setattr(campaign, "fuzzed_design", lambda *_: None)
     monkeypatch.setattr(campaign, "fuzz", fuzz)
     file = tmp_path / "report.json"
-    result = CliRunner().invoke(cli, ["fuzz", "--config", "tiny", "--frames", "5", "--json", str(file)])
+    result = CliRunner().invoke(cli, ["fuzz", "--config", "tiny", "--cases", "5", "--json", str(file)])
     assert result.exit_code == 1
     assert "seed 7, records, cube: record 1 is zeros: 3 colours" in result.output
-    assert "2 corrupt and 3 legal frames gathered light" in result.output
+    assert "2 corrupt frames gathered light, 3 legal frames gathered light" in result.output
     assert json.loads(file.read_text())["disagreements"][0]["seed"] == 7
 
 
-def test_an_unknown_kind_is_refused() -> None:
-    result = CliRunner().invoke(cli, ["fuzz", "--kind", "weather"], standalone_mode=False)
-    assert isinstance(result.exception, (UserError, SystemExit))
+@pytest.mark.parametrize(
+    ("arguments", "advice"),
+    [
+        (("--kind", "weather"), "no kind of case weather: choose from records, "),
+        (("--axi", "16"), "give --refit, too"),
+        (("--refit", "--axi", "24"), "give a power of two from 4 to 64"),
+    ],
+)
+def test_wrong_options_are_refused(arguments: tuple[str, ...], advice: str) -> None:
+    result = CliRunner().invoke(cli, ["fuzz", *arguments])
+    assert result.exit_code == 2 and advice in result.output and result.output.count("\n") == 1
 
 
 def test_a_kind_that_a_design_lacks_is_refused() -> None:

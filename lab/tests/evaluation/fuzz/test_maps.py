@@ -30,7 +30,7 @@ def manifest() -> Manifest:
 @pytest.mark.parametrize("options", [(), pytest.param(SLIC, marks=pytest.mark.matrix)], ids=["two-level", "SLIC"])
 def test_hardware_and_model_agree_on_corrupt_maps(options: tuple[str, ...]) -> None:
     """Pixels, ratios, counters and error bits, and the legal frame after each. Long version:
-    ``colonnade fuzz --config small --kind maps --frames 700``.
+    ``colonnade fuzz --config small --kind maps --cases 700``.
     """
     report = fuzz(design_for("small", options), FRAMES, seed=1, kinds=("maps",))
     assert report["disagreements"] == []
