@@ -39,7 +39,7 @@ REPLACED = {"sweep": "colonnade explore STUDY.toml"}
 LABORATORY = {
     "study": "Measure reconstructed rooms, or AR frames in them.",
     "verify": "Compare the RTL with its model, and the model with Embree.",
-    "fuzz": "Compare the RTL with its model on corrupt frames and refits.",
+    "fuzz": "Compare the RTL with its model on corrupt frames, batches of rays and refits.",
     "bench": "Measure rays per cycle of the benchmark meshes.",
     "rays": "Measure rays of applications a second.",
     "explore": "Measure quality, speed, area and power of many configurations.",

@@ -1,4 +1,4 @@
-"""``colonnade fuzz``: corrupt frames and refits, by the RTL and by its model."""
+"""``colonnade fuzz``: corrupt frames, batches of rays and refits, by the RTL and by its model."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     default=200,
     show_default=True,
     metavar="N",
-    help="Number of cases: corrupt frames, or refits.",
+    help="Number of cases: corrupt frames, refits, or rings of batches.",
 )
 @click.option(
     "--seed",
@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     "kinds",
     multiple=True,
     metavar="KIND",
-    help="Kind of case. Frames: records, registers, both, maps, gather, instances; refits: vertices, "
-    "plans, bus. Repeatable.  [default: all]",
+    help="Kind of case. Frames: records, registers, both, maps, gather, instances; a device for rays: rays, batches, "
+    "bus; refits: vertices, plans, bus. Repeatable.  [default: all]",
 )
 @json_option
 @click.pass_context
@@ -67,7 +67,7 @@ def fuzz(
     kinds: tuple[str, ...],
     json_file: Path | None,
 ) -> None:
-    """Corrupt small legal frames, or refits, and run them with the RTL and the model.
+    """Corrupt small legal frames, or batches of a device for rays, or refits, and run them with the RTL and the model.
 
     Pixels, hits, records, error bits and counters must be equal, also in the legal work that follows each case. The
     table counts cases by kind and outcome: the legal result, another one, an error bit, the watchdog. The exit status

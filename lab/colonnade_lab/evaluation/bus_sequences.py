@@ -21,15 +21,14 @@ from colonnade.device.bit_exact import render_model
 from colonnade.device.shell_build import build_shell_simulator
 from colonnade.device.verilator import run_program
 from colonnade.mesh.load import load_mesh
-from colonnade.rays import Scene, Sensor
-from colonnade.rays.recorded import RecordedRays
-from colonnade.rays.scene import ALL_DEVICE_MASKS, FAN, OCCLUDED, SENSOR
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.dram_image import PAGE_BYTES, dram_image
 from colonnade.scene_image.file import Loads
 from colonnade.scene_image.packer import pack
+
+from colonnade_lab.evaluation.fuzz.rays import RayScene, any_batch
 
 _WIDTH, _HEIGHT, _FORMAT = 20, 6, 0
 _MESH = "sphere:1"
@@ -42,6 +41,8 @@ _IMAGE, _FRAMEBUFFER, _SCENE, _MEMORY = 0x1000, 0x80000, 0x100000, 0x180000
 _WINDOW, _WINDOW_BYTES, _RING, _RING_LOG = 0x80000, 0x33000, 0x1000, 5
 _RAY_REGISTERS = ("rays.tail", "rays.head", "errors.batch")
 _BATCHES = 180
+#: Most rays of each batch, in turn: their places hold 128.
+_MOST_RAYS = (128, 13, 13, 13, 60, 13, 13, 13, 13)
 
 
 @dataclass(frozen=True)
@@ -148,32 +149,16 @@ def _write_batches(
     folder: Path, manifest: Manifest, address: Callable[[str], int]
 ) -> tuple[Loads, dict[str, int], list[str]]:
     """Batches of rays: the image of their scene, its registers, and lines of the job."""
-    mesh, asked = load_mesh(_MESH), RecordedRays()
-    design = json.dumps(manifest.config)
-    (folder / "design.json").write_text(design)
-    of_design = mesh.vertices, mesh.faces, str(folder / "design.json")
-    scenes = Scene(*of_design, backend=asked), Scene(*of_design)
+    scene, random = RayScene(manifest), np.random.default_rng(1)
     window = _WINDOW, _WINDOW + _WINDOW_BYTES
     lines = [" ".join(("rays", *(str(address(name)) for name in _RAY_REGISTERS), *map(str, window)))]
-    random = np.random.default_rng(1)
     for number in range(_BATCHES):
-        way = random.normal(size=(60 if number % 10 == 0 else 1 + number % 13, 3))
-        start = 3 * way / np.linalg.norm(way, axis=1, keepdims=True)
-        target = random.uniform(-1.2, 1.2, start.shape) * np.abs(mesh.vertices).max(axis=0)
-        limits = np.zeros((len(way), 1)), np.full((len(way), 1), np.inf)
-        rays = np.hstack([start, limits[0], target - start, limits[1]]).astype(np.float32)
-        mode, origin = number // 9 % 3 | ALL_DEVICE_MASKS, start[0]
-        form, count = SENSOR if number % 9 == 8 else (0, FAN)[number % 2], len(way)
-        records = np.ascontiguousarray(rays[:, 4:] if form == FAN else rays)
-        if form == SENSOR:
-            sensor = Sensor(tuple(origin), tuple(-origin - 0.5), (0.02, 0, 0.01), (0, 0.3, 0), 64, 2)
-            records, count = np.frombuffer(sensor.record(), np.uint8), 128 if mode & 3 == OCCLUDED else 64
-        hits = [scene.submit(records, count, mode | form, origin) for scene in scenes][1]
-        batch, of_batch, _ = asked.batches[-1]
-        for part, content in {"batch": batch, "rays": of_batch, "hits": hits.tobytes()}.items():
+        batch = any_batch(random, _MOST_RAYS[number % len(_MOST_RAYS)])
+        hits = scene.answer(batch)
+        assert hits is not None
+        for part, content in {"batch": batch.words.tobytes(), "rays": batch.rays, "hits": hits}.items():
             (folder / f"{part}{number}").write_bytes(content)
         lines.append(f"batch batch{number} rays{number} hits{number}")
     values = {name: 0 for name, each in manifest.registers.items() if each.access == "rw" and name != "rays.tail"}
     ring = {"ring.base": _WINDOW + _RING, "ring.sizeLog": _RING_LOG}
-    assert asked.records is not None
-    return asked.records, values | asked.values | ring, lines
+    return scene.image, values | scene.values | ring, lines

@@ -10,8 +10,9 @@ from typing import Any
 
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
-from colonnade.design.generator import GeneratedDesign, design_for, shell_design_for
+from colonnade.design.generator import GeneratedDesign, design_for, manifest_for, shell_design_for
 
+from colonnade_lab.evaluation.fuzz.batches import BatchBench
 from colonnade_lab.evaluation.fuzz.bench import OUTCOMES, Bench
 from colonnade_lab.evaluation.fuzz.corruption import KINDS
 from colonnade_lab.evaluation.fuzz.frames import FrameBench
@@ -20,11 +21,11 @@ from colonnade_lab.evaluation.fuzz.refits import RefitBench
 #: Cases per run of a bench.
 BATCH = 100
 
-#: Names of all kinds: of frames, of refits.
-ALL_KINDS = (*KINDS, *RefitBench.kinds)
+#: Names of all kinds: of frames, of batches of rays, of refits.
+ALL_KINDS = tuple(dict.fromkeys((*KINDS, *BatchBench.kinds, *RefitBench.kinds)))
 
-#: The data bus of a shell with a refit unit, bytes.
-REFIT_BUS = 16
+#: The only data bus of a shell for rays, and that of one with a refit unit, bytes.
+RAY_BUS, REFIT_BUS = 64, 16
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def fuzzed_design(
     bus_bytes: int = REFIT_BUS,
     progress: Progress = QUIET,
 ) -> GeneratedDesign:
-    """The design of a campaign: the device, or its AXI4 shell.
+    """The design of a campaign: the device, or its AXI4 shell if it traces rays of applications.
 
     Args:
         config: The configuration.
@@ -62,11 +63,15 @@ def fuzzed_design(
     """
     if refit:
         return shell_design_for(config, overrides, bus_bytes, progress, refit=True)
+    if manifest_for(config, overrides, progress).manifest.config["frame"]["rays"]:
+        return shell_design_for(config, overrides, RAY_BUS, progress)
     return design_for(config, overrides, progress)
 
 
 def bench_of(design: GeneratedDesign, progress: Progress = QUIET) -> Bench[Any]:
     """What runs the cases of a design that `fuzzed_design` answers."""
+    if design.manifest.config["frame"]["rays"]:
+        return BatchBench(design, progress)
     return RefitBench(design, progress) if (design.dir / "shell.json").exists() else FrameBench(design, progress)
 
 

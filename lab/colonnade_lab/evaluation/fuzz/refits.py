@@ -131,20 +131,20 @@ class RefitBench(Bench[PlannedRefit]):
         """A refit of a mesh at a pose, near one, or of vertices anywhere in the grid, with any normals."""
         mesh = self.meshes[int(random.integers(len(self.meshes)))]
         vertices = mesh.posed(random.random())
-        most = (1 << int(self.manifest.config["geometry"]["vertexBits"])) - 1
+        highest = (1 << int(self.manifest.config["geometry"]["vertexBits"])) - 1
         how = int(random.integers(4))
         if how:
             places = vertices[:, :3].astype(np.int64)
-            reach = 1 << int(random.integers(1, most.bit_length() + 1))
+            reach = 1 << int(random.integers(1, highest.bit_length() + 1))
             if how == 1:
                 places += random.integers(-reach, reach, places.shape)
             elif how == 2:
-                places = random.integers(0, most + 1, places.shape)
+                places = random.integers(0, highest + 1, places.shape)
             else:
-                places = random.choice((0, 1, most - 1, most), places.shape)
+                places = random.choice((0, 1, highest - 1, highest), places.shape)
             limit = 1 << (self.manifest.layouts["triangle"].fields["body.normals[0].u"].width - 1)
             codes = random.integers(-limit, limit, (len(places), 2))
-            vertices = vertex_words(np.clip(places, 0, most), codes)
+            vertices = vertex_words(np.clip(places, 0, highest), codes)
         count = len(mesh.records)
         root = int(random.integers((1 << self.manifest.layouts["node"].fields["first"].width) - count))
         records, bounds, flat = mesh.refitted(vertices, root, self.manifest)
