@@ -29,7 +29,8 @@ Content = bytes | str | Callable[[Path], None]
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 SCENE = '[mesh]\nname = "cube"\n'
 #: Command lines for `s.toml`, without a simulator.
-RENDER = "render s.toml --config tiny --backend model --size 8x8"
+RENDER_BY = "render s.toml --config tiny --size 8x8 --backend"
+RENDER = f"{RENDER_BY} model"
 COMPARE = "compare x.png a.png --no-dists"
 HITS = "compare x.npz h.npz"
 ROOM = "inspect --background room --no-dists"

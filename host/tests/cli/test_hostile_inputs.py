@@ -197,7 +197,7 @@ CASES |= {
     "frames": Case(f"{RENDER} --frames 1000000000 --output f.png", "1<=x<=10000"),
     "no-frames": Case(f"{RENDER} --frames 0 --output f.png", "1<=x<=10000"),
     "frames-digits": Case(f"{RENDER} --frames {NINES} --output f.png", "--frames"),
-    "size-digits": Case(f"{RENDER} --size {NINES}x8", "WIDTHxHEIGHT"),
+    "size-digits": Case(f"render s.toml --config tiny --size {NINES}x8", "WIDTHxHEIGHT"),
     "hardware-without-frames": Case("render s.toml --config traversal --backend model", "(frame.rays)"),
     "rays-of-hardware-for-frames": Case("bench --rays 1 --config tiny --mesh none", "choose one with frame.rays"),
     "rays-of-two-meshes": Case("bench --rays 1 --config traversal --mesh none --mesh none", "one --mesh"),

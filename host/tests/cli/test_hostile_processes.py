@@ -49,7 +49,7 @@ def tiny_disk(place: Path) -> Iterator[Path]:
 
 FULL = {
     "render": f"{RENDER} --output disk/f.png --json disk/r.json",
-    "hits": f"{RENDER} --size 200x200 --hits disk/h.npz",
+    "hits": "render s.toml --config tiny --backend model --size 200x200 --hits disk/h.npz",
     "pack": f"{PACK} --mesh sphere:2000 --output disk/q",
     "generate": "generate --config tiny --manifest-only --output disk/d",
     "json": "inspect p --json disk/r.json",

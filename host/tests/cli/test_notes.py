@@ -30,7 +30,7 @@ def invoked(folder: Path, arguments: str) -> Result:
 
 
 @pytest.mark.parametrize(
-    "command", [hostile.RENDER, f"{hostile.RENDER} --backend reference", "pack s.toml --output p --config tiny"]
+    "command", [hostile.RENDER, f"{hostile.RENDER_BY} reference", "pack s.toml --output p --config tiny"]
 )
 def test_a_note_is_a_line_and_with_strict_an_error(folder: Path, command: str) -> None:
     noted = invoked(folder, f"{command} --mesh x.obj")
@@ -52,7 +52,7 @@ def test_colours_beyond_the_material_table_are_merged_and_noted(folder: Path) ->
 
 @pytest.mark.parametrize("backend", ["model", "reference"])
 def test_hardware_with_corner_colours_keeps_them_all(folder: Path, backend: str) -> None:
-    command = f"{hostile.RENDER} --mesh x.obj --backend {backend}"
+    command = f"{hostile.RENDER_BY} {backend} --mesh x.obj"
     noted = invoked(folder, f"{command} --set geometry.cornerColours=true --set frame.materials=1")
     assert noted.exit_code == 0, noted.output
     assert noted.stderr.splitlines() == [LINE]
