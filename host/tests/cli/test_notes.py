@@ -43,9 +43,8 @@ def test_a_note_is_a_line_and_with_strict_an_error(folder: Path, command: str) -
 
 
 def test_colours_beyond_the_material_table_are_merged_and_noted(folder: Path) -> None:
-    arguments = f"{hostile.RENDER} --mesh x.obj --set frame.materials=1"
     for backend in ("model", "reference"):
-        noted = invoked(folder, f"{arguments} --backend {backend}")
+        noted = invoked(folder, f"{hostile.RENDER_BY} {backend} --mesh x.obj --set frame.materials=1")
         assert noted.exit_code == 0, noted.output
         assert "2 materials become 1, their colours off by" in noted.stderr and "frame.materials is 1" in noted.stderr
 
