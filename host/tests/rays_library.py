@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from pathlib import Path
 
-from colonnade.design.toolchain import project_root
+from colonnade.rays.library import compile_library
+
+#: Options of a sanitizer, where tools/sanitizers runs the tests.
+SANITIZER = os.environ.get("COLONNADE_SANITIZER", "").split()
 
 
 def compiled_library(folder: Path) -> Path:
     """A shared library in a folder, in place of `libembree4`."""
-    root, output = project_root(), folder / "libembree4.so.4"
-    flags = "-std=gnu++17 -O1 -ffp-contract=off -fPIC -shared -pthread -Wall -Wextra -Werror".split()
-    sources = [root / "host/cpp/rays" / name for name in ("rays.cpp", "embree.cpp", "simulated.cpp")]
-    command = ["g++", *flags, f"-I{root / 'host/cpp'}", f"-I{root / 'driver/include'}", *sources, "-o", output]
-    subprocess.run(command, check=True)
+    return compile_library(folder, "-O1", "-Wall", "-Wextra", "-Werror", *SANITIZER)
+
+
+def compiled_program(source: Path, library: Path) -> Path:
+    """A program in C that is linked with the library."""
+    output = library.parent / source.stem
+    options = f"-std=gnu11 -O1 -Wall -Wextra -Werror -pthread -Wl,-rpath,{library.parent}".split()
+    subprocess.run(["gcc", *options, *SANITIZER, source, library, "-lm", "-ldl", "-o", output], check=True)
     return output

@@ -114,6 +114,14 @@ def gather(data: Path, target: Target, jar: Path) -> None:
     for name in ("live.html", "live.js", "orbit.js", "style.css"):
         shutil.copy(ROOT / "site" / name, data / "site")
     shutil.copy(ROOT / "tools" / "verilated-object", data / "tools")
+    # The library for rays, which `colonnade rays --library` compiles
+    cpp = ROOT / "host" / "cpp"
+    folders = [cpp / name for name in ("mesh", "model", "packer", "rays")]
+    sources = [*cpp.glob("*.hpp"), *(file for folder in folders for file in folder.glob("*.[ch]pp"))]
+    for source in (*sources, ROOT / "driver" / "include" / "colonnade_rays.h"):
+        target_file = data / source.relative_to(ROOT)
+        target_file.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(source, target_file)
     shutil.copy(ROOT / ".jvmopts", data)
     shutil.copy(ROOT / "LICENSE", data)
     archives.copy_jar(jar, data / jar.name, target.firtool)

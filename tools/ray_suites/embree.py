@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from colonnade.common.errors import UserError
+from colonnade.rays.library import compile_library
 
 #: Names of tests, as regular expressions with SCENE for a scene's flags, and how often each repeats its rays: of all
 #: scenes, and of one.
@@ -39,14 +40,16 @@ OPTIONS = {
 }
 
 
-def build(run: Callable[..., str], checkout: Path, folder: Path, library: Callable[..., None]) -> Path:
-    """The program `embree_verify`; `library` compiles the library of rays to a path.
-
-    Calls that the library lacks, of other tests, stay without an address.
-    """
+def configure(run: Callable[..., str], checkout: Path, folder: Path) -> None:
+    """Make the files of a build, and a header among those of the checkout."""
     folder.mkdir(parents=True, exist_ok=True)
     run("cmake", "-S", checkout, "-B", folder, *(f"-D{name}={value}" for name, value in OPTIONS.items()), cwd=checkout)
-    library(folder / "libembree4.so.4", "-Wl,-soname,libembree4.so.4")
+
+
+def build(run: Callable[..., str], checkout: Path, folder: Path) -> Path:
+    """The program `embree_verify`."""
+    configure(run, checkout, folder)
+    compile_library(folder)
     for part in PARTS:
         run("make", "-j2", f"{part}/fast", cwd=folder)
     return folder / "embree_verify"

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from colonnade.common.errors import UserError
+from colonnade.rays.library import compile_library
 
 #: Test files, and the names with which their tests begin.
 TESTS = ("EmbreeIntersector", "winding_number_antipodal")
@@ -15,12 +16,12 @@ TESTS = ("EmbreeIntersector", "winding_number_antipodal")
 EIGEN = Path("/usr/include/eigen3")
 
 
-def build(run: Callable[..., str], checkouts: Mapping[str, Path], folder: Path, library: Callable[..., None]) -> Path:
+def build(run: Callable[..., str], checkouts: Mapping[str, Path], folder: Path) -> Path:
     """The program of the tests; `checkouts` has libigl, its data, and Embree with the headers."""
     if not EIGEN.is_dir():
         raise UserError("no Eigen found, which libigl needs; run: sudo apt-get install libeigen3-dev catch2")
     folder.mkdir(parents=True, exist_ok=True)
-    library(folder / "libembree4.so.4", "-Wl,-soname,libembree4.so.4")
+    library = compile_library(folder)
     tests, program = checkouts["libigl"] / "tests", folder / "tests"
     includes = [tests, checkouts["libigl"] / "include", checkouts["embree"] / "include", EIGEN]
     flags = ["-std=c++17", "-O1", "-DNDEBUG", f'-DLIBIGL_DATA_DIR="{checkouts["libigl-tests-data"]}"']
@@ -29,7 +30,7 @@ def build(run: Callable[..., str], checkouts: Mapping[str, Path], folder: Path, 
     objects = [folder / f"{source.stem}.o" for source in sources]
     for source, output in zip(sources, objects, strict=True):
         run("g++", *flags, "-c", source, "-o", output, cwd=folder)
-    run("g++", *objects, folder / "libembree4.so.4", f"-Wl,-rpath,{folder}", "-o", program, cwd=folder)
+    run("g++", *objects, library, f"-Wl,-rpath,{folder}", "-o", program, cwd=folder)
     return program
 
 

@@ -6,8 +6,6 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
-from importlib import import_module
-from importlib.util import find_spec
 from typing import Any, NoReturn
 
 import click
@@ -17,9 +15,11 @@ from colonnade.cli.capture import capture
 from colonnade.cli.compare import compare
 from colonnade.cli.generate import generate
 from colonnade.cli.inspect import inspect
+from colonnade.cli.laboratory import laboratory
 from colonnade.cli.light import light
 from colonnade.cli.options import echo
 from colonnade.cli.pack import pack
+from colonnade.cli.rays import rays
 from colonnade.cli.registers import registers
 from colonnade.cli.render import render
 from colonnade.cli.view import view
@@ -41,7 +41,6 @@ LABORATORY = {
     "verify": "Compare the RTL with its model, and the model with Embree.",
     "fuzz": "Compare the RTL with its model on corrupt frames, batches of rays and refits.",
     "bench": "Measure rays per cycle of the benchmark meshes.",
-    "rays": "Measure rays of applications a second.",
     "explore": "Measure quality, speed, area and power of many configurations.",
     "ppa": "Estimate area, timing and power of a configuration.",
 }
@@ -103,9 +102,7 @@ class OneLineErrors(click.Group):
 
 def _of_laboratory(name: str) -> click.Command:
     """The command of the laboratory; a `UserError` if it is not installed."""
-    if find_spec("colonnade_lab") is None:
-        raise UserError(f"no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab")
-    command = getattr(import_module(f"colonnade_lab.cli.{name}"), name)
+    command = getattr(laboratory(name), name)
     assert isinstance(command, click.Command)
     return command
 
@@ -157,5 +154,5 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for command in (generate, registers, pack, inspect, capture, light, render, view, compare):
+for command in (generate, registers, pack, inspect, capture, light, render, view, compare, rays):
     cli.add_command(command)

@@ -66,7 +66,7 @@ def rays_of_kind(kind: str, mesh: Mesh, count: int) -> Floats:
 
 def measured(mesh: Mesh, config: str, overrides: tuple[str, ...], count: int) -> Iterator[RayRates]:
     """Rates of each kind; the time of Embree has its conversion from arrays, as that of the model has."""
-    scene, embree = Scene(mesh.vertices, mesh.faces, config, overrides), _embree(mesh)
+    scene, embree = Scene(mesh.vertices, mesh.faces, config, overrides), embree_of(mesh)
     has_caches = manifest_for(config, overrides).manifest.config["columnBvhMemory"]["cache"] is not None
     for kind in KINDS:
         rays = rays_of_kind(kind, mesh, count)
@@ -102,7 +102,8 @@ def report(rates: list[RayRates]) -> list[dict[str, Any]]:
     return [asdict(each) for each in rates]
 
 
-def _embree(mesh: Mesh) -> Any:
+def embree_of(mesh: Mesh) -> Any:
+    """Embree's scene of a mesh, by embreex; None without it."""
     try:
         from embreex import rtcore_scene
         from embreex.mesh_construction import TriangleMesh

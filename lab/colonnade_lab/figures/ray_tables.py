@@ -14,6 +14,7 @@ _TITLES = {
     "three-mesh-bvh": "three-mesh-bvh `RandomRaycasts`: every hit of every ray equal as floats",
     "embree": "Embree `embree_verify`: ",
     "libigl": "libigl `tests/include/igl/embree`: ",
+    "vcglib": "vcglib `apps/embree`, parts that end on the bunny: ",
 }
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
+
 import pytest
 from colonnade.mesh.load import load_mesh
 from colonnade.rays import Scene
 
+from colonnade_lab.evaluation import ray_calls
 from colonnade_lab.evaluation.ray_bench import batches_of
 from colonnade_lab.evaluation.rays import KINDS, measured
 
@@ -23,6 +26,15 @@ def test_hits_are_those_of_embree() -> None:
 
 def test_a_design_without_caches_has_no_traffic() -> None:
     assert [each.dram_bytes for each in measured(load_mesh("cube"), "small", (), 10)] == [None] * len(KINDS)
+
+
+@pytest.mark.matrix
+def test_calls_are_measured_beside_those_of_embree() -> None:
+    pytest.importorskip("embreex")
+    times = [*ray_calls.measured(load_mesh("torus"), 160)]
+    assert [each.kind for each in times] == [*KINDS]
+    for each in times:
+        assert all(isinstance(value, float) and value > 0 for value in astuple(each)[1:])
 
 
 #: Designs for rays beside the preset: one traversal unit, and two columns of two rows whose scene is in DRAM, of 16

@@ -1,0 +1,16 @@
+"""The laboratory, which is a distribution of its own."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from colonnade.common.errors import UserError
+
+
+def laboratory(name: str) -> Any:
+    """The module of a command in `colonnade_lab.cli`; a `UserError` if the laboratory is not installed."""
+    if find_spec("colonnade_lab") is None:
+        raise UserError(f"no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab")
+    return import_module(f"colonnade_lab.cli.{name}")
