@@ -1,60 +1,185 @@
-// Embree's devices, scenes and queries for triangles, on colonnade_rays.h. Structures are those of Embree 4's documented binary interface.
+// Embree's devices, buffers, geometries and scenes for triangles, on colonnade_rays.h. Structures are those of Embree 4's documented binary
+// interface, errors those of its calls.
 #pragma once
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <map>
 #include <mutex>
+#include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "colonnade_rays.h"
 
 namespace colonnade::rays::embree {
 
-enum Error { none = 0, invalidArgument = 2, invalidOperation = 3 };
-enum BufferType { indexBuffer = 0, vertexBuffer = 1 };
-/// Formats of the two buffers: three 32-bit words.
-constexpr int formats[] = {0x5003, 0x9003};
-constexpr unsigned invokeArgumentFilter = 1 << 1;
-/// Rays of the largest packet.
-constexpr std::size_t packetRays = 16;
+enum ErrorCode { none, unknown, invalidArgument, invalidOperation, outOfMemory, cancelled = 6 };
+enum BufferType { indexBuffer, vertexBuffer, attributeBuffer };
+enum Format { uint3 = 0x5003, float1 = 0x9001, float3 = 0x9003, float16 = 0x9010 };
+constexpr unsigned invokeArgumentFilter = 1 << 1; ///< of a query's flags
+constexpr unsigned noId = ~0u;
 
-struct Device {
-    int references = 1;
-    int error = none;
+/// A call that fails: its code, and why.
+struct Error : std::runtime_error {
+    ErrorCode code;
+    Error(ErrorCode code, const char* what) : std::runtime_error(what), code(code) {}
+};
+
+struct Device;
+
+/// What a handle names, with its references.
+struct Object {
+    explicit Object(Device* of) : device(of) {}
+    virtual ~Object() = default;
+    Object(const Object&) = delete;
+    Object& operator=(const Object&) = delete;
+
+    void retain() { references_.fetch_add(1, std::memory_order_relaxed); }
+    void release() {
+        if (references_.fetch_sub(1, std::memory_order_acq_rel) == 1) delete this;
+    }
+
+    Device* const device;
+
+private:
+    std::atomic<int> references_{1};
+};
+
+/// A reference to an object, or null.
+template <class T> class Reference {
+public:
+    Reference(T* to = nullptr) : to_(to) {
+        if (to_) to_->retain();
+    }
+    Reference(const Reference& other) : Reference(other.to_) {}
+    Reference(Reference&& other) noexcept : to_(std::exchange(other.to_, nullptr)) {}
+    Reference& operator=(Reference other) noexcept {
+        std::swap(to_, other.to_);
+        return *this;
+    }
+    ~Reference() {
+        if (to_) to_->release();
+    }
+    /// Takes over the reference that a new object has.
+    static Reference of(T* made) {
+        Reference result(made);
+        made->release();
+        return result;
+    }
+
+    T* get() const { return to_; }
+    T* operator->() const { return to_; }
+
+private:
+    T* to_;
+};
+
+/// The first error of a thread since it asked last, and the text of the latest such.
+struct LastError {
+    int code = none;
+    std::string text;
+};
+
+struct Device final : Object {
+    Device() : Object(this) {
+        if (const int status = colonnade_rays_open_environment(&rays)) throw Error(status == COLONNADE_RAYS_NO_MEMORY ? outOfMemory : unknown, "the design or the device does not open");
+    }
+    ~Device() override { colonnade_rays_close(rays); }
+
+    /// The calling thread's error; of a null device that of calls without one.
+    static LastError& error(const Device* device) {
+        thread_local std::map<std::uint64_t, LastError> errors;
+        return errors[device ? device->number_ : 0];
+    }
+    static void fail(Device* device, int code, const char* text) noexcept {
+        try {
+            if (device && device->report) device->report(device->user, code, text);
+            LastError& last = error(device);
+            if (last.code == none) last = {code, text};
+        } catch (...) {} // Without memory the error is lost
+    }
+    /// Turns the status of a call of the library into an error.
+    void check(int status) {
+        if (status == COLONNADE_RAYS_OK) return;
+        const bool isHardware = status == COLONNADE_RAYS_DEVICE;
+        throw Error(status == COLONNADE_RAYS_NO_MEMORY ? outOfMemory : isHardware ? unknown : invalidOperation, colonnade_rays_error(rays));
+    }
+
     void (*report)(void*, int, const char*) = nullptr;
     void* user = nullptr;
     colonnade_rays_device* rays = nullptr;
-    std::mutex calls; ///< Rays come from any thread; the library runs one call at a time
 
-    void fail(int code, const char* text) {
-        if (error == none) error = code;
-        if (report) report(user, code, text);
+private:
+    inline static std::atomic<std::uint64_t> devices{0};
+    const std::uint64_t number_ = ++devices; ///< Not used again, as an address is
+};
+
+/// An object of a device, which stays as long.
+struct Child : Object {
+    explicit Child(Device* of) : Object(of) { of->retain(); }
+    ~Child() override { device->release(); }
+};
+
+inline void* needed(void* handle) {
+    if (!handle) throw Error(invalidArgument, "invalid argument");
+    return handle;
+}
+
+/// Runs a call on a handle, whose failures become errors of its device, or of the thread if the handle is null.
+template <class Call> auto called(Object* handle, const Call& call) noexcept -> decltype(call()) {
+    Device* const device = handle ? handle->device : nullptr;
+    try {
+        needed(handle);
+        return call();
+    } catch (const Error& error) {
+        Device::fail(device, error.code, error.what());
+    } catch (const std::bad_alloc&) {
+        Device::fail(device, outOfMemory, "out of memory");
+    } catch (const std::exception& error) {
+        Device::fail(device, unknown, error.what());
     }
-    void check(int status) {
-        if (status != COLONNADE_RAYS_OK) fail(invalidArgument, colonnade_rays_error(rays));
+    return decltype(call())();
+}
+
+struct Buffer final : Child {
+    /// Memory of its own, if `shared` is null.
+    Buffer(Device* of, char* shared, std::size_t size) : Child(of), bytes(size), data(shared ? shared : static_cast<char*>(std::calloc(size + 1, 1))), isOwned_(!shared) {
+        if (!data) throw std::bad_alloc();
+    }
+    ~Buffer() override {
+        if (isOwned_) std::free(data);
+    }
+
+    const std::size_t bytes;
+    char* const data;
+
+private:
+    const bool isOwned_;
+};
+
+/// Items in a buffer.
+struct View {
+    Reference<Buffer> buffer;
+    char* data = nullptr;
+    std::size_t stride = 0, count = 0;
+
+    template <class T> std::array<T, 3> row(std::size_t i) const {
+        std::array<T, 3> values;
+        std::memcpy(values.data(), data + i * stride, sizeof values);
+        return values;
     }
 };
 
-struct RTCRay {
-    float org[3], tnear, dir[3], time, tfar;
-    unsigned mask, id, flags;
-};
-struct RTCHit {
-    float normal[3], u, v;
-    unsigned primitive, geometry, instance;
-};
-struct RTCRayHit {
-    alignas(16) RTCRay ray;
-    alignas(16) RTCHit hit;
-};
-
-/// What a filter gets: a ray with the t of its hit, and the hit. It clears `*valid` to refuse the hit.
+/// What a filter gets. It clears `*valid` to refuse the hit. `ray` has the t of its hit; of a single ray it is the caller's.
 struct FilterArguments {
     int* valid;
-    void *user, *context;
-    RTCRay* ray;
-    RTCHit* hit;
+    void *user, *context, *ray, *hit;
     unsigned count;
 };
 using Filter = void (*)(const FilterArguments*);
@@ -64,164 +189,192 @@ struct QueryArguments {
     Filter filter;
 };
 
-struct Buffer {
-    std::vector<char> owned;
-    char* data = nullptr;
-    std::size_t stride = 0, count = 0;
-};
+struct Geometry final : Child {
+    using Child::Child;
 
-struct Geometry {
-    explicit Geometry(Device* of) : device(of) {}
-    Device* device;
-    int references = 1;
-    Buffer buffers[2];
-    bool isEnabled = true;
-    unsigned mask = 0xffffffff;
+    View& view(int type, unsigned slot) {
+        if (type == attributeBuffer && slot < attributes.size()) return attributes[slot];
+        if ((type == indexBuffer || type == vertexBuffer) && slot == 0) return views[type];
+        throw Error(type == attributeBuffer ? invalidOperation : invalidArgument, "there is no buffer of this type and slot");
+    }
+
+    /// `made`: a function of the bytes that makes the buffer.
+    template <class Make> View& set(int type, unsigned slot, int format, std::size_t offset, std::size_t stride, std::size_t count, const Make& make) {
+        if (count > UINT32_MAX || stride > UINT32_MAX) throw Error(invalidArgument, "the buffer is too large");
+        View& to = view(type, slot);
+        if (type == attributeBuffer ? format < float1 || format > float16 : format != (type == indexBuffer ? uint3 : float3))
+            throw Error(invalidOperation, "the buffer has another format");
+        const Reference<Buffer> buffer = make(stride * count);
+        if (((reinterpret_cast<std::uintptr_t>(buffer->data) + offset) | stride) % 4 != 0) throw Error(invalidOperation, "data are not aligned to 4 bytes");
+        if (offset > buffer->bytes || stride * count > buffer->bytes - offset) throw Error(invalidArgument, "the buffer is too small");
+        if (type == indexBuffer && count != to.count) change();
+        to = {buffer, buffer->data + offset, stride, count};
+        return to;
+    }
+
+    /// A change that needs a commit.
+    void change() {
+        isCommitted = false;
+        ++changes;
+    }
+    void enable(bool toBeEnabled) {
+        changes += isEnabled != toBeEnabled;
+        isEnabled = toBeEnabled;
+    }
+    bool hasFilters() const { return filters[0] || filters[1] || takesArgumentFilter; }
+
+    View views[2];
+    std::vector<View> attributes;
+    bool isCommitted = false, isEnabled = true, takesArgumentFilter = false;
+    unsigned mask = 1, changes = 0;
     void* user = nullptr;
     Filter filters[2] = {}; ///< of closest hits, of occlusion
-    bool takesArgumentFilter = false;
-
-    template <class T> std::vector<T> rows(BufferType type) const {
-        const Buffer& buffer = buffers[type];
-        std::vector<T> values(3 * buffer.count);
-        for (std::size_t i = 0; i < buffer.count; ++i) std::memcpy(&values[3 * i], buffer.data + i * buffer.stride, 3 * sizeof(T));
-        return values;
-    }
 };
 
-struct Scene {
-    explicit Scene(Device* of) : device(of) {}
-    Device* device;
-    int references = 1;
-    std::map<unsigned, Geometry*> geometries;
-    std::vector<unsigned> ids; ///< of each mesh
-    std::vector<std::vector<double>> vertices;
-    std::vector<std::vector<std::uint32_t>> faces;
+/// A mesh of a committed scene.
+struct Part {
+    unsigned id;
+    Reference<Geometry> geometry;
+    std::vector<std::array<float, 3>> normals; ///< of each face
+};
+
+/// What rays meet: the scene at its last commit.
+struct Committed {
+    explicit Committed(Device& device) { device.check(colonnade_rays_scene_new(device.rays, &rays)); }
+    Committed(Committed&& other) noexcept : rays(std::exchange(other.rays, nullptr)), parts(std::move(other.parts)), hasFilters(other.hasFilters) {}
+    Committed& operator=(Committed&& other) noexcept {
+        std::swap(rays, other.rays);
+        parts.swap(other.parts);
+        hasFilters = other.hasFilters;
+        return *this;
+    }
+    ~Committed() { colonnade_rays_scene_free(rays); }
+
+    /// Adds a geometry. Triangles with an index or a vertex that is none, or a vertex too far away, become points, and keep their place.
+    void add(Device& device, unsigned id, Geometry& geometry) {
+        const View &corners = geometry.views[vertexBuffer], &triangles = geometry.views[indexBuffer];
+        const std::uint32_t vertexCount = static_cast<std::uint32_t>(corners.count);
+        std::vector<double> vertices(3 * corners.count);
+        std::vector<bool> isVertex(corners.count, true);
+        for (std::size_t i = 0; i < corners.count; ++i) {
+            const auto row = corners.row<float>(i);
+            for (int a = 0; a < 3; ++a) isVertex[i] = isVertex[i] && std::abs(row[a]) < largest;
+            for (int a = 0; a < 3 && isVertex[i]; ++a) vertices[3 * i + a] = row[a];
+        }
+        std::vector<std::uint32_t> faces(3 * triangles.count, vertexCount);
+        std::uint32_t some = vertexCount; // A vertex of a triangle
+        for (std::size_t i = 0; i < triangles.count; ++i) {
+            const auto row = triangles.row<std::uint32_t>(i);
+            bool isFace = true;
+            for (const std::uint32_t corner : row) isFace = isFace && corner < vertexCount && isVertex[corner];
+            if (!isFace) continue;
+            std::copy(row.begin(), row.end(), &faces[3 * i]);
+            some = row[0];
+        }
+        if (some == vertexCount) return;
+        std::replace(faces.begin(), faces.end(), vertexCount, some);
+        std::uint32_t mesh;
+        const int status = colonnade_rays_mesh_add(rays, vertices.data(), vertexCount, faces.data(), triangles.count, &mesh);
+        if (status == COLONNADE_RAYS_BAD_MESH) return; // No face has an area
+        device.check(status);
+        device.check(colonnade_rays_mesh_mask(rays, mesh, geometry.mask));
+        Part part{id, &geometry, {}};
+        part.normals.reserve(triangles.count);
+        for (std::size_t i = 0; i < triangles.count; ++i) {
+            const double *at[3], *&a = at[0], *&b = at[1], *&c = at[2];
+            for (int corner = 0; corner < 3; ++corner) at[corner] = &vertices[3 * std::size_t{faces[3 * i + corner]}];
+            const auto component = [&](int x, int y) { return static_cast<float>((b[x] - a[x]) * (c[y] - a[y]) - (b[y] - a[y]) * (c[x] - a[x])); };
+            part.normals.push_back({component(1, 2), component(2, 0), component(0, 1)});
+        }
+        parts.push_back(std::move(part));
+    }
+
     colonnade_rays_scene* rays = nullptr;
+    std::vector<Part> parts; ///< of each mesh
+    bool hasFilters = false;
 
-    bool hasFilters(const QueryArguments* arguments) const {
-        if (arguments && arguments->filter) return true;
-        for (const auto& [id, each] : geometries)
-            if (each->filters[0] || each->filters[1]) return true;
-        return false;
-    }
+private:
+    static constexpr float largest = 1.844e18f; ///< Embree's limit of a coordinate
 };
 
-inline Device& device(void* handle) { return *static_cast<Device*>(handle); }
-inline Scene& scene(void* handle) { return *static_cast<Scene*>(handle); }
-inline Geometry& geometry(void* handle) { return *static_cast<Geometry*>(handle); }
+struct Scene final : Child {
+    explicit Scene(Device* of) : Child(of), committed(*of) {}
 
-inline void release(Geometry* geometry) {
-    if (--geometry->references == 0) delete geometry;
-}
-
-inline colonnade_rays_ray rayOf(const RTCRay& r) { return {{r.org[0], r.org[1], r.org[2]}, r.tnear, {r.dir[0], r.dir[1], r.dir[2]}, r.tfar}; }
-
-/// A ray without an interval is not active, and keeps its bytes.
-inline bool isActive(const RTCRay& ray) { return ray.tnear <= ray.tfar && ray.tfar >= 0; }
-
-inline void take(const Scene& scene, const colonnade_rays_hit& hit, RTCRayHit& query) {
-    const std::vector<double>& at = scene.vertices[hit.mesh];
-    const std::uint32_t* const face = &scene.faces[hit.mesh][3 * hit.face];
-    double edges[2][3];
-    for (int i = 0; i < 2; ++i)
-        for (int a = 0; a < 3; ++a) edges[i][a] = at[3 * face[i + 1] + a] - at[3 * face[0] + a];
-    for (int a = 0; a < 3; ++a) query.hit.normal[a] = static_cast<float>(edges[0][(a + 1) % 3] * edges[1][(a + 2) % 3] - edges[0][(a + 2) % 3] * edges[1][(a + 1) % 3]);
-    query.ray.tfar = static_cast<float>(hit.t);
-    query.hit.u = static_cast<float>(hit.u);
-    query.hit.v = static_cast<float>(hit.v);
-    query.hit.primitive = hit.face;
-    query.hit.geometry = scene.ids[hit.mesh];
-    query.hit.instance = ~0u;
-}
-
-/// Whether the filters of the geometry and of the call accept a hit.
-inline bool isAccepted(const Scene& scene, bool isOcclusion, const QueryArguments* arguments, RTCRayHit& query) {
-    const Geometry& geometry = *scene.geometries.at(query.hit.geometry);
-    const bool takesArgument = arguments && (geometry.takesArgumentFilter || (arguments->flags & invokeArgumentFilter));
-    int valid = -1;
-    const FilterArguments call{&valid, geometry.user, arguments ? arguments->context : nullptr, &query.ray, &query.hit, 1};
-    for (const Filter filter : {geometry.filters[isOcclusion], takesArgument ? arguments->filter : nullptr})
-        if (filter && valid) filter(&call);
-    return valid != 0;
-}
-
-/// Takes the closest hit that filters accept. Filters run outside of the lock: they may trace rays.
-inline bool takeFiltered(Scene& scene, RTCRayHit& query, bool isOcclusion, const QueryArguments* arguments) {
-    const colonnade_rays_ray ray = rayOf(query.ray);
-    std::vector<colonnade_rays_hit> hits(16);
-    for (std::size_t count = 0;; hits.resize(count)) {
-        const std::lock_guard lock(scene.device->calls);
-        scene.device->check(colonnade_rays_all(scene.rays, &ray, 1, 0, query.ray.mask, SIZE_MAX, hits.data(), hits.size(), &count));
-        if (count > hits.size()) continue;
-        hits.resize(count);
-        break;
-    }
-    for (const colonnade_rays_hit& hit : hits) {
-        RTCRayHit candidate = query;
-        take(scene, hit, candidate);
-        if (!isAccepted(scene, isOcclusion, arguments, candidate)) continue;
-        query = candidate;
-        return true;
-    }
-    return false;
-}
-
-/// Calls `trace` with the active rays of a packet that follow each other and have the same mask: rays, their queries, count and mask.
-template <class Trace> void eachBatch(RTCRayHit* queries, std::size_t count, const Trace& trace) {
-    for (std::size_t next = 0; next < count;) {
-        colonnade_rays_ray rays[packetRays];
-        RTCRayHit* of[packetRays];
-        std::size_t active = 0;
-        unsigned mask = 0;
-        for (; next < count; ++next) {
-            const RTCRay& ray = queries[next].ray;
-            if (!isActive(ray)) continue;
-            if (active != 0 && ray.mask != mask) break;
-            mask = ray.mask;
-            rays[active] = rayOf(ray);
-            of[active++] = &queries[next];
+    unsigned attach(Geometry* geometry, unsigned id) {
+        needed(geometry);
+        if (geometry->device != device) throw Error(invalidArgument, "the geometry is another device's");
+        const std::lock_guard lock(table_);
+        if (id == noId) {
+            while (geometries_.count(firstFree_)) ++firstFree_;
+            id = firstFree_;
         }
-        if (active != 0) trace(rays, of, active, mask);
+        if (!geometries_.emplace(id, geometry).second) throw Error(invalidOperation, "the scene has a geometry of this number");
+        isModified = isModified || geometry->isEnabled;
+        return id;
     }
-}
+    void detach(unsigned id) {
+        if (id == noId) throw Error(invalidArgument, "invalid argument");
+        const std::lock_guard lock(table_);
+        if (geometries_.erase(id) == 0) throw Error(invalidOperation, "the scene has no such geometry");
+        firstFree_ = std::min(firstFree_, id);
+        isModified = true;
+    }
+    /// Null if there is none.
+    Geometry* geometry(unsigned id) {
+        const std::lock_guard lock(table_);
+        const auto found = geometries_.find(id);
+        return found == geometries_.end() ? nullptr : found->second.get();
+    }
 
-/// The closest hits of a packet, at most `packetRays` rays.
-inline void intersect(Scene& scene, RTCRayHit* queries, std::size_t count, const QueryArguments* arguments) {
-    const bool hasFilters = scene.hasFilters(arguments);
-    for (std::size_t i = 0; hasFilters && i < count; ++i)
-        if (isActive(queries[i].ray)) takeFiltered(scene, queries[i], false, arguments);
-    if (hasFilters) return;
-    eachBatch(queries, count, [&](const colonnade_rays_ray* rays, RTCRayHit* const* of, std::size_t active, unsigned mask) {
-        colonnade_rays_hit hits[packetRays];
-        std::fill_n(hits, active, colonnade_rays_hit{0, 0, 0, UINT32_MAX, UINT32_MAX, 0, 0});
+    /// Threads that come during a commit wait for it, and find nothing to do.
+    void commit() {
+        const std::lock_guard lock(commits_);
+        std::vector<Seen> now;
         {
-            const std::lock_guard lock(scene.device->calls);
-            scene.device->check(colonnade_rays_closest(scene.rays, rays, active, 0, mask, hits));
+            const std::lock_guard tableLock(table_);
+            for (const auto& [id, each] : geometries_) now.push_back({id, each, each->changes});
         }
-        for (std::size_t i = 0; i < active; ++i)
-            if (hits[i].face != UINT32_MAX) take(scene, hits[i], *of[i]);
-    });
-}
-
-/// Which rays of a packet, at most `packetRays`, hit anything: their tfar becomes negative infinity.
-inline void occlude(Scene& scene, RTCRayHit* queries, std::size_t count, const QueryArguments* arguments) {
-    const auto end = [](RTCRayHit& query) { query.ray.tfar = -std::numeric_limits<float>::infinity(); };
-    const bool hasFilters = scene.hasFilters(arguments);
-    for (std::size_t i = 0; hasFilters && i < count; ++i) {
-        RTCRayHit candidate = queries[i];
-        if (isActive(candidate.ray) && takeFiltered(scene, candidate, true, arguments)) end(queries[i]);
+        const auto isSame = [](const Seen& a, const Seen& b) { return a.id == b.id && a.geometry.get() == b.geometry.get() && a.changes == b.changes; };
+        if (!isModified && std::equal(now.begin(), now.end(), seen_.begin(), seen_.end(), isSame)) return;
+        isModified = true;
+        Committed empty(*device), next(*device); // The scene is empty if this fails
+        device->check(colonnade_rays_commit(empty.rays));
+        committed = std::move(empty);
+        tell(0);
+        for (const Seen& each : now) {
+            if (!each.geometry->isEnabled) continue;
+            if (!each.geometry->isCommitted) throw Error(invalidOperation, "geometry not committed");
+            next.hasFilters = next.hasFilters || each.geometry->hasFilters();
+            next.add(*device, each.id, *each.geometry.get());
+        }
+        device->check(colonnade_rays_commit(next.rays));
+        tell(1);
+        committed = std::move(next);
+        seen_ = std::move(now);
+        isModified = false;
     }
-    if (hasFilters) return;
-    eachBatch(queries, count, [&](const colonnade_rays_ray* rays, RTCRayHit* const* of, std::size_t active, unsigned mask) {
-        std::uint8_t isOccluded[packetRays] = {};
-        {
-            const std::lock_guard lock(scene.device->calls);
-            scene.device->check(colonnade_rays_occluded(scene.rays, rays, active, 0, mask, isOccluded));
-        }
-        for (std::size_t i = 0; i < active; ++i)
-            if (isOccluded[i]) end(*of[i]);
-    });
-}
+
+    std::atomic<bool> isModified{true};
+    int flags = 0;
+    bool (*progress)(void*, double) = nullptr;
+    void* progressUser = nullptr;
+    Committed committed;
+
+private:
+    struct Seen {
+        unsigned id;
+        Reference<Geometry> geometry;
+        unsigned changes;
+    };
+
+    void tell(double part) const {
+        if (progress && !progress(progressUser, part)) throw Error(cancelled, "the progress monitor ends the commit");
+    }
+
+    std::mutex table_, commits_;
+    std::map<unsigned, Reference<Geometry>> geometries_;
+    unsigned firstFree_ = 0; ///< Smaller numbers are taken
+    std::vector<Seen> seen_;
+};
 
 } // namespace colonnade::rays::embree

@@ -144,7 +144,8 @@ int colonnade_rays_open_environment(colonnade_rays_device** device) {
     const char *const designName = "COLONNADE_RAYS_DESIGN", *const deviceName = "COLONNADE_RAYS_DEVICE";
     const char* variable = designName;
     try {
-        const std::string design = contentOf(variable);
+        const bool hasDesign = std::getenv(designName);
+        const std::string design = hasDesign ? contentOf(variable) : "";
         std::unique_ptr<SimulatedDevice> simulated;
         colonnade_rays_backend backend{};
         if (std::getenv(deviceName)) {
@@ -152,7 +153,7 @@ int colonnade_rays_open_environment(colonnade_rays_device** device) {
             simulated = std::make_unique<SimulatedDevice>(Description(contentOf(variable)));
             backend = simulated->backend();
         }
-        const int status = colonnade_rays_open(design.c_str(), simulated ? &backend : nullptr, device);
+        const int status = colonnade_rays_open(hasDesign ? design.c_str() : nullptr, simulated ? &backend : nullptr, device);
         if (status == COLONNADE_RAYS_OK) {
             simulated.release(); // The library closes it
             return status;

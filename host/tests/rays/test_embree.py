@@ -1,22 +1,38 @@
-"""Embree's calls, of a library in place of `libembree4`: filters, threads, and what it refuses."""
+"""Embree's calls, of a library in place of `libembree4`: what a program for Embree 4 gets, filters, threads."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
+import importlib.util
+import json
+import os
+import subprocess
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from exact_rays import mesh_of, rays_of
-from rays_library import compiled_library
+from rays_library import compiled_library, compiled_program
 
-from colonnade.design.generator import manifest_for
-from colonnade.rays.scene import design_text
+from colonnade.cli.main import cli
 
 pytestmark = pytest.mark.matrix
+FOLDER = Path(__file__).parent
+#: What Embree answers to each case of `embree_calls.c`.
+ANSWERS: dict[str, list[str]] = json.loads((FOLDER / "embree_calls.json").read_text())
+#: What the library answers in its place: faces nearer than a quarter unit, geometries that it refuses, and cases in
+#: which Embree itself crashes.
+HERE = {
+    "detached": ["0 0 t 5 occluded 1 error 0", "-1 -1 t inf occluded 0 error 0"],
+    "filter_coplanar": ["-1 -1 t inf occluded 0 error 0"],
+    "filter_near": ["-1 -1 t inf occluded 0 error 0"],
+    "refused": ["quads 1 made: error 3", "motion: error 3", "transform: error 3"],
+    "small_buffers": ["1 stride: error 2", "too small: error 2", "0 0 t 5 occluded 1 error 0"],
+}
 INDICES, VERTICES, UINT3, FLOAT3 = 0, 1, 0x5003, 0x9003
-INVALID_ARGUMENT, INVALID_OPERATION, NONE = 2, 3, 2**32 - 1
+NONE = 2**32 - 1
 QUERY = np.dtype(
     [
         *(("org", "f4", 3), ("tnear", "f4"), ("dir", "f4", 3), ("time", "f4"), ("tfar", "f4"), ("mask", "u4")),
@@ -46,6 +62,7 @@ class Embree:
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self._library = library
+        self._geometries: list[int] = []
         self.device = self.call("rtcNewDevice", None)
         self.scene = self.call("rtcNewScene", self.device)
 
@@ -62,12 +79,20 @@ class Embree:
         self.call("rtcSetSharedGeometryBuffer", geometry, kind, slot, form, array.ctypes.data, 0, stride, count)
 
     def add(self, vertices: np.ndarray, faces: np.ndarray) -> int:
-        """A mesh, whose arrays stay where they are; call `rtcCommitScene` after it."""
+        """A mesh, whose arrays stay where they are; `commit` after it."""
         geometry = self.call("rtcNewGeometry", self.device, 0)
         self.buffer(geometry, VERTICES, FLOAT3, vertices)
         self.buffer(geometry, INDICES, UINT3, faces)
         self.call("rtcAttachGeometry", self.scene, geometry)
+        self._geometries.append(geometry)
         return geometry
+
+    def commit(self) -> None:
+        """Commit geometries and scene."""
+        for geometry in self._geometries:
+            self.call("rtcCommitGeometry", geometry)
+        self.call("rtcCommitScene", self.scene)
+        assert self.error() == 0
 
     def hits(self, rays: np.ndarray, call: str = "rtcIntersect1") -> np.ndarray:
         queries = queries_of(rays)
@@ -95,13 +120,58 @@ def queries_of(rays: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ctypes.CDLL]:
-    folder = tmp_path_factory.mktemp("embree")
-    output = compiled_library(folder)
-    (folder / "design").write_text(design_text(manifest_for("edge", ()).manifest))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("COLONNADE_RAYS_DESIGN", str(folder / "design"))
-        yield ctypes.CDLL(str(output))
+def library_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compiled_library(tmp_path_factory.mktemp("embree"))
+
+
+@pytest.fixture(scope="module")
+def library(library_file: Path) -> ctypes.CDLL:
+    return ctypes.CDLL(str(library_file))
+
+
+@pytest.fixture(scope="module")
+def program(library_file: Path) -> Path:
+    return compiled_program(FOLDER / "embree_calls.c", library_file)
+
+
+def answers_of(program: Path, *words: str, library: Path | None = None) -> list[str]:
+    """Lines of a case of the program, by default of the library that it is linked with."""
+    variables = os.environ | ({"LD_PRELOAD": str(library)} if library else {})
+    done = subprocess.run([program, *words], env=variables, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def test_the_library_has_all_names_of_embree(library_file: Path, program: Path) -> None:
+    """And no other ones with its prefix; none of them crashes on null handles."""
+    names = (FOLDER / "embree_names.txt").read_text().split()
+    table = subprocess.run(["nm", "-D", "--defined-only", library_file], capture_output=True, text=True, check=True)
+    words = (line.split()[-1] for line in table.stdout.splitlines())
+    assert sorted(word for word in words if word.startswith("rtc")) == sorted(names)
+    assert answers_of(program, "nulls", *names) == ["done"]
+
+
+@pytest.mark.parametrize("case", sorted(ANSWERS | HERE))
+def test_a_program_gets_what_embree_gives(case: str, program: Path) -> None:
+    assert answers_of(program, case) == HERE.get(case, ANSWERS.get(case))
+
+
+@pytest.mark.skipif("COLONNADE_SANITIZER" in os.environ, reason="Embree is not compiled with the sanitizer")
+@pytest.mark.parametrize("case", sorted(ANSWERS))
+def test_embree_gives_what_is_recorded(case: str, program: Path) -> None:
+    embreex = importlib.util.find_spec("embreex")
+    found = [*Path(embreex.origin).parents[1].glob("embreex.libs/libembree4*")] if embreex and embreex.origin else []
+    if not found:
+        pytest.skip("embreex has no Embree of its own here")
+    assert answers_of(program, case, library=found[0]) == ANSWERS[case]
+
+
+def test_the_command_compiles_the_library(tmp_path: Path) -> None:
+    done = CliRunner().invoke(cli, ["rays", "--library", str(tmp_path / "new")])
+    file = tmp_path / "new" / "libembree4.so.4"
+    assert done.stdout.splitlines() == [str(file), f"LD_PRELOAD={file} PROGRAM"]
+    assert (tmp_path / "new" / "libembree4.so").resolve() == file
+    assert ctypes.CDLL(str(file)).rtcNewDevice(None) != 0
 
 
 def test_a_filter_refuses_hits_and_those_behind_them_count(library: ctypes.CDLL) -> None:
@@ -118,14 +188,14 @@ def test_a_filter_refuses_hits_and_those_behind_them_count(library: ctypes.CDLL)
     embree.call("rtcSetGeometryUserData", filtered, 123)
     for name in ("rtcSetGeometryIntersectFilterFunction", "rtcSetGeometryOccludedFilterFunction"):
         embree.call(name, filtered, refuse)
-    embree.call("rtcCommitScene", embree.scene)
+    embree.commit()
     down = np.array([[0.7, 0.2, 3, 0, 0, 0, -1], [0.2, 0.7, 3, 0, 0, 0, -1]])
     hits = embree.hits(down)
     assert hits["mesh"].tolist() == [1, 1] and hits["tfar"].tolist() == [3, 3] and hits["primitive"].tolist() == [0, 1]
     assert seen == [(123, 2.0, 0, 1), (123, 2.0, 1, 1)]
     assert embree.hits(down, "rtcOccluded1")["tfar"].tolist() == [-np.inf, -np.inf]
     embree.call("rtcDetachGeometry", embree.scene, 1)
-    embree.call("rtcCommitScene", embree.scene)
+    embree.commit()
     assert embree.hits(down)["mesh"].tolist() == [NONE, NONE]
     assert embree.hits(down, "rtcOccluded1")["tfar"].tolist() == [np.inf, np.inf]
 
@@ -136,7 +206,7 @@ def test_a_packet_has_the_hits_of_its_rays(library: ctypes.CDLL) -> None:
     above = SQUARE[0] + np.float32([0, 0, 1])
     for mask, vertices in ((1, SQUARE[0]), (2, above)):
         embree.call("rtcSetGeometryMask", embree.add(vertices, SQUARE[1]), mask)
-    embree.call("rtcCommitScene", embree.scene)
+    embree.commit()
     queries = queries_of(rays_of(random.uniform(-0.2, 1.2, (160, 3)) * [1, 1, 0] + [0, 0, 3], [[0, 0, -1]] * 160))
     queries["mask"] = random.choice([1, 2, 3], 160)
     queries["tfar"][::7] = -1
@@ -160,22 +230,7 @@ def test_rays_of_several_threads_have_their_own_hits(library: ctypes.CDLL) -> No
     for _ in range(8):
         embree = Embree(library)
         embree.add(corners, triangles)
-        embree.call("rtcCommitScene", embree.scene)
+        embree.commit()
         with ThreadPoolExecutor(4) as pool:
             for hits in pool.map(embree.packet_hits, [rays] * 4):
                 np.testing.assert_allclose(hits["tfar"], 2, atol=1e-3)
-
-
-def test_what_is_no_triangle_at_rest_is_refused(library: ctypes.CDLL) -> None:
-    embree = Embree(library)
-    geometry = embree.add(*SQUARE)
-    assert embree.error() == 0
-    embree.buffer(geometry, VERTICES, FLOAT3, SQUARE[0] + 1, slot=1)
-    assert embree.error() == INVALID_OPERATION
-    embree.buffer(geometry, INDICES, UINT3 + 1, np.zeros((1, 4), np.uint32))
-    assert embree.error() == INVALID_ARGUMENT
-    embree.call("rtcSetGeometryTimeStepCount", geometry, 2)
-    assert embree.error() == INVALID_OPERATION
-    assert embree.call("rtcNewGeometry", embree.device, 1) == 0 and embree.error() == INVALID_OPERATION
-    assert embree.call("rtcGetGeometryBufferData", geometry, VERTICES, 0) == SQUARE[0].ctypes.data
-    assert embree.call("rtcGetGeometry", embree.scene, 7) == 0
