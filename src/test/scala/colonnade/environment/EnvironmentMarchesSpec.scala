@@ -85,6 +85,10 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
 
     def isIdle: Boolean = inFlight.isEmpty && offered.isEmpty
 
+    /** Requests that the marches have taken; those and one that is offered. */
+    var requests   = Vector.empty[Request]
+    def begun: Int = requests.size + offered.size
+
     /** @param asks may store another ray, and request another answer */
     def step(willing: Double, asks: Boolean): Unit = {
       val free =
@@ -119,6 +123,7 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
       if (port.visible.valid.peekBoolean()) end(port.visible.bits.peekInt().toInt, None, isVisible = true)
       if (port.req.ready.peekBoolean()) for (request <- offered) {
         inFlight += request.ray.context -> request
+        requests :+= request
         maxInFlight = maxInFlight.max(inFlight.size)
         distance = Some(request.ray.hitDistance)
         offered = None
@@ -151,6 +156,44 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
       // Frames of different cameras
       for (from <- Seq(Seq(0.3, 0.1, -0.2), Seq(-0.4, 0.2, 0.3)))
         checkFrame(dut, stimulus, scene, isMapCamera, from, random)
+    }
+
+  private def model(words: Map[String, Seq[BigInt]], view: ViewCase, rays: Seq[MarchCase]) =
+    Model.attributes(config, words, rays.map(view.words ++ _.words), "march").map(MarchCase.answer.zip(_).toMap)
+
+  it should "report illegal words of the maps that any march comes to" in
+    test(new EnvironmentMarchesHarness(config)).withAnnotations(Simulation.verilator) { dut =>
+      val random   = new Random(4)
+      val stimulus = new MarchStimulus(config, random)
+      val image    = new EnvironmentImage(config, random, illegal = 0.1)
+      val scene    = new EnvironmentScene(config, random)
+      val camera   = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
+      val view     = camera.view.copy(isMapCamera = false)
+      dut.clock.setTimeout(0)
+      EnvironmentImage.load(dut.load, dut.clock, config, image.words)
+      dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
+      dut.start.poke(true)
+      dut.clock.step()
+      dut.start.poke(false)
+
+      // Two rays at a time, one for each march
+      val rounds = for (_ <- 0 until 40) yield {
+        val rays      = new Rays(dut.paths, config, () => stimulus.inRoom(camera), random)
+        var isIllegal = false
+        var cycles    = 0
+        while (rays.begun < 2 || !rays.isIdle) {
+          rays.step(willing = 1, asks = rays.begun < 2)
+          isIllegal ||= dut.events.illegalRecord.peekBoolean()
+          cycles += 1
+          assert(cycles < 10000)
+          dut.clock.step()
+        }
+        (rays.requests.map(_.ray), isIllegal)
+      }
+      val models = model(image.words, view, rounds.flatMap(_._1))
+      for ((both, (_, isIllegal)) <- models.map(_("isIllegal") == 1).grouped(2).zip(rounds))
+        assert(isIllegal == both.contains(true))
+      assert(models.map(_("isIllegal")).distinct.size == 2)
     }
 
   /** @param from the position of a camera that is not the maps', in that one's view space */
@@ -187,8 +230,7 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
     assert(rays.maxInFlight > (if (isMapCamera) 4 else 3), "several contexts are under way at a time")
 
     val answers = rays.answers
-    val words   = answers.map(answer => view.words ++ answer.request.ray.words)
-    val models  = Model.attributes(config, scene.words, words, "march").map(MarchCase.answer.zip(_).toMap)
+    val models  = model(scene.words, view, answers.map(_.request.ray))
     for ((Answer(request, surface, isVisible), expected) <- answers.zip(models)) {
       val isHit =
         if (request.isOcclusionTest) expected("hidesObject") == 1 else expected("kind") != HitKind.miss.litValue

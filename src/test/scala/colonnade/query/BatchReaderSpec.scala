@@ -212,14 +212,14 @@ private class BatchBench(dut: BatchReaderHarness, columns: Int, stall: Int, seed
   }
 
   /** A cycle; returns the run that is taken. */
-  private def cycle(takes: Boolean, fails: Boolean = false): Option[ReadBatch#HandedOut] = {
-    dut.runs.ready.poke(takes)
+  private def cycle(accepts: Boolean, fails: Boolean = false): Option[ReadBatch#HandedOut] = {
+    dut.runs.ready.poke(accepts)
     val ends = if (random.nextInt(4) == 0) random.nextInt(open.min(2 * columns) + 1) else 0
     dut.resolved.poke(ends)
     dut.failed.poke(fails && ends > 0)
     memory.cycle()
     val run   = dut.runs.bits
-    val taken = Option.when(takes && dut.runs.valid.peekBoolean())(
+    val taken = Option.when(accepts && dut.runs.valid.peekBoolean())(
       (
         Some(run.rays.peekInt()),
         run.hits.peekInt(),
@@ -249,7 +249,7 @@ private class BatchBench(dut: BatchReaderHarness, columns: Int, stall: Int, seed
   def begin(batch: ReadBatch, runs: Int): Unit = {
     submit(batch, 0)
     val expected = batch.runs(rays(0), hits(0)).take(runs)
-    for (_ <- 0 until 40 * runs; found <- cycle(takes = expected.hasNext)) check(found, expected.next())
+    for (_ <- 0 until 40 * runs; found <- cycle(accepts = expected.hasNext)) check(found, expected.next())
     expected.hasNext shouldBe false
     errors shouldBe 0
   }
@@ -270,7 +270,7 @@ private class BatchBench(dut: BatchReaderHarness, columns: Int, stall: Int, seed
         expected = batch.runs(rays(index), hits(index))
       }
       val fails = batch.fails && !expected.hasNext
-      cycle(takes = random.nextBoolean(), fails).foreach(check(_, expected.next()))
+      cycle(accepts = random.nextBoolean(), fails).foreach(check(_, expected.next()))
       if (open > 0 || expected.hasNext) memory.written should not contain done(index)
       val head = dut.head.peekInt().toInt
       if (head > index) {
@@ -286,7 +286,7 @@ private class BatchBench(dut: BatchReaderHarness, columns: Int, stall: Int, seed
       }
       cycles += 1
       cycles should be < 60000
-      if (index == last) for (_ <- 0 until 20) cycle(takes = true) shouldBe empty
+      if (index == last) for (_ <- 0 until 20) cycle(accepts = true) shouldBe empty
     }
     errors shouldBe batches.count(batch => !batch.isLegal || batch.fails || batch.isTagLost)
     raysDone shouldBe batches.filter(_.isLegal).map(_.count).sum

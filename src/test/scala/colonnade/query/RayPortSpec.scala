@@ -62,7 +62,7 @@ private class PortMaster(dut: RayPortHarness, memory: AxiMemory, index: Int, ran
   private def word()            = BigInt(8 * bytes, random)
   private val toRead            = bursts(0x100000)
   private val toWrite           = bursts(0x800000)
-  private val awaited           = mutable.Queue.empty[(BigInt, BigInt, Boolean)] // data, response, last
+  private val due               = mutable.Queue.empty[(BigInt, BigInt, Boolean)] // data, response, last
   private val responses         = mutable.Queue.empty[BigInt]                    // to writes
   private val beats             = mutable.Queue.empty[(BigInt, Boolean)]         // to send
   private val contents          = mutable.Map.empty[BigInt, BigInt]
@@ -74,7 +74,7 @@ private class PortMaster(dut: RayPortHarness, memory: AxiMemory, index: Int, ran
     contents(burst.address + bytes * beat) = value
   }
 
-  def isDone: Boolean = toRead.isEmpty && toWrite.isEmpty && awaited.isEmpty && responses.isEmpty && beats.isEmpty
+  def isDone: Boolean = toRead.isEmpty && toWrite.isEmpty && due.isEmpty && responses.isEmpty && beats.isEmpty
 
   def offer(): Unit = {
     asks = toRead.nonEmpty && (asks || random.nextInt(4) == 0)
@@ -99,11 +99,11 @@ private class PortMaster(dut: RayPortHarness, memory: AxiMemory, index: Int, ran
         read.r.bits.data.peekInt(),
         read.r.bits.resp.peekInt(),
         read.r.bits.last.peekBoolean()
-      ) shouldBe awaited.dequeue()
+      ) shouldBe due.dequeue()
     if (asks && read.ar.ready.peekBoolean()) {
       val burst = toRead.dequeue()
       for (beat <- 0 until burst.beats)
-        awaited += ((contents(burst.address + bytes * beat), memory.response(burst.address), beat + 1 == burst.beats))
+        due += ((contents(burst.address + bytes * beat), memory.response(burst.address), beat + 1 == burst.beats))
       asks = false
     }
     if (write.b.valid.peekBoolean() && write.b.ready.peekBoolean())

@@ -92,7 +92,7 @@ class RayQueriesSpec extends AnyFlatSpec with OneSimulation with Matchers {
     // Runs of any length, or two rows of tiles
     case class Traced(at: BigInt, hits: BigInt, dir: Seq[BigInt], rays: Range) {
       def hitsOf(index: Int): BigInt = {
-        val (column, row) = TestSensor.place(index, isTiled)
+        val (column, row) = TestSensor.positionOf(index, isTiled)
         hits + (row * 64 + column) * size
       }
     }
@@ -101,18 +101,18 @@ class RayQueriesSpec extends AnyFlatSpec with OneSimulation with Matchers {
     val sensor = TestSensor.of(batch.rays.take(9))
     val runs   = for (((count, first), run) <- counts.zip(counts.scanLeft(0)(_ + _)).zipWithIndex) yield {
       val (column, row) = if (isTiled) (run % 4 * Run.tileColumns, run / 4 * Run.tileRows) else (0, run)
-      val place         = if (isTiled) (row * 64 + column) * size else 0x1000 * run
+      val offset        = if (isTiled) (row * 64 + column) * size else 0x1000 * run
       val word          = if (response == 2) 8 * random.nextInt(8) else 0
       Traced(
         0x100000 + 0x1000 * run,
-        0x400000 + place + word,
+        0x400000 + offset + word,
         sensor.sum(sensor.corner, column, row),
         first until first + count
       )
     }
     if (form < 2) for (run <- runs) memory.store(run.at, batch.rays.slice(words * run.rays.head, words * run.rays.end))
     val records = for (run <- runs; (ray, index) <- run.rays.zipWithIndex) yield {
-      val (x, y)      = TestSensor.place(index, isTiled)
+      val (x, y)      = TestSensor.positionOf(index, isTiled)
       lazy val stored = batch.rays.slice(words * ray, words * (ray + 1))
       form match {
         case 0 => stored

@@ -76,7 +76,7 @@ class RunReaderSpec extends AnyFlatSpec with OneSimulation with Matchers {
     val expected = for ((run, number) <- runs.zipWithIndex; index <- 0 until run.count) yield {
       val words = Seq.fill(bytes / 4)(BigInt(32, random))
       memory.store(run.address + index * bytes, words)
-      val (column, row) = TestSensor.place(index, run.isTile)
+      val (column, row) = TestSensor.positionOf(index, run.isTile)
       val record        = form match {
         case 0 => words
         case 1 => shared.take(4) ++ words

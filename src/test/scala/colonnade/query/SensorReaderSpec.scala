@@ -31,7 +31,7 @@ class SensorReaderSpec extends AnyFlatSpec with OneSimulation with Matchers {
         )
       }
       val expected = for ((first, count, isTile) <- runs; index <- 0 until count) yield {
-        val (column, row) = TestSensor.place(index, isTile)
+        val (column, row) = TestSensor.positionOf(index, isTile)
         (TestSensor.floats(sensor.sum(first, column, row)), index + 1 == count)
       }
       var (next, taken, cycles) = (0, 0, 0)

@@ -47,7 +47,7 @@ object TestSensor {
     sums.map(sum => BigInt(floatToRawIntBits((sum.toInt * math.pow(2, -RaySensor.fractionBits)).toFloat)) & 0xffffffffL)
 
   /** Column and row of a ray in its run. */
-  def place(index: Int, isTile: Boolean): (Int, Int) =
+  def positionOf(index: Int, isTile: Boolean): (Int, Int) =
     if (isTile) (index % Run.tileColumns, index / Run.tileColumns) else (index, 0)
 }
 
