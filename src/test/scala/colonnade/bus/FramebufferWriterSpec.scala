@@ -209,20 +209,6 @@ class FramebufferWriterSpec extends AnyFlatSpec with OneSimulation {
     }
   }
 
-  it should "flush a column when its last pixel is in its row" in {
-    val shell = ShellConfig(8)
-    test(new GuardedWriter(pair, shell)).withAnnotations(Simulation.verilator) { dut =>
-      val bench = new Bench(dut, pair, shell, new Random(6))
-      bench.settings(0, 64, 0, (0, 4096))
-      for (_ <- 0 until 10) {
-        val (left, right) = bench.shots(16, 8).partition(_.x < 8) // a tile of each column
-        bench.memory.bursts.clear()
-        bench.frame(left.zip(right).flatMap { case (first, second) => Seq(first, second) })
-        assert(bench.memory.bursts == Seq.fill(16)(4))
-      }
-    }
-  }
-
   inOneSimulation(new GuardedWriter(pair, wide))(
     "write nothing outside the window, report it, and forget it with the next frame" -> { dut =>
       val bench = new Bench(dut, pair, wide, new Random(4))
