@@ -182,7 +182,7 @@ class Scene:
     def ranges(self, sensor: Sensor, mode: int = 0, mask: int = 0xFF) -> Floats:
         """The t of the closest hit of a sensor's rays, float64 [height, width], of float32; inf for a miss.
 
-        The device makes the rays. Unlike `closest`, hits are those of the device, not refined, and `mask` has its 8 bits.
+        The device makes the rays. Unlike `closest`, hits are those of the device, not refined; `mask` has 8 bits.
 
         Raises:
             UserError: The sensor is too far away.
@@ -209,7 +209,8 @@ class Scene:
         far: float = np.inf,
     ) -> NDArray[np.uint8]:
         """Hand over a batch as it is: `records` in memory, of `count` rays or a sensor; the bytes of its hits."""
-        start = [float(value) for value in _array("origin", [origin], np.float64, 3)[0].astype(np.float32)]
+        places: Any = [origin]
+        start = [float(value) for value in _array("origin", places, np.float64, 3)[0].astype(np.float32)]
         data = np.ascontiguousarray(records).view(np.uint8).ravel()
         result: NDArray[np.uint8] = self._query(
             "submit", data, _word("count", count), _word("mode", mode), start, near, far
