@@ -141,9 +141,8 @@ public:
             shear[2 * i] = ray.shear[0];
             shear[2 * i + 1] = ray.shear[1];
             std::array<Entered, 4> entered;
-            std::uint64_t tests = 0;
             enters[i] = ray.enters;
-            isHit[i] = ray.enters && BoxTests(ray, numbers_).test(node, ray.tMax, entered, tests) > 0;
+            isHit[i] = ray.enters && BoxTests(ray, numbers_).test(node, tMaxUnits(ray.tMax, numbers_), entered) > 0;
         }
         return result;
     }

@@ -75,10 +75,9 @@ void replyBox(Query& query, const Numbers& n) {
         for (auto* planes : {&node.low, &node.high})
             for (auto& axis : *planes) axis[child] = static_cast<std::uint8_t>(query.number());
     std::array<Entered, 4> entered;
-    std::uint64_t tests = 0;
-    const int count = BoxTests(ray, n).test(node, limit, entered, tests);
+    const int count = BoxTests(ray, n).test(node, tMaxUnits(limit, n), entered);
     Reply reply;
-    reply << static_cast<Wide>(tests) << count;
+    reply << node.children() << count;
     for (int i = 0; i < count; ++i) reply << entered[i].slot << entered[i].tNear;
     reply.print();
 }

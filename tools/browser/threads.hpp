@@ -9,6 +9,7 @@
 #define _LIBCPP_HAS_THREADS 0
 #endif
 #if !_LIBCPP_HAS_THREADS
+#define thread_local // Of the only thread
 namespace std {
 class mutex {
 public:

@@ -43,8 +43,8 @@ inline std::int64_t shiftToFit(Wide x, int bits, UnsignedWide all) {
 /// x / 2^bits rounded to nearest, ties to even; a left shift for negative `bits`.
 template <class Integer> Integer nearestEven(Integer x, int bits) {
     if (bits <= 0) return floorShift(x, bits);
-    const Integer quotient = x >> bits, rest = x - shiftLeft(quotient, bits), half = Integer(1) << (bits - 1);
-    return quotient + ((rest > half || (rest == half && (quotient & 1))) ? 1 : 0);
+    const Integer quotient = x >> bits, rest = x & ((Integer(1) << bits) - 1), half = Integer(1) << (bits - 1);
+    return quotient + (rest + (quotient & 1) > half);
 }
 
 template <class Integer> Integer clamp(Integer x, Integer low, Integer high) { return x < low ? low : x > high ? high : x; }

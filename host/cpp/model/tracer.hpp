@@ -162,11 +162,13 @@ private:
         Node other;
         std::uint64_t nodeVisits = 0;
         StackEntry next{false, static_cast<std::uint32_t>(state.root), 0};
+        std::int64_t limit = tMaxUnits(best.t, numbers_);
         for (bool busy = !record_.errors.watchdog; busy;) {
             busy = false;
             if (next.isLeaf) {
                 testRecord(state, next.address);
                 if (state.isOver()) return;
+                limit = tMaxUnits(best.t, numbers_);
             } else if (const Node* const found = memory_.nodeAt(next.address, other); !found) {
                 record_.errors.illegalRecord = true;
             } else {
@@ -177,14 +179,15 @@ private:
                 }
                 ++record_.counters.nodeReads;
                 const Node& node = *found;
+                prefetchChildren(node);
                 std::array<Entered, nodeChildren> entered;
                 int count = 0;
-                if (node.isLegal) count = boxes.test(node, best.t, entered, record_.counters.boxTests);
+                record_.counters.boxTests += node.isLegal ? static_cast<std::uint64_t>(node.children()) : 0;
+                if (node.isLegal) count = boxes.test(node, limit, entered);
                 else record_.errors.illegalRecord = true;
                 if (record_.log.isOn()) logNode(next.address, node, entered, count);
                 for (int i = count - 1; i > 0; --i) {
                     const StackEntry entry = entryOf(node, entered[i]);
-                    memory_.prefetch(entry.address);
                     if (depth < static_cast<std::size_t>(numbers_.stackDepth)) stack[depth++] = entry;
                     else record_.errors.stackOverflow = true;
                 }
@@ -196,7 +199,7 @@ private:
             }
             while (!busy && depth > 0) {
                 next = stack[--depth];
-                busy = next.tNear <= tMaxUnits(best.t, numbers_);
+                busy = next.tNear <= limit;
             }
         }
     }
@@ -207,6 +210,13 @@ private:
             const bool isHit = std::any_of(entered.begin(), entered.begin() + count, [slot](const Entered& child) { return child.slot == slot; });
             record_.log.addChild(node, slot, entryOf(node, {slot, 0}).address, isHit);
         }
+    }
+
+    /// Fetches what the ray reads next while the node's children are tested.
+    void prefetchChildren(const Node& node) const {
+        const std::size_t step = frame_.leafRecords();
+        for (std::size_t i = 0; i < node.nodes; ++i) memory_.prefetch(node.first + i);
+        for (std::size_t i = 0; i < node.leaves; ++i) memory_.prefetch(node.first + node.nodes + i * step);
     }
 
     StackEntry entryOf(const Node& node, const Entered& child) const {

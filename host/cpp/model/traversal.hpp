@@ -1,6 +1,11 @@
 // BoxUnit and TriangleUnit (docs/numbers.md, sections 3 and 4).
 #pragma once
 #include <cstring>
+#include <limits>
+#include <utility>
+#ifdef __SSE4_1__
+#include <smmintrin.h>
+#endif
 
 #include "ray_setup.hpp"
 
@@ -45,76 +50,78 @@ class BoxTests {
 public:
     BoxTests(const Ray& ray, const Numbers& n)
         : n_(n), maxPlane_((std::int64_t(1) << n.boxBits) - 1), maxBase_((std::int64_t(1) << (n.nodeBits - 1)) - 1), maxNear_((std::int64_t(1) << (n.nearBits - 1)) - 1) {
+        // A plane from the other side has all of its bits changed
         for (int a = 0; a < 3; ++a) {
-            axis_[a] = ray.objectAxis(a);
-            negative_[a] = ray.negative[a];
-            origin_[a] = ray.boxOrigin[a];
+            const int axis = ray.objectAxis(a);
+            const auto flip = ray.negative[a] ? static_cast<std::uint32_t>(maxPlane_) * 0x01010101u : 0u;
+            axes_[a] = {axis, ray.negative[a], ray.boxOrigin[a], ray.negative[a] ? maxPlane_ : 0, flip};
         }
         for (int a = 0; a < 2; ++a) {
-            reciprocal_[a] = ray.reciprocal[a];
-            exponent_[a] = ray.exponent[a];
+            const int drop = n.reciprocalFraction - ray.exponent[a];
+            sides_[a] = {ray.reciprocal[a], ray.negative[a] ? -ray.reciprocal[a] : ray.reciprocal[a], drop, ray.exponent[a] - n.stepFraction};
         }
     }
 
-    /// Tests a node's children; writes the hit ones in order of tNear and returns their number. `tests` counts the tested children.
-    int test(const Node& node, std::int64_t tMax, std::array<Entered, nodeChildren>& entered, std::uint64_t& tests) const {
-        tests += static_cast<std::uint64_t>(node.children());
+    /// Tests a node's children; writes the hit ones in order of tNear and returns their number. `limit`: the tMaxUnits of the ray.
+    int test(const Node& node, std::int64_t limit, std::array<Entered, nodeChildren>& entered) const {
         // The distance along z' at which the ray reaches the node's first z plane, vertex units, and the exponent of the node there
-        const int exponent = node.exponent[axis_[2]];
-        const std::int64_t cornerZ = node.origin[axis_[2]] - origin_[2], z = negative_[2] ? -(cornerZ + (maxPlane_ << exponent)) : cornerZ;
+        const Axis& along = axes_[2];
+        const int exponent = node.exponent[along.axis], toNear = n_.nearFraction - exponent;
+        const std::int64_t cornerZ = node.origin[along.axis] - along.origin + (along.first << exponent), z = along.negative ? -cornerZ : cornerZ;
         // The planes along z', the ray's origin and its tMax, in the children's t
-        const int toNear = n_.nearFraction - exponent;
         const Lanes pad = all(std::int64_t(1) << std::max(0, n_.boxPadLog + toNear));
-        const Planes along = planesOf(node, 2);
-        Lanes tNear = greatest(all(scaled(-z, toNear)), along.first * (1 << n_.nearFraction) - pad);
-        Lanes tFar = least(all(scaled(tMaxUnits(tMax, n_) - z, toNear)), along.last * (1 << n_.nearFraction) + pad);
+        Lanes tNear = greatest(all(scaled(-z, toNear)), first(node, along) * (1 << n_.nearFraction) - pad);
+        Lanes tFar = least(all(scaled(limit - z, toNear)), last(node, along) * (1 << n_.nearFraction) + pad);
         for (int a = 0; a < 2; ++a) {
-            const Side side(*this, a, node.origin[axis_[a]] - origin_[a], node.exponent[axis_[a]], z, exponent);
-            const Planes planes = planesOf(node, a);
-            const Lanes step = all(side.step);
-            tNear = greatest(tNear, scaled(all(side.near) + planes.first * step, side.scale));
-            tFar = least(tFar, scaled(all(side.far) + planes.last * (step + 1), side.scale));
+            const Axis& axis = axes_[a];
+            const Side& side = sides_[a];
+            const int axisExponent = node.exponent[axis.axis], finest = axisExponent + side.finest;
+            // At least `finest`, so no shift is negative, and those to the children's t are short
+            const int lowest = std::max(finest, exponent - n_.stepReach);
+            // A floored and, plus 1, a raised plane's step; the first planes' near and far t; the left shift of a sum of these to the children's t
+            const std::int64_t step = side.reciprocal >> std::min(63, n_.reciprocalFraction - n_.stepFraction + lowest - finest);
+            const std::int64_t exact = (node.origin[axis.axis] - axis.origin) * side.signedReciprocal - (z << side.drop);
+            const std::int64_t base = clamp(exact >> std::min(63, lowest + side.drop), -maxBase_ - 1, maxBase_);
+            const std::int64_t sidePad = (((step + 1) << n_.boxPadLog) >> axisExponent) + 1;
+            const int scale = lowest + toNear;
+            const std::int64_t roundUp = (std::int64_t(1) << std::max(0, -scale)) - 1;
+            const std::int64_t near = base - sidePad - axis.first * (step + 1), far = base + sidePad + 1 + roundUp - axis.first * step;
+            const Lanes steps = all(step);
+            tNear = greatest(tNear, scaled(all(near) + first(node, axis) * steps, scale));
+            tFar = least(tFar, scaled(all(far) + last(node, axis) * (steps + 1), scale));
         }
-        const Lanes misses = tNear > tFar;
-        int count = 0;
-        for (int slot = 0; slot < node.children(); ++slot) {
-            if (misses[slot]) continue;
-            const std::int64_t t = tNear[slot];
-            int position = count++;
-            for (; position > 0 && entered[position - 1].tNear > t; --position) entered[position] = entered[position - 1];
-            entered[position] = {slot, t};
-        }
+        // Sorted by (tNear, slot) in a network of four, the missed ones last
+        const Lanes slots{0, 1, 2, 3};
+        const Lanes isHit = (tNear <= tFar) & (slots < all(node.children()));
+        const Lanes keys = isHit ? tNear * nodeChildren + slots : all(std::numeric_limits<std::int32_t>::max());
+        const int count = -(isHit[0] + isHit[1] + isHit[2] + isHit[3]);
+        std::int32_t sorted[nodeChildren] = {keys[0], keys[1], keys[2], keys[3]};
+        const auto order = [&sorted](int one, int other) {
+            const std::int32_t low = std::min(sorted[one], sorted[other]);
+            sorted[other] = std::max(sorted[one], sorted[other]);
+            sorted[one] = low;
+        };
+        order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
         // A child's t in vertex units, rounded down
-        for (int i = 0; i < count; ++i) entered[i].tNear = std::max<std::int64_t>(0, z + floorShift(entered[i].tNear, toNear));
+        for (int i = 0; i < count; ++i)
+            entered[i] = {sorted[i] & (nodeChildren - 1), std::max<std::int64_t>(0, z + floorShift(std::int64_t{sorted[i] >> 2}, toNear))};
         return count;
     }
 
 private:
-    /// The first and the last plane of each child that the ray crosses along an axis, from the node's first one.
-    struct Planes {
-        Lanes first, last;
+    /// An axis x', y' or z' of the ray: the object's axis, the ray's origin and the node's first plane there, and what turns planes round.
+    struct Axis {
+        int axis;
+        bool negative;
+        std::int64_t origin, first;
+        std::uint32_t flip;
     };
 
-    /// What the children of a node share along axis x' or y': a floored and, plus 1, a raised plane's step, the first planes' near and far t,
-    /// and the left shift of a sum of these to the children's t.
+    /// Axis x' or y': the reciprocal, with its sign, the right shift of its products to vertex units, and the exponent of the finest steps in a node
+    /// of exponent 0.
     struct Side {
-        std::int64_t step, near, far;
-        int scale;
-
-        Side(const BoxTests& of, int a, std::int64_t corner, int axisExponent, std::int64_t z, int exponent) {
-            const Numbers& n = of.n_;
-            const int drop = n.reciprocalFraction - of.exponent_[a], finest = axisExponent + of.exponent_[a] - n.stepFraction;
-            // Not below 0 and at least `finest`, so no shift is negative, and those to the children's t are short
-            const int lowest = std::max(finest, exponent - n.stepReach);
-            step = of.reciprocal_[a] >> std::min(63, n.reciprocalFraction - n.stepFraction + lowest - finest);
-            const std::int64_t product = corner * of.reciprocal_[a], exact = (of.negative_[a] ? -product : product) - (z << drop);
-            const std::int64_t base = clamp(exact >> std::min(63, lowest + drop), -of.maxBase_ - 1, of.maxBase_);
-            const std::int64_t pad = (((step + 1) << n.boxPadLog) >> axisExponent) + 1;
-            scale = lowest - (exponent - n.nearFraction);
-            const std::int64_t roundUp = (std::int64_t(1) << std::max(0, -scale)) - 1;
-            near = base - pad - (of.negative_[a] ? of.maxPlane_ * (step + 1) : 0);
-            far = base + pad + 1 + roundUp - (of.negative_[a] ? of.maxPlane_ * step : 0);
-        }
+        std::int64_t reciprocal, signedReciprocal;
+        int drop, finest;
     };
 
     static Lanes least(Lanes one, Lanes other) { return one < other ? one : other; }
@@ -124,29 +131,29 @@ private:
         return Lanes{each, each, each, each};
     }
 
-    static Lanes lanesOf(std::uint32_t bytes) {
+    static Lanes lanesOf(const std::array<std::uint8_t, nodeChildren>& planes, std::uint32_t flip) {
+        std::uint32_t bytes;
+        std::memcpy(&bytes, planes.data(), sizeof bytes);
+        bytes ^= flip;
+#ifdef __SSE4_1__
+        return reinterpret_cast<Lanes>(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(static_cast<int>(bytes))));
+#else
         using Bytes = std::uint8_t __attribute__((vector_size(nodeChildren)));
         Bytes each;
         std::memcpy(&each, &bytes, sizeof each);
         return __builtin_convertvector(each, Lanes);
+#endif
     }
 
-    Planes planesOf(const Node& node, int a) const {
-        std::uint32_t low, high;
-        std::memcpy(&low, node.low[axis_[a]].data(), sizeof low);
-        std::memcpy(&high, node.high[axis_[a]].data(), sizeof high);
-        if (!negative_[a]) return {lanesOf(low), lanesOf(high)};
-        // Counted from the other side: all bits of a plane change
-        const std::uint32_t flip = static_cast<std::uint32_t>(maxPlane_) * 0x01010101u;
-        return {lanesOf(high ^ flip), lanesOf(low ^ flip)};
-    }
+    /// The first and the last plane of each child that the ray crosses along an axis, from the node's first one.
+    static Lanes first(const Node& node, const Axis& along) { return lanesOf((along.negative ? node.high : node.low)[along.axis], along.flip); }
+    static Lanes last(const Node& node, const Axis& along) { return lanesOf((along.negative ? node.low : node.high)[along.axis], along.flip); }
 
     /// t · 2^scale, rounded down and saturated to `nearBits` bits.
     std::int64_t scaled(std::int64_t t, int scale) const {
         if (scale <= 0) return clamp(t >> std::min(-scale, 63), -maxNear_ - 1, maxNear_);
         // All but 0 saturate by `nearBits` places
-        const int shift = std::min(scale, n_.nearBits);
-        return clamp(clamp(t, -maxNear_ - 1, maxNear_) * (std::int64_t(1) << shift), -maxNear_ - 1, maxNear_);
+        return clamp(clamp(t, -maxNear_ - 1, maxNear_) * (std::int64_t(1) << std::min(scale, n_.nearBits)), -maxNear_ - 1, maxNear_);
     }
 
     Lanes scaled(Lanes t, int scale) const {
@@ -158,11 +165,8 @@ private:
 
     const Numbers& n_;
     std::int64_t maxPlane_, maxBase_, maxNear_;
-    std::array<int, 3> axis_;
-    std::array<bool, 3> negative_;
-    std::array<std::int64_t, 3> origin_;
-    std::array<std::int64_t, 2> reciprocal_;
-    std::array<int, 2> exponent_;
+    std::array<Axis, 3> axes_;
+    std::array<Side, 2> sides_;
 };
 
 /// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which begins as `Hit::none`.

@@ -19,23 +19,25 @@ struct PlaneHit {
 class Faces {
 public:
     Faces() = default;
-    Faces(std::vector<mesh::Vector> vertices, std::vector<mesh::Face> faces) : vertices_(std::move(vertices)), faces_(std::move(faces)) {}
+    Faces(std::vector<mesh::Vector> vertices, std::vector<mesh::Face> faces) : vertices_(std::move(vertices)), faces_(std::move(faces)) {
+        corners_.reserve(faces_.size());
+        for (const mesh::Face& face : faces_) corners_.push_back({vertices_[face[0]], vertices_[face[1]], vertices_[face[2]]});
+    }
 
     const std::vector<mesh::Vector>& vertices() const { return vertices_; }
     const std::vector<mesh::Face>& faces() const { return faces_; }
 
     bool hasArea(std::size_t index) const {
-        const mesh::Face& face = faces_[index];
-        const mesh::Vector& corner = vertices_[face[0]];
-        const mesh::Vector area = mesh::cross(mesh::difference(vertices_[face[1]], corner), mesh::difference(vertices_[face[2]], corner));
+        const std::array<mesh::Vector, 3>& corners = corners_[index];
+        const mesh::Vector area = mesh::cross(mesh::difference(corners[1], corners[0]), mesh::difference(corners[2], corners[0]));
         return area[0] != 0 || area[1] != 0 || area[2] != 0;
     }
 
     /// Nothing for a ray along the face's plane, or one whose numbers overflow.
     std::optional<PlaneHit> hit(std::size_t index, const double* origin, const double* direction) const {
-        const mesh::Face& face = faces_[index];
-        const mesh::Vector &corner = vertices_[face[0]], d{direction[0], direction[1], direction[2]};
-        const mesh::Vector e1 = mesh::difference(vertices_[face[1]], corner), e2 = mesh::difference(vertices_[face[2]], corner);
+        const std::array<mesh::Vector, 3>& corners = corners_[index];
+        const mesh::Vector &corner = corners[0], d{direction[0], direction[1], direction[2]};
+        const mesh::Vector e1 = mesh::difference(corners[1], corner), e2 = mesh::difference(corners[2], corner);
         const mesh::Vector s = mesh::difference({origin[0], origin[1], origin[2]}, corner), p = mesh::cross(d, e2), q = mesh::cross(s, e1);
         const double determinant = dot(e1, p);
         if (determinant == 0 || !std::isfinite(determinant)) return std::nullopt;
@@ -87,6 +89,7 @@ private:
 
     std::vector<mesh::Vector> vertices_;
     std::vector<mesh::Face> faces_;
+    std::vector<std::array<mesh::Vector, 3>> corners_; ///< of the faces, together for the sake of the cache
     std::unique_ptr<Neighbours> neighbours_ = std::make_unique<Neighbours>();
 };
 

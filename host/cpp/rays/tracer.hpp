@@ -18,7 +18,7 @@ class Sums {
 public:
     void add(std::uint64_t rays, std::uint64_t refused, const Counters& c) {
         static std::atomic<unsigned> threads{0};
-        thread_local const unsigned thread = threads++;
+        static thread_local const unsigned thread = threads++;
         Part& part = parts_[thread % parts_.size()];
         const std::uint64_t values[] = {rays, refused, c.raysInBox, c.nodeReads, c.boxTests, c.triangleTests};
         for (std::size_t i = 0; i < part.sums.size(); ++i)
@@ -78,7 +78,11 @@ public:
 
     /// The answer to a ray of the mode HITS or OCCLUDED; in the latter any triangle on the way.
     Answer answer(const colonnade_rays_record& ray, std::uint32_t mode, RayRecord& record) const {
-        Answer answer{COLONNADE_RAYS_MISS, ray.tfar, converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0), {}, Hit::none(0)};
+        Answer answer;
+        answer.id = COLONNADE_RAYS_MISS;
+        answer.tfar = ray.tfar;
+        answer.hit.found = false;
+        answer.converted = converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0);
         const ConvertedRay& converted = answer.converted;
         if (converted.kind == ConvertedRay::Kind::outOfRange) answer.id = COLONNADE_RAYS_OUT_OF_RANGE;
         record.refused += converted.kind == ConvertedRay::Kind::refused;
