@@ -109,10 +109,11 @@ inline bool isNarrow(const RayRequest& request, const Numbers& n) {
                      n.gridFraction + n.entryBits, n.gridBits}) < 60;
 }
 
-inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Numbers& n) {
-    Ray ray{};
+/// Writes the fields of a ray that the request sets; one that does not enter has others as they were.
+inline void prepareRay(const RayRequest& request, const Bounds& bounds, const Numbers& n, Ray& ray) {
     ray.axis = dominantAxis(request.direction);
-    if (request.direction[ray.axis] == 0) return ray;
+    ray.enters = false;
+    if (request.direction[ray.axis] == 0) return;
 
     // Shear factors and reciprocals
     const Normalised dominant = normalise(magnitude(request.direction[ray.axis]), n.mantissaBits);
@@ -121,6 +122,7 @@ inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Num
         const Wide component = request.direction[ray.objectAxis(a)];
         const Normalised minor = normalise(magnitude(component), n.mantissaBits);
         const int exponent = dominant.exponent - minor.exponent;
+        ray.shear[a] = 0;
         if (component != 0) {
             const std::uint64_t quotient = divide(minor.mantissa, dominant.mantissa, n.shearDigits);
             const auto shear = static_cast<std::int64_t>(floorShift<Wide>(Wide(quotient) << (n.shearFraction - n.shearDigits), exponent));
@@ -136,6 +138,11 @@ inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Num
     }
     if (isNarrow(request, n)) enterBox<std::int64_t>(ray, request, bounds, n);
     else enterBox<Wide>(ray, request, bounds, n);
+}
+
+inline Ray prepareRay(const RayRequest& request, const Bounds& bounds, const Numbers& n) {
+    Ray ray{};
+    prepareRay(request, bounds, n, ray);
     return ray;
 }
 

@@ -212,7 +212,10 @@ private:
         }
         local.step = square > 0 ? scene_.unit() / std::sqrt(square) : 0;
         const double tnear = ray.tnear / local.scale - slack * local.step, tfar = ray.tfar / local.scale + slack * local.step;
-        const bool isMoved = tnear < 0 || std::max({std::abs(at[0]), std::abs(at[1]), std::abs(at[2])}) > farEdges * scene_.edge();
+        // Far behind its origin a ray that begins outside of the box has no hit
+        const double most = std::max({std::abs(at[0]), std::abs(at[1]), std::abs(at[2])}), margin = 2 * slack * scene_.unit();
+        const bool isAtBox = std::min({at[0], at[1], at[2]}) > -margin && std::max({at[0], at[1], at[2]}) < scene_.edge() + margin;
+        const bool isMoved = most > farEdges * scene_.edge() || (tnear < 0 && (isAtBox || ray.tnear < 0));
         double enters = std::min(0.0, tnear), leaves = std::numeric_limits<double>::infinity();
         for (int a = 0; a < 3 && isMoved; ++a) {
             const double low = -scene_.edge(), high = 2 * scene_.edge();

@@ -76,19 +76,26 @@ public:
 
     /// `isLocal`: the origin is relative to the position (0, 0, 0) of the device.
     ConvertedRay convert(const colonnade_rays_record& ray, bool isLocal) const {
-        ConvertedRay result{ConvertedRay::Kind::refused, {}, 0, 0};
+        ConvertedRay result{};
+        convert(ray, isLocal, result);
+        return result;
+    }
+
+    /// Writes all of a legal ray, and the kind of others.
+    void convert(const colonnade_rays_record& ray, bool isLocal, ConvertedRay& result) const {
+        result.kind = ConvertedRay::Kind::refused;
         const Float near(ray.tnear), far(ray.tfar);
-        if (near.isNan || far.isNan || !(ray.tnear <= ray.tfar) || far.mantissa < 0) return result;
+        if (near.isNan || far.isNan || !(ray.tnear <= ray.tfar) || far.mantissa < 0) return;
         std::array<int, 3> exponents;
         int largest = std::numeric_limits<int>::min(), dominant = 0;
         for (int a = 0; a < 3; ++a) {
             const Float direction(ray.direction[a]);
-            if (!direction.isFinite || !Float(ray.origin[a]).isFinite) return result;
+            if (!direction.isFinite || !Float(ray.origin[a]).isFinite) return;
             result.request.direction[a] = direction.mantissa;
             exponents[a] = direction.exponent;
             if (direction.mantissa != 0) largest = std::max(largest, direction.exponent);
         }
-        if (largest == std::numeric_limits<int>::min()) return result;
+        if (largest == std::numeric_limits<int>::min()) return;
         for (int a = 0; a < 3; ++a) {
             // At most directionBits, 64
             const auto mantissa = static_cast<std::int64_t>(result.request.direction[a]);
@@ -101,7 +108,6 @@ public:
         result.kind = ConvertedRay::Kind::legal;
         for (int a = 0; a < 3; ++a)
             if (!toGrid(ray.origin[a], isLocal ? 0 : placement_.base[a], result.request.origin[a])) result.kind = ConvertedRay::Kind::outOfRange;
-        return result;
     }
 
     /// Sets a step of t, from the direction's largest component.

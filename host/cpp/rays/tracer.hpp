@@ -1,8 +1,11 @@
 // Rays through the bit-exact model of a scene.
 #pragma once
 #include <atomic>
+#include <map>
+#include <mutex>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "batch_bytes.hpp"
 #include "conversion.hpp"
@@ -13,24 +16,23 @@ namespace colonnade::rays {
 static_assert(sizeof(colonnade_rays_batch) == 64 && sizeof(colonnade_rays_record) == 32 && sizeof(colonnade_rays_sensor) == 64 && sizeof(colonnade_rays_response) == 16,
               "formats in memory");
 
-/// Sums of what rays did, which threads add to.
+/// Sums of what rays did. A thread adds to its own ones, so that it needs no lock and shares no line of a cache.
 class Sums {
 public:
     void add(std::uint64_t rays, std::uint64_t refused, const Counters& c) {
-        static std::atomic<unsigned> threads{0};
-        static thread_local const unsigned thread = threads++;
-        Part& part = parts_[thread % parts_.size()];
+        static thread_local std::pair<std::uint64_t, Part*> last{};
+        if (last.first != number_) last = {number_, &partOfThread()};
         const std::uint64_t values[] = {rays, refused, c.raysInBox, c.nodeReads, c.boxTests, c.triangleTests};
-        for (std::size_t i = 0; i < part.sums.size(); ++i)
-            if (values[i] != 0) part.sums[i].fetch_add(values[i], std::memory_order_relaxed);
-        std::uint64_t deepest = part.deepest.load(std::memory_order_relaxed);
-        while (deepest < c.deepestStack && !part.deepest.compare_exchange_weak(deepest, c.deepestStack, std::memory_order_relaxed)) {}
+        Part& part = *last.second;
+        for (std::size_t i = 0; i < part.sums.size(); ++i) part.sums[i].store(part.sums[i].load(std::memory_order_relaxed) + values[i], std::memory_order_relaxed);
+        if (c.deepestStack > part.deepest.load(std::memory_order_relaxed)) part.deepest.store(c.deepestStack, std::memory_order_relaxed);
     }
 
     colonnade_rays_sums total() const {
         std::array<std::uint64_t, 6> sums{};
         std::uint64_t deepest = 0;
-        for (const Part& part : parts_) {
+        const std::lock_guard<std::mutex> lock(adding_);
+        for (const auto& [thread, part] : parts_) {
             for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += part.sums[i];
             deepest = std::max<std::uint64_t>(deepest, part.deepest);
         }
@@ -38,12 +40,25 @@ public:
     }
 
 private:
-    /// Threads that count at the same time should not share a line of a cache.
     struct alignas(64) Part {
         std::array<std::atomic<std::uint64_t>, 6> sums{};
         std::atomic<std::uint64_t> deepest{0};
     };
-    std::array<Part, 16> parts_;
+
+    /// Unlike an address, not that of sums before.
+    static std::uint64_t newNumber() {
+        static std::atomic<std::uint64_t> numbers{0};
+        return ++numbers;
+    }
+
+    Part& partOfThread() {
+        const std::lock_guard<std::mutex> lock(adding_);
+        return parts_[std::this_thread::get_id()];
+    }
+
+    const std::uint64_t number_ = newNumber();
+    mutable std::mutex adding_;
+    std::map<decltype(std::this_thread::get_id()), Part> parts_; ///< a thread that has ended leaves its own to one of the same id
 };
 
 /// What the rays of a thread do until their sums are added.
@@ -82,14 +97,14 @@ public:
         answer.id = COLONNADE_RAYS_MISS;
         answer.tfar = ray.tfar;
         answer.hit.found = false;
-        answer.converted = converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0);
+        converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0, answer.converted);
         const ConvertedRay& converted = answer.converted;
         if (converted.kind == ConvertedRay::Kind::outOfRange) answer.id = COLONNADE_RAYS_OUT_OF_RANGE;
         record.refused += converted.kind == ConvertedRay::Kind::refused;
         if (converted.kind != ConvertedRay::Kind::legal) return answer;
         const RayFilter filter{(mode & COLONNADE_RAYS_CULL_FRONT) != 0, (mode & COLONNADE_RAYS_CULL_BACK) != 0, (mode & COLONNADE_RAYS_OPAQUE_ONLY) != 0,
                                static_cast<int>(mode >> COLONNADE_RAYS_MASK_SHIFT)};
-        answer.prepared = prepareRay(converted.request, frame_.bounds, numbers_);
+        prepareRay(converted.request, frame_.bounds, numbers_, answer.prepared);
         const SceneSearch search(numbers_, memory_, frame_, record);
         const bool isOcclusion = (mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_OCCLUDED;
         answer.hit = isOcclusion ? search.anyHit(answer.prepared, filter) : search.trace(answer.prepared, &filter);

@@ -15,12 +15,11 @@ from rays_library import compiled_library
 from colonnade.design.generator import manifest_for
 from colonnade.rays import Scene
 from colonnade.rays.device import device_text, registers_text
-from colonnade.rays.scene import ALL_DEVICE_MASKS, design_text
+from colonnade.rays.scene import ALL_MASKS, design_text
 
 pytestmark = pytest.mark.matrix
 DESIGN = "tiny", ("frame.rays=true", "units.rayInterval=1", "units.pathContexts=256")
 HIT = np.dtype([("t", "f8"), ("uv", "f8", 2), ("mesh", "u4"), ("face", "u4"), ("flags", "u4"), ("ray", "u4")])
-ALL = ALL_DEVICE_MASKS
 
 #: Two commits of a triangle, in a process that SIGPIPE would end; prints the statuses of its calls.
 _COMMITS = """
@@ -57,7 +56,8 @@ def test_hits_and_counters_of_the_device_are_those_of_the_model(
     vertices, faces = mesh_of("torus")
     rays = outside_rays(vertices, 300, seed=6)
     model = Scene(vertices, faces, *DESIGN)
-    wanted, is_occluded = model.closest(rays), model.occluded(rays)
+    wanted = model.closest(rays)
+    counted, is_occluded = model.counters(), model.occluded(rays)
     for name, value in environment(tmp_path, device_text(*DESIGN, ("--dram", "7", "--random", "20"))).items():
         monkeypatch.setenv(name, value)
     calls, device, scene, mesh = ctypes.CDLL(str(library)), ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_uint32()
@@ -76,14 +76,13 @@ def test_hits_and_counters_of_the_device_are_those_of_the_model(
     call("mesh_add", scene, of(corners), len(corners), of(triangles), len(triangles), ctypes.byref(mesh))
     for _ in range(2):
         call("commit", scene)
-        call("closest", scene, of(rays), len(rays), ALL, of(hits))
-        call("occluded", scene, of(rays), len(rays), ALL, of(found))
+        call("closest", scene, of(rays), len(rays), 0, ALL_MASKS, of(hits))
         assert (hits["t"] == wanted.t).all() and (hits["face"].astype(np.int32) == wanted.face).all()
-        assert (found == is_occluded).all() and 0 < found.sum() < len(found)
     calls.colonnade_rays_counters(device, of(sums))
+    call("occluded", scene, of(rays), len(rays), 0, ALL_MASKS, of(found))
+    assert (found == is_occluded).all() and 0 < found.sum() < len(found)
     calls.colonnade_rays_scene_free(scene)
     calls.colonnade_rays_close(device)
-    counted = model.counters()
     assert sums[:2].tolist() == [2 * counted["rays"], 2 * counted["raysRefused"]]
 
 
