@@ -18,8 +18,8 @@ extern "C" {
 
 enum colonnade_rays_status {
     COLONNADE_RAYS_OK,
-    COLONNADE_RAYS_BAD_DESIGN,    /* the design has a line that is none, or lacks one */
-    COLONNADE_RAYS_BAD_MESH,      /* a vertex is not finite, an index has no vertex, a wrong count, no face has an area, too many vanish */
+    COLONNADE_RAYS_BAD_DESIGN, /* the design has a line that is none, or lacks one */
+    COLONNADE_RAYS_BAD_MESH, /* a vertex is not finite, an index has no vertex, a wrong count, no face has an area, too many vanish */
     COLONNADE_RAYS_NO_MESH,       /* the scene has no mesh of this number */
     COLONNADE_RAYS_DOES_NOT_FIT,  /* more records, triangles or stack entries than the design has */
     COLONNADE_RAYS_NOT_COMMITTED, /* a scene changed after its last commit */
@@ -143,8 +143,7 @@ void colonnade_rays_scene_free(struct colonnade_rays_scene *scene);
 int colonnade_rays_mesh_add(struct colonnade_rays_scene *scene, const double *vertices, size_t vertex_count,
                             const uint32_t *faces, size_t face_count, uint32_t *mesh);
 /* Moves the vertices of a mesh: `vertex_count` is what it has. */
-int colonnade_rays_mesh_update(struct colonnade_rays_scene *scene, uint32_t mesh, const double *vertices,
-                               size_t vertex_count);
+int colonnade_rays_mesh_update(struct colonnade_rays_scene *scene, uint32_t mesh, const double *vertices, size_t vertex_count);
 /* Removes a mesh; its number is not used again. */
 int colonnade_rays_mesh_remove(struct colonnade_rays_scene *scene, uint32_t mesh);
 /* Leaves a mesh out of the scene, or takes it in. */
@@ -152,8 +151,7 @@ int colonnade_rays_mesh_enable(struct colonnade_rays_scene *scene, uint32_t mesh
 /* Rays with a bit in common with the mask, at first all ones, may hit the mesh. */
 int colonnade_rays_mesh_mask(struct colonnade_rays_scene *scene, uint32_t mesh, uint32_t mask);
 /* `is_opaque` [face_count], which is what the mesh has; NULL, 0: all are. */
-int colonnade_rays_mesh_opacity(struct colonnade_rays_scene *scene, uint32_t mesh, const uint8_t *is_opaque,
-                                size_t face_count);
+int colonnade_rays_mesh_opacity(struct colonnade_rays_scene *scene, uint32_t mesh, const uint8_t *is_opaque, size_t face_count);
 /* Packs the scene and loads it. A scene without faces has no hits. One in which more than one face in a hundred vanishes
  * on the device's grid is refused. */
 int colonnade_rays_commit(struct colonnade_rays_scene *scene);

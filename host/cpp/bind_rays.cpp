@@ -66,7 +66,8 @@ private:
         const nb::tuple found =
             nb::cast<nb::tuple>(device_.attr("submit")(nb::bytes(&batch, sizeof batch), nb::bytes(rays, rays::rayBytes(batch)), rays::responseBytes(batch)));
         const auto hits = nb::cast<nb::bytes>(found[1]);
-        if (hits.size() != rays::responseBytes(batch)) throw std::invalid_argument("the device answers " + std::to_string(hits.size()) + " bytes in place of " + std::to_string(rays::responseBytes(batch)));
+        if (hits.size() != rays::responseBytes(batch))
+            throw std::invalid_argument("the device answers " + std::to_string(hits.size()) + " bytes in place of " + std::to_string(rays::responseBytes(batch)));
         std::memcpy(reinterpret_cast<void*>(batch.hits), hits.data(), hits.size());
         const auto tag = nb::cast<std::uint32_t>(found[0]);
         if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = tag;
@@ -164,7 +165,8 @@ public:
         bool* isOccluded;
         auto result = makeArray<bool>({rays.shape(0)}, isOccluded);
         inParts(rays.shape(0), [&](std::size_t first, std::size_t count) {
-            check(released([&] { return colonnade_rays_occluded(scene_, raysOf(rays) + first, count, mode, mask, reinterpret_cast<std::uint8_t*>(isOccluded) + first); }));
+            check(
+                released([&] { return colonnade_rays_occluded(scene_, raysOf(rays) + first, count, mode, mask, reinterpret_cast<std::uint8_t*>(isOccluded) + first); }));
         });
         return result;
     }

@@ -103,8 +103,7 @@ public:
         };
         order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
         // A child's t in vertex units, rounded down
-        for (int i = 0; i < count; ++i)
-            entered[i] = {sorted[i] & (nodeChildren - 1), std::max<std::int64_t>(0, z + floorShift(std::int64_t{sorted[i] >> 2}, toNear))};
+        for (int i = 0; i < count; ++i) entered[i] = {sorted[i] & (nodeChildren - 1), std::max<std::int64_t>(0, z + floorShift(std::int64_t{sorted[i] >> 2}, toNear))};
         return count;
     }
 

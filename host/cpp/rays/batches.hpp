@@ -95,7 +95,8 @@ public:
         record.log.writeTo(&steps);
         for (std::size_t i = 0; i < count; ++i) {
             steps.clear();
-            scene_.model()->answer(localOf(rays[i], isRefined_ ? slack : 0).ray, deviceMode(mode, mask, isOcclusion ? COLONNADE_RAYS_OCCLUDED : COLONNADE_RAYS_HITS), record);
+            scene_.model()->trace(localOf(rays[i], isRefined_ ? slack : 0).ray, deviceMode(mode, mask, isOcclusion ? COLONNADE_RAYS_OCCLUDED : COLONNADE_RAYS_HITS),
+                                  record);
             for (const RayStep& step : steps)
                 if (step.kind == RayStep::Kind::node || step.kind == RayStep::Kind::record) reads[i].push_back(static_cast<std::uint32_t>(step.value));
         }
@@ -158,8 +159,7 @@ private:
                     if (walk.found.size() >= most) return;
                     // The next float at least: there the device has come no further than the face, or a quarter unit is less than a digit
                     float& near = walk.left.ray.tnear;
-                    near = std::max(std::nextafter(near, std::numeric_limits<float>::infinity()),
-                                    static_cast<float>(std::max(near, response.t) + walk.left.step / 4));
+                    near = std::max(std::nextafter(near, std::numeric_limits<float>::infinity()), static_cast<float>(std::max(near, response.t) + walk.left.step / 4));
                     next.push_back(live[k]);
                 });
             live = std::move(next);
@@ -272,15 +272,14 @@ private:
         RayRecord record;
         for (std::size_t i = 0; i < count; ++i) {
             const Local& local = localAt(i);
-            const RayModel::Answer answer = scene_.model()->answer(local.ray, bits, record);
-            take(i, local, answer.id, [&] { return scene_.model()->response(answer); });
+            const RayModel::Result result = scene_.model()->trace(local.ray, bits, record);
+            take(i, local, result.id, [&] { return scene_.model()->response(result); });
         }
         sums_.add(count, record.refused, record.counters);
         if (record.errors.stackOverflow || record.errors.illegalRecord) check(COLONNADE_RAYS_DEVICE);
     }
 
-    template <class LocalAt, class Take>
-    void queryDevice(std::size_t count, std::uint32_t bits, std::uint32_t form, const LocalAt& localAt, const Take& take) const {
+    template <class LocalAt, class Take> void queryDevice(std::size_t count, std::uint32_t bits, std::uint32_t form, const LocalAt& localAt, const Take& take) const {
         const std::size_t most = std::min(count, batchRays);
         std::vector<Line> records(most / 2 + 1), responses(most / 4 + 1);
         std::vector<Local> locals;

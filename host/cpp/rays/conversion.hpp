@@ -125,8 +125,8 @@ public:
     colonnade_rays_response hitOf(const ConvertedRay& converted, const Ray& ray, const Hit& hit) const {
         const auto steps = static_cast<std::uint64_t>(floorShift<Wide>(ray.tEntry, -n_.gridFraction) + hit.t);
         const auto sum = static_cast<std::uint64_t>(hit.weights[0] + hit.weights[1] + hit.weights[2]);
-        return {nearestFloat(steps, converted.product, converted.exponent), idOf(hit),
-                nearestFloat(static_cast<std::uint64_t>(hit.weights[1]), sum, 0), nearestFloat(static_cast<std::uint64_t>(hit.weights[2]), sum, 0)};
+        return {nearestFloat(steps, converted.product, converted.exponent), idOf(hit), nearestFloat(static_cast<std::uint64_t>(hit.weights[1]), sum, 0),
+                nearestFloat(static_cast<std::uint64_t>(hit.weights[2]), sum, 0)};
     }
 
 private:

@@ -22,7 +22,7 @@ struct Design {
             } else if (kind == "layout") {
                 Field field{};
                 lines >> record >> name >> field.offset >> field.width >> field.isSigned;
-                if (lines && (field.offset < 0 || field.offset > mostBits || field.width < 0 || field.width > mostBits))
+                if (lines && (field.offset < 0 || field.offset > maxBits || field.width < 0 || field.width > maxBits))
                     throw std::invalid_argument("the design's field " + record + " " + name + " is none");
                 format.layouts[record][name] = field;
             } else throw std::invalid_argument("the design has a line of the unknown kind '" + kind + "'");
@@ -30,7 +30,7 @@ struct Design {
         }
         for (const char* each : records)
             if (!format.layouts.count(each)) throw std::invalid_argument("the design has no layout of '" + std::string(each) + "'");
-        format.recordBits = ranged("recordBits", 64, mostBits);
+        format.recordBits = ranged("recordBits", 64, maxBits);
         format.vertexBits = ranged("vertexBits", 10, 24);
         format.boxBits = ranged("boxBits", 4, 7);
         format.stackDepth = ranged("stackDepth", 4, 256);
@@ -39,7 +39,7 @@ struct Design {
         ranged("directionBits", 26, 64);
         ranged("depth", 1, 1 << 22);
         for (const auto& [name, value] : numbers)
-            if (value < -mostBits || value > 1 << 22) throw std::invalid_argument("the design's " + name + " is " + std::to_string(value) + ", which no device has");
+            if (value < -maxBits || value > 1 << 22) throw std::invalid_argument("the design's " + name + " is " + std::to_string(value) + ", which no device has");
         for (const auto& [name, layout] : format.layouts)
             for (const auto& [field, at] : layout)
                 if (isOfRecords(name) && (at.width > 64 || at.offset + at.width > format.recordBits))
@@ -50,7 +50,7 @@ struct Design {
 
 private:
     /// Of records, and of other layouts of a manifest.
-    static constexpr int mostBits = 4096;
+    static constexpr int maxBits = 4096;
     static constexpr const char* records[] = {"node", "nearPair", "triangle", "flatPair", "farPair"};
 
     static bool isOfRecords(const std::string& name) { return std::find(std::begin(records), std::end(records), name) != std::end(records); }

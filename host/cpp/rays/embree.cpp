@@ -63,7 +63,8 @@ template <int width> void traceFiltered(Scene& scene, const Packet<width>& packe
     }
     std::vector<colonnade_rays_hit> hits(16);
     for (std::size_t count = 0;; hits.resize(count)) {
-        scene.device->check(colonnade_rays_all(scene.committed.rays, &ray, 1, 0, packet.template get<unsigned>(rayMask, lane), SIZE_MAX, hits.data(), hits.size(), &count));
+        scene.device->check(
+            colonnade_rays_all(scene.committed.rays, &ray, 1, 0, packet.template get<unsigned>(rayMask, lane), SIZE_MAX, hits.data(), hits.size(), &count));
         if (count > hits.size()) continue;
         hits.resize(count);
         break;
@@ -163,7 +164,8 @@ Device* rtcNewDevice(const char*) {
 int rtcGetDeviceError(Device* device) { return std::exchange(Device::error(device).code, none); }
 const char* rtcGetDeviceLastErrorMessage(Device* device) { return Device::error(device).text.c_str(); }
 const char* rtcGetErrorString(int error) {
-    constexpr const char* texts[] = {"No Error", "Unknown error", "Invalid argument", "Invalid operation", "Out of Memory", "Unsupported CPU", "Build cancelled", "Level Zero raytracing support missing"};
+    constexpr const char* texts[] = {"No Error",      "Unknown error",   "Invalid argument", "Invalid operation",
+                                     "Out of Memory", "Unsupported CPU", "Build cancelled",  "Level Zero raytracing support missing"};
     return error >= 0 && error < static_cast<int>(std::size(texts)) ? texts[error] : "Invalid error code";
 }
 void rtcSetDeviceErrorFunction(Device* device, void (*report)(void*, int, const char*), void* user) {
@@ -247,7 +249,9 @@ void rtcSetSharedGeometryBufferHostDevice(Geometry* geometry, int type, unsigned
 void* rtcSetNewGeometryBuffer(Geometry* geometry, int type, unsigned slot, int format, std::size_t stride, std::size_t count) {
     return called(geometry, [&]() -> void* {
         // Room for reads of 16 bytes
-        return geometry->set(type, slot, format, 0, stride, count, [&](std::size_t bytes) { return Reference<Buffer>::of(new Buffer(geometry->device, nullptr, bytes + 16)); }).data;
+        return geometry
+            ->set(type, slot, format, 0, stride, count, [&](std::size_t bytes) { return Reference<Buffer>::of(new Buffer(geometry->device, nullptr, bytes + 16)); })
+            .data;
     });
 }
 void rtcSetNewGeometryBufferHostDevice(Geometry* geometry, int type, unsigned slot, int format, std::size_t stride, std::size_t count, void** data, void** onDevice) {
@@ -390,19 +394,13 @@ void rtcGetSceneLinearBounds(Scene* scene, float* bounds) {
 
 // Rays
 #define SINGLE(PREFIX) \
-    void PREFIX##Intersect1(Scene* scene, char* ray, const QueryArguments* arguments) { \
-        trace<1, false>(nullptr, scene, ray, arguments); \
-    } \
-    void PREFIX##Occluded1(Scene* scene, char* ray, const QueryArguments* arguments) { \
-        trace<1, true>(nullptr, scene, ray, arguments); \
-    }
+    void PREFIX##Intersect1(Scene* scene, char* ray, const QueryArguments* arguments) { trace<1, false>(nullptr, scene, ray, arguments); } \
+    void PREFIX##Occluded1(Scene* scene, char* ray, const QueryArguments* arguments) { trace<1, true>(nullptr, scene, ray, arguments); }
 #define PACKET(PREFIX, WIDTH) \
     void PREFIX##Intersect##WIDTH(const int* valid, Scene* scene, char* packet, const QueryArguments* arguments) { \
         trace<WIDTH, false>(valid, scene, packet, arguments); \
     } \
-    void PREFIX##Occluded##WIDTH(const int* valid, Scene* scene, char* packet, const QueryArguments* arguments) { \
-        trace<WIDTH, true>(valid, scene, packet, arguments); \
-    }
+    void PREFIX##Occluded##WIDTH(const int* valid, Scene* scene, char* packet, const QueryArguments* arguments) { trace<WIDTH, true>(valid, scene, packet, arguments); }
 #define RAYS(PREFIX) SINGLE(PREFIX) PACKET(PREFIX, 4) PACKET(PREFIX, 8) PACKET(PREFIX, 16)
 RAYS(rtc)
 RAYS(rtcTraversable)
@@ -410,7 +408,7 @@ RAYS(rtcTraversable)
 // What is refused, by the argument that is the handle: `first`, `second` or `third`, or null for none. Arguments behind it are not read.
 #define REFUSED(HANDLE, RESULT, NAME) \
     ssize_t NAME([[maybe_unused]] Object* first, [[maybe_unused]] Object* second, [[maybe_unused]] Object* third) { \
-        refuse(HANDLE, #NAME REFUSAL);  \
+        refuse(HANDLE, #NAME REFUSAL); \
         return RESULT; \
     }
 #define REFUSED_FORWARDS(PREFIX, CALL) \

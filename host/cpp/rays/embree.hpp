@@ -88,7 +88,8 @@ struct LastError {
 
 struct Device final : Object {
     Device() : Object(this) {
-        if (const int status = colonnade_rays_open_environment(&rays)) throw Error(status == COLONNADE_RAYS_NO_MEMORY ? outOfMemory : unknown, "the design or the device does not open");
+        if (const int status = colonnade_rays_open_environment(&rays))
+            throw Error(status == COLONNADE_RAYS_NO_MEMORY ? outOfMemory : unknown, "the design or the device does not open");
     }
     ~Device() override { colonnade_rays_close(rays); }
 
@@ -137,13 +138,9 @@ template <class Call> auto called(Object* handle, const Call& call) noexcept -> 
     try {
         needed(handle);
         return call();
-    } catch (const Error& error) {
-        Device::fail(device, error.code, error.what());
-    } catch (const std::bad_alloc&) {
+    } catch (const Error& error) { Device::fail(device, error.code, error.what()); } catch (const std::bad_alloc&) {
         Device::fail(device, outOfMemory, "out of memory");
-    } catch (const std::exception& error) {
-        Device::fail(device, unknown, error.what());
-    }
+    } catch (const std::exception& error) { Device::fail(device, unknown, error.what()); }
     return decltype(call())();
 }
 

@@ -49,9 +49,9 @@ public:
     std::string whyTooCoarse() const {
         const std::size_t count = faces_.faces().size();
         const bool isLost = count != 0 && quantised_.faces.empty();
-        if (!isLost && dropped_ <= count / mostDropped) return {};
+        if (!isLost && dropped_ <= count / droppedShare) return {};
         return (isLost ? "no face keeps an area at " : std::to_string(dropped_) + " of " + std::to_string(count) + " faces vanish at ") +
-               std::to_string(design_.format.vertexBits) + " bits a coordinate: " + (design_.format.vertexBits < mostBits ? "use a design with more, or " : "") +
+               std::to_string(design_.format.vertexBits) + " bits a coordinate: " + (design_.format.vertexBits < maxBits ? "use a design with more, or " : "") +
                "leave out what widens the box";
     }
 
@@ -96,9 +96,7 @@ public:
     bool isOpaque(std::size_t face) const { return isClear_[face] == 0; }
 
     /// The face of a packed id; all ones for an id of none.
-    std::size_t faceOfId(std::uint32_t id) const {
-        return id < faceOfId_.size() && faceOfId_[id] != noFace ? faceOfId_[id] : ~std::size_t{0};
-    }
+    std::size_t faceOfId(std::uint32_t id) const { return id < faceOfId_.size() && faceOfId_[id] != noFace ? faceOfId_[id] : ~std::size_t{0}; }
 
     /// u, v of a response by the corners of the face.
     std::array<double, 2> weightsOf(const colonnade_rays_response& response) const {
@@ -112,8 +110,8 @@ public:
 private:
     static constexpr std::uint32_t noFace = UINT32_MAX;
     /// Of the faces, one in so many may vanish.
-    static constexpr std::size_t mostDropped = 100;
-    static constexpr int mostBits = 24;
+    static constexpr std::size_t droppedShare = 100;
+    static constexpr int maxBits = 24;
 
     void join(const std::vector<std::unique_ptr<MeshPart>>& meshes) {
         std::vector<std::uint32_t> enabledMasks;

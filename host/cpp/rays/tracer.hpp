@@ -83,7 +83,7 @@ public:
     }
 
     /// What a ray hits: the id of a response, and what `response` makes the rest of.
-    struct Answer {
+    struct Result {
         std::uint32_t id;
         float tfar;
         ConvertedRay converted;
@@ -91,31 +91,31 @@ public:
         Hit hit;
     };
 
-    /// The answer to a ray of the mode HITS or OCCLUDED; in the latter any triangle on the way.
-    Answer answer(const colonnade_rays_record& ray, std::uint32_t mode, RayRecord& record) const {
-        Answer answer;
-        answer.id = COLONNADE_RAYS_MISS;
-        answer.tfar = ray.tfar;
-        answer.hit.found = false;
-        converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0, answer.converted);
-        const ConvertedRay& converted = answer.converted;
-        if (converted.kind == ConvertedRay::Kind::outOfRange) answer.id = COLONNADE_RAYS_OUT_OF_RANGE;
+    /// The result of a ray of the mode HITS or OCCLUDED; in the latter any triangle on the way.
+    Result trace(const colonnade_rays_record& ray, std::uint32_t mode, RayRecord& record) const {
+        Result result;
+        result.id = COLONNADE_RAYS_MISS;
+        result.tfar = ray.tfar;
+        result.hit.found = false;
+        converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0, result.converted);
+        const ConvertedRay& converted = result.converted;
+        if (converted.kind == ConvertedRay::Kind::outOfRange) result.id = COLONNADE_RAYS_OUT_OF_RANGE;
         record.refused += converted.kind == ConvertedRay::Kind::refused;
-        if (converted.kind != ConvertedRay::Kind::legal) return answer;
+        if (converted.kind != ConvertedRay::Kind::legal) return result;
         const RayFilter filter{(mode & COLONNADE_RAYS_CULL_FRONT) != 0, (mode & COLONNADE_RAYS_CULL_BACK) != 0, (mode & COLONNADE_RAYS_OPAQUE_ONLY) != 0,
                                static_cast<int>(mode >> COLONNADE_RAYS_MASK_SHIFT)};
-        prepareRay(converted.request, frame_.bounds, numbers_, answer.prepared);
+        prepareRay(converted.request, frame_.bounds, numbers_, result.prepared);
         const SceneSearch search(numbers_, memory_, frame_, record);
         const bool isOcclusion = (mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_OCCLUDED;
-        answer.hit = isOcclusion ? search.anyHit(answer.prepared, filter) : search.trace(answer.prepared, &filter);
-        if (answer.hit.found) answer.id = converter_.idOf(answer.hit);
-        return answer;
+        result.hit = isOcclusion ? search.anyHit(result.prepared, filter) : search.trace(result.prepared, &filter);
+        if (result.hit.found) result.id = converter_.idOf(result.hit);
+        return result;
     }
 
-    /// An answer in the application's numbers.
-    colonnade_rays_response response(const Answer& answer) const {
-        if (!answer.hit.found) return {answer.tfar, answer.id, 0, 0};
-        return converter_.hitOf(answer.converted, answer.prepared, answer.hit);
+    /// A result in the application's numbers.
+    colonnade_rays_response response(const Result& result) const {
+        if (!result.hit.found) return {result.tfar, result.id, 0, 0};
+        return converter_.hitOf(result.converted, result.prepared, result.hit);
     }
 
     /// Runs a batch in several threads; a status.
@@ -162,9 +162,7 @@ private:
 #ifdef __cpp_exceptions
         try {
             threads.emplace_back(call);
-        } catch (const std::system_error&) {
-            return false;
-        }
+        } catch (const std::system_error&) { return false; }
         return true;
 #else
         (void)threads, (void)call;
@@ -197,7 +195,7 @@ private:
                 if (batch.mode & COLONNADE_RAYS_FAN) std::memcpy(ray.direction, rays + 16 * i, 16);
                 else setSensorRay(ray, *reinterpret_cast<const colonnade_rays_sensor*>(rays), static_cast<std::uint32_t>(i), batch.tfar);
             } else std::memcpy(&ray, rays + sizeof ray * i, sizeof ray);
-            const Answer found = answer(ray, batch.mode, record);
+            const Result found = trace(ray, batch.mode, record);
             if (form == COLONNADE_RAYS_OCCLUDED) {
                 word |= static_cast<std::uint64_t>(found.hit.found) << i % 64;
                 if (i % 64 != 63 && i + 1 != last) continue;

@@ -19,8 +19,8 @@ struct Traffic {
 };
 
 /// The records that each ray reads in the model of a committed scene, in their order. Throws Failure.
-std::vector<std::vector<std::uint32_t>> readsOf(const colonnade_rays_scene& scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t mode, std::uint32_t mask,
-                                                bool isOcclusion);
+std::vector<std::vector<std::uint32_t>> readsOf(const colonnade_rays_scene& scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t mode,
+                                                std::uint32_t mask, bool isOcclusion);
 
 /// Tags of a cache whose sets replace the line that was least recently used.
 class LineCache {

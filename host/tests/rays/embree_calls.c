@@ -258,8 +258,8 @@ static void filter_ray(void) {
     rtcCommitScene(scene);
     larger.query.ray.id = 3;
     rtcIntersect1(scene, &larger.query, NULL);
-    printf("calls %d geometry %d t %g normal %g %g %g\n", calls, (int)larger.query.geometry, larger.query.ray.tfar, larger.query.normal[0] + 0, larger.query.normal[1] + 0,
-           larger.query.normal[2]);
+    printf("calls %d geometry %d t %g normal %g %g %g\n", calls, (int)larger.query.geometry, larger.query.ray.tfar, larger.query.normal[0] + 0,
+           larger.query.normal[1] + 0, larger.query.normal[2]);
     struct Ray ray = down(~0u).ray;
     rtcOccluded1(scene, &ray, NULL);
     printf("%g\n", ray.tfar);
@@ -585,12 +585,12 @@ static const struct {
     const char *name;
     void (*run)(void);
 } cases[] = {
-    CASE(attach_by_id),    CASE(bad_index),       CASE(bad_vertices), CASE(bounds),          CASE(buffers),     CASE(commits),      CASE(detached),
-    CASE(error_function),  CASE(errors_of_threads), CASE(filter_address), CASE(filter_apart),  CASE(filter_coplanar), CASE(filter_near), CASE(filter_of_call),
-    CASE(filter_ray),      CASE(first_error),     CASE(handles),      CASE(huge_buffers),    CASE(lengths),     CASE(many_masks),   CASE(masks),
-    CASE(no_error),        CASE(no_triangle),     CASE(null_data),    CASE(null_handles),    CASE(outlier),     CASE(progress),     CASE(properties),
-    CASE(refused),         CASE(threads_build),   CASE(threads_filter), CASE(threads_join),  CASE(threads_trace), CASE(traversable), CASE(vertex_attributes),
-    CASE(small_buffers),     CASE(wrong_buffers),
+    CASE(attach_by_id),   CASE(bad_index),         CASE(bad_vertices),   CASE(bounds),       CASE(buffers),         CASE(commits),     CASE(detached),
+    CASE(error_function), CASE(errors_of_threads), CASE(filter_address), CASE(filter_apart), CASE(filter_coplanar), CASE(filter_near), CASE(filter_of_call),
+    CASE(filter_ray),     CASE(first_error),       CASE(handles),        CASE(huge_buffers), CASE(lengths),         CASE(many_masks),  CASE(masks),
+    CASE(no_error),       CASE(no_triangle),       CASE(null_data),      CASE(null_handles), CASE(outlier),         CASE(progress),    CASE(properties),
+    CASE(refused),        CASE(threads_build),     CASE(threads_filter), CASE(threads_join), CASE(threads_trace),   CASE(traversable), CASE(vertex_attributes),
+    CASE(small_buffers),  CASE(wrong_buffers),
 };
 
 int main(int count, char **words) {
