@@ -443,3 +443,24 @@ def test_a_closed_mesh_has_no_leaks(config: str) -> None:
 @pytest.mark.parametrize("overrides", ((), EXACT))
 def test_a_closed_mesh_has_no_leaks_in_a_million_rays(overrides: tuple[str, ...]) -> None:
     assert leaks(1_000_000, "edge", overrides) == 0
+
+
+@pytest.mark.parametrize(("settings", "most"), (((), 2e-4), (EXACT, 1e-5)))
+def test_few_rays_that_begin_on_a_closed_mesh_and_go_in_leave_it(settings: tuple[str, ...], most: float) -> None:
+    """Only such as stay within some units of the face on which they begin, as far as it goes."""
+    random = np.random.default_rng(1)
+    for name in ("sphere:4", "torus"):
+        vertices, faces = mesh_of(name)
+        corners = vertices[faces]
+        inward = -np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+        extent = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        face = random.integers(len(faces), size=100_000)
+        way = random.normal(size=(len(face), 3))
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+        cosine = (way * inward[face]).sum(axis=1)
+        way[cosine < 0] *= -1
+        scene = Scene(vertices, faces, "edge", settings)
+        leaves = scene.closest(rays_of(corners.mean(axis=1)[face], way, 1e-4, np.inf)).face < 0
+        assert leaves.mean() <= most
+        assert (np.abs(cosine) * extent[face] < 4 * scene.unit)[leaves].all()
