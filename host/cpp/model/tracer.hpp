@@ -154,7 +154,7 @@ private:
         }
     }
 
-    void traverse(TraceState& state) const {
+    __attribute__((flatten)) void traverse(TraceState& state) const {
         const Hit& best = state.best;
         const BoxTests boxes(state.ray, numbers_);
         std::array<StackEntry, 256> stack;
