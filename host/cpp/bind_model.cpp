@@ -142,7 +142,7 @@ public:
             shear[2 * i + 1] = ray.shear[1];
             std::array<Entered, 4> entered;
             enters[i] = ray.enters;
-            isHit[i] = ray.enters && BoxTests(ray, numbers_).test(node, tMaxUnits(ray.tMax, numbers_), entered) > 0;
+            isHit[i] = ray.enters && colonnade::testBoxes(ray, node, ray.tMax, numbers_, entered) > 0;
         }
         return result;
     }

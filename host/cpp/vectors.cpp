@@ -75,7 +75,7 @@ void replyBox(Query& query, const Numbers& n) {
         for (auto* planes : {&node.low, &node.high})
             for (auto& axis : *planes) axis[child] = static_cast<std::uint8_t>(query.number());
     std::array<Entered, 4> entered;
-    const int count = BoxTests(ray, n).test(node, tMaxUnits(limit, n), entered);
+    const int count = testBoxes(ray, node, limit, n, entered);
     Reply reply;
     reply << node.children() << count;
     for (int i = 0; i < count; ++i) reply << entered[i].slot << entered[i].tNear;

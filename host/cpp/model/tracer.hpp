@@ -121,7 +121,7 @@ private:
     }
 
     void run(TraceState& state) const {
-        if (numbers_.bvh) traverse(state);
+        if (numbers_.bvh) hasNarrowBoxes(numbers_) ? traverse<std::int32_t>(state) : traverse<std::int64_t>(state);
         else
             for (std::size_t i = 0; (i == 0 || i < frame_.recordCount) && !state.isOver(); i += frame_.leafRecords()) testRecord(state, i);
     }
@@ -154,9 +154,9 @@ private:
         }
     }
 
-    __attribute__((flatten)) void traverse(TraceState& state) const {
+    template <class Integer> __attribute__((flatten)) void traverse(TraceState& state) const {
         const Hit& best = state.best;
-        const BoxTests boxes(state.ray, numbers_);
+        const BoxTests<Integer> boxes(state.ray, numbers_);
         std::array<StackEntry, 256> stack;
         std::size_t depth = 0;
         Node other;

@@ -42,12 +42,15 @@ struct Entered {
     std::int64_t tNear;
 };
 
-/// A value of each child of a node. The widths of docs/numbers.md, section 3, fit 32 bits in all formats.
-using Lanes = std::int32_t __attribute__((vector_size(4 * nodeChildren)));
+/// Whether 32 bits hold the numbers of box tests: not with wide vertices and narrow divisions.
+inline bool hasNarrowBoxes(const Numbers& n) { return n.nodeBits < 30; }
 
-/// Box tests of a ray (docs/numbers.md, section 3).
-class BoxTests {
+/// Box tests of a ray (docs/numbers.md, section 3). `Integer` holds their numbers.
+template <class Integer> class BoxTests {
 public:
+    /// A value of each child of a node.
+    using Lanes __attribute__((vector_size(sizeof(Integer) * nodeChildren))) = Integer;
+
     BoxTests(const Ray& ray, const Numbers& n)
         : n_(n), maxPlane_((std::int64_t(1) << n.boxBits) - 1), maxBase_((std::int64_t(1) << (n.nodeBits - 1)) - 1), maxNear_((std::int64_t(1) << (n.nearBits - 1)) - 1) {
         // A plane from the other side has all of its bits changed
@@ -93,17 +96,17 @@ public:
         // Sorted by (tNear, slot) in a network of four, the missed ones last
         const Lanes slots{0, 1, 2, 3};
         const Lanes isHit = (tNear <= tFar) & (slots < all(node.children()));
-        const Lanes keys = isHit ? tNear * nodeChildren + slots : all(std::numeric_limits<std::int32_t>::max());
-        const int count = -(isHit[0] + isHit[1] + isHit[2] + isHit[3]);
-        std::int32_t sorted[nodeChildren] = {keys[0], keys[1], keys[2], keys[3]};
+        const Lanes keys = isHit ? tNear * nodeChildren + slots : all(std::numeric_limits<Integer>::max());
+        const int count = static_cast<int>(-(isHit[0] + isHit[1] + isHit[2] + isHit[3]));
+        Integer sorted[nodeChildren] = {keys[0], keys[1], keys[2], keys[3]};
         const auto order = [&sorted](int one, int other) {
-            const std::int32_t low = std::min(sorted[one], sorted[other]);
+            const Integer low = std::min(sorted[one], sorted[other]);
             sorted[other] = std::max(sorted[one], sorted[other]);
             sorted[one] = low;
         };
         order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
         // A child's t in vertex units, rounded down
-        for (int i = 0; i < count; ++i) entered[i] = {sorted[i] & (nodeChildren - 1), std::max<std::int64_t>(0, z + floorShift(std::int64_t{sorted[i] >> 2}, toNear))};
+        for (int i = 0; i < count; ++i) entered[i] = {static_cast<int>(sorted[i] & (nodeChildren - 1)), std::max<std::int64_t>(0, z + floorShift(std::int64_t{sorted[i] >> 2}, toNear))};
         return count;
     }
 
@@ -126,7 +129,7 @@ private:
     static Lanes least(Lanes one, Lanes other) { return one < other ? one : other; }
     static Lanes greatest(Lanes one, Lanes other) { return one > other ? one : other; }
     static Lanes all(std::int64_t value) {
-        const auto each = static_cast<std::int32_t>(value);
+        const auto each = static_cast<Integer>(value);
         return Lanes{each, each, each, each};
     }
 
@@ -135,13 +138,12 @@ private:
         std::memcpy(&bytes, planes.data(), sizeof bytes);
         bytes ^= flip;
 #ifdef __SSE4_1__
-        return reinterpret_cast<Lanes>(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(static_cast<int>(bytes))));
-#else
+        if constexpr (sizeof(Integer) == 4) return reinterpret_cast<Lanes>(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(static_cast<int>(bytes))));
+#endif
         using Bytes = std::uint8_t __attribute__((vector_size(nodeChildren)));
         Bytes each;
         std::memcpy(&each, &bytes, sizeof each);
         return __builtin_convertvector(each, Lanes);
-#endif
     }
 
     /// The first and the last plane of each child that the ray crosses along an axis, from the node's first one.
@@ -158,7 +160,10 @@ private:
     Lanes scaled(Lanes t, int scale) const {
         const Lanes high = all(maxNear_), low = ~high;
         if (scale <= 0) t = t >> -scale;
-        else t = least(greatest(t, low), high) * (1 << std::min(scale, n_.nearBits));
+        else {
+            const int shift = std::min(scale, n_.nearBits);
+            t = least(greatest(t, all((~maxNear_ >> shift) - 1)), all((maxNear_ >> shift) + 1)) * (1 << shift);
+        }
         return least(greatest(t, low), high);
     }
 
@@ -167,6 +172,12 @@ private:
     std::array<Axis, 3> axes_;
     std::array<Side, 2> sides_;
 };
+
+/// As `BoxTests::test`, of a ray with a tMax.
+inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const Numbers& n, std::array<Entered, nodeChildren>& entered) {
+    const std::int64_t limit = tMaxUnits(tMax, n);
+    return hasNarrowBoxes(n) ? BoxTests<std::int32_t>(ray, n).test(node, limit, entered) : BoxTests<std::int64_t>(ray, n).test(node, limit, entered);
+}
 
 /// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which begins as `Hit::none`.
 template <class Product> bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best) {

@@ -16,12 +16,18 @@ class BoxUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
 
   private val laneVariants = Seq(lanes(TestConfigs.tiny, 1), lanes(TestConfigs.tiny, 4))
 
+  /** The widest numbers of box tests: fine vertices, padded for narrow divisions. */
+  private val widest = {
+    val narrow = TestConfigs.withPrecision(16, 16, 16)
+    narrow.copy(geometry = narrow.geometry.copy(vertexBits = 24))
+  }
+
   private def shape(config: ColonnadeConfig) =
     s"${config.precision}, ${config.units.boxLanes} lanes"
 
   for (
     (config, i) <-
-      (TestConfigs.formats ++ laneVariants :+ TestConfigs.withExtraSlices(TestConfigs.tiny)).zipWithIndex
+      (TestConfigs.formats ++ laneVariants :+ TestConfigs.withExtraSlices(TestConfigs.tiny) :+ widest).zipWithIndex
   )
     it should s"follow the model under random stalls, format $i (${shape(config)})" taggedAs
       (if (i < TestConfigs.formats.size) Always.ifExtreme(config) else Always) in
