@@ -445,8 +445,8 @@ def test_a_closed_mesh_has_no_leaks_in_a_million_rays(overrides: tuple[str, ...]
     assert leaks(1_000_000, "edge", overrides) == 0
 
 
-@pytest.mark.parametrize(("settings", "most"), (((), 2e-4), (EXACT, 1e-5)))
-def test_few_rays_that_begin_on_a_closed_mesh_and_go_in_leave_it(settings: tuple[str, ...], most: float) -> None:
+@pytest.mark.parametrize(("settings", "share"), (((), 2e-4), (EXACT, 1e-5)))
+def test_few_rays_that_begin_on_a_closed_mesh_and_go_in_leave_it(settings: tuple[str, ...], share: float) -> None:
     """Only such as stay within some units of the face on which they begin, as far as it goes."""
     random = np.random.default_rng(1)
     for name in ("sphere:4", "torus"):
@@ -462,5 +462,5 @@ def test_few_rays_that_begin_on_a_closed_mesh_and_go_in_leave_it(settings: tuple
         way[cosine < 0] *= -1
         scene = Scene(vertices, faces, "edge", settings)
         leaves = scene.closest(rays_of(corners.mean(axis=1)[face], way, 1e-4, np.inf)).face < 0
-        assert leaves.mean() <= most
+        assert leaves.mean() <= share
         assert (np.abs(cosine) * extent[face] < 4 * scene.unit)[leaves].all()
