@@ -115,7 +115,7 @@ RECORD3D: dict[str, tuple[Callable[[], dict[str, bytes | None]], str]] = {
     "metadata-text": (lambda: {"metadata": b"\xff"}, "is not JSON"),
     "no-certain-depth": (
         lambda: {f"rgbd/{n}.conf": lzfse.compress(bytes(recording().depth.size)) for n in range(2)},
-        "no floor",
+        "no frame has certain depth in half of its pixels",
     ),
 }
 

@@ -193,7 +193,8 @@ def test_what_samples_do_not_show_is_one_line(
     tmp_path: Path, text: str, options: tuple[object, ...], message: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    result = run("render", scene_file(tmp_path, text), "--config", "tiny", "--backend", "model", *options)
+    backend = () if "--backend" in options else ("--backend", "model")
+    result = run("render", scene_file(tmp_path, text), "--config", "tiny", *backend, *options)
     assert result.exit_code == 2
     assert message in result.stderr and len(result.stderr.splitlines()) == 1
 

@@ -274,7 +274,8 @@ def test_the_hardware_renders_the_frames_of_the_model(folder: Path, keyframes: i
 
 def run(folder: Path, *arguments: object) -> Result:
     settings = [word for each in ROOM for word in ("--set", each)]
-    common = ("render", folder / "albedo.toml", "--config", "small", *settings, "--backend", "model", "--size", "96x72")
+    backend = () if "--backend" in arguments else ("--backend", "model")
+    common = ("render", folder / "albedo.toml", "--config", "small", *settings, *backend, "--size", "96x72")
     return CliRunner().invoke(cli, [str(argument) for argument in (*common, "--samples", 1, *arguments)])
 
 
