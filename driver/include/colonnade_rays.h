@@ -155,7 +155,7 @@ int colonnade_rays_mesh_opacity(struct colonnade_rays_scene *scene, uint32_t mes
 /* Packs the scene and loads it. A scene without faces has no hits. One in which more than one face in a hundred vanishes
  * on the device's grid is refused. */
 int colonnade_rays_commit(struct colonnade_rays_scene *scene);
-/* Faces with an area that vanish on the grid of the committed scene: no ray hits them. */
+/* Faces that vanish on the grid of the committed scene, so that no ray hits them; not those thinner than 2^-36 of the box. */
 int colonnade_rays_dropped(const struct colonnade_rays_scene *scene, size_t *faces);
 /* The box of the committed scene. */
 int colonnade_rays_bounds(const struct colonnade_rays_scene *scene, double low[3], double high[3]);

@@ -27,10 +27,16 @@ public:
     const std::vector<mesh::Vector>& vertices() const { return vertices_; }
     const std::vector<mesh::Face>& faces() const { return faces_; }
 
-    bool hasArea(std::size_t index) const {
+    /// The distance of a face's corner from the longest edge.
+    double altitude(std::size_t index) const {
         const std::array<mesh::Vector, 3>& corners = corners_[index];
+        double longest = 0;
+        for (int i = 0; i < 3; ++i) {
+            const mesh::Vector edge = mesh::difference(corners[(i + 1) % 3], corners[i]);
+            longest = std::max(longest, std::sqrt(dot(edge, edge)));
+        }
         const mesh::Vector area = mesh::cross(mesh::difference(corners[1], corners[0]), mesh::difference(corners[2], corners[0]));
-        return area[0] != 0 || area[1] != 0 || area[2] != 0;
+        return longest > 0 ? std::sqrt(dot(area, area)) / longest : 0;
     }
 
     /// Nothing for a ray along the face's plane, or one whose numbers overflow.

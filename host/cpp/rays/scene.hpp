@@ -38,11 +38,11 @@ public:
         unit_ = 1 / quantised_.scale;
         edge_ = std::ldexp(unit_, design.format.vertexBits);
         std::size_t whole = 0;
-        for (std::size_t i = 0; i < faces_.faces().size(); ++i) whole += faces_.hasArea(i);
+        for (std::size_t i = 0; i < faces_.faces().size(); ++i) whole += faces_.altitude(i) > std::ldexp(edge_, thinLog);
         dropped_ = whole - std::min(whole, quantised_.faces.size());
     }
 
-    /// Faces with an area that the grid drops: their corners become one line.
+    /// Faces that the grid drops, as their corners become one line; not those that are thinner than rounding to double makes lines.
     std::size_t dropped() const { return dropped_; }
 
     /// Why the grid is too coarse; nothing if it is not.
@@ -111,7 +111,7 @@ private:
     static constexpr std::uint32_t noFace = UINT32_MAX;
     /// Of the faces, one in so many may vanish.
     static constexpr std::size_t droppedShare = 100;
-    static constexpr int maxBits = 24;
+    static constexpr int maxBits = 24, thinLog = -36;
 
     void join(const std::vector<std::unique_ptr<MeshPart>>& meshes) {
         std::vector<std::uint32_t> enabledMasks;

@@ -372,6 +372,19 @@ def test_faces_that_vanish_are_told() -> None:
     assert Scene(*SQUARE).dropped == 0
 
 
+def test_lines_at_the_poles_of_a_sphere_are_no_faces() -> None:
+    """A row of 64 faces has corners that only the rounding of a sine tells apart."""
+    down, around = np.meshgrid(np.linspace(0, np.pi, 17), np.linspace(0, 2 * np.pi, 64, endpoint=False), indexing="ij")
+    vertices = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)], axis=2)
+    at = np.arange(17 * 64).reshape(17, 64)
+    corners = at[:-1], np.roll(at[:-1], -1, axis=1), at[1:], np.roll(at[1:], -1, axis=1)
+    first, second, third, fourth = (each.ravel() for each in corners)
+    faces = np.concatenate([np.column_stack([first, third, fourth]), np.column_stack([first, fourth, second])])
+    scene = Scene(vertices.reshape(-1, 3), faces, "edge")
+    assert scene.dropped == 0
+    assert scene.closest([[0.1, 0.2, 5, 0, 0, 0, -1, np.inf]]).face[0] >= 0
+
+
 @pytest.mark.parametrize(("distance", "length"), ((1e9, 1), (4e11, 1), (3, 1e200), (3, 1e-200), (1e15, 1e-30)))
 @pytest.mark.parametrize("settings", ((), EXACT))
 def test_all_hits_end_where_a_step_is_below_a_digit(distance: float, length: float, settings: tuple[str, ...]) -> None:
