@@ -64,6 +64,15 @@ public:
     /// The first triangle that a traversal meets, not the closest one.
     Hit anyHit(const Ray& ray, const RayFilter& filter) const { return ray.enters ? search(ray, &filter, true).occluder : Hit::none(ray.tMax); }
 
+    /// All triangles that a prepared ray hits before its tMax, in the order of (t, id).
+    std::vector<Hit> allHits(const Ray& ray, const RayFilter& filter) const {
+        std::vector<Hit> hits;
+        if (!ray.enters) return hits;
+        search(ray, &filter, false, 0, &hits);
+        std::sort(hits.begin(), hits.end(), [](const Hit& one, const Hit& other) { return other.isReplacedBy(one.t, one.id); });
+        return hits;
+    }
+
 private:
     struct StackEntry {
         bool isLeaf;
@@ -79,15 +88,16 @@ private:
         bool isShadow;
         const RayFilter* filter;
         Occlusion occlusion;
-        Hit occluder; ///< that ended the search of a shadow ray
+        Hit occluder;           ///< that ended the search of a shadow ray
+        std::vector<Hit>* hits; ///< of a ray that wants all, and keeps its tMax
 
         bool isOver() const { return occlusion == Occlusion::opaque; }
     };
 
     /// Traces a prepared ray from a root, by default that of the scene.
-    TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0) const {
+    TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0, std::vector<Hit>* hits = nullptr) const {
         ++record_.counters.raysInBox;
-        TraceState state{ray, frame_.roots[instance], Hit::none(ray.tMax), isShadow, filter, Occlusion::none, Hit::none(ray.tMax)};
+        TraceState state{ray, frame_.roots[instance], Hit::none(ray.tMax), isShadow, filter, Occlusion::none, Hit::none(ray.tMax), hits};
         run(state);
         return state;
     }
@@ -145,6 +155,10 @@ private:
             record_.log.addTriangle(vertices, id, isHit);
             hit.isClear = leaf.isClear;
             if (!isHit || (state.filter && !state.filter->accepts(hit, leaf))) continue;
+            if (state.hits) {
+                state.hits->push_back(hit);
+                continue;
+            }
             if (!state.isShadow) {
                 state.best = hit;
                 continue;

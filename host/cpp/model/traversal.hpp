@@ -42,6 +42,11 @@ struct Entered {
     std::int64_t tNear;
 };
 
+// Vectors of 32 bytes are no arguments between files. g++ warns of them at the end of a file.
+#ifndef __clang__
+#pragma GCC diagnostic ignored "-Wpsabi"
+#endif
+
 /// Whether 32 bits hold the numbers of box tests: not with wide vertices and narrow divisions.
 inline bool hasNarrowBoxes(const Numbers& n) { return n.nodeBits < 30; }
 
@@ -106,7 +111,8 @@ public:
         };
         order(0, 1), order(2, 3), order(0, 2), order(1, 3), order(1, 2);
         // A child's t in vertex units, rounded down
-        for (int i = 0; i < count; ++i) entered[i] = {static_cast<int>(sorted[i] & (nodeChildren - 1)), std::max<std::int64_t>(0, z + floorShift(std::int64_t{sorted[i] >> 2}, toNear))};
+        for (int i = 0; i < count; ++i)
+            entered[i] = {static_cast<int>(sorted[i] & (nodeChildren - 1)), std::max<std::int64_t>(0, z + floorShift(std::int64_t{sorted[i] >> 2}, toNear))};
         return count;
     }
 

@@ -139,14 +139,14 @@ private:
         }
     };
 
-    /// The hits of some rays one after the other, by tnear: a quarter unit beyond the last one, where the faces that were met are known.
+    /// The hits of some rays. The model finds all in one traversal. A device finds one after the other, by tnear: a quarter unit beyond the last
+    /// one, where the faces that were met are known.
     std::vector<AppHit> following(const AppRay* rays, const std::vector<std::size_t>& some, std::uint32_t mode, std::uint32_t mask, std::size_t most) const {
         std::vector<Walk> walks;
-        std::vector<std::size_t> live;
-        for (const std::size_t ray : some) {
-            live.push_back(walks.size());
-            walks.push_back({ray, localOf(rays[ray], slack)});
-        }
+        for (const std::size_t ray : some) walks.push_back({ray, localOf(rays[ray], slack)});
+        std::vector<std::size_t> live(device_ ? walks.size() : 0);
+        for (std::size_t i = 0; i < live.size(); ++i) live[i] = i;
+        if (!device_) takeAll(rays, walks, mode, mask, most);
         while (!live.empty()) {
             std::vector<std::size_t> next;
             query(
@@ -171,6 +171,22 @@ private:
             hits.insert(hits.end(), walk.found.begin(), walk.found.begin() + static_cast<std::ptrdiff_t>(std::min(walk.found.size(), most)));
         }
         return hits;
+    }
+
+    void takeAll(const AppRay* rays, std::vector<Walk>& walks, std::uint32_t mode, std::uint32_t mask, std::size_t most) const {
+        RayRecord record;
+        for (Walk& walk : walks)
+            for (const colonnade_rays_response& response : scene_.model()->traceAll(walk.left.ray, deviceMode(mode, mask, COLONNADE_RAYS_HITS), record)) {
+                if (walk.found.size() >= most) break;
+                take(rays[walk.ray], walk, response, mode, mask, most);
+            }
+        count(walks.size(), record);
+    }
+
+    /// Adds what rays of the model did.
+    void count(std::size_t rays, const RayRecord& record) const {
+        sums_.add(rays, record.refused, record.counters);
+        if (record.errors.stackOverflow || record.errors.illegalRecord) check(COLONNADE_RAYS_DEVICE);
     }
 
     /// Adds the hits that a face stands for which the device has met.
@@ -275,8 +291,7 @@ private:
             const RayModel::Result result = scene_.model()->trace(local.ray, bits, record);
             take(i, local, result.id, [&] { return scene_.model()->response(result); });
         }
-        sums_.add(count, record.refused, record.counters);
-        if (record.errors.stackOverflow || record.errors.illegalRecord) check(COLONNADE_RAYS_DEVICE);
+        this->count(count, record);
     }
 
     template <class LocalAt, class Take> void queryDevice(std::size_t count, std::uint32_t bits, std::uint32_t form, const LocalAt& localAt, const Take& take) const {

@@ -94,22 +94,23 @@ public:
     /// The result of a ray of the mode HITS or OCCLUDED; in the latter any triangle on the way.
     Result trace(const colonnade_rays_record& ray, std::uint32_t mode, RayRecord& record) const {
         Result result;
-        result.id = COLONNADE_RAYS_MISS;
-        result.tfar = ray.tfar;
-        result.hit.found = false;
-        converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0, result.converted);
-        const ConvertedRay& converted = result.converted;
-        if (converted.kind == ConvertedRay::Kind::outOfRange) result.id = COLONNADE_RAYS_OUT_OF_RANGE;
-        record.refused += converted.kind == ConvertedRay::Kind::refused;
-        if (converted.kind != ConvertedRay::Kind::legal) return result;
-        const RayFilter filter{(mode & COLONNADE_RAYS_CULL_FRONT) != 0, (mode & COLONNADE_RAYS_CULL_BACK) != 0, (mode & COLONNADE_RAYS_OPAQUE_ONLY) != 0,
-                               static_cast<int>(mode >> COLONNADE_RAYS_MASK_SHIFT)};
-        prepareRay(converted.request, frame_.bounds, numbers_, result.prepared);
+        if (!prepare(ray, mode, record, result)) return result;
+        const RayFilter filter = filterOf(mode);
         const SceneSearch search(numbers_, memory_, frame_, record);
         const bool isOcclusion = (mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_OCCLUDED;
         result.hit = isOcclusion ? search.anyHit(result.prepared, filter) : search.trace(result.prepared, &filter);
         if (result.hit.found) result.id = converter_.idOf(result.hit);
         return result;
+    }
+
+    /// The responses to all triangles that a ray of the mode HITS hits, in the order of (t, id).
+    std::vector<colonnade_rays_response> traceAll(const colonnade_rays_record& ray, std::uint32_t mode, RayRecord& record) const {
+        Result result;
+        std::vector<colonnade_rays_response> responses;
+        if (!prepare(ray, mode, record, result)) return responses;
+        for (const Hit& hit : SceneSearch(numbers_, memory_, frame_, record).allHits(result.prepared, filterOf(mode)))
+            responses.push_back(converter_.hitOf(result.converted, result.prepared, hit));
+        return responses;
     }
 
     /// A result in the application's numbers.
@@ -149,6 +150,25 @@ public:
     }
 
 private:
+    /// Sets up a ray as a miss; false if it is one without a look at the scene.
+    bool prepare(const colonnade_rays_record& ray, std::uint32_t mode, RayRecord& record, Result& result) const {
+        result.id = COLONNADE_RAYS_MISS;
+        result.tfar = ray.tfar;
+        result.hit.found = false;
+        converter_.convert(ray, (mode & COLONNADE_RAYS_LOCAL) != 0, result.converted);
+        const ConvertedRay& converted = result.converted;
+        if (converted.kind == ConvertedRay::Kind::outOfRange) result.id = COLONNADE_RAYS_OUT_OF_RANGE;
+        record.refused += converted.kind == ConvertedRay::Kind::refused;
+        if (converted.kind != ConvertedRay::Kind::legal) return false;
+        prepareRay(converted.request, frame_.bounds, numbers_, result.prepared);
+        return true;
+    }
+
+    static RayFilter filterOf(std::uint32_t mode) {
+        return {(mode & COLONNADE_RAYS_CULL_FRONT) != 0, (mode & COLONNADE_RAYS_CULL_BACK) != 0, (mode & COLONNADE_RAYS_OPAQUE_ONLY) != 0,
+                static_cast<int>(mode >> COLONNADE_RAYS_MASK_SHIFT)};
+    }
+
     static constexpr std::size_t raysOfAThread = 512;
     static constexpr std::uint32_t forms = COLONNADE_RAYS_FAN | COLONNADE_RAYS_SENSOR;
 

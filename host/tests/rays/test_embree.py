@@ -22,12 +22,9 @@ pytestmark = pytest.mark.matrix
 FOLDER = Path(__file__).parent
 #: What Embree answers to each case of `embree_calls.c`.
 ANSWERS: dict[str, list[str]] = json.loads((FOLDER / "embree_calls.json").read_text())
-#: What the library answers in its place: faces nearer than a quarter unit, geometries that it refuses, and cases in
-#: which Embree itself crashes.
+#: What the library answers in its place: geometries that it refuses, and cases in which Embree itself crashes.
 HERE = {
     "detached": ["0 0 t 5 occluded 1 error 0", "-1 -1 t inf occluded 0 error 0"],
-    "filter_coplanar": ["-1 -1 t inf occluded 0 error 0"],
-    "filter_near": ["-1 -1 t inf occluded 0 error 0"],
     "refused": ["quads 1 made: error 3", "motion: error 3", "transform: error 3"],
     "small_buffers": ["1 stride: error 2", "too small: error 2", "0 0 t 5 occluded 1 error 0"],
 }

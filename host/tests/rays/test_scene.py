@@ -89,6 +89,20 @@ def test_equal_faces_of_either_side_are_all_hit() -> None:
     assert scene.closest([DOWN, UP], CULL_BACK).face.tolist() == [0, 2]
 
 
+@pytest.mark.parametrize("gap", (0, 1e-7, 1e-5, 1e-3))
+@pytest.mark.parametrize("refine", (True, False))
+def test_faces_of_one_place_are_all_hit(gap: float, refine: bool) -> None:
+    """Decals: the grid rounds most of them to one plane, and only their vertices tell which one is first."""
+    scene, random = Scene(refine=refine), np.random.default_rng(8)
+    for level in range(10):
+        scene.add(3 * SQUARE[0] - [*random.uniform(0.5, 1.5, 2), -gap * level], SQUARE[1])
+    rays = rays_of(random.uniform(0, 1, (200, 2)) @ np.eye(2, 3) + [0, 0, 5], np.zeros((200, 3)) - [0, 0, 1], 0, np.inf)
+    hits = scene.all(rays)
+    assert (np.bincount(hits.ray, minlength=200) == 10).all()
+    if refine and gap:
+        assert (hits.mesh.reshape(200, 10) == np.arange(10)[::-1]).all()
+
+
 def test_moved_vertices_move_the_hits() -> None:
     scene = Scene(*SQUARE)
     scene.update(0, SQUARE[0] + [0, 0, 0.5])
