@@ -33,8 +33,8 @@ MIN_FREE_BYTES = 16 << 20
 
 _BLOCK = 1 << 20
 
-#: SHA-256 of each file, for the entries that this process verified or made.
-_verified: dict[Path, dict[str, str]] = {}
+#: The entries that this process verified or made.
+_verified: set[Path] = set()
 
 
 def seal(folder: Path, key: str | None = None) -> None:
@@ -45,12 +45,17 @@ def seal(folder: Path, key: str | None = None) -> None:
 
 def is_intact(folder: Path, key: str | None = None) -> bool:
     """Whether a sealed folder is unchanged: the same files with the same content."""
-    return _digests(folder, key or folder.name) is not None
-
-
-def digests(folder: Path) -> dict[str, str] | None:
-    """SHA-256 of each file by its path in the entry; None for a folder that `entry` did not return."""
-    return _verified.get(folder)
+    try:
+        sealed = json.loads((folder / CONTENTS).read_bytes())
+        if sealed["version"] != VERSION or sealed["key"] != (key or folder.name):
+            return False
+        expected = {name: (size, digest) for name, (size, digest) in sealed["files"].items()}
+        # Sizes first: most damage shows without reading the files
+        if {name: path.stat().st_size for name, path in _files(folder)} != {n: s for n, (s, _) in expected.items()}:
+            return False
+        return _contents(folder) == expected
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return False
 
 
 @contextlib.contextmanager
@@ -90,7 +95,7 @@ def entry(
                         yield content
                         seal(content, folder.name)
                     temporary.replace(content, folder)
-                _verified[folder] = _known(folder)
+                _verified.add(folder)
     except OSError as error:
         if (refusal := _unwritable(folder.parent, error)) is None:
             raise
@@ -157,32 +162,11 @@ def _full(folder: Path) -> UserError:
 def _is_known(folder: Path) -> bool:
     """Whether the entry is intact; each process verifies it once."""
     if folder not in _verified or not (folder / CONTENTS).is_file():
-        found = _digests(folder, folder.name)
-        if found is None:
-            _verified.pop(folder, None)
+        _verified.discard(folder)
+        if not is_intact(folder):
             return False
-        _verified[folder] = found
+        _verified.add(folder)
     return True
-
-
-def _known(folder: Path) -> dict[str, str]:
-    """Digests of an entry that was just sealed, without reading its files again."""
-    files = json.loads((folder / CONTENTS).read_text())["files"]
-    return {name: digest for name, (_, digest) in files.items()}
-
-
-def _digests(folder: Path, key: str) -> dict[str, str] | None:
-    try:
-        sealed = json.loads((folder / CONTENTS).read_bytes())
-        if sealed["version"] != VERSION or sealed["key"] != key:
-            return None
-        expected = {name: (size, digest) for name, (size, digest) in sealed["files"].items()}
-        # Sizes first: most damage shows without reading the files
-        if {name: path.stat().st_size for name, path in _files(folder)} != {n: s for n, (s, _) in expected.items()}:
-            return None
-        return {name: digest for name, (_, digest) in expected.items()} if _contents(folder) == expected else None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return None
 
 
 def _contents(folder: Path) -> dict[str, tuple[int, str]]:

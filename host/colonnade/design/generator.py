@@ -30,6 +30,7 @@ from colonnade.design.design_folder import check_replaceable, replace_folder
 from colonnade.design.idle_parts import idle_notes
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import cache_directory, find_java, generator_jar, printed, project_root
+from colonnade.design.verilog import without_places
 
 #: Source states to keep in the cache; older ones are removed when they were not used for a day.
 KEPT_STATES = 4
@@ -76,12 +77,11 @@ class GeneratedDesign:
         return sorted(path for path in self.dir.iterdir() if path.suffix in (".sv", ".v"))
 
     def digest(self) -> str:
-        """SHA-256 of the SystemVerilog: designs with equal digests behave identically."""
-        known = cache.digests(self.dir.parent) or {}
+        """SHA-256 of the SystemVerilog without places: designs with equal digests behave identically."""
         lines = []
         for path in self.sources:
-            content = known.get(f"{DESIGN}/{path.name}") or hashlib.sha256(path.read_bytes()).hexdigest()
-            lines.append(f"{path.name} {content}\n")
+            text = without_places(path.read_text(encoding="utf-8"))
+            lines.append(f"{path.name} {hashlib.sha256(text.encode()).hexdigest()}\n")
         return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 

@@ -27,7 +27,7 @@ Damage = Callable[[Path], object]
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """Folders of built entries; starts without verified entries."""
-    monkeypatch.setattr(cache, "_verified", {})
+    monkeypatch.setattr(cache, "_verified", set())
     return []
 
 
@@ -71,7 +71,6 @@ def test_makes_an_entry_once(tmp_path: Path, made: list[Path], capsys: pytest.Ca
         assert get(folder, made) == folder
     assert len(made) == 1
     assert cache.is_intact(folder)
-    assert set(cache.digests(folder) or ()) == {"program", "deep/a.sv"}
     assert names(tmp_path) == {"k0", "k0.lock"}
     assert capsys.readouterr().err == ""
 

@@ -221,12 +221,15 @@ def test_an_interrupted_generator_leaves_nothing(checkout: Path, monkeypatch: py
     assert {path.name for path in state.iterdir() if path.suffix != ".lock"} <= before
 
 
-def test_a_cached_design_has_the_digest_of_its_copy(checkout: Path, tmp_path: Path) -> None:
+def test_a_digest_is_of_what_a_design_does(checkout: Path, tmp_path: Path) -> None:
     design = generator.design_for("tiny")
-    assert cache.digests(entry_of(design)) is not None
     copy = generator.generate("tiny", [], tmp_path / "copy")
-    assert cache.digests(copy.dir.parent) is None
     assert copy.digest() == design.digest()
+    verilog, digests = copy.dir / "Top.sv", list[str]()
+    for text in ("lost at A.scala:41 assert(x)", "lost at A.scala:42 assert(x)", "lost at A.scala:42 assert(y)"):
+        verilog.write_text(f'$error("{text}");\n')
+        digests.append(copy.digest())
+    assert digests[0] == digests[1] != digests[2]
 
 
 def test_generate_replaces_only_a_design(checkout: Path, tmp_path: Path) -> None:

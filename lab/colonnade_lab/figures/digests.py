@@ -17,6 +17,7 @@ from colonnade.common.toml_files import parse_toml
 from colonnade.design.config_name import find_configuration
 from colonnade.design.generator import design_for, source_hash
 from colonnade.design.toolchain import cache_directory, project_root
+from colonnade.design.verilog import without_places
 
 from colonnade_lab.common.parallel import in_order, processors
 from colonnade_lab.figures.catalog import Design, Entry
@@ -40,8 +41,6 @@ _PYTHON = re.compile(
 #: What digests of scenes and studies are called.
 SCENES = "scenes"
 
-_PLACE = re.compile(r"\bat \w+\.scala:\d+")
-
 
 def digest_of(files: Iterable[Path]) -> str:
     """The digest of files of C++, SystemVerilog or Python."""
@@ -55,7 +54,7 @@ def _normal(file: Path) -> str:
     if is_python:
         # Indentation has a meaning
         return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
-    return re.sub(r" ?([^\w ]) ?", r"\1", " ".join(_PLACE.sub("", text).split()))
+    return re.sub(r" ?([^\w ]) ?", r"\1", " ".join(without_places(text).split()))
 
 
 def digest_of_scenes(files: Iterable[Path]) -> str:

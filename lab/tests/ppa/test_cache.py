@@ -52,7 +52,8 @@ def yosys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_a_damaged_netlist_is_synthesised_again(
     yosys: list[str], versions: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "Unit.sv").write_text("module Unit(\n  input clock\n);\nendmodule\n")
+    verilog = 'module Unit(\n  input clock\n);\n$error("lost at A.scala:1 assert(x)");\nendmodule\n'
+    (tmp_path / "Unit.sv").write_text(verilog)
     (tmp_path / "memories.json").write_text("[]")
     hierarchy, into = Hierarchy(tmp_path), Technology(None, "", None)
 
@@ -66,6 +67,10 @@ def test_a_damaged_netlist_is_synthesised_again(
     halve(kept)
     assert [again(), again()] == [first, first]
     assert capsys.readouterr().err == "colonnade: the cached netlist of Unit was damaged and is built again\n"
+    assert len(yosys) == 2
+    # An assertion in another line is the same unit
+    (tmp_path / "Unit.sv").write_text(verilog.replace(":1", ":2"))
+    again()
     assert len(yosys) == 2
     versions["pyosys"] = "2"
     again()

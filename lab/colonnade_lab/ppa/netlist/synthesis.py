@@ -28,6 +28,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.toolchain import cache_directory, project_root
+from colonnade.design.verilog import without_places
 
 from colonnade_lab.ppa.library import liberty, liberty_files, liberty_syntax
 from colonnade_lab.ppa.library.cells import Library
@@ -159,7 +160,7 @@ def synthesise(hierarchy: Hierarchy, top: str, tech: Technology, progress: Progr
     script = _script(hierarchy, top, own, black_boxes, tech)
     digest = hashlib.sha256("\n".join(script).encode())
     for module in own:
-        digest.update(hierarchy.files[module].read_bytes())
+        digest.update(without_places(hierarchy.files[module].read_text(encoding="utf-8")).encode())
     boxes = "".join(hierarchy.header(module) for module in black_boxes)
     digest.update(f"{tech.digest} {_constraints(tech)} {boxes} {importlib.metadata.version('pyosys')}".encode())
     folder = cache_directory(project_root()) / "ppa" / f"{top}-{digest.hexdigest()[:20]}"
