@@ -11,8 +11,9 @@ import pytest
 from gltf_documents import POINTS, READ
 from gltf_documents import _arrays as with_arrays
 
+from colonnade.common import published
 from colonnade.common.errors import UserError
-from colonnade.mesh.files import gltf
+from colonnade.mesh.files import catalog, gltf
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.geometry.topology import subdivide
 from colonnade.mesh.load import clean_mesh, load_mesh
@@ -168,12 +169,24 @@ def test_a_missing_mesh_is_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         (str(tmp_path / "no.obj"), "does not exist"),
         (str(tmp_path), "is a folder"),
         ("nothing", "no mesh nothing: name a file"),
-        ("fandisk", "COLONNADE_MESHES"),
         ("sphere:many", "must be from 0"),
         ("teapot:0", "must be from 1"),
         ("nothing:2", "no mesh nothing: name a file"),
     ):
         with pytest.raises(UserError, match=message):
+            load_mesh(name)
+
+
+def test_the_meshes_of_the_figures_are_fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each has an address and a digest; a file of another content is refused before it is read."""
+    monkeypatch.delenv("COLONNADE_MESHES", raising=False)
+    monkeypatch.setenv("COLONNADE_DOWNLOADS", str(tmp_path))
+    assert catalog.KNOWN.keys() == published.MESHES.keys()
+    for name, download in published.MESHES.items():
+        (tmp_path / download.name).write_text(TRIANGLE)
+        with pytest.raises(
+            UserError, match=rf"{download.name}, from COLONNADE_DOWNLOADS, is another file than the mesh"
+        ):
             load_mesh(name)
 
 

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     "liberties",
     multiple=True,
     metavar="PATH",
-    help="Standard-cell library: a .lib or .lib.gz file, or a folder of them. Repeatable; all files form one library.",
+    help="Standard-cell library: asap7 or sky130, which are fetched, or a .lib or .lib.gz file, or a folder of them."
+    " Repeatable; all files form one library.",
 )
 @click.option(
     "--delay", type=PositiveNumber(), metavar="NS", help="Target delay of technology mapping.  [default: 60 FO4]"

@@ -11,6 +11,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.input_files import read_input
 from colonnade.common.limits import MAX_LIBERTY_BYTES
 from colonnade.common.progress import QUIET, Progress
+from colonnade.common.published import LIBRARIES
 from colonnade.design.config_name import find_configuration
 from colonnade.design.frame_limits import check_size
 from colonnade.design.manifest import Manifest
@@ -254,13 +255,13 @@ def _job(kind: str, title: str, identity: Mapping[str, Any], arguments: Mapping[
 
 
 def _library(file: StudyFile, name: str, given: Mapping[str, Sequence[str]]) -> dict[str, bytes]:
-    """The liberty files of a library by their names."""
-    if name not in given:
+    """The liberty files of a library by their names; those of a published library if none are given."""
+    if name not in given and name not in LIBRARIES:
         advice = f"--library {name}=FILE names its liberty files"
         raise file.error(("libraries", name), f"the library {name} has no files: {advice}")
     found: dict[str, bytes] = {}
     try:
-        paths = library_files(given[name])
+        paths = library_files(given.get(name, (name,)))
     except UserError as error:
         raise file.error(("libraries", name), f"the library {name}: {error}") from None
     for path in paths:

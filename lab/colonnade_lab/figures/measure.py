@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import json
-import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -19,22 +18,21 @@ from colonnade.design.generator import manifest_for
 from colonnade.design.toolchain import project_root
 
 from colonnade_lab.common.parallel import processors
-from colonnade_lab.figures.catalog import LIBRARIES, REPORT, Entry
+from colonnade_lab.figures.catalog import REPORT, Entry
 from colonnade_lab.figures.data import Data, commands_of, commit, config_problem, declare_measured, is_current, text_of
 from colonnade_lab.figures.digests import digests_of, emit
 from colonnade_lab.figures.kept import kept, record_lines
+from colonnade_lab.ppa.library.liberty_files import find_liberties
 
 
 def require_libraries(entries: Sequence[Entry]) -> None:
-    """Check that the variables name the liberty files.
+    """Fetch the libraries of entries, unless they are there.
 
     Raises:
-        UserError: A variable is not set.
+        UserError: A library cannot be fetched.
     """
     for library in dict.fromkeys(library for entry in entries for library in entry.libraries):
-        if not os.environ.get(library):
-            names = ", ".join(entry.name for entry in entries if library in entry.libraries)
-            raise UserError(f"set {library} to the liberty files of this library, separated by spaces: for {names}")
+        find_liberties((library,))
 
 
 def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
@@ -91,7 +89,7 @@ def _report(entry: Entry, command: tuple[str, ...]) -> Any:
     (root / "out").mkdir(exist_ok=True)
     with temporary_folder() as folder:
         report = root / entry.report if entry.report else folder / "report.json"
-        program, *arguments = _expanded(command, report)
+        program, *arguments = (part.replace(REPORT, str(report)) for part in command)
         programs: dict[str, list[object]] = {
             "colonnade": [Path(sys.executable).parent / "colonnade"],
             **{tool: [sys.executable, tool] for tool in ("tools/room-frames", "tools/simulators", "tools/view-frames")},
@@ -105,17 +103,3 @@ def _report(entry: Entry, command: tuple[str, ...]) -> Any:
     if failed:
         raise UserError(f"{entry.name}: {len(failed)} measurements failed, the first one: {failed[0]}")
     return content
-
-
-def _expanded(command: tuple[str, ...], report: Path) -> list[str]:
-    """The command with the paths of its report and of the libraries."""
-    found: list[str] = []
-    for part in command:
-        prefix, _, library = part.rpartition("=")
-        if library in LIBRARIES:
-            option = found.pop()
-            for file in os.environ[library].split():
-                found += [option, f"{prefix}={file}" if prefix else file]
-        else:
-            found.append(part.replace(REPORT, str(report)))
-    return found

@@ -398,7 +398,7 @@ def test_check_lists_the_points_and_writes_nothing(study: Path) -> None:
         ('["cube"]', '["kube"]', ":13: "),
         ("scene.toml", "none.toml", ":12: "),
         ("[quality]", "[area]\n[quality]", None),
-        ('"Try <b>"\n', '"Try"\nlibraries = ["asap7"]\n', ":2: the library asap7 has no files: --library asap7=FILE"),
+        ('"Try <b>"\n', '"Try"\nlibraries = ["cells"]\n', ":2: the library cells has no files: --library cells=FILE"),
     ],
 )
 def test_what_is_missing_is_refused_before_the_first_job(

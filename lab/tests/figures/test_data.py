@@ -15,6 +15,7 @@ from colonnade.design.toolchain import project_root
 from colonnade_lab.figures import catalog, data, digests, kept, measure
 from colonnade_lab.figures.catalog import Entry
 from colonnade_lab.figures.facts import PRESETS
+from colonnade_lab.ppa.library.liberty_files import find_liberties
 
 CONFIG = {"array": {"rows": 1}, "frame": None}
 ENTRY = Entry("bench-tiny", "tiny", {"": ("colonnade", "bench", "--config", "tiny", "--json", "REPORT")}, sources=())
@@ -310,14 +311,17 @@ def test_the_catalog_measures_every_preset() -> None:
         catalog.selected(("beauty",))
 
 
-def test_libraries_are_named_by_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_libraries_are_those_of_variables_or_fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     entries = catalog.selected(("area-tiny", "energy-area"))
     monkeypatch.delenv("ASAP7", raising=False)
-    with pytest.raises(UserError, match="set ASAP7"):
+    monkeypatch.setenv("COLONNADE_DOWNLOADS", str(tmp_path))
+    (tmp_path / "asap7_simple.lib.gz").touch()
+    with pytest.raises(UserError, match=r"asap7_simple\.lib\.gz, from COLONNADE_DOWNLOADS, is another file"):
         measure.require_libraries(entries)
-    monkeypatch.setenv("ASAP7", "a.lib b.lib")
+    files = [tmp_path / name for name in ("a.lib", "b.lib")]
+    for file in files:
+        file.touch()
+    monkeypatch.setenv("ASAP7", " ".join(map(str, files)))
     measure.require_libraries(entries)
-    ppa, explore = (measure._expanded(entry.commands[""], tmp_path / "r.json") for entry in entries)
-    assert ppa[3:] == ["tiny", "--liberty", "a.lib", "--liberty", "b.lib", "--json", str(tmp_path / "r.json")]
-    assert explore[3:7] == ["--library", "asap7=a.lib", "--library", "asap7=b.lib"]
+    assert find_liberties(("ASAP7",)) == find_liberties(("asap7",)) == tuple(files)
     assert data.commands_of(entries[0]) == ["colonnade ppa --config tiny --liberty ASAP7"]

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import gzip
 import io
+import os
 import re
 import zlib
 from collections.abc import Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 
+from colonnade.common.downloads import fetched
 from colonnade.common.errors import UserError, reason_of
-from colonnade.common.input_files import is_folder, read_input, require_regular
+from colonnade.common.input_files import exists, is_folder, read_input, require_regular
 from colonnade.common.limits import MAX_LIBERTY_BYTES
+from colonnade.common.published import LIBRARIES
 
 #: Cells that ordinary logic must not use: scan, power domains, probes, delays.
 AVOIDED = (
@@ -39,14 +42,20 @@ FOR_POWER = re.compile(rf"{_ALWAYS_DROPPED}|timing")
 
 
 def find_liberties(names: Sequence[str]) -> tuple[Path, ...]:
-    """The liberty files of ``--liberty``, whose values are files or folders.
+    """The liberty files of ``--liberty``, whose values are files, folders, or names of published libraries.
+
+    A library is in the files and folders of the variable of its name, separated by spaces, else it is fetched.
 
     Raises:
-        UserError: A file is missing, or a folder has no liberty files.
+        UserError: A file is missing, cannot be fetched, or a folder has no liberty files.
     """
     found: list[Path] = []
     for name in names:
-        path = Path(name)
+        path, library = Path(name), LIBRARIES.get(name.lower())
+        if library is not None and not exists(path):
+            own = os.environ.get(name.upper(), "").split()
+            found += find_liberties(own) if own else (fetched(file, f"a file of {name}") for file in library.files)
+            continue
         if is_folder(path):
             try:
                 inside = sorted(p for p in path.iterdir() if re.search(r"\.lib(\.gz)?$", p.name))
@@ -56,7 +65,11 @@ def find_liberties(names: Sequence[str]) -> tuple[Path, ...]:
                 raise UserError(f"{name} holds no .lib and no .lib.gz file: name another folder for --liberty")
             found += inside
         else:
-            require_regular(path, "the liberty", f"no liberty {name}: name a .lib or .lib.gz file, or a folder of them")
+            require_regular(
+                path,
+                "the liberty",
+                f"no liberty {name}: name a .lib or .lib.gz file, a folder of them, or {' or '.join(LIBRARIES)}",
+            )
             found.append(path)
     return tuple(found)
 
