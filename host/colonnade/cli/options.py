@@ -89,6 +89,18 @@ class SceneName(_PathType):
 SCENE = SceneName()
 
 
+class RoomName(_PathType):
+    """The folder of a room, or the name of one of the project's rooms, such as ``living``. A folder comes first."""
+
+    name = "room"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Find the folder; the code that reads it checks that it exists."""
+        from colonnade.scene.parser import room_folder
+
+        return room_folder(value)
+
+
 def configuration_options(command: Decorated) -> Decorated:
     """Add ``--config`` and ``--set``, which choose the hardware configuration."""
     command = click.option(
@@ -195,9 +207,20 @@ def strict_option(command: Decorated) -> Decorated:
 
 
 def background_option(command: Decorated) -> Decorated:
-    """Add ``--background``, which replaces the scene's background by a room."""
+    """Add ``--background``, also called ``--room``, which replaces the scene's background by a room."""
     return click.option(
-        "--background", type=FILE, metavar="DIR", help="Replace the scene's background by the room in this folder."
+        "--background",
+        "--room",
+        type=RoomName(),
+        metavar="DIR",
+        help="Replace the scene's background by the room in this folder, or a room of the project such as living.",
+    )(command)
+
+
+def animation_option(command: Decorated) -> Decorated:
+    """Add ``--animation``, which replaces that of the scene's mesh."""
+    return click.option(
+        "--animation", metavar="NAME", help="Play this animation of the scene's glTF file, a name or a number."
     )(command)
 
 

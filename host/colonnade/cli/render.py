@@ -13,6 +13,7 @@ from colonnade.cli.options import (
     FILE,
     SCENE,
     Command,
+    animation_option,
     background_option,
     configuration_options,
     echo,
@@ -49,11 +50,11 @@ class _Render(Command):
 
 
 def _is_scene(word: str) -> bool:
-    """Whether a word is the name of a scene or of a TOML file."""
-    from colonnade.scene.parser import scene_file
+    """Whether a word is the name of a scene, of a TOML file or of a mesh file."""
+    from colonnade.scene.parser import is_mesh_file, scene_file
 
     try:
-        return word.endswith(".toml") or scene_file(word).is_file()
+        return word.endswith(".toml") or is_mesh_file(Path(word)) or scene_file(word).is_file()
     except (UserError, OSError, ValueError):
         return False
 
@@ -72,6 +73,7 @@ def _is_scene(word: str) -> bool:
 @mesh_option
 @simplify_option
 @background_option
+@animation_option
 @encoder_option
 @click.option("--relit", is_flag=True, help="Show the room shaded by the scene's lights instead of its photo.")
 @click.option(
@@ -139,6 +141,7 @@ def render(
     mesh: str | None,
     simplify: int | None,
     background: Path | None,
+    animation: str | None,
     encoder: Encoder | None,
     relit: bool,
     truth: Path | None,
@@ -154,6 +157,8 @@ def render(
     json_file: Path | None,
 ) -> None:
     """Render SCENE, a TOML file or the name of one such as room, and print its rays, cycles and seconds.
+
+    SCENE may be a mesh, such as my.glb: a camera then frames it, with the materials of its file.
 
     With --frames the object or a light moves, with --sequence the camera.
     """
@@ -209,6 +214,7 @@ def render(
         mesh=mesh,
         simplify=simplify,
         background=background,
+        animation=animation,
         sequence=sequence,
         keyframes=keyframes,
         encoder=encoder,

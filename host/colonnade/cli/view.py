@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from colonnade.cli.options import Command, configuration_options, echo, encoder_option, size_option
+from colonnade.cli.options import (
+    Command,
+    animation_option,
+    background_option,
+    configuration_options,
+    echo,
+    encoder_option,
+    size_option,
+)
 from colonnade.maps.encoders import Encoder
 
 
@@ -14,6 +22,8 @@ from colonnade.maps.encoders import Encoder
 @click.argument("scene", type=click.Path())
 @configuration_options
 @size_option("Frame size in pixels.  [default: 320x240]")
+@background_option
+@animation_option
 @encoder_option
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port of the page.  [default: a free one]"
@@ -24,11 +34,13 @@ def view(
     config: str,
     overrides: tuple[str, ...],
     size: str | None,
+    background: Path | None,
+    animation: str | None,
     encoder: Encoder | None,
     port: int,
     opens: bool,
 ) -> None:
-    """Show SCENE, a TOML file or the name of one, in a page at 127.0.0.1, rendered by the bit-exact model.
+    """Show SCENE, a TOML file, the name of one, or a mesh, in a page at 127.0.0.1, rendered by the bit-exact model.
 
     Drag orbits, the wheel zooms, shift and drag pans. The scene is loaded again whenever its file or one that it
     reads changes. The key s writes the camera into the file, r goes back to that of the file. Ctrl-C ends the command.
@@ -44,7 +56,8 @@ def view(
 
     pixels = parse_size(size) if size is not None else (320, 240)
     file = scene_file(scene)
-    session = Session(file, config, overrides, pixels, encoder, for_terminal(), is_own=file == Path(scene))
+    is_own = file == Path(scene)
+    session = Session(file, config, overrides, pixels, encoder, for_terminal(), is_own, background, animation)
     server = ViewServer(session, port)
     server.start()
     echo(f"{file} is in view; Ctrl-C ends. Its page, for you alone:")

@@ -48,7 +48,7 @@ def render_frames(request: RenderRequest, progress: Progress = QUIET) -> Iterato
         require_extra("reference", "the reference backend")
     room = request.background if request.sequence is None else request.sequence.path.parent
     if not isinstance(request.scene, Scene):
-        scene = load_scene(request.scene, room)
+        scene = load_scene(request.scene, room, request.animation)
     else:
         scene = request.scene if room is None else request.scene.with_environment(room)
     if isinstance(request.mesh, str):

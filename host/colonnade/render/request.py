@@ -24,7 +24,7 @@ class RenderRequest:
     """A request for one frame of a scene, or for the frames of its motion.
 
     Attributes:
-        scene: A scene, or its file, TOML.
+        scene: A scene, or its file, TOML or a mesh.
         config: Preset, path, or precision such as ``32b32s64d``.
         overrides: Changes to the configuration, ``key=value``.
         backend: ``rtl``: the generated Verilog in a simulator; ``model``: its bit-exact model; ``reference``: Embree.
@@ -34,6 +34,7 @@ class RenderRequest:
         mesh: A mesh that replaces the scene's, or its name or file.
         simplify: Number of triangles to which a named mesh of more is simplified; None: that of the scene.
         background: Folder of a room that replaces the scene's background.
+        animation: Name or number of an animation that replaces that of the scene file's mesh.
         sequence: Views of a room, one for each frame, which replace the scene's background and motion.
         keyframes: Of a sequence, every so many frames have maps; None: as its file says.
         hits: Whether the caller needs hit triangles; the configuration must then have them.
@@ -57,6 +58,7 @@ class RenderRequest:
     mesh: str | Mesh | None = None
     simplify: int | None = None
     background: Path | None = None
+    animation: str | None = None
     sequence: RoomSequence | None = None
     keyframes: int | None = None
     hits: bool = False

@@ -71,6 +71,8 @@ def object_mesh(scene: Scene, environment: Environment | None = None, corner_col
         return joined_mesh(scene, environment, corner_colours)
     mesh = load.load_mesh(scene.mesh_source, scene.mesh.crease, corner_colours, scene.mesh.simplify, scene.mesh.played)
     report_replaced(mesh, scene.material)
+    if scene.note:
+        notes.tell(scene.note)
     return mesh
 
 

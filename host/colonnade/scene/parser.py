@@ -25,6 +25,9 @@ from colonnade.scene.model import MAX_EDGE, MAX_OBJECTS, MeshSource, Scene
 #: ``light``; several ``object`` are its objects.
 _TABLES = "mesh transform object camera light material paths ambient background motion frame".split()
 
+#: The project's scene of a mesh that is given in place of a scene: its tables but ``mesh``.
+MESH_SCENE = "as-authored"
+
 _SCHEMA = TypeAdapter(Scene)
 _JSON_SCHEMA: dict[str, Any] = _SCHEMA.json_schema()
 
@@ -50,31 +53,81 @@ def scene_file(name: str | Path) -> Path:
     return named
 
 
-def load_scene(path: str | Path, room: Path | None = None) -> Scene:
-    """Read a scene file; its paths are relative to its folder.
+@checked
+def room_folder(name: str | Path) -> Path:
+    """The folder of a room: a folder, or the name of one of the project's rooms, such as ``living``."""
+    path = Path(name)
+    if re.fullmatch(r"[\w-]+", str(name)) is None or os.path.lexists(path):
+        return path
+    try:
+        named = project_root() / "scenes" / "rooms" / path
+    except UserError:
+        return path
+    return named if named.is_dir() else path
+
+
+def load_scene(path: str | Path, room: Path | None = None, animation: str | None = None) -> Scene:
+    """Read a scene file; its paths are relative to its folder. A mesh file gets a scene, of which a note tells.
 
     Args:
         path: The file.
         room: Folder of a room in place of the scene's background, if it has one.
+        animation: Name or number of an animation in place of that of the scene's mesh.
 
     Raises:
-        UserError: The file is missing, is not TOML, or has an invalid key or value.
+        UserError: The file is missing, is neither TOML nor a mesh, or has an invalid key or value.
     """
     file = Path(path)
-    scene = scene_of(read_tables(file), f"scene {file}", file.parent, room is not None)
+    tables = read_tables(file, room is not None)
+    if animation is not None:
+        tables = _with_animation(tables, animation)
+    scene = scene_of(tables, f"scene {file}", file.parent, room is not None)
+    if is_mesh_file(file):
+        scene = replace(scene, note=_note_of_mesh(file, room is not None))
     return scene if room is None else scene.with_environment(room)
 
 
-def read_tables(file: Path) -> dict[str, Any]:
-    """The tables of a scene file, as they stand in it.
+def is_mesh_file(file: Path) -> bool:
+    """Whether a file is a mesh, by its suffix."""
+    return file.suffix.lower() in SUFFIXES
+
+
+def read_tables(file: Path, in_room: bool = False) -> dict[str, Any]:
+    """The tables of a scene file, as they stand in it; or those of the scene that a mesh file gets.
+
+    Args:
+        file: The file.
+        in_room: Whether the scene gets a room, also if its background names none: then a mesh has no other table.
 
     Raises:
-        UserError: The file is missing, or is not TOML.
+        UserError: The file is missing, or is neither TOML nor a mesh.
     """
-    if file.suffix.lower() in SUFFIXES:
-        raise UserError(f"{file} is a mesh, not a scene: give it by mesh.path of a scene, or as --mesh of as-authored")
+    if is_mesh_file(file):
+        return ({} if in_room else read_tables(_mesh_scene())) | {"mesh": {"path": file.name}}
     content = read_input(file, "the scene", missing=f"scene file {file} does not exist")
-    return parse_toml(content, f"scene {file}")
+    try:
+        return parse_toml(content, f"scene {file}")
+    except UserError:
+        if file.suffix.lower() in ("", ".toml"):
+            raise
+        suffixes = ", ".join(SUFFIXES)
+        raise UserError(f"{file} is neither a scene in TOML, nor a mesh, whose suffix is one of {suffixes}") from None
+
+
+def _mesh_scene() -> Path:
+    return project_root() / "scenes" / f"{MESH_SCENE}.toml"
+
+
+def _note_of_mesh(file: Path, in_room: bool) -> str:
+    """What a mesh file's scene assumes."""
+    others = "place, size and light by the room" if in_room else f"camera, light and background of {_mesh_scene()}"
+    return f"{file} has the materials of its file, and {others}: a scene file changes them"
+
+
+def _with_animation(tables: dict[str, Any], animation: str) -> dict[str, Any]:
+    if "object" in tables and isinstance(tables["object"], list):
+        raise UserError("an animation is of a single object: give mesh.animation to an [[object]]")
+    return tables | {"mesh": dict(_table(tables, "mesh")) | {"animation": animation}}
 
 
 def scene_of(tables: Mapping[str, Any], where: str, folder: Path, in_room: bool = False) -> Scene:

@@ -29,7 +29,7 @@ from colonnade.render.room_defaults import with_room_defaults
 from colonnade.render.samples import tell_defaults
 from colonnade.scene.model import Camera, Scene
 from colonnade.scene.model.values import WorldVector
-from colonnade.scene.parser import load_scene
+from colonnade.scene.parser import is_mesh_file, load_scene
 from colonnade.scene.passes import exposed
 from colonnade.scene.view import place
 from colonnade.scene_image.file import SceneImage
@@ -108,6 +108,7 @@ class Session:
         encoder: Of a room's maps and of textures.
         progress: Shows the run of the generator.
         is_own: The file is the user's; False: it belongs to the project, and no camera is saved into it.
+        room, animation: As in `load_scene`.
 
     Raises:
         UserError: The scene cannot be read or packed.
@@ -122,8 +123,11 @@ class Session:
         encoder: Encoder | None = None,
         progress: Progress = QUIET,
         is_own: bool = True,
+        room: Path | None = None,
+        animation: str | None = None,
     ) -> None:
         self.file, self.size = file, size
+        self._room, self._animation = room, animation
         self._is_own = is_own
         self._encoder = encoder
         self._config = config
@@ -236,9 +240,11 @@ class Session:
         """Write a camera into the scene file.
 
         Raises:
-            UserError: The file is not the user's, or has an error; no frame can show the scene with this camera; or see
-                `save_camera`.
+            UserError: The file is not the user's, is a mesh, or has an error; no frame can show the scene with this
+                camera; or see `save_camera`.
         """
+        if is_mesh_file(self.file):
+            raise UserError(f"{self.file} is a mesh: a camera is saved into a scene file with mesh.path")
         if not self._is_own:
             copy = f"cp -r {shlex.quote(str(self.file.parent))} my-scenes && colonnade view my-scenes/{self.file.name}"
             raise UserError(f"{self.file.stem} is a scene of the project: to save a camera, view a copy of it: {copy}")
@@ -293,7 +299,8 @@ class Session:
         lines: list[str] = []
         with ledger.opened() as files, notes.opened(lines.append):
             self._lookups = files.lookups  # up to an error, if there is one
-            description, line = with_room_defaults(load_scene(self.file), self._config, self._manifest)
+            loaded = load_scene(self.file, self._room, self._animation)
+            description, line = with_room_defaults(loaded, self._config, self._manifest)
             description = exposed(description)
             samples = description.frame.samples or 1
             description = description.with_samples(samples if samples > 1 else STILL_SAMPLES)

@@ -124,9 +124,8 @@ def test_mistakes_are_named(tmp_path: Path, text: str, message: str) -> None:
     assert "\n" not in str(caught.value) and "scene.toml" in str(caught.value)
 
 
-def test_a_mesh_is_no_scene_and_a_mark_is_no_text(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"a\.GLB is a mesh, not a scene: give it by mesh\.path"):
-        load_scene(tmp_path / "a.GLB")
+def test_a_mesh_file_gets_a_scene_and_a_mark_is_no_text(tmp_path: Path) -> None:
+    assert load_scene(tmp_path / "a.GLB").mesh.path == tmp_path / "a.GLB"
     assert load_scene(write(tmp_path, '\ufeff[mesh]\nname = "cube"')).mesh.name == "cube"
 
 

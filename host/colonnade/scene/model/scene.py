@@ -33,7 +33,7 @@ class Scene:
     gathers. ``fits_lights`` tells that these have an area, a guess that no mirror shows. ``pass_lights`` is the number
     of lights of a pass, if those were found and may be more; 0: it has all. ``headroom`` scales all lights
     up and diffuse albedos of the object down (`colonnade.environment.photo_colours`). ``exposure`` is the device's
-    number for the radiance 1.0, as a factor.
+    number for the radiance 1.0, as a factor. ``note`` tells what the scene of a mesh file assumes.
     """
 
     mesh: MeshSource
@@ -59,6 +59,7 @@ class Scene:
     pass_lights: int = 0
     headroom: float = 1.0
     exposure: float = 1.0
+    note: str = ""
 
     def at(self, progress: float) -> Scene:
         """The scene at a progress along its motion."""
@@ -85,7 +86,7 @@ class Scene:
             UserError: The scene has several objects.
         """
         self.require_one_object("a mesh replaces that of a single object")
-        return replace(self, mesh=replace(self.mesh, name=name_or_path, path=None))
+        return replace(self, mesh=replace(self.mesh, name=name_or_path, path=None), note="")
 
     def with_simplified_mesh(self, triangles: int) -> Scene:
         """The scene with its mesh simplified to so many triangles.
