@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from pathlib import Path
 
 from colonnade.common import processes
@@ -10,7 +11,9 @@ from colonnade.design.toolchain import project_root, require_program
 
 #: The library's name: programs for Embree 4 are linked with it.
 NAME = "libembree4.so.4"
-_OPTIONS = "-std=gnu++17 -O3 -DNDEBUG -ffp-contract=off -fPIC -shared -pthread".split()
+#: Those of host/CMakeLists.txt for the same sources.
+_OPTIONS = "-std=gnu++17 -O3 -DNDEBUG -Wno-psabi -ffp-contract=off -fPIC -shared -pthread".split()
+_OPTIONS += ["-msse4.1"] * (platform.machine() in ("x86_64", "AMD64"))
 
 
 def compile_library(folder: Path, *options: str) -> Path:

@@ -55,8 +55,11 @@ public:
         return &other.emplace(leaves_[leafAt_[address]]);
     }
 
-    /// Fetches a record that is read soon.
-    void prefetch(std::size_t address) const { __builtin_prefetch(slots_.data() + std::min(address, recordCount_)); }
+    /// Fetches the records that the children of a node begin with, while they are tested.
+    void prefetch(std::size_t address) const {
+        const Slot* const first = slots_.data() + std::min(address, recordCount_);
+        for (int i = 0; i < nodeChildren; ++i) __builtin_prefetch(first + i);
+    }
 
     /// The attributes of a hit triangle, without colours.
     Face faceOf(std::uint64_t id) const { return colonnade::faceOf(leaves_[leafAt_[id / leafTriangles]], static_cast<int>(id % leafTriangles), normalFraction_); }

@@ -40,11 +40,27 @@ struct TraceRecord {
     RayLog log;
 };
 
+/// What a program keeps of each triangle. It is fetched while the search of the ray that hits one goes on.
+struct FaceTable {
+    const std::uint32_t* indices = nullptr; ///< of the records, by id; UINT32_MAX for none
+    const std::uint8_t* records = nullptr;
+    std::size_t bytes = 0; ///< of a record
+
+    bool isEmpty() const { return indices == nullptr; }
+    void prefetchIndex(std::uint64_t id) const { __builtin_prefetch(indices + id); }
+    void prefetchRecord(std::uint64_t id) const {
+        if (indices[id] == UINT32_MAX) return;
+        const std::uint8_t* const record = records + indices[id] * bytes;
+        __builtin_prefetch(record);
+        __builtin_prefetch(record + bytes - 1);
+    }
+};
+
 /// Finds the hits of prepared rays in a scene that does not change, and notes what it did. It only refers to its arguments.
 class SceneSearch {
 public:
-    SceneSearch(const Numbers& numbers, const ColumnMemory& memory, const Frame& frame, TraceRecord& record)
-        : numbers_(numbers), memory_(memory), frame_(frame), record_(record) {}
+    SceneSearch(const Numbers& numbers, const ColumnMemory& memory, const Frame& frame, TraceRecord& record, FaceTable faces = {})
+        : numbers_(numbers), memory_(memory), frame_(frame), record_(record), faces_(faces) {}
 
     /// The closest hit of a prepared ray.
     Hit trace(const Ray& ray, const RayFilter* filter = nullptr) const {
@@ -145,6 +161,7 @@ private:
             return;
         }
         const LeafTriangles& leaf = *found;
+        if (!faces_.isEmpty()) faces_.prefetchIndex(leafTriangles * address);
         record_.log.addRead(RayStep::Kind::record, address);
         for (int i = 0; i < leaf.count; ++i) {
             ++record_.counters.triangleTests;
@@ -155,6 +172,7 @@ private:
             record_.log.addTriangle(vertices, id, isHit);
             hit.isClear = leaf.isClear;
             if (!isHit || (state.filter && !state.filter->accepts(hit, leaf))) continue;
+            if (!faces_.isEmpty()) faces_.prefetchRecord(id);
             if (state.hits) {
                 state.hits->push_back(hit);
                 continue;
@@ -193,7 +211,7 @@ private:
                 }
                 ++record_.counters.nodeReads;
                 const Node& node = *found;
-                prefetchChildren(node);
+                memory_.prefetch(node.first);
                 std::array<Entered, nodeChildren> entered;
                 int count = 0;
                 record_.counters.boxTests += node.isLegal ? static_cast<std::uint64_t>(node.children()) : 0;
@@ -226,12 +244,6 @@ private:
         }
     }
 
-    /// Fetches what the ray reads next while the node's children are tested.
-    void prefetchChildren(const Node& node) const {
-        const std::size_t step = frame_.leafRecords();
-        for (std::size_t i = 0; i < node.nodes; ++i) memory_.prefetch(node.first + i);
-        for (std::size_t i = 0; i < node.leaves; ++i) memory_.prefetch(node.first + node.nodes + i * step);
-    }
 
     StackEntry entryOf(const Node& node, const Entered& child) const {
         const auto slot = static_cast<std::uint32_t>(child.slot), nodes = std::uint32_t{node.nodes};
@@ -244,6 +256,7 @@ private:
     const ColumnMemory& memory_;
     const Frame& frame_;
     TraceRecord& record_;
+    FaceTable faces_;
 };
 
 /// Finds the hits of prepared rays. Copies share the column memory.

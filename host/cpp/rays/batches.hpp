@@ -33,8 +33,8 @@ public:
                     if (id >= COLONNADE_RAYS_OUT_OF_RANGE) return;
                     const std::size_t i = first + k, face = faceOf(id);
                     if (isRefined_ || !scene_.masks().isExact()) {
-                        const std::optional<PlaneHit> hit = isRefined_ ? planeHit(face, local, rays[i]) : std::nullopt;
-                        if (hit && hit->least >= 0 && accepts(rays[i], mode, mask, face, *hit)) hits[i] = hitOf(i, face, *hit);
+                        const std::optional<PlaneHit> hit = isRefined_ ? refined(face, local, rays[i], mode, mask) : std::nullopt;
+                        if (hit) hits[i] = hitOf(i, face, *hit);
                         else left.push_back(i);
                         return;
                     }
@@ -58,11 +58,7 @@ public:
                     isOccluded[i] = id < COLONNADE_RAYS_OUT_OF_RANGE;
                     if (!isOccluded[i] || (!isRefined_ && scene_.masks().isExact())) return;
                     // The model names the triangle, a device does not
-                    if (!device_ && isRefined_) {
-                        const std::size_t face = faceOf(id);
-                        const std::optional<PlaneHit> hit = planeHit(face, local, rays[i]);
-                        if (hit && hit->least >= 0 && accepts(rays[i], mode, mask, face, *hit)) return;
-                    }
+                    if (!device_ && isRefined_ && refined(faceOf(id), local, rays[i], mode, mask)) return;
                     isOccluded[i] = 0;
                     left.push_back(i);
                 });
@@ -346,6 +342,12 @@ private:
         std::optional<PlaneHit> hit = scene_.faces().hit(face, ray.origin, local.direction);
         if (hit) hit->t *= local.scale;
         return hit;
+    }
+
+    /// The hit of the face that the device found, if its vertices agree and the ray accepts it.
+    std::optional<PlaneHit> refined(std::size_t face, const Local& local, const AppRay& ray, std::uint32_t mode, std::uint32_t mask) const {
+        const std::optional<PlaneHit> hit = planeHit(face, local, ray);
+        return hit && hit->least >= 0 && accepts(ray, mode, mask, face, *hit) ? hit : std::nullopt;
     }
 
     bool accepts(const AppRay& ray, std::uint32_t mode, std::uint32_t mask, std::size_t face, const PlaneHit& hit) const {

@@ -16,20 +16,30 @@ struct PlaneHit {
     bool backSide;
 };
 
+/// What the hit of a face reads, together for the sake of a processor's cache.
+struct FaceRecord {
+    std::array<mesh::Vector, 3> corners;
+    std::uint32_t mesh, face; ///< of the application
+    bool isClear;
+};
+
 class Faces {
 public:
     Faces() = default;
-    Faces(std::vector<mesh::Vector> vertices, std::vector<mesh::Face> faces) : vertices_(std::move(vertices)), faces_(std::move(faces)) {
-        corners_.reserve(faces_.size());
-        for (const mesh::Face& face : faces_) corners_.push_back({vertices_[face[0]], vertices_[face[1]], vertices_[face[2]]});
+    /// `each`: the faces in the order of `faces`, but for their corners.
+    Faces(std::vector<mesh::Vector> vertices, std::vector<mesh::Face> faces, std::vector<FaceRecord> each)
+        : vertices_(std::move(vertices)), faces_(std::move(faces)), records_(std::move(each)) {
+        for (std::size_t i = 0; i < faces_.size(); ++i)
+            for (int corner = 0; corner < 3; ++corner) records_[i].corners[corner] = vertices_[faces_[i][corner]];
     }
 
     const std::vector<mesh::Vector>& vertices() const { return vertices_; }
     const std::vector<mesh::Face>& faces() const { return faces_; }
+    const FaceRecord& operator[](std::size_t index) const { return records_[index]; }
 
     /// The distance of a face's corner from the longest edge.
     double altitude(std::size_t index) const {
-        const std::array<mesh::Vector, 3>& corners = corners_[index];
+        const std::array<mesh::Vector, 3>& corners = records_[index].corners;
         double longest = 0;
         for (int i = 0; i < 3; ++i) {
             const mesh::Vector edge = mesh::difference(corners[(i + 1) % 3], corners[i]);
@@ -41,7 +51,7 @@ public:
 
     /// Nothing for a ray along the face's plane, or one whose numbers overflow.
     std::optional<PlaneHit> hit(std::size_t index, const double* origin, const double* direction) const {
-        const std::array<mesh::Vector, 3>& corners = corners_[index];
+        const std::array<mesh::Vector, 3>& corners = records_[index].corners;
         const mesh::Vector &corner = corners[0], d{direction[0], direction[1], direction[2]};
         const mesh::Vector e1 = mesh::difference(corners[1], corner), e2 = mesh::difference(corners[2], corner);
         const mesh::Vector s = mesh::difference({origin[0], origin[1], origin[2]}, corner), p = mesh::cross(d, e2), q = mesh::cross(s, e1);
@@ -95,7 +105,7 @@ private:
 
     std::vector<mesh::Vector> vertices_;
     std::vector<mesh::Face> faces_;
-    std::vector<std::array<mesh::Vector, 3>> corners_; ///< of the faces, together for the sake of the cache
+    std::vector<FaceRecord> records_;
     std::unique_ptr<Neighbours> neighbours_ = std::make_unique<Neighbours>();
 };
 

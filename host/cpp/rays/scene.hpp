@@ -75,7 +75,8 @@ public:
         }
         records_ = packer.records();
         describe(packer.sections());
-        if (hasModel) model_ = std::make_unique<RayModel>(Numbers(design_.numbers), design_.number("directionBits"), design_.format.layouts, image_);
+        const FaceTable table{faceOfId_.data(), reinterpret_cast<const std::uint8_t*>(&faces_[0]), sizeof(FaceRecord)};
+        if (hasModel) model_ = std::make_unique<RayModel>(Numbers(design_.numbers), design_.number("directionBits"), design_.format.layouts, image_, table);
     }
 
     bool isEmpty() const { return faces_.faces().empty(); }
@@ -90,10 +91,10 @@ public:
     /// That of the cube of all vertex units.
     double edge() const { return edge_; }
 
-    std::uint32_t meshOf(std::size_t face) const { return owners_[face].first; }
-    std::uint32_t faceOf(std::size_t face) const { return owners_[face].second; }
-    std::uint32_t maskOf(std::size_t face) const { return meshMasks_[owners_[face].first]; }
-    bool isOpaque(std::size_t face) const { return isClear_[face] == 0; }
+    std::uint32_t meshOf(std::size_t face) const { return faces_[face].mesh; }
+    std::uint32_t faceOf(std::size_t face) const { return faces_[face].face; }
+    std::uint32_t maskOf(std::size_t face) const { return meshMasks_[faces_[face].mesh]; }
+    bool isOpaque(std::size_t face) const { return !faces_[face].isClear; }
 
     /// The face of a packed id; all ones for an id of none.
     std::size_t faceOfId(std::uint32_t id) const { return id < faceOfId_.size() && faceOfId_[id] != noFace ? faceOfId_[id] : ~std::size_t{0}; }
@@ -122,6 +123,7 @@ private:
         maskMap_ = MaskMap(enabledMasks);
         std::vector<mesh::Vector> vertices;
         std::vector<mesh::Face> faces;
+        std::vector<FaceRecord> records;
         for (std::size_t number = 0; number < meshes.size(); ++number) {
             if (!meshes[number] || !meshes[number]->isEnabled) continue;
             const MeshPart& part = *meshes[number];
@@ -138,12 +140,13 @@ private:
                     face[corner] = index;
                 }
                 faces.push_back(face);
-                owners_.push_back({static_cast<std::uint32_t>(number), static_cast<std::uint32_t>(i)});
+                const bool isClear = !part.isOpaque.empty() && !part.isOpaque[i];
+                records.push_back({{}, static_cast<std::uint32_t>(number), static_cast<std::uint32_t>(i), isClear});
                 masks_.push_back(maskMap_.of(part.mask));
-                isClear_.push_back(!part.isOpaque.empty() && !part.isOpaque[i]);
+                isClear_.push_back(isClear);
             }
         }
-        faces_ = Faces(std::move(vertices), std::move(faces));
+        faces_ = Faces(std::move(vertices), std::move(faces), std::move(records));
     }
 
     void checkFit(const packer::Sections& sections) const {
@@ -174,7 +177,6 @@ private:
 
     const Design& design_;
     Faces faces_;
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> owners_;
     std::vector<std::uint32_t> meshMasks_;
     MaskMap maskMap_;
     std::vector<std::uint8_t> masks_, isClear_; ///< of the faces; a leaf has the device's mask in place of a material

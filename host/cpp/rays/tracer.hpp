@@ -69,9 +69,9 @@ struct RayRecord : TraceRecord {
 /// A loaded scene. It does not change: any number of threads may trace at the same time.
 class RayModel {
 public:
-    RayModel(const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts, const colonnade_rays_image& image)
+    RayModel(const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts, const colonnade_rays_image& image, FaceTable faces = {})
         : numbers_(whole(numbers)), memory_(layouts, numbers_),
-          converter_(numbers_, directionBits, {image.scale_mantissa, image.scale_exponent, {image.base[0], image.base[1], image.base[2]}}) {
+          converter_(numbers_, directionBits, {image.scale_mantissa, image.scale_exponent, {image.base[0], image.base[1], image.base[2]}}), faces_(faces) {
         memory_.load(image.records, image.record_count, image.record_bytes);
         frame_ = {};
         frame_.recordCount = image.record_count;
@@ -96,7 +96,7 @@ public:
         Result result;
         if (!prepare(ray, mode, record, result)) return result;
         const RayFilter filter = filterOf(mode);
-        const SceneSearch search(numbers_, memory_, frame_, record);
+        const SceneSearch search(numbers_, memory_, frame_, record, faces_);
         const bool isOcclusion = (mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_OCCLUDED;
         result.hit = isOcclusion ? search.anyHit(result.prepared, filter) : search.trace(result.prepared, &filter);
         if (result.hit.found) result.id = converter_.idOf(result.hit);
@@ -243,6 +243,7 @@ private:
     ColumnMemory memory_;
     RayConverter converter_;
     Frame frame_;
+    FaceTable faces_;
 };
 
 } // namespace colonnade::rays
