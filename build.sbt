@@ -53,7 +53,7 @@ lazy val colonnade = (project in file("."))
     Test / unmanagedSources += baseDirectory.value / "examples" / "axi4" / "ColonnadeAxi4.scala",
     // Elaboration recurses deeply; a fork also keeps the simulators' memory out of sbt.
     Test / fork := true,
-    Test / javaOptions ++= Seq("-Xmx4g", "-Xss16m"),
+    Test / javaOptions ++= IO.readLines(baseDirectory.value / ".jvmopts").filter(_.startsWith("-")),
     Test / testForkedParallel := true,
     // The simulators are compiled with the flags of the specs, not with those of the user; and without optimisation:
     // compiling takes longer than the short simulations.

@@ -46,9 +46,8 @@ VERIFY_ARCHIVE, READ_ARCHIVE = "-XX:+VerifySharedSpaces", "-XX:SharedArchiveFile
 #: The generator's option for a manifest without SystemVerilog.
 MANIFEST_ONLY = "--manifest-only"
 
-#: Most of the generator's code runs once. The optimising compiler of Java would take longer than it saves, and so would
-#: the threads of its garbage collector.
-JAVA_OPTIONS = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-XX:ErrorFile=/dev/null")
+#: Java's options are those of this file of the checkout or wheel, and one against files of crashes.
+JAVA_OPTIONS, NO_CRASH_FILE = ".jvmopts", "-XX:ErrorFile=/dev/null"
 
 #: What Java prints of an exception that a program does not handle: it is one of the generator.
 _CRASH = "Exception in thread"
@@ -267,7 +266,7 @@ def _run(
     archives = [] if MANIFEST_ONLY in options else [f"{WRITE_ARCHIVE}{written}"]
     if archive.is_file():
         archives = [VERIFY_ARCHIVE, f"{READ_ARCHIVE}{archive}"]
-    command = [str(java), *JAVA_OPTIONS, *archives, *_java_options(root), "-cp", classpath, "colonnade.Generate"]
+    command = [str(java), *_java_options(root), *archives, "-cp", classpath, "colonnade.Generate"]
     command += ["--config", str(source.path), "--output", str(design), *sets, *options]
     with progress.step("generating the manifest" if MANIFEST_ONLY in options else "generating the hardware"):
         done = processes.run(command, cwd=root)
@@ -285,9 +284,8 @@ def _run(
 
 
 def _java_options(root: Path) -> list[str]:
-    file = root / ".jvmopts"
-    lines = file.read_text().split("\n") if file.is_file() else ["-Xss16m"]
-    return [line.strip() for line in lines if line.strip() and not line.startswith("#")]
+    lines = (root / JAVA_OPTIONS).read_text().splitlines()
+    return [*(line for line in lines if line.startswith("-")), NO_CRASH_FILE]
 
 
 def _forget_old_states(folder: Path) -> None:

@@ -50,7 +50,8 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     root = tmp_path / "checkout"
     (root / "src" / "main").mkdir(parents=True)
     (root / "configs").mkdir()
-    (root / "build.sbt").write_text("")
+    for name in ("build.sbt", ".jvmopts"):
+        (root / name).write_text("")
     (root / "src" / "main" / "A.scala").write_text("object A")
     for preset in ("tiny", "small"):
         (root / "configs" / f"{preset}.json").write_text("{}")
@@ -85,6 +86,7 @@ def release(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     for preset in ("tiny", "small"):
         (root / "configs" / f"{preset}.json").write_text("{}")
     (root / "colonnade-generator.jar").write_bytes(b"PK")
+    (root / ".jvmopts").write_text("")
     monkeypatch.setattr(toolchain, "RELEASE", root)
     monkeypatch.delenv("COLONNADE_HOME")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
