@@ -11,7 +11,7 @@ RUN apt-get update \
   && /opt/colonnade/tools/test-packages \
   && rm -rf /var/lib/apt/lists/* /var/cache/apt/* /opt/colonnade/.cache
 RUN useradd --create-home --shell /bin/bash colonnade && install -d -o colonnade -g colonnade /colonnade
-ENV LANG=C.UTF-8 PIP_NO_CACHE_DIR=1
+ENV LANG=C.UTF-8 PIP_NO_CACHE_DIR=1 UV_NO_CACHE=1
 USER colonnade
 
 FROM tools

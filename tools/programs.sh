@@ -11,6 +11,7 @@ sbt_version=1.12.14
 sbt_launcher="$root/.tools/sbt-launch-$sbt_version.jar"
 sbt_launcher_sha256=1750c8fb61c2d2f82da40b2cd9014f4d8a1bd49a361402ea5b1cec061ed66578
 sbt_boot="$root/.cache/sbt-boot-$sbt_version" # sbt itself, as the launcher fetches it
+uv="$root/.venv/bin/uv"
 
 # Minimum versions. Verilator: the oldest that the tests ran with; keep host/colonnade/{design/toolchain,device/compiler}.py equal.
 minimum_verilator=5.006
@@ -122,13 +123,6 @@ too_old() {
   fi
 }
 
-# Whether all of the packages are optional: without z3 its proofs are cancelled, without Icarus Verilog its tests are
-# skipped. Usage: are_optional [PACKAGE]…
-are_optional() {
-  local package
-  for package in "$@"; do [ "$package" = z3 ] || [ "$package" = iverilog ] || return 1; done
-}
-
 sha256_matches() { [ -f "$1" ] && [ "$(sha256sum "$1" | cut -d' ' -f1)" = "$2" ]; }
 
 # Prints the Debian packages of missing programs on one line, separated by spaces.
@@ -138,8 +132,6 @@ missing_packages() {
   has verilator || missing+=(verilator)
   has g++ || missing+=(g++)
   has make || missing+=(make)
-  has z3 || missing+=(z3)
-  has iverilog || missing+=(iverilog)
   # Maven only downloads the sbt launcher, so it is not needed if the launcher exists or COLONNADE_SBT is set.
   [ -n "${COLONNADE_SBT:-}" ] || has mvn || sha256_matches "$sbt_launcher" "$sbt_launcher_sha256" || missing+=(maven)
   python="$(python_program)"
@@ -147,16 +139,30 @@ missing_packages() {
   echo "${missing[*]}"
 }
 
-# Installs a lock of host/locks into an environment. pip rejects files whose hash is not in the lock.
-# Usage: install_locked ENVIRONMENT LOCK [OPTION OF PIP]…
+# Installs a lock of host/locks into an environment: by uv, or by pip where .venv has no uv yet or uv fails. Both reject
+# files whose hash is not in the lock.
+# Usage: install_locked ENVIRONMENT LOCK [OPTION OF BOTH]…
 install_locked() {
-  local environment="$1" lock="$2" log="$root/.cache/pip-$2.log" different
+  local environment="$1" lock="$2" log="$root/.cache/pip-$2.log" different="" index place sources=()
   shift 2
   mkdir -p "$root/.cache"
-  PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1 "$environment/bin/python" -m pip install --no-deps --require-hashes "$@" \
-    -r "$root/host/locks/$lock.txt" >"$log" 2>&1 </dev/null && return
-  # pip prints the package in the line after its warning.
-  different="$(awk '/DO NOT MATCH THE HASHES/ { getline; sub(/^ */, ""); sub(/ from .*/, ""); print; exit }' "$log")"
+  set -- --no-deps --require-hashes "$@" -r "$root/host/locks/$lock.txt"
+  export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1
+  if [ -x "$uv" ]; then
+    # uv does not read where pip's settings look for packages.
+    index="$("$(dirname "$uv")/python" -m pip config get global.index-url 2>/dev/null || true)"
+    index="${PIP_INDEX_URL:-$index}"
+    [ -z "$index" ] || sources+=(--default-index "$index")
+    for place in ${PIP_FIND_LINKS:-}; do sources+=(--find-links "$place"); done
+    [ -z "${PIP_NO_INDEX:-}" ] || sources+=(--no-index)
+    "$uv" pip install --python "$environment/bin/python" "${sources[@]}" "$@" >"$log" 2>&1 </dev/null && return
+    different="$(sed -nE 's/.*Hash mismatch for `([^`]*)`.*/\1/p' "$log" | head -n 1)"
+  fi
+  if [ -z "$different" ]; then
+    "$environment/bin/python" -m pip install "$@" >"$log" 2>&1 </dev/null && return
+    # pip prints the package in the line after its warning.
+    different="$(awk '/DO NOT MATCH THE HASHES/ { getline; sub(/^ */, ""); sub(/ from .*/, ""); print; exit }' "$log")"
+  fi
   [ -z "$different" ] || die "the SHA-256 of $different is not in host/locks/$lock.txt; it was not installed: see $log"
   tail -n 20 "$log" >&2
   die "installing the packages of host/locks/$lock.txt failed: see $log"

@@ -56,7 +56,7 @@ def project_tables() -> dict[str, Any]:
 
 
 def wanted_locks() -> list[Lock]:
-    """The locks: build requirements, .venv with host and laboratory, extras apart, `ppa`, each further group."""
+    """The locks: build requirements, `make render`, all of .venv, extras apart, `ppa`, each further group."""
     data = project_tables()
     laboratory = tomllib.loads(LABORATORY.read_text(encoding="utf-8"))["project"]
     project = data["project"]
@@ -68,7 +68,14 @@ def wanted_locks() -> list[Lock]:
     # The laboratory also depends on the host itself
     measures = [one for one in laboratory["dependencies"] if not one.startswith(project["name"])]
     host = [*project["dependencies"], *itertools.chain(*extras.values()), *measures]
-    tables = {"build": build, "host": host, **apart, **laboratory["optional-dependencies"], **groups}
+    tables = {
+        "build": build,
+        "render": project["dependencies"],
+        "host": host,
+        **apart,
+        **laboratory["optional-dependencies"],
+        **groups,
+    }
     return [Lock(name, tuple(table), project["requires-python"]) for name, table in tables.items()]
 
 
@@ -92,7 +99,7 @@ def _compile(uv: str, lock: Lock, upgrade: bool) -> None:
         if lock.path.is_file() and not upgrade:
             result.write_text(lock.path.read_text(encoding="utf-8"), encoding="utf-8")
         # Locks of the same .venv share their versions.
-        for earlier in ("build", "host"):
+        for earlier in ("build", "render", "host"):
             if earlier == lock.name:
                 break
             command += ["--constraints", str(LOCKS / f"{earlier}.txt")]

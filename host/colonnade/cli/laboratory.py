@@ -12,5 +12,6 @@ from colonnade.common.errors import UserError
 def laboratory(name: str) -> Any:
     """The module of a command in `colonnade_lab.cli`; a `UserError` if the laboratory is not installed."""
     if find_spec("colonnade_lab") is None:
-        raise UserError(f"no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab")
+        advice = "pip install colonnade-lab, or make setup in a checkout"
+        raise UserError(f"no colonnade-lab found, which colonnade {name} needs: {advice}")
     return import_module(f"colonnade_lab.cli.{name}")

@@ -29,7 +29,6 @@ def require_extra(extra: str, purpose: str) -> None:
     """
     for module, platforms in EXTRAS[extra].items():
         if find_spec(module) is None:
-            where = f" ({platforms})" if platforms else ""
-            raise UserError(
-                f"no package {module} found, which {purpose} needs: pip install 'colonnade[{extra}]'{where}"
-            )
+            advice = f"pip install 'colonnade[{extra}]'" + (f" ({platforms})" if platforms else "")
+            advice += ", or make setup in a checkout" if extra != "denoise" else ""
+            raise UserError(f"no package {module} found, which {purpose} needs: {advice}")

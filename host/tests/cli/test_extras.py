@@ -35,29 +35,31 @@ cli.main(["render", "scenes/object.toml", "--mesh", "teapot:2", "--config", "tin
             ["render", "scenes/object.toml", "--backend", "reference", "--output", "OUT"],
             "embreex",
             "no package embreex found, which the reference backend needs: pip install 'colonnade[reference]'"
-            " (Linux on x86_64 and macOS)",
+            " (Linux on x86_64 and macOS), or make setup in a checkout",
         ),
         (
             ["compare", "scenes/rooms/living/albedo.png", "scenes/rooms/living/albedo.png"],
             "flip_evaluator",
             "no package flip_evaluator found, which a comparison of pictures needs: pip install 'colonnade[quality]'"
-            " (Linux on x86_64 and macOS, Python up to 3.13)",
+            " (Linux on x86_64 and macOS, Python up to 3.13), or make setup in a checkout",
         ),
         (
             ["inspect", "--background", "scenes/rooms/living"],
             "flip_evaluator",
             "no package flip_evaluator found, which inspect --background needs: pip install 'colonnade[quality]'"
-            " (Linux on x86_64 and macOS, Python up to 3.13)",
+            " (Linux on x86_64 and macOS, Python up to 3.13), or make setup in a checkout",
         ),
         (
             ["registers", "--config", "tiny", "--output", "OUT"],
             "peakrdl_html",
-            "no package peakrdl_html found, which colonnade registers needs: pip install 'colonnade[integration]'",
+            "no package peakrdl_html found, which colonnade registers needs: pip install 'colonnade[integration]',"
+            " or make setup in a checkout",
         ),
         (
             ["capture", "README.md", "--output", "OUT"],
             "lzfse",
-            "no package lzfse found, which a Record3D capture needs: pip install 'colonnade[capture]'",
+            "no package lzfse found, which a Record3D capture needs: pip install 'colonnade[capture]',"
+            " or make setup in a checkout",
         ),
     ],
 )
@@ -89,7 +91,8 @@ def test_without_the_laboratory_its_commands_name_it(name: str, monkeypatch: pyt
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "colonnade_lab", None)
     result = CliRunner().invoke(cli, [name, "--help"])
-    line = f"colonnade: error: no colonnade-lab found, which colonnade {name} needs: pip install colonnade-lab\n"
+    line = f"colonnade: error: no colonnade-lab found, which colonnade {name} needs: "
+    line += "pip install colonnade-lab, or make setup in a checkout\n"
     assert (result.exit_code, result.stderr) == (2, line)
     assert name in CliRunner().invoke(cli, ["--help"]).stdout
 

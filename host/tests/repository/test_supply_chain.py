@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import venv
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -51,7 +52,10 @@ def test_a_lock_older_than_pyproject_is_named(
     newer = tmp_path / "pyproject.toml"
     newer.write_text(locks.PROJECT.read_text().replace('"click>=8.1,<9"', '"click>=8.1,<10"'))
     monkeypatch.setattr(locks, "PROJECT", newer)
-    assert locks.check() == ["host/locks/host.txt is older than the dependencies in pyproject.toml; run: tools/lock"]
+    assert locks.check() == [
+        f"host/locks/{name}.txt is older than the dependencies in pyproject.toml; run: tools/lock"
+        for name in ("render", "host")
+    ]
 
 
 def test_the_bill_of_materials_has_all_locks(module: Callable[[str], ModuleType]) -> None:
@@ -78,24 +82,32 @@ def test_locks_contain_no_urls(file: str | Path) -> None:
     assert not re.search('(?<!"url": "https)://', (ROOT / file).read_text())
 
 
+@pytest.mark.parametrize("installer", ["uv", "pip"])
 @pytest.mark.parametrize("altered", [False, True])
-def test_pip_takes_only_the_locked_file(tmp_path: Path, altered: bool) -> None:
+def test_only_the_locked_file_is_installed(tmp_path: Path, altered: bool, installer: str) -> None:
     wheel = tmp_path / "tiny-1.0-py3-none-any.whl"
-    with zipfile.ZipFile(wheel, "w") as archive:
-        archive.writestr("tiny.py", "")
-        archive.writestr("tiny-1.0.dist-info/METADATA", "Metadata-Version: 2.1\nName: tiny\nVersion: 1.0\n")
-        archive.writestr("tiny-1.0.dist-info/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
-        archive.writestr("tiny-1.0.dist-info/RECORD", "")
+
+    def write(source: str) -> None:
+        with zipfile.ZipFile(wheel, "w") as archive:
+            information = "tiny-1.0.dist-info"
+            archive.writestr("tiny.py", source)
+            archive.writestr(f"{information}/METADATA", "Metadata-Version: 2.1\nName: tiny\nVersion: 1.0\n")
+            archive.writestr(f"{information}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+            archive.writestr(f"{information}/RECORD", "")
+
+    write("")
     locked = hashlib.sha256(wheel.read_bytes()).hexdigest()
     if altered:
-        wheel.write_bytes(wheel.read_bytes() + b" ")
+        write("import os")
     locks = tmp_path / "host" / "locks"
     locks.mkdir(parents=True)
     (locks / "tiny.txt").write_text(f"tiny==1.0 --hash=sha256:{locked}\n")
-    target = tmp_path / "target"
-    where = {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path), "PIP_TARGET": str(target)}
-    done = bash(f"root='{tmp_path}'; install_locked '{sys.prefix}' tiny", **where)
-    assert (target / "tiny.py").is_file() is not altered
+    venv.create(tmp_path / "environment", with_pip=installer == "pip")
+    where = {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(tmp_path), "UV_CACHE_DIR": str(tmp_path / "cache")}
+    script = "uv=none; " * (installer == "pip") + f"root='{tmp_path}'; install_locked '{tmp_path}/environment' tiny"
+    done = bash(script, **where)
+    site = next((tmp_path / "environment").glob("lib/python*/site-packages"))
+    assert (site / "tiny.py").is_file() is not altered
     if altered:
         assert done.returncode == 2
         assert done.stderr.count("\n") == 1
