@@ -17,9 +17,10 @@ help: ## what the targets do
 setup: ## install whatever is missing: system programs, .venv, sbt
 	@tools/setup
 
-render: setup ## render SCENE through the RTL of CONFIG at SIZE with SAMPLES a pixel into out/render.png
+render: ## render SCENE through the RTL of CONFIG at SIZE with SAMPLES a pixel into out/render.png, the first one into out/preview.png
+	@tools/setup --render '$(CONFIG)'
 	@mkdir -p out
-	@$(venv)/colonnade render $(SCENE) --config $(CONFIG) --backend rtl --size $(SIZE) --samples $(SAMPLES) --output out/render.png --json out/render.json
+	@$(venv)/colonnade render $(SCENE) --config $(CONFIG) --backend rtl --size $(SIZE) --samples $(SAMPLES) --preview out/preview.png --output out/render.png --json out/render.json
 
 test: ## the hardware's specs (sbt test) and the host's tests (pytest)
 	@tools/test

@@ -32,6 +32,7 @@ from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
 from colonnade.maps.encoders import Encoder
 
 if TYPE_CHECKING:
+    from colonnade.common.types import Floats
     from colonnade.render.report import FrameReport
     from colonnade.render.request import Backend
     from colonnade.scene.model import Denoiser
@@ -122,6 +123,13 @@ def _is_scene(word: str) -> bool:
 @click.option(
     "--output", type=FILE, metavar="FILE", help="Write a PNG picture, or of several frames a .webp animation."
 )
+@click.option(
+    "--preview",
+    "preview_file",
+    type=FILE,
+    metavar="FILE",
+    help="Of several samples also write the PNG picture of the first one, as soon as it is there, not filtered.",
+)
 @click.option("--video", "video_file", type=FILE, metavar="FILE", help="Of several frames also write an .mp4 video.")
 @click.option("--hits", "hits_file", type=FILE, metavar="FILE", help="Write hit triangles and distances as .npz.")
 @click.option(
@@ -151,6 +159,7 @@ def render(
     samples: int | None,
     denoise: Denoiser | Literal["none"] | None,
     output: Path | None,
+    preview_file: Path | None,
     video_file: Path | None,
     hits_file: Path | None,
     waveform: Path | None,
@@ -185,10 +194,13 @@ def render(
         require_suffix("--output", output, ".png")
         if video_file is not None:
             raise click.UsageError("--video needs --frames or --sequence", click.get_current_context())
+    if preview_file is not None and (frames is not None or backend == "reference"):
+        raise click.UsageError("--preview is of one frame, not of the reference", click.get_current_context())
+    require_suffix("--preview", preview_file, ".png")
     require_suffix("--video", video_file, ".mp4")
     require_suffix("--hits", hits_file, ".npz")
     require_suffix("--waveform", waveform, ".vcd")
-    require_outputs(*pictures, *hits_files, video_file, waveform, json_file)
+    require_outputs(*pictures, preview_file, *hits_files, video_file, waveform, json_file)
     if video_file is not None:
         require_extra("capture", "--video")
     if truth is not None:
@@ -203,6 +215,12 @@ def render(
     from colonnade.render.video import video
 
     progress = for_terminal()
+
+    def show(picture: Floats) -> None:
+        assert preview_file is not None
+        write_png(preview_file, picture)
+        progress.note(f"{preview_file} shows the first sample of each pixel, the others follow")
+
     request = RenderRequest(
         scene=scene,
         config=config,
@@ -223,6 +241,7 @@ def render(
         truth=truth,
         waveform=waveform,
         denoise=False if denoise == "none" else denoise,
+        preview=None if preview_file is None else show,
     )
     results = render_frames(request, progress)
     is_film = pictures != [] and pictures[0].suffix.lower() == ".webp"

@@ -66,6 +66,12 @@ def parse_output(lines: Iterable[str]) -> list[FrameOutput]:
     return frames
 
 
+def is_whole(registers: Mapping[str, int], pixel_file: Path) -> bool:
+    """Whether the harness has written the pixels of a frame."""
+    pixels = registers["frame.height"] * registers["frame.width"]
+    return pixel_file.exists() and pixel_file.stat().st_size == pixels * PIXEL.itemsize
+
+
 def read_frame(
     manifest: Manifest, registers: Mapping[str, int], pixel_file: Path, output: FrameOutput
 ) -> tuple[Frame, int]:

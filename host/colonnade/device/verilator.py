@@ -18,7 +18,7 @@ from colonnade.common.progress import QUIET, Progress, Report
 from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import GeneratedDesign
 from colonnade.design.manifest import Manifest
-from colonnade.device.harness_job import FrameOutput, frame_commands, parse_output, read_frame
+from colonnade.device.harness_job import FrameOutput, frame_commands, is_whole, parse_output, read_frame
 from colonnade.device.simulator_build import build_simulator
 from colonnade.scene_image.file import SceneImage
 
@@ -114,6 +114,7 @@ def simulate(
     progress: Progress = QUIET,
     through_port: bool = False,
     waveform: Path | None = None,
+    early: Callable[[Frame], None] | None = None,
 ) -> float:
     """Render one frame per set of registers. The image is loaded once.
 
@@ -126,6 +127,7 @@ def simulate(
         progress: Shows the steps.
         through_port: Load records through the load port, one per cycle, and not directly into the memories.
         waveform: VCD file for the signals of the device, its first column and that column's first traversal unit.
+        early: Takes the pixels of the first frame, without counters, while the others are simulated.
 
     Returns:
         Simulated clock cycles per second of host time, without loading.
@@ -140,10 +142,17 @@ def simulate(
     program = build_simulator(design, progress, waveform=waveform is not None)
     with temporary_folder() as folder:
         job, pixel_files = write_job(folder, design.manifest, image, registers, through_port)
+        waiting = [early] if early is not None and len(registers) > 1 else []
+
+        def advanced(fraction: float) -> None:
+            report(fraction)
+            if waiting and is_whole(registers[0], pixel_files[0]):
+                waiting.pop()(read_frame(design.manifest, registers[0], pixel_files[0], FrameOutput(0, 0.0))[0])
+
         try:
             with progress.step("rendering in the simulator") as report:
                 options = [*stalls.options, *(["--waveform", WAVEFORM] if waveform else [])]
-                lines = run_program([str(program), *options, job.name], folder, report)
+                lines = run_program([str(program), *options, job.name], folder, advanced)
             outputs = parse_output(lines)
             for of_frame in zip(registers, pixel_files, outputs, strict=True):
                 each(_frame(design.manifest, *of_frame))

@@ -99,9 +99,9 @@ def rendered(
     if request.backend == "rtl":
         assert request.config is not None
         design = design_for(request.config, request.overrides, progress)
-        found = rtl_passes(design, frames, registers, progress, request.waveform)
+        found = rtl_passes(design, frames, registers, progress, request.waveform, request.preview)
     else:
-        found = model_passes(frames, registers, progress)
+        found = model_passes(frames, registers, progress, request.preview)
     for frame, (passes, seconds, rate) in zip(frames, found, strict=True):
         require_no_errors(passes.frame.errors)
         maps, header = frame.prepared.maps, frame.prepared.image.header

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from colonnade.common.accumulation import FramePasses
 from colonnade.common.framebuffer import Frame
 from colonnade.common.progress import QUIET, Progress
+from colonnade.common.types import Floats
 from colonnade.design.generator import GeneratedDesign
 from colonnade.render.host_frame import HostFrame
 
 #: The registers of each pass of a frame.
 Registers = list[dict[str, int]]
+#: Takes a picture, linear, float64 [height, width, 3].
+Preview = Callable[[Floats], None]
 #: The passes of a frame, its seconds by step, and the RTL's simulated cycles per second.
 Rendered = tuple[FramePasses, dict[str, float], float | None]
 
@@ -24,6 +28,7 @@ def rtl_passes(
     registers: Sequence[Registers],
     progress: Progress = QUIET,
     waveform: Path | None = None,
+    preview: Preview | None = None,
 ) -> Iterator[Rendered]:
     """Render all passes of frames in one run of the simulator. Each frame reports an equal part of the run time.
 
@@ -33,6 +38,7 @@ def rtl_passes(
         registers: Of each frame.
         progress: Shows the run.
         waveform: VCD file of the signals.
+        preview: Takes the picture of the first sample of the first frame.
     """
     from colonnade.device.simulator_build import build_simulator
     from colonnade.device.verilator import simulate
@@ -48,14 +54,19 @@ def rtl_passes(
         sums.add(frame, one.sample.layer)
 
     every: list[Mapping[str, int]] = [one for of_frame in registers for one in of_frame]
-    rate = simulate(design, frames[0].prepared.image, every, add, progress=progress, waveform=waveform)
+    early = None if preview is None else lambda frame: preview(_picture(frames[0], frame))
+    image = frames[0].prepared.image
+    rate = simulate(design, image, every, add, progress=progress, waveform=waveform, early=early)
     run = (time.perf_counter() - built) / len(registers)
     for sums in into:
         yield sums, {"build": built - begun, "run": run}, rate
 
 
 def model_passes(
-    frames: Sequence[HostFrame], registers: Sequence[Registers], progress: Progress = QUIET
+    frames: Sequence[HostFrame],
+    registers: Sequence[Registers],
+    progress: Progress = QUIET,
+    preview: Preview | None = None,
 ) -> Iterator[Rendered]:
     """Render pass by pass with a model that is loaded once. Arguments are as in `rtl_passes`."""
     from colonnade.device.bit_exact import loaded_model, model_frame
@@ -70,5 +81,15 @@ def model_passes(
                 def share(done: int, total: int, before: int = index, passes: int = len(of_frame)) -> None:
                     report((before + done / total) / passes)
 
-                sums.add(model_frame(model, values, share), one.sample.layer)
+                frame_of_pass = model_frame(model, values, share)
+                sums.add(frame_of_pass, one.sample.layer)
+                if preview is not None and index == 0 and frame is frames[0] and len(of_frame) > 1:
+                    preview(_picture(frame, frame_of_pass))
         yield sums, {"run": time.perf_counter() - begun}, None
+
+
+def _picture(frame: HostFrame, first: Frame) -> Floats:
+    """The picture of the first pass of a frame, not filtered."""
+    passes = replace(frame, denoise=False).no_passes()
+    passes.add(first)
+    return frame.image(passes.whole)

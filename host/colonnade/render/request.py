@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -10,6 +11,7 @@ from colonnade.common.arguments import check_types
 from colonnade.common.errors import UserError
 from colonnade.common.frame_size import Size
 from colonnade.common.limits import MAX_FRAMES, MAX_SAMPLES
+from colonnade.common.types import Floats
 from colonnade.design.config_name import Overrides
 from colonnade.environment.sequence import Sequence as RoomSequence
 from colonnade.maps.encoders import Encoder
@@ -43,6 +45,8 @@ class RenderRequest:
         waveform: VCD file for the signals of one small RTL frame.
         encoder: Of the room's maps and of textures; None: as `Encoder` says.
         denoise: Filter the noise of gathered light, of the model and the RTL, as `FrameSize.denoise`; None: as there.
+        preview: Takes the picture of the first of several samples, linear, float64 [height, width, 3], not filtered,
+            before the other samples are traced; of a single frame by the model or the RTL.
 
     Raises:
         UserError: A value is none of these.
@@ -67,6 +71,7 @@ class RenderRequest:
     waveform: Path | None = None
     encoder: Encoder | None = None
     denoise: bool | Denoiser | None = None
+    preview: Callable[[Floats], None] | None = None
 
     def __post_init__(self) -> None:
         check_types(vars(self), type(self))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,8 @@ from live_maps import SMALL_MAPS
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
-from colonnade.common.image_io import encode_srgb
+from colonnade.common.image_io import encode_srgb, read_picture
+from colonnade.device import verilator
 from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import Backend, RenderRequest
@@ -89,6 +91,39 @@ def test_verify_compares_frames_of_several_samples(folder: Path) -> None:
     report = verify(file, "tiny", (), ["teapot:3"], SIZE)
     assert report["equal"]
     assert report["meshes"]["teapot:3"]["reference"]["psnr"] > 40
+
+
+@pytest.mark.verilator
+@pytest.mark.parametrize("backend", ["model", "rtl"])
+def test_a_preview_is_of_the_first_sample_and_changes_nothing(
+    folder: Path, backend: Backend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_program, were_there = verilator.run_program, list[bool]()
+
+    def run_long(command: list[str], place: Path, report: Callable[[float], None]) -> list[str]:
+        report(0.1)
+        were_there.append(preview.exists())
+        lines = run_program(command, place, lambda _: None)
+        # As the simulator does in its second frame
+        report(0.2)
+        were_there.append(preview.exists())
+        return lines
+
+    monkeypatch.setattr(verilator, "run_program", run_long)
+    file, preview, picture = scene_file(folder, EVERYTHING), tmp_path / "preview.png", tmp_path / "picture.png"
+    options = ["--config", "tiny", "--backend", backend, "--size", "40x30", "--preview", preview, "--output", picture]
+    done = run("render", file, *options)
+    assert done.exit_code == 0, done.output
+    assert done.stderr.count(f"{preview} shows the first sample of each pixel, the others follow") == 1
+    assert were_there == ([False, True] if backend == "rtl" else [])
+    first, whole = map(read_picture, (preview, picture))
+    np.testing.assert_array_equal(whole, encode_srgb(of(file, backend).image))
+    assert not np.array_equal(first, whole) and psnr(whole, first) > 20
+
+
+def test_a_preview_is_of_one_frame(folder: Path) -> None:
+    done = run("render", scene_file(folder, SOFT), "--config", "tiny", "--preview", "p.png", "--frames", 2)
+    assert done.exit_code == 2 and "--preview is of one frame, not of the reference" in done.stderr
 
 
 def test_one_sample_is_the_frame_without_samples(folder: Path) -> None:
