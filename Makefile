@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup render test test-hardware test-host verify bench soc live browser check docs release release-check container lock format clean
+.PHONY: help setup render test test-hardware test-host verify paper bench soc live browser check docs release release-check container lock format clean
 
 venv := .venv/bin
 SCENE ?= scenes/metal.toml
@@ -33,6 +33,9 @@ test-host: ## only pytest
 
 verify: setup ## the full matrix: array shapes, precisions, meshes; long
 	@tools/verify
+
+paper: setup ## each claim of the source paper in a cheap form against docs/paper.md, and out/paper/index.html; FULL=1 takes hours
+	@tools/paper $(if $(FULL),--full)
 
 bench: setup ## rays per cycle of the benchmark meshes, and out/bench.png: where the cycles go
 	@mkdir -p out

@@ -1,4 +1,4 @@
-"""``colonnade study``: the accuracy of reconstructed rooms, and the quality loss of AR frames in them."""
+"""``colonnade study``: the accuracy of reconstructed rooms, the quality loss of AR frames in them, and baselines."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ output_option = click.option("--output", type=FILE, metavar="DIR", help="Write t
 
 @click.group(cls=Commands)
 def study() -> None:
-    """Measure reconstructed rooms against their depth maps, and AR frames in them.
+    """Measure reconstructed rooms against their depth maps, AR frames in them, and baselines.
 
     ROOMS are folders. SEEDS, such as 0-9,100, each generate a room of known geometry. Tables are in Markdown.
     """
@@ -133,6 +133,23 @@ def live(rooms: tuple[Path, ...], seeds: list[int] | None, no_dists: bool, json_
 def live_paths(seeds: list[int], json_file: Path | None) -> None:
     """The encoder of a moving camera along a path through each generated room."""
     _report("live_maps", lambda study, on: study.study_paths(seeds, on), json_file, table="path_table")
+
+
+@study.command()
+@click.argument("mesh", default="bunny")
+@json_option
+def cpu(mesh: str, json_file: Path | None) -> None:
+    """A frame of the benchmark on one core: all triangles for all rays in plain C++, and Embree."""
+    _report("cpu_baseline", lambda study, on: study.study_mesh(mesh, on), json_file)
+
+
+@study.command()
+@rooms_argument
+@click.option("--rtl", is_flag=True, help="Also count cycles, of the RTL of the preset traversal.")
+@json_option
+def room_mesh(rooms: tuple[Path, ...], rtl: bool, json_file: Path | None) -> None:
+    """Mirror rays through a room's mesh in the tree, and through its march."""
+    _report("room_mesh", lambda study, on: study.study_rooms(rooms, rtl, on), json_file)
 
 
 def _report(

@@ -13,7 +13,7 @@ from colonnade.design.toolchain import project_root
 
 from colonnade_lab.figures import pages, pictures
 from colonnade_lab.figures.catalog import catalog, selected
-from colonnade_lab.figures.data import commands_of, digest_table, problems
+from colonnade_lab.figures.data import commands_of, digest_table, problems, release_problems
 from colonnade_lab.figures.digests import emit
 from colonnade_lab.figures.measure import measure, require_libraries
 
@@ -26,15 +26,17 @@ def main() -> None:
     parts = tuple(argument for argument in arguments if argument != "--again")
     if parts == ("list",):
         for entry in catalog().values():
-            print(f"{entry.name}: {'; '.join(commands_of(entry))}")
+            print(f"{entry.name} ({entry.occasion}): {'; '.join(commands_of(entry))}")
     elif parts == ("digests",):
         emit(catalog().values())
         for line in digest_table(docs):
             print(line)
-    elif parts in (("check",), ("check", "--quick")):
-        if parts == ("check",):
+    elif parts[:1] == ("check",) and parts[1:] in ((), ("--quick",), ("--release",)):
+        if parts[1:] != ("--quick",):
             emit(catalog().values())
         found = [*problems(docs), *pages.problems(docs), *pictures.problems(docs)]
+        if parts[1:] == ("--release",):
+            found += release_problems(docs)
         for problem in found:
             print(f"figures: {problem}", file=sys.stderr)
         raise SystemExit(1 if found else 0)
@@ -54,6 +56,9 @@ def _measure(parts: tuple[str, ...], docs: Path, again: bool) -> None:
     begin = time.monotonic()
     for entry in entries:
         measure(entry, docs, again=again)
+    if parts:
+        for name, table in pages.tables_of(docs, [entry.name for entry in entries]):
+            print(f"\n{name}\n{table}")
     print(f"figures: {len(entries)} parts in {(time.monotonic() - begin) / 60:,.1f} minutes", flush=True)
 
 

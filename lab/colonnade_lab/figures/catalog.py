@@ -16,6 +16,16 @@ from colonnade_lab.explore.study_file import load_study
 #: Stands for the file that a command writes its report to.
 REPORT = "REPORT"
 
+#: When entries are measured: after each change of hardware; for a release; after a change of sources of the host.
+CHANGE, RELEASE, SOURCES = CLASSES = ("change", "release", "sources")
+
+#: Entries of the first class: the headline of README and the rows of its presets.
+_CHANGED = (
+    *("bench-edge", "rooms", "equality-small", "area-edge-asap7"),
+    *("bench-lean", "area-lean-asap7", "bench-small", "area-small-asap7", "bench-tiny", "area-tiny-asap7"),
+    *("area-traversal-asap7", "bench-fpga", "area-fpga-asap7"),
+)
+
 #: Stand for the liberty files of a library in a command, and name the variables that hold their paths.
 LIBRARIES = ("ASAP7", "SKY130")
 
@@ -58,6 +68,11 @@ class Entry:
     libraries: tuple[str, ...] = ()
     designs: tuple[Design, ...] | None = None
     sources: tuple[str, ...] = ("tree",)
+
+    @property
+    def occasion(self) -> str:
+        """When it is measured: one of `CLASSES`."""
+        return SOURCES if not self.hardware else CHANGE if self.name in _CHANGED else RELEASE
 
     @property
     def hardware(self) -> tuple[Design, ...]:
@@ -325,6 +340,14 @@ def catalog() -> dict[str, Entry]:
         _study("bvh-tests", **_MODEL),
         _study("bvh-costs", "ASAP7"),
         _study("bvh-cycles"),
+        _study("bvh-power", "ASAP7"),
+        Entry(
+            "room-mesh",
+            "traversal",
+            _colonnade("study", "room-mesh", _ROOMS[0], "--rtl"),
+            sources=("maps", "rays", "tree"),
+        ),
+        Entry("cpu-baseline", "edge", _colonnade("study", "cpu", "bunny"), **_alone()),
         _study("mixed-precision", "ASAP7"),
         _study("energy-area", "ASAP7"),
         _study("vertices-contexts", "ASAP7"),
@@ -333,7 +356,9 @@ def catalog() -> dict[str, Entry]:
 
 
 def selected(parts: tuple[str, ...]) -> list[Entry]:
-    """The entries of parts: a part is the name of an entry, else what names begin with before a hyphen; none: all.
+    """The entries of parts; none: all.
+
+    A part is the name of an entry, one of `CLASSES`, else what names begin with before a hyphen.
 
     Raises:
         KeyError: A part that names no entry.
@@ -341,7 +366,10 @@ def selected(parts: tuple[str, ...]) -> list[Entry]:
     entries = catalog()
     found: dict[str, Entry] = {}
     for part in parts or tuple(entries):
-        of_part = [part] if part in entries else [name for name in entries if name.startswith(f"{part}-")]
+        if part in CLASSES:
+            of_part = [name for name, entry in entries.items() if entry.occasion == part]
+        else:
+            of_part = [part] if part in entries else [name for name in entries if name.startswith(f"{part}-")]
         if not of_part:
             raise KeyError(part)
         found |= {name: entries[name] for name in of_part}

@@ -17,6 +17,7 @@ from colonnade.design.toolchain import project_root
 
 from colonnade_lab.explore.figures import area_figures
 from colonnade_lab.figures.catalog import REPORT, Entry, catalog
+from colonnade_lab.figures.catalog import SOURCES as OF_SOURCES
 from colonnade_lab.figures.digests import digests_of, stale
 
 #: Lists the entries without a file, or with one of other hardware than today's. It is absent if there are none.
@@ -121,6 +122,21 @@ def problems(docs: Path) -> Iterator[str]:
         elif not problem and name in declared and None not in digests_of(entry).values():
             yield f"data/{UNMEASURED}: {name} is measured: take it from the list"
     yield from _size_problems(Data(docs), entries)
+
+
+def release_problems(docs: Path) -> Iterator[str]:
+    """One line for each figure that a release cannot show: not measured, or of a commit that is not in the history."""
+    for name in unmeasured(docs):
+        yield f"data/{UNMEASURED}: {name} is not measured: run tools/figures {name}"
+    for name, entry in catalog().items():
+        content = Data(docs).get(name)
+        if content is None:
+            continue
+        head, again = str(content.get("commit")), f"run tools/figures --again {name}"
+        if _git("merge-base", "--is-ancestor", head, "HEAD") is None:
+            yield f"data/{name}.json: its commit {head[:8]} is not in the history: {again}"
+        elif content.get("is_modified") and entry.occasion != OF_SOURCES:
+            yield f"data/{name}.json: it is of changes to commit {head[:8]}: {again}"
 
 
 def _size_problems(data: Data, entries: Mapping[str, Entry]) -> Iterator[str]:

@@ -128,6 +128,26 @@ def encodings(data: Data) -> str:
     return markdown([*titles, *frames_of, "logic of the memory, kGE", "its memories, KiB"], rows)
 
 
+def room_mesh(data: Data) -> str:
+    """Mirror rays through a room's mesh in the tree, and through its march."""
+    rows = []
+    for name, found in data.result("room-mesh").items():
+        tree = [
+            "tree",
+            f"{found['mesh_bytes'] / 1e6:.1f} MB",
+            f"{found['node_reads']:.1f} nodes, {found['triangle_tests']:.1f} triangles",
+        ]
+        march = ["march", f"{found['plane_bytes'] / 1e3:.1f} KB", f"{found['march_steps']:.1f} steps"]
+        right = (f"{100 * found[f'{way}_right']:.1f}" for way in ("mesh", "march"))
+        cycles = "–" if found["cycles"] is None else f"{found['cycles']:.2f}"
+        rows.append(
+            [f"{name}, {found['triangles']:,} triangles", *tree, f"{found['dram_bytes']:,.0f}", cycles, next(right)]
+        )
+        rows.append([f"{name}, maps", *march, "0", "–", next(right)])
+    head = ["room", "by", "scene", "a ray", "bytes of DRAM a ray", "cycles a ray"]
+    return markdown([*head, "right, %"], rows)
+
+
 #: The unit of `colonnade ppa` that has the physical-attribute memory, in designs whose columns do not share it.
 _MAPS_UNIT = "ColumnEnvironment"
 
@@ -144,4 +164,5 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     "moving-frames": moving_frames,
     "captures": captures,
     "paper-maps": encodings,
+    "room-mesh": room_mesh,
 }

@@ -36,7 +36,7 @@ def require_libraries(entries: Sequence[Entry]) -> None:
 
 
 def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
-    """Run the commands of an entry and write its data file; not if the file is of today's sources.
+    """Run the commands of an entry and write its data file; else tell of its age if the file is of today's sources.
 
     Raises:
         UserError: A command failed.
@@ -44,7 +44,7 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
     known = Data(docs).get(entry.name)
     emit([entry])
     if known is not None and not again and is_current(entry, known):
-        print(f"figures: {entry.name} is of these sources", flush=True)
+        print(f"figures: {entry.name} was {age(known)}; --again repeats", flush=True)
         return
     print(f"figures: {entry.name}", flush=True)
     head, is_modified = commit()
@@ -74,6 +74,13 @@ def measure(entry: Entry, docs: Path, *, again: bool = False) -> None:
         stream.write(f"{record_lines(content)}\n".encode())
     declare_measured(docs, entry.name)
     print(f"figures: {entry.name} took {seconds:,.0f} s", flush=True)
+
+
+def age(content: Mapping[str, Any]) -> str:
+    """When, of which commit and in what time a data file was measured."""
+    seconds = float(content["seconds"])
+    took = f"{seconds / 60:.1f} min" if seconds >= 60 else f"{seconds:.0f} s"
+    return f"measured {content['date']} of commit {str(content['commit'])[:8]} in {took}"
 
 
 def _seconds_before(known: Mapping[str, Any] | None, entry: Entry, head: str | None) -> float:

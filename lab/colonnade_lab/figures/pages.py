@@ -8,8 +8,9 @@ between ``<!-- figure:PRESET.NAME -->`` and ``<!-- end -->`` within a line, see 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
@@ -26,7 +27,7 @@ from colonnade_lab.figures import (
     study_tables,
     tree_tables,
 )
-from colonnade_lab.figures.data import Data, Missing
+from colonnade_lab.figures.data import Data, Missing, unmeasured
 from colonnade_lab.figures.facts import FORMATS, PRESETS, facts, text
 
 #: The generator of each table.
@@ -43,9 +44,47 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     **ray_tables.TABLES,
 }
 
+#: Tables of what a measurement took, which say no figure of the hardware.
+_OF_MINUTES = ("measuring", "paper-minutes")
+
 _TABLE = re.compile(r"^<!-- ([\w-]+) -->\n.*?^<!-- end -->$", re.DOTALL | re.MULTILINE)
 _FIGURE = re.compile(r"<!-- figure:(\w+)\.(\w+) -->.*?<!-- end -->")
 _MARKER = re.compile(r"<!-- (?!end -->)([\w:.-]+) -->")
+
+
+class _Read(Data):
+    """Data that notes which of its files are read."""
+
+    def __init__(self, data: Data) -> None:
+        self._data = data
+        self.names: set[str] = set()
+
+    def get(self, name: str) -> Mapping[str, Any] | None:
+        self.names.add(name)
+        return self._data.get(name)
+
+
+def _earlier(read: _Read, declared: Collection[str]) -> str:
+    """A line below a table for its files that are of earlier hardware or sources."""
+    contents = {name: content for name in sorted(read.names & set(declared)) if (content := read.get(name)) is not None}
+    if not contents:
+        return ""
+    found = (f"`{name}` at commit {str(content['commit'])[:8]}" for name, content in contents.items())
+    return f"\n\n*Measured before the last change: {', '.join(found)}.*"
+
+
+def tables_of(docs: Path, entries: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """The names and the text of the tables that are made of data files, without those of minutes."""
+    for name, table in TABLES.items():
+        if name in _OF_MINUTES:
+            continue
+        read = _Read(Data(docs))
+        try:
+            text = table(read)
+        except Missing:
+            continue
+        if not read.names.isdisjoint(entries):
+            yield name, text
 
 
 def pages_of(docs: Path) -> list[Path]:
@@ -53,8 +92,8 @@ def pages_of(docs: Path) -> list[Path]:
     return [file for file in (docs.parent / "README.md", *sorted(docs.glob("*.md"))) if file.is_file()]
 
 
-def page(content: str, data: Data) -> str:
-    """A page with new tables and figures.
+def page(content: str, data: Data, declared: Collection[str] = ()) -> str:
+    """A page with new tables and figures; tables of `declared` files say that they are of an earlier state.
 
     Raises:
         UserError: A marker names no table or figure, or has no end.
@@ -65,8 +104,9 @@ def page(content: str, data: Data) -> str:
         used.append(match[1])
         if match[1] not in TABLES:
             raise UserError(f"there is no table {match[1]}: choose from {', '.join(TABLES)}")
+        read = _Read(data)
         try:
-            body = TABLES[match[1]](data)
+            body = TABLES[match[1]](read) + ("" if match[1] in _OF_MINUTES else _earlier(read, declared))
         except Missing as missing:
             body = f"Not measured: run `tools/figures {missing}`."
         return f"<!-- {match[1]} -->\n{body}\n<!-- end -->"
@@ -114,6 +154,6 @@ def _pages(docs: Path, data: Data) -> Iterator[tuple[Path, str, str]]:
     for file in pages_of(docs):
         old = file.read_text(encoding="utf-8")
         try:
-            yield file, old, page(old, data)
+            yield file, old, page(old, data, unmeasured(docs))
         except UserError as error:
             raise UserError(f"{file}: {error}") from None

@@ -11,7 +11,15 @@ from colonnade_lab.evaluation.bench import geometric_mean
 from colonnade_lab.figures.data import Data, Missing
 from colonnade_lab.figures.facts import MEGAHERTZ, facts, text
 from colonnade_lab.figures.precision_tables import lowest_psnr, printed_index, saved
-from colonnade_lab.figures.tree_tables import megabytes, more_area, more_records, speed_ups
+from colonnade_lab.figures.tree_tables import (
+    laptop,
+    less_energy,
+    megabytes,
+    more_area,
+    more_power,
+    more_records,
+    speed_ups,
+)
 from colonnade_lab.ppa.netlist.memories import chip_unit_kge
 
 #: Presets of 10×8 arrays, which table 1 has.
@@ -20,7 +28,7 @@ ARRAYS = ("edge", "lean")
 #: The entries that the page's commands measure.
 PARTS = (
     *("bvh-tests", "bvh-costs", "bvh-cycles", "mixed-precision", "paper-maps", "paper-unit", "ablation"),
-    *("environments", "bench-edge", "area-edge-asap7"),
+    *("environments", "bench-edge", "area-edge-asap7", "bvh-power", "room-mesh", "cpu-baseline"),
 )
 
 
@@ -129,6 +137,9 @@ FACTS: Mapping[str, Callable[[Data], str]] = {
     "moreRecords": more_records,
     "moreArea": more_area,
     "speedUps": speed_ups,
+    "morePower": more_power,
+    "lessEnergy": less_energy,
+    "cpuMinutes": laptop,
     "powerSaved": lambda data: saved(data, paper.PRECISION, "mw"),
     "areaSaved": lambda data: saved(data, paper.PRECISION, "array_kge"),
     "printedIndex": lambda data: f"{printed_index(data)[paper.PRECISION]:.3f}",

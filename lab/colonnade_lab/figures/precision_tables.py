@@ -58,10 +58,15 @@ def savings(data: Data) -> str:
 
 def saved(data: Data, name: str, figure: str) -> str:
     """What a precision saves of a figure of its library against the baseline, %."""
+    return f"{100 * (1 - relative(data, figure)[name]):.1f}"
+
+
+def relative(data: Data, figure: str) -> dict[str, float]:
+    """A figure of the library of each precision, relative to the baseline's."""
     study = data.result("mixed-precision")
     (library,) = study["libraries"]
     values = {point["name"]: point["figures"][f"{figure}.{library}"] for point in study["points"]}
-    return f"{100 * (1 - values[name] / values[study['baseline']]):.1f}"
+    return {name: value / values[study["baseline"]] for name, value in values.items()}
 
 
 def printed_index(data: Data) -> dict[str, float]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from colonnade_lab.common.markdown import markdown
-from colonnade_lab.figures.catalog import MARCHES, SAMPLES, catalog
+from colonnade_lab.figures.catalog import CLASSES, MARCHES, SAMPLES, catalog
 from colonnade_lab.figures.data import Data, commands_of
 from colonnade_lab.figures.facts import MEGAHERTZ, PRESETS, facts, text
 
@@ -225,10 +225,14 @@ def samples(data: Data) -> str:
 
 
 def measuring(data: Data) -> str:
-    """The minutes of `tools/figures`: its longest parts, and all."""
-    minutes = {name: content["seconds"] / 60 for name in catalog() if (content := data.get(name)) is not None}
+    """The minutes of `tools/figures`: its longest parts, classes, and all."""
+    entries = catalog()
+    minutes = {name: content["seconds"] / 60 for name in entries if (content := data.get(name)) is not None}
     longest = sorted(minutes, key=lambda name: -minutes[name])[:_LONGEST]
     rows = [[f"`{name}`", f"{minutes[name]:.1f}"] for name in longest]
+    for occasion in CLASSES:
+        of_class = [minutes[name] for name, entry in entries.items() if name in minutes and entry.occasion == occasion]
+        rows.append([f"`{occasion}`, {len(of_class)} parts", f"{sum(of_class):.1f}"])
     return markdown(["part", "minutes"], [*rows, [f"all {len(minutes)}", f"{sum(minutes.values()):.1f}"]])
 
 

@@ -10,6 +10,7 @@ from colonnade_lab.common.markdown import markdown
 from colonnade_lab.evaluation.bench import geometric_mean
 from colonnade_lab.explore.figures import per_ray
 from colonnade_lab.figures.data import Data
+from colonnade_lab.figures.facts import MEGAHERTZ
 from colonnade_lab.report.speed_up import NONE, reductions
 
 Point = Mapping[str, Any]
@@ -87,17 +88,93 @@ def costs(data: Data) -> str:
     return markdown(["", *names, *overheads, "the paper, %"], rows)
 
 
+def power(data: Data) -> str:
+    """Area, power and energy of one unit with and without a tree, beside the paper's power."""
+    points = _points(data.result("bvh-power"))
+    (library,) = data.result("bvh-power")["libraries"]
+    rows = []
+    for title, key, form, published in (
+        ("array, kGE", "array_kge", ",.0f", "–"),
+        ("power of a row at 200 MHz, mW", "mw", ".2f", f"+{100 * paper.TREE_POWER:g}"),
+        ("energy of an in-box ray, nJ", "nj", ".3f", "–"),
+    ):
+        values = [point["figures"][f"{key}.{library}"] for point in points.values()]
+        rows.append([title, *(format(value, form) for value in values), _more(*values), published])
+    return markdown(["", *points, "BVH4, %", "the paper, %"], rows)
+
+
+def more_power(data: Data) -> str:
+    """The power of a row of `tiny` with its tree against that without one, %."""
+    points = _points(data.result("bvh-power"))
+    return _more(*(point["figures"]["mw.asap7"] for point in points.values()))
+
+
+def less_energy(data: Data) -> str:
+    """How many times less energy a ray takes with the tree of `tiny`."""
+    tree, none = (point["figures"]["nj.asap7"] for point in _points(data.result("bvh-power")).values())
+    return f"{none / tree:.1f}"
+
+
+def cpu(data: Data) -> str:
+    """A frame of the bunny on a core without a tree and in Embree, beside the paper's laptop and `edge`."""
+    (found,) = data.result("cpu-baseline").values()
+    edge = data.result("bench-edge")["meshes"]["bunny"]
+    primary = f"{found['rays']:,}"
+    rows = [
+        ["the paper's laptop, i7-8665U", "none", "–", f"{paper.LAPTOP_HOURS:g} h", "–"],
+        [
+            f"plain C++, a core of {found['processor']}",
+            "none",
+            primary,
+            f"{found['plain_seconds'] / 60:.1f} min",
+            f"{found['rays'] / found['plain_seconds'] / 1e6:.4f}",
+        ],
+        [
+            "Embree 4, the same core",
+            "its own",
+            primary,
+            f"{1e3 * found['embree_seconds']:.0f} ms",
+            f"{found['rays'] / found['embree_seconds'] / 1e6:.1f}",
+        ],
+    ]
+    rays = round(edge["rays_per_cycle"] * edge["cycles"])
+    seconds = edge["cycles"] / (MEGAHERTZ * 1e6)
+    rows.append(
+        [
+            "`edge` at 200 MHz",
+            "BVH4",
+            f"{rays:,}, with shadows",
+            f"{1e3 * seconds:.2f} ms",
+            f"{rays / seconds / 1e6:,.0f}",
+        ]
+    )
+    return markdown(["", "tree", "rays", "time", "MRay/s"], rows)
+
+
+def laptop(data: Data) -> str:
+    """Minutes of the frame in plain C++ on one core."""
+    (found,) = data.result("cpu-baseline").values()
+    return f"{found['plain_seconds'] / 60:.1f}"
+
+
 def more_records(data: Data) -> str:
     """The records of the tree of `edge` against none, %."""
-    tree, none = _tree_and_none(data.result("bvh-costs"))
-    return _more(_records(tree, "records"), _records(none, "records"))
+    return f"{overheads(data)['records']:+.1f}"
 
 
 def more_area(data: Data) -> str:
     """The array of `edge` with its tree against that without one, %."""
+    return f"{overheads(data)['area']:+.1f}"
+
+
+def overheads(data: Data) -> dict[str, float]:
+    """How much more records and area `edge` has with its tree than without one, %."""
     study = data.result("bvh-costs")
     (library,) = study["libraries"]
-    return _more(*(point["area"][library]["array_kge"] for point in _tree_and_none(study)))
+    tree, none = _tree_and_none(study)
+    areas = (point["area"][library]["array_kge"] for point in (tree, none))
+    records = (_records(point, "records") for point in (tree, none))
+    return {kind: 100 * (own / other - 1) for kind, (own, other) in {"records": records, "area": areas}.items()}
 
 
 def speed_ups(data: Data) -> str:
@@ -128,4 +205,10 @@ def _more(own: float, other: float) -> str:
     return f"{100 * (own / other - 1):+.1f}"
 
 
-TABLES: Mapping[str, Callable[[Data], str]] = {"bvh-tests": tests, "bvh-cycles": cycles, "bvh-costs": costs}
+TABLES: Mapping[str, Callable[[Data], str]] = {
+    "bvh-tests": tests,
+    "bvh-cycles": cycles,
+    "bvh-costs": costs,
+    "bvh-power": power,
+    "cpu-baseline": cpu,
+}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -54,17 +54,7 @@ def measure(
     if tech.library and operation:
         for workload in operation.workloads:
             require_recordable(workload, design.manifest)
-    netlists: dict[str, Any] = {}
-    units: dict[str, dict[str, Any]] = {}
-    for level in hierarchy.levels:
-        for module in (*hierarchy.units(level), level.top):
-            name = level.rest if module == level.top else module
-            with progress.step(f"synthesising {name}"):
-                for each in (*hierarchy.parts(module), module):
-                    netlists[each] = synthesise(hierarchy, each, tech, progress)
-                count = hierarchy.instances(module, level)
-                units[name] = _unit(level, module, count, netlists, hierarchy.parts(module), tech)
-            finished(level.name, name, units[name])
+    netlists, units = _synthesised(hierarchy, hierarchy.levels, tech, progress, finished)
     with progress.step("timing the whole traversal unit"):
         whole = _timing(Netlist(netlists, LEVELS[0].top, tech.library), tech) if tech.library else None
     power, batches = None, list[dict[str, Any]]()
@@ -112,6 +102,40 @@ def measure(
         "power_mw": power["glitch_aware"]["total_mw"] if power else None,
         "energy_per_ray_nj": power["glitch_aware"]["energy_per_ray_nj"] if power else None,
     }
+
+
+def traversal_unit(
+    config: str, overrides: Sequence[str], liberties: Sequence[str], progress: Progress = QUIET
+) -> dict[str, float]:
+    """Area of the units of a traversal unit, kGE, and of all of it with its memories, "all"; arguments as `measure`."""
+    require_yosys()
+    tech = technology(tuple(liberties), None)
+    hierarchy = Hierarchy(black_boxed_design_for(config, overrides, progress).dir)
+    units = _synthesised(hierarchy, hierarchy.levels[:1], tech, progress)[1]
+    whole = _levels(units, 1, 1, hierarchy.memories())[LEVEL_NAMES[0]]
+    return {name: float(unit["kge"]) for name, unit in units.items()} | {"all": float(whole["kge"])}
+
+
+def _synthesised(
+    hierarchy: Hierarchy,
+    levels: Iterable[Level],
+    tech: Technology,
+    progress: Progress,
+    finished: Finished = lambda level, name, unit: None,
+) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+    """The netlists of levels, and their units."""
+    netlists: dict[str, Any] = {}
+    units: dict[str, dict[str, Any]] = {}
+    for level in levels:
+        for module in (*hierarchy.units(level), level.top):
+            name = level.rest if module == level.top else module
+            with progress.step(f"synthesising {name}"):
+                for each in (*hierarchy.parts(module), module):
+                    netlists[each] = synthesise(hierarchy, each, tech, progress)
+                count = hierarchy.instances(module, level)
+                units[name] = _unit(level, module, count, netlists, hierarchy.parts(module), tech)
+            finished(level.name, name, units[name])
+    return netlists, units
 
 
 def _unit(

@@ -217,6 +217,22 @@ def results(report: dict[str, Any]) -> dict[str, Any]:
         "bvh-tests": trees("BVH4", "BVH2"),
         "bvh-costs": trees("BVH4", "BVH2", "none"),
         "bvh-cycles": trees("BVH4", "BVH2", "none"),
+        "bvh-power": {
+            "libraries": ["asap7"],
+            "points": [
+                {"name": name, "figures": {"array_kge.asap7": 1e3, "mw.asap7": mw, "nj.asap7": nj}}
+                for name, mw, nj in (("BVH4", 2.1, 0.5), ("none", 2.0, 5.0))
+            ],
+        },
+        "room-mesh": {
+            "r": {"triangles": 600_000, "mesh_bytes": 2_000_000, "plane_bytes": 12_288, "rays": 1000}
+            | {"node_reads": 20.0, "triangle_tests": 3.0, "march_steps": 19.0, "dram_bytes": 900.0}
+            | {"mesh_right": 1.0, "march_right": 0.975, "cycles": 2.5}
+        },
+        "cpu-baseline": {
+            "bunny": {"processor": "Zuse Z4", "triangles": 69_451, "rays": 307_200, "in_box": 100_000}
+            | {"plain_seconds": 240.0, "embree_seconds": 0.03072}
+        },
         "paper-unit": {"bench": bench, "area": area()},
         "paper-maps": {
             "living": room("Room"),

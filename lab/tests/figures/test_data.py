@@ -309,6 +309,29 @@ def test_the_catalog_measures_every_preset() -> None:
     assert [entry.name for entry in catalog.selected(("light",))] == ["light"]  # not light-users
     with pytest.raises(KeyError):
         catalog.selected(("beauty",))
+    classes = [{entry.name for entry in catalog.selected((name,))} for name in catalog.CLASSES]
+    assert sum(map(len, classes)) == len(entries) == len(set.union(*classes))
+    changed, released, sourced = classes
+    assert {f"bench-{name}" for name in ("edge", "lean", "small", "tiny", "fpga")} < changed
+    assert {"scaling", "bvh-cycles"} < released and {"quality-edge", "environments"} < sourced
+
+
+def test_a_release_shows_no_figure_of_an_unknown_commit_or_of_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = {"bench-edge": ("aaaa", False), "rooms": ("bbbb", False), "bench-lean": ("aaaa", True)}
+    monkeypatch.setattr(data, "catalog", lambda: {name: catalog.catalog()[name] for name in known})
+    monkeypatch.setattr(data, "_git", lambda *arguments: "" if "aaaa" in arguments else None)
+    (tmp_path / "data").mkdir()
+    for name, (head, is_modified) in known.items():
+        content = {"commit": head, "is_modified": is_modified}
+        (tmp_path / "data" / f"{name}.json").write_text(json.dumps(content))
+    (tmp_path / "data" / data.UNMEASURED).write_text("scaling\n")
+    assert list(data.release_problems(tmp_path)) == [
+        "data/unmeasured.txt: scaling is not measured: run tools/figures scaling",
+        "data/rooms.json: its commit bbbb is not in the history: run tools/figures --again rooms",
+        "data/bench-lean.json: it is of changes to commit aaaa: run tools/figures --again bench-lean",
+    ]
 
 
 def test_libraries_are_those_of_variables_or_fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,9 +32,7 @@ class DepthMesh:
     def __init__(self, environment: Environment, split: bool = True) -> None:
         """Build the mesh. With ``split`` false it joins all neighbours."""
         self._environment = environment
-        points = environment.points()
-        faces = _faces(points, environment.normals, split)
-        self._tracer = RayTracer(Triangles(points.reshape(-1, 3), faces))
+        self._tracer = RayTracer(triangles_of(environment, split))
         corners = self._tracer.corners
         self._normals: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
@@ -50,6 +48,12 @@ class DepthMesh:
         u = position[:, 0] / z * environment.fx + environment.cx
         v = position[:, 1] / z * environment.fy + environment.cy
         return SurfaceHits(position, u, v, outside)
+
+
+def triangles_of(environment: Environment, split: bool = True) -> Triangles:
+    """The triangles of a room's depth map, in view space, metres. With ``split`` false they join all neighbours."""
+    points = environment.points()
+    return Triangles(points.reshape(-1, 3), _faces(points, environment.normals, split))
 
 
 def full_backdrop(environment: Environment, bounding: BoundingSurface | None = None) -> Backdrop:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,7 +89,7 @@ def record(
     one_column: Overrides = (*overrides, "array.columns=1")
     design = design_for(config, one_column, progress)
     require_recordable(workload, design.manifest)
-    ports = {module: _Ports.of(yosys) for module, yosys in modules.items()}
+    ports = {module: _Ports.of(yosys, _words(design, module)) for module, yosys in modules.items()}
     with _with_recorders(design, ports, workload.outer) as recorded, temporary_folder() as folder:
         (folder / "limit").write_text(f"{workload.cycles}\n")
         facts = workload.run(OneColumn(config, one_column, design), recorded, folder, progress)
@@ -102,18 +102,34 @@ def record(
 
 @dataclass(frozen=True)
 class _Ports:
-    """The ports of a recorded module, without the clock."""
+    """The ports of a recorded module, without the clock.
+
+    Attributes:
+        inputs: Inputs of the gates.
+        outputs: Outputs of the gates that the simulated module has.
+        absent: Inputs that it does not have, since no unit reads them: they reach memories alone, and are 0.
+    """
 
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
+    absent: frozenset[str]
 
     @staticmethod
-    def of(ports: Mapping[str, Any]) -> _Ports:
+    def of(ports: Mapping[str, Any], present: Set[str]) -> _Ports:
+        """The ports of gates in Yosys's JSON; `present` has all names of the simulated module."""
+
         def towards(direction: str) -> tuple[Port, ...]:
             found = ((name, port) for name, port in ports.items() if port["direction"] == direction)
             return tuple(Port(name, len(port["bits"])) for name, port in found if name != CLOCK)
 
-        return _Ports(towards("input"), towards("output"))
+        inputs = towards("input")
+        outputs = tuple(port for port in towards("output") if port.name in present)
+        return _Ports(inputs, outputs, frozenset(port.name for port in inputs) - present)
+
+
+def _words(design: GeneratedDesign, module: str) -> Set[str]:
+    """The words of a module's Verilog, its ports among them."""
+    return set(re.findall(r"\w+", (design.dir / f"{module}.sv").read_text()))
 
 
 def _cycles(lines: Sequence[str]) -> tuple[tuple[int, int], ...]:
@@ -142,7 +158,7 @@ def _recorder(module: str, ports: _Ports, design: GeneratedDesign, outer: str) -
         instance = f"{name}."
 
     def joined(names: Sequence[Port]) -> str:
-        return ", ".join(f"{instance}{port.name}" for port in names)
+        return ", ".join(f"{port.bits}'h0" if port.name in ports.absent else f"{instance}{port.name}" for port in names)
 
     return _RECORDER.lstrip().format(
         module=module,

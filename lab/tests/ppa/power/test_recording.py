@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 from colonnade.common.errors import UserError
+from colonnade.design.generator import GeneratedDesign, manifest_for
 
 from colonnade_lab.evaluation.ray_bench import KINDS
 from colonnade_lab.ppa.netlist.hierarchy import TRIANGLES
 from colonnade_lab.ppa.power.batch import BatchWorkload
 from colonnade_lab.ppa.power.frame import PATH_MODULES, FrameWorkload
-from colonnade_lab.ppa.power.record import record
+from colonnade_lab.ppa.power.record import _Ports, _recorder, _words, record
 from colonnade_lab.ppa.power.recording import Recording
 
 UNIT = "TraversalUnit"
@@ -79,6 +81,17 @@ def test_recordings_are_of_one_unit_and_its_paths_from_the_first_to_the_last_cyc
     shared = dict.fromkeys(PATH_MODULES, share) | {TRIANGLES: frame.traced / of_group}
     assert frame.shares == {UNIT: 1.0} | shared
     assert share < shared[TRIANGLES] < 1
+
+
+def test_ports_that_the_simulated_module_lacks_are_0_or_left_out(tmp_path: Path) -> None:
+    """Those of rays that only memories hold: firtool drops them where the memories are modules."""
+    (tmp_path / f"{UNIT}.sv").write_text(f"module {UNIT}(input clock, reset, io_start, output io_isFree);\nendmodule\n")
+    design = GeneratedDesign(tmp_path, manifest_for("tiny").manifest)
+    gates = ports(("io_start", "io_ray"), ("io_isFree", "io_gone"))
+    found = _Ports.of(gates, _words(design, UNIT))
+    assert [port.name for port in found.inputs] == ["reset", "io_start", "io_ray"]
+    assert [port.name for port in found.outputs] == ["io_isFree"]
+    assert ".inputs({reset, io_start, 1'h0}), .outputs({io_isFree})" in _recorder(UNIT, found, design, "Column")
 
 
 RAY_PORTS = {
