@@ -6,6 +6,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from colonnade.common.errors import UserError
@@ -72,16 +73,17 @@ def _cheap(bench: Bench, names: list[str]) -> Iterator[Outcome]:
 def _measured(check: Check, bench: Bench, named: bool) -> Outcome:
     """Measure a claim; one that is not named does without a second mesh."""
     lacking = bench.lacks(need for need in check.needs if named or need != SECOND)
+    found = partial(Outcome, check.claim, check.paper, command=f"tools/paper {check.name}")
     if lacking is not None:
-        return Outcome(check.claim, check.paper, reason=lacking, failed=named)
+        return found(reason=lacking, failed=named)
     begin = time.monotonic()
     try:
         figures = check.measure(bench)
     except Missing as missing:
-        return Outcome(check.claim, check.paper, reason=f"docs/data has no {missing}", failed=named)
+        return found(reason=f"docs/data has no {missing}", failed=named)
     except (Differs, UserError) as error:
-        return Outcome(check.claim, check.paper, reason=str(error), failed=True)
-    return Outcome(check.claim, check.paper, tuple(figures), seconds=time.monotonic() - begin)
+        return found(reason=str(error), failed=True)
+    return found(figures=tuple(figures), seconds=time.monotonic() - begin)
 
 
 def _printed(outcomes: Iterator[Outcome]) -> Iterator[Outcome]:

@@ -39,6 +39,7 @@ class _Both(Data):
         self._page = page
 
     def get(self, name: str) -> Mapping[str, Any] | None:
+        """See `Data`."""
         found = super().get(name)
         return self._page.get(name) if found is None else found
 

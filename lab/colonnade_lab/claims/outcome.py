@@ -30,6 +30,7 @@ class Outcome:
         reason: Why there are none; None if there are.
         failed: The reason is a failure.
         seconds: Wall time.
+        command: What measures it.
     """
 
     claim: str
@@ -38,6 +39,7 @@ class Outcome:
     reason: str | None = None
     failed: bool = False
     seconds: float = 0.0
+    command: str = ""
 
     @property
     def is_right(self) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 from colonnade.common.atomic_files import replacing
 
 from colonnade_lab.claims.outcome import Outcome
+from colonnade_lab.claims.plots import Drawn
 
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 1080px; margin: 2em auto; padding: 0 1em; color: #222; }
@@ -23,6 +24,8 @@ tr.claim td { border-top: 2px solid #999; }
 figure { margin: 0; }
 img { width: 100%; }
 figcaption { font-weight: bold; }
+figure p { margin: 0.2em 0 1em; }
+small, code { color: #666; font-size: 80%; }
 """
 
 
@@ -31,7 +34,7 @@ def write(
     title: str,
     lines: Sequence[str],
     outcomes: Sequence[Outcome],
-    plots: Sequence[tuple[str, str, Path | None]],
+    plots: Sequence[Drawn],
 ) -> None:
     """Write the page.
 
@@ -40,10 +43,10 @@ def write(
         title: Its title.
         lines: What is said before the table.
         outcomes: The claims.
-        plots: Those of `colonnade_lab.claims.plots.draw`.
+        plots: The paper's figures.
     """
     rows = "".join(_rows(outcome) for outcome in outcomes)
-    pictures = "".join(_plot(*plot) for plot in plots)
+    pictures = "".join(_plot(plot) for plot in plots)
     text = f"""<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>
 <h1>{escape(title)}</h1>
@@ -51,7 +54,7 @@ def write(
 <h2>Claim by claim</h2>
 <table><tr><th>claim</th><th>the paper</th><th>measured</th><th>page</th><th>now</th><th>equal</th></tr>{rows}</table>
 <h2>The paper's figures, from the data of docs/paper.md</h2>
-<p>Dotted lines are the paper's own values.</p>
+<p>Dotted lines are the paper's own values. docs/paper.md says why figures differ.</p>
 <div class="plots">{pictures}</div>
 </html>
 """
@@ -60,7 +63,8 @@ def write(
 
 
 def _rows(outcome: Outcome) -> str:
-    head = f"<td>{escape(outcome.claim)}</td><td>{escape(outcome.paper)}</td>"
+    command = f"<br><code>{escape(outcome.command)}</code>" if outcome.command else ""
+    head = f"<td>{escape(outcome.claim)}{command}</td><td>{escape(outcome.paper)}</td>"
     if outcome.reason is not None:
         kind = "no" if outcome.failed else "out"
         word = "failed" if outcome.failed else "left out"
@@ -76,9 +80,12 @@ def _rows(outcome: Outcome) -> str:
     return "".join(rows)
 
 
-def _plot(name: str, title: str, file: Path | None) -> str:
-    caption = f"<figcaption>{escape(name)}: {escape(title)}</figcaption>"
-    if file is None:
+def _plot(drawn: Drawn) -> str:
+    plot = drawn.plot
+    caption = f"<figcaption>{escape(plot.name)}: {escape(plot.title)}</figcaption>"
+    if drawn.file is None:
         return f"<figure>{caption}<p>Not measured.</p></figure>"
-    data = base64.b64encode(file.read_bytes()).decode()
-    return f'<figure>{caption}<img alt="{escape(title)}" src="data:image/png;base64,{data}"></figure>'
+    data = base64.b64encode(drawn.file.read_bytes()).decode()
+    picture = f'<img alt="{escape(plot.title)}" src="data:image/png;base64,{data}">'
+    sources = "".join(f"<br>{escape(source)}" for source in drawn.sources)
+    return f"<figure>{caption}{picture}<p>{escape(plot.note)}<small>{sources}</small></p></figure>"

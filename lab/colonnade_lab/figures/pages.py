@@ -52,7 +52,7 @@ _FIGURE = re.compile(r"<!-- figure:(\w+)\.(\w+) -->.*?<!-- end -->")
 _MARKER = re.compile(r"<!-- (?!end -->)([\w:.-]+) -->")
 
 
-class _Read(Data):
+class Read(Data):
     """Data that notes which of its files are read."""
 
     def __init__(self, data: Data) -> None:
@@ -60,11 +60,12 @@ class _Read(Data):
         self.names: set[str] = set()
 
     def get(self, name: str) -> Mapping[str, Any] | None:
+        """See `Data`."""
         self.names.add(name)
         return self._data.get(name)
 
 
-def _earlier(read: _Read, declared: Collection[str]) -> str:
+def _earlier(read: Read, declared: Collection[str]) -> str:
     """A line below a table for its files that are of earlier hardware or sources."""
     contents = {name: content for name in sorted(read.names & set(declared)) if (content := read.get(name)) is not None}
     if not contents:
@@ -78,7 +79,7 @@ def tables_of(docs: Path, entries: Iterable[str]) -> Iterator[tuple[str, str]]:
     for name, table in TABLES.items():
         if name in _OF_MINUTES:
             continue
-        read = _Read(Data(docs))
+        read = Read(Data(docs))
         try:
             text = table(read)
         except Missing:
@@ -104,7 +105,7 @@ def page(content: str, data: Data, declared: Collection[str] = ()) -> str:
         used.append(match[1])
         if match[1] not in TABLES:
             raise UserError(f"there is no table {match[1]}: choose from {', '.join(TABLES)}")
-        read = _Read(data)
+        read = Read(data)
         try:
             body = TABLES[match[1]](read) + ("" if match[1] in _OF_MINUTES else _earlier(read, declared))
         except Missing as missing:

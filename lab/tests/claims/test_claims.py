@@ -158,7 +158,8 @@ def test_the_command_ends_with_1_if_a_figure_differs(
 ) -> None:
     monkeypatch.setattr(command, "project_root", lambda: tmp_path)
     monkeypatch.setattr(command, "commit", lambda: ("c0ffee00", False))
-    monkeypatch.setattr(plots, "draw", lambda data, folder: iter([("Fig. 1", "title", None)]))
+    drawn = plots.Drawn(plots.Plot("Fig. 1", "title", "note", lambda data, axes: None), None, ())
+    monkeypatch.setattr(plots, "draw", lambda data, folder: iter([drawn]))
     for now, status in (("1", 0), ("2", 1)):
         check = Check("one", "claim <1>", "6", lambda bench, now=now: [Figure("a", "1", now)], ())
         monkeypatch.setattr(command, "CHECKS", (check,))
@@ -175,16 +176,18 @@ def test_the_command_ends_with_1_if_a_figure_differs(
 
 
 def test_all_plots_are_drawn_from_the_data(tmp_path: Path) -> None:
-    found = {name: file for name, _, file in plots.draw(Data(ROOT / "docs"), tmp_path)}
-    assert list(found) == list(plots.PLOTS)
-    for name, file in found.items():
-        if file is None:
+    found = list(plots.draw(Data(ROOT / "docs"), tmp_path))
+    assert [each.plot for each in found] == list(plots.PLOTS)
+    for each in found:
+        if each.file is None:
             with pytest.raises(Missing) as missing:
-                plots.PLOTS[name][1](Data(ROOT / "docs"), None)
+                each.plot.draw(Data(ROOT / "docs"), None)
             assert str(missing.value) in unmeasured(ROOT / "docs")
-    assert all(file is None for _, _, file in plots.draw(Data(tmp_path), tmp_path))
-    page.write(tmp_path / "index.html", "Title", [], [], [("Fig. 6(a)", "Power", found["Fig. 6(a)"])])
-    assert 'src="data:image/png;base64,' in (tmp_path / "index.html").read_text()
+    assert found[1].sources[0].startswith("bvh-cycles: measured 20")
+    assert all(each.file is None for each in plots.draw(Data(tmp_path), tmp_path))
+    page.write(tmp_path / "index.html", "Title", [], [], found[:1])
+    text = (tmp_path / "index.html").read_text()
+    assert 'src="data:image/png;base64,' in text and "mixed-precision: measured 20" in text
 
 
 def test_the_full_form_measures_the_entries_and_compares_the_tables(
