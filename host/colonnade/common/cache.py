@@ -58,6 +58,16 @@ def is_intact(folder: Path, key: str | None = None) -> bool:
         return False
 
 
+def holds(folder: Path) -> bool:
+    """Whether an entry is there and intact; each process verifies it once."""
+    if folder not in _verified or not (folder / CONTENTS).is_file():
+        _verified.discard(folder)
+        if not is_intact(folder):
+            return False
+        _verified.add(folder)
+    return True
+
+
 @contextlib.contextmanager
 def entry(
     folder: Path,
@@ -79,12 +89,12 @@ def entry(
     Raises:
         UserError: the cache is not writable.
     """
-    if _is_known(folder) and is_usable(folder):
+    if holds(folder) and is_usable(folder):
         yield None
         return
     try:
         with locked(folder.parent / f"{folder.name}.lock", what, progress):
-            if _is_known(folder) and is_usable(folder):
+            if holds(folder) and is_usable(folder):
                 yield None
             else:
                 if os.path.lexists(folder):
@@ -157,16 +167,6 @@ def _disk_watched(content: Path, cache: Path) -> Iterator[None]:
 
 def _full(folder: Path) -> UserError:
     return UserError(f"no space left on the disk of the cache {folder}: free some there")
-
-
-def _is_known(folder: Path) -> bool:
-    """Whether the entry is intact; each process verifies it once."""
-    if folder not in _verified or not (folder / CONTENTS).is_file():
-        _verified.discard(folder)
-        if not is_intact(folder):
-            return False
-        _verified.add(folder)
-    return True
 
 
 def _contents(folder: Path) -> dict[str, tuple[int, str]]:

@@ -85,8 +85,8 @@ class GeneratedDesign:
 
 
 def manifest_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
-    """Generate only the manifest, enough for packing, the model and the frame registers."""
-    return _cached(config, overrides, (MANIFEST_ONLY,), progress)
+    """The manifest alone, enough for packing, the model and the frame registers."""
+    return _cached(config, overrides, (MANIFEST_ONLY,), progress, takes_complete=True)
 
 
 def design_for(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET) -> GeneratedDesign:
@@ -107,7 +107,8 @@ def shell_manifest_for(
     refit: bool = False,
 ) -> GeneratedDesign:
     """Generate only ``manifest.json`` and ``shell.json``, enough for register descriptions."""
-    return _cached(config, overrides, (MANIFEST_ONLY, *_shell_options(bus_bytes, refit=refit)), progress)
+    options = (MANIFEST_ONLY, *_shell_options(bus_bytes, refit=refit))
+    return _cached(config, overrides, options, progress, takes_complete=True)
 
 
 def shell_design_for(
@@ -171,13 +172,18 @@ def source_hash(root: Path) -> str:
 
 
 @checked
-def _cached(config: str, overrides: Overrides, options: tuple[str, ...], progress: Progress) -> GeneratedDesign:
+def _cached(
+    config: str, overrides: Overrides, options: tuple[str, ...], progress: Progress, takes_complete: bool = False
+) -> GeneratedDesign:
     root = project_root()
     source = find_configuration(config, overrides, root)
     if options == (MANIFEST_ONLY,) and (released := _released(root, source)) is not None:
         return released
     state = cache_directory(root) / "generator" / source_hash(root)
     entry = state / _key(source, options)
+    # A design in the cache has its manifest beside the Verilog
+    if takes_complete and cache.holds(complete := state / _key(source, options[1:])):
+        entry = complete
     with cache.entry(entry, "design", progress) as empty:
         if empty is not None:
             java = find_java()

@@ -223,6 +223,14 @@ def test_an_interrupted_generator_leaves_nothing(checkout: Path, monkeypatch: py
     assert {path.name for path in state.iterdir() if path.suffix != ".lock"} <= before
 
 
+def test_a_design_in_the_cache_has_its_manifest(checkout: Path, tmp_path: Path) -> None:
+    design = generator.design_for("tiny")
+    assert generator.manifest_for("tiny").manifest == design.manifest
+    assert runs(checkout) == ["sbt", "java"]
+    generator.generate("tiny", [], tmp_path / "output", manifest_only=True)
+    assert runs(checkout) == ["sbt", "java", "java"], "no Verilog beside a manifest that the user asks for"
+
+
 def test_a_digest_is_of_what_a_design_does(checkout: Path, tmp_path: Path) -> None:
     design = generator.design_for("tiny")
     copy = generator.generate("tiny", [], tmp_path / "copy")
