@@ -131,22 +131,43 @@ def encodings(data: Data) -> str:
 def room_mesh(data: Data) -> str:
     """Mirror rays through a room's mesh in the tree, and through its march."""
     rows = []
+    around = next(each for each in data.result("ray-device")["kinds"] if each["kind"] == _AROUND)
+    batches = data.result("area-traversal-asap7")["batches"]
+    energy = next(each for each in batches if each["scene"]["kind"] == _AROUND)["glitch_aware"]["at_28nm"]
+    edge = data.file("marches")["config"]
+    marches = edge["array"]["columns"] * edge["units"]["marches"]
     for name, found in data.result("room-mesh").items():
-        tree = [
-            "tree",
-            f"{found['mesh_bytes'] / 1e6:.1f} MB",
-            f"{found['node_reads']:.1f} nodes, {found['triangle_tests']:.1f} triangles",
+        own = energy["energy_per_any_ray_nj"] * found["node_reads"] / around["node_reads"]
+        tree = f"{found['node_reads']:.1f} nodes, {found['triangle_tests']:.1f} triangles"
+        cycles = sum(_MARCH) + _STEP * found["march_steps"]
+        rows += [
+            [
+                *(f"{name}, {found['triangles']:,} triangles", "tree", f"{found['mesh_bytes'] / 1e6:.1f} MB", tree),
+                *(f"{found['dram_bytes']:,.0f}", f"{found['cycles']:.1f}", f"{own:.1f}"),
+                f"{100 * found['mesh_right']:.1f}",
+            ],
+            [
+                *(
+                    f"{name}, planes",
+                    "march",
+                    f"{found['plane_bytes'] / 1e3:.1f} KB",
+                    f"{found['march_steps']:.1f} steps",
+                ),
+                *("0", f"{cycles / marches:.1f}", "–", f"{100 * found['march_right']:.1f}"),
+            ],
         ]
-        march = ["march", f"{found['plane_bytes'] / 1e3:.1f} KB", f"{found['march_steps']:.1f} steps"]
-        right = (f"{100 * found[f'{way}_right']:.1f}" for way in ("mesh", "march"))
-        cycles = "–" if found["cycles"] is None else f"{found['cycles']:.2f}"
-        rows.append(
-            [f"{name}, {found['triangles']:,} triangles", *tree, f"{found['dram_bytes']:,.0f}", cycles, next(right)]
-        )
-        rows.append([f"{name}, maps", *march, "0", "–", next(right)])
-    head = ["room", "by", "scene", "a ray", "bytes of DRAM a ray", "cycles a ray"]
+    head = ["room", "by", "scene", "a ray", "bytes of DRAM a ray", "cycles a ray", "nJ a ray"]
     return markdown([*head, "right, %"], rows)
 
+
+def room_bytes(data: Data) -> str:
+    """How many times the bytes of a room's planes its mesh takes."""
+    (found,) = data.result("room-mesh").values()
+    return f"{found['mesh_bytes'] / found['plane_bytes']:,.0f}"
+
+
+#: The batch whose energy a node is, and the least cycles of a march: before its first tile and at its end, a tile.
+_AROUND, _MARCH, _STEP = "from around, shuffled, hits", (92, 23), 7
 
 #: The unit of `colonnade ppa` that has the physical-attribute memory, in designs whose columns do not share it.
 _MAPS_UNIT = "ColumnEnvironment"

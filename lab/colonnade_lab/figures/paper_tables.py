@@ -10,6 +10,7 @@ from colonnade_lab.common.markdown import markdown
 from colonnade_lab.evaluation.bench import geometric_mean
 from colonnade_lab.figures.data import Data, Missing
 from colonnade_lab.figures.facts import MEGAHERTZ, facts, text
+from colonnade_lab.figures.map_tables import room_bytes
 from colonnade_lab.figures.precision_tables import lowest_psnr, printed_index, saved
 from colonnade_lab.figures.tree_tables import (
     laptop,
@@ -95,11 +96,6 @@ def _marched(data: Data) -> str:
     return " to ".join(f"{share:.1f}" for share in sorted({min(found), max(found)}))
 
 
-def _march_steps(data: Data) -> str:
-    """Steps of a ray in the rooms, mean: the lowest and the highest."""
-    return " to ".join(f"{steps:.0f}" for steps in sorted({round(each["mean_steps"]) for each in _marches(data)}))
-
-
 def _marches(data: Data) -> list[Mapping[str, Any]]:
     """The device's marches in each room."""
     accuracy = data.result("environments")["accuracy"]
@@ -126,7 +122,7 @@ FACTS: Mapping[str, Callable[[Data], str]] = {
     "slicDists": lambda data: _relit(data, "slic"),
     "twoLevelDists": lambda data: _relit(data, "twoLevel"),
     "marched": _marched,
-    "marchSteps": _march_steps,
+    "roomBytes": room_bytes,
     "nj": lambda _: f"{paper.MILLIWATTS / paper.MRAYS:.2f}",
     "raysAFrame": lambda _: f"{round(paper.RAYS_A_FRAME, -3):,.0f}",
     "againstRivals": _against_rivals,

@@ -56,7 +56,10 @@ def area() -> dict[str, Any]:
             "zero_delay": POWER,
             "glitch_aware": POWER,
         },
-        "batches": [{"scene": {"kind": "near"}, **{key: {"at_28nm": {"energy_per_any_ray_nj": 1.5}} for key in KINDS}}],
+        "batches": [
+            {"scene": {"kind": kind}, **{key: {"at_28nm": {"energy_per_any_ray_nj": 1.5}} for key in KINDS}}
+            for kind in ("near", "from around, shuffled, hits")
+        ],
     }
 
 
@@ -266,7 +269,8 @@ def results(report: dict[str, Any]) -> dict[str, Any]:
         "ray-device": {
             "rays": 1000,
             "kinds": [
-                {"kind": "near", "node_reads": 2.0, "triangle_tests": 1.0, "rays_per_cycle": 3.5, "in_box": 3.25}
+                {"kind": kind, "node_reads": 2.0, "triangle_tests": 1.0, "rays_per_cycle": 3.5, "in_box": 3.25}
+                for kind in ("near", "from around, shuffled, hits")
             ],
         },
         "ray-rates": {

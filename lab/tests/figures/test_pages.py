@@ -31,7 +31,8 @@ def docs(tmp_path: Path, rtl_report: Callable[[float], dict[str, Any]]) -> Path:
             "commit": "c0ffee00" * 5,
             "is_modified": False,
             "processors": 2,
-            "config": {"precision": {"mac": 32, "sqrt": 32, "div": 64}},
+            "config": {"precision": {"mac": 32, "sqrt": 32, "div": 64}}
+            | {"array": {"columns": 8}, "units": {"marches": 2}},
             "result": result,
         }
         (tmp_path / "docs" / "data" / f"{name}.json").write_text(json.dumps(content))
