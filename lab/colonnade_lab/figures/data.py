@@ -37,7 +37,7 @@ SOURCES = (
         "tools/soc-fpga",
         "tools/view-frames",
     ),
-    *(":!lab/colonnade_lab/figures", ":!lab/colonnade_lab/report", ":!lab/tests"),
+    *(":!lab/colonnade_lab/claims", ":!lab/colonnade_lab/figures", ":!lab/colonnade_lab/report", ":!lab/tests"),
     *(":!host/tests", ":!host/locks", ":!src/test"),
 )
 
