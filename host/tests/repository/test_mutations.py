@@ -51,3 +51,18 @@ def test_a_module_is_concrete_and_may_extend_an_abstract_one(tool: dict[str, Any
     declared = {name for inside in tool["modules"]().values() for name in inside.values()}
     assert {"ShadingPipeline", "TraversalStack", "TexelReader"} <= declared
     assert not {"Shader", "RaySetup", "ObjectAlbedo", "LitAssemblerIO"} & declared
+
+
+def test_the_curve_puts_suites_with_most_faults_a_second_first(tool: dict[str, Any]) -> None:
+    table = {str(n): {"spec": spec} for n, spec in enumerate(("FastSpec", "SlowSpec", "SlowSpec", "FastSpec"))}
+    rows = tool["curve"](table, {"SlowSpec": 30.0, "IdleSpec": 60.0, "FastSpec": 10.0}).splitlines()
+    assert [row.split() for row in rows[1:]] == [
+        ["2", "10.0", "50.0%", "10.0%", "FastSpec"],
+        ["2", "30.0", "100.0%", "40.0%", "SlowSpec"],
+        ["0", "60.0", "100.0%", "100.0%", "IdleSpec"],
+    ]
+
+
+def test_kills_and_seconds_are_summed_by_suite(tool: dict[str, Any]) -> None:
+    rows = tool["kills"]([("B", True, 2.0), ("A", True, 1.5), ("B", False, 4.0)]).splitlines()
+    assert [row.split() for row in rows[1:]] == [["1", "1", "1.5", "A"], ["1", "2", "6.0", "B"]]
