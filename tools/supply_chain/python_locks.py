@@ -56,9 +56,13 @@ def project_tables() -> dict[str, Any]:
 
 
 def wanted_locks() -> list[Lock]:
-    """The locks: build requirements, `make render`, all of .venv, extras apart, `ppa`, each further group."""
+    """The locks: build requirements, `make render`, all of .venv, extras apart, `yosys`, `ppa`, each further group."""
     data = project_tables()
     laboratory = tomllib.loads(LABORATORY.read_text(encoding="utf-8"))["project"]
+    tools = {
+        extra: [one for one in requirements if not one.startswith(laboratory["name"])]
+        for extra, requirements in laboratory["optional-dependencies"].items()
+    }
     project = data["project"]
     extras: dict[str, list[str]] = dict(project.get("optional-dependencies", {}))
     # A checkout has a JDK, and no test needs 88 MB of Open Image Denoise
@@ -73,7 +77,7 @@ def wanted_locks() -> list[Lock]:
         "render": project["dependencies"],
         "host": host,
         **apart,
-        **laboratory["optional-dependencies"],
+        **tools,
         **groups,
     }
     return [Lock(name, tuple(table), project["requires-python"]) for name, table in tables.items()]

@@ -11,10 +11,11 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import black_boxed_design_for
 
 from colonnade_lab.common import paper
+from colonnade_lab.common.yosys import require_yosys
 from colonnade_lab.ppa.netlist import memories
 from colonnade_lab.ppa.netlist.hierarchy import LEVEL_NAMES, LEVELS, Hierarchy, Level, Memory
 from colonnade_lab.ppa.netlist.mapped import Netlist
-from colonnade_lab.ppa.netlist.synthesis import Technology, count_gates, require_yosys, synthesise, technology
+from colonnade_lab.ppa.netlist.synthesis import Technology, count_gates, synthesise, technology
 from colonnade_lab.ppa.power.record import require_recordable
 from colonnade_lab.ppa.power.report import Operation, measure_power
 from colonnade_lab.ppa.timing import opensta

@@ -39,7 +39,7 @@ def yosys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The runs of a stand-in for Yosys."""
     runs: list[str] = []
 
-    def run(script: list[str], place: Path, links: object, log: Path) -> None:
+    def run(script: list[str], place: Path, log: Path, links: object) -> None:
         runs.append(log.name)
         (place / "netlist.json").write_text(json.dumps(NETLIST))
 

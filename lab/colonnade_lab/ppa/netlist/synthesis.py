@@ -10,19 +10,14 @@ from __future__ import annotations
 import gzip
 import hashlib
 import importlib.metadata
-import importlib.util
 import json
-import os
 import re
-import subprocess
-import sys
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from colonnade.common import cache, processes
+from colonnade.common import cache
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
@@ -30,6 +25,7 @@ from colonnade.common.temporary import temporary_folder
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.design.verilog import without_places
 
+from colonnade_lab.common.yosys import run_yosys
 from colonnade_lab.ppa.library import liberty, liberty_files, liberty_syntax
 from colonnade_lab.ppa.library.cells import Library
 from colonnade_lab.ppa.library.one_library import library_files
@@ -63,14 +59,6 @@ NETLIST = "netlist.json.gz"
 
 #: Default of ``--delay``, FO4 of the library.
 TARGET_FO4 = 60
-
-_RUN = """
-import sys
-from pyosys import libyosys
-design = libyosys.Design()
-for line in open(sys.argv[1]):
-    libyosys.run_pass(line.strip(), design)
-"""
 
 
 @dataclass(frozen=True)
@@ -113,12 +101,6 @@ class Gates:
     def total(self) -> float:
         """Gate equivalents of all cells."""
         return self.registers + self.combinational
-
-
-def require_yosys() -> None:
-    """Raise a `UserError` if Yosys is missing."""
-    if importlib.util.find_spec("pyosys") is None:
-        raise UserError("colonnade ppa needs Yosys: run tools/ppa-environment, which installs pyosys")
 
 
 def technology(liberties: tuple[str, ...], delay: float | None) -> Technology:
@@ -171,7 +153,7 @@ def synthesise(hierarchy: Hierarchy, top: str, tech: Technology, progress: Progr
                 links |= {file.name: file for file in (tech.library.files if tech.library else ())}
                 (work / "constraints").write_text(_constraints(tech))
                 (work / "boxes.sv").write_text(boxes)
-                run_yosys([*script, "write_json netlist.json"], work, links, folder.with_suffix(".log"))
+                run_yosys([*script, "write_json netlist.json"], work, folder.with_suffix(".log"), links)
                 written = json.loads((work / "netlist.json").read_text())["modules"][top]
             (empty / NETLIST).write_bytes(gzip.compress(json.dumps(_trimmed(written)).encode(), 3))
     netlist: dict[str, Any] = json.loads(gzip.decompress((folder / NETLIST).read_bytes()))
@@ -218,31 +200,6 @@ def _constraints(tech: Technology) -> str:
     inverter = tech.library.inverter
     load = 4 * next(pin.capacitance for pin in inverter.pins.values() if pin.direction == "input")
     return f"set_driving_cell {inverter.name}\nset_load {1000 * load:.4f}\n"
-
-
-def run_yosys(script: list[str], folder: Path, links: Mapping[str, Path], log: Path) -> None:
-    """Run Yosys commands in `folder`.
-
-    Args:
-        script: The commands.
-        folder: Working folder.
-        links: Input files by the name that the commands use.
-        log: File for the output of Yosys.
-
-    Raises:
-        RuntimeError: Yosys fails.
-    """
-    for name, file in links.items():
-        (folder / name).symlink_to(file.resolve())
-    (folder / "script.ys").write_text("\n".join(script) + "\n")
-    with log.open("w") as stream:
-        command = [sys.executable, "-c", _RUN, "script.ys"]
-        # Yosys shares converted libraries below TMPDIR between processes
-        environment = os.environ | {"TMPDIR": str(folder)}
-        done = processes.run(command, cwd=folder, env=environment, stdout=stream, stderr=subprocess.STDOUT)
-    if done.returncode != 0:
-        errors = [line for line in log.read_text(errors="replace").splitlines() if "ERROR" in line or "error:" in line]
-        raise RuntimeError(f"Yosys failed: {(errors or ['no error message'])[0]} (see {log})")
 
 
 def count_gates(netlist: dict[str, Any], tech: Technology) -> Gates:

@@ -24,7 +24,7 @@ from colonnade.common.temporary import temporary_folder
 from colonnade.design.generator import design_for
 from colonnade.design.toolchain import cache_directory, project_root
 
-from colonnade_lab.ppa.netlist.synthesis import require_yosys, run_yosys
+from colonnade_lab.common.yosys import require_yosys, run_yosys
 
 #: Default depth of a column memory, the largest that fits the largest ECP5. The user's overrides take precedence.
 DEPTH = 1024
@@ -63,7 +63,7 @@ def place(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET
             links = {file.name: file for file in design.sources}
             script = [f"read_slang --top Colonnade {' '.join(links)}", "synth_ecp5 -top Colonnade -json netlist.json"]
             with progress.step("synthesising for ECP5"):
-                run_yosys(script, folder, links, cache_file.with_suffix(".log"))
+                run_yosys(script, folder, cache_file.with_suffix(".log"), links)
             with progress.step("placing and routing"):
                 _place(folder, cache_file.with_suffix(".nextpnr.log"))
             placed = json.loads((folder / "report.json").read_text())

@@ -5,6 +5,8 @@ import chiseltest.ChiselScalatestTester
 import org.scalatest.exceptions.TestFailedException
 import org.scalatest.flatspec.AnyFlatSpec
 
+import java.nio.file.{Files, Paths}
+
 /** Counts while `counts` is set. */
 private class Counter(check: (UInt, Bool) => Unit) extends Module {
   val counts = IO(Input(Bool()))
@@ -43,57 +45,70 @@ private class OnePort(readsAlways: Boolean) extends Module {
 class ProofsSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
   behavior of "Proofs"
 
-  private def objection(cycles: Int)(module: => Module): String =
-    intercept[TestFailedException](prove(cycles)(module)).getMessage
+  private def objection(proof: => Unit): String = intercept[TestFailedException](proof).getMessage
 
-  it should "prove true assertions, and reach covers" in {
-    prove(cycles = 5) {
+  it should "prove what holds in all cycles, and reach covers" in {
+    prove {
+      new Counter((count, counts) => {
+        chisel3.assume(!(counts && count === 6.U))
+        chisel3.assert(count < 7.U)
+        cover(count === 6.U)
+      })
+    }
+  }
+
+  it should "prove what holds in some cycles" in {
+    val module = () =>
       new Counter((count, _) => {
         chisel3.assert(count < 5.U)
         cover(count === 4.U)
       })
-    }
+    proveUntil(cycles = 5)(module())
+    assert(objection(proveUntil(cycles = 6)(module())).contains("violated in cycle 6"))
+    assert(objection(prove(module())).contains("violated in cycle 6"))
   }
 
   it should "name the first violated assertion, its cycle and its trace" in {
-    val text = objection(cycles = 6) {
+    val text = objection(prove {
       new Counter((count, _) => {
-        chisel3.assert(count < 4.U, "less than four")
         chisel3.assert(count < 9.U, "less than nine")
+        chisel3.assert(count < 4.U, "less than four")
       })
-    }
-    assert(text.startsWith("Counter: violated in cycle 5 after the reset: 'less than four' (src/test"))
-    assert(text.contains("see test_run_dir/") && text.endsWith("Counter.vcd"))
+    })
+    assert(text.startsWith("Counter: violated in cycle 5 after the reset: 'less than four' (ProofsSpec.scala:"))
     assert(!text.contains("nine"))
+    val trace = Paths.get(text.split(" see ").last)
+    assert(trace.endsWith("Counter.vcd") && Files.readString(trace).contains(" count "))
   }
 
   it should "refuse contradictory assumptions" in {
-    val text = objection(cycles = 5) {
+    val text = objection(prove {
       new Counter((count, counts) => {
         chisel3.assume(counts)
         chisel3.assume(count < 2.U)
         chisel3.assert(count < 2.U)
       })
-    }
-    assert(text.contains("the assumptions can't be kept for 5 cycles"))
+    })
+    assert(text.contains("the assumptions cannot be kept for 20 cycles"))
   }
 
   it should "refuse a proof with an unreachable cover" in {
-    val text = objection(cycles = 5) {
-      new Counter((count, _) => {
+    val module = () =>
+      new Counter((count, counts) => {
+        chisel3.assume(!(counts && count === 4.U))
         chisel3.assert(count < 8.U)
         cover(count === 5.U)
       })
-    }
-    assert(text.contains("can't happen within 5 cycles: src/test"))
+    assert(objection(proveUntil(cycles = 5)(module())).contains("cannot happen within 5 cycles: src/test"))
+    assert(objection(prove(module())).contains("cannot happen: src/test"))
   }
 
   it should "refuse a proof without assertions" in {
-    assert(objection(cycles = 5)(new Counter((_, _) => ())).contains("nothing is asserted"))
+    assert(objection(prove(new Counter((_, _) => ()))).contains("nothing is asserted"))
   }
 
   it should "model a single-port memory whose output is undefined without a read" in {
-    prove(cycles = 6)(new OnePort(readsAlways = false))
-    assert(objection(cycles = 6)(new OnePort(readsAlways = true)).contains("the word that was written"))
+    prove(new OnePort(readsAlways = false))
+    assert(objection(prove(new OnePort(readsAlways = true))).contains("the word that was written"))
   }
 }

@@ -43,7 +43,7 @@ class ColumnBvhControllerSpec extends AnyFlatSpec with ChiselScalatestTester wit
   for (snooping <- Seq(true, false))
     it should s"neither lose nor duplicate reads, and starve no row, whenever two banks respond, snooping $snooping" in {
       val shape = config(rows = 3, banks = 2, latency = 1, depth = 16)
-      prove(cycles = 8)(
+      prove(
         new ColumnBvhControllerProof(shape.copy(columnBvhMemory = shape.columnBvhMemory.copy(snooping = snooping)))
       )
     }

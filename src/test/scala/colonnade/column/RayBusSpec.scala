@@ -9,7 +9,7 @@ class RayBusSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
 
   for ((rows, contexts) <- Seq((1, 1), (2, 2), (3, 1)))
     it should s"send each ray once, to a unit with an idle context, with $rows units of $contexts" in
-      prove(cycles = 9)(new RayBusProof(
+      prove(new RayBusProof(
         TestConfigs.tiny.copy(
           array = TestConfigs.tiny.array.copy(rows = rows, contexts = contexts),
           units = TestConfigs.tiny.units.copy(pathContexts = 4)

@@ -38,5 +38,5 @@ class FirstSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
 
   for (count <- Seq(2, 3, 6))
     it should s"serve each of $count claims once" in
-      prove(cycles = 10)(new RegisteredFirstProof(count))
+      prove(new RegisteredFirstProof(count))
 }

@@ -58,7 +58,7 @@ class PixelCollectorSpec extends AnyFlatSpec with ChiselScalatestTester with Pro
   private val withoutHits = TestConfigs.tiny.copy(frame = TestConfigs.tiny.frame.copy(hits = false))
 
   it should "neither lose nor duplicate pixels" in {
-    prove(cycles = 10)(new PixelCollectorProof(withoutHits))
+    prove(new PixelCollectorProof(withoutHits))
   }
 
   for (count <- Seq(1, 3)) {

@@ -1,29 +1,27 @@
 package colonnade.unit
 
 import chiseltest._
-import colonnade.{Always, Matrix, Proofs, TestConfigs}
+import colonnade.{Proofs, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 class AttributeFetchSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
   behavior of "AttributeFetch"
 
-  private val tiny = TestConfigs.tiny
+  private def module(contexts: Int, slots: Int, hasColours: Boolean) = {
+    val tiny   = TestConfigs.tiny
+    val config = tiny.copy(
+      columnBvhMemory = tiny.columnBvhMemory.copy(depth = 16, banks = 1),
+      units = tiny.units.copy(pathContexts = contexts),
+      geometry = tiny.geometry.copy(cornerColours = hasColours)
+    )
+    new AttributeFetchProof(config, slots)
+  }
 
   // A device with colours has leaves without them, too
-  for (
-    (contexts, slots, cycles, colours, tag) <- Seq(
-      (2, 1, 11, false, Matrix),
-      (3, 2, 9, false, Always),
-      (2, 1, 13, true, Always),
-      (2, 1, 15, true, Matrix)
-    )
-  )
-    it should s"answer each of the hits of $contexts contexts once, by $slots slots, colours $colours, in $cycles cycles" taggedAs tag in {
-      val config = tiny.copy(
-        columnBvhMemory = tiny.columnBvhMemory.copy(depth = 16, banks = 1),
-        units = tiny.units.copy(pathContexts = contexts),
-        geometry = tiny.geometry.copy(cornerColours = colours)
-      )
-      prove(cycles)(new AttributeFetchProof(config, slots))
-    }
+  for (hasColours <- Seq(false, true))
+    it should s"answer each of the hits of two contexts once, by one slot, colours $hasColours" in
+      prove(module(contexts = 2, slots = 1, hasColours))
+
+  it should "answer each of the hits of three contexts once, by two slots" in
+    proveUntil(cycles = 9)(module(contexts = 3, slots = 2, hasColours = false))
 }

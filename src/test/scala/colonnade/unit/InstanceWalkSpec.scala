@@ -74,7 +74,7 @@ class InstanceWalkSpec extends AnyFlatSpec with ChiselScalatestTester with Match
 
   it should "resolve each visit once, for any hits, and results in any order" in {
     val narrow = TestConfigs.withInstances(TestConfigs.withPrecision(16, 16, 16), 3)
-    prove(20)(
+    prove(
       new InstanceResultsProof(
         narrow.copy(
           geometry = narrow.geometry.copy(vertexBits = 10, triangleBits = Some(16)),
