@@ -3,15 +3,17 @@
 The paper leaves Norm open. Here power and area are ratios to the baseline's. Power is that at equal rates of rays,
 which is energy per ray: otherwise a slow design wins. The loss is the mean DISTS distance from the baseline's frames;
 its norm is ``1 + loss / SCALE``. So a loss of 0 is worth 1, not 0, and cannot win by itself: a loss of `SCALE` has to
-be paid for by half of the power or half of the area.
+be paid for by half of the power or half of the area. A study may have other norms (`Norms`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
+
+from colonnade_lab.explore.norm import Norm
 
 #: The DISTS loss that doubles the index, %.
 SCALE = 1.0
@@ -47,28 +49,50 @@ class Terms:
     area: float
 
 
-DEFINITION = (
-    f"RenderIndex = (1 + DISTS loss / {SCALE:g} %) × energy per ray / the baseline's × area / the baseline's; lower is "
-    "better. The DISTS loss is the mean DISTS distance from the baseline's frames. Energy per ray is power at equal "
-    "rates of rays."
-)
+@dataclass(frozen=True)
+class Norms:
+    """The three norms.
+
+    Attributes:
+        loss: Of the DISTS loss, %.
+        power: Of the energy per ray over the baseline's.
+        area: Of the area over the baseline's.
+    """
+
+    loss: Norm = field(default_factory=lambda: Norm(f"1 + x / {SCALE:g}"))
+    power: Norm = field(default_factory=lambda: Norm("x"))
+    area: Norm = field(default_factory=lambda: Norm("x"))
+
+    @property
+    def definition(self) -> str:
+        """The index in words."""
+        terms = ((self.loss, "DISTS loss, %"), (self.power, "energy per ray"), (self.area, "area"))
+        product = " × ".join(f"({norm.text}) of {term}" for norm, term in terms)
+        return (
+            f"RenderIndex = {product}; lower is better. The DISTS loss is the mean DISTS distance from the baseline's "
+            "frames. Energy per ray is power at equal rates of rays; it and area are relative to the baseline's."
+        )
 
 
-def index_rows(points: Sequence[Mapping[str, Any]], baseline: str, libraries: Sequence[str]) -> list[dict[str, Any]]:
-    """The index and its factors, for each library and point that has them.
+def index_rows(
+    points: Sequence[Mapping[str, Any]], baseline: str, libraries: Sequence[str], norms: Norms | None = None
+) -> list[dict[str, Any]]:
+    """The index and its factors, for each library and point that has them; None where a norm has no value.
 
     Args:
         points: Points of ``study.json`` with their figures.
         baseline: Name of the point whose power and area are 1.
         libraries: Names of the libraries.
+        norms: None: the default ones.
     """
-    rows = []
+    by, rows = norms or Norms(), []
     for library in libraries:
         terms = _terms(points, baseline, library)
         for name, own in terms.items():
-            norms = {"norm_loss": 1 + own.loss / SCALE, "norm_power": own.energy, "norm_area": own.area}
-            row = {"name": name, "library": library, "loss": own.loss, **norms}
-            rows.append(row | {"index": math.prod(norms.values())})
+            values = (by.loss(own.loss), by.power(own.energy), by.area(own.area))
+            factors = dict(zip(("norm_loss", "norm_power", "norm_area"), values, strict=True))
+            row = {"name": name, "library": library, "loss": own.loss, **factors, "index": math.prod(values)}
+            rows.append({key: None if value != value else value for key, value in row.items()})
     return rows
 
 

@@ -91,6 +91,7 @@ class Results:
             "baseline": study.baseline,
             "points": entries,
             "front": {"objectives": list(objectives), "points": front} if objectives else None,
+            "plots": [list(pair) for pair in study.plots],
             "render_index": index,
             "search": search,
             "jobs": {"run": tally.run, "cached": tally.cached, "failed": tally.failed, "seconds": round(seconds, 1)},
@@ -105,10 +106,10 @@ class Results:
         has, baseline = self._plan.has, self._plan.study.baseline
         if baseline is None or not (has["quality"] and has["area"] and has["power"]):
             return None
-        rows = render_index.index_rows(entries, baseline, self._plan.libraries)
+        norms = self._plan.study.render_index.norms
+        rows = render_index.index_rows(entries, baseline, self._plan.libraries, norms)
         return {
-            "definition": render_index.DEFINITION,
-            "scale": render_index.SCALE,
+            "definition": norms.definition,
             "rows": rows,
             "sensitivity": render_index.sensitivity(entries, baseline, self._plan.libraries),
         }

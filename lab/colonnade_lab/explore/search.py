@@ -25,7 +25,7 @@ def parse_condition(text: str) -> tuple[str, str, float] | None:
 
 
 def check_search(file: StudyFile, columns: Sequence[Column]) -> None:
-    """Refuse objectives and constraints that name no figure of the study.
+    """Refuse objectives, axes of plots and constraints that name no figure of the study.
 
     Raises:
         UserError: One is unknown, or a constraint is malformed.
@@ -36,6 +36,10 @@ def check_search(file: StudyFile, columns: Sequence[Column]) -> None:
     for name in search.objectives if search else file.study.objectives:
         if name not in directed:
             raise file.error((*where, name), f"no figure {name}; figures of this study: {', '.join(directed)}")
+    drawn = [*(column.key for column in columns), *file.study.axes]
+    for name in (name for pair in file.study.plots for name in pair):
+        if name not in drawn:
+            raise file.error(("plots", name), f"no figure {name}; figures and axes of this study: {', '.join(drawn)}")
     for text in search.constraints if search else ():
         condition = parse_condition(text)
         if condition is None:

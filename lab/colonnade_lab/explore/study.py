@@ -18,8 +18,11 @@ from colonnade.common.errors import UserError
 from colonnade.common.frame_size import parse_size
 from colonnade.common.limits import MAX_DESIGNS
 from colonnade.common.terminal_text import one_line
-from pydantic import BeforeValidator, ConfigDict, PlainValidator, Strict, StrictBool
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, PlainValidator, Strict, StrictBool
 from pydantic.dataclasses import dataclass
+
+from colonnade_lab.explore.norm import Norm
+from colonnade_lab.explore.render_index import Norms
 
 #: The fastest clock for power, MHz.
 MAX_CLOCK = 1e6
@@ -153,6 +156,37 @@ class Power:
     clock: Annotated[float, Gt(0), Le(MAX_CLOCK)] = 200.0
 
 
+def _norm_at(x: float) -> AfterValidator:
+    """Refuses text that is no norm, or has no positive value for the baseline."""
+
+    def checked(text: str) -> str:
+        if not Norm(text)(x) > 0:
+            raise ValueError(f"the norm {text!r} has no value above 0 for the baseline, x = {x:g}")
+        return text
+
+    return AfterValidator(checked)
+
+
+@dataclass(frozen=True, config=_STRICT)
+class RenderIndex:
+    """Norms of the RenderIndex, expressions of ``x``: `colonnade_lab.explore.norm`.
+
+    Attributes:
+        loss: Of the DISTS loss, %.
+        power: Of the energy per ray, over the baseline's.
+        area: Of the area, over the baseline's.
+    """
+
+    loss: Annotated[str, _norm_at(0.0)] = Norms().loss.text
+    power: Annotated[str, _norm_at(1.0)] = Norms().power.text
+    area: Annotated[str, _norm_at(1.0)] = Norms().area.text
+
+    @property
+    def norms(self) -> Norms:
+        """The norms as functions."""
+        return Norms(Norm(self.loss), Norm(self.power), Norm(self.area))
+
+
 @dataclass(frozen=True, config=_STRICT)
 class Search:
     """A search for the Pareto front over the axes.
@@ -188,6 +222,8 @@ class Study:
         baseline: Name of the point that the others are compared with.
         libraries: Names of standard-cell libraries, whose files the command line gives; empty: Yosys's generic gates.
         objectives: Figures whose Pareto front is reported.
+        plots: Pairs of figures or axes that are drawn beside those of objectives, each horizontal, then vertical.
+        render_index: Norms of the RenderIndex.
         quality, tests, cycles, area, power: The measures; one without a table is not taken.
         design: The configuration that every point starts from.
         axes: Values of configuration fields.
@@ -203,6 +239,8 @@ class Study:
     baseline: str | None = None
     libraries: _Names = ()
     objectives: _Names = ()
+    plots: tuple[tuple[Annotated[str, MinLen(1)], Annotated[str, MinLen(1)]], ...] = ()
+    render_index: RenderIndex = field(default_factory=RenderIndex)
     design: Design = field(default_factory=Design)
     axes: Mapping[str, Annotated[tuple[FieldValue, ...], MinLen(1)]] = field(default_factory=dict)
     point: tuple[NamedPoint, ...] = ()

@@ -30,6 +30,20 @@ UNIT_COLOURS = (
     *("#F0E442", "#8C6D31", "#7A68A6", "#9ACD32", "#A9A9A9", "#D9D9D9"),
 )
 
+#: Moves the labels of a scatter plot apart, in Vega, into which a browser compiles Vega-Lite: the selected point, the
+#: baseline and the front come first; a label without a place is left out. It needs a canvas; `labels` does without.
+LABEL_PLACES: Spec = {
+    "type": "label",
+    "size": {"signal": "[width, height]"},
+    "sort": {"field": "datum.rank"},
+    "anchor": ["top", "right", "bottom", "left", "top-right", "top-left", "bottom-right", "bottom-left"],
+    "offset": [7, 9, 7, 9, 5, 5, 5, 5],
+    "avoidMarks": ["points_marks"],
+}
+
+#: Space between the points of a scatter plot and its edges, for labels, and its height; pixels.
+SCATTER_PADDING, SCATTER_HEIGHT = (42, 26), 540
+
 _STEP = 24
 _FONT = "system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', Arial, sans-serif"
 
@@ -37,14 +51,16 @@ _FONT = "system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', Arial, sans-se
 def scatter(rows: Sequence[Row], x: Column, y: Column, fields: int, *, has_front: bool) -> Spec:
     """Two figures of all points; parameters ``x``, ``y`` (keys of columns) and ``selected`` (a name)."""
     base = (
-        alt.Chart(_data(rows), height=540)
+        alt.Chart(_data(rows), height=SCATTER_HEIGHT)
         .add_params(_param("x", x["key"]), _param("y", y["key"]), _param("selected", ""))
         .transform_calculate(x="datum.numbers[x]", y="datum.numbers[y]", xText="datum.texts[x]", yText="datum.texts[y]")
         .transform_filter("isValid(datum.x) && isValid(datum.y)")
     )
-    # The padding leaves space for the labels above the points.
-    horizontal = alt.X("x:Q", title=axis_title_of(x), scale=alt.Scale(zero=False, nice=False, padding=42))
-    vertical = alt.Y("y:Q", title=axis_title_of(y), scale=alt.Scale(zero=False, nice=False, padding=26))
+    wide, high = (alt.Scale(zero=False, nice=False, padding=padding) for padding in SCATTER_PADDING)
+    horizontal, vertical = (
+        alt.X("x:Q", title=axis_title_of(x), scale=wide),
+        alt.Y("y:Q", title=axis_title_of(y), scale=high),
+    )
     kinds = [ON_FRONT, OFF_FRONT] if has_front else [OFF_FRONT]
     legend = alt.Legend(title=None, orient="top", symbolSize=110) if has_front else None
     colour = alt.Scale(domain=kinds, range=[COLOURS[5], COLOURS[0]][-len(kinds) :])
@@ -65,13 +81,12 @@ def scatter(rows: Sequence[Row], x: Column, y: Column, fields: int, *, has_front
             alt.Tooltip("yText:N", title="y"),
         ],
     )
-    shown = "datum.name === selected ? datum.name : datum.label"
     labels = (
-        base.transform_calculate(shown=shown)
-        .mark_text(dy=-13, fontSize=11, color=INK, limit=220)
-        .encode(x=horizontal, y=vertical, text="shown:N")
+        base.transform_calculate(rank="datum.name === selected ? -1 : datum.rank")
+        .mark_text(fontSize=11, color=INK, limit=220, dx=alt.expr("datum.dx"), dy=alt.expr("datum.dy"))
+        .encode(x=horizontal, y=vertical, text="label:N")
     )
-    return _spec(points + labels)
+    return _spec(points.properties(name="points") + labels.properties(name="labels"))
 
 
 def render_index(rows: Sequence[Row], libraries: Sequence[str]) -> Spec:
@@ -91,11 +106,11 @@ def render_index(rows: Sequence[Row], libraries: Sequence[str]) -> Spec:
             tooltip=[
                 alt.Tooltip("name:N", title="point"),
                 alt.Tooltip("library:N"),
-                alt.Tooltip("index:Q", title="RenderIndex", format=".4g"),
-                alt.Tooltip("loss:Q", format=".4g"),
-                alt.Tooltip("norm_loss:Q", title="norm of loss", format=".4g"),
-                alt.Tooltip("norm_power:Q", title="norm of power", format=".4g"),
-                alt.Tooltip("norm_area:Q", title="norm of area", format=".4g"),
+                alt.Tooltip("index:Q", title="RenderIndex", format=".3g"),
+                alt.Tooltip("loss:Q", format=".3g"),
+                alt.Tooltip("norm_loss:Q", title="norm of loss", format=".3g"),
+                alt.Tooltip("norm_power:Q", title="norm of power", format=".3g"),
+                alt.Tooltip("norm_area:Q", title="norm of area", format=".3g"),
             ],
         )
     )

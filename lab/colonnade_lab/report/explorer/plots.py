@@ -9,18 +9,23 @@ from pathlib import Path
 from typing import Any
 
 from colonnade_lab.common.file_names import FileNames
-from colonnade_lab.report.explorer.charts import INK, Spec
+from colonnade_lab.report.explorer.charts import INK, SCATTER_HEIGHT, SCATTER_PADDING, Spec
+from colonnade_lab.report.explorer.labels import placed
 from colonnade_lab.report.explorer.rows import LEVELS
 from colonnade_lab.report.explorer.sections import Chart, bar_charts, scatter_axes, scatter_chart
-from colonnade_lab.report.explorer.study import Study, objectives
+from colonnade_lab.report.explorer.study import Study, objectives, scatter_columns
 from colonnade_lab.report.explorer.vega import drawn
 
-#: Width of a plot, CSS pixels.
-WIDTH = 760
+#: Width of a plot, and what its vertical axis and edges take of it, CSS pixels.
+WIDTH, _AXIS = 760, 75
 
 
 def write_all(study: Study, folder: Path, write: Callable[[Path, bytes], None]) -> list[Path]:
-    """Write a plot for each pair of objectives and for each library, level and workload; returns the paths."""
+    """Write a plot for each pair of objectives, for each of the study's, and for each library, level and workload.
+
+    Returns:
+        The paths.
+    """
     paths = []
     charts = list(plots(study))
     for (name, _), pictures in zip(charts, drawn([_static(spec) for _, spec in charts]), strict=True):
@@ -39,9 +44,15 @@ def plots(study: Study) -> Iterator[tuple[str, Spec]]:
 
 def _all(study: Study) -> Iterator[tuple[str, Spec]]:
     pairs = list(itertools.combinations(objectives(study), 2))
+    known = {column["key"]: column for column in scatter_columns(study)}
+    own = [(known[x], known[y]) for x, y in study.get("plots", []) if x in known and y in known]
+    pairs += [pair for pair in own if pair not in pairs]
     first = scatter_axes(study)
     for x, y in pairs or ([first] if first else []):
-        yield f"pareto--{x['key']}--{y['key']}", scatter_chart(study, x, y)
+        spec = scatter_chart(study, x, y)
+        area = (WIDTH - _AXIS, SCATTER_HEIGHT)
+        spec["data"]["values"] = placed(spec["data"]["values"], x["key"], y["key"], area, SCATTER_PADDING)
+        yield f"pareto--{x['key']}--{y['key']}", spec
     for chart in bar_charts(study).values():
         yield from _choices(chart)
 

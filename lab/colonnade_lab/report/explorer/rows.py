@@ -25,31 +25,27 @@ LEVELS = {"traversal_unit": "one traversal unit", "column": "one column", "array
 MAX_UNITS = 12
 OTHER_UNITS = "other units"
 
-#: Front points that are labelled in the scatter plot; more would overlap.
-MAX_LABELS = 12
-
 ON_FRONT = "on the front"
 OFF_FRONT = "not on the front"
 
 
 def scatter_rows(study: Study) -> list[Row]:
-    """A row for each point: name, kind, configuration, and every figure as number and as text."""
+    """A row for each point: name, kind, configuration, label with offset and rank, each figure as number and text."""
     columns = scatter_columns(study)
-    has_labels = sum(bool(point["on_front"]) for point in study["points"]) <= MAX_LABELS
-    rows = []
-    for point in study["points"]:
-        is_baseline = point["name"] == study["baseline"]
-        rows.append(
-            {
-                "name": point["name"],
-                "kind": ON_FRONT if point["on_front"] else OFF_FRONT,
-                "configuration": configuration_text(point),
-                "label": point["name"] if is_baseline or (has_labels and point["on_front"]) else "",
-                "numbers": {column["key"]: _number(point, column["key"]) for column in columns},
-                "texts": {column["key"]: _text(point, column) for column in columns},
-            }
-        )
-    return rows
+    return [
+        {
+            "name": point["name"],
+            "kind": ON_FRONT if point["on_front"] else OFF_FRONT,
+            "configuration": configuration_text(point),
+            "label": point["name"],
+            "dx": 0.0,
+            "dy": 0.0,
+            "rank": 0 if point["name"] == study["baseline"] else 1 if point["on_front"] else 2,
+            "numbers": {column["key"]: _number(point, column["key"]) for column in columns},
+            "texts": {column["key"]: _text(point, column) for column in columns},
+        }
+        for point in study["points"]
+    ]
 
 
 def _number(point: Point, key: str) -> float | None:
@@ -62,11 +58,12 @@ def _text(point: Point, column: Column) -> str:
 
 
 def index_order(study: Study) -> list[str]:
-    """Names of the points with a RenderIndex: the best first, by the first choice of a norm."""
-    index = study["render_index"]
-    names = list(dict.fromkeys(row["name"] for row in index["rows"] if is_number(row["index"])))
-    ranked = [name for name in (index["sensitivity"] or [{"ranking": []}])[0]["ranking"] if name in names]
-    return list(dict.fromkeys([*ranked, *names]))
+    """Names of the points with a RenderIndex: the best first, by the first library that has it."""
+    found: dict[str, float] = {}
+    for row in study["render_index"]["rows"]:
+        if is_number(row["index"]):
+            found.setdefault(row["name"], row["index"])
+    return sorted(found, key=lambda name: (found[name], name))
 
 
 def index_rows(study: Study) -> list[Row]:
