@@ -25,7 +25,7 @@ from colonnade.device.compiler import (
     require_right_compiler,
     require_verilator,
 )
-from colonnade.device.simulator_sources import DEVICE, write_sources
+from colonnade.device.simulator_sources import DEVICE, large_parts, write_sources
 
 PROGRAM = "simulator"
 
@@ -58,7 +58,7 @@ FAST = Optimisation("-O3", 20000)
 #: For frames so small that compiling takes longer than simulating.
 QUICK = Optimisation("-O0", 2**31 - 1)
 
-_HARNESS = ("array.hpp", "dram.hpp", "dram_timing.hpp")
+_HARNESS = ("array.hpp", "still.hpp", "dram.hpp", "dram_timing.hpp")
 
 #: Paths that make and the shell take as one word.
 _PLAIN_PATH = re.compile(r"[\w/.+@%,-]+", re.ASCII)
@@ -129,7 +129,8 @@ def _build(
     with temporary_folder() as work:
         if not _PLAIN_PATH.fullmatch(str(work)):
             raise UserError(f"make cannot build a simulator in {work.parent.parent}: set TMPDIR to a plain path")
-        models = write_sources(design.sources, work)
+        # A waveform has the column's signals in one place
+        models = write_sources(design.sources, work, () if waveform else large_parts(design.sources))
         (work / "ports.hpp").write_text(ports_header(design.manifest, design.sources))
         program, *_ = names = harness_of(design.manifest)
         for name in names:

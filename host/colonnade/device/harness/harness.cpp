@@ -13,6 +13,7 @@
 // --memory PERCENT of cycles in which each bank is stalled, --burst N, the longest stall in cycles;
 // for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-interval N, --dram-banks N, --dram-random PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
 // --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
+// --deaf 1: a fault for tests: models that are not evaluated since they stand still do not hear their inputs.
 // With WAVEFORM defined, --waveform FILE writes the signals of the frames as VCD; the time unit is a cycle.
 // Progress goes to standard error as "progress SHARE". Exit status 0, or 3 on an error.
 #include <algorithm>
@@ -61,7 +62,7 @@ constexpr std::uint64_t watchdogMargin = 100'000, watchdogs = 2;
 constexpr std::uint64_t freePeriods = 840;
 
 struct Options {
-    unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32, checkInterval = 64;
+    unsigned stallPercent = 0, seed = 1, memoryPercent = 0, memoryBurst = 32, checkInterval = 64, deaf = 0;
     std::string waveform;
     DramOptions dram;
 };
@@ -101,7 +102,7 @@ private:
 class Harness {
 public:
     explicit Harness(const Options& options)
-        : random_(options.seed), stallPercent_(options.stallPercent), checkInterval_(std::max(1u, options.checkInterval))
+        : array_(options.deaf != 0), random_(options.seed), stallPercent_(options.stallPercent), checkInterval_(std::max(1u, options.checkInterval))
 #ifdef MEMORY_BANKS
           ,
           stalls_(options)
@@ -365,6 +366,7 @@ int main(int argc, char** argv) try {
                                                        {"--memory", &options.memoryPercent},
                                                        {"--burst", &options.memoryBurst},
                                                        {"--check", &options.checkInterval},
+                                                       {"--deaf", &options.deaf},
                                                        {"--dram", &options.dram.latency},
                                                        {"--dram-interval", &options.dram.interval},
                                                        {"--dram-banks", &options.dram.banks},
