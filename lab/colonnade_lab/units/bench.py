@@ -23,6 +23,9 @@ from colonnade_lab.units.engines import ask
 #: Name of the module around both versions.
 BENCH = "UnitBench"
 
+#: The input that chooses a mutant; 0: none.
+MUTANT = "mutant"
+
 #: Cycles of a random test whose inputs have one pace each.
 _EPISODE = 256
 
@@ -65,21 +68,21 @@ class Bench:
         self._has_reset = any(port.name == "reset" for port in ports)
         self._names = {port.name for port in ports}
 
-    def verilog(self, has_clock: bool) -> str:
-        """The module for simulation, and with `FORMAL` for a proof."""
+    def verilog(self, has_clock: bool, mutant: int = 0) -> str:
+        """The module for simulation, where `+mutant=` chooses a mutant, and with `FORMAL` for a proof of this one."""
         lines = [f"module {BENCH}(", "  input clock", "`ifdef FORMAL", "  , input reset"]
         lines += [f"  , input {port.range}{port.name}" for port in self.inputs]
         lines += ["`endif", ");"]
         for port in self.outputs:
             lines.append(f"  wire {port.range}a_{port.name}, b_{port.name};")
-        lines += ["`ifndef FORMAL", *self._stimulus(), "`endif"]
+        lines += ["`ifdef FORMAL", f"  wire [15:0] {MUTANT} = {mutant};", "`else", *self._stimulus(), "`endif"]
         for side, module in (("a", self._unit), ("b", self._other)):
             connections = [".clock(clock)"] if has_clock else []
             connections += [".reset(reset)"] if self._has_reset else []
             connections += [f".{port.name}({port.name})" for port in self.inputs]
             connections += [f".{port.name}({side}_{port.name})" for port in self.outputs]
             if self._has_mutants:
-                connections.append(".mutant(" + ("16'd0" if side == "a" else "mutant") + ")")
+                connections.append(f".{MUTANT}({MUTANT if side == 'b' else 0})")
             lines.append(f"  {module} {side} ({', '.join(connections)});")
         claims = [self._differs(port) for port in self.outputs]
         lines += ["`ifdef FORMAL", *self._contract()]
@@ -126,9 +129,9 @@ class Bench:
 
     def _stimulus(self) -> list[str]:
         """Random inputs, whose pace changes with each episode."""
-        lines = ["  reg reset = 1; integer cycle = 0, cycles; reg [15:0] mutant;"]
+        lines = ["  reg reset = 1; integer cycle = 0, cycles; reg [15:0] " + MUTANT + ";"]
         lines += ['  initial if (!$value$plusargs("cycles=%d", cycles)) cycles = 2000;']
-        lines += ['  initial if (!$value$plusargs("mutant=%d", mutant)) mutant = 0;']
+        lines += ['  initial if (!$value$plusargs("mutant=%d", ' + MUTANT + ")) " + MUTANT + " = 0;"]
         update = []
         for n, port in enumerate(self.inputs):
             lines.append(f"  reg {port.range}{port.name} = 0; reg [2:0] pace_{n} = 0;")

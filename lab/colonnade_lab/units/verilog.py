@@ -43,6 +43,10 @@ class Modules:
         inner = {child for children in self.children.values() for child in children}
         return max(sorted(set(self.texts) - inner), key=lambda name: len(self.closure(name)))
 
+    def lines(self, top: str) -> int:
+        """Lines of a module and those below it."""
+        return sum(self.texts[name].count("\n") for name in self.closure(top))
+
     def bits(self, top: str) -> int:
         """Bits of all memories in a module and those below it, each module counted once."""
         found = (match for name in self.closure(top) for match in _MEMORY.finditer(self.texts[name]))
