@@ -71,10 +71,11 @@ object KeptSimulators extends Simulator {
 
   /** What turns a circuit into a simulator. */
   private lazy val tools: Seq[String] = {
-    val versions = Seq("verilator", "g++").map(program => Try(Process(s"$program --version").!!(ProcessLogger(_ => ()))))
-    val script   = os.read(os.pwd / "tools" / "verilated-object")
-    val java     = Seq("java.home", "java.version").map(System.getProperty)
-    val jars     = System.getProperty("java.class.path").split(":").map(_.split("/").last).filter(_.endsWith(".jar"))
+    val versions =
+      Seq("verilator", "g++").map(program => Try(Process(s"$program --version").!!(ProcessLogger(_ => ()))))
+    val script = os.read(os.pwd / "tools" / "verilated-object")
+    val java   = Seq("java.home", "java.version").map(System.getProperty)
+    val jars   = System.getProperty("java.class.path").split(":").map(_.split("/").last).filter(_.endsWith(".jar"))
     versions.map(_.toString) ++ Seq(script, sys.env.getOrElse("MAKEFLAGS", "")) ++ java ++ jars.sorted
   }
 }
