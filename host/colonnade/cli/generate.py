@@ -73,7 +73,7 @@ def generate(
         design = generator.generate(
             config, overrides, output, manifest_only, black_box_memories, terminal, bus_bytes, pixel_stream, refit
         )
-    files = design_folder.listed(design.dir)
+    files = ["manifest.json"] if output is None else design_folder.listed(design.dir)
     manifest = json.loads((design.dir / "manifest.json").read_text())
     if output is not None:
         echo(f"{output}: {len(files)} files, configuration {manifest['configHash'][:12]}")

@@ -11,7 +11,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from colonnade.cli.main import cli
 from colonnade.common import cache, notes
 from colonnade.common.errors import UserError
 from colonnade.design import generator, manifest, toolchain
@@ -229,6 +231,9 @@ def test_a_design_in_the_cache_has_its_manifest(checkout: Path, tmp_path: Path) 
     assert runs(checkout) == ["sbt", "java"]
     generator.generate("tiny", [], tmp_path / "output", manifest_only=True)
     assert runs(checkout) == ["sbt", "java", "java"], "no Verilog beside a manifest that the user asks for"
+    report = tmp_path / "report.json"
+    done = CliRunner().invoke(cli, ["generate", "--config", "tiny", "--print", "--json", str(report)])
+    assert done.exit_code == 0 and json.loads(report.read_text())["files"] == ["manifest.json"]
 
 
 def test_a_digest_is_of_what_a_design_does(checkout: Path, tmp_path: Path) -> None:
