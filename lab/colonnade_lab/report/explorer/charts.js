@@ -6,10 +6,6 @@ const embedOptions = {
   renderer: "svg",
   ast: true, // expressions are interpreted: the page's policy forbids code from texts
   actions: { export: true, source: false, compiled: false, editor: false },
-  patch: (compiled) => {
-    for (const mark of compiled.marks) if (mark.name === "labels_marks") mark.transform = [study.labelPlaces];
-    return compiled;
-  },
   tooltip: { theme: matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light" },
 };
 

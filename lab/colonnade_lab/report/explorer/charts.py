@@ -30,17 +30,6 @@ UNIT_COLOURS = (
     *("#F0E442", "#8C6D31", "#7A68A6", "#9ACD32", "#A9A9A9", "#D9D9D9"),
 )
 
-#: Moves the labels of a scatter plot apart, in Vega, into which a browser compiles Vega-Lite: the selected point, the
-#: baseline and the front come first; a label without a place is left out. It needs a canvas; `labels` does without.
-LABEL_PLACES: Spec = {
-    "type": "label",
-    "size": {"signal": "[width, height]"},
-    "sort": {"field": "datum.rank"},
-    "anchor": ["top", "right", "bottom", "left", "top-right", "top-left", "bottom-right", "bottom-left"],
-    "offset": [7, 9, 7, 9, 5, 5, 5, 5],
-    "avoidMarks": ["points_marks"],
-}
-
 #: Space between the points of a scatter plot and its edges, for labels, and its height; pixels.
 SCATTER_PADDING, SCATTER_HEIGHT = (42, 26), 540
 
@@ -82,11 +71,11 @@ def scatter(rows: Sequence[Row], x: Column, y: Column, fields: int, *, has_front
         ],
     )
     labels = (
-        base.transform_calculate(rank="datum.name === selected ? -1 : datum.rank")
+        base.transform_calculate(text="datum.name === selected ? datum.name : datum.label")
         .mark_text(fontSize=11, color=INK, limit=220, dx=alt.expr("datum.dx"), dy=alt.expr("datum.dy"))
-        .encode(x=horizontal, y=vertical, text="label:N")
+        .encode(x=horizontal, y=vertical, text="text:N")
     )
-    return _spec(points.properties(name="points") + labels.properties(name="labels"))
+    return _spec(points + labels)
 
 
 def render_index(rows: Sequence[Row], libraries: Sequence[str]) -> Spec:

@@ -1,5 +1,4 @@
-"""Places for the labels of a scatter plot that is not drawn by a browser, which has a transform for them
-(`charts.LABEL_PLACES`): beside their points, apart from each other and from all points."""
+"""Places for the labels of a scatter plot in a file: beside their points, apart from each other and from all points."""
 
 from __future__ import annotations
 

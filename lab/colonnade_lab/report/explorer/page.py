@@ -18,7 +18,6 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from colonnade_lab.report.explorer import pictures, tables
-from colonnade_lab.report.explorer.charts import LABEL_PLACES
 from colonnade_lab.report.explorer.rows import LEVELS
 from colonnade_lab.report.explorer.sections import bar_charts, scatter_axes, scatter_chart, search_text
 from colonnade_lab.report.explorer.study import (
@@ -160,7 +159,6 @@ def _data(
             {"name": each["name"], "reference": _key(each["reference"], encoded)} for each in study["workloads"]
         ],
         "axisTitles": {column["key"]: axis_title_of(column) for column in scatter_columns(study)},
-        "labelPlaces": LABEL_PLACES,
         "charts": specs,
         "pictures": {picture.key: picture.as_json() for picture in encoded.values()},
     }

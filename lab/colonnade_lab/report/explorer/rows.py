@@ -25,6 +25,9 @@ LEVELS = {"traversal_unit": "one traversal unit", "column": "one column", "array
 MAX_UNITS = 12
 OTHER_UNITS = "other units"
 
+#: Front points that are labelled on the page, whose axes change; in files labels have places of their own (`labels`).
+MAX_LABELS = 12
+
 ON_FRONT = "on the front"
 OFF_FRONT = "not on the front"
 
@@ -32,19 +35,21 @@ OFF_FRONT = "not on the front"
 def scatter_rows(study: Study) -> list[Row]:
     """A row for each point: name, kind, configuration, label with offset and rank, each figure as number and text."""
     columns = scatter_columns(study)
+    ranks = [0 if each["name"] == study["baseline"] else 1 if each["on_front"] else 2 for each in study["points"]]
+    has_labels = ranks.count(1) <= MAX_LABELS
     return [
         {
             "name": point["name"],
             "kind": ON_FRONT if point["on_front"] else OFF_FRONT,
             "configuration": configuration_text(point),
-            "label": point["name"],
+            "label": point["name"] if rank == 0 or (has_labels and rank == 1) else "",
             "dx": 0.0,
-            "dy": 0.0,
-            "rank": 0 if point["name"] == study["baseline"] else 1 if point["on_front"] else 2,
+            "dy": -13.0,
+            "rank": rank,
             "numbers": {column["key"]: _number(point, column["key"]) for column in columns},
             "texts": {column["key"]: _text(point, column) for column in columns},
         }
-        for point in study["points"]
+        for point, rank in zip(study["points"], ranks, strict=True)
     ]
 
 
