@@ -50,7 +50,7 @@ class Survey:
 
 
 def survey(modules: Modules, unit: str, count: int, seed: int, cycles: int, limit: int) -> Survey:
-    """Mutate a unit without the modules below it, and tell its mutants apart.
+    """Mutate a unit without the modules below it, and tell its mutants apart; one without cells has none.
 
     Args:
         modules: The design.
@@ -63,6 +63,8 @@ def survey(modules: Modules, unit: str, count: int, seed: int, cycles: int, limi
     start = _seconds()
     with temporary_folder() as folder:
         changes = _write(modules, unit, count, seed, folder)
+        if not changes:
+            return Survey(unit, {}, 0.0, _seconds() - start)
         sides = Bench(unit, unit, modules.ports(unit), has_mutants=True)
         (folder / "bench.sv").write_text(sides.verilog(modules.has_clock(unit)))
         sources = [folder / "unit.v", folder / "parts.sv"]

@@ -40,3 +40,10 @@ def test_mutants_are_told_apart_or_proved_equivalent(tmp_path: Path) -> None:
     # The condition is never true: some mutants of it are equivalent. Those of the sum are not
     assert found.counts["equivalent"] > 0 and found.counts["random"] > 10 and not found.counts["open"]
     assert all(kind == "random" for kind, change in found.classes.values() if "$add" in change)
+
+
+def test_a_unit_of_wires_has_no_mutants(tmp_path: Path) -> None:
+    (tmp_path / "Wires.sv").write_text(
+        "module Wires(\n  input  io_a,\n  output io_b\n);\n\n  assign io_b = io_a;\nendmodule\n"
+    )
+    assert not survey(Modules(tmp_path), "Wires", count=9, seed=1, cycles=20, limit=20).classes
