@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "binding.hpp"
+#include "cycles/simulation.hpp"
 #include "model/frame.hpp"
 
 using namespace nanobind::literals;
@@ -46,6 +47,24 @@ public:
     void start(const Values& registers) {
         gathers_ = registers.count("gather.bounces") != 0;
         device_.start(registers);
+        device_.work.writeTo(nullptr);
+    }
+
+    /// Renders all rows of the frame and notes the work of the units, instead of the pixels.
+    void noteWork(std::int64_t height) {
+        work_ = {};
+        device_.work.writeTo(&work_);
+        const nb::gil_scoped_release release;
+        for (std::int64_t y = 0; y < height; ++y)
+            for (std::int64_t x = 0; x < device_.frame().width; ++x) device_.render(x, y);
+        work_.pixels.push_back(static_cast<std::uint32_t>(work_.steps.size()));
+        height_ = static_cast<unsigned>(height);
+        device_.work.writeTo(nullptr);
+    }
+
+    Values cycles(const Values& design, const cycles::DramDesign& dram) const {
+        const nb::gil_scoped_release release;
+        return cycles::simulate(cycles::Design(design), dram, work_, device_.frame(), height_);
     }
 
     nb::dict rows(std::int64_t first, std::int64_t last) {
@@ -189,6 +208,8 @@ private:
     std::unique_ptr<AttributeImage> environment_;
     std::unique_ptr<TextureImage> texture_;
     bool gathers_ = false;
+    FrameWork work_;
+    unsigned height_ = 0;
 };
 
 } // namespace
@@ -217,6 +238,11 @@ void bind_model(nb::module_& module) {
         .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a, "high"_a,
              "Tests each ray against one box (planes corner + (low << exponent), corner + (high << exponent), vertex units). Returns enters (the object's box), is_hit, "
              "and the prepared ray in its permuted frame: heading int64 [n, 4] (axis, three signs), origin int64 [n, 3], shear int64 [n, 2].")
+        .def("note_work", &Model::noteWork, "height"_a, "Renders the rows of the frame, and notes the work of the device's units instead of pixels.")
+        .def(
+            "cycles", [](const Model& model, const Values& design, int latency, int interval) { return model.cycles(design, {latency, interval}); }, "design"_a,
+            "latency"_a, "interval"_a,
+            "Counters of the noted frame, by name, with those that depend on time. `design`: its configuration by paths, numbers and `recordBytes`; DRAM's latency and the cycles between its beats.")
         .def("counters", &Model::counters, "Timing-independent counters since `start`, by name.")
         .def("errors", &Model::errors, "Sticky error bits since `start`, by name.");
 }

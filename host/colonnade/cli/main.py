@@ -40,6 +40,7 @@ LABORATORY = {
     "study": "Measure reconstructed rooms, or AR frames in them.",
     "verify": "Compare the RTL with its model, and the model with Embree.",
     "fuzz": "Compare the RTL with its model on corrupt frames, batches of rays and refits.",
+    "cycles": "Count the cycles of frames, or of a change, by a model in seconds.",
     "bench": "Measure rays per cycle of the benchmark meshes.",
     "explore": "Measure quality, speed, area and power of many configurations.",
     "ppa": "Estimate area, timing and power of a configuration.",

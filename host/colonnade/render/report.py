@@ -137,17 +137,28 @@ class FrameReport:
 def frame_report(backend: str, manifest: Manifest, header: ImageHeader, frame: Frame) -> FrameReport:
     """The report of a frame of the model or the RTL, without its seconds."""
     height, width = frame.is_object.shape
-    counters = frame.counters
+    return counted_report(backend, manifest, header, (width, height), frame.counters, frame.errors)
+
+
+def counted_report(
+    backend: str,
+    manifest: Manifest,
+    header: ImageHeader,
+    size: tuple[int, int],
+    counters: Mapping[str, int],
+    errors: Sequence[str],
+) -> FrameReport:
+    """The report of a frame of which counters and error bits are known."""
     rays = {kind: counters[f"rays{kind.capitalize()}"] for kind in RAY_KINDS} | {"in_box": counters["raysInBox"]}
     return FrameReport(
         backend=backend,
         config=manifest.config,
         mesh=mesh_report(header),
-        size=(width, height),
+        size=size,
         rays=rays,
         cycles=counters.get("cycles"),
         counters=counters,
-        errors=frame.errors,
+        errors=errors,
         room=_environment_report(manifest, counters),
     )
 

@@ -21,7 +21,8 @@ public:
     EnvironmentPoint cameraView(const WideVector& origin, const Vector& direction, const EnvironmentView& view) const {
         MapRay ray = projected(origin, direction, view, RayClip::leastExponent(view));
         EnvironmentPoint point{};
-        const std::optional<Way> clipped = RayClip(f_, sizes_).clip(ray, view);
+        point.work.isFromCamera = true;
+        const std::optional<Way> clipped = RayClip(f_, sizes_).clip(ray, view, point.work);
         if (!clipped) return point;
         for (int a = 0; a < 3; ++a) ray.from[a] += static_cast<std::int64_t>(inMap(Wide(clipped->mantissa) * ray.dir[a], -clipped->exponent));
         placeInMap(ray, view);
@@ -114,7 +115,9 @@ private:
                 return ray.dir[axis] - static_cast<std::int64_t>(floorShift<Wide>(Wide(centre) * ray.dir[2], f_));
             };
             const Wide dir = Wide(plane.a) * fromCentre(0, centreU) + Wide(plane.b) * fromCentre(1, centreV) + Wide(plane.c) * ray.dir[2];
+            ++point.work.boundingPlanes;
             if (distance <= 0 || dir <= 0) continue;
+            ++point.work.approached;
             const Normalised rate = normalise(magnitude(dir), f_), way = normalise(magnitude(distance), f_);
             const std::uint64_t quotient = divide(rate.mantissa, way.mantissa, f_);
             const int exponent = rate.exponent - way.exponent;

@@ -37,6 +37,22 @@ struct EnvironmentTexel {
 /// What of the environment a ray hits.
 enum class HitKind { miss, map, boundingPlane };
 
+/// What a march has done, for the cycle model: tiles of one plane, tiles of several planes with the planes that are looked at there, tiles that are passed cell by cell, cells, planes
+/// that are none of the last four, squares passed behind the visible surfaces, bounding planes with those that the ray approaches; and planes that a camera's origin is outside of.
+struct MarchWork {
+    std::uint16_t flatTiles, tiles, planes, cellTiles, cells, fetches, behind, boundingPlanes, approached, outside;
+    bool isFromCamera;
+    std::array<int, 4> last;
+    int oldest;
+
+    /// A plane is looked up.
+    void lookUp(int id) {
+        if (std::find(last.begin(), last.end(), id + 1) != last.end()) return;
+        last[static_cast<std::size_t>(oldest++ & 3)] = id + 1;
+        ++fetches;
+    }
+};
+
 /// The point where a ray hits the environment, with the albedo and normal of pixel (x, y) or of a bounding plane's entry. Its distance from
 /// the origin is travel · 2^travelExponent ray directions. `isHidden`: the point is on the extension of an occluded surface.
 struct EnvironmentPoint {
@@ -46,6 +62,7 @@ struct EnvironmentPoint {
     std::int64_t travel;
     int travelExponent;
     int steps;
+    MarchWork work;
     /// A word beyond the planes' heap was read on the way.
     bool isIllegal;
 };

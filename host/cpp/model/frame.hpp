@@ -73,9 +73,10 @@ public:
         const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
         Pixel pixel{frame_.lighting.background, {one, one, one}};
         ++counters.raysPrimary;
+        work.beginPixel();
         const RayRequest request = primaryRay(x, y);
         if (!frame_.maySeeObject(x, y)) return directView(pixel, x, y, request);
-        log.addRay(RayKind::primary, request, numbers_);
+        logRay(RayKind::primary, request);
         const Ray ray = prepareRay(request, frame_.bounds, numbers_);
         const Hit hit = trace(ray);
         if (!hit.found) return directView(pixel, x, y, request);
@@ -120,7 +121,7 @@ private:
         const Vector& normal = found.texel.normal;
         Path path = Path::of(view, one);
         gatherFrom(originAt(view, found), {normal[0], normal[1], normal[2]}, normal, nullptr, path, pixelPoint(x, y));
-        log.addRay(RayKind::gather, path.ray, numbers_);
+        logRay(RayKind::gather, path.ray);
         const Ray ray = prepareRay(path.ray, frame_.bounds, numbers_);
         const Hit hit = trace(ray);
         if (!hit.found) return std::nullopt;

@@ -58,7 +58,7 @@ protected:
                 next = lightAt(*at, point, path);
                 if (!next) return path.radiance;
             }
-            log.addRay(*next, path.ray, numbers_);
+            logRay(*next, path.ray);
 
             // Trace the ray
             ray = prepareRay(path.ray, frame_.bounds, numbers_);
@@ -71,6 +71,11 @@ protected:
         }
     }
 
+    void logRay(RayKind kind, const RayRequest& request) const {
+        log.addRay(kind, request, numbers_);
+        work.addRay(kind == RayKind::shadow, kind == RayKind::gather);
+    }
+
     /// The attributes of a hit triangle in the world, without colours.
     Face faceAt(const Hit& hit) const {
         const Face face = memory_->faceOf(hit.id);
@@ -81,11 +86,16 @@ protected:
     std::optional<ObjectPoint> pointOf(const Ray& ray, const Hit& hit) {
         Face face = faceAt(hit);
         const Material& material = frame_.lighting.materialOf(face);
+        work.addSurface(hit.id / leafTriangles, workOf(material.kind), material.hasCornerColours || material.hasTexture);
         if ((material.hasCornerColours || material.hasTexture) && !memory_->readColours(hit.id, face)) {
             errors.illegalRecord = true;
             return std::nullopt;
         }
         return ObjectPoint{surfaceOf(ray, hit, face, numbers_), material, albedoOf(material, hit, face)};
+    }
+
+    static PathStep::Material workOf(MaterialKind kind) {
+        return kind == MaterialKind::mirror ? PathStep::Material::mirror : kind == MaterialKind::glass ? PathStep::Material::glass : PathStep::Material::diffuse;
     }
 
     /// Adds the light of a surface to a path. The path ends there, or goes on with a ray that gathers light.
@@ -161,7 +171,7 @@ protected:
             Occlusion occluder = Occlusion::none;
             if (illumination.needsShadowRay) {
                 ++counters.raysShadow;
-                log.addRay(RayKind::shadow, illumination.shadowRay, numbers_);
+                logRay(RayKind::shadow, illumination.shadowRay);
                 occluder = occlusion(prepareRay(illumination.shadowRay, frame_.bounds, numbers_));
             }
             for (int channel = 0; channel < 3; ++channel) {
@@ -194,8 +204,9 @@ protected:
     };
 
     /// Counts a lookup, and reads its texel if it hits.
-    EnvironmentHit lookedUp(const Vector& direction, const EnvironmentPoint& point) {
+    EnvironmentHit lookedUp(const Vector& direction, const EnvironmentPoint& point, bool isDirect) {
         EnvironmentHit found{direction, point, {}};
+        work.addLookup(isDirect, point.work, point.kind != HitKind::miss);
         if (point.kind != HitKind::miss) found.texel = march_->texelOf(point, frame_.environment);
         ++counters.raysEnvironment;
         counters.marchSteps += static_cast<std::uint64_t>(point.steps);
@@ -207,14 +218,14 @@ protected:
     EnvironmentHit findHit(const RayRequest& ray) {
         Vector direction;
         blockScale(ray.direction, numbers_.shadeBits, direction);
-        return lookedUp(direction, march_->findHit(ray.origin, direction, frame_.environment));
+        return lookedUp(direction, march_->findHit(ray.origin, direction, frame_.environment), false);
     }
 
     EnvironmentHit findDirectView(std::int64_t x, std::int64_t y, const RayRequest& ray) {
         Vector direction;
         blockScale(ray.direction, numbers_.shadeBits, direction);
         const EnvironmentView& view = frame_.environment;
-        return lookedUp(direction, view.isMapCamera ? march_->directView(x, y, direction, view) : march_->cameraView(ray.origin, direction, view));
+        return lookedUp(direction, view.isMapCamera ? march_->directView(x, y, direction, view) : march_->cameraView(ray.origin, direction, view), view.isMapCamera);
     }
 
     bool hasEnvironment() const { return frame_.hasEnvironment && march_.has_value(); }
@@ -224,7 +235,9 @@ protected:
 
     /// Whether a point of the environment hides the hit of a ray, which is from the camera or not.
     bool hides(const EnvironmentHit& found, const Ray& ray, const Hit& hit, bool isFromCamera) const {
-        return march_->hides(found.point, found.direction, distanceOf(ray, hit), isFromCamera, frame_.environment);
+        const bool isHidden = march_->hides(found.point, found.direction, distanceOf(ray, hit), isFromCamera, frame_.environment);
+        work.testsHit(isHidden);
+        return isHidden;
     }
 
     /// Where the rays of a point of the environment begin.
@@ -275,7 +288,9 @@ protected:
             // It starts on the opposite side of the surface to the refracted ray
             reflection.origin = offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_);
             for (int a = 0; a < 3; ++a) reflection.direction[a] = next.reflection[a];
+            const std::size_t step = work.position();
             seen = leavingRadiance(path, reflection, false);
+            work.isReflectionAt(step);
         }
         for (int channel = 0; channel < 3; ++channel) {
             const std::int64_t reflected = (path.throughput[channel] * next.fresnelWeight) >> numbers_.lightFraction;

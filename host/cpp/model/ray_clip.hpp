@@ -26,7 +26,8 @@ public:
 
     /// The way from the origin, in ray.dir, to the last plane that the ray enters through; 0 · 2^none if the origin is inside, nothing if the ray
     /// stays outside a plane.
-    std::optional<Way> clip(const MapRay& ray, const EnvironmentView& view) const {
+    /// `work` counts the planes that the origin is outside of.
+    std::optional<Way> clip(const MapRay& ray, const EnvironmentView& view, MarchWork& work) const {
         const std::int64_t near = floorShift(std::int64_t(1) << f_, ray.fromShift + f_ - view.exponent);
         Way best{0, none};
         for (int i = 0; i < 5; ++i) {
@@ -35,6 +36,7 @@ public:
             const std::int64_t limit = i == 0 ? 0 : isHigh ? (std::int64_t(size) << insetLog) - 1 : 1, from = ray.from[axis] - (i == 0 ? near : 0);
             const std::int64_t outside = distance(from, ray.from[2] * limit, isHigh);
             if (outside <= 0) continue;
+            ++work.outside;
             const std::int64_t rate = -distance(ray.dir[axis], ray.dir[2] * limit, isHigh);
             if (rate <= 0) return std::nullopt;
             const Normalised way = normalise(magnitude(outside), f_), speed = normalise(magnitude(rate), f_);

@@ -37,8 +37,14 @@ public:
             int nearest = 0;
             std::int64_t nearestW = 0;
             bool isInFrontOfAll = !state.isBehind;
+            ++(info.count == 1 ? point.work.flatTiles : point.work.tiles);
+            if (info.count == 1) point.work.lookUp(info.ids[0]);
             for (int i = 0; i < info.count && info.count > 1; ++i) {
                 const std::int64_t atExit = distanceAt(depths[i], s1), w = toW(atExit, depths[i]);
+                if (isInFrontOfAll) {
+                    ++point.work.planes;
+                    point.work.lookUp(info.ids[i]);
+                }
                 isInFrontOfAll = isInFrontOfAll && atExit >= 0 && distanceAt(depths[i], s0) >= 0;
                 if (i == 0 || w < nearestW) {
                     nearest = i;
@@ -47,6 +53,7 @@ public:
             }
             if (info.count == 1 || isInFrontOfAll) {
                 ++point.steps;
+                point.work.behind += state.isBehind;
                 if (testPlane(ray, depths[nearest], s0, s1, {tile, sizes_.tileLog, info.count == 1 ? s0 : s1}, state)) return reportHit(ray, view, state, point);
             } else if (marchCells(ray, info, depths, tile, axes, tEnter, tExit, state, point)) {
                 return reportHit(ray, view, state, point);
@@ -157,6 +164,7 @@ private:
 
     bool marchCells(const MapRay& ray, const TileInfo& info, const std::array<PlaneDistance, 4>& depths, const std::array<int, 2>& tile,
                     const std::array<AxisSteps, 2>& axes, std::int64_t tEnter, std::int64_t tExit, MarchState& state, EnvironmentPoint& point) const {
+        ++point.work.cellTiles;
         const int cellLog = info.cellLog2, perTile = 1 << (sizes_.tileLog - cellLog);
         const auto start = pixelOf(ray, {tile, sizes_.tileLog, tEnter >> guardBits});
         std::array<int, 2> cell;
@@ -180,6 +188,9 @@ private:
             int slot = 0;
             while (slot < 3 && info.ids[slot] != plane.id) ++slot;
             ++point.steps;
+            ++point.work.cells;
+            point.work.behind += state.isBehind;
+            point.work.lookUp(plane.id);
             if (testPlane(ray, depths[slot], tEnter >> guardBits, cellExit >> guardBits, {square, cellLog, tEnter >> guardBits}, state)) return true;
             if (cellExit >= tExit || point.steps >= maxSteps) return false;
             tEnter = cellExit;

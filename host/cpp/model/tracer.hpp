@@ -5,6 +5,7 @@
 #include "column_memory.hpp"
 #include "ray_log.hpp"
 #include "registers.hpp"
+#include "work_log.hpp"
 
 namespace colonnade {
 
@@ -33,11 +34,12 @@ struct RayFilter {
     }
 };
 
-/// What the rays of a scene do: counters, errors and steps of one thread.
+/// What the rays of a scene do: counters, errors, steps and work of one thread.
 struct TraceRecord {
     Counters counters{};
     Errors errors{};
     RayLog log;
+    WorkLog work;
 };
 
 /// What a program keeps of each triangle. It is fetched while the search of the ray that hits one goes on.
@@ -67,14 +69,19 @@ public:
         const Hit best = Hit::none(ray.tMax);
         if (!ray.enters) return best;
         const Hit hit = frame_.instances.empty() ? search(ray, filter, false).best : nearestOfInstances(ray, best);
-        if (hit.found) record_.log.addHit(hit.id, static_cast<double>(hit.t));
+        if (hit.found) {
+            record_.log.addHit(hit.id, static_cast<double>(hit.t));
+            record_.work.addHit();
+        }
         return hit;
     }
 
     /// The occluders of a prepared shadow ray; the first opaque triangle ends the search.
     Occlusion occlusion(const Ray& ray, const RayFilter* filter = nullptr) const {
         if (!ray.enters) return Occlusion::none;
-        return frame_.instances.empty() ? search(ray, filter, true).occlusion : occlusionByInstances(ray);
+        const Occlusion found = frame_.instances.empty() ? search(ray, filter, true).occlusion : occlusionByInstances(ray);
+        if (found == Occlusion::opaque) record_.work.addHit();
+        return found;
     }
 
     /// The first triangle that a traversal meets, not the closest one.
@@ -113,6 +120,7 @@ private:
     /// Traces a prepared ray from a root, by default that of the scene.
     TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0, std::vector<Hit>* hits = nullptr) const {
         ++record_.counters.raysInBox;
+        record_.work.enterBox();
         TraceState state{ray, frame_.roots[instance], Hit::none(ray.tMax), isShadow, filter, Occlusion::none, Hit::none(ray.tMax), hits};
         run(state);
         return state;
@@ -163,12 +171,15 @@ private:
         const LeafTriangles& leaf = *found;
         if (!faces_.isEmpty()) faces_.prefetchIndex(leafTriangles * address);
         record_.log.addRead(RayStep::Kind::record, address);
+        record_.work.addLeaf(address, leaf.count);
         for (int i = 0; i < leaf.count; ++i) {
             ++record_.counters.triangleTests;
             Hit hit = state.best;
             const std::uint64_t id = leafTriangles * address + static_cast<std::uint64_t>(i);
             const std::array<Vector, 3> vertices = leaf.verticesOf(i);
-            const bool isHit = testTriangle(state.ray, vertices, id, numbers_, hit);
+            bool crossesTriangle = false;
+            const bool isHit = testTriangle(state.ray, vertices, id, numbers_, hit, record_.work.isOn() ? &crossesTriangle : nullptr);
+            if (crossesTriangle) record_.work.addCrossed(i);
             record_.log.addTriangle(vertices, id, isHit);
             hit.isClear = leaf.isClear;
             if (!isHit || (state.filter && !state.filter->accepts(hit, leaf))) continue;
@@ -218,6 +229,7 @@ private:
                 if (node.isLegal) count = boxes.test(node, limit, entered);
                 else record_.errors.illegalRecord = true;
                 if (record_.log.isOn()) logNode(next.address, node, entered, count);
+                record_.work.addNode(next.address, count);
                 for (int i = count - 1; i > 0; --i) {
                     const StackEntry entry = entryOf(node, entered[i]);
                     if (depth < static_cast<std::size_t>(numbers_.stackDepth)) stack[depth++] = entry;
@@ -232,6 +244,7 @@ private:
             while (!busy && depth > 0) {
                 next = stack[--depth];
                 busy = next.tNear <= limit;
+                if (!busy) record_.work.addDropped();
             }
         }
     }

@@ -185,8 +185,8 @@ inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const 
     return hasNarrowBoxes(n) ? BoxTests<std::int32_t>(ray, n).test(node, limit, entered) : BoxTests<std::int64_t>(ray, n).test(node, limit, entered);
 }
 
-/// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which begins as `Hit::none`.
-template <class Product> bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best) {
+/// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which begins as `Hit::none`. `crossesTriangle`, if any, becomes true if the ray's line crosses it.
+template <class Product> bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best, bool* crossesTriangle) {
     std::array<std::int64_t, 3> x, y, z;
     for (int i = 0; i < 3; ++i) {
         Vector p;
@@ -203,6 +203,7 @@ template <class Product> bool testTriangle(const Ray& ray, const std::array<Vect
                                           Product(x[0]) * y[1] - Product(y[0]) * x[1]};
     const bool anyNegative = edges[0] < 0 || edges[1] < 0 || edges[2] < 0, anyPositive = edges[0] > 0 || edges[1] > 0 || edges[2] > 0;
     if (anyNegative == anyPositive) return false;
+    if (crossesTriangle) *crossesTriangle = true;
 
     std::array<UnsignedOf<Product>, 3> areas;
     for (int i = 0; i < 3; ++i) areas[i] = magnitude(edges[i]);
@@ -225,8 +226,8 @@ template <class Product> bool testTriangle(const Ray& ray, const std::array<Vect
     return true;
 }
 
-inline bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best) {
-    return n.gridBits <= 32 ? testTriangle<std::int64_t>(ray, vertices, id, n, best) : testTriangle<Wide>(ray, vertices, id, n, best);
+inline bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best, bool* crossesTriangle = nullptr) {
+    return n.gridBits <= 32 ? testTriangle<std::int64_t>(ray, vertices, id, n, best, crossesTriangle) : testTriangle<Wide>(ray, vertices, id, n, best, crossesTriangle);
 }
 
 } // namespace colonnade

@@ -9,6 +9,7 @@ from typing import Any
 
 from colonnade.design.toolchain import project_root
 
+from colonnade_lab.evaluation.cycle_errors import PARTS
 from colonnade_lab.evaluation.light.user_rooms import REPORT as USERS_ROOMS
 from colonnade_lab.explore.points import points_of
 from colonnade_lab.explore.study_file import load_study
@@ -225,6 +226,12 @@ def _marches() -> Entry:
     return Entry("marches", "edge", commands, libraries=("ASAP7",), designs=designs)
 
 
+def _cycles() -> Entry:
+    """The cycle model beside the recorded cycles of the RTL."""
+    commands = {part: ("tools/cycle-errors", part, f"--json={REPORT}") for part in PARTS}
+    return Entry("cycles", "edge", commands, **_alone("model", "cycles", "tree"))
+
+
 def _gather() -> Entry:
     """Gathered light on `edge`: a pass of the RTL, and pictures of the model against the reference."""
 
@@ -331,6 +338,7 @@ def catalog() -> dict[str, Entry]:
         ),
         Entry("ray-device", "traversal", _colonnade("bench", "--config", "traversal", "--rays", "262144")),
         Entry("view", "small", {"": ("tools/view-frames", f"--json={REPORT}")}, **_MODEL),
+        _cycles(),
         _paper_unit(),
         _paper_maps(),
         _study("ablation"),

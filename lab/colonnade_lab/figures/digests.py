@@ -26,6 +26,7 @@ from colonnade_lab.figures.catalog import Design, Entry
 SOURCES: Mapping[str, tuple[str, ...]] = {
     "live": ("host/cpp/live/*.[ch]*",),
     "model": ("host/cpp/model/*.hpp",),
+    "cycles": ("host/cpp/cycles/*.[ch]pp",),
     "maps": tuple(f"host/colonnade/maps/{each}.py" for each in ("*_encoder", "*_fit", "slic", "palette", "heap")),
     "rays": ("host/colonnade/rays/*.py", "host/cpp/rays/*.[ch]pp", "tools/ray_suites/*"),
     "roomLight": ("host/colonnade/environment/*_fit.py", "host/colonnade/maps/room_light.py"),

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from colonnade_lab.common.markdown import markdown
+from colonnade_lab.evaluation.cycle_errors import CountedFrame, mean_and_worst
 from colonnade_lab.figures.catalog import CLASSES, MARCHES, SAMPLES, catalog
 from colonnade_lab.figures.data import Data, commands_of
 from colonnade_lab.figures.facts import MEGAHERTZ, PRESETS, facts, text
@@ -166,6 +167,18 @@ def marches(data: Data) -> str:
     return markdown(["`units.marches`", "cycles", "a pixel", "array, mm² at 28 nm"], rows)
 
 
+def cycle_errors(data: Data) -> str:
+    """Errors of the cycle model by part, and the frame of the largest one."""
+    found, rows = data.result("cycles"), []
+    for part, (designs, frames) in CYCLE_PARTS.items():
+        counted = [CountedFrame(**frame) for frame in found[part]["frames"]]
+        mean, worst = mean_and_worst([frame.error for frame in counted])
+        at = next(frame for frame in counted if frame.error == worst)
+        name = at.name if len({frame.design for frame in counted}) == 1 else f"{at.design}, {at.name}"
+        rows.append([designs, frames, str(len(counted)), f"{mean:.2%}", f"{worst:+.2%}", name])
+    return markdown(["design", "frames", "number", "mean error", "largest", "of"], rows)
+
+
 def gather(data: Data) -> str:
     """Passes of `edge` that gather light, and how near the model is to the reference."""
     found = data.result("gather")
@@ -236,6 +249,20 @@ def measuring(data: Data) -> str:
     return markdown(["part", "minutes"], [*rows, [f"all {len(minutes)}", f"{sum(minutes.values()):.1f}"]])
 
 
+#: Designs and frames of the parts of the entry `cycles`.
+CYCLE_PARTS = {
+    "edge": ("`edge`", "eight meshes, 640×480"),
+    "mirrors": ("`edge`", "the same as mirrors"),
+    "lean": ("`lean`", "eight meshes, 640×480"),
+    "small": ("`small`", "two meshes, 640×480"),
+    "tiny": ("`tiny`", "two meshes, 640×480"),
+    "scaling": ("`edge`, a field changed", "bunny, teapot, 320×240"),
+    "ablation": ("one column, scene on chip", "bunny, teapot, 160×120"),
+    "rooms": ("`edge`", "whole rooms, 640×480"),
+    "gather": ("`edge`", "gathered light, 640×480"),
+}
+
+
 def _command(name: str) -> str:
     return f"`{commands_of(catalog()[name])[0]}`"
 
@@ -250,6 +277,7 @@ TABLES: Mapping[str, Callable[[Data], str]] = {
     "rooms": rooms,
     "moved-rooms": moved_rooms,
     "marches": marches,
+    "cycle-errors": cycle_errors,
     "gather": gather,
     "environments": environments,
     "rebuilds": rebuilds,

@@ -1,0 +1,89 @@
+"""The cycle model against recorded counters of the RTL, and what must hold whatever its constants."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from colonnade.common.errors import UserError
+from colonnade.design.generator import manifest_for
+from colonnade.design.manifest import Manifest
+from colonnade.device.bit_exact import render_model
+from colonnade.device.cycle_model import NotedFrame, design_values
+from colonnade.device.scene import DeviceScene
+from colonnade.scene.parser import load_scene
+
+ROOT = Path(__file__).parents[3]
+#: Largest error of docs/cycles.md.
+BOUND = 0.03
+SIZE = (160, 120)
+
+
+def manifest_of(*overrides: str, config: str = "edge") -> Manifest:
+    return manifest_for(config, overrides).manifest
+
+
+@cache
+def prepared(config: str, *overrides: str) -> DeviceScene:
+    return DeviceScene.of(
+        load_scene(ROOT / "scenes" / "object.toml").with_mesh("teapot"), manifest_of(*overrides, config=config)
+    )
+
+
+@cache
+def noted(config: str = "edge", size: tuple[int, int] = SIZE) -> NotedFrame:
+    scene = prepared(config)
+    return NotedFrame.of(scene.manifest, scene.image, scene.registers(size))
+
+
+def test_counters_without_time_are_those_of_the_model() -> None:
+    """The simulated units count them themselves: every ray, node and triangle goes through a unit."""
+    for config in ("edge", "small", "tiny"):
+        scene, frame = prepared(config), noted(config, (64, 48))
+        registers = scene.registers((64, 48))
+        model = render_model(scene.manifest, scene.image, registers).counters
+        counted = frame.model.cycles(design_values(scene.manifest, frame.record_bytes), 100, 1)
+        assert frame.counters == model
+        assert {name: counted[name] for name in ("raysInBox", "nodeReads", "triangleTests")} == {
+            name: model[name] for name in ("raysInBox", "nodeReads", "triangleTests")
+        }
+        assert counted["busyBoxUnit"] == model["nodeReads"] * 4 // scene.manifest.config["units"]["boxLanes"]
+
+
+@pytest.mark.parametrize("name", ["base", "rows=5", "columns=1", "contexts=6", "pathContexts=80", "banks=2"])
+def test_cycles_are_those_of_the_rtl(name: str) -> None:
+    """Of the teapot in the study of scaling, by each field alone."""
+    study = json.loads((ROOT / "docs" / "data" / "scaling.json").read_text())["result"]
+    (point,) = [point for point in study["points"] if point["name"] == name]
+    found = noted(size=(320, 240)).cycles(manifest_of(*point["overrides"]))["cycles"]
+    assert found == pytest.approx(point["workloads"]["teapot"]["cycles"], rel=BOUND)
+
+
+def test_the_same_frame_takes_the_same_cycles() -> None:
+    assert noted().cycles(manifest_of()) == noted().cycles(manifest_of())
+
+
+def test_more_of_anything_takes_no_more_cycles() -> None:
+    """But for the noise of arbitration, some per cent."""
+    frame = noted()
+    rows = [frame.cycles(manifest_of(f"array.rows={rows}"))["cycles"] for rows in (2, 5, 10)]
+    columns = [frame.cycles(manifest_of(f"array.columns={columns}"))["cycles"] for columns in (1, 2, 4)]
+    latencies = [frame.cycles(manifest_of(), latency)["cycles"] for latency in (1000, 300, 100, 10)]
+    for found in (rows, columns, latencies):
+        assert all(more < 1.02 * fewer for fewer, more in pairwise(found)), found
+    assert rows[0] > 2 * rows[2] and columns[0] > 3 * columns[2] and latencies[0] > 1.5 * latencies[3]
+
+
+def test_dram_matters_only_behind_a_cache() -> None:
+    own = manifest_of("columnBvhMemory.cache=null", "columnBvhMemory.depth=131072")
+    counters = noted().cycles(own, 1000)
+    assert counters == noted().cycles(own, 10) and "dramReads" not in counters
+
+
+def test_designs_that_are_not_modelled_are_one_line() -> None:
+    with pytest.raises(UserError, match=r"array.rows = 64: the cycle model takes at most 31"):
+        noted().cycles(manifest_of("array.rows=64"))

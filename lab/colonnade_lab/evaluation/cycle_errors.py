@@ -1,0 +1,119 @@
+"""The cycle model against the recorded cycles of the RTL (docs/cycles.md)."""
+
+from __future__ import annotations
+
+import json
+import statistics
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from colonnade.design.generator import manifest_for
+from colonnade.design.toolchain import project_root
+from colonnade.device.cycle_model import NotedFrame
+from colonnade.device.scene import DeviceScene
+from colonnade.scene.model import Scene
+from colonnade.scene.parser import load_scene
+
+from colonnade_lab.evaluation.room_frames import room_frames
+
+
+@dataclass(frozen=True)
+class CountedFrame:
+    """Cycles of a frame by the model and by the RTL."""
+
+    design: str
+    name: str
+    model: int
+    rtl: int
+
+    @property
+    def error(self) -> float:
+        """The model's, relative to the RTL."""
+        return self.model / self.rtl - 1.0
+
+    def as_json(self) -> dict[str, Any]:
+        """The frame as values that JSON can hold."""
+        return asdict(self)
+
+
+def mean_and_worst(errors: Sequence[float]) -> tuple[float, float]:
+    """The mean of the magnitudes, and the largest error with its sign."""
+    return statistics.fmean(map(abs, errors)), max(errors, key=abs)
+
+
+def _recorded(name: str) -> Any:
+    return json.loads((project_root() / "docs" / "data" / f"{name}.json").read_text())["result"]
+
+
+def _noted(scene: Scene, config: str, overrides: Sequence[str], size: tuple[int, int]) -> NotedFrame:
+    manifest = manifest_for(config, overrides).manifest
+    prepared = DeviceScene.of(scene.with_samples(1), manifest, size=size)
+    return NotedFrame.of(manifest, prepared.image, prepared.registers(size))
+
+
+def _benchmark() -> Scene:
+    return load_scene(project_root() / "scenes" / "object.toml")
+
+
+def _bench(preset: str, mirror: bool = False) -> Iterator[CountedFrame]:
+    """Frames of `colonnade bench`."""
+    report = _recorded(f"bench-{preset}")
+    manifest = manifest_for(preset).manifest
+    size = (report["size"][0], report["size"][1])
+    for name, mesh in (report["mirror"] if mirror else report)["meshes"].items():
+        scene = _benchmark().with_mesh(name)
+        if mirror:
+            scene = replace(
+                scene, material=replace(scene.material, kind="mirror"), paths=replace(scene.paths, bounces=1)
+            )
+        cycles = _noted(scene, preset, (), size).cycles(manifest)["cycles"]
+        yield CountedFrame(f"{preset}, mirrors" if mirror else preset, name, cycles, mesh["cycles"])
+
+
+def _study(name: str, config: str = "edge") -> Iterator[CountedFrame]:
+    """Points of a study of the array, whose frames all have the same work."""
+    report = _recorded(name)
+    base = report["points"][0]["overrides"]
+    for workload in report["workloads"]:
+        size = (workload["size"][0], workload["size"][1])
+        noted = _noted(_benchmark().with_mesh(workload["mesh"]), config, base, size)
+        for point in report["points"]:
+            manifest = manifest_for(config, point["overrides"]).manifest
+            rtl = point["workloads"][workload["name"]]["cycles"]
+            yield CountedFrame(point["name"], workload["name"], noted.cycles(manifest)["cycles"], rtl)
+
+
+def _rooms() -> Iterator[CountedFrame]:
+    """Frames of tools/room-frames."""
+    report, manifest = _recorded("rooms"), manifest_for("edge").manifest
+    size = (report["size"][0], report["size"][1])
+    for frame, recorded in zip(room_frames(manifest, size), report["frames"], strict=True):
+        assert (frame.room, frame.name) == (recorded["room"], recorded["object"])
+        cycles = NotedFrame.of(manifest, frame.image, frame.registers).cycles(manifest)["cycles"]
+        yield CountedFrame("edge, rooms", f"{frame.room}, {frame.name}", cycles, recorded["cycles"])
+
+
+def _gather() -> Iterator[CountedFrame]:
+    """Passes that gather light."""
+    report, manifest = _recorded("gather"), manifest_for("edge").manifest
+    scene = load_scene(project_root() / "scenes" / "gathered.toml").with_samples(1)
+    for part, relit in (("pass", False), ("whole", True)):
+        size = (report[part]["size"][0], report[part]["size"][1])
+        prepared = DeviceScene.of(scene, manifest, size=size, relit=relit)
+        noted = NotedFrame.of(manifest, prepared.image, prepared.registers(size, composited=not relit))
+        yield CountedFrame("edge, gathered light", part, noted.cycles(manifest)["cycles"], report[part]["cycles"])
+
+
+#: Frames by the part of docs/data that they are from.
+PARTS: Mapping[str, Callable[[], Iterator[CountedFrame]]] = {
+    "edge": lambda: _bench("edge"),
+    "mirrors": lambda: _bench("edge", mirror=True),
+    "lean": lambda: _bench("lean"),
+    "small": lambda: _bench("small"),
+    "tiny": lambda: _bench("tiny"),
+    "scaling": lambda: _study("scaling"),
+    "ablation": lambda: _study("ablation"),
+    "rooms": _rooms,
+    "gather": _gather,
+}
