@@ -10,8 +10,7 @@ namespace colonnade::cycles {
 
 class Environment {
 public:
-    Environment(const Design& design)
-        : squareCycles_(design.columnsPerCopy > 1 ? 11 : 9), fetchCycles_(design.columnsPerCopy > 1 ? 10 : 8), marches_(static_cast<std::size_t>(design.marches)) {}
+    Environment(const Design& design) : squareCycles_(design.columnsPerCopy > 1 ? 11 : 9), fetchCycles_(8), marches_(static_cast<std::size_t>(design.marches)) {}
 
     /// A request of each kind is accepted.
     bool acceptsDirect() const { return directWaits_ < 0; }
@@ -97,7 +96,7 @@ private:
     /// docs/march.md, cycles; TileProgram.scala, CellProgram.scala, PlaneTest.scala. A row of steps without a plane of the maps ends at the bounding planes.
     Cycle cyclesOf(const MarchWork& march) const {
         const Cycle before = march.isFromCamera ? 66 + 13 * Cycle(march.outside) + (march.outside ? 9 : 0) : 92;
-        const Cycle squares = squareCycles_ * Cycle(march.flatTiles + march.cells) + 5 * Cycle(march.tiles) + 6 * Cycle(march.planes) + 20 * Cycle(march.cellTiles);
+        const Cycle squares = squareCycles_ * Cycle(march.flatTiles + march.cells) + 3 * Cycle(march.tiles) + 6 * Cycle(march.planes) + 22 * Cycle(march.cellTiles);
         return before + squares + fetchCycles_ * Cycle(march.fetches) + 4 * Cycle(march.behind) + 11 * Cycle(march.boundingPlanes) + 12 * Cycle(march.approached) + 23;
     }
 

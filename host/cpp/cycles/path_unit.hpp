@@ -240,11 +240,12 @@ public:
         isFinished_ = retires;
         environmentLeaves_ = retires && !at(doneNow_).inObjectTile;
 
-        // The colour of a path is complete, or it goes on
+        // The colour of a path is complete, or it goes on; one that waits for its ratio gives way
         int coloured = -1;
-        if (colours_.has(now)) {
-            coloured = colours_.front();
-            colours_.pop();
+        for (auto* colours : {&colours_, &ratios_}) {
+            if (coloured >= 0 || !colours->has(now)) continue;
+            coloured = colours->front();
+            colours->pop();
         }
 
         // A path ends
@@ -330,9 +331,7 @@ public:
         if (coloured >= 0) afterColour(now, coloured);
         if (endFires) {
             ending_.remove(lastNow_);
-            const int slots = slotsOf(lastNow_);
-            colours_.push(now + slots + 7, lastNow_);
-            colourOpens_ = now + std::max(slots, 2);
+            takeEnd(now, lastNow_);
         }
         if (hasShadow_ && shadowFires_) {
             requests_.push(shadowPath_);
@@ -381,7 +380,7 @@ public:
             Path& path = at(freeNow_);
             path.isStraight = true;
             path.inObjectTile = pixel.inObjectTile;
-            path.isOfRoom = path.hasGathered = path.isInFresnel = path.goesBack = false;
+            path.isOfRoom = path.hasGathered = path.isInFresnel = path.goesBack = path.isShadowed = false;
             path.step = path.ray = work_.pixels[static_cast<std::size_t>(position)];
             path.end = work_.pixels[static_cast<std::size_t>(position) + 1];
             idle_.remove(freeNow_);
@@ -406,7 +405,7 @@ private:
     struct Path {
         std::uint32_t step = 0, ray = 0, end = 0;
         /// It has left no surface of the object; it is at a point of the environment, that of its pixel; it has gathered, and goes back there; its Fresnel reflection is resolved.
-        bool isStraight = true, isOfRoom = false, hasGathered = false, goesBack = false, isInFresnel = false, inObjectTile = true;
+        bool isStraight = true, isOfRoom = false, hasGathered = false, goesBack = false, isInFresnel = false, isShadowed = false, inObjectTile = true;
     };
     struct Slot {
         int path;
@@ -425,7 +424,10 @@ private:
     void afterTrace(Cycle now, int index) {
         Path& path = at(index);
         const PathStep& ray = work_.steps[path.step];
-        if (ray.kind == PathStep::Kind::ray && ray.isShadow) return afterLights(index);
+        if (ray.kind == PathStep::Kind::ray && ray.isShadow) {
+            path.isShadowed = path.isShadowed || (ray.isDimmed && path.isOfRoom && path.isStraight);
+            return afterLights(index);
+        }
         const bool goesOn = hasNext(path);
         if (goesOn && nextOf(path).kind == PathStep::Kind::surface) {
             ++path.step;
@@ -507,6 +509,18 @@ private:
             resumeOpens_ = now + 3;
             issueBounce(now + 2, resumeNow_, false);
         }
+    }
+
+    /// shading/ColourUnit.scala takes a path; a shadowed pixel of the environment needs ShadowRatios.scala, for one pixel at a time.
+    void takeEnd(Cycle now, int index) {
+        const Path& path = at(index);
+        const Cycle slots = slotsOf(index);
+        const bool needsRatio = path.isOfRoom && (path.isStraight || path.goesBack) && (path.isShadowed || path.goesBack);
+        const Cycle starts = std::max(now + 1, needsRatio ? ratioOpens_ : 0);
+        colourOpens_ = starts + std::max<Cycle>(slots, 2) - 1;
+        if (!needsRatio) return colours_.push(starts + slots + 6, index);
+        ratioOpens_ = starts + slots + 13;
+        ratios_.push(starts + slots + 15, index);
     }
 
     /// Slots of the colour unit: three channels of each light, or of the background.
@@ -676,8 +690,8 @@ private:
     };
     std::vector<Bounce> bounces_;
     std::array<Cycle, 4> glass_{};
-    Delayed<int, 64> colours_;
-    Cycle colourOpens_ = 0, shaderOpens_ = 0;
+    Delayed<int, 64> colours_, ratios_;
+    Cycle colourOpens_ = 0, ratioOpens_ = 0, shaderOpens_ = 0;
     int pixels_ = 0, pixelQueue_;
     bool isFinished_ = false, environmentLeaves_ = false;
     Environment environment_;

@@ -80,6 +80,7 @@ public:
     Occlusion occlusion(const Ray& ray, const RayFilter* filter = nullptr) const {
         if (!ray.enters) return Occlusion::none;
         const Occlusion found = frame_.instances.empty() ? search(ray, filter, true).occlusion : occlusionByInstances(ray);
+        if (found != Occlusion::none) record_.work.addDimmed();
         if (found == Occlusion::opaque) record_.work.addHit();
         return found;
     }

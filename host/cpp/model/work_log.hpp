@@ -16,7 +16,7 @@ struct RecordVisit {
 
 /// A step of a path.
 ///
-/// `ray`: it visits `count` records, the first of which is `first`; `isInBox`: it enters the object's box; `isHit`: of a shadow ray, it is occluded.
+/// `ray`: it visits `count` records, the first of which is `first`; `isInBox`: it enters the object's box; `isHit`: of a shadow ray, something opaque ends it; `isDimmed`: of a shadow ray, it meets anything.
 /// `surface`: the leaf `first` is fetched, with its companion if `hasColours`, and its hit is shaded; `material`.
 /// `lookup`: `first` is that of its march; `isDirect`: by the pipeline of directly seen pixels; `isHit`: a point is found and shaded; `isTest`: it may hide a hit, and
 /// `isHit` tells that it does; `isReflection`: of a Fresnel reflection, whose bounce waits.
@@ -25,11 +25,12 @@ struct PathStep {
     enum class Material : std::uint8_t { diffuse, mirror, glass };
     Kind kind;
     Material material = Material::diffuse;
-    bool isShadow : 1, isGathered : 1, isInBox : 1, isHit : 1, hasColours : 1, isDirect : 1, isTest : 1, isReflection : 1;
+    bool isShadow : 1, isGathered : 1, isInBox : 1, isHit : 1, hasColours : 1, isDirect : 1, isTest : 1, isReflection : 1, isDimmed : 1;
     std::uint32_t first = 0, count = 0;
 
     explicit PathStep(Kind kind)
-        : kind(kind), isShadow(false), isGathered(false), isInBox(false), isHit(false), hasColours(false), isDirect(false), isTest(false), isReflection(false) {}
+        : kind(kind), isShadow(false), isGathered(false), isInBox(false), isHit(false), hasColours(false), isDirect(false), isTest(false), isReflection(false),
+          isDimmed(false) {}
 };
 
 /// The work of a frame: the steps of pixel i are those from `pixels[i]` on to `pixels[i + 1]`.
@@ -83,6 +84,11 @@ public:
     /// The last ray has hit something; of a shadow ray, something opaque.
     void addHit() const {
         if (isOn()) work_->steps.back().isHit = true;
+    }
+
+    /// The last ray, a shadow ray, has met something.
+    void addDimmed() const {
+        if (isOn()) work_->steps.back().isDimmed = true;
     }
 
     void addSurface(std::uint64_t leaf, PathStep::Material material, bool hasColours) const {
