@@ -1,7 +1,6 @@
 """The samples of a frame that gathers light, by a budget of the device's time (docs/sampling.md, "Budget").
 
-The bit-exact model renders a pass, whatever renders the frame, and its cycles are estimated from counters that do not
-depend on timing. So a scene and a configuration always give the same number.
+The cycle model counts a pass, whatever renders the frame. So a scene and a configuration always give the same number.
 """
 
 from __future__ import annotations
@@ -9,21 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
-from colonnade.device.bit_exact import loaded_model, model_frame
+from colonnade.device.cycle_model import NotedFrame
 from colonnade.scene_image.file import SceneImage
 
 #: The most samples that a budget gives; it gives powers of two.
 MAX_BUDGET_SAMPLES = 16
 #: Clock of the device, hertz.
 CLOCK = 200e6
-#: Cycles of a traversal unit for a node, with its share of triangles.
-_NODE = 4
-#: Cycles of a column for a lookup of the environment, with the ray that it gathers and its light, and at least those of
-#: its path over the contexts.
-_LOOKUP, _PATH = 4, 400
-#: Cycles of a march, and of each of its steps; the steps of a march from a mirror.
-_MARCH, _STEP, _STEPS = 212, 10, 18
 
 
 @dataclass(frozen=True)
@@ -32,12 +25,12 @@ class Budget:
 
     Attributes:
         samples: Of a pixel, a power of two.
-        cycles: Estimate of the cycles of a pass.
+        cycles: Those of a pass; None for a design that the cycle model does not know.
         seconds: The budget.
     """
 
     samples: int
-    cycles: int
+    cycles: int | None
     seconds: float
 
     @staticmethod
@@ -48,7 +41,7 @@ class Budget:
         seconds: float,
         passes: Callable[[int], int] = int,
     ) -> Budget:
-        """Render a pass of a frame and estimate how many fit.
+        """Count the cycles of a pass of a frame, and how many passes fit.
 
         Args:
             manifest: The design's manifest.
@@ -57,8 +50,10 @@ class Budget:
             seconds: The budget, at `CLOCK`.
             passes: Those of a frame of so many samples, with those of coats.
         """
-        counters = model_frame(loaded_model(manifest, image), registers).counters
-        cycles = estimated_cycles(manifest, counters, bool(registers.get("environment.isMapCamera", 1)))
+        try:
+            cycles = NotedFrame.of(manifest, image, registers).cycles(manifest)["cycles"]
+        except UserError:
+            return Budget(1, None, seconds)
         samples = MAX_BUDGET_SAMPLES
         while samples > 1 and passes(samples) * cycles > seconds * CLOCK:
             samples //= 2
@@ -68,6 +63,8 @@ class Budget:
     def note(self) -> str:
         """The line that names the number and where it comes from."""
         what = f"{self.samples} sample{'s' if self.samples > 1 else ''} a pixel"
+        if self.cycles is None:
+            return f"{what}: no frame.budget for this design, which the cycle model does not know (--samples)"
         why = "within" if self.cycles <= self.seconds * CLOCK else "the least, beyond"
         return (
             f"{what}, {why} frame.budget = {self.seconds:.3g} s at {CLOCK / 1e6:.0f} MHz and about"
@@ -79,20 +76,3 @@ def rounded(cycles: int) -> int:
     """An estimate with two digits."""
     step = int(10 ** max(len(str(cycles)) - 2, 0))
     return (cycles + step // 2) // step * step
-
-
-def estimated_cycles(manifest: Manifest, counters: Mapping[str, int], is_map_camera: bool) -> int:
-    """Estimate the cycles of a pass that gathers light: those of traversal units, of lookups and of marches.
-
-    Args:
-        manifest: The design's manifest.
-        counters: Of the pass; those that do not depend on timing.
-        is_map_camera: The camera is that of the room's maps, so only reflections and refractions march.
-    """
-    array, units = manifest.config["array"], manifest.config["units"]
-    columns, rows = int(array["columns"]), int(array["rows"])
-    lookups, steps = counters.get("raysEnvironment", 0), counters.get("marchSteps", 0)
-    marching = steps // _STEPS if is_map_camera else lookups
-    work = max(_LOOKUP, _PATH / int(units["pathContexts"])) * lookups
-    work += (_MARCH * marching + _STEP * steps) / int(units["marches"])
-    return max(1, round(_NODE * counters["nodeReads"] / (rows * columns) + work / columns))

@@ -39,9 +39,9 @@ public:
 
         // Hits of marches, one at a time
         if (hitPath_ < 0) {
-            std::uint32_t ended = 0;
-            for (std::size_t i = 0; i < marches_.size(); ++i) ended |= static_cast<std::uint32_t>(marches_[i].path >= 0 && marches_[i].ends <= now) << i;
-            const int granted = hits_.grant(ended);
+            std::uint32_t finished = 0;
+            for (std::size_t i = 0; i < marches_.size(); ++i) finished |= static_cast<std::uint32_t>(marches_[i].path >= 0 && marches_[i].ends <= now) << i;
+            const int granted = hits_.grant(finished);
             if (granted >= 0) {
                 hits_.take(granted);
                 hitPath_ = marches_[static_cast<std::size_t>(granted)].path;

@@ -347,7 +347,7 @@ public:
         for (; left > 0; ++now) {
             const int pixels = step(now);
             if (pixels > 0) last = now;
-            if (now - last > mostWithoutPixel) throw std::runtime_error("the cycle model does not end");
+            if (now - last > maxCyclesWithoutPixel) throw std::runtime_error("the cycle model does not end");
             left -= static_cast<std::uint64_t>(pixels);
         }
         CycleCounters counters{{"cycles", now - 1}};
@@ -447,7 +447,7 @@ private:
     std::vector<std::unique_ptr<Column>> columns_;
     std::vector<std::unique_ptr<SharedBank>> shared_;
     static constexpr std::size_t kinds = 3; // objects, backgrounds, environments
-    static constexpr Cycle mostWithoutPixel = 1'000'000;
+    static constexpr Cycle maxCyclesWithoutPixel = 1'000'000;
     std::array<TileScheduler, kinds> schedulers_;
     Dram dram_;
     RoundRobin addresses_;

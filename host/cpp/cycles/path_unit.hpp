@@ -135,15 +135,15 @@ private:
         busy += entry_.path >= 0;
         const bool settled = isSettled(now), left = isLeft(now, leaves), loads = settled && normaliser_.hasRay && entryIsOpen(leaves),
                    starts = settled && normaliser_.hasMantissas && (!divides() || divisionTaken_);
-        const bool takes = entry_.path >= 0 && !entry_.hasQuotients && now >= entry_.begins + 3 && divides() && now >= divisionEnds_;
-        if (takes) {
+        const bool isAnswered = entry_.path >= 0 && !entry_.hasQuotients && now >= entry_.begins + 3 && divides() && now >= divisionEnds_;
+        if (isAnswered) {
             // Behind the quotients, all steps but those before
             entry_.hasQuotients = true;
             entry_.ends = now + (entry_.isInBox ? design_.entryCycles : design_.missCycles) - 4;
         }
         // They leave the dividers a cycle later
         if (divisionTaken_) divisionEnds_ = -1;
-        divisionTaken_ = takes;
+        divisionTaken_ = isAnswered;
         if (leaves) entry_.path = -1;
         if (loads) {
             entry_ = {normaliser_.path, normaliser_.isInBox, false, now + 1, 0};
@@ -618,9 +618,9 @@ private:
                 toBounce_.pop();
                 --bouncing_;
                 // At the front there is a Fresnel reflection
-                const Cycle takes = isGlass ? (hasNext(at(path)) && nextOf(at(path)).isReflection ? 170 : 104) : 14;
-                if (isGlass) glass_[static_cast<std::size_t>(unit)] = now + takes + 1;
-                bounces_.push_back({now + takes + 3, path});
+                const Cycle latency = isGlass ? (hasNext(at(path)) && nextOf(at(path)).isReflection ? 170 : 104) : 14;
+                if (isGlass) glass_[static_cast<std::size_t>(unit)] = now + latency + 1;
+                bounces_.push_back({now + latency + 3, path});
             }
         }
         for (std::size_t i = 0; i < bounces_.size(); ++i) {

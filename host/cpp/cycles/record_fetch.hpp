@@ -34,7 +34,7 @@ public:
     std::uint32_t ready() const { return hasRecord_; }
     std::uint64_t snoopHits = 0;
 
-    /// A cycle, up to the request and the grant. `readyNext`: kinds whose unit takes a record in the next cycle.
+    /// A cycle, up to the request and the grant. `readyNext`: kinds whose unit source a record in the next cycle.
     Grant step(const Broadcasts& broadcasts, int banks, std::array<bool, 3> readyNext) {
         // Lookup of new fetches
         std::uint32_t hits = 0, used = 0, present = 0;
@@ -59,10 +59,10 @@ public:
         std::uint32_t found = hits, comes = 0;
         std::uint32_t filled = 0;
         std::array<std::uint32_t, 8> filledAddress;
-        std::array<std::uint8_t, 16> takes;
+        std::array<std::uint8_t, 16> source;
         for (std::uint32_t rest = hits; rest; rest &= rest - 1)
-            takes[static_cast<std::size_t>(__builtin_ctz(rest))] = hitBuffer[static_cast<std::size_t>(__builtin_ctz(rest))];
-        std::uint32_t emptied = 0, sleeps = 0, wakes = 0;
+            source[static_cast<std::size_t>(__builtin_ctz(rest))] = hitBuffer[static_cast<std::size_t>(__builtin_ctz(rest))];
+        std::uint32_t emptied = 0, awaiters = 0, retriers = 0;
         for (int bank = 0; bank < banks; ++bank) {
             const Broadcast& broadcast = broadcasts[static_cast<std::size_t>(bank)];
             if (!broadcast.isValid) continue;
@@ -76,28 +76,28 @@ public:
             if (broadcast.isLater) {
                 const bool isPinned = (awaiting & pinned_) != 0;
                 emptied |= awaiting & ~pinned_;
-                if (!isPinned) sleeps |= waiters;
+                if (!isPinned) awaiters |= waiters;
                 continue;
             }
             if (!snooping_ && broadcast.row != row_) continue;
-            int place = -1;
-            if (awaiting) place = __builtin_ctz(awaiting);
+            int slot = -1;
+            if (awaiting) slot = __builtin_ctz(awaiting);
             else if (snooping_ && available) {
-                place = __builtin_ctz(available);
-                if ((waiters & ~hits) == 0) place = waiters ? place : -1;
-                else available &= ~(1u << place);
+                slot = __builtin_ctz(available);
+                if ((waiters & ~hits) == 0) slot = waiters ? slot : -1;
+                else available &= ~(1u << slot);
             }
-            const bool isTaken = place >= 0 && (awaiting || (waiters & ~hits) != 0);
+            const bool isTaken = slot >= 0 && (awaiting || (waiters & ~hits) != 0);
             if (isTaken) {
-                filled |= 1u << place;
-                filledAddress[static_cast<std::size_t>(place)] = broadcast.address;
+                filled |= 1u << slot;
+                filledAddress[static_cast<std::size_t>(slot)] = broadcast.address;
             }
-            if (place >= 0) {
+            if (slot >= 0) {
                 const std::uint32_t taken = (snooping_ ? waiters : waiters & issued_) & ~found;
-                for (std::uint32_t rest = taken; rest; rest &= rest - 1) takes[static_cast<std::size_t>(__builtin_ctz(rest))] = static_cast<std::uint8_t>(place);
+                for (std::uint32_t rest = taken; rest; rest &= rest - 1) source[static_cast<std::size_t>(__builtin_ctz(rest))] = static_cast<std::uint8_t>(slot);
                 found |= taken;
             }
-            wakes |= waiters & ~found;
+            retriers |= waiters & ~found;
         }
 
         // Miss
@@ -105,7 +105,7 @@ public:
         const std::uint32_t missing = pending_ & ~expected & ~awaitsFill_;
         request_ = missing ? __builtin_ctz(missing) : -1;
         if (request_ >= 0 && (available == 0 || (snooping_ && (comes >> request_ & 1)))) request_ = -1;
-        place_ = available ? __builtin_ctz(available) : -1;
+        slot_ = available ? __builtin_ctz(available) : -1;
         expected_ = expected;
 
         // Grant
@@ -125,15 +125,15 @@ public:
             bufferAddress_[static_cast<std::size_t>(__builtin_ctz(rest))] = filledAddress[static_cast<std::size_t>(__builtin_ctz(rest))];
         for (std::uint32_t rest = found; rest; rest &= rest - 1) {
             const auto context = static_cast<std::size_t>(__builtin_ctz(rest));
-            buffer_[context] = takes[context];
+            buffer_[context] = source[context];
             snoopHits += !(issued_ >> context & 1);
         }
         pending_ &= ~found;
         hasRecord_ |= found;
-        sleeps &= ~found;
-        awaitsFill_ = (awaitsFill_ | sleeps) & ~wakes;
-        expected_ &= ~sleeps;
-        retries_ |= wakes;
+        awaiters &= ~found;
+        awaitsFill_ = (awaitsFill_ | awaiters) & ~retriers;
+        expected_ &= ~awaiters;
+        retries_ |= retriers;
         if (grant.context >= 0) hasRecord_ &= ~(1u << grant.context);
         return grant;
     }
@@ -148,12 +148,12 @@ public:
         for (std::uint32_t rest = pending_; rest; rest &= rest - 1)
             if (address_[static_cast<std::size_t>(__builtin_ctz(rest))] == address) expected_ |= rest & -rest;
         issued_ |= 1u << request_;
-        buffer_[static_cast<std::size_t>(request_)] = static_cast<std::uint8_t>(place_);
-        const std::uint32_t place = 1u << place_;
-        full_ &= ~place;
-        reserved_ |= place;
-        bufferAddress_[static_cast<std::size_t>(place_)] = address;
-        pinned_ = (retries_ >> request_ & 1) ? pinned_ | place : pinned_ & ~place;
+        buffer_[static_cast<std::size_t>(request_)] = static_cast<std::uint8_t>(slot_);
+        const std::uint32_t slot = 1u << slot_;
+        full_ &= ~slot;
+        reserved_ |= slot;
+        bufferAddress_[static_cast<std::size_t>(slot_)] = address;
+        pinned_ = (retries_ >> request_ & 1) ? pinned_ | slot : pinned_ & ~slot;
     }
 
     /// A context begins a fetch, which counts from the next cycle on.
@@ -177,7 +177,7 @@ private:
     std::array<std::uint8_t, 16> buffer_{};
     std::uint32_t full_ = 0, reserved_ = 0, pinned_ = 0;
     std::array<std::uint32_t, 8> bufferAddress_{};
-    int request_ = -1, place_ = -1;
+    int request_ = -1, slot_ = -1;
 };
 
 } // namespace colonnade::cycles

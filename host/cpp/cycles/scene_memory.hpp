@@ -72,7 +72,7 @@ public:
         : design_(design), bank_(bank), hasCache_(design.hasCache),
           tags_(hasCache_ ? std::max(1, design.cache.lines / design.banks / design.cache.ways) : 1, hasCache_ ? design.cache.ways : 1),
           awaited_(hasCache_ ? static_cast<std::size_t>(design.cache.misses / design.banks) : 0),
-          mostInFlight_(hasCache_ ? 3u + design.extraSlices : static_cast<unsigned>(design.readLatency + 1)),
+          maxInFlight_(hasCache_ ? 3u + design.extraSlices : static_cast<unsigned>(design.readLatency + 1)),
           readCycles_(hasCache_ ? 2 + design.extraSlices : design.readLatency), free_(static_cast<int>(awaited_.size())) {}
 
     /// The broadcast of this cycle.
@@ -86,7 +86,7 @@ public:
         return false;
     }
 
-    bool isReady() const { return inFlight_.count() < mostInFlight_ && (!hasCache_ || (blocked_ == 0 && free_ > static_cast<int>(accepted_))); }
+    bool isReady() const { return inFlight_.count() < maxInFlight_ && (!hasCache_ || (blocked_ == 0 && free_ > static_cast<int>(accepted_))); }
 
     /// The rest of a cycle, after `requests` by row, of those that do not come, and the line that is announced. `row`: that is accepted, or -1; `address`: its record.
     void step(Cycle now, int row, std::uint32_t address, const Announcement& announced) {
@@ -140,12 +140,12 @@ public:
 
         // Cycle a: an announced line is taken if it is awaited
         if (blocked_ > 0) --blocked_;
-        const bool takes = announced.isValid && isAwaitedBefore(announced.line);
-        if (takes) {
+        const bool isAnnounced = announced.isValid && isAwaited(announced.line);
+        if (isAnnounced) {
             line_ = announced.line;
             blocked_ = 3;
         }
-        taken_ = takes;
+        taken_ = isAnnounced;
         if (enters >= 0) {
             awaited_[static_cast<std::size_t>(enters)] = {entering_, true, false};
             --free_;
@@ -177,7 +177,6 @@ private:
             if (entry.isUsed && entry.line == line) return true;
         return false;
     }
-    bool isAwaitedBefore(std::uint32_t line) const { return isAwaited(line); }
 
     void choose() {
         open_ = -1;
@@ -191,7 +190,7 @@ private:
     bool hasCache_;
     TagStore tags_;
     std::vector<Awaited> awaited_;
-    std::size_t mostInFlight_;
+    std::size_t maxInFlight_;
     Cycle readCycles_;
     Ring<Read, 32> inFlight_;
     Broadcast broadcast_{};
@@ -242,7 +241,7 @@ private:
 /// A bank of the cache that all columns share: memory/SharedCache.scala, AwaitedLines.scala.
 class SharedBank {
 public:
-    static constexpr int columnsPerBus = 4, mostBuses = 64;
+    static constexpr int columnsPerBus = 4, maxBuses = 64;
 
     SharedBank(const Design& design, int bank)
         : design_(design), bank_(bank), buses_((design.columns + columnsPerBus - 1) / columnsPerBus),
@@ -382,7 +381,7 @@ private:
     std::vector<Awaited> awaited_;
     std::size_t tail_ = 0, sender_ = 0, head_ = 0, used_ = 0;
     RoundRobin arbiter_;
-    std::array<Announcement, mostBuses> announced_{};
+    std::array<Announcement, maxBuses> announced_{};
     std::uint64_t busy_ = 0, asked_ = 0;
     std::uint32_t line_ = 0, buddy_ = 0;
     bool isWaiting_ = false, isBuddy_ = false, buddyIsValid_ = false, isFilling_ = false, isFresh_ = true, hasLine_ = false, isGathered_ = false, gathers_ = false;

@@ -28,10 +28,10 @@ public:
     bool isBusy() const { return step_ != Step::idle; }
 
     /// The result that is offered in this cycle, if any.
-    bool offers() const { return !pending_.isEmpty() && (!pending_.front().isCrossed || hit_ == Hit::offering); }
+    bool offers() const { return !pending_.isEmpty() && (!pending_.front().crossesTriangle || hit_ == Hit::offering); }
     struct Pending {
         std::int8_t row, context;
-        bool isLast, isCrossed;
+        bool isLast, crossesTriangle;
     };
     const Pending& offered() const { return pending_.front(); }
 
@@ -39,7 +39,7 @@ public:
     bool step(Cycle now, bool isTaken, const Candidate* candidate) {
         // Distances
         if (hit_ != Hit::none || isDividing_ || hasNumerator_ || hasWeights_) {
-            const bool hitLeaves = isTaken && pending_.front().isCrossed;
+            const bool hitLeaves = isTaken && pending_.front().crossesTriangle;
             const bool collects = isDividing_ && now >= divisionEnd_ && (hit_ == Hit::none || hitLeaves);
             const bool divides = hasNumerator_ && now >= numeratorEnd_ && !isDividing_;
             const bool weighed = hasWeights_ && now >= weightsEnd_ && (!hasNumerator_ || divides);
@@ -67,13 +67,13 @@ public:
         if (isTaken) pending_.pop();
         if (!decisions_.isEmpty() && decisions_.front().due == slots_) {
             const Decision& decision = decisions_.front();
-            if (pendingIsFull || (decision.isCrossed && hasWeights_)) advances = false;
+            if (pendingIsFull || (decision.crossesTriangle && hasWeights_)) advances = false;
             else {
-                if (decision.isCrossed) {
+                if (decision.crossesTriangle) {
                     hasWeights_ = true;
                     weightsEnd_ = now + 7;
                 }
-                pending_.push({decision.row, decision.context, decision.isLast, decision.isCrossed});
+                pending_.push({decision.row, decision.context, decision.isLast, decision.crossesTriangle});
                 decisions_.pop();
             }
         }
@@ -117,7 +117,7 @@ private:
     struct Decision {
         std::int64_t due;
         std::int8_t row, context;
-        bool isLast, isCrossed;
+        bool isLast, crossesTriangle;
     };
 
     int divisionCycles_;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,24 +15,15 @@ from colonnade.design.generator import manifest_for
 from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import MeshMaterial
-from colonnade.render.budget import CLOCK, Budget, estimated_cycles, rounded
+from colonnade.render.budget import CLOCK, Budget, rounded
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.model import FrameSize, Light, Material, MeshSource, Paths, Scene
 
-DATA = Path(__file__).parents[3] / "docs" / "data"
 SIZE = (24, 18)
 GATHERS = Scene(MeshSource(name="teapot:4"), paths=Paths(gather=1), frame=FrameSize(*SIZE))
 #: As in `test_gather.py`, so that the simulator is there.
 OPTIONS = ("physicalAttributeMemory=null", "array.columns=1")
-
-
-def test_the_estimate_is_that_of_the_rtl() -> None:
-    """Passes of `edge` that the pages have, one whose columns are the bottleneck and one whose units are."""
-    manifest = manifest_for("edge").manifest
-    for name in ("gather", "light"):
-        counters = json.loads((DATA / f"{name}.json").read_text())["result"]["pass"]["counters"]
-        assert estimated_cycles(manifest, counters, True) == pytest.approx(counters["cycles"], rel=0.25)
 
 
 @pytest.mark.verilator
@@ -44,8 +34,8 @@ def test_rtl_and_model_have_the_samples_of_one_budget(told: list[str]) -> None:
     np.testing.assert_array_equal(rtl.image, model.image)
     (line,) = [line for line in told if "a pixel" in line]
     assert f"{model.report.samples} samples a pixel, within frame.budget = 0.0003 s at 200 MHz" in line
-    cycles = rtl.report.cycles_per_sample or 0
-    assert cycles / 2 < float(line.split("about ")[1].split(" ")[0].replace(",", "")) < 2 * cycles
+    cycles = float(line.split("about ")[1].split(" ")[0].replace(",", ""))
+    assert cycles == pytest.approx(rtl.report.cycles_per_sample, rel=0.1)
 
 
 def test_longer_budgets_give_more_samples() -> None:
@@ -59,15 +49,12 @@ def test_longer_budgets_give_more_samples() -> None:
 
 
 def test_passes_of_coats_count() -> None:
-    """16 samples with coats are 20 passes: a budget of 17 has 8 samples, and 16 without coats.
-
-    The passes of the plain mesh with a coat of its own are cheaper.
-    """
+    """16 samples with coats are 20 passes: a budget of 17 has 8 samples, and 16 without coats."""
     prepared = DeviceScene.of(GATHERS, manifest_for("small").manifest)
-    cycles = Budget.of(prepared.manifest, prepared.image, prepared.registers(SIZE, composited=True), 1.0).cycles
+    cycles = Budget.of(prepared.manifest, prepared.image, prepared.registers(SIZE, composited=True), 1.0).cycles or 0
     frame = FrameSize(*SIZE, budget=17 * cycles / CLOCK)
     coated = replace(load_mesh("teapot:2"), materials=(MeshMaterial(roughness=0.3),))
-    for roughness, mesh, samples, passes in ((1.0, None, 16, 16), (0.3, None, 8, 10), (None, coated, 16, 20)):
+    for roughness, mesh, samples, passes in ((1.0, None, 16, 16), (0.3, None, 8, 10), (None, coated, 8, 10)):
         scene = replace(GATHERS, material=Material(roughness=roughness), frame=frame)
         report = render(RenderRequest(scene, "small", backend="model", mesh=mesh)).report
         assert report.samples == samples and report.rays["primary"] == passes * SIZE[0] * SIZE[1]
@@ -93,6 +80,13 @@ def test_estimates_are_rounded_to_two_digits() -> None:
     assert [rounded(cycles) for cycles in (7, 99, 104, 105, 112_870)] == [7, 99, 100, 110, 110_000]
     assert "the least, beyond frame.budget = 1e-06 s at" in Budget(1, 1000, 1e-6).note
     assert Budget(1, 1000, 1 / 30).note.startswith("1 sample a pixel, within frame.budget = 0.0333 s at 200 MHz")
+
+
+def test_a_design_without_a_cycle_model_has_one_sample(told: list[str]) -> None:
+    options = ("units.extraSlices=true",)
+    request = RenderRequest(replace(GATHERS, frame=FrameSize(*SIZE, budget=1.0)), "small", options, backend="model")
+    assert render(request).report.samples == 1
+    assert "the cycle model does not know" in told[-1]
 
 
 @pytest.mark.parametrize(

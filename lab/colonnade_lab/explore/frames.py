@@ -116,6 +116,12 @@ def cycles_job(
     return Job(KINDS["cycles"], title, identity, {**design, **arguments})
 
 
+def counted_job(title: str, design: Mapping[str, Any], manifest: Manifest, frame: Frame, size: tuple[int, int]) -> Job:
+    """The job that counts the cycles of a frame with the cycle model; arguments as of `cycles_job`."""
+    identity = {"config": manifest.config, "frame": frame.identity, "size": size}
+    return Job(KINDS["counted"], title, identity, {**design, "scene": frame.scene, "mesh": frame.mesh, "size": size})
+
+
 def run_in_order(
     jobs: Sequence[Job],
     parallel: int,

@@ -66,6 +66,12 @@ KINDS = {
             uses_generator=True,
             uses_model=True,
         ),
+        Kind(
+            "counted",
+            (*_SCENE, "colonnade.device", "colonnade_lab.evaluation"),
+            {"memory": 1000, "java": 1},
+            uses_model=True,
+        ),
         Kind("area", ("colonnade_lab.ppa",), {"memory": 2000, "java": 1, "yosys": 1}, uses_generator=True),
         Kind(
             "power",

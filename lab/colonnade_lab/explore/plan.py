@@ -18,7 +18,7 @@ from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 
 from colonnade_lab.explore import figures
-from colonnade_lab.explore.frames import Frame, cycles_job
+from colonnade_lab.explore.frames import Frame, counted_job, cycles_job
 from colonnade_lab.explore.jobs import KINDS, Job, JobFailed
 from colonnade_lab.explore.points import Point, config_of
 from colonnade_lab.explore.result import figures_of
@@ -132,7 +132,8 @@ class Plan:
         if study.cycles is not None:
             for frame in self._frames_of(point, study.cycles.meshes):
                 title = f"cycles of {point.name}, {frame.name}"
-                found.cycles[frame.name] = cycles_job(title, design, manifest, frame, study.workload.size)
+                count = counted_job if study.cycles.backend == "model" else cycles_job
+                found.cycles[frame.name] = count(title, design, manifest, frame, study.workload.size)
         for library in self.libraries:
             of_library = identity | {"library": self._digests.get(library, {})}
             arguments = design | {"library": self._contents.get(library, {})}

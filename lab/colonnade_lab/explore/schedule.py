@@ -21,7 +21,15 @@ FIRST_LINE = 10.0
 MAX_INTERVAL = 60.0
 
 #: Seconds of a job of each kind, until one of its kind has been measured.
-EXPECTED = {"reference": 5.0, "picture": 8.0, "comparison": 5.0, "cycles": 90.0, "area": 200.0, "power": 150.0}
+EXPECTED = {
+    "reference": 5.0,
+    "picture": 8.0,
+    "comparison": 5.0,
+    "cycles": 90.0,
+    "counted": 6.0,
+    "area": 200.0,
+    "power": 150.0,
+}
 
 #: The folder of a job's result, or the reason why there is none.
 Outcome = Path | JobFailed

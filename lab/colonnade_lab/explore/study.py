@@ -129,9 +129,15 @@ class Tests:
 
 @dataclass(frozen=True, config=_STRICT)
 class Cycles:
-    """Frames of the RTL. `meshes` restricts them; empty: all of the workload."""
+    """Cycles of frames.
+
+    Attributes:
+        meshes: Meshes of the workload; empty: all.
+        backend: The RTL in a simulator, or the cycle model, which needs no simulator.
+    """
 
     meshes: _Names = ()
+    backend: Literal["rtl", "model"] = "rtl"
 
 
 @dataclass(frozen=True, config=_STRICT)

@@ -94,6 +94,19 @@ def cycles(
     write_result(folder, mesh_result(report))
 
 
+def counted(folder: Path, *, config: str, overrides: Sequence[str], scene: Scene, mesh: Mesh, size: Size) -> None:
+    """Count the cycles of a frame with the cycle model."""
+    from colonnade.device.scene import DeviceScene
+
+    from colonnade_lab.evaluation.bench import mesh_result
+    from colonnade_lab.evaluation.cycles import frame_cycles
+
+    with _configuration(config) as path:
+        manifest = manifest_for(str(path), overrides).manifest
+    report = frame_cycles(DeviceScene.of(scene.with_samples(1), manifest, mesh), size)
+    write_result(folder, mesh_result({**report, "cycles_per_second": None, "seconds": {}}))
+
+
 def area(folder: Path, *, config: str, overrides: Sequence[str], library: Mapping[str, bytes]) -> None:
     """Synthesise a configuration."""
     from colonnade_lab.ppa.measure import measure

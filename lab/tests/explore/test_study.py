@@ -10,9 +10,11 @@ from colonnade.common.errors import UserError
 from colonnade.common.limits import MAX_DESIGNS
 from colonnade.design.toolchain import project_root
 
+from colonnade_lab.explore import work
 from colonnade_lab.explore.figures import columns
 from colonnade_lab.explore.plan import Plan
 from colonnade_lab.explore.points import grid_size, manifests_of, point_of, points_of
+from colonnade_lab.explore.result import figures_of
 from colonnade_lab.explore.search import check_search
 from colonnade_lab.explore.study_file import StudyFile, line_of, load_study
 
@@ -260,3 +262,20 @@ def test_odd_values_are_refused_in_a_line_with_file_and_key(tmp_path: Path) -> N
                 assert not any(word in message for word in ("item", "validation", "instance", "Input", "Traceback"))
             else:
                 assert not any(bad in value for bad in ("1979", "07:32", "\\u", "nan", "inf")), (key, value)
+
+
+def test_cycles_are_counted_by_the_model(tmp_path: Path) -> None:
+    """With the keys that the RTL's frames have, and without a simulator."""
+    (tmp_path / "object.toml").write_text('mesh.name = "cube"\n')
+    text = STUDY.replace('baseline = "32b32s64d"\n', "").replace(
+        "[quality]\ndists = false", '[cycles]\nbackend = "model"'
+    )
+    file = study(tmp_path, text)
+    plan = Plan(file, {})
+    point = points_of(file)[0]
+    manifest = manifests_of(file, [point])[point.name]
+    (job,) = plan.jobs(point, manifest, None).cycles.values()
+    assert job.kind.name == "counted" and "verilator" not in job.kind.needs
+    work.counted(tmp_path, **job.arguments)
+    result = figures_of(tmp_path)
+    assert result["cycles"] > 32 * 24 and result["rays_per_cycle_in_box"] > 0 and result["bottleneck"]
