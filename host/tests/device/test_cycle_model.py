@@ -63,6 +63,14 @@ def test_cycles_are_those_of_the_rtl(name: str) -> None:
     assert found == pytest.approx(point["workloads"]["teapot"]["cycles"], rel=BOUND)
 
 
+def test_time_in_units_is_that_of_the_rtl() -> None:
+    """Of the benchmark's teapot. No arbiter adds to it, so it is nearer than the cycles."""
+    rtl = json.loads((ROOT / "docs" / "data" / "bench-edge.json").read_text())["result"]["meshes"]["teapot"]["counters"]
+    found = noted(size=(640, 480)).cycles(manifest_of())
+    for counter in ("contextsBox", "contextsTriangles", "contextsShading", "busyBoxUnit", "busyShader"):
+        assert found[counter] == pytest.approx(rtl[counter], rel=0.003), counter
+
+
 def test_the_same_frame_takes_the_same_cycles() -> None:
     assert noted().cycles(manifest_of()) == noted().cycles(manifest_of())
 
