@@ -230,10 +230,10 @@ def test_python_and_scala_know_each_others_folders(tmp_path: Path) -> None:
         "0263829989b6fd954f72baaf2fc64bc2e2f01d692d4de72986ea808f6e99813f  sub/b",
     ]
     check_replaceable(tmp_path)
-    # What the generator itself wrote into the cache
+    # What the generator itself wrote into the cache: a manifest, or a design that has it
     written, copy = manifest_for("tiny").dir, tmp_path / "copy"
-    copy.mkdir()
-    for name in ("manifest.json", MARKER):
+    for name in (MARKER, *(line.split("  ", 1)[1] for line in (written / MARKER).read_text().splitlines()[1:])):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(written / name, copy / name)
     check_replaceable(copy)
 
