@@ -258,7 +258,6 @@ private:
         }
     }
 
-
     StackEntry entryOf(const Node& node, const Entered& child) const {
         const auto slot = static_cast<std::uint32_t>(child.slot), nodes = std::uint32_t{node.nodes};
         const bool isLeaf = slot >= nodes;

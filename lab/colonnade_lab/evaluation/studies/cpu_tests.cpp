@@ -37,8 +37,7 @@ static double distance(const Ray &ray, const Triangle &triangle) {
     return t > 0 ? t : INFINITY;
 }
 
-template <typename Item>
-static std::vector<Item> items(std::FILE *file, const char *count) {
+template <typename Item> static std::vector<Item> items(std::FILE *file, const char *count) {
     std::vector<Item> result(std::strtoul(count, nullptr, 10));
     if (std::fread(result.data(), sizeof(Item), result.size(), file) != result.size()) std::exit(1);
     return result;

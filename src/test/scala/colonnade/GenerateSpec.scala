@@ -52,13 +52,20 @@ class GenerateSpec extends AnyFlatSpec with Matchers {
 
   it should "refuse a pixel stream without the shell" in Scratch { scratch =>
     val output = scratch.resolve("out").toString
-    refused("--config", "tiny", "--output", output, "--manifest-only", "--pixel-stream")("--pixel-stream needs --axi BYTES")
+    refused(
+      "--config",
+      "tiny",
+      "--output",
+      output,
+      "--manifest-only",
+      "--pixel-stream"
+    )("--pixel-stream needs --axi BYTES")
     run("--config", "tiny", "--output", output, "--manifest-only", "--axi", "16", "--pixel-stream")._1 shouldBe 0
   }
 
   it should "refuse a refit unit without the shell, a scene in DRAM and records of 256 bits" in Scratch { scratch =>
-    val output                                  = scratch.resolve("out").toString
-    def shell(config: String, more: String*)    = Seq("--config", config, "--output", output, "--manifest-only") ++ more
+    val output                               = scratch.resolve("out").toString
+    def shell(config: String, more: String*) = Seq("--config", config, "--output", output, "--manifest-only") ++ more
     def needs(options: Seq[String], needed: String) = refused(options: _*)(s"error: $needed\n")
     needs(shell("edge", "--refit"), "--refit needs --axi BYTES")
     needs(

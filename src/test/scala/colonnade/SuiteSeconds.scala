@@ -12,9 +12,9 @@ class SuiteSeconds extends Reporter {
   private var start = 0.0
 
   def apply(event: Event): Unit = event match {
-    case _:     SuiteStarting  => start = SuiteSeconds.used()
+    case _: SuiteStarting      => start = SuiteSeconds.used()
     case suite: SuiteCompleted => println(f"SUITE ${suite.suiteId} ${SuiteSeconds.used() - start}%.1f")
-    case _ => ()
+    case _                     => ()
   }
 }
 

@@ -217,7 +217,11 @@ final case class ColonnadeConfig(
   else {
     val hasPipeline = units.shadeInterval < UnitsConfig.sequentialShadeInterval
     Require("frame.gather", !frame.gather || frame.hasBounces, "needs frame.maxBounces=1")
-    Require("frame.gather", !frame.gather || hasPipeline, s"needs units.shadeInterval=${UnitsConfig.shadeIntervals.min}")
+    Require(
+      "frame.gather",
+      !frame.gather || hasPipeline,
+      s"needs units.shadeInterval=${UnitsConfig.shadeIntervals.min}"
+    )
     Require(
       "units.pathContexts",
       units.pathContexts <= UnitsConfig.maxPathContexts,

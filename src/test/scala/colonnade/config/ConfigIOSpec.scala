@@ -220,7 +220,7 @@ class ConfigIOSpec extends AnyFlatSpec with Matchers with Properties {
       Seq("64b64s64d" -> "frame.maxWidth=4096", "small" -> "frame.instances=4", "edge" -> "units.pathContexts=1")
     for ((name, other) <- designs; feature <- Seq("frame.rays", "frame.gather") if name != "traversal") {
       val settings = Seq(other, s"$feature=true")
-      val needed =
+      val needed   =
         try { ConfigIO.load(name, settings); Nil }
         catch { case error: ConfigError => error.getMessage.stripPrefix(s"$feature needs ").split(", ").toSeq }
       noException should be thrownBy ConfigIO.load(name, settings ++ needed)
