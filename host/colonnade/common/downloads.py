@@ -25,6 +25,7 @@ from urllib.parse import urlsplit
 from colonnade.common import notes
 from colonnade.common.atomic_files import replacing
 from colonnade.common.errors import UserError, reason_of
+from colonnade.common.input_files import sha256_of
 from colonnade.common.locks import locked
 
 #: Names the folder that is searched before the network.
@@ -79,7 +80,7 @@ def fetched(download: Download, what: str) -> Path:
     folder = cache_folder() / download.sha256[:16]
     file = folder / download.name
     with locked(cache_folder() / f"{download.sha256[:16]}.lock", what):
-        if not (file.is_file() and _digest(file) == download.sha256):
+        if not (file.is_file() and sha256_of(file) == download.sha256):
             folder.mkdir(parents=True, exist_ok=True)
             part = folder / f"{download.published}.part"
             notes.tell(f"fetching {what} from {download.url}")
@@ -111,7 +112,7 @@ def _in_folder(download: Download, what: str) -> Path | None:
         return None
     file, archive = Path(base) / download.name, Path(base) / download.published
     if file.is_file():
-        if _attempt(download, what, lambda: _digest(file)) != download.sha256:
+        if _attempt(download, what, lambda: sha256_of(file)) != download.sha256:
             raise UserError(f"{file}, from {VARIABLE}, is another file than {what}: {_wanted(download)}")
         return file
     if download.member is None or not archive.is_file():
@@ -201,11 +202,3 @@ def _wanted(download: Download) -> str:
         f"put {download.url}{part} into a folder and name that in {VARIABLE}"
         f" ({download.name}, SHA-256 {download.sha256})"
     )
-
-
-def _digest(file: Path) -> str:
-    digest = hashlib.sha256()
-    with file.open("rb") as stream:
-        while block := stream.read(_BLOCK):
-            digest.update(block)
-    return digest.hexdigest()

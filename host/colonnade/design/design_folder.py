@@ -8,7 +8,6 @@ replaced only if it is empty, or if it contains exactly the listed files, unchan
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import os
 import shutil
 import stat
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from colonnade.common.atomic_files import kind_of, make_folder
 from colonnade.common.errors import UserError, reason_of
+from colonnade.common.input_files import sha256_of
 from colonnade.common.temporary import replace, temporary_folder
 
 #: Name of the file list.
@@ -24,7 +24,6 @@ MARKER = ".colonnade.sha256"
 TITLE = "# Written by colonnade generate, which replaces this folder only while its files are as listed here."
 
 _MAX_MARKER_BYTES = 1 << 24
-_BLOCK = 1 << 20
 
 
 def check_replaceable(output: Path) -> None:
@@ -71,7 +70,7 @@ def listed(folder: Path) -> list[str]:
 
 def write_marker(folder: Path) -> None:
     """Write the marker of a complete folder."""
-    lines = [f"{_digest(folder / name)}  {name}" for name in listed(folder)]
+    lines = [f"{sha256_of(folder / name)}  {name}" for name in listed(folder)]
     (folder / MARKER).write_text("\n".join([TITLE, *lines]) + "\n", encoding="utf-8")
 
 
@@ -135,7 +134,7 @@ def _why_not_ours(folder: Path) -> str | None:
     for name, digest in expected.items():
         if name not in found:
             return f"lacks {name}, which colonnade generate wrote"
-        if _digest(folder / name) != digest:
+        if sha256_of(folder / name) != digest:
             return f"holds {name}, which was changed after colonnade generate wrote it"
     return None
 
@@ -154,14 +153,6 @@ def _read_marker(file: Path) -> dict[str, str] | None:
     if any(len(digest) != 64 or not name for digest, _, name in entries):
         return None
     return {name: digest for digest, _, name in entries}
-
-
-def _digest(file: Path) -> str:
-    digest = hashlib.sha256()
-    with file.open("rb") as stream:
-        while block := stream.read(_BLOCK):
-            digest.update(block)
-    return digest.hexdigest()
 
 
 def _copy(source: Path, target: Path) -> None:
