@@ -51,9 +51,11 @@ lazy val colonnade = (project in file("."))
     },
     // A black box to copy: it compiles, and has the pins of its Verilog.
     Test / unmanagedSources += baseDirectory.value / "examples" / "axi4" / "ColonnadeAxi4.scala",
-    // Elaboration recurses deeply; a fork also keeps the simulators' memory out of sbt.
+    // Elaboration recurses deeply; a fork also keeps the simulators' memory out of sbt. Its simulations repeat a few
+    // loops for minutes: the optimising compiler, which .jvmopts leaves out, halves their time.
     Test / fork := true,
-    Test / javaOptions ++= IO.readLines(baseDirectory.value / ".jvmopts").filter(_.startsWith("-")),
+    Test / javaOptions ++=
+      IO.readLines(baseDirectory.value / ".jvmopts").filter(_.startsWith("-")).filterNot(_.contains("TieredStopAtLevel")),
     Test / testForkedParallel := true,
     // The simulators are compiled with the flags of the specs, not with those of the user; and without optimisation:
     // compiling takes longer than the short simulations.
