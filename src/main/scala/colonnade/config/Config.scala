@@ -4,9 +4,10 @@ import chisel3.util.log2Ceil
 
 /** Shape of the array.
   *
-  * @param rows     traversal units that share one column memory (N)
-  * @param columns  columns side by side (M)
-  * @param contexts rays in flight in each traversal unit
+  * @param rows     traversal units of a column (N)
+  * @param columns  columns (M)
+  * @param contexts rays in flight in a traversal unit; contexts beyond `units.pathContexts` (over all rows) stay idle,
+  *                 with a note
   */
 final case class ArrayConfig(rows: Int = 1, columns: Int = 1, contexts: Int = 8) {
   Require.within("array.rows", rows, 1, ArrayConfig.maxRows)
@@ -24,9 +25,9 @@ object ArrayConfig {
 
 /** Operand widths, the paper's mixed precision: `32b32s64d` is mac 32, sqrt 32, div 64.
   *
-  * @param mac  multiply-accumulate operands
-  * @param sqrt radicand of the square root
-  * @param div  dividend of a division
+  * @param mac  bits of multiply-accumulate operands
+  * @param sqrt bits of a radicand
+  * @param div  bits of a dividend; mantissas have half
   */
 final case class PrecisionConfig(mac: Int = 32, sqrt: Int = 32, div: Int = 64) {
   Require.within("precision.mac", mac, 16, 64)
@@ -47,13 +48,13 @@ object PrecisionConfig {
 
 /** Geometry records and the acceleration structure.
   *
-  * @param vertexBits         a vertex coordinate, unsigned, in the object's cube
-  * @param boxBits            a child box's coordinate relative to its node
-  * @param triangleBits       operands of the triangle test; `precision.mac` unless set
-  * @param bvh                false: every ray tests every triangle (the exhaustive baseline)
-  * @param cornerColours      a face holds a colour for each corner, and a material may take its albedo from them
-  * @param textureBytes       of the texture memory; with one, a material may take the colours of the corners as positions
-  *                           in it; 0: no textures
+  * @param vertexBits    bits of a vertex coordinate, unsigned, in the object's cube
+  * @param boxBits       bits of a child box's coordinate relative to its node
+  * @param triangleBits  bits of the triangle test's operands; null: as `precision.mac`
+  * @param bvh           false: every ray in the object's box tests every triangle
+  * @param cornerColours a face has a colour at each corner: docs/shading.md#corner-colours
+  * @param textureBytes  bytes of the texture memory (docs/textures.md), from 5,314 to 21,632; 0: no textures; needs
+  *                      `cornerColours`
   */
 final case class GeometryConfig(
     vertexBits:    Int = 16,
@@ -74,17 +75,17 @@ final case class GeometryConfig(
 
 /** Units of a column.
   *
-  * @param boxLanes      children that the box unit tests per cycle
-  * @param triangleLanes parallel triangle units of a group of rows
-  * @param triangleRows  rows of a column in a group, which shares its triangle units
-  * @param marches       environment marches of a column, if the device supports an environment
-  * @param pathContexts  pixels in flight in a column's path unit; with frame.rays: its rays, a power of two from 64 on
-  * @param rayInterval   most cycles between rays that ray set-up takes, while the rays that it has prepared are taken: 1
-  *                      chooses a pipeline, 32 one ray after the other
-  * @param shadeInterval most cycles of the shader for a light on a diffuse hit, while what it has shaded is taken and
-  *                      texels come at once: 3 chooses a pipeline, 128 one hit after the other. Hits on mirrors and
-  *                      glass take the time of their bounce units
-  * @param extraSlices   the optional timing slices of traversal and caches, for FPGAs: some steps take a cycle more
+  * @param boxLanes      children that a box unit tests in a cycle
+  * @param triangleLanes triangle units of a group of rows: docs/traversal.md#triangle-groups
+  * @param triangleRows  rows of a group; more than the column has: all
+  * @param marches       environment marches of a column (docs/march.md); beyond `pathContexts` they stay idle, with a
+  *                      note
+  * @param pathContexts  pixels in flight in a column's path unit, at most 256; with `frame.rays` rays in flight, a
+  *                      power of two from 64 on
+  * @param rayInterval   most cycles a ray in ray set-up, while results are taken: 1 a pipeline, 32 sequential
+  * @param shadeInterval most cycles of the shader for a light on a diffuse hit, while results are taken and texels come
+  *                      at once: 3 a pipeline, 128 sequential
+  * @param extraSlices   timing slices in traversal and caches, for FPGAs: some steps take a cycle more
   */
 final case class UnitsConfig(
     boxLanes:      Int = 2,
@@ -115,21 +116,21 @@ object UnitsConfig {
   val sequentialRayInterval:   Int = 32
   val sequentialShadeInterval: Int = 128
 
-  /** Legal intervals: those of the pipeline and of the sequential unit. */
+  /** Legal intervals: the pipeline's, and the sequential unit's. */
   val rayIntervals:   Seq[Int] = Seq(1, sequentialRayInterval)
   val shadeIntervals: Seq[Int] = Seq(3, sequentialShadeInterval)
 }
 
 /** The memory that the units of a column share.
   *
-  * @param depth         records
-  * @param banks         independent banks, interleaved by record address
-  * @param stackDepth    traversal stack entries of each context
-  * @param snooping      a context gets its record from the read of any unit of the column
-  * @param recordBuffers record buffers of a traversal unit
+  * @param depth         records; with a cache it only sets the width of addresses
+  * @param banks         banks, interleaved by record address
+  * @param stackDepth    traversal stack entries of a context
+  * @param snooping      a context takes any record that the column reads
+  * @param recordBuffers records that a traversal unit holds or awaits
   * @param readLatency   cycles from an accepted read to its record
-  * @param holdable      an input per bank that stalls it, so that verification can vary the latency at run time
-  * @param cache         the memory is a cache of records in DRAM; none: a scratchpad that holds the whole scene
+  * @param holdable      an input per bank stalls it, so that verification can vary the latency at run time
+  * @param cache         caches of a scene in DRAM (docs/scene-cache.md); null: a scratchpad holds the whole scene
   */
 final case class ColumnBvhMemoryConfig(
     depth:         Int = 131072,
@@ -151,17 +152,20 @@ final case class ColumnBvhMemoryConfig(
 
 /** Limits of a frame.
   *
-  * @param maxWidth   widest frame, pixels
-  * @param maxHeight  highest frame, pixels
-  * @param tileSize   edge of the square tiles that are dispatched to columns, pixels
+  * @param maxWidth   width of the largest frame, pixels
+  * @param maxHeight  height of the largest frame, pixels
+  * @param tileSize   edge of a tile, pixels
   * @param materials  entries of the material table
   * @param lights     point lights
-  * @param maxBounces reflections and refractions of a path that are traced; 0: every material is diffuse
-  * @param hits       the pixel stream also carries the hit triangle and its distance
-  * @param emission   materials have a colour that diffuse surfaces emit
-  * @param gather     diffuse surfaces gather light: docs/gather.md
-  * @param rays       rays of applications and their hits in place of pixels: docs/rays.md
-  * @param instances  objects with a transform of their own: docs/path-tracer.md; 0: none
+  * @param maxBounces traced reflections and refractions of a path; 0: every surface is diffuse
+  * @param hits       pixels carry the hit triangle and its distance
+  * @param emission   diffuse materials have an emission: docs/shading.md#colour-unit
+  * @param gather     diffuse surfaces gather light (docs/gather.md); needs `maxBounces` and `units.shadeInterval` 3
+  * @param rays       rays of applications in place of pixels (docs/rays.md#the-device); needs `maxBounces` 0,
+  *                   `units.rayInterval` 1, triangle tests of at most 38 bits, directions of at most 64 bits; excludes
+  *                   the environment and instances
+  * @param instances  objects with transforms of their own (docs/path-tracer.md#instances): 0, or at least 2; needs
+  *                   `geometry.bvh`
   */
 final case class FrameConfig(
     maxWidth:   Int = 1920,
@@ -197,9 +201,9 @@ object FrameConfig {
 }
 
 /** A whole generator configuration: immutable, checked at construction. The names, types and defaults of the parameters
-  * are those of the keys of its JSON, see [[ConfigIO]]. The defaults are the preset `tiny`.
+  * are the keys' of its JSON, see [[ConfigIO]]. The defaults are the preset `tiny`.
   *
-  * @param physicalAttributeMemory none for a device without an environment
+  * @param physicalAttributeMemory the maps of an environment; null: no environment
   */
 final case class ColonnadeConfig(
     array:                   ArrayConfig = ArrayConfig(),

@@ -18,16 +18,17 @@ object MapEncoding {
 
 /** The on-chip maps of the environment: albedo, normals and planes.
   *
-  * @param width       of the maps, pixels
-  * @param height      of the maps, pixels
-  * @param encoding    of albedo and normals
-  * @param tileSize    edge of a tile, pixels
-  * @param paletteSize entries of a two-level map's palette
-  * @param mapBytes    of albedo, and of normals
-  * @param planes      entries of the plane table
-  * @param planeBytes  of the plane map, its table and the bounding planes
-  * @param boundingPlanes bounding planes outside the view
-  * @param columnsPerCopy consecutive columns that read one copy of the maps; 1: each column has its own
+  * @param width          width of the maps, pixels
+  * @param height         height of the maps, pixels
+  * @param encoding       encoding of albedo and normals, twoLevel or slic: docs/attributes.md#encodings
+  * @param tileSize       edge of a tile, pixels
+  * @param paletteSize    entries of a two-level map's palette
+  * @param mapBytes       bytes of the albedo map, and of the normal map; descriptors and palette leave at most 16,384
+  *                       bytes as heap
+  * @param planes         entries of the plane table
+  * @param planeBytes     bytes of plane map, plane table and bounding planes; the rest is heap, at most 16,384 bytes
+  * @param boundingPlanes bounding planes, beyond the view
+  * @param columnsPerCopy columns that read one copy of the maps (docs/attributes.md#copies); more than the array has: all
   */
 final case class PhysicalAttributeMemoryConfig(
     width:          Int = 640,

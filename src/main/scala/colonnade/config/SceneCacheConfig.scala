@@ -3,14 +3,14 @@ package colonnade.config
 /** Caches between traversal units and a scene in DRAM: one in every column, and one that all columns share. A line is two
   * records. Pairs of lines are interleaved over `columnBvhMemory.banks` banks in both.
   *
-  * @param lines        lines of a column's cache
-  * @param ways         its associativity
-  * @param misses       lines that it can await at a time
-  * @param sharedLines  lines of the shared cache; 0: there is none
-  * @param sharedWays   its associativity; 0 without one
-  * @param sharedMisses lines that are awaited from DRAM at a time
-  * @param busBytes     width of the DRAM port
-  * @param parity       each record in a cache has a parity bit
+  * @param lines        lines of a column's cache: a power of two, at most 4,096, for each way and bank
+  * @param ways         ways of a column's cache
+  * @param misses       lines that a column awaits; a multiple of the banks
+  * @param sharedLines  lines of the shared cache, as `lines`; 0: no shared cache
+  * @param sharedWays   ways of the shared cache, at most 16; 0 without one
+  * @param sharedMisses lines awaited from DRAM; a multiple of the banks
+  * @param busBytes     bytes of the DRAM port; 4 without a shared cache
+  * @param parity       each record has a parity bit from the DRAM port to the requesters
   */
 final case class SceneCacheConfig(
     lines:        Int = 512,
