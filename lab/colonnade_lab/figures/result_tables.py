@@ -21,20 +21,20 @@ def presets(data: Data) -> str:
     """What each preset is for, and its figures."""
     fpga = data.optional("fpga")
     rows = []
-    for preset, (purpose, verified) in PRESETS.items():
+    for preset, purpose in PRESETS.items():
         own = facts(data, preset)
         logic, clock = f"{text(own, 'kge')} kGE", f"{text(own, 'mhz')} MHz"
         if preset == "fpga" and fpga is not None:
             logic, clock = f"{fpga['luts']:,} LUTs", f"{fpga['fmax_mhz']:.0f} MHz, routed"
         figures = (text(own, key) for key in ("raysPerCycle", "mm2", "njGlitches", "framesPerJoule"))
         rays, area, energy, frames = figures
-        rows.append([f"`{preset}`", purpose, rays, logic, area, clock, energy, frames, verified])
+        rows.append([f"`{preset}`", purpose, rays, logic, area, clock, energy, frames])
     titles = ["preset", "for", "in-box rays a cycle", "logic", "mm², 28 nm", "clock", "nJ a ray", "frames/s/W"]
-    return markdown([*titles, "RTL equals the model in"], rows)
+    return markdown(titles, rows)
 
 
 def headlines(data: Data) -> str:
-    """The figures that matter most."""
+    """The figures of `edge` that matter most, beside those in the table of presets."""
     own = facts(data, "edge")
     rooms, quality = data.optional("rooms"), data.optional("quality-edge")
     maps = data.optional("environments")
@@ -44,12 +44,7 @@ def headlines(data: Data) -> str:
         largest = max(mesh["triangles"] for mesh in quality["meshes"].values())
         psnr = f"{min(values):.1f} to {max(values):.1f} dB PSNR on {len(values)} meshes of up to {largest:,} triangles"
         rows.append(["model against the float scene", psnr])
-    rates = f"{text(own, 'raysPerCycle')} in-box rays per cycle; as mirrors {text(own, 'mirrorRaysPerCycle')}"
-    rows.append(["rays, eight meshes, scene in DRAM", rates])
     rows.append(["at the area of the paper's chip", f"{text(own, 'equalArea')} times its rays per cycle"])
-    rows.append(["area at 28 nm, every memory counted", f"{text(own, 'mm2')} mm²"])
-    energy = f"{text(own, 'nj')} nJ per in-box ray, {text(own, 'njGlitches')} with glitches"
-    rows.append(["energy at 28 nm, without wires", energy])
     if rooms is not None:
         mean = rooms["mean_cycles"]
         rows.append(["AR frames of 640×480, relit", f"{MEGAHERTZ * 1e6 / mean:,.0f} per second at {MEGAHERTZ:g} MHz"])
