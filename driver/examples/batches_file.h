@@ -1,5 +1,5 @@
 /* A file of batches of rays, as examples/rays/batches.py writes it. Addresses of rays count from the beginning of the file,
- * those of hits and tags from the beginning of the results. */
+ * addresses of hits and tags from the beginning of the results. */
 #ifndef BATCHES_FILE_H
 #define BATCHES_FILE_H
 
@@ -15,7 +15,7 @@ struct batches_file {
     uint32_t record_count, batch_count, result_bytes, unwritten, reserved[14]; /* unwritten: a word of the results before */
     struct colonnade_rays_batch batches[];
 };
-_Static_assert(sizeof(struct batches_file) == 128, "the header is that of examples/rays/batches.py");
+_Static_assert(sizeof(struct batches_file) == 128, "the header is as in examples/rays/batches.py");
 
 /* Writes where its scene lies among the rays. */
 static inline enum colonnade_error batches_set_rays(struct colonnade *device, const struct batches_file *file) {

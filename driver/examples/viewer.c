@@ -31,7 +31,7 @@ enum { STEP = 5, STEEPEST = 85, FILE_BYTES = 1 << 20, WRITES = 4096, PAGE = 4096
 
 static const double RADIAN = 3.14159265358979323846 / 180, METRE = 4294967296.0, ONE = 1073741824.0;
 
-/* The camera from that of the view file: degrees around the middle of the picture, and a factor of its distance. */
+/* The camera from the view file's: degrees around the middle of the picture, and a factor of its distance. */
 struct orbit {
     double azimuth, elevation, distance;
 };
@@ -269,7 +269,7 @@ static uint32_t move_objects(const struct target *target, struct colonnade *devi
     return colonnade_motion_writes(motion, now, before, writes);
 }
 
-/* Finds the registers of a frame: those of the view, then those of what moves. */
+/* Finds the registers of a frame: the view's, then the moving objects'. */
 static void find_frames(const struct target *target, struct colonnade *device, struct colonnade_view *view, struct play *play,
                         uint32_t number, uint32_t count, struct colonnade_frame frames[2]) {
     static uint8_t writes[8 * WRITES], moves[8 * COLONNADE_MOTION_WRITES];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Driver of the Colonnade device in its AXI4 shell: docs/driver.md.
  *
- * It allocates nothing, uses no floating point, and keeps no state but what it is given. Pointers are those of the caller,
+ * It allocates nothing, uses no floating point, and keeps no state but what it is given. Pointers are the caller's,
  * and are not kept beyond the call, but for `bus` and `design` of `colonnade_probe`. What a call fills is filled when it
  * returns COLONNADE_OK, and unchanged otherwise. It makes no access that the shell would refuse. */
 #ifndef COLONNADE_H
@@ -49,7 +49,7 @@ enum colonnade_error {
     /* Of colonnade_mesh.h */
     COLONNADE_NOT_A_CLIP,    /* no clip file, or one of another version, or numbers that no design has */
     COLONNADE_OUTSIDE,       /* a vertex leaves the object's grid, or an object the world's cube */
-    COLONNADE_OTHER_RECORDS, /* the records are not those of the clip */
+    COLONNADE_OTHER_RECORDS, /* the records are not the clip's */
     COLONNADE_TOO_DEEP,      /* a plan needs more boxes than the unit holds */
     /* Of colonnade_batches.h */
     COLONNADE_NO_RAYS, /* the design traces no rays of applications */
@@ -164,7 +164,7 @@ enum colonnade_error colonnade_check_maps(const struct colonnade_design *design,
 enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
 
 /* Loads the maps of another view or room, as colonnade_load does. The scene, textures and registers stay. The registers of
- * the next frame have to be those of these maps. An image that the processor does not see must hold maps alone. */
+ * the next frame must be these maps'. An image that the processor does not see must hold maps alone. */
 enum colonnade_error colonnade_load_maps(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
 
 /* Reads a frame file of `bytes` bytes, and fills `frame`, which points into it. */

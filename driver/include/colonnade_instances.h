@@ -48,8 +48,8 @@ uint32_t colonnade_instance_words(const struct colonnade_world *world);
 /* The place of the root among them. */
 uint32_t colonnade_instance_root(const struct colonnade_world *world);
 
-/* Places an object. Refused is a transform that scales an axis to nothing, one that makes the object too small for the world,
- * and one with which it leaves the world's cube. */
+/* Places an object. Errors: a transform that scales an axis to nothing, or makes the object too small for the world,
+ * or lets it leave the world's cube. */
 enum colonnade_error colonnade_find_instance(const struct colonnade_world *world, const struct colonnade_object *object,
                                              const struct colonnade_transform *transform, struct colonnade_instance *instance);
 

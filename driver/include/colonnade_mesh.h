@@ -25,7 +25,7 @@ struct colonnade_mesh {
     uint32_t depth;        /* nodes on the longest path from the root */
     uint32_t vertices, leaves, bones, targets, changes, keys;
     uint32_t duration;    /* 2^-16 s */
-    int32_t linear_shift; /* fraction bits of matrices beyond those of translations */
+    int32_t linear_shift; /* fraction bits of matrices beyond translations' */
     int32_t shift;        /* fraction bits of translations */
     const uint8_t *vertex_words, *leaf_words, *change_words, *key_words;
 };
@@ -59,12 +59,12 @@ void colonnade_mesh_pose(const struct colonnade_mesh *mesh, uint32_t time, int32
 /* The words of a pose. */
 uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh);
 
-/* The mesh's vertices in a pose. Refused is a pose in which one leaves the object's grid. */
+/* The mesh's vertices in a pose; an error if one leaves the object's grid. */
 enum colonnade_error colonnade_mesh_skin(const struct colonnade_mesh *mesh, const int32_t *pose,
                                          struct colonnade_vertex *vertices);
 
 /* Makes a copy of the mesh's records for another root, since nodes hold addresses. `from` and `copy` point at the roots, which
- * have the addresses `from_root` and `root`; they do not overlap. `path` is that of colonnade_mesh_refit. */
+ * have the addresses `from_root` and `root`; they do not overlap. `path` is as for colonnade_mesh_refit. */
 enum colonnade_error colonnade_mesh_copy(const struct colonnade_mesh *mesh, const uint32_t *from, uint32_t from_root,
                                          uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path);
 
@@ -81,7 +81,7 @@ enum { COLONNADE_MESH_WRITES = 3 };
 
 /* The pairs of words of a frame that reads the copy at `root`, of a scene that is this mesh alone: they invalidate the caches.
  * `records` is the number of all records of the scene with its copies, `writes` has space for COLONNADE_MESH_WRITES pairs.
- * Answers their number, 0 if the scene lies on chip. Set them by colonnade_set_frame after those of a view. */
+ * Answers their number, 0 if the scene lies on chip. Set them by colonnade_set_frame after a view's. */
 uint32_t colonnade_mesh_writes(const struct colonnade_design *design, uint32_t root, uint32_t records, uint8_t *writes);
 
 enum {
@@ -126,13 +126,13 @@ struct colonnade_leaf {
 };
 
 /* Pairs triangles along edges, each with the neighbour that gives the smallest box, of 32 at an edge. Answers the number of
- * leaves. `layout` is any clip of the design. Space: `leaves` that of count, scratch vertex_count + 4 * count words. */
+ * leaves. `layout` is any clip of the design. Space: `leaves` for count, scratch vertex_count + 4 * count words. */
 uint32_t colonnade_mesh_pairs(const struct colonnade_mesh *layout, const struct colonnade_vertex *vertices,
                               uint32_t vertex_count, const struct colonnade_triangle *triangles, uint32_t count,
                               struct colonnade_leaf *leaves, uint32_t *scratch);
 
 /* Builds a tree over leaves, by the places of vertices; colonnade_mesh_refit writes its boxes. `mesh` is a copy of any clip of
- * the design, and becomes that of the leaves: it can be refitted and planned, and has no pose. Space: leaf_words 16 bytes and
+ * the design, and becomes the leaves': it can be refitted and planned, and has no pose. Space: leaf_words 16 bytes and
  * scratch 4 words a leaf, copy at most 2 records a leaf. Packed ids are new ones. */
 void colonnade_mesh_build(struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
                           const struct colonnade_leaf *leaves, uint32_t count, uint8_t *leaf_words, uint32_t *copy,

@@ -57,7 +57,7 @@ void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t
 enum colonnade_error colonnade_motion_move(const struct colonnade_view *view, const struct colonnade_pose *move,
                                            const int64_t pivot[3], struct colonnade_transform *transform);
 
-/* The registers of all objects: `transforms`, also those of the program's own, give `instances`. */
+/* The registers of all objects: `transforms`, also of the program's own, give `instances`. */
 enum colonnade_error colonnade_motion_find(const struct colonnade_motion *motion, const struct colonnade_transform *transforms,
                                            struct colonnade_instance *instances);
 
@@ -74,9 +74,9 @@ enum colonnade_error colonnade_motion_bend(const struct colonnade_motion *motion
                                            const struct colonnade_motion_memory *memory, uint32_t time,
                                            const struct colonnade_instance *last, struct colonnade_instance *instances);
 
-/* The pairs of words of instances, of their bounds and offset, but for those that `before` has, too: instances that the device
+/* The pairs of words of instances, of their bounds and offset, unless `before` has them: instances that the device
  * has, NULL if it has none. Where a mesh that bends has another root, they invalidate the caches. Answers their number.
- * `writes` has space for COLONNADE_MOTION_WRITES pairs. Set them by colonnade_set_frame after those of a view, whose bounds
+ * `writes` has space for COLONNADE_MOTION_WRITES pairs. Set them by colonnade_set_frame after a view's, whose bounds
  * colonnade_view_set_bounds gives. */
 uint32_t colonnade_motion_writes(const struct colonnade_motion *motion, const struct colonnade_instance *instances,
                                  const struct colonnade_instance *before, uint8_t *writes);

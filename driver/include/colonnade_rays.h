@@ -28,7 +28,7 @@ enum colonnade_rays_status {
     COLONNADE_RAYS_NO_MEMORY
 };
 
-/* A batch of rays in memory, 64 bytes. Addresses are multiples of 64, for the model those of this process. */
+/* A batch of rays in memory, 64 bytes. Addresses are multiples of 64, for the model in this process. */
 struct colonnade_rays_batch {
     uint64_t rays, hits;     /* rays in, or a sensor; hits out */
     uint32_t count, mode;    /* 1 to 2^24 rays; the bits below */
@@ -162,9 +162,9 @@ int colonnade_rays_bounds(const struct colonnade_rays_scene *scene, double low[3
 /* A vertex unit, and the corner that local origins count from. */
 int colonnade_rays_grid(const struct colonnade_rays_scene *scene, double *unit, double corner[3]);
 
-/* Rays. `mode` has the bits of CULL_FRONT, CULL_BACK, OPAQUE_ONLY; `mask` is that of all rays of a call. */
+/* Rays. `mode` has the bits of CULL_FRONT, CULL_BACK, OPAQUE_ONLY; `mask` is for all rays of a call. */
 
-/* The closest hit of each ray. With `colonnade_rays_refine` it is that of the meshes as the application has them. */
+/* The closest hit of each ray. With `colonnade_rays_refine` it is on the meshes as the application has them. */
 int colonnade_rays_closest(struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
                            uint32_t mode, uint32_t mask, struct colonnade_rays_hit *hits);
 /* 1 for each ray with a hit, else 0. */
@@ -173,12 +173,12 @@ int colonnade_rays_occluded(struct colonnade_rays_scene *scene, const struct col
 /* All hits of all rays, by ray and t, at most `most` a ray. `hits` has room for `capacity`; `*found` may be more. */
 int colonnade_rays_all(struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count, uint32_t mode,
                        uint32_t mask, size_t most, struct colonnade_rays_hit *hits, size_t capacity, size_t *found);
-/* t, u, v of hits in double, from the meshes' own vertices, or those of a neighbour where these say no: 1, as at first. */
+/* t, u, v of hits in double, from the meshes' own vertices, or a neighbour's where these say no: 1, as at first. */
 void colonnade_rays_refine(struct colonnade_rays_scene *scene, int is_refined);
 /* An order of the rays in which near ones follow each other: origins in Morton order, then the octant of the direction. */
 int colonnade_rays_order(const struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
                          uint32_t *order);
-/* Hands over a batch as it is. The mask of its mode is the device's: that of the low 8 bits of the meshes' masks, if no
+/* Hands over a batch as it is. The mask of its mode is the device's: of the low 8 bits of the meshes' masks, if no
  * other bits tell meshes apart. */
 int colonnade_rays_submit(struct colonnade_rays_scene *scene, const struct colonnade_rays_batch *batch);
 /* Waits until all batches are done. */

@@ -15,7 +15,7 @@ enum {
     COLONNADE_VIEW_LIGHTS = 8,
     COLONNADE_VIEW_EDGES = 6, /* half-planes of frame.objectOutline */
     COLONNADE_VIEW_RAYS = 4,  /* gathered rays of a path */
-    /* Words that are computed, at most: those of frame, camera, lights, environment, its window, and sample points. Numbers
+    /* Words that are computed, at most: of frame, camera, lights, environment, its window, and sample points. Numbers
      * of more than 32 bits have two. */
     COLONNADE_VIEW_FRAME = 7 + 3 * COLONNADE_VIEW_EDGES,
     COLONNADE_VIEW_CAMERA = 2 * 12 + 1,
@@ -91,13 +91,13 @@ struct colonnade_view {
     struct colonnade_light lights[COLONNADE_VIEW_LIGHTS];
     struct colonnade_sample sample;
     uint32_t words[2][COLONNADE_VIEW_WORDS];
-    bool is_map_camera; /* in a room: the camera is that of its maps */
+    bool is_map_camera; /* in a room: the camera took its maps */
     bool accepted;      /* which of `words` the device has */
     bool is_known;      /* it has them */
     bool is_computed;   /* the others are a whole frame */
 };
 
-/* Reads a view file, which `colonnade pack --view-file` writes. Poses and lights are those of its scene. */
+/* Reads a view file, which `colonnade pack --view-file` writes. Poses and lights are its scene's. */
 enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design, const void *data,
                                          size_t bytes);
 
@@ -110,14 +110,14 @@ enum colonnade_error colonnade_view_set_camera(struct colonnade_view *view, cons
 enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, const struct colonnade_pose *object);
 /* The bounds of what moves within the object's cube, vertex units; until the first call they are the file's. */
 enum colonnade_error colonnade_view_set_bounds(struct colonnade_view *view, const int32_t low[3], const int32_t high[3]);
-/* Light `index` of the scene, 0 to its count - 1; until the first call it is that of the file. */
+/* Light `index` of the scene, 0 to its count - 1; until the first call it is the file's. */
 enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index, const struct colonnade_light *light);
 
 /* Pass `index` of a frame of 1, 2, 4, ... 64 passes: the host's pixel shift and sample points (docs/sampling.md). It holds
  * until the next call, whatever moves; until the first one a frame has one pass. */
 enum colonnade_error colonnade_view_set_sample(struct colonnade_view *view, uint32_t index, uint32_t count);
 
-/* Computes the registers. `frame` has those that differ from the accepted ones, in `writes`, which has space for `capacity`
+/* Computes the registers. `frame` has changes from the accepted ones, in `writes`, which has space for `capacity`
  * pairs of words; colonnade_view_most_writes says how many are enough. */
 enum colonnade_error colonnade_view_frame(struct colonnade_view *view, uint8_t *writes, uint32_t capacity,
                                           struct colonnade_frame *frame);

@@ -53,7 +53,7 @@ static void sort_edges(const struct colonnade_triangle *triangles, uint32_t coun
     }
 }
 
-/* Where the edges to a vertex end, within those of a first vertex. */
+/* Where the edges to a vertex end, within a first vertex's. */
 static uint32_t end_of(const struct colonnade_triangle *triangles, const uint32_t *sorted, uint32_t low, uint32_t high,
                        uint32_t vertex) {
     while (low < high) {

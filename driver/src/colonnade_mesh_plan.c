@@ -7,7 +7,7 @@
 enum { LINES, TRIANGLE, PAIR, NODE };
 enum {
     ENTRY_LINES = COLONNADE_PLAN_WORDS - 1,
-    RING_LINES = 128, /* that the unit holds, with those that it has requested */
+    RING_LINES = 128, /* that the unit holds, with requested ones */
     LINES_IN_FLIGHT = 32,
     LEAF_LINES = 4 /* at most, of a leaf; none of them may push out another one */
 };

@@ -85,7 +85,7 @@ struct blend {
     int32_t cofactors[9];         /* of its linear part, scaled */
 };
 
-/* Half the matrix of a vertex, from those of its bones. */
+/* Half the matrix of a vertex, from its bones'. */
 static void mix(const int32_t *pose, const uint8_t *halves, int32_t matrix[MATRIX_WORDS]) {
     const uint32_t others = colonnade_half(halves, 7) + colonnade_half(halves, 8) + colonnade_half(halves, 9);
     const uint32_t first = (((uint32_t)1 << WEIGHT_BITS) - others) << (32 - 1 - WEIGHT_BITS);

@@ -16,7 +16,7 @@ static void find_box(struct colonnade_view *view, const struct colonnade_work *w
     int64_t planes[3][2];
     uint64_t most = 0;
     for (int axis = 0; axis < 3; ++axis) {
-        /* The device's eye is that of the registers */
+        /* The device's eye is the registers' */
         const int64_t eye = colonnade_shift_left(colonnade_nearest(work->eye[axis], 16 + shift), shift);
         const int64_t low = scene->low[axis] - pad, high = scene->high[axis] + pad;
         planes[axis][0] = (fraction < 0 ? colonnade_floor(low, -fraction) : colonnade_shift_left(low, fraction)) - eye;

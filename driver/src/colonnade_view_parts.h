@@ -73,7 +73,7 @@ bool colonnade_is_pose(const struct colonnade_pose *pose);
 /* Whether a position is in the world. */
 bool colonnade_is_place(const int64_t position[3]);
 
-/* Whether focal lengths and principal point, 2^-32 pixels, are those of a lens. */
+/* Whether focal lengths and principal point, 2^-32 pixels, are a lens's. */
 bool colonnade_is_lens(int64_t fx, int64_t fy, int64_t cx, int64_t cy);
 
 /* Whether a scene's device renders the picture of a camera. */
@@ -85,7 +85,7 @@ bool colonnade_find_on_grid(const struct colonnade_view *view, const int64_t poi
 /* Axes and eye of a pose. Answers whether the eye is in the hardware's range. */
 bool colonnade_find_sight(const struct colonnade_view *view, const struct colonnade_pose *pose, struct colonnade_work *work);
 
-/* The scaled rays of a picture, as whole numbers: those of the registers. */
+/* The scaled rays of a picture, as whole numbers, from the registers. */
 struct colonnade_view_rays {
     int32_t first[3], step_x[3], step_y[3];
     int shift; /* of `first` */

@@ -13,7 +13,7 @@ static int find_shift(uint64_t most, int bits) {
     return shift;
 }
 
-/* A grid position p is at matrix * p + offset in the maps; the offset is -matrix * eye. The sight is that of the maps. */
+/* A grid position p is at matrix * p + offset in the maps; the offset is -matrix * eye. The sight is the maps'. */
 static bool set_projection(struct colonnade_view *view, const struct colonnade_work *work) {
     const struct colonnade_view_scene *scene = &view->scene;
     const int bits = scene->mac_bits;
@@ -277,8 +277,8 @@ static struct cover find_cover(const struct colonnade_view *view, const struct l
     return cover;
 }
 
-/* The room may hide the object where a tile under its box is nearer than the box's end; from a camera that is not that of
- * the maps, always. The tolerance is twice the largest error of the tiles around the object, from 1/400 of the distance to
+/* The room may hide the object where a tile under its box is nearer than the box's end; from a camera other than
+ * the maps', always. The tolerance is twice the largest error of the tiles around the object, from 1/400 of the distance to
  * a tenth of the edge. The lengths are from the maps' camera. */
 static void set_occlusion(struct colonnade_view *view, const struct colonnade_work *work, const struct lengths *lengths) {
     const struct colonnade_view_scene *scene = &view->scene;

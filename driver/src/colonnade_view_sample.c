@@ -85,7 +85,7 @@ enum colonnade_error colonnade_view_set_sample(struct colonnade_view *view, uint
     struct colonnade_sample *sample = &view->sample;
     uint32_t point[2];
     find_point(index, count, point);
-    for (int axis = 0; axis < 2; ++axis) /* the middle of its step, from that of the pixel */
+    for (int axis = 0; axis < 2; ++axis) /* the middle of its step, from the pixel's */
         sample->shift[axis] = ((int64_t)(2 * point[axis] + 1) - (int64_t)count) * (COLONNADE_PIXEL / 2 / count);
     for (uint32_t ray = 0; ray < COLONNADE_VIEW_RAYS; ++ray) {
         find_point(count == 1 ? 0 : orders[view->scene.lights + ray][count - 2 + index], count, point);

@@ -55,7 +55,7 @@ static uint32_t read_register(void *context, uint32_t address) {
     return device.status;
 }
 
-/* A frame reads records of the mesh, from `first` up to `end`: they are those of its pose. */
+/* A frame reads records of the mesh, from `first` up to `end`: they are its pose's. */
 static void read_records(uint32_t root, uint32_t first, uint32_t end) {
     const uint32_t *wanted = expected[root != motion.roots[0][0]];
     CHECK(root + end <= device.registers[record_count]);
@@ -114,7 +114,7 @@ static void play(uint32_t object) {
     }
 }
 
-/* Clips that are not those of the scene are refused, and nothing bends. */
+/* Clips that are not the scene's are refused, and nothing bends. */
 static void refuse(uint32_t bytes) {
     static const uint32_t roots[] = {1, 0x7FFFFFFF, 0xFFFFFFFF};
     const struct colonnade_motion right = motion;

@@ -143,7 +143,7 @@ static void add_scene(bool has_room, bool gathers) {
     file.words[3] = (uint32_t)(4 * file.count);
 }
 
-/* Whether words are other than those of a right file. */
+/* Whether words differ from a right file's. */
 static bool damage(void) {
     const uint32_t changes = take();
     if (changes < 192) return false;

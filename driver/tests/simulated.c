@@ -4,7 +4,7 @@
  * usage: simulated IMAGE FRAME interrupt|poll [SCENE | MAPS OTHER FRAME]
  *
  * SCENE has the records of a scene in DRAM. After three frames the device loads MAPS, but first OTHER, an image of maps of
- * another format, which it has to refuse; frames from then on are those of the last FRAME.
+ * another format, which it has to refuse; frames from then on are the last FRAME's.
  *
  * Memory: the image at PAGE, scene or maps behind it, then framebuffers, each in a window of its size.
  * A page of untouched memory is around each of them. */

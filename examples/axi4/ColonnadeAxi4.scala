@@ -53,7 +53,7 @@ class Axi4Pins(idBits: Int, addressBits: Int, dataBytes: Int, hasAttributes: Boo
   val rready = Output(Bool())
 }
 
-/** The top `colonnade_axi4`, for systems in Chisel. The default widths are those of Rocket Chip's MMIO and slave ports.
+/** The top `colonnade_axi4`, for systems in Chisel. The default widths are Rocket Chip's for MMIO and slave ports.
   *
   * @param masterBytes
   *   `--axi` of the design

@@ -59,7 +59,7 @@ module colonnade_axi4 #(
     input  logic [8*SCENE_BYTES-1:0] m_axi_scene_rdata
 `endif
 );
-  // Bursts are refused. Ids of the memory's answers are those of the device.
+  // Bursts are refused. Ids of the memory's answers are the device's.
   wire unused = &{1'b0, s_axi_awburst, s_axi_arburst, m_axi_bid, m_axi_rid};
 
   logic [15:0] awaddr, araddr;

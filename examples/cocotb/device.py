@@ -54,7 +54,7 @@ def cycles_since(begin: float) -> int:
 
 
 class Device:
-    """The registers of the shell, by the names of ``shell.json``, and those of the device behind them."""
+    """The registers of the shell, by the names of ``shell.json``, and the device's behind them."""
 
     def __init__(self, dut: Any, design: Path) -> None:
         shell = json.loads((design / "shell.json").read_text())

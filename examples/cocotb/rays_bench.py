@@ -28,7 +28,7 @@ async def traces_batches(dut: Any) -> None:
     assert IMAGE + job.files["IMAGE"].stat().st_size <= RING
     memory.write(BATCHES, content)
     memory.write(results, unwritten.to_bytes(4, "little") * (size // 4))
-    # Addresses in the file count from its beginning, or that of the results
+    # Addresses in the file count from its beginning, or the results'
     for number in range(count):
         batch = bytearray(content[HEADER_BYTES + BATCH_BYTES * number :][:BATCH_BYTES])
         for word, base in ((0, BATCHES), (8, results), (48, results)):

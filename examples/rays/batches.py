@@ -4,7 +4,7 @@ Usage: python examples/rays/batches.py --config DESIGN [--set KEY=VALUE …] [--
 
 - PREFIX.image, PREFIX.dram: the device image of a torus, and its records if the design reads them from DRAM
 - PREFIX.batches: a header of 128 bytes, 64 bytes for each batch, and rays. Addresses of rays count from the beginning
-  of this file, those of hits and tags from the beginning of the results
+  of this file, of hits and tags from the beginning of the results
 - PREFIX.results: tags and hits of the bit-exact model, among bytes that the device does not write
 
 Batches have all forms of rays and of hits. One is misaligned, and one names rays that are outside of the memory.

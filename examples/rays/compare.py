@@ -1,4 +1,4 @@
-"""Compares the results of batches of rays with those of batches.py.
+"""Compares the results of batches of rays with batches.py's.
 
 usage: compare.py RESULTS EXPECTED
 """

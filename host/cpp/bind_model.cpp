@@ -242,7 +242,7 @@ void bind_model(nb::module_& module) {
         .def(
             "cycles", [](const Model& model, const Values& design, int latency, int interval) { return model.cycles(design, {latency, interval}); }, "design"_a,
             "latency"_a, "interval"_a,
-            "Counters of the noted frame, by name, with those that depend on time. `design`: its configuration by paths, numbers and `recordBytes`; DRAM's latency and the cycles between its beats.")
+            "Counters of the noted frame, by name, with timing-dependent ones. `design`: its configuration by paths, numbers and `recordBytes`; DRAM's latency and the cycles between its beats.")
         .def("counters", &Model::counters, "Timing-independent counters since `start`, by name.")
         .def("errors", &Model::errors, "Sticky error bits since `start`, by name.");
 }

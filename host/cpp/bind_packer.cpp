@@ -340,7 +340,7 @@ void bind_packer(nb::module_& module) {
     module.def("sampled", &sampled<std::uint8_t>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
     module.def("sampled", &sampled<float>, "pixels"_a, "uvs"_a, "wrap_u"_a, "wrap_v"_a, "is_nearest"_a, "values"_a.none());
     module.def("atlas", &atlas, "uvs"_a, "textures"_a, "factors"_a, "pictures"_a, "linear"_a, "edge"_a,
-               "Colours, texture coordinates and scale of an atlas; None for more paints than tiles. `textures` and `factors` are those of each face, -1 for none.");
+               "Colours, texture coordinates and scale of an atlas; None for more paints than tiles. `textures` and `factors` are each face's, -1 for none.");
     module.def("cut_alpha", &cutAlpha, "corners"_a, "uvs"_a, "alphas"_a, "texture"_a.none(), "alpha"_a.none(), "linear"_a, "factor"_a, "cutoff"_a, "pane_factor"_a.none(),
                "smallest"_a, "budget"_a,
                "Kinds of faces, owners and weights of pieces, panes, whether cuts are coarse, whether blending is not visible, and the filled picture.");

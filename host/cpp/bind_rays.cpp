@@ -87,7 +87,7 @@ private:
 
 class Rays {
 public:
-    /// `design` None: those of the library. `device` None: the model.
+    /// `design` None: the library's. `device` None: the model.
     Rays(const std::optional<std::string>& design, nb::object device) {
         colonnade_rays_backend backend{};
         if (!device.is_none()) {
@@ -186,7 +186,7 @@ public:
         return {{"reads", static_cast<std::int64_t>(found.reads)}, {"lines", static_cast<std::int64_t>(found.lines)}};
     }
 
-    /// A batch of `count` rays from memory: the bytes of its records or its sensor in, and those of its responses out.
+    /// A batch of `count` rays from memory: the bytes of its records or its sensor in, the bytes of its responses out.
     Pixels<std::uint8_t> submit(const Column<std::uint8_t>& rays, std::uint32_t count, std::uint32_t mode, const std::array<float, 3>& origin, float tnear, float tfar) {
         struct alignas(64) Line {
             std::uint8_t bytes[64];

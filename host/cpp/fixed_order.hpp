@@ -111,7 +111,7 @@ inline double exp(double x) {
 /// x to the power y for x >= 0; relative error below 2^-45 for results from 2^-64 to 2^64.
 inline double power(double x, double y) { return x > 0 ? exp(y * log(x)) : (y == 0 ? 1 : 0); }
 
-/// `power` of each number, with the same bits: those of a block side by side.
+/// `power` of each number, with the same bits: a block's side by side.
 inline __attribute__((always_inline)) void power(const double* x, double y, double* out, std::size_t count) {
     constexpr std::size_t block = 16;
     std::size_t done = 0;

@@ -17,7 +17,7 @@
 //                                                         -> isRefraction origin[3] direction[3] reflection[3] fresnelWeight
 //   cornernormal u v                                      -> normal[3]
 //   geometricnormal vertices[9]                           -> normal[3]
-//   leaf   words[n], n = 8 up to 19 vertex bits, 32 bits each, low ones first         -> format isClear material vertices[4][3] normals[4][2]; those that it has not are 0
+//   leaf   words[n], n = 8 up to 19 vertex bits, 32 bits each, low ones first         -> format isClear material vertices[4][3] normals[4][2]; missing ones are 0
 //   leafface triangle words[n]                            -> material normals[9] geometricNormal[3]
 //   newleaf isPair isClear material vertices[4][3] normals[4][2]
 //                                                         -> words[n]; all 0 if the vertices are too far apart

@@ -249,7 +249,7 @@ inline std::vector<std::uint32_t> orderOfTriangles(BinaryTree& tree, const std::
     return order;
 }
 
-/// Builds the tree over leaves; `boxes` are those of the triangles. If the binary tree is higher than the stack is deep, it is built
+/// Builds the tree over leaves; `boxes` are the triangles'. If the binary tree is higher than the stack is deep, it is built
 /// again with that limit. The caller must check whether the returned tree fits the stack.
 inline Bvh build(const std::vector<Box>& boxes, const std::vector<LeafTriangles>& leaves, unsigned most, unsigned boxBits, unsigned stackDepth, unsigned leafRecords) {
     std::vector<Box> boxesOfLeaves(leaves.size());

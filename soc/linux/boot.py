@@ -108,7 +108,7 @@ def main() -> None:
     if not seen.console:
         fail(f"Linux has ended without an access to the device: see {log}")
     Image.fromarray(np.ascontiguousarray(display.colours(seen.console))).save(output / "console.png")
-    # The first interrupt of a program is that of its image, whose bytes lie in the framebuffer then
+    # The first interrupt of a program is its image's, whose bytes lie in the framebuffer then
     kinds = [images[0], *[None] * frames, images[1], None]
     if len(seen.interrupts) != len(kinds):
         fail(f"{len(seen.interrupts)} interrupts in place of {len(kinds)}: see {log}")

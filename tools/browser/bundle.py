@@ -11,7 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SITE = ROOT / "site"
-#: Modules after those that they import.
+#: Modules after the modules that they import.
 WORKER = (
     *("design", "library", "corners", "gltfchecks", "gltfdocument", "photo", "surfaces", "coverage", "gltfmaterials"),
     *("gltfclip", "gltf", "meshes", "sums", "depth", "encoder", "room", "rtl", "worker"),

@@ -23,7 +23,7 @@ CHECKSUMS = "SHA256SUMS"
 
 
 def main(arguments: list[str]) -> None:
-    """Make the files; ``TIME`` is that of all of them, in seconds of Unix. ``PYTHON…`` compile the wheels."""
+    """Make the files; ``TIME`` is the time of all of them, in seconds of Unix. ``PYTHON…`` compile the wheels."""
     jar, site, output = map(Path, arguments[:3])
     time = int(arguments[3])
     version = tomllib.loads((ROOT / "host" / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]

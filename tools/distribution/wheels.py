@@ -130,7 +130,7 @@ def gather(data: Path, target: Target, jar: Path) -> None:
 def _copy_headers(source: Path, multiarch: str, include: Path) -> Path:
     """Copy Python's headers; Debian's pyconfig.h includes one for the target.
 
-    That of this machine serves both processors, whose types have the same sizes.
+    This machine's serves both processors, whose types have the same sizes.
     """
     shutil.copytree(source, include)
     beside = source.parent / multiarch / source.name / "pyconfig.h"

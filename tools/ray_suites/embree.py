@@ -25,7 +25,7 @@ TESTS = {
     r"triangle_split_epsilon\..*": (1, 1),
     r"watertight_triangles\.SCENE\..*": (1, 0.2),
 }
-#: All flags, and those of one kind of scene: the library reads none. These expressions have no brackets.
+#: All flags, and the flags of one kind of scene: the library reads none. These expressions have no brackets.
 ALL_SCENES, ONE_SCENE = ".*", "StaticRobust"
 #: Parts of Embree that the tests use beside its calls.
 PARTS = ("sys", "math", "simd", "lexers", "tasking", "image", "alloc_tutorial", "scenegraph", "embree_verify")
@@ -41,7 +41,7 @@ OPTIONS = {
 
 
 def configure(run: Callable[..., str], checkout: Path, folder: Path) -> None:
-    """Make the files of a build, and a header among those of the checkout."""
+    """Make the files of a build, and a header among the checkout's."""
     folder.mkdir(parents=True, exist_ok=True)
     run("cmake", "-S", checkout, "-B", folder, *(f"-D{name}={value}" for name, value in OPTIONS.items()), cwd=checkout)
 

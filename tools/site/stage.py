@@ -2,7 +2,7 @@
 
 - README, CHANGELOG, CONTRIBUTING and SECURITY become pages, so that each text exists once.
 - tools/mutations makes the page of modules and faults; links to src/test/mutations.toml lead there.
-- Each Python package of host/colonnade gets a page of its docstrings; those of the Python API follow docs/api.md.
+- Each Python package of host/colonnade gets a page of its docstrings; the Python API's follow docs/api.md.
 - Scaladoc, PeakRDL's register pages and the page of tools/browser are copied into the site, from the folders that the
   environment variables COLONNADE_SCALADOC, COLONNADE_REGISTERS and COLONNADE_BROWSER name.
 - Links are written for the repository (``../SECURITY.md``); here they are pointed at the site's pages. Of a link to a
@@ -176,7 +176,7 @@ def packages() -> list[str]:
 
 
 def _front_matter(page: str) -> str:
-    """The front matter of a page; that of a guide is empty."""
+    """The front matter of a page; a guide's is empty."""
     return "---\nsearch:\n  exclude: true\n---\n" if page.startswith(_UNSEARCHED) else ""
 
 

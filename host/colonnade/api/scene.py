@@ -40,7 +40,7 @@ _OPTIONS = ("overrides", "samples", "relit", "truth", "encoder", "denoise", "hit
 class Scene:
     """A scene: objects, camera, lights and background.
 
-    Its tables and their keys, units and defaults are those of a scene file (docs/host.md, "Placement"). Several lights
+    It has the tables, keys, units and defaults of a scene file (docs/host.md, "Placement"). Several lights
     are a list of tables. Values are checked when the scene is made. A scene does not change; `with_tables` makes
     another.
 
@@ -116,7 +116,7 @@ class Scene:
         return scene
 
     def with_tables(self, **tables: Tables | None) -> Scene:
-        """The scene with other tables: each replaces that of its name; None removes it.
+        """The scene with other tables: each replaces the table of its name; None removes it.
 
         ``scene.with_tables(camera={"position": (0, 1, 3), "target": (0, 0, 0)})``
 
@@ -148,7 +148,7 @@ class Scene:
             backend: ``model``, the bit-exact model; ``rtl``, the generated Verilog in a simulator; or ``reference``,
                 Embree in floating point.
             config: The design: a preset, a JSON file, or a precision such as ``32b32s64d``.
-            size: Width and height, pixels; None: those of the scene, 640×480 unless given.
+            size: Width and height, pixels; None: the scene's, 640×480 unless given.
             options: Others of `RenderRequest`: ``overrides``, ``samples``, ``relit``, ``truth``, ``encoder``,
                 ``denoise``, ``hits``, ``waveform``; and ``progress`` (`colonnade.common.progress.for_terminal`).
 
@@ -255,6 +255,6 @@ def _plain(value: Any, key: str) -> Any:
 
 @contextlib.contextmanager
 def _noted(earlier: set[str] | None = None) -> Iterator[None]:
-    """Show notes as warnings, but those of before."""
+    """Show notes as warnings, except earlier ones."""
     with notes.opened(lambda line: warnings.warn(line, stacklevel=2), earlier):
         yield

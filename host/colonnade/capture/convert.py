@@ -99,7 +99,7 @@ def convert(
         output: The folder.
         every: Of so many frames one is taken.
         only: First and last frame that is taken; None: all.
-        up: What points up in the capture's world; None: the format's vertical, or that of the floor.
+        up: What points up in the capture's world; None: the format's vertical, or the floor's.
         progress: Shows the work.
 
     Raises:

@@ -1,7 +1,7 @@
 """Levels the world of a capture: y up, the floor at 0.
 
 The floor is the largest low plane: one that many surface points lie on, whose normal points up, and that few points lie
-below. Without it the vertical is that of the largest level plane, such as a table, and without one that of the walls.
+below. Without it the vertical is the largest level plane's, such as a table's, and without one the walls'.
 Cameras tell less: their pictures are nearly free of roll, but look down by any angle. Where the vertical is known, only
 the height of the floor is found.
 """
@@ -135,7 +135,7 @@ def _on(plane: _Plane) -> str:
 
 
 def _without_floor(seen: _Surface, overhead: Floats) -> tuple[Floats, str]:
-    """The vertical of the largest level plane that cameras without much roll see from above, or that of the walls.
+    """The vertical of the largest level plane that cameras without much roll see from above, or the walls'.
 
     A wall in front of a camera that looks down has a normal that points down in the picture, and one at its side is
     out of the allowed roll, so neither is taken for a level plane.
@@ -177,8 +177,8 @@ def _largest_plane(
     Args:
         seen: What the frames show.
         is_candidate: Points whose normals are tried, bool [n].
-        is_low: Few points may lie below it. Otherwise surfaces that are upright to it count, too, so that the vertical
-            is that of the walls.
+        is_low: Few points may lie below it. Surfaces that are upright to it also count, so that the vertical
+            is the walls'.
         normal: Its normal, if that is known.
     """
     points, normals = seen.points, seen.normals

@@ -51,7 +51,7 @@ def decode_lzfse(streams: Sequence[tuple[str, bytes, int]], where: str) -> list[
 
 
 def _main() -> None:
-    """Decode the streams of standard input, each after its length and that of its content, to standard output.
+    """Decode the streams of standard input, each after its length and its content's, to standard output.
 
     The output of streams before one that is refused is whole.
     """

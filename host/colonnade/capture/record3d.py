@@ -3,7 +3,7 @@
 ``metadata`` has ``w h`` of the photos, ``K`` (3x3, column by column, pixels) or ``perFrameIntrinsicCoeffs`` (fx, fy,
 cx, cy), ``poses`` (quaternion x, y, z, w and position, OpenGL axes, camera to world), ``fps``, ``frameTimestamps`` and
 the size ``dw dh`` of depth. Depth is float32, metres, confidence a byte from 0 to 2; both are LZFSE streams. The world
-is that of the first camera, so its y is not up.
+is the first camera's, so its y is not up.
 """
 
 from __future__ import annotations

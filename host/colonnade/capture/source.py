@@ -16,7 +16,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Bytes, Floats
 from colonnade.environment.repair import holes_of
 
-#: Factors of the camera's axes in OpenGL, x right, y up, z backward, to those of view space.
+#: Factors of the camera's axes in OpenGL, x right, y up, z backward, to view space's.
 OPENGL_AXES = np.array([1.0, -1.0, -1.0])
 #: Largest distance of a camera from the origin, metres; largest focal length or principal point, pixels.
 _MAX_METRES, _MAX_PIXELS = 1e6, 1e6
@@ -91,7 +91,7 @@ def pose(rotation: Floats, position: Floats, where: str, axes: Floats | None = N
         rotation: Camera to world, float64 [3, 3].
         position: Of the camera, float64 [3].
         where: For messages.
-        axes: Factors of the camera's axes to those of view space; None: they are these.
+        axes: Factors of the camera's axes to view space's; None: they are equal.
     """
     if not (np.isfinite(rotation).all() and np.isfinite(position).all()) or np.abs(position).max() > _MAX_METRES:
         raise UserError(f"{where}: the pose must be finite, and the camera within {_MAX_METRES:g} metres")

@@ -59,7 +59,7 @@ class Direction(_VectorType):
     "--up",
     type=Direction(),
     metavar="X,Y,Z",
-    help="What points up in the capture's world, such as 0,0,1; by default the format's vertical, or that of the floor,"
+    help="What points up in the capture's world, such as 0,0,1; by default the format's vertical, or the floor's,"
     " of a table, or of walls.",
 )
 @json_option

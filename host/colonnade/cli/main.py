@@ -86,7 +86,7 @@ class OneLineErrors(click.Group):
         return name, command, rest
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """A command by its name; those of the laboratory are imported here."""
+        """A command by its name; commands of the laboratory are imported here."""
         return _of_laboratory(cmd_name) if cmd_name in LABORATORY else super().get_command(ctx, cmd_name)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -94,7 +94,7 @@ class OneLineErrors(click.Group):
         return [*self.commands, *LABORATORY]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands, those of the laboratory apart and without importing them."""
+        """List the commands, the laboratory's apart and without importing them."""
         own = [(name, command.get_short_help_str()) for name, command in self.commands.items()]
         for title, rows in (("Commands", own), ("Commands of the laboratory, colonnade-lab", [*LABORATORY.items()])):
             with formatter.section(title):

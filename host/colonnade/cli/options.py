@@ -218,7 +218,7 @@ def background_option(command: Decorated) -> Decorated:
 
 
 def animation_option(command: Decorated) -> Decorated:
-    """Add ``--animation``, which replaces that of the scene's mesh."""
+    """Add ``--animation``, which replaces the animation of the scene's mesh."""
     return click.option(
         "--animation", metavar="NAME", help="Play this animation of the scene's glTF file, a name or a number."
     )(command)
@@ -229,7 +229,7 @@ def encoder_option(command: Decorated) -> Decorated:
     return click.option(
         "--encoder",
         type=click.Choice(ENCODERS),
-        help="Encoder of a room's maps and of textures. live: that of a moving camera; offline: maps that are a little"
+        help="Encoder of a room's maps and of textures. live: for a moving camera; offline: maps that are a little"
         " better, in far more time.  [default: live, where it writes the layout of the maps]",
     )(command)
 

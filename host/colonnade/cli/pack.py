@@ -56,7 +56,7 @@ from colonnade.maps.encoders import Encoder
 @click.option(
     "--clip-file", type=FILE, metavar="FILE", help="Also write what a processor needs to bend or move meshes."
 )
-@size_option("Frame size of --frame-file, --photo-file and --view-file, e.g. 640x480.  [default: that of the scene]")
+@size_option("Frame size of --frame-file, --photo-file and --view-file, e.g. 640x480.  [default: the scene's]")
 @strict_option
 @json_option
 def pack(

@@ -28,10 +28,10 @@ def rays(
 ) -> None:
     """Count the rays that the model and Embree answer a second, and what the model and its caches read for one.
 
-    "shuffled" rays have no order; the others have that of `colonnade.rays.Scene.order`. The measurements need
+    "shuffled" rays have no order; the others have `colonnade.rays.Scene.order`. The measurements need
     colonnade-lab.
 
-    With --library programs for Embree 4 take their rays from the model: that of `edge`, without a file.
+    With --library programs for Embree 4 take their rays from the model, of `edge` without a file.
     """
     require_outputs(json_file)
     if library is not None:

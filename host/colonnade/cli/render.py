@@ -70,7 +70,7 @@ def _is_scene(word: str) -> bool:
     show_default=True,
     help="rtl: the generated Verilog in a simulator; model: its bit-exact model; reference: Embree in floating point.",
 )
-@size_option("Frame size in pixels, e.g. 640x480.  [default: that of the scene]")
+@size_option("Frame size in pixels, e.g. 640x480.  [default: the scene's]")
 @mesh_option
 @simplify_option
 @background_option
@@ -108,7 +108,7 @@ def _is_scene(word: str) -> bool:
     "--samples",
     type=click.IntRange(min=1, max=MAX_SAMPLES),
     metavar="N",
-    help="Trace N samples a pixel, as N passes over the frame.  [default: those of the scene; if it names none, what"
+    help="Trace N samples a pixel, as N passes over the frame.  [default: the scene's; if it names none, what"
     " frame.budget allows with gathered light, 4 in the photo of a room, otherwise 1]",
 )
 @click.option(

@@ -43,7 +43,7 @@ def view(
     """Show SCENE, a TOML file, the name of one, or a mesh, in a page at 127.0.0.1, rendered by the bit-exact model.
 
     Drag orbits, the wheel zooms, shift and drag pans. The scene is loaded again whenever its file or one that it
-    reads changes. The key s writes the camera into the file, r goes back to that of the file. Ctrl-C ends the command.
+    reads changes. The key s writes the camera into the file, r goes back to the file's. Ctrl-C ends the command.
     """
     import threading
     import webbrowser

@@ -27,7 +27,7 @@ _LEVEL = "deepestStack"
 
 @dataclass(frozen=True)
 class Accumulation:
-    """Sums over the samples of each pixel. Those of the device are exact, so their order does not matter.
+    """Sums over the samples of each pixel. The device's are exact, so their order does not matter.
 
     The arrays are uint32 from the device, and float64 from the reference, or where they are blurred.
 
@@ -186,7 +186,7 @@ class FramePasses:
         white: The device's number for the colour 1.0.
         albedo_of: The albedo that the frame of a pass of surfaces shows, given its number; None: `albedo` is not kept.
         albedo: Sums over all passes, float64 [height, width, 3].
-        layers: The passes of other layers, by name; their counters and errors are also in those of the frame.
+        layers: The passes of other layers, by name; their counters and errors are also in the frame's.
     """
 
     first: Frame | None = None
@@ -228,7 +228,7 @@ class FramePasses:
 
     @property
     def sums(self) -> Accumulation:
-        """Sums over all passes; those of a single one are made when they are needed."""
+        """Sums over all passes; a single one's are made when they are needed."""
         assert self.first is not None
         if self._sums is None:
             self._sums = Accumulation.of_frame(self.first, self.white)
@@ -236,7 +236,7 @@ class FramePasses:
 
     @property
     def whole(self) -> Accumulation:
-        """`sums` with those of the other layers."""
+        """`sums` with the other layers'."""
         return self.sums.with_layers(layer.sums for layer in self.layers.values())
 
     def object_variance(self) -> npt.NDArray[np.float64] | None:

@@ -64,7 +64,7 @@ def parse_npz(data: bytes, names: Sequence[str]) -> list[NDArray[Any]]:
 
 
 def _member(archive: zipfile.ZipFile, name: str) -> bytes:
-    """Unpack one member. The size limit is that of the largest image, whatever the archive claims."""
+    """Unpack one member. The size limit is the largest image's, whatever the archive claims."""
     maximum = MAX_PIXELS * _MAX_BYTES
     too_large = ValueError(f"{name} is too large")
     if archive.getinfo(name).file_size > maximum:

@@ -133,7 +133,7 @@ def made_folder(path: Path) -> Iterator[None]:
 
 
 def _mode(path: Path) -> int:
-    """Permission bits of the file that is replaced, or those of a new file."""
+    """Permission bits of the file that is replaced, or of a new file."""
     with contextlib.suppress(OSError):
         return path.lstat().st_mode & 0o777
     mask = os.umask(0)

@@ -1,6 +1,6 @@
 """Fetches published files once, by their SHA-256, into the user's cache or from a folder of the user's.
 
-The folder is that of the environment variable COLONNADE_DOWNLOADS; it has files of the same names and content, for
+The environment variable COLONNADE_DOWNLOADS names the folder; it has files of the same names and content, for
 machines without the network. A transfer that broke goes on where it ended. `published` lists the files.
 """
 
@@ -160,7 +160,7 @@ def _place(download: Download, source: Path, file: Path, what: str) -> None:
 
 @contextlib.contextmanager
 def _content(source: Path, member: str | None) -> Iterator[IO[bytes]]:
-    """A file, or that of a tar or zip archive that has this name, without folders."""
+    """A file, or the member of a tar or zip archive that has this name, without folders."""
     if member is None:
         with source.open("rb") as stream:
             yield stream

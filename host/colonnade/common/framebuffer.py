@@ -18,7 +18,7 @@ class Frame:
         triangle: int64 [height, width]; packed triangle id, -1 where the ray missed the object.
         instance: int64 [height, width]; number of the object where `scene.instances` are on, else 0; -1 for a miss.
         distance: float64 [height, width]; t from the camera along the ray's dominant axis, vertex units.
-        counters: Values by register name; the model has only those that do not depend on timing.
+        counters: Values by register name; the model has only counters that do not depend on timing.
         ratio: uint16 [height, width, 3]; light on the room with the object over light without it, 4096 is 1.0; None
             without a room.
         errors: Names of the sticky error bits that are set.

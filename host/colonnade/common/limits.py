@@ -12,7 +12,7 @@ MAX_DIGITS = 40
 MAX_TEXT = 4096
 #: Pixels of an input picture: twice the largest frame.
 MAX_PIXELS = 2 * 4096 * 4096
-#: Pixels of all textures of a mesh in its files; and those that are kept, 128 for each texel of the texture memory.
+#: Pixels of all textures of a mesh in its files; and kept ones, 128 for each texel of the texture memory.
 MAX_TEXTURE_PIXELS = 1 << 29
 KEPT_TEXTURE_PIXELS = 1 << 25
 #: Frames of one command.
@@ -38,7 +38,7 @@ MAX_TEXT_BYTES = 1 << 20
 MAX_PICTURE_BYTES = 1 << 30
 #: Bytes of a mesh, with the files that it references.
 MAX_MESH_BYTES = 1 << 31
-#: Triangles of a mesh with its instances: twice those of the largest memory.
+#: Triangles of a mesh with its instances: twice the largest memory's.
 MAX_TRIANGLES = 1 << 24
 #: Bytes of a scene image and of its header.
 MAX_IMAGE_BYTES = 1 << 32

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from colonnade.common.errors import UserError
 
-#: Open files that a command needs, and those that it asks for.
+#: Open files that a command needs, and that it asks for.
 MIN_FILES, WANTED_FILES = 64, 1024
 
 #: Address space that a command needs, in MB; the pictures of a study's report are drawn by V8, which reserves much.
@@ -40,7 +40,7 @@ _SIGNALS = {
 
 
 def check(command: str) -> None:
-    """Refuse to run a command for which this machine's limits are too low; raises those that may be raised.
+    """Refuse to run a command for which this machine's limits are too low; raises limits that may be raised.
 
     Raises:
         UserError: A limit is too low; the message names it.

@@ -1,6 +1,6 @@
 """Notes on an input: what it holds and a result will not show, what was repaired, or what was chosen for it.
 
-The command line opens a block that shows them as lines on standard error; with ``--strict`` those of `report` are an
+The command line opens a block that shows them as lines on standard error; with ``--strict`` the ones of `report` are an
 error. Outside of such a block, as in a program that uses the packages, they are silent, and found at the object that
 they concern.
 """
@@ -41,7 +41,7 @@ def opened(show: Callable[[str], None], earlier: set[str] | None = None) -> Iter
 
     Args:
         show: Shows a line.
-        earlier: Lines of earlier blocks, which are left out; those of this one are added.
+        earlier: Lines of earlier blocks, which are left out; this block's are added.
     """
     global _current
     before, _current = _current, Notes(show, lines=set() if earlier is None else earlier)

@@ -63,7 +63,7 @@ class Ended(RuntimeError):
 
 
 class Group:
-    """Programs that end together, e.g. those of one thread pool."""
+    """Programs that end together, e.g. of one thread pool."""
 
     def __init__(self) -> None:
         self.is_ended = False

@@ -1,6 +1,6 @@
 """The published files that Colonnade fetches on demand: meshes and standard-cell libraries.
 
-None of them is a part of Colonnade; their publishers state the terms of use. Meshes are those of the figures, byte for
+None of them is a part of Colonnade; their publishers state the terms of use. Meshes are the figures', byte for
 byte.
 """
 

@@ -16,7 +16,7 @@ def plain(text: str) -> str:
 
 
 def listed(names: Sequence[str], maximum: int = 240) -> str:
-    """Names in a line, of at most so many characters, and the number of those that are left out."""
+    """Names in a line, of at most so many characters, and the number of names that are left out."""
     words: list[str] = []
     length = 0
     for name in names:

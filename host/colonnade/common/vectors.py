@@ -18,7 +18,7 @@ def unit_vectors(vectors: Floats) -> Floats:
 def cofactors(linear: Floats) -> Floats:
     """What turns normals as ``linear`` [..., 3, 3] turns surfaces: its inverse transpose, times its determinant.
 
-    It exists for flat transforms, too.
+    It also exists for flat transforms.
     """
     x, y, z = (linear[..., i] for i in range(3))
     return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)], axis=-1)

@@ -46,7 +46,7 @@ VERIFY_ARCHIVE, READ_ARCHIVE = "-XX:+VerifySharedSpaces", "-XX:SharedArchiveFile
 #: The generator's option for a manifest without SystemVerilog.
 MANIFEST_ONLY = "--manifest-only"
 
-#: Java's options are those of this file of the checkout or wheel, and one against files of crashes.
+#: Java's options come from this file of the checkout or wheel, and one against files of crashes.
 JAVA_OPTIONS, NO_CRASH_FILE = ".jvmopts", "-XX:ErrorFile=/dev/null"
 
 #: What Java prints of an exception that a program does not handle: it is one of the generator.
@@ -143,7 +143,7 @@ def generate(
         manifest_only: Option of the generator.
         black_box_memories: Option of the generator.
         progress: Shows the steps.
-        bus_bytes: Generate the AXI4 shell, too, with a bus of so many bytes.
+        bus_bytes: Also generate the AXI4 shell, with a bus of so many bytes.
         pixel_stream: The shell has an AXI4-Stream of pixels.
         refit: The shell has a unit that bends meshes.
     """

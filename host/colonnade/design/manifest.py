@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from colonnade.common.errors import UserError
 
-#: The newest version of manifests that is read; the older ones are, too.
+#: The newest version of manifests that is read; older ones are as well.
 VERSION = 3
 
 

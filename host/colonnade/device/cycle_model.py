@@ -26,7 +26,7 @@ class NotedFrame:
     Attributes:
         model: A ``colonnade._core.Model`` that holds the notes.
         record_bytes: Bytes of a record.
-        counters: Those that do not depend on time, by name.
+        counters: Counters that do not depend on time, by name.
         errors: Error bits of the frame.
     """
 

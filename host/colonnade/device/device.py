@@ -108,7 +108,7 @@ class Device(ABC):
 
     @abstractmethod
     def counters(self) -> dict[str, int]:
-        """The counters of the last frame, by name without ``counters.``; the model has those that need no clock."""
+        """The counters of the last frame, by name without ``counters.``; the model has the ones that need no clock."""
 
     @abstractmethod
     def pixels(self) -> Pixels:
@@ -131,7 +131,7 @@ class Device(ABC):
 
         Args:
             scene: A scene that was packed for this design.
-            size: Width and height, pixels; None: that of the scene.
+            size: Width and height, pixels; None: the scene's.
 
         Returns:
             As `pixels`.
@@ -249,7 +249,7 @@ def require_format(image: SceneImage, manifest: Manifest) -> None:
 
 
 def check_frame(registers: Mapping[str, int], photo: Pixels | None, manifest: Manifest) -> None:
-    """Refuse registers that are not those of a frame, and a photo that the frame cannot show.
+    """Refuse registers that are not a frame's, and a photo that the frame cannot show.
 
     Raises:
         UserError: A register is missing, unknown or out of range, the frame is too large, or the photo has another size

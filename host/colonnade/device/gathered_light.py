@@ -48,7 +48,7 @@ def scene_cube(
 ) -> LightCube | None:
     """The light that rays meet that leave the object, by directions of mesh space; None for a scene that gathers none.
 
-    In a room it is the room's light at the middle of the object, elsewhere that of a panorama, or the ambient light.
+    In a room it is the room's light at the middle of the object, elsewhere a panorama's, or the ambient light.
     The lights with a radius are marked in it, but not fitted ones, whose places are guesses. Radiance has the scene's
     `exposure`.
 

@@ -55,7 +55,7 @@ def frame_commands(manifest: Manifest, registers: Mapping[str, int], pixel_file:
 def parse_output(lines: Iterable[str]) -> list[FrameOutput]:
     """The output of the harness by frame; the last frame of a failed run may lack registers.
 
-    Other lines are skipped, such as those of an assertion of the hardware.
+    Other lines are skipped, such as an assertion's of the hardware.
     """
     frames: list[FrameOutput] = []
     for words in filter(None, map(str.split, lines)):

@@ -41,7 +41,7 @@ def pack_objects(
     """Pack a mesh, or the objects of a joined mesh as instances if the design and its tables can hold them so.
 
     Objects of equal records share them, if they bend alike. One mesh holds, and a note says: more objects than
-    `frame.instances`, and objects too small for a transform. Arguments and errors are those of `pack`.
+    `frame.instances`, and objects too small for a transform. Arguments and errors are as for `pack`.
     """
     if mesh.objects and (limit := int(manifest.config["frame"].get("instances", 0))):
         try:
@@ -168,7 +168,7 @@ def _key(image: SceneImage) -> tuple[bytes, bytes]:
 
 @dataclass(frozen=True)
 class MovingInstances:
-    """Instances that move by their transforms, those with an animation by their own records, too.
+    """Instances that move by their transforms, with an animation also by their own records.
 
     Attributes:
         images: The meshes, each once.
@@ -187,7 +187,7 @@ class MovingInstances:
         mesh: Mesh,
         manifest: Manifest,
     ) -> MovingInstances:
-        """Those of a joined mesh.
+        """The instances of a joined mesh.
 
         Raises:
             UserError: An object is too small for the scene of all poses.
@@ -221,7 +221,7 @@ class MovingInstances:
 
 
 def _motion_keys(instances: Sequence[Instance], mesh: Mesh) -> Keys:
-    """The transforms of the objects of a joined mesh over the time of its clip: those of their boxes."""
+    """The transforms of the objects of a joined mesh over the time of its clip: the transforms of their boxes."""
     assert mesh.clip is not None
     boxes = [still_clip(one.box) for one in instances]
     places = [one.place or Place.of([one.transform]) for one in mesh.objects]

@@ -136,7 +136,7 @@ class Shell:
             raise UserError(f"{_MEANINGS.get(error, 'the driver has refused the call')} ({error})")
 
     def _loaded(self, image: Loads) -> int:
-        """Load records and maps, or store those that lie in DRAM; the address of the first page behind them."""
+        """Load records and maps, or store the ones that lie in DRAM; the address of the first page behind them."""
         base, content = self.transport.base, device_image(image, self.manifest)
         free = self._stored("the scene", base, content)
         self._begin(None)

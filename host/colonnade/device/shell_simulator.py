@@ -43,7 +43,7 @@ class Bus:
 
 @dataclass(frozen=True)
 class SharedMemory:
-    """A file that is the memory behind the shell, and that other programs map, too.
+    """A file that is the memory behind the shell, and that other programs also map.
 
     Attributes:
         path: It has the memory's size, or more.
@@ -131,7 +131,7 @@ class SimulatedTransport:
         return (self._folder / _FILE).read_bytes()
 
     def set_bus(self, bus: Bus) -> None:
-        """Set the memory behind the masters from now on; that of a scene in DRAM stays as it is."""
+        """Set the memory behind the masters from now on; a scene's memory in DRAM stays as it is."""
         self._send(f"bus {bus.latency} {bus.stall} {bus.order} {bus.errors} {bus.seed}")
 
     def fail(self, beats: int) -> None:

@@ -16,7 +16,7 @@ around the unit. So the unit sees them in the same cycle as the column's registe
 run time (``Array::check``). All models clock on both edges (`both_edges`): a cycle takes one evaluation of a unit, not
 two.
 
-A *part* of a column (`PARTS`) that is large is a model, too. Its outputs may depend combinationally on its inputs: it
+A large *part* of a column (`PARTS`) is also a model. Its outputs may depend combinationally on its inputs: it
 and its column are evaluated until both settle.
 
 Verilator evaluates all that depends on an input in each evaluation. So inputs go into registers that an *event* clocks,
@@ -266,7 +266,7 @@ def write_sources(sources: Iterable[Path], folder: Path, parts: Sequence[str] = 
         parts: Modules, of which those in a column become models: of `PARTS`.
 
     Returns:
-        The files of each model by top module: `UNIT_MODEL`, those of the parts, `COLUMN_MODEL`, `DEVICE`.
+        The files of each model by top module: `UNIT_MODEL`, the parts, `COLUMN_MODEL`, `DEVICE`.
     """
     verilog = {path.stem: both_edges(path.read_text()) for path in sources}
     (of_units, units_path), (of_columns, columns_path) = RAY_PARENTS if RENAMED.keys() <= verilog.keys() else PARENTS
@@ -297,7 +297,7 @@ def write_sources(sources: Iterable[Path], folder: Path, parts: Sequence[str] = 
 
 
 def large_parts(sources: Iterable[Path]) -> list[str]:
-    """Those of `PARTS` that are large enough to be worth the compilation of a model."""
+    """The `PARTS` that are large enough to be worth the compilation of a model."""
     verilog = {path.stem: path.read_text() for path in sources}
     instances = Counter(inner for text in verilog.values() for inner, _ in _INSTANCE.findall(text))
     sizes = {part: sum(len(verilog[module]) for module in _below(verilog, part)) for part in PARTS}
@@ -317,7 +317,7 @@ def _place(verilog: Mapping[str, str], part: str) -> tuple[str, str] | None:
 
 
 def _below(verilog: Mapping[str, str], top: str) -> set[str]:
-    """A module and all below it, without those that have no Verilog."""
+    """A module and all below it that have Verilog."""
     found, pending = set[str](), [top]
     while pending:
         module = pending.pop()

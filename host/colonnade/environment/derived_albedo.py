@@ -1,6 +1,6 @@
 """The albedo of a room that has only a photo: photo / irradiance, at most 1.
 
-The irradiance is that of lights fitted to the photo, with an albedo of one brightness. Its hues are those of the photo,
+The irradiance is from lights fitted to the photo, with an albedo of one brightness. Its hues are the photo's,
 divided by the hue of the light, which is taken from the photo's mean colour around a pixel (grey world). So the albedo
 shows the photo again under these lights. Brightness that they do not explain, such as shadows, stays in it.
 """
@@ -21,7 +21,7 @@ from colonnade.environment.model import Environment
 
 #: Mean albedo of the channels of each pixel while lights are fitted.
 _BRIGHTNESS = 0.45
-#: Share of the photo's mean hue that is the light's, as an exponent; what is left is that of the things.
+#: Share of the photo's mean hue that is the light's, as an exponent; what is left is the things'.
 _OF_LIGHT = 0.6
 #: Reach of the mean, in picture widths, and places along an edge at which it is taken.
 _REACH, _STEPS = 0.4, 9
@@ -32,11 +32,11 @@ _DARK = 1e-4
 
 
 def derived_albedo(room: Environment, lights: RoomLights | None = None) -> Floats:
-    """The albedo of a room with a photo; that of `room` is not used.
+    """The albedo of a room with a photo; `room`'s own is not used.
 
     Args:
         room: The room.
-        lights: Those that were found in another view of it; None: `hue_lights`.
+        lights: Lights that were found in another view of it; None: `hue_lights`.
 
     Returns:
         Linear, 0 to 1, float64 [height, width, 3].

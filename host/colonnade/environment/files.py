@@ -25,7 +25,7 @@ def inside(folder: Path, name: str, where: str) -> Path:
     """A file that a list names, which must lie in a folder, also after links.
 
     Args:
-        folder: That of the list.
+        folder: The list's.
         name: Of the file, relative to the folder.
         where: What names it, for messages.
 

@@ -15,7 +15,7 @@ from colonnade.common.types import Floats
 FACE = 16
 #: Directions averaged along each edge of a texel.
 _SUBSAMPLES = 4
-#: The value 1.0 in the device's cube, and its largest value, that of a light.
+#: The value 1.0 in the device's cube, and its largest value, a light's.
 _ONE, _LAST = 1 << 12, (1 << 16) - 1
 #: The radiance of a light in the device's cube.
 MOST = _LAST / _ONE
@@ -30,8 +30,8 @@ class LightCube:
     """Radiance by direction.
 
     Attributes:
-        texels: Linear, float64 [6, n, n, 3]. Face 2 a + s is that of directions whose largest component is a, 0 to 2,
-            with sign s, 1 for a negative one. Rows part the slope of the next axis, columns that of the one after it,
+        texels: Linear, float64 [6, n, n, 3]. Face 2 a + s has the directions whose largest component is a, 0 to 2,
+            with sign s, 1 for a negative one. Rows part the slope of the next axis, columns of the one after it,
             from -1 to 1.
         lights: Texels in which there is a light, bool [6, n, n]; None: there are none. Their radiance is without it.
         middle: Where it is collected, in the space of its directions, float64 [3]; None: it is of everywhere.

@@ -44,11 +44,11 @@ _FIRST_DAMPING, _LAST_DAMPING, _CONVERGED = 1e-3, 1e9, 1e-8
 #: Step of numeric derivatives, metres.
 _STEP = 1e-4
 #: Least ambient light, as a share of the best ambient light without point lights: shadows that are drawn are not darker
-#: than those of a room whose walls reflect light.
+#: than of a room whose walls reflect light.
 _AMBIENT_SHARE = 0.5
 #: A further light, or the walls, have to lower the robust cost to this share.
 _GAIN = 0.97
-#: Limits of an intensity (that of a scene), and of a fitted falloff.
+#: Limits of an intensity (as in a scene), and of a fitted falloff.
 _MAX_INTENSITY = 15.0
 _FALLOFF_RANGE = (0.5, 4.0)
 
@@ -78,7 +78,7 @@ def fit_lights(environment: Environment, count: int = DEFAULT_LIGHTS, walls: boo
     Args:
         environment: The room.
         count: Number of point lights.
-        walls: Fit the light of the walls of a box around the room, too: large sources do not become point lights.
+        walls: Also fit the light of the walls of a box around the room: large sources do not become point lights.
             The ambient light of the result is then the best one beside the point lights. The walls are dropped if they
             do not explain the photo better.
 

@@ -82,7 +82,7 @@ def exposure(points: Floats, normals: Floats, position: Floats, falloff: float |
 def room_box(environment: Environment) -> tuple[Floats, Floats]:
     """The corners of the box around a room, world space, float64 [3] each: what the camera sees, and around.
 
-    Its lowest level is that of the floor.
+    Its lowest level is the floor's.
     """
     points, eye = world_surface(environment)[0].reshape(-1, 3), environment.camera_to_world[:, 3]
     low = np.minimum(np.percentile(points, 2, axis=0), eye) - _MARGIN

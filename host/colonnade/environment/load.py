@@ -109,7 +109,7 @@ def load_maps(
     camera_height: float | None = None,
     lights: RoomLights | None = None,
 ) -> Environment:
-    """Load a room's maps, and derive those that are missing.
+    """Load a room's maps, and derive missing ones.
 
     Args:
         name: Of the room.

@@ -43,7 +43,7 @@ class Panorama:
         return solid_angles(*self.radiance.shape[:2])
 
     def at(self, directions: Floats) -> Floats:
-        """Radiance from directions of any length, world space, float64 [n, 3] each: that of the nearest pixel."""
+        """Radiance from directions of any length, world space, float64 [n, 3] each: of the nearest pixel."""
         height, width = self.radiance.shape[:2]
         x, y, z = directions.T
         row = np.arctan2(np.hypot(x, z), y) * (height / np.pi)

@@ -19,7 +19,7 @@ _BRIGHT, _WHITE = 6.0, 1.0
 _MIN_SHARE = 0.01
 #: Largest radius of a light, radians: a wider part becomes several.
 _MAX_RADIUS = np.radians(20.0)
-#: The radius of a part is at most so many times that of its brighter half, otherwise this alone is the light.
+#: The radius of a part is at most so many times its brighter half's, otherwise this alone is the light.
 _EVEN = 1.5
 #: The panes of a window: their distance in sums of their radii, and the ratio of their radiances, at most.
 _GAP, _ALIKE = 1.3, 3.0

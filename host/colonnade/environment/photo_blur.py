@@ -25,7 +25,7 @@ _BORDER = 8
 def measured_blur(photo: NDArray[np.uint8]) -> float:
     """The standard deviation of a photo's blur, pixels; 0 if it has too few edges to tell.
 
-    It is that of the sharpest fifth of its edges, so that soft shadows and what is out of focus do not count.
+    It is measured at the sharpest fifth of its edges, so that soft shadows and what is out of focus do not count.
 
     Args:
         photo: sRGB, uint8 [height, width, 3].

@@ -45,7 +45,7 @@ def photo_colours(environment: Environment, lights: RoomLights, headroom: float 
     Args:
         environment: The room.
         lights: Of the scene.
-        headroom: That of another view of the room; None: that of this one.
+        headroom: Of another view of the room; None: of this one.
     """
     assert environment.photo is not None
     light = irradiance(*world_surface(environment), lights)

@@ -13,8 +13,8 @@ from colonnade.common.types import Floats
 _AXES = np.array([[1.0, 1.0, 1.0], [1.0, 0.0, -1.0], [1.0, -2.0, 1.0]]) / np.sqrt([[3.0], [2.0], [6.0]])
 #: Edge of a block, pixels, a multiple of 4; the least number of blocks, and the ranges of brightness.
 _BLOCK, _BLOCKS, _RANGES = 16, 40, 5
-#: Of white noise all wavelet coefficients have one deviation. How much larger, and by how many codes, that of the other
-#: coefficients of the first level and that of the second level may be: surfaces have more of these.
+#: Of white noise all wavelet coefficients have one deviation. How much larger, and by how many codes, other
+#: coefficients' of the first and of the second level may be: surfaces have more of these.
 _FIRST, _SECOND, _SLACK = 1.6, 1.8, 0.3
 #: The percentile of the blocks of a range that counts, and what it is of the deviation of white noise.
 _LOW, _LOW_SHARE = 25, 0.94
@@ -40,9 +40,9 @@ class Grain:
 
     @staticmethod
     def of(photo: NDArray[np.uint8]) -> Grain | None:
-        """That of a photo, sRGB, uint8 [height, width, 3]; None if it has none, or too few blocks without texture.
+        """The grain of a photo, sRGB, uint8 [height, width, 3]; None if it has none, or too few blocks without texture.
 
-        Blocks count whose wavelet coefficients are as large on each axis and in two octaves, as those of noise are.
+        Blocks count whose wavelet coefficients are as large on each axis and in two octaves, as for noise.
         """
         height, width = (length // _BLOCK * _BLOCK for length in photo.shape[:2])
         first, second = _details(photo[:height, :width].astype(np.float64) @ _AXES.T)
@@ -68,7 +68,7 @@ class Grain:
         return float(self.deviation[:, 0].mean() / np.sqrt(3))
 
     def noise(self, codes: Floats, frame: int) -> Floats:
-        """Noise for a picture: that of a pixel is a function of its place and of the frame.
+        """Noise for a picture: a pixel's is a function of its place and of the frame.
 
         Args:
             codes: The picture, sRGB, 0 to 255, float64 [height, width, 3].

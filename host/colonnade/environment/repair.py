@@ -17,7 +17,7 @@ _MAX_BAD_NORMALS = 0.05
 _MAX_FACING_AWAY = 0.1
 #: Largest fraction of pixels without depth.
 MAX_HOLES = 0.5
-#: Least and largest depth, metres: those of one and of all steps of a depth picture.
+#: Least and largest depth, metres: one and all steps of a depth picture.
 _DEPTHS = (1e-6, 1e8)
 
 

@@ -40,9 +40,9 @@ class SeenLight:
     distance: Floats
 
     def beside(self, other: SeenLight) -> SeenLight:
-        """This light, and that of another picture in directions that this one does not show.
+        """This light, and another picture's in directions that this one does not show.
 
-        The other one's exposure is that of this one where both show something.
+        The other one's exposure is matched where both show something.
         """
         both = self.is_seen & other.is_seen & ~self.is_bright & ~other.is_bright
         weights = texel_weights() * both

@@ -40,7 +40,7 @@ def seen_sources(environment: Environment) -> list[RoomLight]:
             continue
         away = eye - points
         cosine = fixed_order.dot(facing, away) / np.sqrt(fixed_order.dot(away, away))
-        # A pixel's area across the ray is that of its square at depth 1, times the slant of the ray
+        # A pixel's area across the ray is its square's at depth 1, times the slant of the ray
         slant = depth / np.sqrt(fixed_order.dot(away, away))
         area = (depth**2 * slant / cosine.clip(min=0.1)).sum() / (environment.fx * environment.fy)
         position = points.mean(axis=0) + _BEFORE * facing.mean(axis=0)

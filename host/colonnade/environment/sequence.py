@@ -43,7 +43,7 @@ class SequenceFrame:
         photo, depth: Pictures, relative to the file; depth is grey of 16 bits or a ``.npy`` array.
         fx, fy, cx, cy: The lens, pixels.
         cam_to_world: Three rows of the pose, as in ``meta.json``.
-        albedo, normal: Pictures as those of a room; derived if they are missing.
+        albedo, normal: Pictures as of a room; derived if they are missing.
     """
 
     time: _Float
@@ -114,7 +114,7 @@ class Sequence:
         return len(self.content.frame)
 
     def room(self, number: int) -> Environment:
-        """The maps of a frame; those that the sequence does not hold are derived.
+        """The maps of a frame; maps that the sequence does not hold are derived.
 
         Albedos are derived with one light, which is fitted to the first frame without an albedo.
 

@@ -20,7 +20,7 @@ from colonnade.common.types import Floats
 from colonnade.environment.lights import world_surface
 from colonnade.environment.model import Environment
 
-#: Cosine of a pixel's normal with that of a surface; least share of a surface in the picture.
+#: Cosine of a pixel's normal with a surface's; least share of a surface in the picture.
 _FACING, _LEAST_SHARE = 0.95, 0.015
 #: Of the ground, and of another surface: the least share of the variance of logarithms of luminance that is between the
 #: two kinds, and the least ratio of their hues, red over blue.

@@ -48,7 +48,7 @@ class Surround:
 def wall_exposures(points: Floats, normals: Floats, low: Floats, high: Floats) -> Floats:
     """Irradiance of unshadowed surfaces in a box by each of its patches with a radiance of 1, over π.
 
-    That of all patches together is 1, as in a closed room.
+    All patches together have 1, as in a closed room.
 
     Args:
         points: World space, float64 [n, 3].

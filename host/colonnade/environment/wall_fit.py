@@ -14,7 +14,7 @@ from colonnade.environment.lights import MIN_HEIGHT, RoomLights, irradiance
 from colonnade.environment.photo_colours import MAX_INTENSITY
 from colonnade.environment.surround import PATCHES, Surround, non_negative_least_squares, wall_exposures
 
-#: Weight that holds the light of each patch of the walls to the mean ambient light, against that of all samples.
+#: Weight that holds the light of each patch of the walls to the mean ambient light, against all samples' weight.
 _HELD = 0.1
 #: Repetitions of the fit of the walls before there are point lights, and of the fit of an ambient light.
 ALTERNATIONS, _REWEIGHTINGS = 3, 10

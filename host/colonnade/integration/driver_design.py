@@ -26,8 +26,8 @@ class DriverDesign:
 
     Attributes:
         format_words: The format hash, 8 words.
-        numbers: Those of ``struct colonnade_design`` by name. `scene_page` and `invalidate` are 0 if no scene lies in
-            DRAM, and so are those of rays in a design of frames, but for `scene` with a scene in DRAM.
+        numbers: Numbers of ``struct colonnade_design`` by name. `scene_page` and `invalidate` are 0 if no scene lies in
+            DRAM, and so are the ones of rays in a design of frames, but for `scene` with a scene in DRAM.
         maps: Words of a record and number of records of each memory of a room's maps, in the order of their load
             targets, which begin at 1.
         errors: Names of the device's error bits, by their number.
@@ -42,7 +42,7 @@ class DriverDesign:
 
     @classmethod
     def of(cls, table: RegisterTable, manifest: Manifest) -> DriverDesign:
-        """That of a design with its shell.
+        """The content for a design with its shell.
 
         Raises:
             ValueError: Its registers are not in the order that the driver needs.

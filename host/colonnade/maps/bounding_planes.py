@@ -48,7 +48,7 @@ class BoundingPlanes:
 def choose_bounding_planes(
     environment: Environment, projection: PlaneProjection, planes: NDArray[np.float64], maximum: int
 ) -> BoundingPlanes:
-    """Choose at most ``maximum`` planes: the virtual wall, then those of ``planes`` around the room, largest first."""
+    """Choose at most ``maximum`` planes: the virtual wall, then ``planes`` around the room, largest first."""
     samples = sample_pixels(environment, projection, _STEP)
     albedo = environment.albedo[::_STEP, ::_STEP].reshape(-1, 3)
     points = environment.points()[::_STEP, ::_STEP].reshape(-1, 3)

@@ -13,7 +13,7 @@ def pack_words(groups: Sequence[NDArray[np.uint16]], size: int) -> tuple[NDArray
 
     Args:
         groups: Sequences of one length each, uint16 [n, length].
-        size: Words of the heap; at least those of all different sequences.
+        size: Words of the heap; at least as many as all different sequences have.
 
     Returns:
         The heap, uint16 [size], and for each group the addresses of its sequences, int64 [n].

@@ -52,8 +52,8 @@ def room_light(
         image: Its encoded maps, for the bounding planes.
         lights: Of the room, without shadows: they light what nothing shows.
         point: World space, float64 [3].
-        from_photo: The light is that of the room's photo, if there is one, not of its albedo under the lights.
-        unseen: The light of directions that the room's picture does not show; None: that of the bounding planes.
+        from_photo: The light is the room's photo's, if there is one, not of its albedo under the lights.
+        unseen: The light of directions that the room's picture does not show; None: the bounding planes'.
         second: Another view of the room, which shows further directions.
     """
     directions, _ = face_directions(FINE)

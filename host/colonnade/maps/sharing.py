@@ -1,6 +1,6 @@
 """Chooses the words that tiles share in a heap.
 
-A descriptor may point to any words, also to those of another tile. So tiles offer their words, and any tile may take
+A descriptor may point to any words, also to another tile's. So tiles offer their words, and any tile may take
 any of them, with another error.
 """
 
@@ -41,7 +41,7 @@ class Offered:
         return reached
 
     def without_least(self, chosen: NDArray[np.bool_], words: int) -> NDArray[np.bool_]:
-        """The chosen sequences without those that gain least per word: as many as have so many words, at least one."""
+        """The chosen sequences without the least gains per word: as many as have so many words, at least one."""
         which = np.flatnonzero(chosen)
         options = np.vstack([self.free, self.errors[which]])
         if len(options) < 2:
@@ -101,7 +101,7 @@ def shared_words(
     errors_of: Callable[[Subdivided], NDArray[np.float32]],
     budget: int,
 ) -> tuple[NDArray[np.intp], list[Users]]:
-    """Choose the words that are in the heap, and those that each tile has.
+    """Choose the words that are in the heap, and the words of each tile.
 
     In large maps only words that are in the heap anyway are offered, in very large ones none.
 
@@ -144,12 +144,12 @@ def shared_words(
 def choose_shared(offered: Offered, budget: int, start: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Choose sequences so that the sum of the tiles' errors is small, where each tile takes the best chosen sequence.
 
-    From ``start`` on, each step drops the sequences that gain least per word, and adds those that gain most per word
+    From ``start`` on, each step drops the sequences that gain least per word, and adds the ones that gain most per word
     in their place. A step that does not reduce the error is undone and followed by a smaller one.
 
     Args:
         offered: The sequences.
-        budget: Words of all chosen sequences; those of ``start`` are within it.
+        budget: Words of all chosen sequences; ``start`` is within it.
         start: bool [sequences], the first choice; the result has at most its error.
 
     Returns:

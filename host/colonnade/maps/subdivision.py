@@ -67,7 +67,7 @@ class Subdivided:
     def ordered(self, ranks: NDArray[np.intp]) -> Subdivided:
         """The same tiles with their members in the order that gives similar tiles equal words.
 
-        Members of a heap are by ascending rank. Two of a descriptor alone begin with that of cell 0.
+        Members of a heap are by ascending rank. Two of a descriptor alone begin with cell 0's.
         """
         keys = ranks[self.members]
         if self.mode.in_descriptor == self.members.shape[1]:

@@ -1,7 +1,7 @@
 """Loads triangle meshes by name, or from a file (OBJ, PLY, STL, OFF, glTF, 3MF, COLLADA …).
 
 Every loaded mesh is clean: vertices are merged by position, degenerate faces, duplicate faces and unused vertices are
-removed, and closed parts point outward. Its corner normals are those of the file, else smooth up to a crease angle.
+removed, and closed parts point outward. Its corner normals are the file's, else smooth up to a crease angle.
 """
 
 from __future__ import annotations

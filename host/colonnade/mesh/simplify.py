@@ -27,7 +27,7 @@ class Simplified:
 
     Attributes:
         owners: The nearest face of the mesh before, int64 [m].
-        seams: Faces across a seam of textures, whose coordinates are those of one side.
+        seams: Faces across a seam of textures, with the coordinates of one side.
     """
 
     vertices: Floats
@@ -49,7 +49,7 @@ def simplified(mesh: Mesh, triangles: int) -> Simplified:
     """
     import fast_simplification
 
-    # Its thresholds are lengths: those of a mesh as long as 1
+    # Its thresholds are lengths, for a mesh as long as 1
     scale = mesh.extent.edge
     vertices, faces = fast_simplification.simplify(mesh.vertices / scale, mesh.faces, target_count=triangles)
     vertices = vertices * scale

@@ -97,7 +97,7 @@ class RayDevice(RayBackend):
 
 
 def device_text(config: str, overrides: Overrides = (), options: Sequence[str] = (), progress: Progress = QUIET) -> str:
-    """The content of a file `COLONNADE_RAYS_DEVICE` for the library in C; arguments are those of `RayDevice`.
+    """The content of a file `COLONNADE_RAYS_DEVICE` for the library in C; arguments are as for `RayDevice`.
 
     Raises:
         UserError: As of `RayDevice`.

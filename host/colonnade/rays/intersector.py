@@ -20,10 +20,10 @@ class RayMeshIntersector:
 
     Args:
         geometry: The mesh; when it changes, the next query packs it anew.
-        config: The design, as that of `Scene`.
+        config: The design, as of `Scene`.
         overrides: Its settings.
         scale_to_box: Ignored; a scene has its own scale.
-        backend: As that of `Scene`.
+        backend: As of `Scene`.
     """
 
     def __init__(

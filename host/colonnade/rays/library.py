@@ -11,7 +11,7 @@ from colonnade.design.toolchain import project_root, require_program
 
 #: The library's name: programs for Embree 4 are linked with it.
 NAME = "libembree4.so.4"
-#: Those of host/CMakeLists.txt for the same sources.
+#: As in host/CMakeLists.txt for the same sources.
 _OPTIONS = "-std=gnu++17 -O3 -DNDEBUG -Wno-psabi -ffp-contract=off -fPIC -shared -pthread".split()
 _OPTIONS += ["-msse4.1"] * (platform.machine() in ("x86_64", "AMD64"))
 

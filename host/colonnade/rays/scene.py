@@ -26,7 +26,7 @@ from colonnade.scene_image.packer import record_format
 #: Bits of a batch's mode, as `driver/include/colonnade_rays.h` has them.
 CULL_FRONT, CULL_BACK, OPAQUE_ONLY = 1 << 8, 1 << 9, 1 << 10
 RANGES, OCCLUDED, FAN, SENSOR = 1, 2, 1 << 4, 1 << 5
-#: A ray's mask, 32 bits; and that of a batch as it is, which is in the top byte of its mode.
+#: A ray's mask, 32 bits; and the mask of a batch as it is, in the top byte of its mode.
 ALL_MASKS, ALL_DEVICE_MASKS = 0xFFFFFFFF, 0xFF << 24
 
 Backend = Literal["model", "rtl"] | RayBackend
@@ -43,7 +43,7 @@ class Hits:
         ray: Index of the ray, int64 [n].
         mesh: Number of the mesh, int64 [n]; -1 for a miss.
         face: Index of the mesh's face, int64 [n]; -1 for a miss.
-        t: Distance in lengths of the ray's direction, float64 [n]; that of a miss is the ray's tfar.
+        t: Distance in lengths of the ray's direction, float64 [n]; of a miss the ray's tfar.
         uv: Weights of the face's second and third corner, float64 [n, 2].
         is_back: The face's corners turn clockwise as the ray sees them, bool [n].
         is_opaque: bool [n].
@@ -182,7 +182,7 @@ class Scene:
     def ranges(self, sensor: Sensor, mode: int = 0, mask: int = 0xFF) -> Floats:
         """The t of the closest hit of a sensor's rays, float64 [height, width], of float32; inf for a miss.
 
-        The device makes the rays. Unlike `closest`, hits are those of the device, not refined; `mask` has 8 bits.
+        The device makes the rays. Unlike `closest`, hits are the device's, not refined; `mask` has 8 bits.
 
         Raises:
             UserError: The sensor is too far away.

@@ -16,7 +16,7 @@ _MAX_RAYS = 1 << 24
 
 @dataclass(frozen=True)
 class Sensor:
-    """Rays from a point: that of column x and row y has the direction corner + x · right + y · down.
+    """Rays from a point: the ray of column x and row y has the direction corner + x · right + y · down.
 
     Attributes:
         origin: float [3].
@@ -52,7 +52,7 @@ class Sensor:
 
     @property
     def exponent(self) -> int:
-        """The device's directions are those of the sensor times 2^-exponent: below 2 on each axis."""
+        """The device's directions are the sensor's times 2^-exponent: below 2 on each axis."""
         corner, right, down = np.array(self._steps, dtype=np.float64)
         ends = [corner + x * right + y * down for x in (0, self.columns - 1) for y in (0, self.height - 1)]
         return int(np.frexp(np.abs([*ends, right, down]).max())[1])

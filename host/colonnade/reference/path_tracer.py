@@ -244,7 +244,7 @@ class PathTracer:
         is_tinted, normals = (kinds == MIRROR) | points.front, points.normals.copy()
         rough = np.flatnonzero(alpha > 0)
         if self._view.gather is not None and len(rough):
-            # Other sample points than those of the rays that are gathered next
+            # Other sample points than the rays' that are gathered next
             number = state.gathered[path[rough]] & 3 ^ np.where(points.front[rough], 3, 2)
             drawn = sphere_points(words[path[rough]] ^ np.array(self._view.gather.points, np.uint8)[number])
             normals[rough] = microfacet_normals(normals[rough], directions[rough], drawn, alpha[rough])

@@ -33,7 +33,7 @@ class ReferenceResult:
         object_mask: The primary ray hits the object, bool [height, width].
         hit_triangles: Face in the mesh's source, -1 for a miss, int64 [height, width].
         t: Depth in mesh units (lengths of the pixel's direction), NaN for a miss, float64 [height, width].
-        rays: Ray counts by kind (primary, shadow, reflection, refraction), and `in_box`, those that enter the object's
+        rays: Ray counts by kind (primary, shadow, reflection, refraction), and `in_box`, rays that enter the object's
             bounding box.
         shadow_ratio: Light on a directly visible background surface over its light without the object; 1 elsewhere and
             without a room, float64 [height, width, 3].

@@ -1,6 +1,6 @@
 """Directions of scattered rays, by the sample points that the device draws (docs/gather.md).
 
-A sample point is a word of two bytes, that of the pass XOR that of the pixel. It stands for a point of the unit
+A sample point is a word of two bytes, the pass's XOR the pixel's. It stands for a point of the unit
 sphere.
 """
 
@@ -27,7 +27,7 @@ _SOBOL = ((2, 1, (1, 3)), (3, 1, (1, 3, 1)))
 def pixel_matrix() -> Bytes:
     """The bytes of each bit of a pixel's Morton code (x in the even bits, low ones first), uint8 [20, 2].
 
-    The bytes of a pixel are the XOR of those of its bits that are set: its point of a Sobol sequence in Morton order.
+    The bytes of a pixel are the XOR over its bits that are set: its point of a Sobol sequence in Morton order.
     """
     columns = []
     for degree, coefficients, first in _SOBOL:

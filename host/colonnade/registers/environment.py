@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from colonnade.scene.view import View
     from colonnade.scene_image.header import ImageHeader
 
-#: Extra fraction bits of a step over those of a map position.
+#: Extra fraction bits of a step over a map position's.
 STEP_GUARD = 12
 
 

@@ -1,6 +1,6 @@
 """Computes all frame registers of a scene, as defined in docs/numbers.md.
 
-Camera, lights, outline and the projection to a room's maps are those of ``driver/src/colonnade_view.c``
+Camera, lights, outline and the projection to a room's maps are by ``driver/src/colonnade_view.c``
 (docs/driver.md): on the object's grid, so that the object itself never moves.
 """
 
@@ -67,7 +67,7 @@ def registers_of(
     environment: EncodedEnvironment | None = None,
     relit: bool = True,
 ) -> dict[str, int]:
-    """Compute the registers of a view; that of the watchdog is 0. Arguments are as in `frame_registers`.
+    """Compute the registers of a view; the watchdog's is 0. Arguments are as in `frame_registers`.
 
     Raises:
         UserError: A distance is out of the hardware's range, or the design lacks a feature.

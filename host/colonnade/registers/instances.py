@@ -31,8 +31,8 @@ def instance_registers(instances: Sequence[Instance], world: ObjectFrame, manife
 
     Args:
         instances: In the order of their numbers.
-        world: Frame of the world, which camera and lights are in, too.
-        manifest: That of a design with instances.
+        world: Frame of the world, which camera and lights are also in.
+        manifest: The manifest of a design with instances.
 
     Raises:
         UserError: An instance is flat, too small for the world, or stretched beyond its range.
@@ -83,7 +83,7 @@ def transform_values(instance: Instance, world: ObjectFrame) -> tuple[list[int],
 
 
 def unit_transform(instance: Instance, world: ObjectFrame) -> tuple[Floats, Floats]:
-    """From vertex units of an instance to those of the world: the linear part and the place of (0, 0, 0)."""
+    """From vertex units of an instance to the world's: the linear part and the place of (0, 0, 0)."""
     transform, frame = np.array(instance.transform), instance.frame
     corner = fixed_order.product(transform[:3, :3], np.array(frame.offset)) + transform[:3, 3]
     return world.scale / frame.scale * transform[:3, :3], (corner - np.array(world.offset)) * world.scale

@@ -1,4 +1,4 @@
-"""The clip file of instances: objects, where they are over time, and the clips of those that bend (docs/driver.md)."""
+"""The clip file of instances: objects, where they are over time, and clips of objects that bend (docs/driver.md)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Motion:
 
     Attributes:
         instances: At rest.
-        keys: Their transforms, from mesh to world: those of bones.
+        keys: Their transforms, from mesh to world, as of bones.
         world: A frame that holds all keys.
         clips: Root and clip file of each mesh that bends.
     """
@@ -112,7 +112,7 @@ def _moved(instances: Sequence[Instance], matrices: Floats) -> list[Instance]:
 
 @dataclass(frozen=True)
 class TargetMotion:
-    """A motion as a target plays it, so that registers of the host are those of the target."""
+    """A motion as a target plays it, so that registers of the host equal the target's."""
 
     motion: Motion
     manifest: Manifest

@@ -62,8 +62,8 @@ def shadow_window(view: View, environment: Environment, depth: Floats, extent: E
 def surface_points(view: View, environment: Environment, depth: Floats) -> Floats:
     """Points where the device takes the room's surface, mesh space, float64 [rows, columns, 3]; NaN at infinite depth.
 
-    Those of the frame's pixels, with the depth of a pixel's centre, also where its ray is shifted; for a camera that is
-    not that of the maps, those of the maps' pixels.
+    Of the frame's pixels, with the depth of a pixel's centre, also where its ray is shifted; for a camera that is
+    not the maps', of the maps' pixels.
     """
     assert view.view_to_mesh is not None
     if not view.is_map_camera:

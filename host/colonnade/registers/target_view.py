@@ -15,7 +15,7 @@ Rotation = Sequence[int]
 
 
 class TargetView:
-    """A view file, the poses that replace those of its scene, and the words that the device has."""
+    """A view file, the poses that replace its scene's, and the words that the device has."""
 
     def __init__(self, file: bytes, manifest: Manifest) -> None:
         """Read a view file.
@@ -52,7 +52,7 @@ class TargetView:
         self._view.set_sample(index, count)
 
     def writes(self) -> list[tuple[int, int]]:
-        """Word addresses and values that differ from those of the last accepted frame.
+        """Word addresses and values that differ from the last accepted frame's.
 
         Raises:
             ValueError: With the name of the driver's error, such as ``tooFar``.

@@ -52,7 +52,7 @@ def view_file(
 
     Args:
         placed: Poses and lights of the start.
-        registers: All registers of the start; those that the target does not compute stay.
+        registers: All registers of the start; registers that the target does not compute stay.
         size: Width and height of the start, pixels.
         header: Header of the mesh's scene image.
         manifest: The design's manifest.
@@ -87,7 +87,7 @@ def still_file(
 
     Args:
         view: The frame.
-        registers: Those that the target does not compute; in a room, window and occlusion too.
+        registers: Registers that the target does not compute; in a room also window and occlusion.
         header: Header of the mesh's scene image.
         manifest: The design's manifest.
         room: The room and its encoded maps.

@@ -29,7 +29,7 @@ TREE_VISITS = 128
 #: From a ray in the world to one in an instance and back, if all other contexts go first.
 INSTANCE_CYCLES = 100
 
-#: A read from DRAM, behind those of all other requesters.
+#: A read from DRAM, behind all other requesters' reads.
 DRAM_CYCLES = 2000
 
 #: A step of the march through an environment, without the lookups of the other units; steps in a tile, cells included.

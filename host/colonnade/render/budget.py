@@ -25,7 +25,7 @@ class Budget:
 
     Attributes:
         samples: Of a pixel, a power of two.
-        cycles: Those of a pass; None for a design that the cycle model does not know.
+        cycles: The cycles of a pass; None for a design that the cycle model does not know.
         seconds: The budget.
     """
 
@@ -48,7 +48,7 @@ class Budget:
             image: What the device holds.
             registers: Of a pass in the middle of everything.
             seconds: The budget, at `CLOCK`.
-            passes: Those of a frame of so many samples, with those of coats.
+            passes: Passes of a frame of so many samples, with passes of coats.
         """
         try:
             cycles = NotedFrame.of(manifest, image, registers).cycles(manifest)["cycles"]

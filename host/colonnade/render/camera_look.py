@@ -17,7 +17,7 @@ from colonnade.environment.photo_blur import measured_blur
 from colonnade.environment.photo_grain import Grain
 from colonnade.scene.model import Scene
 
-#: What `measured_blur` finds in pictures of path tracers at most; their pixels are as sharp as those of a frame. The
+#: What `measured_blur` finds in pictures of path tracers at most; their pixels are as sharp as a frame's. The
 #: least blur that is given, pixels.
 _OWN_BLUR, _LEAST_BLUR = 0.75, 0.4
 
@@ -36,12 +36,12 @@ class CameraLook:
 
     @staticmethod
     def of(scene: Scene, photo: NDArray[np.uint8] | None, size: tuple[int, int]) -> CameraLook | None:
-        """That of the photo of a scene's view; None without one, and if the scene does not want it.
+        """The look of the photo of a scene's view; None without one, and if the scene does not want it.
 
         Args:
             scene: The scene.
             photo: sRGB, uint8 [rows, columns, 3].
-            size: Width and height of the frame, pixels; grain and blur are those of the photo in this size.
+            size: Width and height of the frame, pixels; grain and blur are the photo's in this size.
         """
         if photo is None or not scene.camera.grain:
             return None

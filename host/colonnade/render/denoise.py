@@ -35,7 +35,7 @@ class Guide:
 
     Attributes:
         position, planes, normals: In one space, float64 [height, width, 3]; 0 outside `mask`. ``planes`` are the
-            normals of the surface, ``normals`` those of its shading.
+            normals of the surface, ``normals`` its shading normals.
         mask: The pixel shows the object, bool [height, width].
         plane: How much of their distance two pixels may lie off a plane.
     """

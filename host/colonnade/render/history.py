@@ -27,7 +27,7 @@ _OFF, _COSINE = 0.004, 0.9
 
 @dataclass(frozen=True)
 class Camera:
-    """The rays of a frame, in the space of a guide: those of pixel (x, y) are ``rays @ (1, x, y)``.
+    """The rays of a frame, in the space of a guide: of pixel (x, y) ``rays @ (1, x, y)``.
 
     Attributes:
         origin: float64 [3].
@@ -39,7 +39,7 @@ class Camera:
 
     @staticmethod
     def of(view: View) -> Camera:
-        """That of a view, in the space of the mesh."""
+        """The camera of a view, in the space of the mesh."""
         return Camera(view.origin, np.stack([view.direction, view.step_x, view.step_y], axis=1))
 
     def moved(self, transform: Floats) -> Camera:
@@ -72,7 +72,7 @@ class History:
 
     @staticmethod
     def of(denoise: bool | Denoiser, frames: int) -> History | None:
-        """That of so many frames; None if nothing is blended."""
+        """The history of so many frames; None if nothing is blended."""
         return History() if frames > 1 and denoise in (True, "atrous") else None
 
     def blended(self, name: str, noisy: Noisy, guide: Guide, camera: Camera, longest: int = FRAMES) -> Noisy:
@@ -110,7 +110,7 @@ def _likely(noisy: Noisy, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
 
 
 def _reprojected(before: _Seen, guide: Guide) -> tuple[Floats, Floats, Floats]:
-    """Colours, variances and numbers of frames of a frame's points, 0 for those that the frame before did not show."""
+    """Colours, variances and numbers of frames of a frame's points, 0 for points that the frame before did not show."""
     (height, width), own = guide.mask.shape, guide.mask
     position, planes, normals = guide.position[own], guide.planes[own], guide.normals[own]
     place, is_before = before.camera.pixels(position)

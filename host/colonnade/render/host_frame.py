@@ -81,7 +81,7 @@ class HostFrame:
         )
 
     def image(self, sums: Accumulation) -> Floats:
-        """The picture of sums, with those of all layers: linear, float64 [height, width, 3]."""
+        """The picture of sums, with all layers': linear, float64 [height, width, 3]."""
         if self.relit:
             return sums.image()
         return composited(sums, self.prepared.photo, self.prepared.strength, self.look, self.number, self.sky)
@@ -158,7 +158,7 @@ class HostFrame:
         is_still: bool = True,
         are_few: bool = False,
     ) -> Floats:
-        """Colours without noise: blended with those of the frames before, and filtered; of what is still or moves."""
+        """Colours without noise: blended with the frames before, and filtered; of what is still or moves."""
         from colonnade.render.denoise import Noisy, denoised
         from colonnade.render.history import FRAMES, MOVING_FRAMES
 

@@ -10,7 +10,7 @@ from colonnade.common.framebuffer import Frame
 from colonnade.design.manifest import Manifest
 from colonnade.scene_image.header import ImageHeader
 
-#: Kinds of rays. ``in_box`` counts again those that enter the object's bounding box.
+#: Kinds of rays. ``in_box`` counts again rays that enter the object's bounding box.
 RAY_KINDS = ("primary", "shadow", "reflection", "refraction")
 
 #: Keys that all frames of a sequence share: its report has them once.
@@ -93,7 +93,7 @@ class FrameReport:
 
     @property
     def rays_per_cycle(self) -> float | None:
-        """All rays per cycle, including those that miss the object's bounding box."""
+        """All rays per cycle, including rays that miss the object's bounding box."""
         return self.all_rays / self.cycles if self.cycles else None
 
     @property

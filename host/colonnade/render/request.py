@@ -30,13 +30,13 @@ class RenderRequest:
         config: Preset, path, or precision such as ``32b32s64d``.
         overrides: Changes to the configuration, ``key=value``.
         backend: ``rtl``: the generated Verilog in a simulator; ``model``: its bit-exact model; ``reference``: Embree.
-        size: (width, height), pixels; None: that of the scene.
+        size: (width, height), pixels; None: the scene's.
         frames: Number of frames, from 1. The first shows the scene at rest. Of a sequence its first ones.
-        samples: Samples of a pixel, from 1; None: those of the scene, or a default.
+        samples: Samples of a pixel, from 1; None: the scene's, or a default.
         mesh: A mesh that replaces the scene's, or its name or file.
-        simplify: Number of triangles to which a named mesh of more is simplified; None: that of the scene.
+        simplify: Number of triangles to which a named mesh of more is simplified; None: the scene's.
         background: Folder of a room that replaces the scene's background.
-        animation: Name or number of an animation that replaces that of the scene file's mesh.
+        animation: Name or number of an animation in place of the scene file's.
         sequence: Views of a room, one for each frame, which replace the scene's background and motion.
         keyframes: Of a sequence, every so many frames have maps; None: as its file says.
         hits: Whether the caller needs hit triangles; the configuration must then have them.

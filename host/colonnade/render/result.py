@@ -17,7 +17,7 @@ from colonnade.render.report import FrameReport
 
 @dataclass(frozen=True, repr=False)
 class RenderResult:
-    """A rendered frame. Of several samples a pixel, mask, hits, depths and ratios are those of the first pass.
+    """A rendered frame. Of several samples a pixel, mask, hits, depths and ratios are the first pass's.
 
     Attributes:
         image: Linear colours, 0 to 1, float64 [height, width, 3].

@@ -1,4 +1,4 @@
-"""The samples of a frame: those that are named, a default, or what a budget of time allows (docs/sampling.md)."""
+"""The samples of a frame: the named number, a default, or what a budget of time allows (docs/sampling.md)."""
 
 from __future__ import annotations
 

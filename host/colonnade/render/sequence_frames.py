@@ -57,7 +57,7 @@ def sequence_frames(
     note: str | None,
     progress: Progress,
 ) -> Iterator[RenderResult]:
-    """The frames of a sequence: each with its camera and photo, and with its own maps or those of the last keyframe.
+    """The frames of a sequence: each with its camera and photo, and with its own maps or the last keyframe's.
 
     Object and light move as in other frames of a motion, but the object does not turn unless the scene says so.
     """

@@ -68,7 +68,7 @@ def moved_camera(
     Args:
         scene: The scene; its motion may move the camera.
         start: The camera of the start.
-        centre: Centre of the object's cube at the start, world space; its depth is that of the start's target if the
+        centre: Centre of the object's cube at the start, world space; its depth is the start's target's if the
             scene names none.
         width: Width of the frame, pixels.
         height: Height of the frame, pixels.

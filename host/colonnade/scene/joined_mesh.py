@@ -182,7 +182,7 @@ def _joined_clip(meshes: list[Mesh], places: list[Place]) -> tuple[Clip | None, 
 
 
 def _renumbered(mesh: Mesh, textures: list[Texture]) -> Mesh:
-    """The mesh with materials that name their textures by their number among those of all meshes."""
+    """The mesh with materials that name their textures by their number among all meshes'."""
     materials = tuple(
         material
         if material.texture is None

@@ -87,7 +87,7 @@ def device_room(scene: Scene, manifest: Manifest) -> Environment | None:
 
 
 def view_photo(scene: Scene, room: Environment | None, size: tuple[int, int] | None) -> NDArray[np.uint8] | None:
-    """The photo of a frame's view, sRGB: that of the room, or for a camera that the scene places, of the scene.
+    """The photo of a frame's view, sRGB: the room's, or for a camera that the scene places, of the scene.
 
     Raises:
         UserError: It cannot be read, or does not have the proportions of the frame.
@@ -118,7 +118,7 @@ def lit_room(
 ) -> LitRoom:
     """Find the lights of a scene that names none, and choose the colours that rays see.
 
-    They are those of its panorama, or are fitted to the photo of its room.
+    They come from its panorama, or are fitted to the photo of its room.
 
     Args:
         scene: The scene.
@@ -214,7 +214,7 @@ def next_view(scene: Scene, extent: Extent, room: Environment, relit: bool) -> E
 def photo_strength(scene: Scene, room: Environment, extent: Extent, relit: bool) -> NDArray[np.uint8] | None:
     """The strength of the object's shadow on the photo of a room, uint8 [height, width].
 
-    None, and whole, for a camera that is not that of the maps; and unless the scene wants something else, for lights
+    None, and whole, for a camera that is not the maps'; and unless the scene wants something else, for lights
     that it names, which the photo may not show, and in a room without an albedo map whose photo shows no sun and shade.
 
     Raises:
@@ -253,7 +253,7 @@ def _with_fitted_lights(
 ) -> tuple[Scene, Surround | None]:
     """The scene with fitted lights.
 
-    If it gathers light, they are fitted beside that of the room's walls, and have an area: no photo tells their size,
+    If it gathers light, they are fitted beside the room's walls, and have an area: no photo tells their size,
     and an edge that is too soft shows less than a hard one in a wrong place.
     """
     from colonnade.environment.fitted_lights import fitted_lights

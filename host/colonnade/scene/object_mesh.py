@@ -50,7 +50,7 @@ class SurfaceFeatures:
 
     @classmethod
     def of(cls, manifest: Manifest) -> SurfaceFeatures:
-        """Those of a manifest."""
+        """The features of a manifest's design."""
         materials = int(manifest.config["frame"]["materials"])
         glass = int(manifest.config["frame"]["maxBounces"]) > 0
         return cls(materials, manifest.corner_colours, manifest.texture is not None, manifest.emission, glass)
@@ -86,7 +86,7 @@ def stated_triangles(scene: Scene) -> Iterator[tuple[str, int]]:
 def with_materials(scene: Scene, mesh: Mesh, features: SurfaceFeatures) -> Mesh:
     """The mesh with what a device has, and notes of what it lacks.
 
-    Of more colours than the material table holds, after the scene's values have overridden those of the mesh, plain
+    Of more colours than the material table holds, after the scene's values have overridden the mesh's, plain
     ones move to the corners of faces, or else similar roughnesses, then similar colours are merged.
     """
     has_passes = scene.frame.samples is None and scene.paths.gather > 0

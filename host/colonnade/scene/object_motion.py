@@ -16,7 +16,7 @@ from colonnade.mesh.clips.tracks import Track
 from colonnade.scene.model import Vector
 from colonnade.scene.object_pose import Pose
 
-#: Degrees between two keys of a turn: arcs between them are those of the turn.
+#: Degrees between two keys of a turn, which define its arcs.
 _STEP = 15.0
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -33,7 +33,7 @@ def moving_place(
 
     Args:
         pose: Where it starts.
-        centre: That of its mesh, in mesh space, float64 [3].
+        centre: The centre of its mesh, in mesh space, float64 [3].
         stages: Its motion (`SceneObject.stages`).
         vertical: The axis of its turn.
         seconds: Duration of the motion.

@@ -110,7 +110,7 @@ def panorama_light(scene: Scene, extent: Extent, room: Environment | None, max_l
 def fitted_exposure(panorama: Panorama, seen: SeenLight) -> float:
     """The factor that makes a panorama as bright as a photo in the directions that both show; 1 if these are few.
 
-    It is that of least squares with a variance that grows with the brightness, so a panorama of another place does not
+    It is by least squares with a variance that grows with the brightness, so a panorama of another place does not
     darken it. Directions in which the photo saturates do not count.
     """
     weights = texel_weights()

@@ -72,7 +72,7 @@ def load_scene(path: str | Path, room: Path | None = None, animation: str | None
     Args:
         path: The file.
         room: Folder of a room in place of the scene's background, if it has one.
-        animation: Name or number of an animation in place of that of the scene's mesh.
+        animation: Name or number of an animation in place of the scene's mesh's.
 
     Raises:
         UserError: The file is missing, is neither TOML nor a mesh, or has an invalid key or value.
@@ -93,7 +93,7 @@ def is_mesh_file(file: Path) -> bool:
 
 
 def read_tables(file: Path, in_room: bool = False) -> dict[str, Any]:
-    """The tables of a scene file, as they stand in it; or those of the scene that a mesh file gets.
+    """The tables of a scene file, as they stand in it; or of the scene that a mesh file gets.
 
     Args:
         file: The file.

@@ -47,7 +47,7 @@ def may_have_layers(scene: Scene) -> bool:
 
 
 def layers_of(materials: Iterable[MeshMaterial]) -> list[Layer]:
-    """The layers beside that of surfaces in which materials, as a mesh has them, are not all black."""
+    """The layers, beside surfaces, in which materials, as a mesh has them, are not all black."""
     rendered = [as_rendered(one, gathers=True) for one in materials]
     return [layer for layer in LAYERS[1:] if any(in_layer(one, layer) != BLACK for one in rendered)]
 

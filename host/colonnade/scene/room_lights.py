@@ -1,4 +1,4 @@
-"""The lights of a scene as `RoomLights` in world space, and lights that were found as those of a scene."""
+"""The lights of a scene as `RoomLights` in world space, and found lights as a scene's."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Sample:
     coverage: float | None = None
 
     def coverage_of(self, entry: int) -> float | None:
-        """The threshold of an entry of the material table: those of several do not follow each other."""
+        """The threshold of an entry of the material table: several entries' do not follow each other."""
         return None if self.coverage is None else (self.coverage + entry * _GOLDEN) % 1.0
 
     def light(self, index: int) -> Point:
@@ -110,7 +110,7 @@ def square_points(count: int, dimension: int) -> Floats:
 
 
 def _shifted(points: Floats, number: int, dimension: int) -> Floats:
-    """Points of the unit square, each moved within its interval as a frame's number has it; those of 0 stay."""
+    """Points of the unit square, each moved within its interval as a frame's number has it; points of frame 0 stay."""
     places = square_points(PERIOD, dimension)
     return np.asarray((points + (places[number] - places[0]) / len(points)) % 1.0)
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _HIGH = 0.2
 #: A sun that no panorama shows: its direction, radius in radians, and distance in edges of the object's cube.
 _UP, _RADIUS, _FAR = np.array([0.0, 1.0, 0.0]), float(np.radians(0.5)), 50.0
-#: Albedo of the ground, as that of any room (`derived_albedo`), where a photo alone tells the light.
+#: Albedo of the ground, as of any room (`derived_albedo`), where a photo alone tells the light.
 _ALBEDO = 0.45
 
 

@@ -84,8 +84,8 @@ class View:
         view_to_mesh: Transform from a room's view space, metres, to mesh space, float64 [3, 4]; None without a room.
         shift: Where the rays cross the picture, from the pixels' centres: pixels right and down.
         occlusion: The room hides the object where it is nearer.
-        is_map_camera: In a room: the camera is that of its maps.
-        gather: Gathered rays; None: the ambient light is that of every surface.
+        is_map_camera: In a room: the camera took its maps.
+        gather: Gathered rays; None: every surface has the ambient light.
     """
 
     width: int
@@ -126,7 +126,7 @@ class PlacedScene:
 
     Attributes:
         pose: The object's pose.
-        camera: The camera; its corner is that of the sample's rays.
+        camera: The camera; its corner is the sample's.
         lights: At least one; reach in world units.
     """
 
@@ -170,7 +170,7 @@ def make_view(
 
     Args:
         scene: What to render.
-        extent: Bounds of the mesh (`Mesh.extent`, or that of an image's header).
+        extent: Bounds of the mesh (`Mesh.extent`, or an image header's).
         width: Width of the frame, pixels.
         height: Height of the frame, pixels.
         materials: Materials of the mesh; the scene's values override them.
@@ -217,7 +217,7 @@ def make_view(
 
 
 def with_overrides(materials: Sequence[MeshMaterial], overrides: Material) -> tuple[MeshMaterial, ...]:
-    """Replace values of a mesh's materials by those that the scene gives.
+    """Replace values of a mesh's materials by the scene's.
 
     An albedo replaces corner colours and textures too, another kind the roughness, coverage and clear coat.
     """

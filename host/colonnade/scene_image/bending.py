@@ -41,7 +41,7 @@ class Bending:
     def of(
         cls, clip: GridClip, manifest: Manifest, records: int, depth: int, leaves: npt.NDArray[np.int64], colours: bool
     ) -> Bending:
-        """Those of packed records, whose leaves have these vertices of the clip, int64 [l, 4].
+        """The records of a packed mesh, whose leaves have these vertices of the clip, int64 [l, 4].
 
         Raises:
             UserError: The design has no tree, or wider records than the driver writes.

@@ -17,7 +17,7 @@ from colonnade.scene_image.header import EnvironmentHeader, ImageHeader, LoadedM
 
 
 def with_environment(image: SceneImage, environment: EncodedEnvironment, manifest: Manifest) -> SceneImage:
-    """Add a room's maps to a mesh's image, or replace those of another room.
+    """Add a room's maps to a mesh's image, or replace another room's.
 
     Raises:
         ValueError: The words do not fit the manifest's memories.

@@ -31,7 +31,7 @@ class GridClip:
         poses: Of the keys: matrices of bones row by row, and weights of targets, int64 [k, 12 b + t].
         rest: The rest pose, int64 [12 b + t].
         bones, targets: Their numbers.
-        linear_shift, shift: Fraction bits of matrices beyond those of translations, and of these.
+        linear_shift, shift: Extra fraction bits of matrices; fraction bits of translations.
     """
 
     frame: ObjectFrame

@@ -132,7 +132,7 @@ class TextureHeader:
         textures: Their number; with 0 the memory holds zeros.
         scale: Texels of the atlas for each pixel of a texture, along an axis.
         source_bytes: Size of the textures, three bytes a pixel.
-        memories: Memories of the textures, in the file's order, after those of a room.
+        memories: Memories of the textures, in the file's order, after a room's.
     """
 
     textures: int

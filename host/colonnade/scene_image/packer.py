@@ -102,7 +102,7 @@ def surface_colours(
 ) -> tuple[npt.NDArray[np.int64] | None, Atlas | None]:
     """The colours of a mesh's corners as records hold them, int64 [faces, 3, 3], and its atlas; None without any.
 
-    Arguments and errors are those of `pack`.
+    Arguments and errors are as for `pack`.
     """
     atlas = _atlas(mesh, manifest, materials, headroom)
     return _corner_colours(mesh, manifest, materials, headroom, atlas), atlas
@@ -120,7 +120,7 @@ def pack_geometry(
     colours: npt.NDArray[np.int64] | None,
     children: int = 4,
 ) -> SceneImage:
-    """Pack a mesh without its textures; `colours` are those of `surface_colours`, the rest as in `pack`."""
+    """Pack a mesh without its textures; `colours` are by `surface_colours`, the rest as in `pack`."""
     from colonnade import _core
 
     bits = int(manifest.config["geometry"]["vertexBits"])

@@ -73,7 +73,7 @@ class PrivateServer(ThreadingHTTPServer):
         return f"http://{self.hosts[0]}/{self._link}"
 
     def opens(self, word: str) -> bool:
-        """Whether a word is that of `link`, which is then used up."""
+        """Whether a word is the one of `link`, which is then used up."""
         with self._guard:
             is_link = self._link is not None and secrets.compare_digest(word.encode(), self._link.encode())
             if is_link:

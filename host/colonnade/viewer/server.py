@@ -115,5 +115,5 @@ def _camera(content: str | bytes) -> ViewCamera:
             return _CAMERA.validate_json(content)
         numbers = [float(number) for number in content.split(",")]
         return _CAMERA.validate_python({"position": numbers[:3], "target": numbers[3:]})
-    except ValueError:  # that of pydantic is one, too
+    except ValueError:  # pydantic's is one
         raise Refused(400, "six numbers describe a camera") from None

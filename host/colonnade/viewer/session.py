@@ -64,11 +64,11 @@ class ViewFrame:
 
     Attributes:
         pixels: sRGB, uint8 [height, width, 3].
-        version: That of the scene.
+        version: The scene's.
         milliseconds: Time of registers, model and picture, of the last sample.
         rays: Rays of all kinds, of the last sample.
         samples: Samples a pixel in it.
-        final: Those of the picture of a camera that has rested.
+        final: The samples of the picture of a camera that has rested.
     """
 
     pixels: NDArray[np.uint8]
@@ -161,7 +161,7 @@ class Session:
     def frame(self, camera: ViewCamera | None = None, at: float | None = None) -> ViewFrame:
         """Render a frame of one sample of the scene that was last right, as `colonnade render --samples 1`.
 
-        If noise is filtered, it also has the light of the frames before, as those of a motion have.
+        If noise is filtered, it also has the light of the frames before, as in a motion.
 
         Args:
             camera: In place of the scene's own.
@@ -175,9 +175,9 @@ class Session:
             return self._next(self._picture(camera, at, 1, self._history))
 
     def still(self, camera: ViewCamera | None = None, at: float | None = None) -> ViewFrame:
-        """Render the next sample of a camera that rests: the picture has one more than that of the last call.
+        """Render the next sample of a camera that rests: the picture has one more than the last call's.
 
-        The last picture is that of `colonnade render` with as many samples; further calls give it again. Another
+        The last picture equals `colonnade render` with as many samples; further calls give it again. Another
         camera, moment or version of the scene begins anew.
 
         Args:
@@ -357,7 +357,7 @@ class Session:
 
 
 def _seconds(scene: DeviceScene) -> float:
-    """Duration of a scene's motion: that of its animation, if it has one."""
+    """Duration of a scene's motion: its animation's, if it has one."""
     moves = scene.image.moves
     return moves.seconds if scene.scene.has_animation and moves is not None else MOTION_SECONDS
 

@@ -3,7 +3,7 @@
 /// A plane is linear in inverse depth: w = m · (x, y, 1) at the view ray (x, y, 1), and its normal is -m / |m|. Planes are
 /// fitted twice: in windows around each pixel, as large as the noise of the depth map asks for, of which the flattest of nine
 /// counts, so that a window does not reach across an edge; and to the whole map, where many windows agree, the largest first.
-/// A pixel takes the normal of the large plane that it lies on, else that of its window.
+/// A pixel takes the normal of the large plane that it lies on, else its window's.
 #pragma once
 
 #include <algorithm>
@@ -27,7 +27,7 @@ struct DepthNormals {
     double onPlanes;              ///< share of the pixels that lie on one
 };
 
-/// Radius of the windows that measure the noise, and the least and largest radius of those that give normals, pixels.
+/// Radius of the windows that measure the noise, and the least and largest radius of windows that give normals, pixels.
 constexpr int noiseRadius = 14, minRadius = 2, maxRadius = 11;
 /// Share of the windows that is flat; their largest residual is the noise. A residual of rounding alone counts as `leastNoise`.
 constexpr double flatShare = 0.3, leastNoise = 1e-4;

@@ -1,6 +1,6 @@
-/// The light cube of an object (docs/gather.md): radiance by direction, 6 faces of n × n texels. Face 2 a + s is that of
+/// The light cube of an object (docs/gather.md): radiance by direction, 6 faces of n × n texels. Face 2 a + s has
 /// directions whose largest component is a, with sign s, 1 for a negative one. Rows part the slope of the next axis, columns
-/// that of the one after it, from -1 to 1.
+/// of the one after it, from -1 to 1.
 #pragma once
 
 #include <numeric>

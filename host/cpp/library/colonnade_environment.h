@@ -20,7 +20,7 @@ double colonnade_environment_normals(const double *depth, const uint8_t *holes, 
 /* The plane m with m . p = 1 at points, by least squares. */
 void colonnade_environment_plane(const double *points, uint32_t count, double *plane);
 
-/* The words of the device's cube for an object whose axes are `rotation`, row by row, of those of `radiance`, 6 faces of 32 x 32 texels. */
+/* The words of the device's cube for an object whose axes are `rotation`, row by row, from `radiance`, 6 faces of 32 x 32 texels. */
 void colonnade_environment_cube(const double *radiance, const double *rotation, uint32_t *words);
 
 /* The radiance that words hold. */

@@ -1,5 +1,5 @@
 /* The packer and the bit-exact model without Python, behind C: docs/browser.md. With driver/include/colonnade_view.h, which
- * computes registers from poses, it renders meshes as a design does. One design at a time; calls are those of one thread. */
+ * computes registers from poses, it renders meshes as a design does. One design at a time, from one thread. */
 #ifndef COLONNADE_MODEL_H
 #define COLONNADE_MODEL_H
 
@@ -142,7 +142,7 @@ struct colonnade_step {
 /* Opens a design, by lines of words from its manifest:
  *   number NAME VALUE                             numbers; stackDepth, bvh, recordBits, depth
  *   layout RECORD FIELD OFFSET WIDTH SIGNED       of records
- *   register NAME ADDRESS WORDS WIDTH SIGNED LIMIT   those that are written; limit -1 for none
+ *   register NAME ADDRESS WORDS WIDTH SIGNED LIMIT   written ones; limit -1 for none
  * and for a design with the maps of a room, or with textures:
  *   size NAME VALUE                               of the maps
  *   map RECORD FIELD OFFSET WIDTH SIGNED          of their words

@@ -21,7 +21,7 @@ constexpr int stillRounds = 3;
 
 using Codes = std::array<mesh::Row<std::int64_t>, 3>;
 
-/// The codes at the corners of clean faces; in those of textured ones red and green are positions in the atlas.
+/// The codes at the corners of clean faces; at textured ones red and green are positions in the atlas.
 std::vector<Codes> cornerCodes(const colonnade_mesh& mesh, const std::vector<Part>& parts, const std::vector<mesh::Triangle>* uvs) {
     const double white = static_cast<double>((1 << library->number("colourBits")) - 1);
     std::vector<Codes> codes(parts.size());

@@ -52,7 +52,7 @@ struct Halves {
     }
 };
 
-/// The column of the covariance matrix with the largest variance; its length is that of the standard deviation, 1/8 codes,
+/// The column of the covariance matrix with the largest variance; its length is the standard deviation, 1/8 codes,
 /// on a line of points.
 struct Spread {
     std::int32_t column[3];

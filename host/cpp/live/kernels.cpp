@@ -219,7 +219,7 @@ FOR_PROCESSORS std::int64_t lowerErrors(std::int32_t* have, const std::int32_t* 
 }
 
 // A quotient of whole numbers below 2^53, correctly rounded, is never rounded up to the next whole number here: the exact
-// one is below it by at least 1 / z, more than half a step of the quotient. So the result is that of an integer division.
+// one is below it by at least 1 / z, more than half a step of the quotient. So the result equals an integer division.
 FOR_PROCESSORS void inverseDepth(const std::uint32_t* depth, int count, std::uint32_t unit, std::int32_t* w) {
     const double numerator = static_cast<double>(unit) * 4194304.0;
     for (int i = 0; i < count; ++i) w[i] = static_cast<std::int32_t>(numerator / static_cast<double>(static_cast<std::int32_t>(depth[i])));

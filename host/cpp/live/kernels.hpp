@@ -1,4 +1,4 @@
-/// Inner loops of the live encoder, for the compiler to vectorise. All arithmetic is that of integers, without overflow, so
+/// Inner loops of the live encoder, for the compiler to vectorise. All arithmetic is on integers, without overflow, so
 /// a loop gives the same values in any order and with any vectors. kernels.cpp compiles each loop for several processors.
 #pragma once
 
@@ -43,7 +43,7 @@ std::int64_t halveCells(const std::int16_t* fine, int edge, std::int16_t* coarse
 /// Covariances xx, yy, zz, xy, xz, yz of the points about a point, in half codes (1/8): sums over cells whose mask is -1.
 void covariances(const Cells& cells, const Point& about, const std::int16_t* mask, std::int32_t out[6]);
 
-/// The cluster of the points whose product with `axis` is above `threshold`; their mask is -1, that of the others 0.
+/// The cluster of the points whose product with `axis` is above `threshold`; their mask is -1, the others' 0.
 Cluster above(const Cells& cells, const std::int16_t axis[3], std::int32_t threshold, std::int16_t* mask);
 
 /// The clusters of the points that are nearest to each of four centres, and the number of the centre for each point.

@@ -38,7 +38,7 @@ public:
         blocks_.read(depth, camera);
         if (isWarm_) move(camera, unitBefore);
         regions_.find(blocks_, tolerance, near_, table_);
-        // From here on, the planes are those of the words
+        // From here on, the planes are the words'
         std::fill(output.planes, output.planes + planes_, std::uint64_t{0});
         for (int id = 0; id < planes_ - 1; ++id) {
             if (table_.area[id] > 0) output.planes[id] = planeWord(table_.planes[id]);
@@ -67,7 +67,7 @@ private:
         }
     }
 
-    /// The ids that the next frame tries in each tile: those that the tile shows, and those of its blocks.
+    /// The ids that the next frame tries in each tile: the tile's own, and its blocks'.
     void remember() {
         const int across = blocks_.blockColumns();
         for (std::size_t tile = 0; tile < near_.size(); ++tile) {

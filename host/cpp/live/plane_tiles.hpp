@@ -23,7 +23,7 @@ public:
         : columns_(columns), rows_(rows), heapWords_(heapWords), tiles_(static_cast<std::size_t>(columns) * rows),
           modes_{std::vector<std::int64_t>(tiles_.size() * planeModes), planeWords, planeModes}, selected_(tiles_.size()), heap_(heapWords) {}
 
-    /// Chooses the planes of all tiles; those of the table are the device's.
+    /// Chooses the planes of all tiles; the table's are the device's.
     void choose(const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table, std::int64_t tolerance, std::uint16_t* descriptors,
                 std::uint16_t* heap) {
         const std::vector<std::uint8_t> bySize = table.bySize();

@@ -26,7 +26,7 @@ struct Plane {
 
 /// The word of a plane (docs/background.md); `plane` becomes the plane of this word.
 inline std::uint64_t planeWord(Plane& plane) {
-    // A and B are slopes per 1024 pixels = 2048 half pixels, so their fields are a >> (1 + e); that of C is c >> (12 + e)
+    // A and B are slopes per 1024 pixels = 2048 half pixels, so their fields are a >> (1 + e); C's is c >> (12 + e)
     std::int64_t* const values[3] = {&plane.a, &plane.b, &plane.c};
     const int shifts[3] = {planeBits - 22 - 11, planeBits - 22 - 11, planeBits - 22};
     const auto field = [&](int i, int e) { return (*values[i] + (std::int64_t{1} << (shifts[i] + e - 1))) >> (shifts[i] + e); };
@@ -107,7 +107,7 @@ inline Plane planeOf(const DualVector& dual, const Camera& camera, int width, in
     return {Plane::whole(a / 2 * scale), Plane::whole(b / 2 * scale), Plane::whole((middle + b * (height / 2.0 - camera.cy)) * scale)};
 }
 
-/// How the view of one camera becomes that of another: P' = rotation · (P - move).
+/// How the view of one camera becomes another's: P' = rotation · (P - move).
 struct Motion {
     double rotation[9], move[3];
 

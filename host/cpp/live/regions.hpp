@@ -1,4 +1,4 @@
-/// The table of planes: those of the frame before, moved with the camera, and those of regions that none of them fits.
+/// The table of planes: of the frame before, moved with the camera, and of regions that none of these fits.
 #pragma once
 
 #include <algorithm>

@@ -41,7 +41,7 @@ public:
                     }
         }
         const int pixels = size * size;
-        std::int64_t between[levels] = {}; // squared distances of a level's cells from those of the coarser level
+        std::int64_t between[levels] = {}; // squared distances of a level's cells from the coarser level's
         std::int16_t mean;
         for (int level = finest_; level >= 0; --level) {
             for (int a = 0; a < 3; ++a) between[level] += halveCells(&points_[offset(level, a)], 2 << level, level > 0 ? &points_[offset(level - 1, a)] : &mean);

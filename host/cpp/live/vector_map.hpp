@@ -32,7 +32,7 @@ public:
         std::fill(std::begin(all_), std::end(all_), std::int16_t{-1});
     }
 
-    /// Encodes a frame: three bytes a pixel. The first one fits a palette; later ones start with that of the frame before.
+    /// Encodes a frame: three bytes a pixel. The first one fits a palette; later ones start with the frame before's.
     void encode(const std::uint8_t* codes, std::uint32_t* descriptors, std::uint64_t* palette, std::uint16_t* heap) {
         const std::size_t stride = static_cast<std::size_t>(3) * sizes_.columns * sizes_.tileSize;
         for (int tile = 0; tile < sizes_.tiles(); ++tile) {
@@ -67,7 +67,7 @@ private:
         std::fill(costs, costs + vectorModes, impossible);
         std::int64_t cheapest = impossible;
         int words = 0;
-        // Whether finer cells or more entries than those of `cheapest` may pay for a mode: even a perfect fit leaves what is within the cells
+        // Whether finer cells or more entries than `cheapest` has may pay for a mode: even a perfect fit leaves what is within the cells
         const auto mayPay = [&](int mode, int level) {
             return cheapest == impossible || cheapest - sums.cost(sums.within(level)) > least * std::max(1, vectorWords[mode] - words);
         };

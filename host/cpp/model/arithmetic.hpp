@@ -35,7 +35,7 @@ template <class Integer> Integer floorShift(Integer x, int bits) {
     return bits >= static_cast<int>(8 * sizeof(Integer)) ? (x < 0 ? Integer(-1) : Integer(0)) : x >> bits;
 }
 
-/// floorShift(x, bits) of one of several numbers whose magnitudes or complements have no other bits than `all`, where the result fits 64 bits.
+/// floorShift(x, bits) for x within the bits of `all`, where the result fits 64 bits; faster if `all` fits 62.
 inline std::int64_t shiftToFit(Wide x, int bits, UnsignedWide all) {
     return all >> 62 == 0 ? floorShift(static_cast<std::int64_t>(x), bits) : static_cast<std::int64_t>(floorShift(x, bits));
 }
@@ -72,7 +72,7 @@ inline std::uint64_t divide(std::uint64_t numerator, std::uint64_t denominator, 
     return (numerator << digits) / denominator;
 }
 
-/// floor(sqrt(radicand)): that of floating point, corrected.
+/// floor(sqrt(radicand)): by floating point, corrected.
 inline std::uint64_t squareRoot(std::uint64_t radicand) {
     auto root = std::min<std::uint64_t>(0xffffffff, static_cast<std::uint64_t>(std::sqrt(static_cast<double>(radicand))));
     while (root * root > radicand) --root;

@@ -62,7 +62,7 @@ inline MirrorDirections mirrorAbout(const WideVector& about, const Surface& surf
     return result;
 }
 
-/// Continues a ray at a mirror or glass. The shading normal is the smooth one, or that of a microfacet. The geometric normal replaces it if it faces
+/// Continues a ray at a mirror or glass. The shading normal is the smooth one, or a microfacet's. The geometric normal replaces it if it faces
 /// away from the ray, or if the direction would leave on the wrong side of the surface.
 inline Bounce bounce(const Surface& surface, const Material& material, bool flat, std::int64_t offset, const Numbers& n, const WideVector* microfacet = nullptr) {
     const WideVector geometric = {surface.faceForwardNormal[0], surface.faceForwardNormal[1], surface.faceForwardNormal[2]};

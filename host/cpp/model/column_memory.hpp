@@ -38,7 +38,7 @@ public:
 
     std::uint32_t addressMask() const { return nodeDecoder_.addressMask(); }
 
-    /// `other` is where a record is decoded that the tree reads as a leaf, too.
+    /// `other` is where a record is decoded that the tree also reads as a leaf.
     const Node* nodeAt(std::size_t address, Node& other) const {
         if (address >= recordCount_) return nullptr;
         const Slot& slot = slots_[address];
@@ -47,7 +47,7 @@ public:
         return &other;
     }
 
-    /// `other` is where a record is decoded that the tree reads as a node, too.
+    /// `other` is where a record is decoded that the tree also reads as a node.
     const LeafTriangles* leafAt(std::size_t address, std::optional<LeafTriangles>& other) const {
         if (address >= recordCount_) return nullptr;
         const Slot& slot = slots_[address];

@@ -34,7 +34,7 @@ public:
         return point;
     }
 
-    /// The point visible to the maps' camera in pixel (x, y) of the frame; `direction` is that of the pixel's ray, as in `findHit`.
+    /// The point visible to the maps' camera in pixel (x, y) of the frame; `direction` is the pixel's ray's, as in `findHit`.
     EnvironmentPoint directView(std::int64_t x, std::int64_t y, const Vector& direction, const EnvironmentView& view) const {
         EnvironmentPoint point{};
         Vector position{};

@@ -20,7 +20,7 @@ struct EnvironmentView {
     /// The environment may hide the object; by how much its point must then be nearer, grid steps along the ray's dominant axis.
     bool occlusion;
     std::int64_t occlusionTolerance;
-    /// The frame's camera is that of the maps; otherwise its rays march.
+    /// The frame's camera took the maps; otherwise its rays march.
     bool isMapCamera;
 
     bool shows(std::int64_t x, std::int64_t y) const { return x >= window[0] && x < window[2] && y >= window[1] && y < window[3]; }
@@ -38,7 +38,7 @@ struct EnvironmentTexel {
 enum class HitKind { miss, map, boundingPlane };
 
 /// What a march has done, for the cycle model: tiles of one plane, tiles of several planes with the planes that are looked at there, tiles that are passed cell by cell, cells, planes
-/// that are none of the last four, squares passed behind the visible surfaces, bounding planes with those that the ray approaches; and planes that a camera's origin is outside of.
+/// that are none of the last four, squares passed behind the visible surfaces, bounding planes with approached ones; and planes that a camera's origin is outside of.
 struct MarchWork {
     std::uint16_t flatTiles, tiles, planes, cellTiles, cells, fetches, behind, boundingPlanes, approached, outside;
     bool isFromCamera;

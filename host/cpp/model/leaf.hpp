@@ -81,7 +81,7 @@ public:
     std::array<VectorFields, 4> vertices;
     /// By vertex, from 1: of a pair, relative to vertex 0; and of a far pair, their signs, above their bits.
     std::array<VectorFields, 3> deltas, signs;
-    /// Codes of a triangle; those of a pair without their lowest bits, and these.
+    /// Codes of a triangle; a pair's without their lowest bits, and these.
     std::array<CodeFields, 3> normals;
     std::array<CodeFields, 4> highNormals, lowNormals;
     Field format, isClear, material;

@@ -7,7 +7,7 @@
 
 namespace colonnade {
 
-/// What a path shows where its ray ends, as in the RTL: the background or light of the cube, without a surface; a surface in ambient light and that of
+/// What a path shows where its ray ends, as in the RTL: the background or light of the cube, without a surface; a surface in ambient light and in
 /// the lights; one of the environment that the camera sees, where a gathered ray may replace the ambient light; or one without ambient light, from
 /// which the path goes on with a gathered ray.
 enum class PathEnd { background, cube, lit, directView, gathered, gathers };

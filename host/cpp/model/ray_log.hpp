@@ -9,7 +9,7 @@ namespace colonnade {
 /// Kinds of rays, by the counters that count them.
 enum class RayKind { primary, shadow, reflection, refraction, gather };
 
-/// A step. Positions are those of the object's space, vertex units.
+/// A step. Positions are in the object's space, vertex units.
 struct RayStep {
     enum class Kind { ray, node, child, record, triangle, hit };
     Kind kind;

@@ -20,9 +20,9 @@ struct Lobe {
 /// A material. `eta` is the relative index of refraction on the front and the back side; `reflectance` is at normal incidence, 12 fraction bits.
 struct Material {
     Colour albedo;
-    /// The albedo is that of the corners of the face.
+    /// The albedo comes from the corners of the face.
     bool hasCornerColours;
-    /// The albedo is that of the texture, at the position that the corners give.
+    /// The albedo comes from the texture, at the position that the corners give.
     bool hasTexture;
     /// Added to the light that a diffuse surface reflects.
     Colour emission;

@@ -118,7 +118,7 @@ private:
         bool isOver() const { return occlusion == Occlusion::opaque; }
     };
 
-    /// Traces a prepared ray from a root, by default that of the scene.
+    /// Traces a prepared ray from a root, by default the scene's.
     TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0, std::vector<Hit>* hits = nullptr) const {
         ++record_.counters.raysInBox;
         record_.work.enterBox();

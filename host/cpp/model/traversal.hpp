@@ -23,7 +23,7 @@ struct Hit {
     /// That was hit, in a scene of instances.
     int instance = 0;
 
-    /// That of a ray that has hit nothing yet: only hits with t < `tMax` count.
+    /// A miss, limited to t < `tMax`.
     static Hit none(std::int64_t tMax) { return {false, tMax, 0, {}, false}; }
 
     /// Whether a triangle that the ray hits at `t` is the closest one so far.

@@ -18,7 +18,7 @@ struct RecordVisit {
 ///
 /// `ray`: it visits `count` records, the first of which is `first`; `isInBox`: it enters the object's box; `isHit`: of a shadow ray, something opaque ends it; `isDimmed`: of a shadow ray, it meets anything.
 /// `surface`: the leaf `first` is fetched, with its companion if `hasColours`, and its hit is shaded; `material`.
-/// `lookup`: `first` is that of its march; `isDirect`: by the pipeline of directly seen pixels; `isHit`: a point is found and shaded; `isTest`: it may hide a hit, and
+/// `lookup`: `first` is its march's; `isDirect`: by the pipeline of directly seen pixels; `isHit`: a point is found and shaded; `isTest`: it may hide a hit, and
 /// `isHit` tells that it does; `isReflection`: of a Fresnel reflection, whose bounce waits.
 struct PathStep {
     enum class Kind : std::uint8_t { ray, surface, lookup };
@@ -117,7 +117,7 @@ public:
         work_->steps.back().isHit = isHidden;
     }
 
-    /// The next lookup is that of a Fresnel reflection: the number of steps before it.
+    /// The next lookup is a Fresnel reflection's: the number of steps before it.
     std::size_t position() const { return isOn() ? work_->steps.size() : 0; }
     void isReflectionAt(std::size_t position) const {
         if (isOn() && position < work_->steps.size()) work_->steps[position].isReflection = true;

@@ -39,7 +39,7 @@ inline std::vector<std::uint8_t> fieldLows(const std::map<std::string, Layout>& 
     return lows;
 }
 
-/// Puts vertices where leaves need them first: those of a leaf are near each other in memory.
+/// Puts vertices where leaves need them first: a leaf's are near each other in memory.
 inline void orderByUse(GridClip& clip, std::vector<ClipLeaf>& leaves) {
     const auto isUsed = [](std::int64_t vertex) { return vertex >= 0; };
     std::vector<std::int64_t> numbers(clip.vertices.size(), -1);

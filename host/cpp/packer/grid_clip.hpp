@@ -21,7 +21,7 @@ struct GridClip {
     std::vector<std::vector<std::int64_t>> poses;       ///< of the keys: matrices of bones row by row, weights of targets
     std::vector<std::int64_t> rest;                     ///< the rest pose
     std::size_t bones = 0, targets = 0;
-    int linearShift = 0, shift = 0; ///< fraction bits of matrices beyond those of translations, and of these
+    int linearShift = 0, shift = 0; ///< extra fraction bits of matrices; fraction bits of translations
 };
 
 /// The faces of a clean mesh, whose clip moves it.

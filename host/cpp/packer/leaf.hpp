@@ -24,7 +24,7 @@ inline Octahedral flatCode(const Leaf& leaf, int triangle, int normalFraction) {
     return octahedralOf({static_cast<double>(normal[0]), static_cast<double>(normal[1]), static_cast<double>(normal[2])});
 }
 
-/// The format of a pair: flat where all normals are those of its triangles, else near or far; none if its vertices are too far apart. A pair
+/// The format of a pair: flat where all normals are its triangles', else near or far; none if its vertices are too far apart. A pair
 /// that bends is near, so that it may become twice as long before it loses its normals.
 inline std::optional<LeafFormat> formatOf(const LeafFields& fields, const Leaf& pair, int normalFraction, bool bends = false) {
     bool isFlat = !bends;

@@ -108,7 +108,7 @@ private:
 
 /// Divides triangles among leaves, two to each if they are a pair. A pair costs the area of its box, in proportion to the boxes of
 /// its triangles. The cheapest ones are joined first. Then a triangle that is left takes a neighbour from its pair, if the other one
-/// of that pair has a neighbour that is left, too.
+/// of that pair also has a neighbour that is left.
 class Matching {
 public:
     Matching(const QuantisedMesh& quantised, const std::vector<bvh::Box>& boxes, const Pairing& pairing) : boxes_(boxes), pairOf_(boxes.size(), none) {

@@ -102,7 +102,7 @@ public:
 
 private:
     /// Rays of a batch, edges of the box from which an origin is advanced, vertex units around a hit in which its neighbours count,
-    /// and by which the device's interval is wider than that of refined hits.
+    /// and by which the device's interval is wider than the refined hits'.
     static constexpr std::size_t batchRays = 1 << 16;
     static constexpr double farEdges = 15, neighbourUnits = 16, slack = 4;
 

@@ -130,7 +130,7 @@ public:
     }
 
 private:
-    /// A parameter of the ray in grid steps, rounded down or up, saturated to those of a ray without a limit.
+    /// A parameter of the ray in grid steps, rounded down or up, saturated as for a ray without a limit.
     Wide steps(const Float& t, const ConvertedRay& ray, bool isUp) const {
         if (!t.isFinite) return n_.unlimited();
         if (t.mantissa == 0) return 0;

@@ -72,7 +72,7 @@ template <int width> void traceFiltered(Scene& scene, const Packet<width>& packe
     for (const colonnade_rays_hit& hit : hits) {
         const Part& part = scene.committed.parts[hit.mesh];
         alignas(16) char bytes[48];
-        std::memset(bytes, 0xff, sizeof bytes); // The last word is that of an instance in an array
+        std::memset(bytes, 0xff, sizeof bytes); // The last word is for an instance in an array
         const Packet<1> found{bytes};
         found.take(part, hit, 0, 0);
         Packet<1>{seen}.set(farEnd, 0, static_cast<float>(hit.t));
@@ -84,7 +84,7 @@ template <int width> void traceFiltered(Scene& scene, const Packet<width>& packe
     packet.set(farEnd, lane, end);
 }
 
-/// Traces the active rays of a packet. Those that follow each other and have one mask are a batch.
+/// Traces the active rays of a packet. Consecutive rays with one mask are a batch.
 template <int width, bool isOcclusion> void trace(const int* valid, Scene* scene, char* bytes, const QueryArguments* arguments) noexcept {
     called(scene, [&] {
         const Packet<width> packet{static_cast<char*>(needed(bytes))};

@@ -1,5 +1,5 @@
-// Embree's devices, buffers, geometries and scenes for triangles, on colonnade_rays.h. Structures are those of Embree 4's documented binary
-// interface, errors those of its calls.
+// Embree's devices, buffers, geometries and scenes for triangles, on colonnade_rays.h. Structures are as in Embree 4's documented binary
+// interface, errors as of its calls.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -93,7 +93,7 @@ struct Device final : Object {
     }
     ~Device() override { colonnade_rays_close(rays); }
 
-    /// The calling thread's error; of a null device that of calls without one.
+    /// The calling thread's error; of a null device the error of calls without one.
     static LastError& error(const Device* device) {
         thread_local std::map<std::uint64_t, LastError> errors;
         return errors[device ? device->number_ : 0];

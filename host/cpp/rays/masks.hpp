@@ -1,4 +1,4 @@
-// Masks of 32 bits by those of the device, which have 8.
+// Masks of 32 bits by the device's, which have 8.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -40,7 +40,7 @@ private:
 
     static bool isEmpty(const std::vector<bool>& set) { return std::find(set.begin(), set.end(), true) == set.end(); }
 
-    /// Gives each bit that of its set; false if a set is missing.
+    /// Gives each bit its set's; false if a set is missing.
     bool assign(const std::vector<std::vector<bool>>& sets, const std::vector<std::vector<bool>>& own) {
         for (unsigned bit = 0; bit < bits; ++bit) {
             const bool isOwn = own.size() == deviceBits && bit < deviceBits && own[bit] == sets[bit];

@@ -74,7 +74,7 @@ public:
 private:
     static double dot(const mesh::Vector& a, const mesh::Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-    /// Faces by the places of their corners: those of place p are at[first[p]] … at[first[p + 1] - 1].
+    /// Faces by the places of their corners: place p's are at[first[p]] … at[first[p + 1] - 1].
     struct Neighbours {
         std::vector<std::int64_t> positions; ///< of the vertices
         std::vector<std::size_t> first, at;

@@ -138,7 +138,7 @@ int colonnade_rays_open(const char* design, const colonnade_rays_backend* backen
     *device = new (std::nothrow) colonnade_rays_device;
     if (!*device) return COLONNADE_RAYS_NO_MEMORY;
     return guarded([&] {
-        // A device has one design: that of its hardware
+        // A device has one design: its hardware's
         std::vector<const char*> texts{design ? design : edgeDesign};
         if (!design && !backend) texts.push_back(fineDesign);
         for (const char* const text : texts) {

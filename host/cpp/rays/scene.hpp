@@ -42,7 +42,7 @@ public:
         dropped_ = whole - std::min(whole, quantised_.faces.size());
     }
 
-    /// Faces that the grid drops, as their corners become one line; not those that are thinner than rounding to double makes lines.
+    /// Faces that the grid drops, as their corners become one line; not faces so thin that rounding to double makes them lines.
     std::size_t dropped() const { return dropped_; }
 
     /// Why the grid is too coarse; nothing if it is not.
@@ -88,7 +88,7 @@ public:
     const colonnade_rays_image& image() const { return image_; }
     const std::array<double, 3>& corner() const { return corner_; }
     double unit() const { return unit_; }
-    /// That of the cube of all vertex units.
+    /// The box of the cube of all vertex units.
     double edge() const { return edge_; }
 
     std::uint32_t meshOf(std::size_t face) const { return faces_[face].mesh; }

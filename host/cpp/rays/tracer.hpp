@@ -45,7 +45,7 @@ private:
         std::atomic<std::uint64_t> deepest{0};
     };
 
-    /// Unlike an address, not that of sums before.
+    /// Unlike an address, never equal to earlier sums'.
     static std::uint64_t newNumber() {
         static std::atomic<std::uint64_t> numbers{0};
         return ++numbers;

@@ -53,7 +53,7 @@ def _count(found: list[Outcome], kind: str) -> int:
 
 
 def _cheap(bench: Bench, names: list[str]) -> Iterator[Outcome]:
-    """The claims of names, of `--quick`, or all. Those that are named fail if their files cannot be had."""
+    """The claims of names, of `--quick`, or all. Named ones fail if their files cannot be had."""
     known = {check.name: check for check in CHECKS}
     is_quick = names == ["--quick"]
     named = [] if is_quick else names

@@ -40,7 +40,7 @@ class Bench:
     Attributes:
         data: The data of the page.
         folder: Receives studies and reports.
-        meshes: Those of the cheap forms.
+        meshes: The cheap forms' meshes.
         missing: What cannot be fetched, with the reason; filled by `lacks`.
     """
 

@@ -13,7 +13,7 @@ from colonnade_lab.explore.figures import per_ray
 
 #: Units of the cheap form of Fig. 7(a): the most triangles of a mesh.
 TRIANGLES = (50, 150)
-#: Precisions of that of Fig. 8, beside the baseline: the paper's first example, and its choice.
+#: Precisions of Fig. 8's, beside the baseline: the paper's first example, and its choice.
 PRECISIONS = ("24b24s24d", paper.PRECISION)
 _ROOM = "scenes/rooms/living"
 

@@ -32,7 +32,7 @@ TABLES: Mapping[str, tuple[str, str]] = {
 
 
 class _Both(Data):
-    """Data measured now, else those of the page."""
+    """Data measured now, else the page's."""
 
     def __init__(self, now: Path, page: Data) -> None:
         super().__init__(now)
@@ -49,7 +49,7 @@ def outcomes(data: Data, folder: Path) -> Iterator[Outcome]:
 
     Args:
         data: The data of the page.
-        folder: Receives the data files; those of an earlier run of the same sources are kept.
+        folder: Receives the data files; files of an earlier run of the same sources are kept.
     """
     entries = catalog()
     for name in paper_tables.PARTS:

@@ -15,7 +15,7 @@ class Figure:
 
     @property
     def is_equal(self) -> bool:
-        """Whether it is that of the page, or of this machine."""
+        """Whether it is the page's, or this machine's."""
         return self.page in ("", self.now)
 
 
@@ -26,7 +26,7 @@ class Outcome:
     Attributes:
         claim: Where the paper has it, and what it says.
         paper: The paper's figure.
-        figures: Those of here.
+        figures: Our figures.
         reason: Why there are none; None if there are.
         failed: The reason is a failure.
         seconds: Wall time.
@@ -43,7 +43,7 @@ class Outcome:
 
     @property
     def is_right(self) -> bool:
-        """Whether nothing failed, and every figure is that of the page."""
+        """Whether nothing failed, and every figure equals the page's."""
         return not self.failed and all(figure.is_equal for figure in self.figures)
 
     def lines(self) -> list[str]:

@@ -203,7 +203,7 @@ class Drawn:
     sources: tuple[str, ...]
 
 
-_GATES = "Power is that of replayed gates, without wires, clock tree and DRAM."
+_GATES = "Power is of replayed gates, without wires, clock tree and DRAM."
 
 PLOTS = (
     Plot(

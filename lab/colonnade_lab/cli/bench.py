@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @click.command(cls=Command)
 @configuration_options
 @click.option("--mesh", "meshes", multiple=True, type=MESH, metavar="MESH", help="Render only this mesh. Repeatable.")
-@size_option("Frame size in pixels.  [default: that of the benchmark scene]")
+@size_option("Frame size in pixels.  [default: the benchmark scene's]")
 @click.option(
     "--jobs",
     type=click.IntRange(min=1),
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     "--reuse/--fresh",
     default=False,
     show_default=True,
-    help="Reuse cached results of earlier runs, also those of explore.",
+    help="Reuse cached results of earlier runs, also of explore.",
 )
 @click.option("--mirror/--no-mirror", default=True, show_default=True, help="Also render the meshes as mirrors.")
 @click.option(

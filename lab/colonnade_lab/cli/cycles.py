@@ -36,7 +36,7 @@ _MESHES = ("teapot", "torus", "sphere:81920")
 @click.option(
     "--mesh", "meshes", multiple=True, type=MESH, metavar="MESH", help="Mesh of the scene. Repeatable with --against."
 )
-@size_option("Frame size in pixels.  [default: that of the scene]")
+@size_option("Frame size in pixels.  [default: the scene's]")
 @click.option(
     "--dram",
     "latency",
@@ -47,7 +47,7 @@ _MESHES = ("teapot", "torus", "sphere:81920")
 @click.option(
     "--against",
     metavar="CONFIG",
-    help="Compare with this configuration; HEAD: with that of --config in the last commit.",
+    help="Compare with this configuration; HEAD: with --config in the last commit.",
 )
 @click.option(
     "--liberty",
@@ -72,7 +72,7 @@ def cycles(
     """Count the cycles of a frame with the cycle model: in seconds, without a simulator.
 
     The bit-exact model renders the frame, and its rays go through a model of the units and caches with the latencies
-    of the RTL. The counters are those of the RTL, within a per cent or two. Without SCENE it is the benchmark's.
+    of the RTL. The counters are the RTL's, within a per cent or two. Without SCENE it is the benchmark's.
 
     With --against the frames of some meshes are counted on two designs, at three latencies of DRAM: the change of their
     cycles with its scatter, the gates of units that differ, and whether the pictures are equal.

@@ -38,7 +38,7 @@ def study() -> None:
 def rays(rooms: tuple[Path, ...], json_file: Path | None) -> None:
     """Rays from mirror, matt and glass spheres: the share that finds the correct point.
 
-    With planes of the full maps, and with those of the attribute memory.
+    With planes of the full maps, and of the attribute memory.
     """
     _report("environment_accuracy", lambda study, _: study.study_rooms(rooms), json_file)
 
@@ -101,7 +101,7 @@ def generated(seeds: list[int], no_dists: bool, json_file: Path | None) -> None:
 @seeds_argument
 @json_option
 def views(seeds: list[int], json_file: Path | None) -> None:
-    """Cameras beside that of the maps in generated rooms: the share of pixels that is right."""
+    """Cameras beside the maps' in generated rooms: the share of pixels that is right."""
     _report("moved_views", lambda study, on: study.study_seeds(seeds, progress=on), json_file)
 
 

@@ -27,9 +27,9 @@ from colonnade.cli.options import (
     "--scene",
     type=FILE,
     metavar="SCENE",
-    help="Scene with the material, lights and paths.  [default: that of the benchmark]",
+    help="Scene with the material, lights and paths.  [default: the benchmark's]",
 )
-@size_option("Frame size in pixels.  [default: that of the scene]")
+@size_option("Frame size in pixels.  [default: the scene's]")
 @click.option("--rtl/--no-rtl", default=True, show_default=True, help="Compare the RTL with the model.")
 @click.option("--reference/--no-reference", default=True, show_default=True, help="Compare the model with Embree.")
 @strict_option

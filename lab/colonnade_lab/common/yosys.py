@@ -34,7 +34,7 @@ def abc_program() -> Path:
 
 
 def _python() -> Path:
-    """The interpreter that has Yosys: this one, or that of `tools/proof-environment`."""
+    """The interpreter that has Yosys: this one, or the one of `tools/proof-environment`."""
     if importlib.util.find_spec("pyosys") is not None:
         return Path(sys.executable)
     apart = project_root() / ".cache" / "proof-environment" / "bin" / "python"

@@ -33,7 +33,7 @@ def frame_cycles(
     dram_latency: int = DRAM_LATENCY,
     dram_interval: int = DRAM_INTERVAL,
 ) -> dict[str, Any]:
-    """The report of a frame as that of the RTL, with its cycles by the cycle model.
+    """The report of a frame as of the RTL, with its cycles by the cycle model.
 
     Args:
         prepared: The scene on the design.
@@ -75,7 +75,7 @@ class Compared:
 
     @property
     def ratios(self) -> list[float]:
-        """Cycles of the first design over those of the second one, at each latency."""
+        """Cycles of the first design over the second one's, at each latency."""
         return [first / second for first, second in zip(*self.cycles, strict=True)]
 
     def as_json(self) -> dict[str, Any]:
@@ -113,7 +113,7 @@ class Change:
 
     @staticmethod
     def of(frames: Sequence[Compared]) -> Change:
-        """That of all frames."""
+        """The sum of all frames."""
         means = [
             math.exp(statistics.fmean(math.log(frame.ratios[i]) for frame in frames)) for i in range(len(LATENCIES))
         ]

@@ -36,7 +36,7 @@ class DeviceMarch:
             environment: The room.
             image: Its encoded maps.
             manifest: Of the device.
-            is_from_camera: Rays are those of a camera: they see the maps, or nothing.
+            is_from_camera: Rays come from a camera: they see the maps, or nothing.
         """
         from colonnade import _core
 

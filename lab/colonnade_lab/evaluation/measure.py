@@ -47,7 +47,7 @@ def measure_frame(
 
     Returns:
         `colonnade.render.report.frame_report` with ``config_hash``, ``cycles_per_second``, ``seconds``, and with a
-        cache ``dram_line_bytes``, those that the DRAM port moves for a line.
+        cache ``dram_line_bytes``, bytes that the DRAM port moves for a line.
     """
     design = design_for(config, overrides)
     manifest = design.manifest

@@ -96,7 +96,7 @@ def measured(
     options: Sequence[str] = (),
     progress: Progress = QUIET,
 ) -> Iterator[DeviceRates]:
-    """Rates of each kind. The caches are those that the batch before it has left."""
+    """Rates of each kind. The caches are as the batch before has left them."""
     from colonnade.rays.device import RayDevice
 
     device = RayDevice(config, overrides, options, progress)

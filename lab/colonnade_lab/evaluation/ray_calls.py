@@ -26,7 +26,7 @@ _PROGRAM = Path(__file__).with_suffix(".c")
 
 @dataclass(frozen=True)
 class CallTimes:
-    """CPU microseconds a ray of a kind; those of Embree are None without embreex.
+    """CPU microseconds a ray of a kind; Embree's are None without embreex.
 
     Attributes:
         kind: One of `KINDS`.

@@ -16,7 +16,7 @@ from colonnade.rays import Scene
 
 #: Counters of what rays read.
 READS = ("nodeReads", "triangleTests")
-#: Kinds of rays; "shuffled" ones have no order, the others that of `Scene.order`.
+#: Kinds of rays; "shuffled" ones have no order, the others `Scene.order`.
 KINDS = ("outside", "outside, shuffled", "off the surface", "off the surface, shuffled", "occlusion")
 
 
@@ -46,7 +46,7 @@ class RayRates:
 
 
 def rays_of_kind(kind: str, mesh: Mesh, count: int) -> Floats:
-    """Rays [count, 8] of a kind, float32 values; those of a name are always the same."""
+    """Rays [count, 8] of a kind, float32 values; a name's are always the same."""
     random = np.random.default_rng(len(kind.partition(",")[0]))
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     edge, way = (high - low).max(), random.normal(size=(count, 3))
@@ -65,7 +65,7 @@ def rays_of_kind(kind: str, mesh: Mesh, count: int) -> Floats:
 
 
 def measured(mesh: Mesh, config: str, overrides: tuple[str, ...], count: int) -> Iterator[RayRates]:
-    """Rates of each kind; the time of Embree has its conversion from arrays, as that of the model has."""
+    """Rates of each kind; the time of Embree has its conversion from arrays, as the model's has."""
     scene, embree = Scene(mesh.vertices, mesh.faces, config, overrides), embree_of(mesh)
     has_caches = manifest_for(config, overrides).manifest.config["columnBvhMemory"]["cache"] is not None
     for kind in KINDS:

@@ -51,7 +51,7 @@ def room_frames(manifest: Manifest, size: tuple[int, int], moved: bool = False) 
     Args:
         manifest: The design's manifest.
         size: Width and height, pixels.
-        moved: Only mirrors, from a camera beside that of the maps, with the room in each of `ROWS`.
+        moved: Only mirrors, from a camera beside the maps', with the room in each of `ROWS`.
     """
     width, height = size
     for room in ("living", "office"):

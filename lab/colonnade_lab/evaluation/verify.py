@@ -97,8 +97,8 @@ def verify(
         scene: Scene file; its mesh is replaced, unless it has several objects.
         config: Configuration, before `overrides`.
         overrides: Changes to the configuration, ``key.path=value``.
-        meshes: Names or files; if empty, those of the benchmark, or the scene's several objects.
-        size: Width and height, pixels; None: those of the scene.
+        meshes: Names or files; if empty, the benchmark's, or the scene's several objects.
+        size: Width and height, pixels; None: the scene's.
         with_rtl: Compare the RTL with the model.
         with_reference: Compare the model with the reference.
         progress: Shows the steps.
@@ -106,7 +106,7 @@ def verify(
 
     Returns:
         ``{"config", "equal", "meshes": {name: {"triangles", "rtl", "reference"}}}``; a skipped comparison is None. The
-        name of several objects is that of the scene file.
+        name of several objects is the scene file's.
     """
     frames: dict[str, str | None] = {name: name for name in meshes or MESHES}
     if not meshes and load_scene(scene).objects:

@@ -1,4 +1,4 @@
-"""The benchmark: rays per cycle of eight meshes in the RTL, by the same jobs as those of a study."""
+"""The benchmark: rays per cycle of eight meshes in the RTL, by the same jobs as in a study."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def bench(
         config: Configuration, before `overrides`.
         overrides: Changes to the configuration, ``key.path=value``.
         meshes: Names or files.
-        size: Width and height, pixels; None: those of the benchmark scene.
+        size: Width and height, pixels; None: the benchmark scene's.
         parallel: Number of frames in parallel.
         progress: Shows the steps.
         finished: Called after each mesh, in order.

@@ -32,7 +32,7 @@ class Frame:
     """A frame of the workload.
 
     Attributes:
-        name: Its name in tables: that of the mesh, or of the scene, or of both where both vary.
+        name: Its name in tables: of the mesh, or of the scene, or of both where both vary.
         scene: The scene with the mesh's name.
         mesh: The mesh.
         source: The mesh as the study names it; None: the scene's.

@@ -34,11 +34,11 @@ class Kind:
     """A kind of jobs.
 
     Attributes:
-        name: Its name, which is that of its function in `colonnade_lab.explore.work`.
-        packages: Folders of the host's packages whose sources, beside that of the function, determine the result.
+        name: Its name, as of its function in `colonnade_lab.explore.work`.
+        packages: Folders of the host's packages whose sources, beside the function's, determine the result.
         needs: Resources of a worker: programs by their names, and ``memory`` in MB.
         uses_generator: The hardware's sources determine the result.
-        uses_model: The compiled sources do: those of the tree builder and of the model.
+        uses_model: The compiled sources do: the tree builder's and the model's.
     """
 
     name: str

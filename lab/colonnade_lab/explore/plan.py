@@ -104,7 +104,7 @@ class Plan:
         }
 
     def jobs(self, point: Point, manifest: Manifest, baseline: tuple[Point, Manifest] | None) -> PointJobs:
-        """All jobs of a point. Those of the baseline's pictures belong to it, too."""
+        """All jobs of a point, with jobs of the baseline's pictures."""
         study, found = self.study, PointJobs(point, manifest)
         design = {"config": self._config, "overrides": (*self._base, *point.overrides[self._prefix :])}
         if study.quality is not None:
@@ -256,7 +256,7 @@ def _job(kind: str, title: str, identity: Mapping[str, Any], arguments: Mapping[
 
 
 def _library(file: StudyFile, name: str, given: Mapping[str, Sequence[str]]) -> dict[str, bytes]:
-    """The liberty files of a library by their names; those of a published library if none are given."""
+    """The liberty files of a library by their names; a published library's if none are given."""
     if name not in given and name not in LIBRARIES:
         advice = f"--library {name}=FILE names its liberty files"
         raise file.error(("libraries", name), f"the library {name} has no files: {advice}")

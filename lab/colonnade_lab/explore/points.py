@@ -51,7 +51,7 @@ def _name(values: Mapping[str, FieldValue]) -> str:
 
 
 def points_of(file: StudyFile) -> list[Point]:
-    """The points of the axes and the named ones, without those that a search adds.
+    """The points of the axes and the named ones, without points that a search adds.
 
     Raises:
         UserError: Two points have one name, there are too many, or the baseline is unknown.

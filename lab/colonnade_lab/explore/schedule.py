@@ -64,7 +64,7 @@ class Schedule:
         self._waits: set[str] = set()
 
     def run(self, batch: Iterable[Job], finished: Callable[[Job, Outcome], None] = lambda job, outcome: None) -> None:
-        """Run jobs to their end; equal jobs run once. A failed job fails those that read its result."""
+        """Run jobs to their end; equal jobs run once. A failed job fails jobs that read its result."""
         left = {job.key: job for job in batch if job.key not in self.outcomes}
         total = len(left)
         running: dict[Future[dict[str, bytes]], tuple[Job, float, ExitStack]] = {}

@@ -75,7 +75,7 @@ class Design:
 
 @dataclass(frozen=True, config=_STRICT)
 class NamedPoint:
-    """A point beside those of the axes.
+    """A point beside the axes'.
 
     Attributes:
         name: Its name in tables and plots.
@@ -107,7 +107,7 @@ class Workload:
 
 @dataclass(frozen=True, config=_STRICT)
 class Quality:
-    """Pictures of the bit-exact model, compared with Embree's and with those of the baseline.
+    """Pictures of the bit-exact model, compared with Embree's and with the baseline's.
 
     Attributes:
         dists: Measure DISTS, whose weights are a download of 64 MB.
@@ -121,7 +121,7 @@ class Tests:
     """Box tests, triangle tests and node reads of the bit-exact model, and the records of the scene.
 
     Attributes:
-        same_pictures: The pictures of each point with the baseline's `children` must equal those of the baseline.
+        same_pictures: The pictures of each point with the baseline's `children` must equal the baseline's.
     """
 
     same_pictures: StrictBool = False
@@ -228,12 +228,12 @@ class Study:
         baseline: Name of the point that the others are compared with.
         libraries: Names of standard-cell libraries, whose files the command line gives; empty: Yosys's generic gates.
         objectives: Figures whose Pareto front is reported.
-        plots: Pairs of figures or axes that are drawn beside those of objectives, each horizontal, then vertical.
+        plots: Pairs of figures or axes that are drawn beside the objectives', each horizontal, then vertical.
         render_index: Norms of the RenderIndex.
         quality, tests, cycles, area, power: The measures; one without a table is not taken.
         design: The configuration that every point starts from.
         axes: Values of configuration fields.
-        point: Points beside those of the axes.
+        point: Points beside the axes'.
         workload: The frames.
         search: The search, for ``combine = "search"``.
     """

@@ -55,10 +55,10 @@ class Entry:
             hyphen only prepares the next ones.
         overrides: Changes to the configuration, ``key.path=value``.
         report: The file that the commands write, below the root, where they take no name of one.
-        libraries: Those of `LIBRARIES` that the commands need.
+        libraries: The ones of `LIBRARIES` that the commands need.
         designs: Those whose Verilog decides the figures; None: the configuration. None at all for figures of the model,
             whose pictures and counts no timing changes.
-        sources: Names of the host's sources that decide them, too (`digests.SOURCES`).
+        sources: Names of the host's sources that also decide them (`digests.SOURCES`).
     """
 
     name: str
@@ -265,7 +265,7 @@ def _light() -> Entry:
 
 
 def catalog() -> dict[str, Entry]:
-    """All entries by name. Those that the pages need most come first."""
+    """All entries by name, the pages' most needed ones first."""
     entries = (
         _bench("edge"),
         _large(),

@@ -169,7 +169,7 @@ def libraries(data: Data) -> str:
 
 
 def _edge(data: Data) -> dict[str, Report]:
-    """The reports of `edge` by library, that of ASAP7 first."""
+    """The reports of `edge` by library, ASAP7's first."""
     found = {"asap7": data.result("area-edge-asap7")}
     other = data.optional("area-edge-sky130")
     return found | ({"sky130": other} if other else {})

@@ -92,7 +92,7 @@ def unmeasured(docs: Path) -> list[str]:
 
 
 def declare_measured(docs: Path, name: str) -> None:
-    """Take an entry from the list of those that are not measured."""
+    """Take an entry from the list of unmeasured ones."""
     file = docs / "data" / UNMEASURED
     left = [each for each in unmeasured(docs) if each != name]
     if left:
@@ -140,7 +140,7 @@ def release_problems(docs: Path) -> Iterator[str]:
 
 
 def _size_problems(data: Data, entries: Mapping[str, Entry]) -> Iterator[str]:
-    """One line for each array whose size is not that of the same configuration in an earlier entry."""
+    """One line for each array whose size differs from the same configuration's in an earlier entry."""
     known: dict[str, tuple[str, str]] = {}
     for name, entry in entries.items():
         for design, library, config, kge in _sizes(entry, data.get(name) or {}):

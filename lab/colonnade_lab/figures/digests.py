@@ -111,7 +111,7 @@ def _place(design: Design) -> tuple[Path, dict[str, str]]:
 
 
 def stale(entry: Entry, measured: Mapping[str, str]) -> Iterator[str]:
-    """One line for each configuration or source whose digest is another one than that of a data file."""
+    """One line for each configuration or source whose digest differs from a data file's."""
     today = digests_of(entry)
     for name in sorted(today.keys() ^ measured.keys()):
         yield f"it has no digest of {name}" if name in today else f"its digest of {name} belongs to no measurement"

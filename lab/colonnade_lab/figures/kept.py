@@ -60,5 +60,5 @@ def _of_point(point: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _chosen(values: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
-    """The values of keys; without those that are not measured."""
+    """The values of keys, without unmeasured ones."""
     return {key: values[key] for key in keys if values.get(key) is not None}

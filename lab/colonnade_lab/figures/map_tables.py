@@ -1,6 +1,6 @@
 """The tables of maps: ``docs/background.md``, and of captures and the live encoder, ``docs/captures.md``.
 
-Reports also have times, which are those of one machine; no table shows them.
+Reports also have times, which are one machine's; no table shows them.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ def _earlier(read: Read, declared: Collection[str]) -> str:
 
 
 def tables_of(docs: Path, entries: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """The names and the text of the tables that are made of data files, without those of minutes."""
+    """The names and the text of the tables that are made of data files, without tables of minutes."""
     for name, table in TABLES.items():
         if name in _OF_MINUTES:
             continue

@@ -31,7 +31,7 @@ _KEY = "Report"
 
 
 def write(docs: Path) -> None:
-    """Draw all pictures, and replace those that differ or have another digest."""
+    """Draw all pictures, and replace the ones that differ or have another digest."""
     for file, report, draw in _pictures(docs):
         with temporary_folder() as folder:
             draw(report, folder / file.name)
@@ -48,7 +48,7 @@ def write(docs: Path) -> None:
 
 
 def problems(docs: Path) -> Iterator[str]:
-    """One line for each picture that shows another report than that of its data file."""
+    """One line for each picture that shows another report than its data file's."""
     for file, report, _ in _pictures(docs):
         if _digest_of(file) != _digest(report):
             yield f"pictures/{file.name} is not that of its data: run tools/figures pages"

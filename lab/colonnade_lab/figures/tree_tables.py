@@ -21,7 +21,7 @@ def _points(study: Mapping[str, Any]) -> dict[str, Point]:
 
 
 def tests(data: Data) -> str:
-    """Tests of an in-box ray with and without a tree, by mesh, and those of a frame without one by arithmetic."""
+    """Tests of an in-box ray with and without a tree, by mesh, and of a frame without one by arithmetic."""
     study, costs = data.result("bvh-tests"), data.result("bvh-costs")
     points, alone = _points(study), _points(costs)[NONE]
     rows: list[list[str]] = []

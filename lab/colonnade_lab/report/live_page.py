@@ -85,7 +85,7 @@ class Moved:
 
     Attributes:
         triangles: Of all objects.
-        bent: Those of meshes that bend.
+        bent: Figures of meshes that bend.
         costs: Of its frames.
         video: MP4 file.
         rate: Frames a second of the video.

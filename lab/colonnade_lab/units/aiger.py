@@ -57,7 +57,7 @@ def write_circuits(name: str, kinds: dict[str, str], reset: str = "1,0") -> list
 
 
 def claims(folder: Path, kind: str) -> list[str]:
-    """The names of a circuit's checks, in abc's order, without those of the instances around them."""
+    """The names of a circuit's checks, in abc's order, without the instances around them."""
     named = json.loads((folder / f"{kind}.json").read_text())["asserts"]
     return [path[-1].lstrip("\\").rpartition(".")[2] for path in named]
 

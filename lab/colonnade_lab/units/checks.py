@@ -57,7 +57,7 @@ def read_checks(verilog: str, top: str, cycles: int) -> Checks:
 
     def cover(match: re.Match[str]) -> str:
         label = f"cover_{len(texts)}"
-        # The comment has the places of all parts, that of the cover last: "// A.scala:3:5, :9:{2,7}"
+        # The comment has the places of all parts, the cover's last: "// A.scala:3:5, :9:{2,7}"
         lines = re.findall(r":(\d+):", match[2])
         file = re.search(r".*[ \t](\S+?\.scala):", match[2])
         texts[label] = f"{file[1]}:{lines[-1]}" if file and lines else top

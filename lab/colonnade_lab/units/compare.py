@@ -2,7 +2,7 @@
 
 Modules are compared from the bottom up. One whose text and whose parts are equal is equal. Another is compared at its
 ports; where it differs, or its ports do, so is each module around it. So a unit may differ while the device is equal.
-Inputs of a unit keep no contract but that of streams: it may differ only where its neighbours never lead it.
+Inputs of a unit keep no contract but the streams': it may differ in states that its neighbours never reach.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ VERDICTS = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is known of a unit whose text, or that of a part, changed.
+    """What is known of a unit whose text, or a part's, changed.
 
     Attributes:
         unit: The module.

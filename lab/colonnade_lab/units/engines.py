@@ -42,7 +42,7 @@ def ask(circuit: Path, question: str, limit: int = LIMIT) -> Answer:
 
     Args:
         circuit: An AIGER file.
-        question: Commands, such as `pdr`; `bmc3 -F 9` for nine frames, of which the first is that of the reset.
+        question: Commands, such as `pdr`; `bmc3 -F 9` for nine frames, of which the first is the reset's.
         limit: CPU seconds.
     """
     values = circuit.with_suffix(".values")

@@ -62,7 +62,7 @@ class Modules:
         return sorted(found)
 
     def bottom_up(self) -> Iterator[str]:
-        """All modules, each one after those that it instantiates."""
+        """All modules, each one after the modules that it instantiates."""
         seen: set[str] = set()
 
         def visit(name: str) -> Iterator[str]:

@@ -11,7 +11,7 @@
 #include "layout.h"
 #include "soc.h"
 
-/* What compare_frames.py reads of a frame: its poses, and the words that differ from those of the frame before. */
+/* What compare_frames.py reads of a frame: its poses, and the words that differ from the frame before. */
 struct record {
     struct colonnade_camera camera;
     struct colonnade_light light;

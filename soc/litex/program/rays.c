@@ -1,5 +1,5 @@
 /* Hands batches of rays to the device by the driver, with interrupts, and ends the simulation. Up to three batches are in the
- * ring, where those that wait follow the one that runs. The build puts the files of examples/rays/batches.py into memory, and
+* ring, where others wait behind the running one. The build puts the files of examples/rays/batches.py into memory, and
  * their addresses into layout.h. */
 #include <libbase/crc.h>
 #include <stdio.h>

@@ -109,7 +109,7 @@ public:
             parts_.back().each([](auto& part) { part.model->eval(); });
             columns_.back()->eval();
         }
-        for (std::size_t i = 0; i < units_.size(); ++i) { // constants, too
+        for (std::size_t i = 0; i < units_.size(); ++i) { // also constants
             const UnitVariables& variables = unitVariables_[i];
             VUnitModel& inner = *units_[i];
             Unit_INPUTS(INWARD)

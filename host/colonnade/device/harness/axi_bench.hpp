@@ -63,7 +63,7 @@ private:
     const Access noise_{0x5A5A, 10, 0xDEADBEEF};
     bool hasData_;
     std::deque<Access> open_;
-    std::size_t addresses_ = 0, data_ = 0; // those of them that were taken
+    std::size_t addresses_ = 0, data_ = 0; // how many were taken
 };
 
 class Bench {
@@ -99,7 +99,7 @@ public:
     void beginWrite(unsigned address, std::uint32_t data, unsigned strobes = 15) { write_.begin({address, strobes, data, delay(), delay(), delay(), 0}); }
     void beginRead(unsigned address) { read_.begin({address, 15, 0, delay(), 0, delay(), 0}); }
 
-    /// Waits for the answers of what has begun; those of the writes, in order.
+    /// Waits for the answers of what has begun; the answers of the writes, in order.
     std::vector<unsigned> finish() {
         ++slaves.accesses;
         for (unsigned i = 0; !write_.areDone() || !read_.areDone(); ++i) {

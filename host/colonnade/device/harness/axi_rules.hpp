@@ -1,4 +1,4 @@
-// Rules of AXI4 and AXI4-Lite (IHI 0022) at the pins of the shell, and the report of those that were broken.
+// Rules of AXI4 and AXI4-Lite (IHI 0022) at the pins of the shell, and the report of broken ones.
 #pragma once
 #include <array>
 #include <cstdint>

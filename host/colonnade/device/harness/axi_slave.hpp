@@ -167,7 +167,7 @@ private:
     bool wasBusy_ = false;
 };
 
-/// The read channels of a slave. Reads of one id are answered in order, those of others overtake and interleave.
+/// The read channels of a slave. Reads of one id are answered in order, reads of others overtake and interleave.
 class ReadSlave {
 public:
     ReadSlave(Slaves& slaves, std::string port, unsigned busBytes, Silent address, Silent data)

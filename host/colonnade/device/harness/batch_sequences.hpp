@@ -168,7 +168,7 @@ private:
         else std::fill(isOpen.begin() + static_cast<std::ptrdiff_t>(each.hits), isOpen.begin() + static_cast<std::ptrdiff_t>(each.hitEnd), true);
     }
 
-    /// Other wrong batches may write there, too.
+    /// Other wrong batches may also write there.
     bool isShared(std::uint64_t tagAt) const { return tagAt < at(tags_) || tagAt >= at(tags_) + 4 * slots_; }
 
     bool isRight() override {

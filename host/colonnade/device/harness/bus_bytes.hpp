@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 /// Bytes from a bus address on, whose index is the bus address: of this process, where they begin as 0xA5, or of a file
-/// that other programs map, too.
+/// that other programs also map.
 class BusBytes {
 public:
     BusBytes() = default;

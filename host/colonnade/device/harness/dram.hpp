@@ -1,6 +1,6 @@
 // A model of DRAM behind the device's AXI4 read port, for designs with a cache (DRAM_BUS_BYTES).
 //
-// Reads take `latency` cycles, with `banks` also those of rows and refresh (dram_timing.hpp), and then deliver a beat per cycle,
+// Reads take `latency` cycles, with `banks` also rows and refresh (dram_timing.hpp), then deliver a beat per cycle,
 // or every `interval` cycles, in the order of the reads. With `randomPercent`, addresses and beats are refused or withheld in that share of the cycles, and reads of different ids
 // overtake each other. A read beyond the scene is answered with DECERR. Two failures end with the first frame: with
 // `errorsPer1024`, so many of 1024 beats are answered with SLVERR; with `silentAfter`, reads are answered no more after so many.

@@ -25,7 +25,7 @@ private:
 /// DDR3-1600 with 64 data pins behind a controller of 200 MHz, in its cycles of 5 ns (JESD79-3, devices of 4 Gbit).
 ///
 /// A cycle moves one burst of 64 bytes, in the order of the reads. Addresses are row, bank, column. Each bank opens the row of its next read
-/// while others deliver. A read of an open row takes `latency` cycles, of a bank without one an activation more, of another row a precharge, too.
+/// while others deliver. A read of an open row takes `latency` cycles, without one also an activation, of another row also a precharge.
 class BankedDram final : public DramTiming {
 public:
     static constexpr std::uint64_t rowBytes = 8192, burstBytes = 64;

@@ -224,7 +224,7 @@ private:
         awaitIdle("a frame does not end, in spite of the watchdog");
     }
 
-    /// Any values in the registers of a frame, but its size and those of `frame.watchdogCycles` and `dram.page`.
+    /// Any values in the registers of a frame, but its size, `frame.watchdogCycles` and `dram.page`.
     void noisyRegisters() {
         prepare();
         for (const auto& word : job_.frame)

@@ -102,7 +102,7 @@ public:
             std::copy(stored->bytes.begin(), stored->bytes.end(), clean_.begin() + static_cast<std::ptrdiff_t>(stored->address));
     }
 
-    /// Runs a sequence on a shell of its own, whose power-up state is of the seed, too: the seed alone repeats it.
+    /// Runs a sequence on a shell of its own, whose power-up state is also the seed's: the seed repeats it.
     void run(std::uint64_t seed) {
         slaves_.random.seed(seed);
         Verilated::randSeed(static_cast<int>(seed % 0x7FFFFFFF) + 1);

@@ -12,7 +12,7 @@
 //                              1024 of its answers are errors
 //
 // Options: --bus BYTES of the data bus; --memory BYTES of memory, from address --base N (0); --shared FILE, which is the
-// memory, and which other programs may map, too; --latency CYCLES of an answer; --stall
+// memory, and which other programs may also map; --latency CYCLES of an answer; --stall
 // PERCENT of cycles in which a channel does not move; --order N of a write's address and data (WriteOrder); --seed N of stalls and of the state at power-up. An access beyond the memory, an answer with an error, or a
 // broken rule of AXI ends the run. Exit status 0, or 3 on an error.
 #include <cstdint>

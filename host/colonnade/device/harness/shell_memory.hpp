@@ -30,7 +30,7 @@ struct ScenePins {
     CData &io_memory_r_bits_id, &io_memory_r_bits_last, &io_memory_r_bits_resp;
 };
 
-/// Reads of the scene: those of different ids overtake each other where channels stall.
+/// Reads of the scene: reads of different ids overtake each other where channels stall.
 class Scene {
 public:
     Scene(VColonnadeAxi& top, const DramOptions& options, BusBytes& bytes) : pins_(top), dram_(pins_, options, bytes) {}
@@ -258,7 +258,7 @@ public:
         scene_.take();
     }
 
-    /// The memory behind the masters, not that of the scene, from now on.
+    /// The memory behind the masters, not the scene's, from now on.
     void set(const MasterTiming& timing) {
         master_.set(timing);
         refit_.set(timing);

@@ -9,7 +9,7 @@
 /// A Verilator model that clocks on both edges.
 ///
 /// If an even number of edges with equal inputs and outputs leaves its whole state as it was, more of them do the same:
-/// it sleeps, and only counts edges, until an input changes. It then does those that its last period had not completed.
+/// it sleeps, and only counts edges, until an input changes. It then does the edges that its last period lacked.
 /// This is exact, since state and inputs determine the next state. Counters that run freely only lengthen the period.
 template <class Model> class Still {
 public:
@@ -57,7 +57,7 @@ public:
     /// Throws if a period of the sleep changes the state.
     void check(const char* name) {
         if (!isStill_) return;
-        flip(period_); // from the begin of a period: those that it misses are still to be done
+        flip(period_); // from the begin of a period: the missing ones are still to be done
         if (!isSaved()) throw std::runtime_error(std::string("the simulator let ") + name + " sleep, which does not stand still");
     }
 

@@ -34,15 +34,15 @@ class ClipFaces:
         return cls(clip, corners, np.arange(len(corners)), np.repeat(np.eye(3)[None], len(corners), axis=0))
 
     def pieces(self, owners: Indices, weights: Floats) -> ClipFaces:
-        """Those of parts of the surface's faces, by the weights of their corners, float64 [k, 3, 3]."""
+        """The faces of parts of the surface's faces, by the weights of their corners, float64 [k, 3, 3]."""
         return replace(self, owners=self.owners[owners], weights=fixed_order.product(weights, self.weights[owners]))
 
     def kept(self, faces: Indices) -> ClipFaces:
-        """Those of some of the surface's faces."""
+        """Some of the surface's faces."""
         return replace(self, owners=self.owners[faces], weights=self.weights[faces])
 
     def reversed(self, faces: npt.NDArray[np.bool_]) -> ClipFaces:
-        """Those of a surface some of whose faces have the other winding."""
+        """The same of a surface some of whose faces have the other winding."""
         return replace(self, weights=np.where(faces[:, None, None], self.weights[:, ::-1], self.weights))
 
     def with_vertices(self) -> tuple[Clip, Indices]:

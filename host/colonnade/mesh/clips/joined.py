@@ -30,7 +30,7 @@ class Place:
 
     @classmethod
     def of(cls, matrices: Sequence[Floats], tracks: tuple[Track, ...] = ()) -> Place:
-        """That of transforms to their parents, float64 [4, 4] each, with tracks of the first."""
+        """The place of transforms to their parents, float64 [4, 4] each, with tracks of the first."""
         count = len(matrices)
         return cls(
             Nodes(
@@ -77,7 +77,7 @@ def joined_clip(clips: Sequence[Clip], places: Sequence[Place]) -> Clip:
         places: Of each in the scene of all.
     """
     morphs = [clip.morphs for clip in clips]
-    # Before the nodes of each clip are those of its place
+    # Before the nodes of each clip are its place's
     nodes = _offsets(
         [len(place.nodes.parents) + len(clip.nodes.parents) for place, clip in zip(places, clips, strict=True)]
     )

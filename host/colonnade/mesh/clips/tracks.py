@@ -18,7 +18,7 @@ class Animation:
 
     Attributes:
         name: Its name, or its number from 0.
-        file: The file; None: that of the mesh.
+        file: The file; None: the mesh's.
     """
 
     name: str

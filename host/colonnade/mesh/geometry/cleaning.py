@@ -34,9 +34,9 @@ class CleanMesh:
         faces: int32 [m, 3].
         sources: The raw face of each face, int64 [m].
         normals: At the corners, of unit length, or 0 where the adjacent faces' normals cancel, float64 [m, 3, 3].
-        reversed: Faces whose corners are those of their source backwards, bool [m].
+        reversed: Faces whose corners are their source's backwards, bool [m].
         is_open: Faces of open parts, bool [m].
-        repairs: Closed parts whose faces disagreed, and those that pointed inward; faces whose normals all pointed to
+        repairs: Closed parts whose faces disagreed, and parts that pointed inward; faces whose normals all pointed to
             their back, and were negated; corners whose normal pointed to the back of their face, and was computed
             anew; corners without a normal in a file that has some.
     """

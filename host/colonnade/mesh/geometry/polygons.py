@@ -1,7 +1,7 @@
 """Splits polygons into triangles. Concave ones are split by ear clipping, so that no triangle leaves its polygon.
 
 This is our own code because trimesh splits all polygons as fans, and because choices in numpy's float64 are the same on
-every machine, unlike those of a compiled library with fused multiply-add.
+every machine, unlike a compiled library's with fused multiply-add.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _EAR, _UNKNOWN, _NOT_CONVEX = -1, -2, -3
 
 @dataclass(frozen=True)
 class Triangles:
-    """The triangles of polygons; those of a polygon are consecutive.
+    """The triangles of polygons; a polygon's are consecutive.
 
     Attributes:
         corners: Positions in the list of all polygons' corners, int64 [t, 3].
@@ -98,8 +98,8 @@ def _fan_corners(outlines: Floats) -> tuple[Indices, npt.NDArray[np.bool_], npt.
     """How to split polygons of one size.
 
     Returns:
-        The corner from which each is a fan, int64 [p]: the first of a convex polygon, that of a quadrilateral which is
-        not convex; which polygons are none, bool [p]; and which cross themselves, bool [p]: all others turn once.
+        The corner from which each is a fan, int64 [p]: the first of a convex polygon, in a quadrilateral the one
+        that is not convex; which are none, bool [p]; and which cross themselves, bool [p]: all others turn once.
     """
     count, size = outlines.shape[:2]
     no = np.zeros(count, dtype=np.bool_)

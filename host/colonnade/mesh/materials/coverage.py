@@ -30,7 +30,7 @@ class _Cut:
     """The cut of a material's faces.
 
     Attributes:
-        kinds: 1 for faces that are shown, -1 for those that are hidden, 0 for those of which pieces are, int8 [m].
+        kinds: 1 for faces that are shown, -1 for hidden ones, 0 for faces of which pieces are shown, int8 [m].
         pieces: The shown pieces.
         panes: Of a blended material, alpha and mean colour of hidden faces, float64 [m, 4].
         is_coarse: Pieces ended before they were small enough.
@@ -49,11 +49,11 @@ class _Cut:
 def _cut(
     surface: RawSurface, faces: Indices, texture: Texture | None, alpha: Alpha, factor: float, budget: int
 ) -> _Cut:
-    """Cut a material's faces by the alpha of its texture, if that has one, times that of their corners.
+    """Cut a material's faces by the alpha of its texture, if that has one, times their corners' alpha.
 
     Args:
         surface: The surface.
-        faces: Those of the material, int64 [m].
+        faces: The material's faces, int64 [m].
         texture: Its texture; None: without.
         alpha: What counts.
         factor: Of the alpha of panes.

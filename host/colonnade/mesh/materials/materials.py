@@ -58,7 +58,7 @@ _READ_TEXTURES = ("baseColorTexture", "diffuseTexture", "normalTexture")
 _MTL_VALUES = {"Kd": 3, "Ke": 3, "Tf": 3, "illum": 1, "d": 1, "Tr": 1, "Ni": 1, "Pm": 1, "Pr": 1}
 #: What coats reflect, and glass of lights: between 0.04, where it faces the eye, and 0.09, the mean over a sphere.
 COAT_REFLECTANCE = 0.06
-#: Roughness from which on mirrors and glass have highlights: that of the device's narrowest lobe.
+#: Roughness from which on mirrors and glass have highlights: the device's narrowest lobe's.
 HIGHLIGHT_ROUGHNESS = 0.125
 #: The kind of a surface that spreads light cube and lights in a lobe, as the layers of a frame have it (`in_layer`).
 ROUGH_METAL = "rough metal"
@@ -97,7 +97,7 @@ class MeshMaterial:
         kind: diffuse, mirror or glass; in the layers of a frame also `ROUGH_METAL`.
         albedo: Linear, 0 to 1: diffuse reflectance, or tint of reflected or refracted light.
         ior: Index of refraction of glass.
-        roughness: Of a mirror or glass, 0 to 1: 0 reflects sharply. Of a diffuse surface that of the clear coat on it;
+        roughness: Of a mirror or glass, 0 to 1: 0 reflects sharply. Of a diffuse surface its clear coat's;
             0: it has none.
         has_corner_colours: The surface has the colours of `Mesh.corner_colours`, times `albedo`.
         texture: The surface has the colours of this one of `Mesh.textures`, times `albedo`.

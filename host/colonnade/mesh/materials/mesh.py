@@ -62,7 +62,7 @@ class MeshPart:
 
 @dataclass(frozen=True)
 class PlacedMesh:
-    """The geometry of one of the objects of a joined mesh, in its own space; its faces follow those of earlier ones.
+    """The geometry of one of the objects of a joined mesh, in its own space; its faces follow earlier objects' faces.
 
     Attributes:
         vertices: float64 [n, 3].
@@ -70,7 +70,7 @@ class PlacedMesh:
         corner_normals: float64 [m, 3, 3].
         transform: From there to the joined mesh at rest, float64 [4, 4]: a rotation, a scale and a translation.
         place: Where it moves; None: it keeps its transform.
-        clip, clip_corners: As those of a mesh.
+        clip, clip_corners: As of a mesh.
     """
 
     vertices: Floats
@@ -93,7 +93,7 @@ class Mesh:
     Attributes:
         vertices: float64 [n, 3], mesh space.
         faces: int32 [m, 3], counter-clockwise seen from outside.
-        corner_normals: Shading normals at the corners of the faces, unit length, or 0 where those of the adjacent
+        corner_normals: Shading normals at the corners of the faces, unit length, or 0 where normals of the adjacent
             faces cancel, float64 [m, 3, 3].
         materials: Materials of the mesh file; at least one.
         face_materials: uint8 [m], index into `materials`.
@@ -153,7 +153,7 @@ class Mesh:
         vertices = self.clip.vertices(pose.matrices, pose.weights)
         rest = self.clip.rest()
         before, after = _axes(self.clip.vertices(rest.matrices, rest.weights)[faces]), _axes(vertices[faces])
-        # From the axes at rest to those of the pose, times a determinant above 0
+        # From the axes at rest to the pose's, times a determinant above 0
         turns = fixed_order.product(cofactors(before), after.transpose(0, 2, 1))
         normals = unit_vectors(fixed_order.product(self.corner_normals, turns))
         return replace(self, vertices=vertices, faces=faces, corner_normals=normals)

@@ -23,7 +23,7 @@ _REPORTED = 3.0
 
 @dataclass(frozen=True)
 class BakedSurface:
-    """A surface whose corner normals are those of its normal maps.
+    """A surface whose corner normals come from its normal maps.
 
     Attributes:
         vertices: Distinct, ascending, float64 [n, 3].
@@ -40,7 +40,7 @@ class BakedSurface:
     weights: Floats
 
     def corners(self, values: Floats) -> Floats:
-        """Values at the corners of the surface's faces, float64 [m, 3, c], as those of the parts, float64 [k, 3, c]."""
+        """Values at the corners of the surface's faces, float64 [m, 3, c], as of the parts, float64 [k, 3, c]."""
         return fixed_order.product(self.weights, values[self.owners])
 
 
@@ -51,7 +51,7 @@ def baked(vertices: Floats, faces: Faces, normals: Floats, relief: Relief, losse
         vertices: float64 [n, 3], merged by position.
         faces: int32 [m, 3], each with an area.
         normals: At the corners, float64 [m, 3, 3]; 0 for none.
-        relief: The maps. Faces without one keep their normals to the bit, but where they share those of others.
+        relief: The maps. Faces without one keep their normals to the bit, but where they share others' normals.
         losses: Counts maps that the corner normals do not show.
     """
     from colonnade import _core

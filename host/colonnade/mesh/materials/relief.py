@@ -34,7 +34,7 @@ class Relief:
         maps: The normal maps.
         index: The map of each face, -1 for none, int64 [m].
         uvs: Positions of the corners in their map, float64 [m, 3, 2].
-        tangents: Tangents of the file at the corners, along u, and 1 or -1 where the bitangent is that of a mirrored
+        tangents: Tangents of the file at the corners, along u, and 1 or -1 where the bitangent is of a mirrored
             map; 0 where it has none, float64 [m, 3, 4].
     """
 
@@ -44,16 +44,16 @@ class Relief:
     tangents: Floats
 
     def pieces(self, owners: Indices, weights: Floats) -> Relief:
-        """That of parts of the faces, by the weights of their corners, float64 [k, 3, 3]."""
+        """The relief of parts of the faces, by the weights of their corners, float64 [k, 3, 3]."""
         uvs, tangents = (fixed_order.product(weights, values[owners]) for values in (self.uvs, self.tangents))
         return Relief(self.maps, self.index[owners], uvs, tangents)
 
     def kept(self, faces: Indices) -> Relief:
-        """That of some of the faces."""
+        """The relief of some of the faces."""
         return Relief(self.maps, self.index[faces], self.uvs[faces], self.tangents[faces])
 
     def reversed(self, faces: npt.NDArray[np.bool_]) -> Relief:
-        """That of a surface some of whose faces have the other winding."""
+        """The relief of a surface some of whose faces have the other winding."""
         uvs, tangents = (
             np.where(faces[:, None, None], values[:, ::-1], values) for values in (self.uvs, self.tangents)
         )
@@ -61,12 +61,12 @@ class Relief:
 
     @property
     def without_tangents(self) -> Relief:
-        """That without the tangents of the file: those of the surface stand for them."""
+        """The relief without the file's tangents: the surface's stand for them."""
         return replace(self, tangents=np.zeros_like(self.tangents))
 
     @staticmethod
     def joined(parts: Sequence[Relief | None], counts: Sequence[int]) -> Relief | None:
-        """That of surfaces of so many faces, one after the other; None if none has any."""
+        """The relief of surfaces of so many faces, one after the other; None if none has any."""
         if all(part is None for part in parts):
             return None
         maps: list[NormalMap] = []

@@ -33,7 +33,7 @@ def merged_roughness(
 
     entries, index = table_entries(materials)
     area = np.bincount(index, weights, len(entries)).tolist()
-    # Roughnesses of surfaces without a coat count as those that are nearly matt
+    # Roughnesses of surfaces without a coat count as nearly matt
     values = [GLOSSY if one.kind == "diffuse" and not one.roughness else one.roughness for one in entries]
     kinds = {kind: number for number, kind in enumerate(dict.fromkeys(replace(one, roughness=0.0) for one in entries))}
     groups = [kinds[replace(one, roughness=0.0)] for one in entries]

@@ -42,12 +42,12 @@ class Pieces:
 
     @classmethod
     def joined(cls, *parts: Pieces) -> Pieces:
-        """Those of all parts, one after the other."""
+        """The values of all parts, one after the other."""
         owners = np.concatenate([part.owners for part in parts])
         return cls(owners, np.concatenate([part.weights for part in parts]))
 
     def corners(self, values: Floats) -> Floats:
-        """Values at the corners of the faces, float64 [m, 3, …], as those of the pieces, float64 [k, 3, …]."""
+        """Values at the corners of the faces, float64 [m, 3, …], as of the pieces, float64 [k, 3, …]."""
         own = values[self.owners]
         return fixed_order.product(self.weights, own.reshape(*own.shape[:2], -1)).reshape(own.shape)
 
@@ -101,7 +101,7 @@ class RawSurface:
         return replace(self, relief=None if self.relief is None else self.relief.reversed(faces), **flipped)
 
     def pieces(self, pieces: Pieces) -> RawSurface:
-        """The surface of parts of its faces, which name those of the file in `source_faces`."""
+        """The surface of parts of its faces, which name the file's faces in `source_faces`."""
         owners, weights = pieces.owners, pieces.weights
         # Corners that are kept keep their vertex
         kept = weights.max(axis=2) == 1.0

@@ -60,7 +60,7 @@ class CameraKey:
     Attributes:
         at: Progress of the motion.
         position: World position.
-        target: World point at the picture's centre; None: that of the key before, or of the start.
+        target: World point at the picture's centre; None: the key's before, or the start's.
     """
 
     position: WorldVector = field(kw_only=True)

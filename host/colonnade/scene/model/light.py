@@ -75,7 +75,7 @@ class Background:
         occlusion: The room hides the object where it is nearer.
         second_view: The folder of another view of the room, in the same world, relative to the scene file: its photo is
             light around the object.
-        panorama: An equirectangular picture of the light around the object, relative to the scene file: that of the
+        panorama: An equirectangular picture of the light around the object, relative to the scene file, for
             directions that no photo shows.
         panorama_yaw: Rotation of the panorama about the world's y, degrees, as an object's turn; at 0 its middle looks
             along -z.
@@ -85,7 +85,7 @@ class Background:
             there is one.
         shadows: The object's shadow in a room's photo: ``photo``, none where the photo has a shadow of the room, or
             ``whole``. None: ``photo`` for lights that the scene does not name, if the room has an albedo map.
-        colours: Colours of the room in reflections and refractions: ``photo``, those of its photo, or ``albedo``, its
+        colours: Colours of the room in reflections and refractions: ``photo``, its photo's, or ``albedo``, its
             albedo under the scene's lights. None: ``photo`` in a frame that shows the photo, else ``albedo``.
     """
 

@@ -25,11 +25,11 @@ class Scene:
 
     With a room, the camera is the room's unless the scene places it, and the world is the room's world, in metres.
 
-    Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is that of one pass
+    Not in scene files: ``motion_progress`` is the progress along the motion, 0.0 to 1.0. ``sample`` is one pass's
     over the frame. ``standing_points`` are the world points on which the object stands at the ends of the motion, if
-    they are known from another view of its room. ``frame_camera`` is that of a sequence's frame with the maps of
+    they are known from another view of its room. ``frame_camera`` is the camera of a sequence's frame with the maps of
     another frame: a lens for their size, and a pose. ``names_light`` tells whether the scene names lights or ambient
-    light; if not, those of a room are fitted to its photo. ``names_gather`` tells whether it says how many rays a path
+    light; if not, lights of a room are fitted to its photo. ``names_gather`` tells whether it says how many rays a path
     gathers. ``fits_lights`` tells that these have an area, a guess that no mirror shows. ``pass_lights`` is the number
     of lights of a pass, if those were found and may be more; 0: it has all. ``headroom`` scales all lights
     up and diffuse albedos of the object down (`colonnade.environment.photo_colours`). ``exposure`` is the device's
@@ -135,7 +135,7 @@ class Scene:
 
     @property
     def places_camera(self) -> bool:
-        """Whether the camera may be elsewhere than that of the room's maps."""
+        """Whether the camera may be elsewhere than the room's maps' camera."""
         return self.frame_camera is not None or self.camera.position is not None or bool(self.motion.camera)
 
     @property

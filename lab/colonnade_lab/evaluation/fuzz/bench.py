@@ -42,7 +42,7 @@ class Result:
 
     @staticmethod
     def of(outcome: str, case: Sequence[str], legal: Sequence[str]) -> Result:
-        """That of the differences found in a case, and in the legal work after it; `outcome` if there are none."""
+        """The outcome of the differences in a case, and in the legal work after it; `outcome` if there are none."""
         found = (*case, *(f"the next one: {difference}" for difference in legal))
         return Result("disagree" if found else outcome, found, not legal)
 

@@ -24,7 +24,7 @@ BATCH = 100
 #: Names of all kinds: of frames, of batches of rays, of refits.
 ALL_KINDS = tuple(dict.fromkeys((*KINDS, *BatchBench.kinds, *RefitBench.kinds)))
 
-#: The only data bus of a shell for rays, and that of one with a refit unit, bytes.
+#: The only data bus of a shell for rays, and of one with a refit unit, bytes.
 RAY_BUS, REFIT_BUS = 64, 16
 
 

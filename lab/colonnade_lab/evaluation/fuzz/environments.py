@@ -51,7 +51,7 @@ def environment_cases(manifest: Manifest) -> tuple[Case, ...]:
     scenes: list[tuple[str, Scene, Mesh | None]]
     scenes = [(str(material.kind), replace(scene, material=material, paths=paths), mesh) for material in materials]
     if manifest.gathers:
-        # Larger, since its surfaces are to gather light, too
+        # Larger, since its surfaces also gather light
         large = replace(scene, placement=replace(place, size=1.4), paths=replace(paths, gather=2))
         scenes.append((GATHERED, large, patchwork(mesh, manifest)))
     if int(manifest.config["frame"]["instances"]):

@@ -1,4 +1,4 @@
-"""Plans of refits (docs/bus-shell.md): those of meshes, wrong ones, and what the unit does with any of them."""
+"""Plans of refits (docs/bus-shell.md): plans of meshes, wrong ones, and what the unit does with any of them."""
 
 from __future__ import annotations
 

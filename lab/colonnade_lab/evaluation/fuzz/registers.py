@@ -50,8 +50,8 @@ def corrupt_registers(random: np.random.Generator, case: Case, manifest: Manifes
 
 
 def reachable(case: Case, manifest: Manifest) -> Registers:
-    """The registers that may change: all writable ones but `EXCLUDED` and those that would show a memory whose words
-    the case does not load, which hold those of an earlier frame.
+    """The registers that may change: all writable ones but `EXCLUDED` and ones that would show a memory whose words
+    the case does not load, which hold an earlier frame's.
     """
     memories = {section.memory for section in case.image.attributes}
     shows = {"environment.enabled": case.image.header.room is not None, "gather.bounces": LIGHT_CUBE in memories}
@@ -129,7 +129,7 @@ def _vector(random: np.random.Generator, registers: Registers, case: Case) -> di
 
 
 def _all(random: np.random.Generator, registers: Registers, case: Case) -> dict[str, int]:
-    """All registers have any value, but those of the scene's sections, which would leave little to trace."""
+    """All registers have any value, except the scene's sections, which would leave little to trace."""
     return {
         name: _any(random, register) if random.random() < 0.7 else case.registers[name]
         for name, register in registers.items()

@@ -84,7 +84,7 @@ def _write_job(folder: Path, manifest: Manifest, cases: Sequence[Case], rows: in
 def _loads(
     folder: Path, name: str, manifest: Manifest, image: SceneImage, rows: int, loaded: dict[str, object]
 ) -> list[str]:
-    """Load commands for the arrays of an image that are not in the memories yet. Updates `loaded`, those that are."""
+    """Load commands for the arrays of an image that are not in the memories yet. Updates `loaded`, which lists them."""
     lines = []
     if loaded.get("") is not image.records:
         loaded[""] = image.records

@@ -95,7 +95,7 @@ def _shots(arguments: list[str]) -> None:
 
 
 def _assets(arguments: list[str]) -> None:
-    """FOLDER [FILE…]: write what the path tracer needs of glTF files, or of those of the pages."""
+    """FOLDER [FILE…]: write what the path tracer needs of glTF files, or of the pages'."""
     from colonnade_lab.evaluation.light.assets import sample_files, write_jobs
 
     folder, *files = map(Path, arguments)
@@ -103,7 +103,7 @@ def _assets(arguments: list[str]) -> None:
 
 
 def _asset(arguments: list[str]) -> None:
-    """FOLDER [--json FILE]: compare Colonnade's pictures of glTF files with those of the path tracer."""
+    """FOLDER [--json FILE]: compare Colonnade's pictures of glTF files with the path tracer's."""
     from colonnade_lab.evaluation.light.assets import COMMIT, REPOSITORY, compare
 
     results = compare(Path(arguments[0]))

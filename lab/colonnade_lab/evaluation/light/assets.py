@@ -67,7 +67,7 @@ def sample_files() -> list[Path]:
     """The files of `FILES` in the folders of COLONNADE_MESHES.
 
     Raises:
-        UserError: One is missing, or is not that of `COMMIT`.
+        UserError: One is missing, or is not of `COMMIT`.
     """
     folders = [Path(folder) for folder in os.environ.get(VARIABLE, "").split(os.pathsep) if folder]
     found = []

@@ -1,6 +1,6 @@
 """Measures frames with objects in known rooms against the path tracer: what phones do, and Colonnade.
 
-Regions are those of the truth: the object's pixels, and the *room that changes*, its pixels that differ from the photo
+Regions are the truth's: the object's pixels, and the *room that changes*, its pixels that differ from the photo
 by more than `CHANGED` codes. They are the same for all columns.
 """
 
@@ -43,7 +43,7 @@ CONFIG = "small"
 #: What it needs for all lights of a user's room.
 _MORE_LIGHTS = ("frame.lights=8",)
 #: A pixel of the room has changed if a channel differs by more, of 255: the two pictures of the room without objects,
-#: that of the photo and that of the truth, differ by less.
+#: the photo's and the truth's, differ by less.
 CHANGED = 8
 #: Passes of the columns.
 PASSES = (1, 4, 16)
@@ -58,10 +58,10 @@ class Column:
     Attributes:
         passes: Samples of a pixel.
         gather: Gathered rays of a path.
-        denoise: The host's filter of the picture, as that of a scene.
+        denoise: The host's filter of the picture, as of a scene.
         light: What is known: ``panorama``, the lights, and the panorama of all other light; ``lights``, these alone;
             ``exposed``, the whole panorama with its exposure; ``around``, the panorama alone; ``photo``, nothing.
-        has_maps: Albedo and normals of a user's room are known, too.
+        has_maps: Albedo and normals of a user's room are also known.
     """
 
     passes: int
@@ -82,7 +82,7 @@ class Column:
 
 
 def columns(is_users: bool = False) -> dict[str, Column]:
-    """Colonnade's columns by name, or those of a user's room."""
+    """Colonnade's columns by name, or a user's room's."""
     if is_users:
         known, photo = (Column(1, denoise=True, light=light) for light in ("around", "photo"))
         filtered = {
@@ -122,7 +122,7 @@ class Quality:
         frame_dists, object_dists: DISTS of the frame, and of the objects with the truth around them; None without its
             weights.
         things: PSNR of each object, by its kind.
-        brightness: Light of the pixels of the mirror, or of the matt object, over that of the truth; None without them.
+        brightness: Light of the pixels of the mirror, or of the matt object, over the truth's; None without them.
     """
 
     frame: float
@@ -142,7 +142,7 @@ class FrameResult:
     """What was measured of a frame.
 
     Attributes:
-        pixels: Those of the objects, and of the room that changes.
+        pixels: Pixels of the objects, and of the room that changes.
         qualities: By column.
         mirrors: Errors of mirror rays, of the probe and of Colonnade; None without a mirror.
     """
@@ -210,7 +210,7 @@ def _frame(
 
 
 def _colonnade(scenes: Mapping[str, Path], room: KnownRoom) -> dict[str, NDArray[np.uint8]]:
-    """The pictures of all columns; those that differ in their filter alone have the same passes, rendered once."""
+    """The pictures of all columns; columns that differ only in their filter have the same passes, rendered once."""
     pictures: dict[str, NDArray[np.uint8]] = {}
     passes: dict[Column, tuple[HostFrame, FramePasses]] = {}
     for title, column in columns(room.is_users).items():

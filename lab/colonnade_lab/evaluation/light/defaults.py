@@ -1,6 +1,6 @@
 """Measures what the default command gives in users' rooms, beside other settings with the same number of passes.
 
-The objects' error is that of `columns`, against the path tracer. A setting of more rays has fewer samples.
+The objects' error is as in `columns`, against the path tracer. A setting of more rays has fewer samples.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ DEFAULT = "default"
 
 @dataclass(frozen=True)
 class Setting:
-    """Options in place of those of the default command.
+    """Options in place of the default command's.
 
     Attributes:
         gather: Gathered rays of a path; None: as the command chooses.
@@ -74,7 +74,7 @@ class DefaultResult:
     """What was measured of a frame.
 
     Attributes:
-        samples: Those of a pixel that the default command takes.
+        samples: Samples of a pixel that the default command takes.
         objects: PSNR of the objects' pixels, by `DEFAULT` and `SETTINGS`, decibels.
         things: The same of each object, by its kind.
     """

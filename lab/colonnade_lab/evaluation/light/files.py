@@ -61,12 +61,12 @@ def write_panorama(path: Path, radiance: Floats) -> None:
 
 #: The scenes of a frame: what is known of the light, and the gathered rays of a path, as `columns.Column` says.
 LIGHTS = ("lights-0", "panorama-1", "panorama-2", "around-1", "photo-0", "photo-1")
-#: Those of a user's room.
+#: Of a user's room.
 USERS_LIGHTS = (
     *("around-1", "exposed-1", "panorama-1", "around-1-maps", "panorama-1-maps"),
     *("photo-1", "photo-1-maps", "lights-1"),
 )
-#: Those that leave the gathered rays to the command, by what is known.
+#: Scenes that leave the gathered rays to the command, by what is known.
 DEFAULT_LIGHTS = {"panorama": "around-default", "photo alone": "photo-default"}
 
 

@@ -28,7 +28,7 @@ class MirrorErrors:
     """The angle, seen from the mirror, between what a ray should show and the point whose colour it shows.
 
     Attributes:
-        rays: Those that leave the mirror after one reflection, and meet what the photo shows.
+        rays: Rays that leave the mirror after one reflection, and meet what the photo shows.
         median, high: The median and the 90th percentile, degrees.
     """
 
@@ -42,7 +42,7 @@ def mirror_errors(
 ) -> dict[str, MirrorErrors]:
     """The errors of a probe at the room's place, and of the device's march through the encoded maps.
 
-    The rays are those of every second pixel of the photo that shows a mirror, without other objects.
+    The rays are of every second pixel of the photo that shows a mirror, without other objects.
 
     Args:
         room: The room.

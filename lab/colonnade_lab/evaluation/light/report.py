@@ -14,7 +14,7 @@ from colonnade_lab.evaluation.light.columns import FrameResult
 #: Pictures side by side, sRGB, uint8 [height, width, 3].
 Strip = NDArray[np.uint8]
 
-#: The columns that are seen side by side, and those of a user's room, which has no frame of ambient light.
+#: The columns that are seen side by side, and a user's room's, which has no frame of ambient light.
 SIDE_BY_SIDE = ("truth", "probe, rasteriser", "ambient light", "1 pass, filtered", "16 passes, filtered")
 USERS_SIDE_BY_SIDE = ("truth", "probe, rasteriser", "1 pass, filtered", "16 passes, filtered", "photo alone")
 #: Pixels around the objects, width of the pictures side by side, pixels, and their quality in JPEG.

@@ -19,7 +19,7 @@ from colonnade.scene.samples import disc_point, square_points
 from colonnade_lab.evaluation.studies.generated_rooms import plan_of
 from colonnade_lab.evaluation.studies.synthetic_attic import Part, attic_parts, camera_at
 
-#: Size of a photo and of its maps, and that of the frames that are compared, pixels.
+#: Size of a photo and of its maps, and of the frames that are compared, pixels.
 PHOTO, FRAME = (640, 480), (320, 240)
 
 #: Points of an emitter, for the part of it that can be seen.
@@ -169,7 +169,7 @@ def _things(
     glass: tuple[Vector, float],
     turn: float,
 ) -> Mapping[str, tuple[Thing, ...]]:
-    """The objects, each at a foot and in a size, in three frames; those of the last are the second's, rough."""
+    """The objects, each at a foot and in a size, in three frames; the last one's are the second's, rough."""
     tint, white = (0.95, 0.94, 0.92), (1.0, 1.0, 1.0)
     return {
         "rough": (
@@ -188,7 +188,7 @@ def _things(
     }
 
 
-#: All rooms by name; the first one is that of the study on which the gather was designed.
+#: All rooms by name; the first one is of the study on which the gather was designed.
 ROOMS = {
     "attic": KnownRoom(
         attic_parts,

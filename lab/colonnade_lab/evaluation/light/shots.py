@@ -30,7 +30,7 @@ class Item:
 
     Attributes:
         mesh: Its name.
-        kind: Its material; None: that of its file.
+        kind: Its material; None: its file's.
         colour: Linear base colour.
         size: Longest edge of its bounding box, as a share of the matt object's there; metres in ``scenes/rooms``.
         turn: About the vertical, degrees.

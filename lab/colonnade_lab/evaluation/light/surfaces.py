@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from colonnade_lab.evaluation.light.rooms import PHOTO, KnownRoom, PointLight, Thing
 
-#: Longest edge of a triangle of a room: its paint is that of its corners, in between it is linear.
+#: Longest edge of a triangle of a room: its paint is given at its corners, in between it is linear.
 _EDGE = 0.04
 #: A point of an emitter can be seen if nothing lies before this part of the way to it.
 _BEFORE = 0.999
@@ -38,7 +38,7 @@ class RoomSurface:
 
     @classmethod
     def of(cls, room: KnownRoom) -> RoomSurface:
-        """That of a room."""
+        """The surface of a room."""
         from trimesh.remesh import subdivide_to_size
 
         found, colours, faces, count = [], [], [], 0
@@ -123,7 +123,7 @@ class ThingSurface:
 
     @classmethod
     def of(cls, thing: Thing) -> ThingSurface:
-        """That of an object at its place."""
+        """The surface of an object at its place."""
         mesh, pose = load_mesh(thing.mesh), pose_of(thing)
         rotation = rotation_matrix(pose)
         vertices = mesh.vertices @ rotation.T * pose.scale + np.array(pose.translate)

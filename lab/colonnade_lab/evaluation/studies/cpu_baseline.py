@@ -1,6 +1,6 @@
 """A frame of the benchmark on a core of this machine: every triangle for every ray in plain C++, and Embree.
 
-The rays are those of the camera, one a pixel. The plain program takes every `STEP`-th of each row and column, since all
+The rays are the camera's, one a pixel. The plain program takes every `STEP`-th of each row and column, since all
 take minutes.
 """
 
@@ -40,7 +40,7 @@ class CpuBaseline:
 
     Attributes:
         processor: Its name.
-        triangles: Those of the mesh.
+        triangles: Triangles of the mesh.
         rays: Rays of the frame; `in_box` of them enter the mesh's box.
         in_box: See `rays`.
         tested_rays: Rays of the plain program; `hits` of them hit, `embree_hits` in Embree.

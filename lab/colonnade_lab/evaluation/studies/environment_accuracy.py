@@ -165,7 +165,7 @@ def compare(environment: Environment, mesh: DepthMesh, march: RayMarch, rays: Ra
 
 
 def are_right(environment: Environment, truth: SurfaceHits, marched: MarchHits) -> NDArray[np.bool_]:
-    """Rays whose true hit is in the maps and near that of the march, bool [n]."""
+    """Rays whose true hit is in the maps and near the march's, bool [n]."""
     near = np.hypot(marched.seen_u - truth.u, marched.seen_v - truth.v) <= NEAR_PIXELS
     near |= np.linalg.norm(positions(environment, marched) - truth.position, axis=1) <= NEAR_METRES
     return np.asarray(near & _found(marched) & ~truth.outside, dtype=np.bool_)

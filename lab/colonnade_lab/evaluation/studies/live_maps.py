@@ -1,4 +1,4 @@
-"""Study: maps of the live encoder against those of the offline encoder, and along a camera's path.
+"""Study: maps of the live encoder against the offline encoder's, and along a camera's path.
 
 Rays are reflections at mirror spheres, marched on the device, as in `environment_accuracy`. The live encoder gets each
 room as a still. Times are CPU milliseconds of one core, the least of several frames.

@@ -1,4 +1,4 @@
-"""Study: generated rooms seen by cameras that are not that of the maps, on the device.
+"""Study: generated rooms seen by cameras other than the maps', on the device.
 
 The cameras stand up to `METRES` beside the maps' camera along each axis, and turn up to `DEGREES` about each axis. The
 rays of a frame's pixels march. A pixel is right as a ray of `environment_accuracy` is: within 5 pixels or 5 cm of the
@@ -31,7 +31,7 @@ from colonnade_lab.evaluation.studies.generated_rooms import KINDS, generated_ro
 from colonnade_lab.evaluation.studies.synthetic_attic import write_room
 from colonnade_lab.evaluation.studies.visible_surface import VisibleSurface
 
-#: Cameras of a room; how far they are from that of the maps.
+#: Cameras of a room; how far they are from the maps'.
 VIEWS, METRES, DEGREES = 20, 0.3, 10.0
 #: Size of a frame, pixels.
 FRAME = (160, 120)
@@ -104,7 +104,7 @@ def measure_seed(seed: int, encoder: Encoder = "offline", views: int = VIEWS) ->
 
 
 def moved_rays(environment: Environment, random: np.random.Generator) -> tuple[Floats, Floats]:
-    """Rays of a camera near that of the maps, in view space, metres: float64 [n, 3] each."""
+    """Rays of a camera near the maps', in view space, metres: float64 [n, 3] each."""
     position = random.uniform(-METRES, METRES, 3)
     x, y, z = np.radians(random.uniform(-DEGREES, DEGREES, 3))
     about_x = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])

@@ -1,8 +1,8 @@
 """Study: a mirror teapot in generated rooms, seen by a camera that has moved since the keyframe, in three ways.
 
 ``fresh``: maps of the frame. ``marched``: maps of the keyframe, seen from where the camera is. ``stale``: maps of the
-keyframe as if they were those of the frame, with its photo. The truth is the float reference with the full maps of the
-frame. Maps are those of the live encoder.
+keyframe as if they were the frame's, with its photo. The truth is the float reference with the full maps of the
+frame. Maps are the live encoder's.
 
 `colonnade study moved-frames SEEDS` prints the table.
 """

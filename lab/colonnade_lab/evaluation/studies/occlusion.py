@@ -1,6 +1,6 @@
 """Study: how much of an object that stands partly behind furniture is shown and hidden correctly.
 
-The frames are also compared with those of the reference in the rooms' real geometry (``--truth``).
+The frames are also compared with the reference's in the rooms' real geometry (``--truth``).
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class OcclusionResult:
 
 
 def true_occlusion(mesh: Mesh, view: View, made: SyntheticRoom) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """The pixels whose rays meet the object, and those that show it, bool [height, width] each.
+    """The pixels whose rays meet the object, and pixels that show it, bool [height, width] each.
 
     Args:
         mesh: The object.

@@ -1,6 +1,6 @@
 """A room as a mesh in the tree beside its march: what a mirror ray reads of either, and how many find the right point.
 
-The rays are those of mirror spheres (`probe_spheres`). The mesh is that of the depth map (`depth_mesh`), packed for
+The rays are of mirror spheres (`probe_spheres`). The mesh is the depth map's (`depth_mesh`), packed for
 `CONFIG`, whose caches read DRAM; the march reads the maps on chip.
 """
 
@@ -38,7 +38,7 @@ class RoomMesh:
     """A room as a mesh, and its march.
 
     Attributes:
-        triangles: Those of the mesh.
+        triangles: Triangles of the mesh.
         mesh_bytes: Of the packed mesh: nodes and triangles.
         rays: Mirror rays.
         node_reads, triangle_tests: Of a ray in the tree.

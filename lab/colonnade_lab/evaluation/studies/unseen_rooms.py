@@ -1,6 +1,6 @@
 """Study: encoded maps and the device's march in generated rooms, by seed.
 
-Rays are those of `environment_accuracy`: reflections at mirror spheres, right within 5 pixels or 5 cm of the mesh of
+Rays are as in `environment_accuracy`: reflections at mirror spheres, right within 5 pixels or 5 cm of the mesh of
 the depth map. Their hits on the real surface are a second truth. Each ray that is wrong on the device has one cause,
 the first that holds of `CAUSES`.
 

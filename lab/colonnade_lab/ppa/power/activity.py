@@ -91,7 +91,7 @@ def _clock_pins(instance: Instance) -> tuple[str, ...]:
 
 
 def _slew(instance: Instance, timing: NetTiming) -> float:
-    """The slew that drives an output: that of the clock, or the mean over the inputs, ns."""
+    """The slew that drives an output: the clock's, or the mean over the inputs, ns."""
     state = instance.cell.flip_flop
     if state is not None:
         return timing.slews[instance.nets[state.clock]]

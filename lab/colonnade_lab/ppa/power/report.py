@@ -1,6 +1,6 @@
 """The power report of a row that renders a frame or answers a batch of rays: gates, activity and memories.
 
-It is the power of a traversal unit and its share of the modules that work for it: its in-box rays over those of the
+It is the power of a traversal unit and its share of the modules that work for it: its in-box rays over the ones of the
 column.
 """
 
@@ -60,7 +60,7 @@ def measure_power(
     megahertz: float,
     progress: Progress = QUIET,
 ) -> dict[str, Any]:
-    """The power of a workload in a report, with that of each unit in ``units``.
+    """The power of a workload in a report, with each unit's in ``units``.
 
     Args:
         design: The design with black-box memories.

@@ -50,7 +50,7 @@ def window_of(recordings: Mapping[str, Recording], begin: int, end: int, counts:
     """A window of recordings, and the row's shares in it.
 
     Args:
-        recordings: Those of all modules that are replayed.
+        recordings: Recordings of all modules that are replayed.
         begin: First counted cycle.
         end: The cycle after the last one.
         counts: See `Window`.

@@ -126,7 +126,7 @@ def _verilog(netlist: Netlist) -> Iterator[str]:
 
 
 def _saif(netlist: Netlist, activity: Activity, period: float) -> Iterator[str]:
-    """A SAIF file with the transitions and the high time of each net. `period` is that of the clock, ps."""
+    """A SAIF file with the transitions and the high time of each net. `period` is the clock's, ps."""
     (clock,) = netlist.inputs[CLOCK]
     duration = activity.cycles * period
     yield '(SAIFILE (SAIFVERSION "2.0") (DIRECTION "backward") (DESIGN "unit") (DIVIDER /) (TIMESCALE 1 ps)'

@@ -68,7 +68,7 @@ class Analysis:
 
     @staticmethod
     def edges(library: Library) -> tuple[float, float]:
-        """Slew of inputs and clock (ns) and load of outputs (pF): those of an inverter in an FO4 chain."""
+        """Slew of inputs and clock (ns) and load of outputs (pF): as of an inverter in an FO4 chain."""
         inverter = library.inverter
         load = 4 * next(pin.capacitance for pin in inverter.pins.values() if pin.direction == "input")
         output = next(pin for pin in inverter.pins.values() if pin.direction == "output")

@@ -219,7 +219,7 @@ def _cycle(colours: Sequence[str], count: int) -> list[str]:
 
 
 def _spec(chart: Any) -> Spec:
-    """The specification with the style of all charts. Its width is that of its container."""
+    """The specification with the style of all charts. Its width is its container's."""
     text = {"labelColor": INK, "titleColor": INK, "labelFontSize": 11.5, "titleFontSize": 12, "titleFontWeight": 600}
     styled = chart.properties(
         width="container", autosize=alt.AutoSizeParams(type="fit-x", contains="padding")

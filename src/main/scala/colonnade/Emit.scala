@@ -31,7 +31,7 @@ object Emit {
     if (blackBoxMemories) describeMemories(directory)
   }
 
-  /** Chisel runs the firtool of `CHISEL_FIRTOOL_PATH`, else that of the class path, which has one for some platforms. */
+  /** Chisel runs the firtool of `CHISEL_FIRTOOL_PATH`, else the class path's, which has one for some platforms. */
   private def requireFirtool(): Unit = {
     val version = BuildInfo.firtoolVersion.getOrElse("")
     val advice  = s"set CHISEL_FIRTOOL_PATH to the folder of a firtool $version"
@@ -42,7 +42,7 @@ object Emit {
       case None =>
         val os     = System.getProperty("os.name").toLowerCase
         val system = if (os.contains("mac")) "macos" else if (os.contains("win")) "windows" else "linux"
-        // Apple's processors translate that of macos-x64
+        // Apple's processors translate macos-x64's
         val processor = if (system != "macos" && System.getProperty("os.arch") == "aarch64") "aarch64" else "x64"
         val platform  = s"$system-$processor"
         if (getClass.getResource(s"/org.chipsalliance/llvm-firtool/$platform/bin/firtool") == null)

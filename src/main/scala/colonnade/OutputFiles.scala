@@ -65,7 +65,7 @@ object OutputFiles {
     }
   }
 
-  /** Applies to the superuser, too, who may write every file. */
+  /** Also applies to the superuser, who may write every file. */
   private def isWritableByAnybody(file: Path): Boolean =
     !Files.getFileStore(file).supportsFileAttributeView("posix") ||
       Files.getPosixFilePermissions(file).toString.contains("WRITE")

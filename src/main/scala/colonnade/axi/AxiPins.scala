@@ -5,7 +5,7 @@ import chisel3.util.DecoupledIO
 
 import scala.collection.immutable.SeqMap
 
-/** The channels of a port by their names in AXI: those that the master drives, and those that it receives. */
+/** The channels of a port by their names in AXI: driven by the master, and received by it. */
 final case class AxiChannels(driven: Seq[(String, Bundle)], received: Seq[(String, Bundle)])
 
 /** The pins of an AXI port, named as block-design tools and test benches expect them: `awvalid`, `awaddr`, `wdata`, ….

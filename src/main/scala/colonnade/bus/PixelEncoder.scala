@@ -13,7 +13,7 @@ final class EncodedPixel(config: ColonnadeConfig) extends Bundle {
   val data = UInt(PixelWord.bits(config).W) // see [[PixelWord]]
 }
 
-/** A pixel's word: the low bytes are those of the format. With an environment the highest bit says that the word is a
+/** A pixel's word: the low bytes follow the format. With an environment the highest bit says that the word is a
   * shadow ratio, red in the low bits.
   */
 object PixelWord {

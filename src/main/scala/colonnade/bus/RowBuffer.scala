@@ -7,7 +7,7 @@ import colonnade.config.{ColonnadeConfig, ShellConfig}
 
 /** A tile's pixels in one line of the frame.
   *
-  * @param wordBits of a pixel: those of its format, or of a [[PixelWord]]
+  * @param wordBits of a pixel: of its format, or of a [[PixelWord]]
   */
 final class TileRow(config: ColonnadeConfig, wordBits: Int = 8 * PixelFormat.maxBytes) extends Bundle {
 

@@ -72,7 +72,7 @@ final class ShellControl(config: ColonnadeConfig, shell: ShellConfig) extends Mo
   private val begins = state === State.begin
 
   private val frameDone = (state === State.flushing && io.writerIsIdle) || (begins && !io.start)
-  private val hasBegun  = RegNext(state === State.loading, false.B) // the loader is idle in the first cycle, too
+  private val hasBegun  = RegNext(state === State.loading, false.B) // the loader is also idle in the first cycle
   private val loadDone  = state === State.loading && hasBegun && io.loaderIsIdle
 
   when(io.commands.start) { isQueued := true.B }

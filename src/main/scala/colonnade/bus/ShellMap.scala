@@ -25,7 +25,7 @@ final case class ShellRegister(
   def words: Int = (width + AxiLite.dataBits - 1) / AxiLite.dataBits
 }
 
-/** Byte addresses of AXI4-Lite: the shell's registers, at the same address in every design that has them, and those of the
+/** Byte addresses of AXI4-Lite: the shell's registers, at the same address in every design that has them, and of the
   * device.
   */
 object ShellMap {
@@ -100,7 +100,7 @@ object ShellMap {
     setting("rays.windowEnd", 0x180, byteAddress, "No batch reads or writes from this address on.")
   )
 
-  /** Those of a design: of frames, or of rays. */
+  /** The registers of a design: of frames, or of rays. */
   def of(config: ColonnadeConfig, shell: ShellConfig): Seq[ShellRegister] = {
     val ofFrames = Seq("framebuffer", "photo", "stream")
     val absent   =
@@ -180,8 +180,8 @@ object ShellMap {
     )
   )
 
-  /** Writes to the device's registers that the shell takes while a frame runs: at least one of each word, and 256. Those of
-    * a device for rays do not wait.
+  /** Writes to the device's registers that the shell takes while a frame runs: at least one of each word, and 256. With
+    * `frame.rays` they do not wait.
     */
   def postedWrites(config: ColonnadeConfig): Int =
     if (config.frame.rays) 2 else (1 << log2Ceil(writableWords(config).size)).max(256)

@@ -68,7 +68,7 @@ final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extend
   val interrupt = Output(Bool())
 }
 
-/** The registers of [[ShellMap]], and the way to those of the device. What is written there while a frame runs waits for
+/** The registers of [[ShellMap]], and the way to the device's. What is written there while a frame runs waits for
   * its end; all of the device's registers fit. A device for rays takes its tail while batches run, and its other registers
   * while none does.
   *

@@ -22,7 +22,7 @@ final class BankReaderIO(config: ColonnadeConfig) extends Bundle {
 }
 
 /** One bank's part of the [[ColumnBvhController]]: an arbiter, the list of reads in flight, and the broadcast register.
-  * The list has space for the reads that the bank has in flight. Records that a cache receives are broadcast, too.
+  * The list has space for the reads that the bank has in flight. Records that a cache receives are also broadcast.
   *
   * With snooping, a request for a record in flight waits, because its row will get the record from that broadcast.
   */

@@ -123,7 +123,7 @@ final class Column(config: ColonnadeConfig, pathTracer: ColonnadeConfig => PathT
   }
   for (error <- io.memoryError) error := RegNext(caches.flatMap(_.error).reduce(_ || _), false.B)
 
-  // Environment: marches read the column's own maps, or those that some columns share
+  // Environment: marches read the column's own maps, or maps that columns share
   private val environment = config.physicalAttributeMemory.map(_ => Module(new ColumnEnvironment(config)).io)
   for (maps <- environment) {
     maps.load := io.load

@@ -3,7 +3,7 @@ package colonnade.common
 import chisel3._
 import chisel3.util.{log2Ceil, Valid}
 
-/** A choice among claims: that of this cycle, and that of the next one, as far as it is known. */
+/** The claim that is granted now, and the one to be granted next, if known. */
 final case class Choice(now: Valid[UInt], following: Valid[UInt])
 
 object Choice {

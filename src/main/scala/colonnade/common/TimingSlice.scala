@@ -23,7 +23,7 @@ sealed class TimingSlice private[common] (val isEnabled: Boolean) {
 
   def valid[T <: Data](signal: Valid[T]): Valid[T] = if (isEnabled) Pipe(signal.valid, signal.bits) else signal
 
-  /** A queue of two, for one transfer per cycle; `ready` is registered, too. */
+  /** A queue of two, for one transfer per cycle; `ready` is also registered. */
   def queue[T <: Data](stream: DecoupledIO[T]): DecoupledIO[T] = if (isEnabled) Queue(stream, 2) else stream
 }
 

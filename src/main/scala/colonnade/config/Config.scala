@@ -160,7 +160,8 @@ final case class ColumnBvhMemoryConfig(
   * @param maxBounces traced reflections and refractions of a path; 0: every surface is diffuse
   * @param hits       pixels carry the hit triangle and its distance
   * @param emission   diffuse materials have an emission: docs/shading.md#colour-unit
-  * @param gather     diffuse surfaces gather light (docs/gather.md); needs `maxBounces` and `units.shadeInterval` 3
+  * @param gather     diffuse surfaces gather light (docs/gather.md); needs `maxBounces` above 0 and
+  *                   `units.shadeInterval` 3
   * @param rays       rays of applications in place of pixels (docs/rays.md#the-device); needs `maxBounces` 0,
   *                   `units.rayInterval` 1, triangle tests of at most 38 bits, directions of at most 64 bits; excludes
   *                   the environment and instances

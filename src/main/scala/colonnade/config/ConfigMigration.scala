@@ -6,7 +6,7 @@ private[config] object ConfigMigration {
   /** A change of a configuration's JSON. */
   private type Change = ujson.Obj => Unit
 
-  /** What each version changes in configurations of the one before: that of version 2 comes first. */
+  /** What each version changes in configurations of the one before; version 2 comes first. */
   private val changes: Seq[Seq[Change]] = Seq(
     Seq(
       renamed("physicalAttributeMemory", "shellPlanes", "boundingPlanes"),

@@ -40,7 +40,7 @@ final case class NumberFormats(geometry: GeometryConfig, precision: PrecisionCon
   val radicandBits:   Int = precision.sqrt / 2 * 2
   val cosineFraction: Int = mantissaBits.min(colourBits + 4)
 
-  /** Width of the squared cosine of a refraction, unsigned: that of the shader's multiplier at most. */
+  /** Width of the squared cosine of a refraction, unsigned: at most the width of the shader's multiplier. */
   val rootBits: Int = (2 * shadeBits + 1).min(gridBits.max(shadeBits + 1).max(lightBits + 2) - 1)
 
   /** Largest exponent of a node: a child's planes are less than two cubes from its node's corner. */

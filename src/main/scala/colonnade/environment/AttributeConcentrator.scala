@@ -11,7 +11,7 @@ final class AttributeConcentratorIO(config: ColonnadeConfig, requesters: Int, ta
 }
 
 /** Joins several ports into one, with an [[AttributeArbiter]] for each channel. Of a column's ports the last one goes first,
-  * that of directly seen pixels: it asks in every fourth cycle at most, and all pixels wait for it.
+  * the pipeline of directly seen pixels: it asks in every fourth cycle at most, and all pixels wait for it.
   */
 final class AttributeConcentrator(config: ColonnadeConfig, requesters: Int, tagBits: Int, ofColumn: Boolean)
     extends Module {

@@ -18,7 +18,7 @@ final class CellLookupIO(config: ColonnadeConfig, tagBits: Int) extends Bundle {
   * cell its mask is read first, and then the word with the id that the mask selects. So each request takes two cycles at
   * most, and columns that share the memory can count on that. Latency five cycles and one request a cycle if it needs at
   * most one word; one cycle more for a second word. A word beyond the heap is 0 and makes the response illegal; the highest
-  * address decides, which is that of a tile's last word or of a cell's mask.
+  * address decides: of a tile's last word, or of a cell's mask.
   */
 final class CellLookup(config: ColonnadeConfig, tagBits: Int) extends Module {
   val io = IO(new CellLookupIO(config, tagBits))

@@ -40,7 +40,7 @@ final class DdaSetup(m: MarchOperations, cells: CellReader) {
       at(begin + 1 + a)(set(m.uvwOrigin(a), m.combine(m.uvwOrigin(a), m.constant(centre(a)), subtract = true)))
   }
 
-  /** Steps between those of the projection and `Tile`. The second axis is normalised while the first one is divided. */
+  /** Steps between the projection and `Tile`. The second axis is normalised while the first one is divided. */
   def describe(): Unit = {
     overlap { at =>
       for (a <- 0 to 1) {

@@ -47,7 +47,7 @@ final class DirectPoint(config: PathConfig) extends Module {
   private val found    = latch(of(selected)(_.distance.bits), enters)
   private val pixel    = of(source)(_.pixel.bits)
   private val texel    = of(source)(_.normal.bits)
-  // From its first step on, a pixel is ready until its last one. Its albedo may come later, behind that of the pixel before
+  // From its first step on, a pixel is ready until its last one. Its albedo may come later, behind the last pixel's
   private val isReady  = of(source)(_.pixel.valid) && (!found.isHit || of(source)(_.normal.valid))
   private val takes    = io.answer.fire
   private val moves    = isHeld && isReady && (at =/= 1.U || !isDone || takes)

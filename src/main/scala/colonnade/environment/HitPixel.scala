@@ -27,7 +27,7 @@ final class HitPixel(m: MarchOperations, stepper: TileStepper, hitDistance: UInt
   /** In the step before `Pixel`: project the hit, and continue at `HitDistance`. */
   def forHit(): Unit = set(purpose, Mux(stepper.isBehind, hidden, visible))
 
-  /** Steps from `Pixel` on, with those that measure the hit's distance beside them; for a cell they have no effect. */
+  /** Steps from `Pixel` on, beside the steps that measure the hit's distance; for a cell they have no effect. */
   def describe(distance: Overlap[MarchLabel] => Unit): Unit = {
     label(Pixel)
     overlap { at =>

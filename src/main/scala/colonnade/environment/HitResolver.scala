@@ -30,7 +30,7 @@ final class HitResolver(
   val rateMantissa: UInt = Reg(UInt((f + 1).W))
   val rateExponent: SInt = Reg(SInt(shiftBits.W))
 
-  /** There is a bounding plane after that of the index. */
+  /** There is a bounding plane after the indexed one. */
   val hasNext: Bool = !isOver(index +& 1.U)
 
   private def isOver(index: UInt): Bool = index === view.boundingPlanes || index === layout.config.boundingPlanes.U

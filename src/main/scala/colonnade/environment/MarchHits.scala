@@ -71,7 +71,7 @@ final class MarchHits(config: PathConfig) extends Module {
   private val Seq((hasAlbedo, albedo), (hasNormal, normal)) = fetches
   io.illegal := Seq(io.albedo.resp, io.normals.resp).map(resp => resp.valid && resp.bits.isIllegal).reduce(_ || _)
 
-  // The distance; to that of a camera's ray the way to the maps is added, in units of twice the larger one
+  // The distance; for a camera's ray the way to the maps is added, in units of twice the larger one
   private val divider = Module(new Divider(f, f)).io
   divider.division.valid            := io.hit.fire
   divider.division.bits.numerator   := io.hit.bits.hit.numerator

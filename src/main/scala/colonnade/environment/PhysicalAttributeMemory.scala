@@ -15,7 +15,7 @@ final class PhysicalAttributeMemoryIO(config: ColonnadeConfig, requesters: Int, 
   * that share one memory. Each of the four channels accepts one request a cycle, see [[AttributeConcentrator]]. A reset
   * drops requests in flight, but keeps the maps.
   *
-  * Latency: that of the map and two cycles.
+  * Latency: the map's and two cycles.
   */
 final class PhysicalAttributeMemory(
     config:     ColonnadeConfig,

@@ -137,5 +137,5 @@ final class RayClip(
 object RayClip {
   val planes:   Int = 5     // near, left, right, top, bottom
   val insetLog: Int = 2     // log2 of the planes within a pixel
-  val noWay:    Int = -1024 // the exponent of no way; less than that of any way
+  val noWay:    Int = -1024 // the exponent of no way; less than any other
 }

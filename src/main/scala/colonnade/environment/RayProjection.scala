@@ -28,7 +28,7 @@ final class RayProjection(m: MarchOperations, view: EnvironmentView, request: Ma
   /** A product of two digits, in units of 2^log. */
   private class Term(val log: Int, val wide: SInt, val narrow: SInt)
 
-  // The multiplier's wide factor holds digits of the registers, the narrow one those of the ray
+  // The multiplier's wide factor holds digits of the registers, the narrow one digits of the ray
   private def ofView(number: SInt): Digits = new Digits(number, wideBits - 1)
   private def ofRay(number:  SInt): Digits = new Digits(number, narrowBits - 1)
 

@@ -13,7 +13,7 @@ final class TextureMemoryIO(config: ColonnadeConfig, columns: Int) extends Bundl
 
 /** The textures of some columns: one atlas as a two-level map: docs/textures.md.
   *
-  * One request a cycle, of the columns by round-robin. Latency: that of [[TwoLevelMap]] and two cycles. A reset drops
+  * One request a cycle, of the columns by round-robin. Latency: [[TwoLevelMap]]'s and two cycles. A reset drops
   * requests in flight, but keeps the atlas.
   */
 final class TextureMemory(config: ColonnadeConfig, columns: Int) extends Module {

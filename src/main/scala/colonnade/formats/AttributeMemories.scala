@@ -22,10 +22,10 @@ final class CubeTexel extends Bundle {
   def radiance(mantissa: UInt): UInt = (mantissa << exponent)(NumberFormats.lightBits - 1, 0)
 }
 
-/** The memories for loads beside that of the records: of the environment's maps, of the textures, of gathered light. */
+/** The memories for loads beside the records': of the environment's maps, of the textures, of gathered light. */
 object AttributeMemories {
 
-  /** Those of the environment, if there is one, then those of the textures, if there are any, then the light cube. */
+  /** The environment's, if there is one, then the textures', if there are any, then the light cube. */
   def apply(config: ColonnadeConfig): Seq[AttributeMemory] =
     (environment(config) ++ textures(config) ++ lightCube(config)).zipWithIndex.map {
       case ((name, depth, bits), index) =>

@@ -5,7 +5,7 @@ import chisel3.util.log2Ceil
 import colonnade.common.TimingSlice
 import colonnade.config.ColonnadeConfig
 
-/** Banks are interleaved by record, those of a cache by pair of lines. */
+/** Banks are interleaved by record, a cache's by pair of lines. */
 object Banks {
 
   /** Number of records in one bank of a scratchpad. */

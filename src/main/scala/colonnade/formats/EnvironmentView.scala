@@ -40,8 +40,8 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
   val occlusion          = Bool()
   val occlusionTolerance = UInt((numbers.gridBits - 2).W)
 
-  /** The frame's camera is that of the maps, so the pixel of the map follows from that of the frame. Otherwise rays from
-    * the camera march, and those that the maps show nothing of miss.
+  /** The frame's camera took the maps, so the pixel of the map follows from the frame's. Otherwise rays from
+    * the camera march, and miss where the maps show nothing.
     */
   val isMapCamera = Bool()
 }
@@ -49,5 +49,5 @@ final class EnvironmentView(numbers: NumberFormats) extends Bundle {
 object EnvironmentView {
   val rotationBits:     Int = 16
   val rotationFraction: Int = 14
-  val stepGuard:        Int = 12 // fraction bits of a step beyond those of a position in the map
+  val stepGuard:        Int = 12 // fraction bits of a step beyond a position's in the map
 }

@@ -34,7 +34,7 @@ object FormatsPage {
       body("nearPair"),
       "Far pair: the deltas of a near pair, with a sign in place of the lowest bits of codes, which are 0:",
       body("farPair"),
-      "Flat pair, whose corner normals are those of its triangles; and one triangle:",
+      "Flat pair, with the corner normals of its triangles; and one triangle:",
       body("flatPair"),
       body("triangle"),
       "### Colours",

@@ -103,7 +103,7 @@ final class SceneMap(config: ColonnadeConfig) extends Bundle {
   /** Leaves have companions. */
   val hasColours = Option.when(config.geometry.cornerColours)(Bool())
 
-  /** The distance of leaves, by a multiplication: that of the companion is 1. */
+  /** The distance of leaves, by a multiplication; 1 for the companion. */
   def leafRecords(count: UInt): UInt = hasColours.fold(count)(Mux(_, count << 1, count))
 }
 
@@ -202,7 +202,7 @@ final class Counters(config: ColonnadeConfig) extends Bundle {
   val raysPrimary = counter
   val raysShadow  = counter
 
-  /** Traced rays, without those that only meet the background. */
+  /** Traced rays, without rays that only meet the background. */
   val raysReflection = counter
   val raysRefraction = counter
 

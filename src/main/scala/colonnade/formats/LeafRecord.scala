@@ -127,7 +127,7 @@ final class Leaf(geometry: GeometryConfig, record: UInt) {
   /** Whether geometric normals stand for its corner normals. */
   def isFlat: Bool = near.format === LeafFormat.flatPair
 
-  /** A vertex, in vertex units, by three adders; the last one is that of a pair. */
+  /** A vertex, in vertex units, by three adders; the last one is for a pair. */
   def vertex(index: UInt): Vec3[UInt] = {
     val sums = for (axis <- 0 until 3) yield {
       val deltas = near.body.deltas.map(_.axes(axis)).zip(far.body.signs.map(_.axes(axis))).map { case (delta, sign) =>

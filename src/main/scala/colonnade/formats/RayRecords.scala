@@ -42,7 +42,7 @@ object RayPlacement {
   val exponentBits: Int = 9
   val baseBits:     Int = 64
 
-  /** Bits of `base` behind those of a grid step. */
+  /** Bits of `base` below a grid step. */
   val fractionBits: Int = 3
 }
 
@@ -87,7 +87,7 @@ final class RayBatch extends Bundle {
   def isLocal: Bool      = mode(11)
   def mask: UInt         = mode(31, 24)
 
-  /** Addresses fit those of the port. */
+  /** Addresses fit the port's. */
   def isLegal: Bool = {
     val isAligned = rays(5, 0) === 0.U && hits(5, 0) === 0.U && done(1, 0) === 0.U
     val isInReach = (rays | hits | done)(63, Axi.addressBits) === 0.U

@@ -49,7 +49,7 @@ final class RayCounters(config: ColonnadeConfig) extends Bundle {
   /** Maximum number of entries of any stack. */
   val deepestStack = counter
 
-  /** Rays whose hits are in memory; those of them that are none. */
+  /** Completed rays, whose hits are in memory; malformed rays among them. */
   val rays        = counter
   val raysRefused = counter
 }

@@ -40,7 +40,7 @@ object RegisterMap {
   /** A kind of register.
     *
     * @param base     its first word
-    * @param numbers  those of a design
+    * @param numbers  a design's
     * @param isCommon each has the same address in every design
     */
   private case class Block(base: Int, access: Access, numbers: ColonnadeConfig => Seq[Field], isCommon: Boolean = true)
@@ -73,7 +73,7 @@ object RegisterMap {
     Block(256, Access.ReadWrite, config => Layout.of(settings(config)), isCommon = false)
   )
 
-  /** Those that the host writes before a frame, or a batch. */
+  /** Registers that the host writes before a frame, or a batch. */
   def settings(config: ColonnadeConfig): Data =
     if (config.frame.rays) new RayRegisters(config) else new FrameRegisters(config)
 

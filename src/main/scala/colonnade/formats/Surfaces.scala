@@ -47,13 +47,13 @@ object SamplePoint {
 /** Light that diffuse surfaces gather. */
 final class Gather extends Bundle {
 
-  /** Rays that a path gathers, one after the other; 0: none, and the ambient light is that of every surface. */
+  /** Rays that a path gathers, one after the other; 0: none, and every surface has the ambient light. */
   val bounces = UInt(Gather.countBits.W)
 
   /** The surfaces of the light cube are at 2^(parallax - 1) edges of the object's cube from its middle; 0: far away. */
   val parallax = UInt(Gather.parallaxBits.W)
 
-  /** The sample point of each of them in this frame, before that of the pixel. */
+  /** The sample point of each of them in this frame, before the pixel's. */
   val points = Vec(Gather.maxBounces, new SamplePoint)
 }
 
@@ -129,7 +129,7 @@ final class Material(config: ColonnadeConfig) extends Bundle {
   /** The albedo is interpolated from the colours at the corners of the face; `albedo` has no effect. */
   val hasCornerColours = if (config.geometry.cornerColours) Some(Bool()) else None
 
-  /** The albedo is that of the texture at a position, interpolated from the red and green channels of the corners. */
+  /** The albedo is the texture's at a position, interpolated from the red and green channels of the corners. */
   val hasTexture = config.geometry.texture.map(_ => Bool())
 
   /** What a diffuse surface adds to the light that it reflects; no other surface uses it. */

@@ -11,7 +11,7 @@ final class EnvironmentWalkerIO(config: ColonnadeConfig) extends Bundle {
   val window = Input(new EnvironmentWindow(config))
   val tiles  = Flipped(Decoupled(new Tile(config)))
 
-  /** Pixels that show the environment, and those that show the background. */
+  /** Pixels that show the environment, and pixels that show the background. */
   val positions = Decoupled(new PixelPosition(config))
   val others    = Decoupled(new PixelPosition(config))
 

@@ -97,7 +97,7 @@ object EventSums {
     sums
   }
 
-  /** The events of the array, from those of its columns. */
+  /** The events of the array, from its columns' events. */
   def ofArray(config: ColonnadeConfig, columns: Seq[EventSums]): EventSums =
     joined(new EventSums(config, columns.size), columns.map(_.elements.toMap))
 

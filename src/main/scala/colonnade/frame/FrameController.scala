@@ -57,7 +57,7 @@ final class FrameControllerIO(config: ColonnadeConfig) extends Bundle {
   * which no pixel leaves for `watchdogCycles`, not counting stalls of the sink; the frame then ends with an error.
   *
   * After an abort the frame waits for reads in flight, for `watchdogCycles` at most: a memory that never answers does not
-  * hang the device. The next frame does not start before these reads have ended, and waits as long at most, too.
+  * hang the device. The next frame waits for these reads under the same limit.
   */
 final class FrameController(config: ColonnadeConfig) extends Module {
   import FrameController._

@@ -37,7 +37,7 @@ private[frame] final class TwoStages(in: DecoupledIO[Data], out: DecoupledIO[Dat
   private val isInFirst  = RegInit(false.B)
   private val isInSecond = RegInit(false.B)
 
-  /** The second stage takes the item of the first one; the first stage takes that of `in`. */
+  /** The second stage takes the item of the first one; the first stage takes `in`. */
   val second: Bool = !isInSecond || out.ready
   val first:  Bool = !isInFirst || second
   val isIdle: Bool = !isInFirst && !isInSecond

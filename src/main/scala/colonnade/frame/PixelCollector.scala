@@ -10,7 +10,7 @@ final class PixelCollectorIO(config: ColonnadeConfig, count: Int) extends Bundle
   val pixels  = Decoupled(new Pixel(config))
 }
 
-/** Merges the pixels of `count` sources of a column into one stream, the first source that offers one first.
+/** Merges the pixels of `count` sources of a column into one stream, the first offering source first.
   *
   * Throughput: one pixel per cycle. Latency: one cycle. Pixels of one source stay in order.
   */

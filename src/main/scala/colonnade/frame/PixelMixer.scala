@@ -15,7 +15,7 @@ final class PixelMixerIO(config: ColonnadeConfig) extends Bundle {
   val leaves = Input(Bool()) // a pixel of `environment` has left the column
 }
 
-/** Mixes the pixels of two tiles: those of the environment use units that those of the object leave idle, and the other
+/** Mixes the pixels of two tiles: the environment's use units that the object's leave idle, and the other
   * way round. Combinational, one pixel per cycle.
   *
   * @param maxEnvironment pixels of the environment go first while fewer of them are in flight, and wait otherwise

@@ -13,7 +13,7 @@ sealed class Tile(config: ColonnadeConfig) extends Bundle {
 /** A tile, or a square of one, that meets the object. */
 final class ObjectTile(config: ColonnadeConfig) extends Tile(config) {
 
-  /** Those of the whole tile. */
+  /** The bounds of the whole tile. */
   val edgeValues = EdgeValues(config)
 }
 
@@ -34,7 +34,7 @@ object TileKind extends Enumeration {
   val OfEnvironment = Value // the environment in some pixel, the object in none
   val OfBackground  = Value // the background only
 
-  /** Those of a device. */
+  /** The bounds of a device. */
   def all(config: ColonnadeConfig): Seq[TileKind.Value] =
     values.toSeq.filter(kind => kind != OfEnvironment || config.hasEnvironment)
 }

@@ -18,7 +18,7 @@ final class TileSchedulerIO(config: ColonnadeConfig, kind: TileKind.Value) exten
 }
 
 /** Dispatches the tiles of a frame that are of one kind, in Morton order, to ready columns, round-robin. A [[TileDivider]]
-  * may divide those of the object.
+  * may divide the object's tiles.
   *
   * Throughput: one tile per cycle while the queue holds tiles; the first one comes four cycles after the start. The queue
   * hides the cycles in which codes outside the frame are skipped: a column needs more cycles per tile than a skip takes.
@@ -78,7 +78,7 @@ final class TileScheduler(config: ColonnadeConfig, kind: TileKind.Value) extends
 
   private def tilesIn(pixels: UInt): UInt = (pixels +& (config.frame.tileSize - 1).U) >> pixelLevels
 
-  /** The bits above those of a coordinate are 0, because a tile starts inside the frame. */
+  /** The bits above a coordinate's are 0, because a tile starts inside the frame. */
   private def firstPixel(cell: UInt): UInt = Cat(cell, 0.U(pixelLevels.W)).pad(coordinateBits)(coordinateBits - 1, 0)
 }
 

@@ -14,7 +14,7 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val environment       = Option.when(config.hasEnvironment)(Flipped(Decoupled(new PixelPosition(config))))
   val environmentLeaves = Input(Bool())
 
-  /** Pixels to render, those of the window included. */
+  /** Pixels to render, with the window's. */
   val positions = Decoupled(new UnitPosition(config))
   val window    = Input(new EnvironmentWindow(config))
 
@@ -22,7 +22,7 @@ final class TileWalkerIO(config: ColonnadeConfig) extends Bundle {
   val isIdle = Output(Bool())                       // no pixel is left
 }
 
-/** Sorts the pixels of a tile, in the order of [[TileScan]]: those that may show the object or the environment are rendered,
+/** Sorts the pixels of a tile, in the order of [[TileScan]]: pixels that may show object or environment are rendered,
   * the others go to the background walker. With an environment a [[PixelMixer]] mixes them with pixels of another tile.
   *
   * Throughput: one pixel per cycle, the first one five cycles after its tile is accepted. Of the others

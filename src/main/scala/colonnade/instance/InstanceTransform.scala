@@ -23,7 +23,7 @@ final class ObjectScale(numbers: NumberFormats) extends Bundle {
   /** The dominant component of the object's ray. */
   val length = new Normalised(ObjectScale.mantissaBits(numbers), Normalise.exponentBits(numbers.directionBits))
 
-  /** That of the instance's matrix. */
+  /** The shift of the instance's matrix. */
   val shift = UInt(ObjectInstance.shiftBits.W)
 }
 

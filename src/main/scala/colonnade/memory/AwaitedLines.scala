@@ -18,7 +18,7 @@ private[memory] final class AwaitedLinesIO(config: ColonnadeConfig) extends Bund
   val lookup    = Input(new AwaitedLine(config))
   val isAwaited = Output(Bool())
 
-  /** The line that is looked up is awaited for its buses, too. */
+  /** The line that is looked up is also awaited for its buses. */
   val joins = Input(Bool())
 
   /** The line that is looked up is awaited from now on. */

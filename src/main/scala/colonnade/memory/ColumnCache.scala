@@ -14,7 +14,7 @@ final class ColumnCacheIO(config: ColonnadeConfig) extends Bundle {
 
   val invalidate = Input(Bool()) // forgets all lines; only while idle
 
-  /** With parity: that of a record which was answered or filled in the cycle before is wrong. */
+  /** With parity: a record that was answered or filled in the cycle before has a wrong one. */
   val error = Option.when(Lines.hasParity(config))(Output(Bool()))
 
   val isIdle = Output(Bool()) // no request is in flight, and no line is awaited

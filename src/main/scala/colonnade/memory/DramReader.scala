@@ -32,7 +32,7 @@ final class DramReaderIO(config: ColonnadeConfig) extends Bundle {
 /** Reads lines from DRAM over AXI4: one INCR burst for a line, with its bank as the id.
   *
   * A line begins at a multiple of `SceneLines.pitch`, so no burst crosses 4 KB. A bank gathers one line while
-  * another one waits to be taken; until then, further data for the bank have to wait, and those of other banks behind them.
+  * another one waits to be taken; until then, further data for the bank must wait, and data of other banks behind them.
   * Over a narrow bus a line comes so slowly that it waits where it was gathered.
   */
 final class DramReader(config: ColonnadeConfig) extends Module {

@@ -11,7 +11,7 @@ import chisel3.util.{log2Ceil, Valid}
   * @param sets sets of the cache
   * @param ways ways of a set
   * @param inMemory
-  *   the trees lie in a memory, one of them is updated in a cycle: that of the last use, in the order of the code
+  *   the trees lie in a memory, one of them is updated in a cycle: the one of the last use, in the order of the code
   */
 private[memory] final class Replacement(sets: Int, ways: Int, inMemory: Boolean = false) {
   private val wayBits = log2Ceil(ways.max(2))

@@ -34,7 +34,7 @@ final class SharedCacheIO(config: ColonnadeConfig) extends Bundle {
   * request  accept  tags, awaited lines   announced          line read       records on the bus
   * line             victim                announced, taken   line written    records on the bus
   * }}}
-  * While less than half of the entries of lines to read are used, the buddy of a line that misses is read, too, unless it is
+  * While less than half of the entries of lines to read are used, a missing line's buddy is also read, unless it is
   * held. Reads from DRAM are announced in their order. They precede requests that hit, which keep their place and are looked up
   * again.
   */
@@ -127,7 +127,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   }
   isFilling := fills
 
-  // Announce on the buses that must, and on those that have nothing else to do
+  // Announce on the buses that must, and on idle ones
   private val announced = Mux(fills, filled.line, line)
   private val isOther   = VecInit(byBus(io.requests.map(request => request.valid && request.bits =/= announced))).asUInt
   private val joining   = usable & ~isOther
@@ -163,7 +163,7 @@ final class SharedCache(config: ColonnadeConfig) extends Module {
   private val held     = lines.readWrite(place, incoming.records, isRead || isKept, isKept)
   private val isTaken  = RegNext(isFill, false.B)
 
-  // Cycles d + 4 and d + 5: the records on the bus; those of a failed read become zeros there, and nobody reads them later
+  // Cycles d + 4 and d + 5: the records on the bus; records of a failed read become zeros, and nobody reads them later
   private val ready = VecInit(held.zip(incoming.records).map { case (record, other) =>
     Mux(isTaken, other, record)
   })

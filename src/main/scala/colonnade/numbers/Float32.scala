@@ -30,7 +30,7 @@ final class Float32 extends Bundle {
 object Float32 {
   val mantissaBits: Int = 24
 
-  /** The biased exponent of numbers from a half up to 1: that of mantissa · 2^−24. */
+  /** The biased exponent of numbers from a half up to 1, mantissa · 2^−24. */
   val half: Int = 126
 
   def zero: Float32 = 0.U(32.W).asTypeOf(new Float32)

@@ -27,10 +27,10 @@ final class BatchReaderIO(columns: Int) extends Bundle {
   val isBusy   = Output(Bool())
 }
 
-/** Reads batches from a ring in memory, and the sensor of those that have one, hands out their runs, and writes their tags:
+/** Reads batches from a ring in memory, and their sensor if they have one, hands out their runs, and writes their tags:
   * one batch after the other.
   *
-  * An illegal batch, or one whose sensor cannot be read, has no runs. Its tag, and that of a batch of which a run has
+  * An illegal batch, or one whose sensor cannot be read, has no runs. Its tag, and a batch's tag of which a run has
   * failed, have the error bit. A batch that cannot be read has no tag.
   */
 final class BatchReader(columns: Int) extends Module {
@@ -85,7 +85,7 @@ final class BatchReader(columns: Int) extends Module {
   private val wraps  = column + width === sensor.columns
   private val hitLog = Mux(batch.response === RayBatch.hits, 4.U, 3.U) // of the bytes of a hit or a range
 
-  /** Rows of the sensor that have so many rays are traced in tiles, not those of occlusion. */
+  /** Rows of the sensor that have so many rays are traced in tiles, except for occlusion. */
   private def hasTiles(left: UInt): Bool =
     batch.isSensor && batch.response =/= RayBatch.occluded && left >= (sensor.columns << log2Ceil(Run.tileRows))
   io.runs.valid       := state === running && left =/= 0.U

@@ -138,7 +138,7 @@ final class HitConverter(config: PathConfig) extends Module {
 
 object HitConverter {
 
-  /** Fraction digits of a quotient: those of a float and one for rounding, of a quotient of a half or more. */
+  /** Fraction digits of a quotient: a float's and one for rounding, of a quotient of a half or more. */
   private val digits = Float32.mantissaBits + 1
 }
 

@@ -7,7 +7,7 @@ import colonnade.formats.RayPlacement
 import colonnade.numbers.{Fixed, Float32, Rounding}
 import colonnade.ray.RayRequest
 
-/** A ray on the grid, with limits that are to be converted: those of `converted` have their filter alone. */
+/** A ray on the grid, with limits to be converted; in `converted` they have only their filter. */
 final class PlacedRay(config: PathConfig) extends Bundle {
   val converted = new ConvertedRay(config)
   val limits    = new FloatLimits
@@ -124,7 +124,7 @@ final class PositionStage(config: PathConfig) extends Module {
 
   private def held[T <: Data](value: T): T = RegEnable(value, moves)
 
-  /** The value of a ray in a step, until that of the next one. */
+  /** The value of a ray in a step, until the next ray's. */
   private def held[T <: Data](value: T, in: Int): T = RegEnable(value, moves && step(in))
 }
 

@@ -66,7 +66,7 @@ final class RayColumn(config: ColonnadeConfig) extends Module {
   queries.results :=
     rows.connect(queries.rays, io.registers.scene, io.start, controller.broadcasts, Some(io.batch.mask))
 
-  // Records; the last requester is that of attributes, which nobody reads
+  // Records; the last requester is for attributes, which nobody reads
   for ((port, unit) <- controller.requests.zip(rows.units)) port :<>= unit.requests
   controller.requests.last.valid := false.B
   controller.requests.last.bits  := DontCare

@@ -29,7 +29,7 @@ final class RayQueriesIO(config: PathConfig) extends Bundle {
   val rays    = Decoupled(new PreparedRay(config))
   val results = Flipped(Valid(new TraceResult(config)))
 
-  /** A ray comes that is none. */
+  /** A malformed ray arrives. */
   val refuses = Output(Bool())
 }
 
@@ -82,7 +82,7 @@ final class RayQueries(config: PathConfig) extends Module {
   io.refuses            := setup.request.fire && converted.items.bits.isRefused
   when(setup.request.fire) { scales.write(setup.request.bits.context, converted.items.bits.scale) }
 
-  // Trace them; those that miss the box end here
+  // Trace them; rays that miss the box end here
   private val prepared = setup.ray.bits
   private val misses   = setup.ray.valid && !prepared.enters
   private val entries  = ContextTable(config, new RayEntryPoint(config))

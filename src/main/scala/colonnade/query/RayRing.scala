@@ -34,7 +34,7 @@ final class RayRingIO(config: PathConfig) extends Bundle {
   val next   = Valid(Context(config))
   val ends   = Vec(2, Flipped(Valid(Context(config))))
 
-  /** Tables to read in this cycle; those of the ray that is offered in the next one. */
+  /** Tables to read in this cycle, for the ray that is offered in the next one. */
   val read = Valid(Context(config))
   val rays = Decoupled(new EndedRay)
 }

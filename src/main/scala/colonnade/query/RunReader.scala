@@ -48,7 +48,7 @@ final class RunReaderIO(config: PathConfig) extends Bundle {
   val hasFailed = Output(Bool())
 }
 
-/** Reads the rays of runs by bursts, or makes those of a sensor. A burst is read when all its beats have a place, so that
+/** Reads the rays of runs by bursts, or makes a sensor's rays. A burst is read when all its beats have a place, so that
   * the port never waits for the rays before it.
   */
 final class RunReader(config: PathConfig) extends Module {

@@ -43,7 +43,7 @@ final class AdvanceStagesIO(config: PathConfig) extends Bundle {
 
 /** Scales the shear factors and moves a ray's origin to its entry into the box: a ray a cycle, all axes in parallel.
   *
-  * A shear factor is a magnitude here, and its sign that of its component: rounding to nearest even is symmetric. Source:
+  * A shear factor is a magnitude here, and its sign its component's: rounding to nearest even is symmetric. Source:
   * docs/numbers.md, sections 2.3, 2.4 and 2.7.
   */
 final class AdvanceStages(config: PathConfig) extends Module {

@@ -27,7 +27,7 @@ final class EntryCommand(slices: Int) extends Bundle {
   val takesShear       = Bool()
   val shearSide        = UInt(1.W)
 
-  /** The side of the shear factor that is taken: `shearSide`, or that of the cycle before. */
+  /** The side of the shear factor that is taken: `shearSide`, or its value in the cycle before. */
   val takenSide = UInt(1.W)
 
   /** Multiply the last distance by a reciprocal, or the entry distance by a slice of a shear factor. */

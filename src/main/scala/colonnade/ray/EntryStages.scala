@@ -25,7 +25,7 @@ final class EntryStagesIO(config: PathConfig) extends Bundle {
 /** Computes where a ray enters the object's box: a ray a cycle, one wide addition or one product a stage.
   *
   * Entries below 0 are equivalent to 0, so they are unsigned from stage to stage. An exit below 0 is a flag. The order of
-  * the planes' distances, products, shifts and slacks is that of docs/numbers.md, section 2.6.
+  * the planes' distances, products, shifts and slacks follows docs/numbers.md, section 2.6.
   */
 final class EntryStages(config: PathConfig) extends Module {
   private val numbers      = config.numbers

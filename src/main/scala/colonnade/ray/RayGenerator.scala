@@ -55,7 +55,7 @@ final class RayGenerator(config: PathConfig) extends Module {
   private val isNew    = empty === RayGenerator.emptyCycles.U
   private val position = RegEnable(io.position.bits, io.position.fire)
 
-  // The tiles' last pixels, and whether a pixel comes after those of the other tile
+  // The tiles' last pixels, and whether a pixel comes after the other tile's
   private val accepts  = io.position.fire
   private val changes  = !isNew && tileOf(io.position.bits) =/= tileOf(position)
   private val isChange = RegEnable(changes, accepts)
@@ -127,7 +127,7 @@ final class RayGenerator(config: PathConfig) extends Module {
     def shifted(term: UInt, by: Int): UInt = (term << by)(bits - 1, 0)
     val subtracted = sets.indices.tail.map(n => sets(n) -> ~shifted(terms((n + 1) % 2), (n + 1) / 2))
     val third      = Mux1H((addsDir -> terms(2)) +: subtracted)
-    // The direction before: the last one, or that of the other tile, which is kept when the tile changes
+    // The direction before: the last one, or the other tile's, which is kept when the tile changes
     val returns = isChange && isFirst
     val ofOther = RegEnable(sum, sums && returns)
     val start   =

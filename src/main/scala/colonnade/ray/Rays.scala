@@ -54,7 +54,7 @@ final class VisitLimit(config: PathConfig) extends Bundle {
   val tMax     = UInt((config.numbers.sceneBits + 1).W)
 }
 
-/** What an application's ray does not hit: triangles seen from the front or the back, and those that are not opaque. */
+/** What an application's ray does not hit: triangles seen from the front or the back, or not opaque. */
 final class HitFilter extends Bundle {
   val cullsFront   = Bool()
   val cullsBack    = Bool()
@@ -151,7 +151,7 @@ final class PreparedRay(config: PartConfig) extends Bundle {
   val tMax     = new Fixed(formats.grid) // hits with t < `tMax` count; never negative
   val limits   = Option.when(config.device.frame.rays)(new EntryLimits(numbers))
 
-  /** The instance in whose axes the ray is; none: in those of the world. */
+  /** The instance in whose axes the ray is; none: the world's axes. */
   val visit = InstanceNumber(config.device).map(Valid(_))
 
   /** The root of its object's tree; ray set-up does not know it. */
@@ -160,7 +160,7 @@ final class PreparedRay(config: PartConfig) extends Bundle {
 
 object PreparedRay {
 
-  /** The box that a ray enters: that of all objects, in the axes of an instance the object's whole cube. */
+  /** The box that a ray enters: of all objects, in the axes of an instance the object's whole cube. */
   def box(numbers: NumberFormats, bounds: Bounds, visit: Option[Valid[UInt]]): Bounds = visit.fold(bounds) { visit =>
     val cube = Wire(new Bounds(numbers))
     cube.low.axes.foreach(_ := 0.U)

@@ -5,7 +5,7 @@ import chisel3.util._
 import colonnade.config.ColonnadeConfig
 import colonnade.formats.{NodeRecord, RecordFormats}
 
-/** Writes nodes from the boxes of their children. The exponent of an axis is the least with which all planes fit: that of
+/** Writes nodes from the boxes of their children. The exponent of an axis is the least with which all planes fit: by
   * the bit length, or one more.
   */
 final class NodeBuilder(config: ColonnadeConfig) extends Module {

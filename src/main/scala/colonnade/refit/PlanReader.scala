@@ -12,7 +12,7 @@ final class PlanReaderIO(config: ColonnadeConfig) extends Bundle {
   val lines = Vec(2, Decoupled(UInt((settings.plan.getWidth - log2Ceil(RefitPlan.lineBytes)).W)))
   val data  = Flipped(Valid(UInt(RefitPlan.entryBits.W))) // of the plan
 
-  /** All entries; those of lines after these have been requested. */
+  /** All entries; entries of lines after these have been requested. */
   val entries = Decoupled(new RefitEntry(config))
 
   /** Lines of vertices that no entry waits for any more. */

@@ -33,7 +33,7 @@ final class RefitReader(busBytes: Int) extends Module {
   io.lines(1).ready := ar.ready
   io.axi.ar :<>= TimingSlice.queue(ar) // holds
 
-  // A beat is cut to entries; narrow beats are put together, those of each stream apart: they may alternate
+  // A beat is cut to entries; narrow beats are put together, each stream apart: they may alternate
   private val beat   = TimingSlice.queue(io.axi.r)
   private val last   = (busBytes / entry).max(1) - 1
   private val part   = RegInit(0.U(log2Ceil(last + 1).max(1).W))

@@ -8,7 +8,7 @@ import colonnade.formats.{RecordFormats, Vec3}
 
 final class RefitUnitIO(config: ColonnadeConfig, busBytes: Int) extends Bundle {
 
-  /** A pulse, while idle; the settings are constant until idle. Result and errors are those of the last refit. */
+  /** A pulse, while idle; the settings are constant until idle. Result and errors are the last refit's. */
   val start    = Input(Bool())
   val settings = Input(new RefitSettings(config))
   val result   = Output(new RefitResult(config))

@@ -12,7 +12,7 @@ final class BounceHit(config: PathConfig) extends Bundle {
   val material = MaterialIndex(config)
   val backSide = Bool()
 
-  /** The normal is that of a microfacet. */
+  /** The normal is a microfacet's. */
   val isRough = Lobe(config.device).map(_ => Bool())
 }
 

@@ -4,7 +4,7 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.PathConfig
 
-/** The order of the slots of an operation: those of its surface, light by light of each channel; then those of the path,
+/** The order of the slots of an operation: its surface's, light by light of each channel; then the path's,
   * one for each channel, if it is a bounce, a surface that gathers, or has no surface.
   *
   * @param lightsOn lights that are on, from the first one

@@ -78,7 +78,7 @@ final class ColourUnit(config: PathConfig) extends Module {
   io.cube.read.bits.seesLights   := bounces || !io.end.bits.isScattered
   io.cube.read.bits.isReflection := bounces
 
-  // Its slots follow those of the operation before. Its path is read again and again while a bounce of the same path is
+  // Its slots follow the operation before. Its path is read again and again while a bounce of the same path is
   // under way, or while the ratio unit is busy
   private val starts  = isReading && !isUpdating && !(next.needsRatio && ratios.map(_.busy).getOrElse(false.B))
   private val repeats = isReading && !starts

@@ -20,7 +20,7 @@ final class GeometryConditions {
   val startsOver:   Bool = Wire(Bool()) // the smooth normal is zero: start over with the geometric one
   val isFirstLight: Bool = Wire(Bool()) // the hit's first light; further ones find the normal scaled and measured
 
-  /** The result is taken, and whether it is that of the hit's last light. */
+  /** The result is taken, and whether it is of the hit's last light. */
   val isTaken: Bool = Wire(Bool())
   val isLast:  Bool = Wire(Bool())
 }

@@ -27,7 +27,7 @@ final class LightRead(config: PathConfig) extends Bundle {
   val isReflection = Bool()
 }
 
-/** Asks for the texel that the last ray of a context meets. It comes five cycles later, and stays until that of the next
+/** Asks for the texel that the last ray of a context meets. It comes five cycles later, and stays until the next's
   * read. Its `isLight` is that the path sees a light.
   */
 final class LightPort(config: PathConfig) extends Bundle {
@@ -96,7 +96,7 @@ final class LightCube(config: PathConfig) extends Module {
 
   /** How far from the middle of the object's cube a position is, in 2^-6 of the distance of the surfaces; it is odd. */
   private def offsetOf(position: Fixed): SInt = {
-    // The bits that count; the middle has the lowest one of those that change
+    // The bits that count; the middle has the lowest one that changes
     val coarse = Rounding.saturate(Rounding.floor(position.integer, config.numbers.gridBits - 8), offsetBits + 2)
     val middle = Cat((coarse >> middleLog) -& 1.S, coarse(middleLog - 1, 0)).asSInt
     val steps  = Rounding.saturate((middle >> (io.parallax - 1.U)(Gather.parallaxBits - 1, 0)).asSInt, offsetBits - 1)

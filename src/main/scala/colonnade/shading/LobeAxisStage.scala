@@ -14,7 +14,7 @@ final class LobeAxisStageIO(config: PathConfig) extends Bundle {
   val phase   = Input(ModuloSchedule.phase())
   val isRough = Input(Bool()) // in cycle 0: the surface is rough metal with a lobe
 
-  val dir    = Input(SInt((formats.shadeBits + 1).W)) // from cycle 1 on, as that of [[SurfaceStage]]
+  val dir    = Input(SInt((formats.shadeBits + 1).W)) // from cycle 1 on, as in [[SurfaceStage]]
   val normal = Input(SInt(formats.narrowBits.W))      // from cycle 7 on, likewise
 
   val axis = Output(SInt(formats.narrowBits.W)) // from cycle `axis0` on

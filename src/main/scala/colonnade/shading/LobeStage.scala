@@ -7,7 +7,7 @@ import colonnade.config.NumberFormats
 import colonnade.formats.Lobe
 import colonnade.numbers.Normalise
 
-/** Ports of [[LobeStage]]; cycles count from that of the cosine. */
+/** Ports of [[LobeStage]]; cycles count from the cosine's. */
 final class LobeStageIO(numbers: NumberFormats) extends Bundle {
   val phase  = Input(ModuloSchedule.phase())
   val cosine = Input(UInt((numbers.cosineFraction + 1).W))               // in cycles 0 to 2

@@ -19,7 +19,7 @@ final private[shading] class MirrorHit(config: PathConfig) extends Bundle {
   val dir               = Vec(3, SInt(formats.componentBits.W))
 }
 
-/** Reflections at mirrors, equal to those of [[BounceUnit]]: a hit every three cycles, in order but for restarts. {{{
+/** Reflections at mirrors, equal to [[BounceUnit]]'s: a hit every three cycles, in order but for restarts. {{{
   *
   * request ─▶ n·n, n·d ─▶ |n|²·d + 2c·n ─▶ hemisphere check ─▶ queue ─▶ result
   *      ▲                                        │ with the geometric normal

@@ -11,7 +11,7 @@ object PathEnd extends ChiselEnum {
   /** No surface: the colour of the background, or light of the [[LightCube]]. */
   val background, cube = Value
 
-  val lit        = Value // a surface in the ambient light and that of the lights
+  val lit        = Value // a surface in ambient light and lights
   val directView = Value // a surface of the environment that the camera sees: with its shadow ratio
 
   /** A point of the environment in direct view whose own ray has met the object. The path's radiance replaces the ambient
@@ -55,7 +55,7 @@ final class PathTermination(config: PathConfig) extends Bundle {
   val occlusions = Vec(config.device.frame.lights, Occlusion())        // by light: the shadow rays' outcomes
 
   val isScattered = Bool() // the path has gathered: it sees no lights in the cube
-  val goesBack    = Bool() // the ray is that of a point of the environment, which is lit by the path's colour
+  val goesBack    = Bool() // the ray is of a point of the environment, which is lit by the path's colour
 }
 
 /** A path that goes on after the light of its surface is added. */

@@ -31,8 +31,8 @@ final class SamplePointsIO(config: PathConfig) extends Bundle {
   val port   = Flipped(new SamplePort(config))
 }
 
-/** The sample points of gathered rays: that of the frame for the path's next ray, xor that of the pixel: docs/gather.md.
-  * Mirrors and glass have those of other rays.
+/** The sample points of gathered rays: the frame's for the path's next ray, xor the pixel's: docs/gather.md.
+  * Mirrors and glass have other rays' points.
   */
 final class SamplePoints(config: PathConfig) extends Module {
   val io = IO(new SamplePointsIO(config))

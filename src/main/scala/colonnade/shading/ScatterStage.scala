@@ -206,7 +206,7 @@ object ScatterStage {
 
   private val wide = rough + 3 // its parts along and across the axis are known after this cycle
 
-  /** First cycle of the direction, and that of the normal of a microfacet. */
+  /** First cycle of the direction, and of a microfacet's normal. */
   val dir0:   Int = rough + 12
   val facet0: Int = dir0 + 5
 

@@ -38,7 +38,7 @@ final class TextureLookupIO(config: PathConfig) extends Bundle {
   val isIllegal = Output(Bool()) // a word beyond the heap was read, for one cycle
 }
 
-/** Reads the texel of a hit: the one that its position is in. One hit at a time; latency that of the memory and one cycle.
+/** Reads the texel of a hit: the one that its position is in. One hit at a time; latency: the memory's and one cycle.
   */
 final class TextureLookup(config: PathConfig) extends Module {
   val io = IO(new TextureLookupIO(config))

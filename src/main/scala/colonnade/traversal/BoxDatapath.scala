@@ -23,7 +23,7 @@ final class NodeDistance(config: TraversalConfig) extends Bundle {
   val toOrigin = SInt(numbers.boxDistanceBits.W)
   val exponent = UInt(RecordFormats.exponentBits(config.device).W)
 
-  /** Combinational; rounds down. `t` is at most that of the node's last z' plane. */
+  /** Combinational; rounds down. `t` is at most the node's last z' plane's. */
   def units(t: SInt): UInt = {
     val distance = ((t << exponent).asSInt >> numbers.nearFraction) - toOrigin
     Mux(distance < 0.S, 0.U, distance.asUInt(numbers.boxDistanceBits - 2, 0))

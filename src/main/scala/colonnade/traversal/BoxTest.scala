@@ -34,6 +34,6 @@ final class BoxResult(config: TraversalConfig) extends Bundle {
   val count    = UInt(log2Ceil(NodeRecord.most + 1).W)
   val children = Vec(NodeRecord.most, new EnteredChild(config))
 
-  /** Children tested: those that are not empty. */
+  /** Children tested, without empty ones. */
   val tests = UInt(log2Ceil(NodeRecord.most + 1).W)
 }

@@ -24,7 +24,7 @@ final class EdgeStageIO(formats: TriangleFormats) extends Bundle {
   *
   * One edge per slot, in the order 2, 0, 1: load two vertices, multiply, subtract, test the sign. The triangle is decided
   * with its edge 1, four slots after its last vertex came. The second triangle of a pair needs only edges 0 and 1: its
-  * edge 2 is that of the first one, negated. A triangle seen edge-on, whose edge functions are all zero, is not
+  * edge 2 is the first one's, negated. A triangle seen edge-on, whose edge functions are all zero, is not
   * crossed. Without a triangle the registers hold.
   */
 final class EdgeStage(numbers: NumberFormats) extends Module {

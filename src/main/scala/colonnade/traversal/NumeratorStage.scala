@@ -73,7 +73,7 @@ final class NumeratorStage(config: PartConfig) extends Module {
     if (width >= bits) x(width - 1, width - bits) else Cat(x, 0.U((bits - width).W))
   }
 
-  // The difference of the exponents is gridBits - 3, minus the leading zeros of the numerator, plus those of the sum
+  // The difference of the exponents is gridBits - 3, minus the leading zeros of the numerator, plus the sum's
   // (at most one)
   private val sum     = triangle.sum
   private val isShort = !sum(formats.weightBits - 1)

@@ -21,7 +21,7 @@ final class ShearStageIO(config: PartConfig) extends Bundle {
   val shearedSlot = Output(new TriangleSlot)
   val sheared     = Output(Vec(2, new Fixed(formats.grid)))
 
-  /** Depths of a round's triangle, or of its pair, from the slot after its last vertex is sheared to that of the next
+  /** Depths of a round's triangle, or of its pair, from the slot after its last vertex is sheared to the next
     * round's.
     */
   val depths = Output(Vec(2, new TriangleDepths(formats)))
@@ -68,7 +68,7 @@ final class ShearStage(config: PartConfig) extends Module {
     port := grid(position.integer -& Rounding.nearestEven(product, numbers.shearFraction))
   }
 
-  // Keep the depths until the edges are known: that of the first vertex, and the rises of the others
+  // Keep the depths until the edges are known: the first vertex's, and the rises of the others
   private val early = Reg(new PairDepths(formats))
   private val rise  = {
     val Seq(here, start) = Seq(depth, early.first).map(z => Rounding.floor(z.integer, formats.commonDepthBits))

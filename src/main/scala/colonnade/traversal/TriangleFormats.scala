@@ -8,7 +8,7 @@ import colonnade.numbers.{Fixed, FixedPointFormat, Normalise}
 import colonnade.ray.RayFormats
 
 /** Widths between the stages of the triangle test; docs/numbers.md, section 4. A depth is a vertex's z in the ray's
-  * frame. A rise is the depth of vertex 1 or 2 minus that of vertex 0.
+  * frame. A rise is the depth of vertex 1 or 2 minus vertex 0's.
   */
 final class TriangleFormats(numbers: NumberFormats) {
   val grid: FixedPointFormat = new RayFormats(numbers).grid

@@ -17,7 +17,7 @@ final class TriangleLanesIO(config: PartConfig) extends Bundle {
 }
 
 /** `units.triangleLanes` parallel [[TriangleUnit]]s with round-robin dispatch and round-robin collection of results.
-  * Latency and throughput of a lane are those of the unit.
+  * A lane has the unit's latency and throughput.
   */
 final class TriangleLanes(config: PartConfig) extends Module {
   val io = IO(new TriangleLanesIO(config))

@@ -24,7 +24,7 @@ final private class PendingTriangle(config: PartConfig) extends Bundle {
   * docs/traversal.md. The hit table compares the result with the closest hit so far.
   *
   * Throughput: a pair every 5 cycles, a triangle every 4 cycles; one result for each triangle, in order. Latency of a miss:
-  * 11 cycles, of those of a pair 10 and 12. A triangle that the ray's line crosses takes about 30 cycles plus a quarter of
+  * 11 cycles, in a pair 10 and 12. A triangle that the ray's line crosses takes about 30 cycles plus a quarter of
   * the quotient's digits, one every 7 cycles or one per rotation of the dividers, whichever is longer.
   * Sequencer, shear and edges stall together, when a triangle's edges are known and the next stage is full. The stages
   * ahead share nothing with them, so these always make progress.
@@ -32,7 +32,7 @@ final private class PendingTriangle(config: PartConfig) extends Bundle {
   * A triangle in a plane through the ray misses.
   *
   * @param distanceLanes number of dividers
-  * @param queueDepth    triangles that may wait for their result or for that of an earlier one
+  * @param queueDepth    triangles that may wait for their result or for an earlier one
   */
 final class TriangleUnit(config: PartConfig, distanceLanes: Int = 1, queueDepth: Int = 8) extends Module {
   val io = IO(new TriangleUnitIO(config))

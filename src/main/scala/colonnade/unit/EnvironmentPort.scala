@@ -13,7 +13,7 @@ final class EnvironmentPortIO(config: PathConfig) extends Bundle {
   val view    = Input(new EnvironmentView(config.numbers))
   val control = Flipped(new EnvironmentControl(config))
 
-  /** Primary rays, their pixels, and whether they may hit the object; those that may. */
+  /** Primary rays, their pixels, and whether they may hit the object; rays that may. */
   val primary     = Flipped(Decoupled(new RayRequest(config)))
   val pixel       = Input(new PixelPosition(config.device))
   val meetsObject = Input(Bool())
@@ -62,7 +62,7 @@ final class EnvironmentPort(config: PathConfig) extends Module {
     bounces.resume :<>= control.resume
   }
 
-  // Store rays, if they may march; those of bounces have priority. A path that has gathered stores none, for the table
+  // Store rays, if they may march; bounces have priority. A path that has gathered stores none, for the table
   // still has the point of the environment at which it may have begun
   private val primary   = io.primary.bits
   private val bounceRay = io.bounces.map(_.ray)

@@ -7,7 +7,7 @@ import colonnade.config.PathConfig
 import colonnade.formats.Gather
 import colonnade.shading.Occlusion
 
-/** What [[RtController]] knows of the rays that the path of each context has gathered: none. [[GatheringPaths]] is that of a
+/** What [[RtController]] knows of the rays that the path of each context gathered: none. [[GatheringPaths]] is for a
   * device with gathered light.
   */
 private[unit] class GatherProgress {
@@ -21,7 +21,7 @@ private[unit] class GatherProgress {
   def mayGather(choice:       Choice): Bool = false.B
   def isOfEnvironment(choice: Choice): Bool = true.B
 
-  /** The shadow rays of a point of the environment before it gathered, given those of its path. */
+  /** The shadow rays of a point of the environment before it gathered, given its path's. */
   def before(choice: Choice, occlusions: Seq[Occlusion.Type]): Seq[Occlusion.Type] = occlusions
 
   /** Each to be called once: a path starts; a surface is known; its gathered ray is issued, after its shadow rays. */

@@ -34,7 +34,7 @@ final class HitTableIO(config: TraversalConfig) extends Bundle {
 /** The closest hit of every context's ray: the least (t, packed triangle id), whatever the order of tests.
   *
   * Throughput: one result per cycle, visible in the next cycle. A shadow ray overwrites the hit of its context. With
-  * `units.extraSlices` the comparison takes a cycle: a result's bits must be there in the cycle before its `valid`, too.
+  * `units.extraSlices` the comparison takes a cycle: a result's bits are also there in the cycle before its `valid`.
   */
 final class HitTable(config: TraversalConfig) extends Module {
   private val contexts = config.contexts

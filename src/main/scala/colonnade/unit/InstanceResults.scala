@@ -18,7 +18,7 @@ final class VisitEntry(config: PathConfig) extends Bundle {
 
 final class InstanceResultsIO(config: PathConfig) extends Bundle {
 
-  /** What contexts wait for; one without an instance that is left comes by `misses`, too. */
+  /** What contexts wait for; one without an instance that is left also comes by `misses`. */
   val steps   = Flipped(Valid(new InstanceStep(config)))
   val scales  = Flipped(Valid(new VisitScale(config)))
   val entries = Flipped(Valid(new VisitEntry(config)))
@@ -33,7 +33,7 @@ final class InstanceResultsIO(config: PathConfig) extends Bundle {
 }
 
 /** Compares the hits of a ray in one instance after the other: the nearest one stays, of equal ones the first. A result a
-  * cycle, of the traversal units before those of rays that miss.
+  * cycle, of the traversal units before rays that miss.
   */
 final class InstanceResults(config: PathConfig) extends Module {
   private val numbers = config.numbers

@@ -6,7 +6,7 @@ import colonnade.config.{PartConfig, PathConfig}
 import colonnade.ray.RaySetupIO
 import colonnade.shading.{ShaderIO, ShadowRaysIO}
 
-/** Counts the contexts in a stage, from those that enter and leave it in each cycle. */
+/** Counts the contexts in a stage, from entries and exits in each cycle. */
 object Occupancy {
   def apply(config: PartConfig, enter: Seq[Bool], exit: Seq[Bool]): UInt = {
     val count = RegInit(0.U(log2Ceil(config.contexts + 1).W))

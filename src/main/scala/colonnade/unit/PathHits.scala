@@ -25,7 +25,7 @@ final class PathHitsIO(config: PathConfig) extends Bundle {
   val scene = Input(new SceneMap(config.device))
   val trace = Flipped(new TracePort(config)) // to the path unit
 
-  /** Rays that enter the object's box; what they have met. An [[InstanceWalk]] adds those of visits, and reads rays. */
+  /** Rays that enter the object's box; what they have met. An [[InstanceWalk]] adds visits' rays, and reads rays. */
   val rays    = Decoupled(new PreparedRay(config))
   val results = Flipped(Valid(new TraceResult(config)))
 
@@ -144,7 +144,7 @@ final class PathHits(config: PathConfig) extends Module {
   decoder.leaf.bits.isSecond := record.hit.id(0)
   decoder.leaf.bits.record   := record.record
   decoder.leaf.bits.instance.zip(record.hit.instance).foreach { case (to, from) => to := from }
-  // Faces: in the axes of their leaves, or with instances in those of the world
+  // Faces: in the axes of their leaves, or with instances in the world's
   private val (granted, offered) = io.instances.fold(facesOfLeaves)(facesInWorld)
   private val face               = offered.bits
   trace.hits.valid                     := offered.valid
@@ -169,7 +169,7 @@ final class PathHits(config: PathConfig) extends Module {
     (decoder.grantNext, decoder.face)
   }
 
-  /** The same in the axes of the world; without instances those of leaves are. */
+  /** The same in the world's axes; without instances leaves have them. */
   private def facesInWorld(instances: Vec[ObjectInstance]): (Valid[UInt], Valid[HitFace]) = {
     val faces       = Module(new WorldFaces(config)).io
     val isOff       = io.scene.instances.get === 0.U

@@ -130,8 +130,8 @@ final class PathUnit(config: PathConfig) extends Module {
     cube :<>= light.memory
   }
 
-  // Control: the state of every context. A path may end in the light cube two cycles after its last ray has left, not
-  // one: a choice among many contexts takes a cycle, and so does a slice before one among few
+  // Control: the state of every context. A path may end in the light cube two cycles after its last ray has left:
+  // with many contexts arbitration adds a cycle; with few a slice adds it here
   private val bounced = {
     val now = bounces.map(_.bounced).getOrElse(0.U.asTypeOf(controller.bounced))
     if (io.cube.nonEmpty && !config.isLarge) TimingSlice.valid(now) else now

@@ -29,7 +29,7 @@ final class PrimaryRaysIO(config: PathConfig) extends Bundle {
   val meetsObject = Output(Bool())
 }
 
-/** Allocates an idle context to each pixel position, and generates its primary ray. Throughput: that of `RayGenerator`,
+/** Allocates an idle context to each pixel position, and generates its primary ray. Throughput: `RayGenerator`'s,
   * while contexts are idle.
   */
 final class PrimaryRays(config: PathConfig) extends Module {

@@ -33,7 +33,7 @@ private[unit] final class RecordFill(
 
   val broadcasts: Seq[Valid[RecordBroadcast]] = incoming.map(slice.valid(_))
 
-  /** By bank: its broadcast has this address, which with the slice is that of the cycle before. Only the bank of the address
+  /** By bank: its broadcast has this address, with the slice the cycle before's. Only the bank of the address
     * can have it.
     */
   def brings(address: UInt): Seq[Bool] = {

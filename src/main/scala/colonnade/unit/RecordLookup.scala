@@ -27,7 +27,7 @@ final class RecordLookupIO(config: PartConfig) extends Bundle {
   val isSettling = Output(Vec(contexts, Bool()))
 }
 
-/** Lookup: compares the address of a new fetch with those of all buffers, once. Later only a fill or a new reservation
+/** Lookup: compares the address of a new fetch with all buffers', once. Later only a fill or a new reservation
   * changes what a fetch finds. The matches come in the cycle after the fetch. Two extra slices make it the third cycle:
   * behind the comparators, and behind the choice of the fetch's port. A buffer that takes another address meanwhile does
   * not match.

@@ -17,7 +17,7 @@ import scala.collection.mutable
 final class RtController(config: PathConfig) extends Module {
   private val contexts = config.contexts
 
-  /** The number of contexts takes a cycle, and so does a choice of one of them; the latter with extra slices, too. */
+  /** The number of contexts takes a cycle, as does a choice of one of them, the latter also with extra slices. */
   private val isLarge = config.isLarge
 
   val io = IO(new RtControllerIO(config))
@@ -272,13 +272,13 @@ final class RtController(config: PathConfig) extends Module {
 
   private def isAt(wanted: ContextState.Type): Seq[Bool] = state.map(_ === wanted)
 
-  /** The context that is served next, of those that wait for it. Of many contexts, and with extra slices, it is chosen one
+  /** The context that is served next, among the waiting ones. Of many contexts, and with extra slices, it is chosen one
     * cycle early.
     */
   private def choose(claims: Seq[Bool], isServed: => Bool): Choice =
     if (isLarge || config.device.units.extraSlices) First.registered(claims, isServed) else Choice(First(claims))
 
-  /** Of many contexts, the number is that of the cycle before. */
+  /** Of many contexts, the number is the one of the cycle before. */
   private def count(claims: Seq[Bool], atReset: Int = 0): UInt = {
     val number = PopCount(claims)
     if (isLarge) RegNext(number, atReset.U) else number
