@@ -19,11 +19,13 @@ HELD = ("columnBvhMemory.holdable=true", *_LIMITS)
 HOLDABLE = ("array.rows=3", *HELD)
 #: Beside `tiny`: the narrowest arithmetic.
 NARROW = ("precision=16b16s32d", "geometry.triangleBits=null", *_LIMITS)
-#: Beside `tiny`: three units, two of which share two triangle units, and pipelines for all rays of a column.
+#: Beside `tiny`: three units, two of which share two triangle units, pipelines for all rays of a column, and instances.
 PIPELINED = (
     *("array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
-    *("units.triangleRows=2", "units.triangleLanes=2", *HELD),
+    *("units.triangleRows=2", "units.triangleLanes=2", "frame.instances=8", *HELD),
 )
+#: Beside `small`: one column without maps of a room, with gathered light, textures, colours and emission.
+ALONE = ("physicalAttributeMemory=null", "array.columns=1")
 #: Beside `small`, for frames in a room, so that their tests have one simulator: pipelines, two marches of maps that two
 #: columns share.
 IN_ROOM = (

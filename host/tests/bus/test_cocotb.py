@@ -84,7 +84,7 @@ def write_job(folder: Path, design: GeneratedDesign, settings: Mapping[str, Any]
     (folder / "job.json").write_text(json.dumps(job))
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ["scratchpad", pytest.param("scene in DRAM", marks=pytest.mark.matrix)])
 def test_the_shell_in_icarus(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bus_bytes, overrides, settings = CASES[case]
     design = shell_design_for("tiny", overrides, bus_bytes=bus_bytes, pixel_stream="streamed" in settings["tests"])
@@ -92,6 +92,7 @@ def test_the_shell_in_icarus(case: str, tmp_path: Path, monkeypatch: pytest.Monk
     run_bench(monkeypatch, tmp_path, "ColonnadeAxi", design.sources, "shell_bench,stream_bench", settings["tests"])
 
 
+@pytest.mark.matrix
 def test_the_axi4_top_of_the_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Clean under Verilator's lint with any width of the bus, and registers answer through it."""
     sources = sorted((toolchain.project_root() / "examples" / "axi4").glob("*.sv"))

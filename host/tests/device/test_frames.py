@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 from colonnade_lab.evaluation.fuzz.cases import coloured, textured
 from colonnade_lab.evaluation.throughput import figures, records_taken
-from equal_frames import HOLDABLE, NARROW, PIPELINED, equal_frames
+from equal_frames import ALONE, HOLDABLE, NARROW, PIPELINED, equal_frames
 from leaves import packed_triangles
 
 from colonnade.common.errors import UserError
@@ -54,23 +54,27 @@ def test_hardware_renders_what_the_model_renders(case: tuple[str, str, tuple[str
     assert equal_frames(design, image, registers, stalls)[0].is_object.any()
 
 
-@pytest.mark.parametrize(
-    ("precision", "units"),
-    [
-        pytest.param("16b16s32d", (), marks=pytest.mark.matrix),
-        pytest.param(
-            "24b24s64d",
-            ("units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3"),
-            marks=pytest.mark.matrix,
-        ),
-        ("32b32s64d", ()),
-    ],
+#: Beside `tiny`: what the faces of the next test need.
+SHOWN = (
+    *("geometry.cornerColours=true", "geometry.textureBytes=16384", "frame.maxBounces=4", "array.rows=2"),
+    *("frame.emission=true", "geometry.triangleBits=null"),
 )
-def test_corner_colours_textures_and_emission_equal_the_model(precision: str, units: tuple[str, ...]) -> None:
+PIPES = ("precision=24b24s64d", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3")
+
+
+@pytest.mark.parametrize(
+    ("config", "overrides"),
+    [
+        ("small", ALONE),
+        pytest.param("tiny", SHOWN, marks=pytest.mark.matrix),
+        pytest.param("tiny", (*SHOWN, "precision=16b16s32d"), marks=pytest.mark.matrix),
+        pytest.param("tiny", (*SHOWN, *PIPES), marks=pytest.mark.matrix),
+    ],
+    ids=["small", "tiny", "narrow", "pipelines"],
+)
+def test_corner_colours_textures_and_emission_equal_the_model(config: str, overrides: tuple[str, ...]) -> None:
     """Diffuse, mirroring and clear faces with textures or colours at their corners, and emissive faces with neither."""
-    options = ("geometry.cornerColours=true", "geometry.textureBytes=16384", "frame.maxBounces=4", "array.rows=2")
-    options += ("frame.emission=true", *units)
-    design = design_for("tiny", (f"precision={precision}", "geometry.triangleBits=null", *options))
+    design = design_for(config, overrides)
     mesh = load_mesh("teapot:4")
     kinds = [(kind, shown) for shown in ("texture", "colours") for kind in ("diffuse", "mirror", "glass")]
     materials = tuple(

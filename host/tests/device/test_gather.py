@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from equal_frames import IN_ROOM, equal_frames
+from equal_frames import ALONE, IN_ROOM, equal_frames
 from live_maps import live_maps
 
 from colonnade.design.generator import design_for
@@ -61,7 +61,7 @@ def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, i
 @pytest.mark.parametrize(
     ("options", "in_room"),
     [
-        (("physicalAttributeMemory=null", "array.columns=1"), False),
+        (ALONE, False),
         (IN_ROOM, True),
         pytest.param((*IN_ROOM, *MANY), True, marks=pytest.mark.matrix),
     ],

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from equal_frames import HELD, assert_equal, equal_frames
+from equal_frames import HELD, PIPELINED, assert_equal, equal_frames
 from instance_worlds import World, transform
 
 from colonnade.design.generator import design_for
@@ -24,13 +24,10 @@ KINDS = ("rigid", "scaled", "mirrored", "sheared")
 
 @pytest.mark.parametrize(
     ("count", "overrides"),
-    [
-        (2, HELD),
-        (8, (*HELD, "array.rows=3", "units.pathContexts=24", "units.rayInterval=1", "units.shadeInterval=3")),
-    ],
+    [pytest.param(2, ("frame.instances=2", *HELD), marks=pytest.mark.matrix), (8, PIPELINED)],
 )
 def test_frames_of_instances_are_those_of_the_model(count: int, overrides: Sequence[str]) -> None:
-    design = design_for("tiny", (f"frame.instances={count}", *overrides))
+    design = design_for("tiny", overrides)
     random = np.random.default_rng(count)
     transforms = [transform(random, KINDS[i % 4], 1.0) for i in range(count)]
     world = World(design.manifest, transforms, size=24)

@@ -67,6 +67,7 @@ def run_example(output: Path, target: str = "cocotb", **settings: str) -> str:
     return done.stdout
 
 
+@pytest.mark.matrix
 @needs_icarus
 def test_the_frame_of_an_example_is_that_of_the_model(output: Path) -> None:
     """Through the top with AXI4 ports, and by the backdoor; bytes behind the last pixel of a line are unknown.

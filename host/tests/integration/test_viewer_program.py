@@ -40,7 +40,9 @@ ORBITS = {
 }
 
 
-@pytest.mark.parametrize("case", ORBITS)
+@pytest.mark.parametrize(
+    "case", ["keys, in DRAM", *(pytest.param(case, marks=pytest.mark.matrix) for case in ("keys", "a turn, in DRAM"))]
+)
 def test_the_viewer_renders_the_orbit_of_its_camera(tmp_path: Path, case: str) -> None:
     """Its last frame is the model's, for the camera of the arguments."""
     overrides, arguments, count, (azimuth, elevation, distance) = ORBITS[case]
@@ -79,7 +81,9 @@ def lines_of(frame: NDArray[np.uint8], size: tuple[int, int], manifest: Manifest
     return frame[: stride * size[1]].reshape(size[1], stride)
 
 
-@pytest.mark.parametrize("refit", [False, True], ids=["by the driver", "by the unit"])
+@pytest.mark.parametrize(
+    "refit", [False, pytest.param(True, marks=pytest.mark.matrix)], ids=["by the driver", "by the unit"]
+)
 def test_a_mesh_that_the_viewer_bends_has_the_frames_of_the_model(tmp_path: Path, refit: bool) -> None:
     """It is all of the scene: a frame reads one of two copies of its records while the other one is bent."""
     size, count, design = (24, 16), 5, shell_design_for("tiny", ("array.columns=2", *IN_DRAM), refit=refit)
@@ -186,7 +190,9 @@ PLAYS = {
 }
 
 
-@pytest.mark.parametrize("case", PLAYS)
+@pytest.mark.parametrize(
+    "case", [BY_UNIT, *(pytest.param(case, marks=pytest.mark.matrix) for case in ("on chip", BENDS))]
+)
 def test_frames_that_the_viewer_plays_are_those_of_the_model(tmp_path: Path, case: str) -> None:
     """Each: registers are written, and meshes bent, while the frame before runs."""
     described, overrides, count = PLAYS[case]

@@ -261,7 +261,7 @@ def test_a_camera_of_a_capture_has_any_pose_and_lens(folder: Path) -> None:
     np.testing.assert_allclose(rays, camera.directions(*SIZE) @ camera.to_world[:, :3].T @ pose.rotation, atol=1e-9)
 
 
-@pytest.mark.verilator
+@pytest.mark.matrix
 @pytest.mark.parametrize("keyframes", [1, 2])
 def test_the_hardware_renders_the_frames_of_the_model(folder: Path, keyframes: int) -> None:
     common = {"size": (32, 24), "frames": 2, "keyframes": keyframes}
