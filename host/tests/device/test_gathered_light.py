@@ -288,6 +288,7 @@ def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, told: list[str])
     ]
 
 
+@pytest.mark.matrix
 def test_the_light_stays_while_the_object_turns(tmp_path: Path) -> None:
     """A matt ball and a mirror ball look the same in each frame, with the model and the reference."""
     for kind in ("diffuse", "mirror"):

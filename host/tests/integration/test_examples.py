@@ -81,8 +81,9 @@ def test_the_frame_of_an_example_is_that_of_the_model(output: Path) -> None:
         assert "0 of 384 pixels differ from model.png" in printed
 
 
+@pytest.mark.matrix
 @needs_icarus
-@pytest.mark.parametrize("axi4", ["1", pytest.param("", marks=pytest.mark.matrix)])
+@pytest.mark.parametrize("axi4", ["1", ""])
 def test_the_hits_of_an_example_are_those_of_the_model(tmp_path: Path, axi4: str) -> None:
     """Behind the top with AXI4 ports, which holds the other one. A byte of the results that differs fails."""
     printed = run_example(tmp_path, "cocotb-rays", CONFIG=COLUMNS, AXI4=axi4)

@@ -47,6 +47,7 @@ def expected(sizes: tuple[Path, int, int]) -> str:
     return hash_of(build("gcc", sizes[0], "optimised", "mesh", "-O2", f"-DFRAMES={FRAMES}"))
 
 
+@pytest.mark.matrix
 def test_records_without_optimisation_and_with_sanitizers_are_the_same(
     sizes: tuple[Path, int, int], expected: str
 ) -> None:

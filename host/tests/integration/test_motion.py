@@ -72,6 +72,7 @@ def expected(folder: Path) -> str:
     return found
 
 
+@pytest.mark.matrix
 def test_frames_without_optimisation_and_with_sanitizers_are_the_same(folder: Path, expected: str) -> None:
     assert hash_of(build("gcc", folder, "checked", "motion", "-O0", *SANITIZERS, f"-DFRAMES={FRAMES}")) == expected
 

@@ -25,6 +25,7 @@ def expected(folder: Path) -> str:
     return hash_of(build("gcc", folder, "optimised", "instances", "-O2", f"-DFRAMES={FRAMES}"))
 
 
+@pytest.mark.matrix
 def test_words_without_optimisation_and_with_sanitizers_are_the_same(folder: Path, expected: str) -> None:
     assert hash_of(build("gcc", folder, "checked", "instances", "-O0", *SANITIZERS, f"-DFRAMES={FRAMES}")) == expected
 

@@ -120,7 +120,7 @@ def slow_entry(content: TwoLevelMap, u: int, v: int, layout: AttributeLayout) ->
         AttributeLayout(96, 64, map_bytes=4000),
         AttributeLayout(100, 70, map_bytes=5000, palette_size=16),
         AttributeLayout(50, 30, tile_size=8),
-        AttributeLayout(70, 100, tile_size=32, field_bits=8),
+        pytest.param(AttributeLayout(70, 100, tile_size=32, field_bits=8), marks=pytest.mark.matrix),
         AttributeLayout(5, 3),
     ],
     ids=lambda layout: f"{layout.width}x{layout.height}/{layout.tile_size}",

@@ -116,7 +116,9 @@ def bumps(width: int, height: int) -> Environment:
     return Environment("bumps", environment.albedo, environment.normals, depth, True, environment.camera, None)
 
 
-@pytest.mark.parametrize(("plane_bytes", "tile_size"), [(3000, 16), (8192, 16), (4000, 8)])
+@pytest.mark.parametrize(
+    ("plane_bytes", "tile_size"), [(3000, 16), pytest.param(8192, 16, marks=pytest.mark.matrix), (4000, 8)]
+)
 def test_random_access_follows_the_words(plane_bytes: int, tile_size: int) -> None:
     layout = AttributeLayout(150, 110, plane_bytes=plane_bytes, tile_size=tile_size)
     content = encode_planes(bumps(150, 110), layout)

@@ -136,6 +136,7 @@ def test_one_sample_is_the_frame_without_samples(folder: Path) -> None:
     assert one.report.counters == without.report.counters and one.report.samples == 1
 
 
+@pytest.mark.matrix
 def test_soft_shadows_converge_to_the_reference(folder: Path) -> None:
     file = scene_file(folder, SOFT)
     wanted = encode_srgb(of(file, "reference", samples=64).image)

@@ -228,6 +228,7 @@ def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]
             process.wait()
 
 
+@pytest.mark.matrix
 def test_a_cluster_that_loses_a_worker_gives_the_same_numbers(again: Path, explored_study: Explored) -> None:
     with cluster(again.parent) as (address, workers):
         patient = "from colonnade_lab.explore import runners; runners.CONNECT_SECONDS = 100_000"

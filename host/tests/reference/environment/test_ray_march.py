@@ -152,6 +152,7 @@ def test_the_device_passes_closely_behind_a_thin_board(gap: float, passes: bool)
     np.testing.assert_allclose(x, 1.2 if passes else -0.5, atol=0.04)
 
 
+@pytest.mark.matrix
 def test_the_command_prints_a_table_and_writes_json(tmp_path: Path) -> None:
     write_attic(tmp_path / "attic", 96, 72)
     output = tmp_path / "r.json"

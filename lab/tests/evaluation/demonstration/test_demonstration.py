@@ -41,7 +41,7 @@ def test_photos_have_soft_edges_and_exact_maps() -> None:
     assert np.abs(view.photo.astype(int) - hard.photo).mean() < 25
 
 
-@pytest.mark.parametrize("rtl", [[], pytest.param([1], marks=pytest.mark.verilator)])
+@pytest.mark.parametrize("rtl", [[], pytest.param([1], marks=pytest.mark.matrix)])
 def test_costs_of_frames(tmp_path: Path, rtl: list[int]) -> None:
     sequence = load_sequence(walk.write_walk(tmp_path, SIZE, 3))
     (tmp_path / "scene.toml").write_text(walk.walk_scene(*SIZE))
@@ -70,7 +70,7 @@ def test_the_page_adds_up(tmp_path: Path) -> None:
     assert "http" not in text.replace("http-equiv", ""), "it loads nothing"
 
 
-@pytest.mark.parametrize("rtl", [[], pytest.param([1], marks=pytest.mark.verilator)])
+@pytest.mark.parametrize("rtl", [[], pytest.param([1], marks=pytest.mark.matrix)])
 def test_costs_of_frames_of_objects_that_move(tmp_path: Path, rtl: list[int]) -> None:
     """Before a camera that moves, in maps of each frame."""
     ball = 'mesh = {name = "sphere:2"}\n'

@@ -84,8 +84,8 @@ def test_the_kind_reaches_registers_and_cube(manifest: Manifest, cases: tuple[Ca
 @pytest.mark.verilator
 def test_hardware_and_model_agree_on_corrupt_frames_that_gather() -> None:
     """The campaign counts them. Long version: ``colonnade fuzz --config small --cases 1000``."""
-    report = fuzz(design_for("small", OPTIONS), 60, seed=1)
+    report = fuzz(design_for("small", OPTIONS), 24, seed=1)
     assert report["disagreements"] == [] and report["legal_failures"] == 0
-    assert report["kinds"]["gather"]["changed"] > 5 and list(report["kinds"]) == ALONE
+    assert report["kinds"]["gather"]["changed"] > 2 and list(report["kinds"]) == ALONE
     assert list(report["sums"]) == ["corrupt frames gathered light", "legal frames gathered light"]
-    assert all(20 < number < 60 for number in report["sums"].values())
+    assert all(8 < number < 24 for number in report["sums"].values())

@@ -17,7 +17,7 @@ from colonnade_lab.evaluation.fuzz.campaign import fuzz
 from colonnade_lab.evaluation.fuzz.corruption import KINDS, corrupt_case
 from colonnade_lab.evaluation.fuzz.environments import environment_cases
 
-FRAMES = 16
+FRAMES = 8
 SLIC = ("physicalAttributeMemory.encoding=slic",)
 
 

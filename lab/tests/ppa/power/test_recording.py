@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from colonnade.common.errors import UserError
 from colonnade.design.generator import GeneratedDesign, manifest_for
+from equal_frames import PIPELINED
 
 from colonnade_lab.evaluation.ray_bench import KINDS
 from colonnade_lab.ppa.netlist.hierarchy import TRIANGLES
@@ -47,14 +48,7 @@ def workload(cycles: int) -> FrameWorkload:
 
 
 def recorded(cycles: int) -> dict[str, Recording]:
-    overrides = (
-        "array.rows=3",
-        "units.pathContexts=24",
-        "units.rayInterval=1",
-        "units.shadeInterval=3",
-        "units.triangleRows=2",
-    )
-    return record("tiny", overrides, PORTS, workload(cycles))
+    return record("tiny", PIPELINED, PORTS, workload(cycles))
 
 
 @pytest.mark.verilator
