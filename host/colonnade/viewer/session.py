@@ -108,7 +108,8 @@ class Session:
         encoder: Of a room's maps and of textures.
         progress: Shows the run of the generator.
         is_own: The file is the user's; False: it belongs to the project, and no camera is saved into it.
-        room, animation: As in `load_scene`.
+        room: As in `load_scene`.
+        animation: As in `load_scene`.
 
     Raises:
         UserError: The scene cannot be read or packed.

@@ -65,7 +65,8 @@ def compare(before: Modules, after: Modules, cycles: int, limit: int, progress: 
     """Compare all units that may have changed, those below first.
 
     Args:
-        before, after: The designs.
+        before: The design to compare with.
+        after: The design that is compared.
         cycles: Cycles of random inputs for a unit without a proof.
         limit: CPU seconds of each question to abc.
         progress: Shows the unit.

@@ -31,7 +31,8 @@ def placed(rows: Sequence[Row], x: str, y: str, area: tuple[float, float], paddi
 
     Args:
         rows: Of `rows.scatter_rows`.
-        x, y: Keys of the drawn figures.
+        x: Key of the figure across.
+        y: Key of the figure upwards.
         area: Width and height of the plot, pixels.
         padding: Between the plot's edges and its outermost points, pixels.
     """
