@@ -3,6 +3,7 @@ frame."""
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ from patience import PATIENCE
 
 from colonnade.common import notes, processes
 from colonnade.design.manifest import VERSION, Manifest
+from colonnade.device import simulator_build
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -216,6 +218,14 @@ def quick_simulators(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
     """Build simulators that are soon compiled, but for tests with the mark `matrix`."""
     if request.node.get_closest_marker("matrix") is None:
         monkeypatch.setenv("COLONNADE_QUICK_SIMULATORS", "1")
+
+
+@pytest.fixture(autouse=True)
+def checked_simulators(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Build simulators with the options of a sanitizer where tools/sanitizers names them."""
+    if options := os.environ.get("COLONNADE_SIMULATOR_SANITIZER"):
+        more = "-CFLAGS", options, "-LDFLAGS", options
+        monkeypatch.setattr(simulator_build, "_VERILATOR_OPTIONS", (*simulator_build._VERILATOR_OPTIONS, *more))
 
 
 @pytest.fixture(scope="session", autouse=True)

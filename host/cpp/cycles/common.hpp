@@ -1,6 +1,7 @@
 // Parts of all units: arbiters, short rings, sets of contexts.
 #pragma once
 #include <array>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 
@@ -30,8 +31,12 @@ public:
     const T& front() const { return items_[head_]; }
     T& at(std::size_t i) { return items_[(head_ + i) & (size - 1)]; }
     const T& at(std::size_t i) const { return items_[(head_ + i) & (size - 1)]; }
-    void push(const T& item) { items_[(head_ + count_++) & (size - 1)] = item; }
+    void push(const T& item) {
+        assert(count_ < size);
+        items_[(head_ + count_++) & (size - 1)] = item;
+    }
     void pop() {
+        assert(count_ > 0);
         head_ = (head_ + 1) & (size - 1);
         --count_;
     }

@@ -33,7 +33,9 @@ CycleCounters simulate(const Design& design, const DramDesign& dram, const Frame
         for (unsigned x = 0; x < width; ++x) pixels.push_back(kindOf(frame, x, y, 1));
     for (unsigned y = 0; y < height; y += size)
         for (unsigned x = 0; x < width; x += size) tiles.push_back(kindOf(frame, x, y, size));
-    const FrameSettings settings{static_cast<int>(frame.lighting.lights.size()), frame.gather.bounces, frame.hasEnvironment, frame.environment.isMapCamera};
+    // Without an environment its registers have no value
+    const bool isMapCamera = frame.hasEnvironment && frame.environment.isMapCamera;
+    const FrameSettings settings{static_cast<int>(frame.lighting.lights.size()), frame.gather.bounces, frame.hasEnvironment, isMapCamera};
     return FrameSimulation(design, dram, work, settings, width, height, std::move(pixels), std::move(tiles)).run();
 }
 

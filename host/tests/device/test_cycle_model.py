@@ -18,6 +18,20 @@ from colonnade.device.scene import DeviceScene
 from colonnade.scene.parser import load_scene
 
 ROOT = Path(__file__).parents[3]
+#: Fields of a design that the cycle model takes: the least and the greatest value.
+RANGES = {
+    "array.rows": (1, 31),
+    "array.columns": (1, 32),
+    "array.contexts": (1, 16),
+    "units.boxLanes": (1, 4),
+    "units.triangleLanes": (1, 4),
+    "units.triangleRows": (1, 16),
+    "units.pathContexts": (1, 256),
+    "units.marches": (1, 16),
+    "columnBvhMemory.banks": (1, 4),
+    "columnBvhMemory.recordBuffers": (1, 8),
+    "columnBvhMemory.readLatency": (1, 16),
+}
 #: Largest error for the teapot; that of other frames is in docs/cycles.md.
 BOUND = 0.01
 SIZE = (160, 120)
@@ -90,6 +104,19 @@ def test_dram_matters_only_behind_a_cache() -> None:
     own = manifest_of("columnBvhMemory.cache=null", "columnBvhMemory.depth=131072")
     counters = noted().cycles(own, 1000)
     assert counters == noted().cycles(own, 10) and "dramReads" not in counters
+
+
+@pytest.mark.parametrize("config", ("edge", "tiny"))
+def test_designs_at_both_ends_of_all_fields_count_the_same_work(config: str) -> None:
+    """Each field alone, then all: no queue of the model is too short. `tools/sanitizers` has its assertions."""
+    frame, manifest = noted(config, (40, 30)), prepared(config).manifest
+    own = design_values(manifest, frame.record_bytes)
+    ends = [{name: end} for name, both in RANGES.items() for end in both]
+    ends += [{name: both[i] for name, both in RANGES.items()} for i in (0, 1)]
+    for values in ends:
+        counted = frame.model.cycles(own | values, 100, 1)
+        for name in ("raysInBox", "nodeReads", "triangleTests"):
+            assert counted[name] == frame.counters[name], (values, name)
 
 
 def test_designs_that_are_not_modelled_are_one_line() -> None:
