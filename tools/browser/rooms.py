@@ -65,7 +65,7 @@ def room_data(name: str, manifests: Mapping[str, Manifest]) -> dict[str, Any]:
             if part.memory in map_memories(manifest)
         ]
         if maps is not None and own != maps:
-            raise ValueError(f"the maps of {design} are not those of the other designs")
+            raise ValueError(f"the maps of {design} differ from the other designs'")
         maps = own
     assert ready.photo is not None
     photo = io.BytesIO()

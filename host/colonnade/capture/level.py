@@ -107,7 +107,7 @@ def level(frames: Iterable[Frame], up: Floats | None, where: str) -> Levelling:
         overhead = -seen.cameras[:, :, 1].mean(axis=0)
         floor = _largest_plane(seen, seen.normals @ overhead > _UNCERTAIN * np.linalg.norm(overhead), is_low=True)
         if floor is not None:
-            what = f"the vertical and the floor are those of the largest low plane, {_from_y(floor.normal)}"
+            what = f"the vertical and the floor come from the largest low plane, {_from_y(floor.normal)}"
             return Levelling(_rotation_to_y(floor.normal), -floor.height, f"{what}; {_on(floor)}")
         if not np.linalg.norm(overhead) > _COMMON_UP:
             raise UserError(

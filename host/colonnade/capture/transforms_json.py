@@ -51,7 +51,7 @@ class TransformsJson:
     @property
     def outline(self) -> Outline:
         """What is known before frames are read."""
-        return Outline("nerfstudio", len(self._frames), notes=("times are those of 30 frames a second", *self._notes))
+        return Outline("nerfstudio", len(self._frames), notes=("times assume 30 frames a second", *self._notes))
 
     def frames(self, numbers: Sequence[int]) -> Iterator[Frame]:
         """Read frames, by ascending number."""

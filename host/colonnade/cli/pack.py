@@ -80,7 +80,7 @@ def pack(
 ) -> None:
     """Pack SCENE, a TOML file or the name of one such as room, for one configuration; print its use of each memory."""
     if size is not None and frame_file is None and photo_file is None and view_file is None:
-        message = "--size is that of --frame-file, --photo-file and --view-file"
+        message = "--size is for --frame-file, --photo-file and --view-file"
         raise click.UsageError(message, click.get_current_context())
 
     from colonnade.common import progress

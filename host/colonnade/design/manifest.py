@@ -201,7 +201,7 @@ class Manifest:
             raise UserError(f"the manifest has version {data['version']}, this host reads {VERSION} at most: update it")
         if data["version"] < VERSION:
             raise UserError(
-                f"the manifest has the formats of version {data['version']}, this host packs those of version"
+                f"the manifest has the formats of version {data['version']}, this host packs version"
                 f" {VERSION}: generate it again"
             )
         bits = int(data["records"]["bits"])

@@ -101,5 +101,5 @@ inline void requireLegal(Report& report, const std::string& port, const Address&
     report.require(burst.burst == 1, port, "a burst is not INCR");
     report.require(1u << burst.size == busBytes, port, "beats are not as wide as the bus");
     report.require(burst.end() <= std::uint64_t{1} << 40, port, "a burst leaves the addresses of 40 bits");
-    report.require(burst.protection == 2, port, "the protection is not that of data, unprivileged and non-secure");
+    report.require(burst.protection == 2, port, "the protection is not data, unprivileged and non-secure");
 }
