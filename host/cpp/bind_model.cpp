@@ -245,4 +245,11 @@ void bind_model(nb::module_& module) {
             "Counters of the noted frame, by name, with timing-dependent ones. `design`: its configuration by paths, numbers and `recordBytes`; DRAM's latency and the cycles between its beats.")
         .def("counters", &Model::counters, "Timing-independent counters since `start`, by name.")
         .def("errors", &Model::errors, "Sticky error bits since `start`, by name.");
+    module.def(
+        "bounce_cycles",
+        [](const Values& design) -> Values {
+            const cycles::BounceCycles bounces = cycles::Design(design).bounceCycles;
+            return {{"mirror", bounces.mirror}, {"totalReflection", bounces.totalReflection}, {"behind", bounces.glassFromBehind}, {"front", bounces.glassFromFront}};
+        },
+        "design"_a, "Cycles of a bounce unit on a design, as of `Model.cycles`. ValueError for one that the cycle model does not know.");
 }

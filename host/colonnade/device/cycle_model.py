@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from colonnade import _core
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import loaded_model
@@ -69,6 +70,25 @@ class NotedFrame:
         except ValueError as error:
             raise UserError(str(error)) from None
         return {**self.counters, **timed}
+
+
+def bounce_cycles(manifest: Manifest) -> dict[str, int]:
+    """Cycles of a bounce unit by what is hit: docs/shading.md, Bounces.
+
+    Raises:
+        ValueError: The cycle model does not know the design.
+    """
+    cycles: dict[str, int] = _core.bounce_cycles(design_values(manifest, record_bytes=0))
+    return cycles
+
+
+def knows_design(manifest: Manifest) -> bool:
+    """Whether the cycle model knows a design: its Limits in docs/cycles.md."""
+    try:
+        bounce_cycles(manifest)
+    except ValueError:
+        return False
+    return True
 
 
 def design_values(manifest: Manifest, record_bytes: int) -> dict[str, int]:

@@ -7,6 +7,8 @@
 
 namespace colonnade::cycles {
 
+using Cycle = std::int64_t;
+
 /// common/RoundRobin.scala.
 class RoundRobin {
 public:
@@ -45,6 +47,22 @@ private:
     static_assert((size & (size - 1)) == 0);
     std::array<T, size> items_{};
     std::size_t head_ = 0, count_ = 0;
+};
+
+/// A fixed delay: items in order, each with the cycle from which it is there.
+template <class T, std::size_t size> struct Delayed {
+    struct Item {
+        Cycle at;
+        T value;
+    };
+    Ring<Item, size> items;
+
+    void push(Cycle at, const T& value) { items.push({at, value}); }
+    bool has(Cycle now) const { return !items.isEmpty() && items.front().at <= now; }
+    const T& front() const { return items.front().value; }
+    void pop() { items.pop(); }
+    std::size_t count() const { return items.count(); }
+    bool isEmpty() const { return items.isEmpty(); }
 };
 
 /// A set of numbers below 256.

@@ -6,11 +6,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "bounce_program.hpp"
 #include "model/formats.hpp"
 
 namespace colonnade::cycles {
-
-using Cycle = std::int64_t;
 
 /// Records of a line of the caches.
 constexpr std::uint32_t lineRecords = 2;
@@ -40,6 +39,7 @@ struct Design {
     int entryCycles, missCycles, quotientCycles;
     /// Of the sequential shader: cycles of a hit in the geometry with one light, and from there to its light.
     int geometryCycles, cosineCycles;
+    BounceCycles bounceCycles;
 
     explicit Design(const std::map<std::string, std::int64_t>& values) {
         const auto take = [&](const char* key) { return static_cast<int>(lookUp(values, key)); };
@@ -89,6 +89,8 @@ struct Design {
         const int shadeBits = take("shadeBits");
         geometryCycles = 37 + 2 * ((take("shearFraction") + 1 + shadeBits) / shadeBits) + 5 * late;
         cosineCycles = (take("radicandBits") + 1) / 2 + take("cosineFraction") / 2 + 20;
+
+        bounceCycles = BounceProgram(take("gridBits"), take("rootBits"), take("radicandBits"), take("cosineFraction")).cycles();
 
         // traversal/DistanceStage.scala: radix 4, two digits a cycle
         divisionSteps = take("distanceDigits") / 4 + 1;

@@ -8,9 +8,29 @@
 
 namespace colonnade::cycles {
 
+/// The channel for tiles and cells of the maps that some columns share: environment/AttributeArbiter.scala, CellLookup.scala. A cell of a tile of several planes takes two cycles.
+class CellChannel {
+public:
+    /// A request of a cycle, or of two: returns how long it waits for those before it.
+    Cycle ask(Cycle now, Cycle cycles) {
+        const Cycle waits = std::max<Cycle>(0, openFrom_ - now);
+        openFrom_ = now + waits + cycles;
+        return waits;
+    }
+
+    /// The arbiter's queue has a place, without which a directly seen pixel does not go on.
+    bool hasPlace(Cycle now) const { return openFrom_ - now <= queuePlaces; }
+
+private:
+    static constexpr Cycle queuePlaces = 2;
+
+    Cycle openFrom_ = 0;
+};
+
 class Environment {
 public:
-    Environment(const Design& design) : squareCycles_(design.columnsPerCopy > 1 ? 11 : 9), fetchCycles_(8), marches_(static_cast<std::size_t>(design.marches)) {}
+    Environment(const Design& design, CellChannel& cells)
+        : squareCycles_(design.columnsPerCopy > 1 ? 11 : 9), fetchCycles_(8), cells_(cells), marches_(static_cast<std::size_t>(design.marches)) {}
 
     /// A request of each kind is accepted.
     bool acceptsDirect() const { return directWaits_ < 0; }
@@ -52,26 +72,42 @@ public:
 
         // Requests that wait go into the pipeline, or else to an empty march
         isTaken_ = false;
-        for (const March& march : marches_) busy += march.path >= 0;
-        if (directWaits_ >= 0 && now >= directOpens_ && inPipeline_ < pipelinePlaces) {
+        for (March& march : marches_) {
+            busy += march.path >= 0;
+            if (march.path >= 0 && march.requests > 0 && march.asks <= now) {
+                // Spread over the march: tiles, then cells
+                march.asks += march.interval;
+                march.ends += cells_.ask(now, march.requests-- > march.cells ? 1 : 2);
+            }
+        }
+        if (directWaits_ >= 0 && now >= directOpens_ && inPipeline_ < pipelinePlaces && cells_.hasPlace(now)) {
             isTaken_ = true;
             directOpens_ = now + 4;
             ++inPipeline_;
-            depths_.push({now + directCycles, directWaits_});
+            depths_.push({now + directCycles + cells_.ask(now, directIsFlat_ ? 1 : 2), directWaits_});
             directWaits_ = -1;
         } else if (marchWaits_ >= 0)
             for (March& march : marches_)
                 if (march.path < 0) {
                     isTaken_ = true;
                     march = {marchWaits_, now + marchCycles_};
+                    march.requests = marchRequests_;
+                    march.cells = marchCells_;
+                    march.interval = marchCycles_ / (marchRequests_ + 1);
+                    march.asks = now + march.interval;
                     marchWaits_ = -1;
                     break;
                 }
         if (request >= 0) {
-            if (lookup->isDirect) directWaits_ = request;
-            else {
+            if (lookup->isDirect) {
+                directWaits_ = request;
+                directIsFlat_ = lookup->isFlat;
+            } else {
+                const MarchWork& march = work.marches[lookup->first];
                 marchWaits_ = request;
-                marchCycles_ = cyclesOf(work.marches[lookup->first]);
+                marchCycles_ = cyclesOf(march);
+                marchCells_ = march.cells;
+                marchRequests_ = march.flatTiles + march.tiles + march.cells;
             }
         }
         return answered;
@@ -90,7 +126,8 @@ private:
     };
     struct March {
         int path = -1;
-        Cycle ends = 0;
+        Cycle ends = 0, asks = 0, interval = 0;
+        int requests = 0, cells = 0;
     };
 
     /// docs/march.md, cycles; TileProgram.scala, CellProgram.scala, PlaneTest.scala. A row of steps without a plane of the maps ends at the bounding planes.
@@ -104,6 +141,9 @@ private:
     static constexpr Cycle directCycles = 34, hitCycles = 14;
 
     Cycle squareCycles_, fetchCycles_;
+    CellChannel& cells_;
+    bool directIsFlat_ = false;
+    int marchRequests_ = 0, marchCells_ = 0;
     int directWaits_ = -1, marchWaits_ = -1, hitPath_ = -1, inPipeline_ = 0;
     Cycle marchCycles_ = 0, directOpens_ = 0, pointOpens_ = 0, hitEnds_ = 0;
     bool isTaken_ = false;

@@ -112,9 +112,10 @@ private:
 /// A column with its walkers.
 class Column {
 public:
-    Column(const Design& design, const FrameWork& work, const FrameSettings& settings, unsigned width, unsigned height, const std::vector<PixelKind>& kinds)
+    Column(const Design& design, const FrameWork& work, const FrameSettings& settings, CellChannel& cells, unsigned width, unsigned height,
+           const std::vector<PixelKind>& kinds)
         : design_(design), hasEnvironment_(settings.hasEnvironment), width_(width), height_(height), kinds_(kinds), scan_(log2(design.tileSize)),
-          backgroundScan_(log2(design.tileSize)), environmentScan_(log2(design.tileSize)), paths(design, work, settings) {
+          backgroundScan_(log2(design.tileSize)), environmentScan_(log2(design.tileSize)), paths(design, work, settings, cells) {
         for (int row = 0; row < design.rows; ++row) units.emplace_back(design, work, row);
         for (int row = 0; row < design.rows; row += design.triangleRows) groups.emplace_back(design, std::min(design.triangleRows, design.rows - row));
         for (int bank = 0; bank < design.banks; ++bank) banks.emplace_back(design, bank);
@@ -335,7 +336,9 @@ public:
                       TileScheduler(PixelKind::background, tileLevels(design), static_cast<unsigned>(design.tileSize), false),
                       TileScheduler(PixelKind::environment, tileLevels(design), static_cast<unsigned>(design.tileSize), false)},
           dram_(design, dram) {
-        for (int i = 0; i < design.columns; ++i) columns_.push_back(std::make_unique<Column>(design_, work, settings, width, height, kinds_));
+        cells_.resize(static_cast<std::size_t>((design.columns + design.columnsPerCopy - 1) / design.columnsPerCopy));
+        for (int i = 0; i < design.columns; ++i)
+            columns_.push_back(std::make_unique<Column>(design_, work, settings, cells_[static_cast<std::size_t>(i / design.columnsPerCopy)], width, height, kinds_));
         if (design.hasCache)
             for (int bank = 0; bank < design.banks; ++bank) shared_.push_back(std::make_unique<SharedBank>(design_, bank));
     }
@@ -444,6 +447,7 @@ private:
     const Design design_;
     std::vector<PixelKind> kinds_, tiles_;
     unsigned width_, height_, tilesWide_;
+    std::vector<CellChannel> cells_; // of each copy of the maps
     std::vector<std::unique_ptr<Column>> columns_;
     std::vector<std::unique_ptr<SharedBank>> shared_;
     static constexpr std::size_t kinds = 3; // objects, backgrounds, environments

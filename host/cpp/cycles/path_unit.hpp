@@ -1,8 +1,11 @@
-// unit/PathUnit.scala with ray set-up, the fetch of attributes, shader, bounces and colour unit: follows the path of each pixel of a column.
+// unit/PathUnit.scala with the fetch of attributes, shader and colour unit: follows the path of each pixel of a column.
 #pragma once
 #include <vector>
 
+#include "bounces.hpp"
 #include "environment.hpp"
+#include "ray_generator.hpp"
+#include "ray_setup.hpp"
 #include "record_fetch.hpp"
 
 namespace colonnade::cycles {
@@ -13,167 +16,13 @@ struct FrameSettings {
     bool hasEnvironment, isMapCamera;
 };
 
-/// A fixed delay: items in order, each with the cycle from which it is there.
-template <class T, std::size_t size> struct Delayed {
-    struct Item {
-        Cycle at;
-        T value;
-    };
-    Ring<Item, size> items;
-
-    void push(Cycle at, const T& value) { items.push({at, value}); }
-    bool has(Cycle now) const { return !items.isEmpty() && items.front().at <= now; }
-    const T& front() const { return items.front().value; }
-    void pop() { items.pop(); }
-    std::size_t count() const { return items.count(); }
-    bool isEmpty() const { return items.isEmpty(); }
-};
-
-/// ray/RayGenerator.scala: how many cycles a pixel takes behind the one before it.
-class RayGenerator {
-public:
-    RayGenerator(const Design& design) : topBit_(design.coordinateBits), tileSize_(static_cast<unsigned>(design.tileSize)) {}
-
-    bool isReady(bool rayLeaves) const { return !inFront_ || moves(rayLeaves); }
-    bool hasRay() const { return inBack_; }
-    int ray() const { return back_; }
-
-    void step(bool rayLeaves, bool accepts, int path, unsigned x, unsigned y, bool inObjectTile) {
-        const bool sums = inFront_ && (!inBack_ || rayLeaves), moved = moves(rayLeaves), wasBusy = inFront_ || inBack_;
-        if (sums) --left_;
-        if (rayLeaves) inBack_ = false;
-        if (moved) {
-            inBack_ = true;
-            back_ = front_;
-            inFront_ = false;
-        }
-        const bool isNew = empty_ == emptyCycles;
-        if (wasBusy) empty_ = 0;
-        else if (!isNew) ++empty_;
-        if (!accepts) return;
-        inFront_ = true;
-        front_ = path;
-        if (isNew) last_[0].isKnown = last_[1].isKnown = false;
-        Last& last = last_[inObjectTile];
-        const unsigned tile = y / tileSize_ << 16 | x / tileSize_;
-        const int code = morton(x % tileSize_, y % tileSize_), behind = code - last.code;
-        left_ = last.isKnown && last.tile == tile && behind > 0 && behind <= topBit_ + 1 ? behind : topBit_ + 1;
-        last = {true, tile, code};
-    }
-
-    static int morton(unsigned x, unsigned y) {
-        int code = 0;
-        for (int bit = 0; bit < 8; ++bit) code |= static_cast<int>((x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1));
-        return code;
-    }
-
-private:
-    struct Last {
-        bool isKnown;
-        unsigned tile;
-        int code;
-    };
-
-    bool moves(bool rayLeaves) const { return inFront_ && (!inBack_ || rayLeaves) && left_ == 1; }
-
-    static constexpr int emptyCycles = 8; // without a pixel: then the camera may be another one
-
-    int topBit_, empty_ = emptyCycles;
-    unsigned tileSize_;
-    bool inFront_ = false, inBack_ = false;
-    int front_ = -1, back_ = -1, left_ = 0;
-    Last last_[2] = {};
-};
-
-/// ray/RaySetupPipeline.scala: a ray a cycle, all stages in step; or SequentialRaySetup.scala: up to three rays, in a normaliser, dividers and the entry.
-class RaySetup {
-public:
-    RaySetup(const Design& design) : design_(design), stages_(static_cast<std::size_t>(design.setupStages), -1) {}
-
-    /// The path whose ray is offered, or -1.
-    int offered(Cycle now) const {
-        if (!design_.isSequentialSetup) return stages_[last_];
-        return entry_.path >= 0 && entry_.hasQuotients && now >= entry_.ends ? entry_.path : -1;
-    }
-
-    /// A ray enters if it can. `leaves`: the offered ray is taken.
-    bool isReady(Cycle now, bool leaves) const {
-        if (!design_.isSequentialSetup) return stages_[last_] < 0 || leaves;
-        return normaliser_.path < 0 || isLeft(now, leaves);
-    }
-
-    void step(Cycle now, bool leaves, int entering, const PathStep* ray) {
-        if (design_.isSequentialSetup) return stepSequential(now, leaves, entering, ray);
-        if (stages_[last_] >= 0 && !leaves) return;
-        stages_[last_] = entering; // the place of the last stage becomes that of the first
-        last_ = last_ == 0 ? stages_.size() - 1 : last_ - 1;
-        busy += entering >= 0;
-    }
-
-    std::uint64_t busy = 0;
-
-private:
-    struct Normaliser {
-        int path = -1;
-        bool isInBox, hasMantissas, hasRay;
-        Cycle settles;
-    };
-    struct Entry {
-        int path = -1;
-        bool isInBox, hasQuotients;
-        Cycle begins, ends;
-    };
-
-    bool divides() const { return divisionEnds_ >= 0; }
-    bool isSettled(Cycle now) const { return normaliser_.path >= 0 && now >= normaliser_.settles; }
-    bool entryIsOpen(bool leaves) const { return entry_.path < 0 || leaves; }
-    bool isLeft(Cycle now, bool leaves) const {
-        return isSettled(now) && (!normaliser_.hasMantissas || !divides() || divisionTaken_) && (!normaliser_.hasRay || entryIsOpen(leaves));
-    }
-
-    void stepSequential(Cycle now, bool leaves, int entering, const PathStep* ray) {
-        busy += entry_.path >= 0;
-        const bool settled = isSettled(now), left = isLeft(now, leaves), loads = settled && normaliser_.hasRay && entryIsOpen(leaves),
-                   starts = settled && normaliser_.hasMantissas && (!divides() || divisionTaken_);
-        const bool isAnswered = entry_.path >= 0 && !entry_.hasQuotients && now >= entry_.begins + 3 && divides() && now >= divisionEnds_;
-        if (isAnswered) {
-            // Behind the quotients, all steps but those before
-            entry_.hasQuotients = true;
-            entry_.ends = now + (entry_.isInBox ? design_.entryCycles : design_.missCycles) - 4;
-        }
-        // They leave the dividers a cycle later
-        if (divisionTaken_) divisionEnds_ = -1;
-        divisionTaken_ = isAnswered;
-        if (leaves) entry_.path = -1;
-        if (loads) {
-            entry_ = {normaliser_.path, normaliser_.isInBox, false, now + 1, 0};
-            normaliser_.hasRay = false;
-        }
-        if (starts) {
-            divisionEnds_ = now + design_.quotientCycles;
-            normaliser_.hasMantissas = false;
-        }
-        if (left) normaliser_.path = -1;
-        // The axes rotate by one or two steps unless z is dominant: one on average
-        if (entering >= 0) normaliser_ = {entering, ray->isInBox, true, true, now + 5};
-    }
-
-    const Design& design_;
-    std::vector<int> stages_;
-    std::size_t last_ = 0;
-    Normaliser normaliser_{};
-    Entry entry_{};
-    Cycle divisionEnds_ = -1;
-    bool divisionTaken_ = false;
-};
-
 class PathUnit {
 public:
-    PathUnit(const Design& design, const FrameWork& work, const FrameSettings& settings)
+    PathUnit(const Design& design, const FrameWork& work, const FrameSettings& settings, CellChannel& cells)
         : design_(design), work_(work), settings_(settings), paths_(static_cast<std::size_t>(design.pathContexts)), free_(design.isLarge()), ended_(design.isLarge()),
           next_(design.isLarge()), last_(design.isLarge()), done_(design.isLarge()), camera_(design.isLarge()), others_(design.isLarge()), resumable_(design.isLarge()),
           generator_(design), setup_(design), slots_(std::min(16, design.pathContexts)), fetch_(design, design.rows, slots_, std::min(2, design.recordBuffers)),
-          pixelQueue_(design.isLarge() ? 3 : 1), environment_(design) {
+          bounces_(design), pixelQueue_(design.isLarge() ? 3 : 1), environment_(design, cells) {
         idleCount_ = design.pathContexts;
         for (int i = 0; i < design.pathContexts; ++i) idle_.add(i);
     }
@@ -209,8 +58,8 @@ public:
         // Into the queue in front of ray set-up: rays from surfaces, from bounces, from the camera
         const bool hasPlace = requests_.count() < 2;
         shadowFires_ = hasPlace && hasShadow_;
-        bounceFires_ = hasPlace && !hasShadow_ && bounced_.has(now) && bounceReady_;
-        const bool waitsForBounce = bounced_.has(now) && bounceReady_;
+        bounceFires_ = hasPlace && !hasShadow_ && bounced_.has(now);
+        const bool waitsForBounce = bounced_.has(now);
         generatorBypasses_ = settings_.hasEnvironment && generator_.hasRay() && work_.steps[at(generator_.ray()).step].kind == PathStep::Kind::lookup;
         rayLeavesGenerator_ =
             generator_.hasRay() && !(settings_.hasEnvironment && waitsForBounce) && (generatorBypasses_ || (hasPlace && !shadowFires_ && !waitsForBounce));
@@ -412,7 +261,7 @@ private:
         bool hasColours;
     };
 
-    static constexpr int decoderPlaces = 8, bouncePlaces = 6;
+    static constexpr int decoderPlaces = 8;
     static constexpr Cycle faceAwayCycles = 9;
 
     Path& at(int path) { return paths_[static_cast<std::size_t>(path)]; }
@@ -535,10 +384,10 @@ private:
     void enterShader(Cycle now, int phase) {
         if (design_.isSequentialShader) return enterSequentialShader(now);
         // A light of the hit in the entry has entered
-        if (phase == 1) takesFace_ = lightsLeft_ == 0 && bouncing_ < bouncePlaces && faces_.has(now);
+        if (phase == 1) takesFace_ = lightsLeft_ == 0 && bounces_.hasPlace() && faces_.has(now);
         if (phase != 2 && settings_.hasEnvironment) choosePoint(false);
         if (phase != 2) return;
-        const bool takesPoint = !takesFace_ && isOffered_ && lightsLeft_ == 0 && bouncing_ < bouncePlaces;
+        const bool takesPoint = !takesFace_ && isOffered_ && lightsLeft_ == 0 && bounces_.hasPlace();
         if (settings_.hasEnvironment) choosePoint(takesPoint);
         if (takesPoint) {
             lightsLeft_ = lightsOn() - 1;
@@ -552,8 +401,7 @@ private:
                 lightsLeft_ = lightsOn() - 1;
                 lit_.push(now + design_.shadeLight + 3 + 3 * lightsLeft_, path);
             } else {
-                ++bouncing_;
-                toBounce_.push(now + 12, path);
+                bounces_.push(now + 12, path, surfaceOf(path));
             }
         } else if (lightsLeft_ > 0) {
             --lightsLeft_;
@@ -576,9 +424,9 @@ private:
             shaderOpens_ = now + geometry;
             const bool isFacing = hasNext(at(path)) && nextOf(at(path)).isShadow;
             if (isDiffuse(path)) lit_.push(shaderOpens_ + (isFacing ? design_.cosineCycles : faceAwayCycles), path);
-            else toBounce_.push(shaderOpens_, path);
+            else bounces_.push(shaderOpens_, path, surfaceOf(path));
         }
-        takesFace_ = now + 1 >= shaderOpens_ && faces_.has(now);
+        takesFace_ = now + 1 >= shaderOpens_ && faces_.has(now) && !bounces_.isBlocked(now);
     }
 
     /// One of the points that wait in the table is offered, unless the table is read for a request.
@@ -603,37 +451,19 @@ private:
     }
 
     int lightsOn() const { return std::max(1, settings_.lights); }
-    bool isDiffuse(int path) const { return work_.steps[at(path).step].material == PathStep::Material::diffuse; }
+    const PathStep& surfaceOf(int path) const { return work_.steps[at(path).step]; }
+    bool isDiffuse(int path) const { return surfaceOf(path).material == PathStep::Material::diffuse; }
 
-    /// Mirrors and glass: shading/BouncePipeline.scala.
+    /// Mirrors and glass.
     void finishBounces(Cycle now) {
-        bounceReady_ = true;
-        if (toBounce_.has(now)) {
-            const int path = toBounce_.front();
-            const bool isGlass = work_.steps[at(path).step].material == PathStep::Material::glass;
-            int unit = -1;
-            for (std::size_t i = 0; isGlass && i < glass_.size() && unit < 0; ++i)
-                if (glass_[i] <= now) unit = static_cast<int>(i);
-            if (isGlass ? unit >= 0 : now % 3 == 2) {
-                toBounce_.pop();
-                --bouncing_;
-                // At the front there is a Fresnel reflection
-                const Cycle latency = isGlass ? (hasNext(at(path)) && nextOf(at(path)).isReflection ? 170 : 104) : 14;
-                if (isGlass) glass_[static_cast<std::size_t>(unit)] = now + latency + 1;
-                bounces_.push_back({now + latency + 3, path});
-            }
-        }
-        for (std::size_t i = 0; i < bounces_.size(); ++i) {
-            if (bounces_[i].at > now) continue;
-            const int path = bounces_[i].path;
-            bounces_.erase(bounces_.begin() + static_cast<std::ptrdiff_t>(i));
-            at(path).isStraight = false;
-            if (settings_.hasEnvironment && hasNext(at(path)) && nextOf(at(path)).isReflection) {
-                --inShader_;
-                wait(path);
-            } else issueBounce(now, path, true);
-            break;
-        }
+        const int index = bounces_.step(now);
+        if (index < 0) return;
+        Path& path = at(index);
+        path.isStraight = false;
+        if (settings_.hasEnvironment && hasNext(path) && nextOf(path).isReflection) {
+            --inShader_;
+            wait(index);
+        } else issueBounce(now, index, true);
     }
 
     /// The next ray of a path that bounces, or its end.
@@ -654,8 +484,7 @@ private:
     Choice free_, ended_, next_, last_, done_, camera_, others_, resumable_;
     int freeNow_ = -1, endedNow_ = -1, nextNow_ = -1, lastNow_ = -1, doneNow_ = -1, offers_ = -1, cameraNow_ = -1, othersNow_ = -1, resumeNow_ = -1;
     int idleCount_, inSetup_ = 0, inShader_ = 0;
-    bool missesBox_ = false, raySent_ = false, rayLeavesGenerator_ = false, shadowFires_ = false, bounceFires_ = false, bounceReady_ = true, generatorBypasses_ = false,
-         isOffered_ = false;
+    bool missesBox_ = false, raySent_ = false, rayLeavesGenerator_ = false, shadowFires_ = false, bounceFires_ = false, generatorBypasses_ = false, isOffered_ = false;
     int chosenPoint_ = -1, chosenBefore_ = -1;
     Cycle resumeOpens_ = 0;
     RayGenerator generator_;
@@ -676,20 +505,15 @@ private:
     };
     Ring<Hit, 1024> hits_;
     Delayed<int, 16> faces_;
-    int decoding_ = 0, lightsLeft_ = 0, bouncing_ = 0;
+    int decoding_ = 0, lightsLeft_ = 0;
     bool takesFace_ = false;
     struct Bounced {
         int path;
         bool isFromShader;
     };
-    Delayed<int, 256> lit_, toBounce_;
+    Delayed<int, 256> lit_;
     Delayed<Bounced, 256> bounced_;
-    struct Bounce {
-        Cycle at;
-        int path;
-    };
-    std::vector<Bounce> bounces_;
-    std::array<Cycle, 4> glass_{};
+    Bounces bounces_;
     Delayed<int, 64> colours_, ratios_;
     Cycle colourOpens_ = 0, ratioOpens_ = 0, shaderOpens_ = 0;
     int pixels_ = 0, pixelQueue_;

@@ -49,8 +49,10 @@ public:
             const std::int64_t middle = std::int64_t(size[a]) << (f_ - mapLog - 1);
             ray.position[a] = middle + static_cast<std::int64_t>(wrapped(position[a] - middle, f_ + positionGuard));
         }
-        const CellPlane cell = image_.cellAt(point.x, point.y);
+        const TileInfo tile = image_.tileAt(point.x, point.y);
+        const CellPlane cell = image_.cellAt(tile, point.x, point.y);
         point.isIllegal = cell.isIllegal;
+        point.work.cells = tile.count > 1;
         const PlaneDistance depth = planeDistance(ray, image_.planeOf(cell.id), 0);
         const std::int64_t w = std::min(maximum(), -toW(depth.value, depth));
         const Wide dir = times(view.matrix[2], {direction[0], direction[1], direction[2]});

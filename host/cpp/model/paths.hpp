@@ -260,6 +260,7 @@ protected:
     /// Continues a path at a mirror or glass; nothing if the next ray is not traced.
     std::optional<RayKind> bounceAt(const ObjectPoint& at, const SamplePoint& point, Path& path) {
         const Bounce next = bounceOf(at, point, path);
+        work.addBounce(next.isRefraction, at.surface.backSide);
         const bool isTinted = !at.surface.backSide || at.material.kind == MaterialKind::mirror;
         if (isTinted)
             for (int channel = 0; channel < 3; ++channel) path.throughput[channel] = (path.throughput[channel] * tintOf(at.albedo[channel])) >> numbers_.lightFraction;

@@ -17,20 +17,21 @@ struct RecordVisit {
 /// A step of a path.
 ///
 /// `ray`: it visits `count` records, the first of which is `first`; `isInBox`: it enters the object's box; `isHit`: of a shadow ray, something opaque ends it; `isDimmed`: of a shadow ray, it meets anything.
-/// `surface`: the leaf `first` is fetched, with its companion if `hasColours`, and its hit is shaded; `material`.
-/// `lookup`: `first` is its march's; `isDirect`: by the pipeline of directly seen pixels; `isHit`: a point is found and shaded; `isTest`: it may hide a hit, and
+/// `surface`: the leaf `first` is fetched, with its companion if `hasColours`, and its hit is shaded; `material`; of mirrors and glass `isRefraction`, and whether the hit `isBehind`.
+/// `lookup`: `first` is its march's; `isDirect`: by the pipeline of directly seen pixels, in a tile of one plane if `isFlat`; `isHit`: a point is found and shaded; `isTest`: it may hide a hit, and
 /// `isHit` tells that it does; `isReflection`: of a Fresnel reflection, whose bounce waits.
 struct PathStep {
     enum class Kind : std::uint8_t { ray, surface, lookup };
     enum class Material : std::uint8_t { diffuse, mirror, glass };
     Kind kind;
     Material material = Material::diffuse;
-    bool isShadow : 1, isGathered : 1, isInBox : 1, isHit : 1, hasColours : 1, isDirect : 1, isTest : 1, isReflection : 1, isDimmed : 1;
+    bool isShadow : 1, isGathered : 1, isInBox : 1, isHit : 1, hasColours : 1, isDirect : 1, isTest : 1, isReflection : 1, isDimmed : 1, isRefraction : 1, isBehind : 1,
+        isFlat : 1;
     std::uint32_t first = 0, count = 0;
 
     explicit PathStep(Kind kind)
         : kind(kind), isShadow(false), isGathered(false), isInBox(false), isHit(false), hasColours(false), isDirect(false), isTest(false), isReflection(false),
-          isDimmed(false) {}
+          isDimmed(false), isRefraction(false), isBehind(false), isFlat(false) {}
 };
 
 /// The work of a frame: the steps of pixel i are those from `pixels[i]` on to `pixels[i + 1]`.
@@ -100,10 +101,18 @@ public:
         work_->steps.push_back(step);
     }
 
+    /// The last surface is that of a bounce.
+    void addBounce(bool isRefraction, bool isBehind) const {
+        if (!isOn()) return;
+        work_->steps.back().isRefraction = isRefraction;
+        work_->steps.back().isBehind = isBehind;
+    }
+
     void addLookup(bool isDirect, const MarchWork& march, bool isHit) const {
         if (!isOn()) return;
         PathStep step(PathStep::Kind::lookup);
         step.isDirect = isDirect;
+        step.isFlat = march.cells == 0;
         step.isHit = isHit;
         step.first = static_cast<std::uint32_t>(work_->marches.size());
         if (!isDirect) work_->marches.push_back(march);

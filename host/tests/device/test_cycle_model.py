@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +14,7 @@ from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.device.cycle_model import NotedFrame, design_values
+from colonnade.device.cycle_model import NotedFrame, bounce_cycles, design_values
 from colonnade.device.scene import DeviceScene
 from colonnade.scene.parser import load_scene
 
@@ -117,6 +118,35 @@ def test_designs_at_both_ends_of_all_fields_count_the_same_work(config: str) -> 
         counted = frame.model.cycles(own | values, 100, 1)
         for name in ("raysInBox", "nodeReads", "triangleTests"):
             assert counted[name] == frame.counters[name], (values, name)
+
+
+def test_bounces_take_as_long_as_in_the_rtl() -> None:
+    """The page has the bounds that `BounceUnitSpec` holds, of hits without a restart."""
+    page = " ".join((ROOT / "docs" / "shading.md").read_text().split())
+    pattern = (
+        r"(\d+) for a mirror, (\d+) for a total reflection, (\d+) for glass from behind, (\d+) to \d+ from the front"
+    )
+    found = re.search(pattern, page)
+    assert found is not None
+    said = dict(zip(("mirror", "totalReflection", "behind", "front"), map(int, found.groups()), strict=True))
+    derived = bounce_cycles(manifest_of(config="tiny"))
+    assert derived.keys() == said.keys()
+    assert all(said[name] - 1 <= derived[name] <= said[name] for name in said), derived
+    # Longer roots and quotients make glass slower, but no mirror
+    lean = bounce_cycles(manifest_of("precision=24b24s32d", config="tiny"))
+    assert lean["mirror"] == derived["mirror"] and lean["behind"] < derived["behind"]
+
+
+def test_columns_that_share_maps_wait_for_each_other() -> None:
+    """Marches and directly seen pixels ask for cells; a copy of the maps answers one request a cycle."""
+    room = load_scene(ROOT / "scenes" / "room.toml").with_samples(1)
+    own = DeviceScene.of(room, manifest_of(), size=SIZE)
+    frame = NotedFrame.of(own.manifest, own.image, own.registers(SIZE))
+    busy = [
+        frame.cycles(manifest_of(f"physicalAttributeMemory.columnsPerCopy={columns}"))["busyEnvironment"]
+        for columns in (2, 8)
+    ]
+    assert 1.01 * busy[0] < busy[1]
 
 
 def test_designs_that_are_not_modelled_are_one_line() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from colonnade.design.manifest import Manifest
@@ -45,19 +45,23 @@ class RoomFrame:
     first_row: int
 
 
-def room_frames(manifest: Manifest, size: tuple[int, int], moved: bool = False) -> Iterator[RoomFrame]:
+def room_frames(
+    manifest: Manifest, size: tuple[int, int], moved: bool = False, objects: Iterable[str] = tuple(OBJECTS)
+) -> Iterator[RoomFrame]:
     """All frames of a size.
 
     Args:
         manifest: The design's manifest.
         size: Width and height, pixels.
+        objects: Those of `OBJECTS` by name.
         moved: Only mirrors, from a camera beside the maps', with the room in each of `ROWS`.
     """
     width, height = size
     for room in ("living", "office"):
         environment = load_environment(project_root() / "scenes" / "rooms" / room)
         encoded = EncodedEnvironment.of(environment, manifest)
-        for name, (mesh_name, material) in OBJECTS.items():
+        for name in objects:
+            mesh_name, material = OBJECTS[name]
             if moved and material.kind != "mirror":
                 continue
             mesh = load_mesh(mesh_name)
