@@ -6,7 +6,7 @@ import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 from colonnade.cli.options import FILE, Command, echo, strict_option
@@ -29,6 +29,11 @@ from colonnade.cli.options import FILE, Command, echo, strict_option
     metavar="N",
     help="Jobs to run in parallel on this machine.  [default: number of processors]",
 )
+@click.option(
+    "--backend",
+    type=click.Choice(["model", "rtl"]),
+    help="Count cycles by the cycle model or by the RTL.  [default: as the study says]",
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Run the jobs on a Dask cluster, e.g. tcp://HOST:8786.")
 @click.option("--check", "only_check", is_flag=True, help="Check the study and list its points; run nothing.")
 @strict_option
@@ -37,10 +42,11 @@ def explore(
     output: Path | None,
     libraries: tuple[str, ...],
     jobs: int | None,
+    backend: Literal["model", "rtl"] | None,
     scheduler: str | None,
     only_check: bool,
 ) -> None:
-    """Measure all points of a study: pictures of the model, cycles of the RTL, gates, timing paths and power.
+    """Measure all points of a study: pictures and cycles of models, gates, timing paths and power.
 
     Everything is checked before the first job. Results are cached: after an interruption, or with more points, the
     same command continues. A failed job is reported with its reason and does not stop the others. DIR receives
@@ -65,6 +71,8 @@ def explore(
     elif not only_check:
         raise click.UsageError("--output DIR is missing; --check does without", click.get_current_context())
     file = load_study(study)
+    if backend is not None:
+        file = file.with_backend(backend)
     terminal = progress.for_terminal()
     named = _named(libraries)
     if only_check or output is None:
@@ -109,6 +117,14 @@ def _print(report: Mapping[str, Any]) -> None:
     )
     for point in report["points"]:
         table.print(point["name"], *(point["figures"][column["key"]] for column in shown))
+    for point in report["points"]:
+        for name, frame in point["workloads"].items():
+            if frame.get("rtl_cycles") is not None and frame["cycles"] is not None:
+                error = frame["cycles"] / frame["rtl_cycles"] - 1.0
+                echo(
+                    f"check       {point['name']}, {name}: {frame['cycles']:,} cycles,"
+                    f" of the RTL {frame['rtl_cycles']:,}: {error:+.1%}"
+                )
     for point in report["points"]:
         for failure in point["failures"]:
             echo(f"failed      {point['name']}: {failure['measure']}: {failure['reason']}", err=True)

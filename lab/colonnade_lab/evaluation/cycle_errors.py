@@ -9,13 +9,19 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from colonnade.design.generator import manifest_for
+from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
-from colonnade.device.cycle_model import NotedFrame
+from colonnade.device.cycle_model import NotedFrame, knows_design
 from colonnade.device.scene import DeviceScene
 from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
 
 from colonnade_lab.evaluation.room_frames import room_frames
+from colonnade_lab.explore.frames import Frame
+from colonnade_lab.explore.plan import picture_facts
+from colonnade_lab.explore.points import manifests_of, points_of
+from colonnade_lab.explore.study_file import load_study
+from colonnade_lab.explore.workload import frames_of
 
 
 @dataclass(frozen=True)
@@ -71,17 +77,28 @@ def _bench(preset: str, mirror: bool = False) -> Iterator[CountedFrame]:
         yield CountedFrame(f"{preset}, mirrors" if mirror else preset, name, cycles, mesh["cycles"])
 
 
-def _study(name: str, config: str = "edge") -> Iterator[CountedFrame]:
-    """Points of a study of the array, whose frames all have the same work."""
-    report = _recorded(name)
-    base = report["points"][0]["overrides"]
-    for workload in report["workloads"]:
-        size = (workload["size"][0], workload["size"][1])
-        noted = _noted(_benchmark().with_mesh(workload["mesh"]), config, base, size)
-        for point in report["points"]:
-            manifest = manifest_for(config, point["overrides"]).manifest
-            rtl = point["workloads"][workload["name"]]["cycles"]
-            yield CountedFrame(point["name"], workload["name"], noted.cycles(manifest)["cycles"], rtl)
+def _study(name: str) -> Iterator[CountedFrame]:
+    """Frames of a study, on designs that the cycle model knows. Frames of equal work are rendered once."""
+    recorded = {point["name"]: point["workloads"] for point in _recorded(name)["points"]}
+    file = load_study(project_root() / "scenes" / "studies" / f"{name}.toml")
+    points, size = points_of(file), file.study.workload.size
+    manifests = manifests_of(file, points)
+    for frame in frames_of(file):
+        noted: dict[str, NotedFrame] = {}
+        for point in points:
+            manifest, rtl = manifests[point.name], recorded[point.name].get(frame.name, {}).get("cycles")
+            if rtl is None or not knows_design(manifest):
+                continue
+            own = frame.with_children(point.children)
+            work = json.dumps([own.identity, picture_facts(manifest)])
+            if work not in noted:
+                noted[work] = _noted_of(own, manifest, size)
+            yield CountedFrame(point.name, frame.name, noted[work].cycles(manifest)["cycles"], rtl)
+
+
+def _noted_of(frame: Frame, manifest: Manifest, size: tuple[int, int]) -> NotedFrame:
+    prepared = DeviceScene.of(frame.scene.with_samples(1), manifest, frame.mesh, size=size)
+    return NotedFrame.of(manifest, prepared.image, prepared.registers(size))
 
 
 def _rooms() -> Iterator[CountedFrame]:
@@ -114,6 +131,9 @@ PARTS: Mapping[str, Callable[[], Iterator[CountedFrame]]] = {
     "tiny": lambda: _bench("tiny"),
     "scaling": lambda: _study("scaling"),
     "ablation": lambda: _study("ablation"),
+    "features": lambda: _study("features"),
+    "precisions": lambda: _study("energy-area"),
+    "trees": lambda: _study("bvh-cycles"),
     "rooms": _rooms,
     "gather": _gather,
 }

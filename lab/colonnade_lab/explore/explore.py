@@ -56,7 +56,10 @@ class Exploration:
         if file.study.baseline is not None:
             (point,) = (point for point in points if point.name == file.study.baseline)
             self._baseline = point, manifests[point.name]
-        self.points = [self.plan.jobs(point, manifests[point.name], self._baseline) for point in points]
+        self.points = [
+            self.plan.jobs(point, manifests[point.name], self._baseline, is_checked=point in (points[0], points[-1]))
+            for point in points
+        ]
         self._failed: list[dict[str, Any]] = []
 
     def run(

@@ -16,6 +16,7 @@ from colonnade.design.config_name import find_configuration
 from colonnade.design.frame_limits import check_size
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
+from colonnade.device.cycle_model import knows_design
 
 from colonnade_lab.explore import figures
 from colonnade_lab.explore.frames import Frame, counted_job, cycles_job
@@ -103,8 +104,17 @@ class Plan:
             for frame in self.frames
         }
 
-    def jobs(self, point: Point, manifest: Manifest, baseline: tuple[Point, Manifest] | None) -> PointJobs:
-        """All jobs of a point, with jobs of the baseline's pictures."""
+    def jobs(
+        self, point: Point, manifest: Manifest, baseline: tuple[Point, Manifest] | None, is_checked: bool = False
+    ) -> PointJobs:
+        """All jobs of a point, with jobs of the baseline's pictures.
+
+        Args:
+            point: The point.
+            manifest: Of its design.
+            baseline: The point of the baseline, with its manifest.
+            is_checked: If the cycle model counts the point's cycles, the RTL counts those of one frame, too.
+        """
         study, found = self.study, PointJobs(point, manifest)
         design = {"config": self._config, "overrides": (*self._base, *point.overrides[self._prefix :])}
         if study.quality is not None:
@@ -130,10 +140,13 @@ class Plan:
                 found.support += found.models.values()
         identity = {"config": manifest.config}
         if study.cycles is not None:
+            found.is_modelled = study.cycles.backend == "model" and knows_design(manifest)
             for frame in self._frames_of(point, study.cycles.meshes):
                 title = f"cycles of {point.name}, {frame.name}"
-                count = counted_job if study.cycles.backend == "model" else cycles_job
-                found.cycles[frame.name] = count(title, design, manifest, frame, study.workload.size)
+                timed = title, design, manifest, frame, study.workload.size
+                found.cycles[frame.name] = counted_job(*timed) if found.is_modelled else cycles_job(*timed)
+                if found.is_modelled and is_checked and study.cycles.check and not found.checks:
+                    found.checks[frame.name] = cycles_job(f"RTL check of {title}", *timed[1:])
         for library in self.libraries:
             of_library = identity | {"library": self._digests.get(library, {})}
             arguments = design | {"library": self._contents.get(library, {})}
@@ -159,10 +172,7 @@ class Plan:
     def _picture(self, point: Point, manifest: Manifest, frame: Frame) -> Job:
         size, frame = self.study.workload.size, frame.with_children(point.children)
         overrides = (*self._base, *point.overrides[self._prefix :])
-        # A picture does not depend on the array
-        sections = {key: value for key, value in manifest.config.items() if key not in _ARRAY_SECTIONS}
-        facts: dict[str, Any] = {"formats": manifest.format_hash, "numbers": dict(manifest.numbers), "config": sections}
-        facts |= {"stack": manifest.config["columnBvhMemory"]["stackDepth"], "frame": frame.identity, "size": size}
+        facts = picture_facts(manifest) | {"frame": frame.identity, "size": size}
         arguments = {"config": self._config, "overrides": overrides, "scene": frame.scene, "mesh": frame.mesh}
         return _job("picture", f"picture of {point.name}, {frame.name}", facts, arguments | {"size": size})
 
@@ -181,6 +191,8 @@ class PointJobs:
         self.models: dict[str, Job] = {}
         self.comparisons: dict[tuple[str, str], Job] = {}
         self.cycles: dict[str, Job] = {}
+        self.is_modelled = False
+        self.checks: dict[str, Job] = {}
         self.areas: dict[str, Job] = {}
         self.powers: dict[tuple[str, str], Job] = {}
         self.support: list[Job] = []
@@ -189,7 +201,8 @@ class PointJobs:
         """All jobs."""
         parts: Iterable[Iterable[Job]] = (
             self.support,
-            *(part.values() for part in (self.pictures, self.comparisons, self.cycles, self.areas, self.powers)),
+            *(part.values() for part in (self.pictures, self.comparisons, self.cycles, self.checks)),
+            *(part.values() for part in (self.areas, self.powers)),
         )
         return [job for part in parts for job in part]
 
@@ -222,6 +235,9 @@ class PointJobs:
             timed = of(self.cycles.get(frame.name), frame.name) or {}
             keys = ("cycles", "rays_per_cycle_in_box", "bottleneck", "utilisation", "stalls")
             values |= {key: timed.get(key) for key in keys} | {"is_timed": frame.name in self.cycles}
+            if self.is_modelled:
+                check = of(self.checks.get(frame.name), frame.name) or {}
+                values |= {"is_modelled": True, "rtl_cycles": check.get("cycles")}
             workloads[frame.name] = values
         reports = {name: of(job, None, name) for name, job in self.areas.items()}
         area = {name: figures.area_figures(report) for name, report in reports.items() if report}
@@ -249,6 +265,13 @@ class PointJobs:
         pair = (jobs[frame].key for jobs in (self.pictures, self.models) if frame in jobs)
         found = [outcome for key in pair if isinstance(outcome := outcomes.get(key), Path)]
         return len({(folder / PICTURE).read_bytes() for folder in found}) > 1
+
+
+def picture_facts(manifest: Manifest) -> dict[str, Any]:
+    """What of a design decides a picture, and the work of its frame: not the array."""
+    sections = {key: value for key, value in manifest.config.items() if key not in _ARRAY_SECTIONS}
+    facts: dict[str, Any] = {"formats": manifest.format_hash, "numbers": dict(manifest.numbers), "config": sections}
+    return facts | {"stack": manifest.config["columnBvhMemory"]["stackDepth"]}
 
 
 def _job(kind: str, title: str, identity: Mapping[str, Any], arguments: Mapping[str, Any], **links: Any) -> Job:

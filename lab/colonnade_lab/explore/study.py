@@ -133,11 +133,14 @@ class Cycles:
 
     Attributes:
         meshes: Meshes of the workload; empty: all.
-        backend: The RTL in a simulator, or the cycle model, which needs no simulator.
+        backend: The cycle model, or the RTL in a simulator. The RTL takes designs that the model does not know.
+        check: Of the model: the RTL counts a frame of the first and of the last point, too. They are those of a
+            search's `start`.
     """
 
     meshes: _Names = ()
-    backend: Literal["rtl", "model"] = "rtl"
+    backend: Literal["rtl", "model"] = "model"
+    check: StrictBool = True
 
 
 @dataclass(frozen=True, config=_STRICT)

@@ -9,7 +9,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from colonnade.common.errors import UserError
 from colonnade.common.input_files import read_input
@@ -36,6 +36,17 @@ class StudyFile:
     study: Study
     path: Path
     text: str
+
+    def with_backend(self, backend: Literal["model", "rtl"]) -> StudyFile:
+        """The study with its cycles counted by the cycle model or by the RTL.
+
+        Raises:
+            UserError: It counts none.
+        """
+        if self.study.cycles is None:
+            raise UserError(f"{self.path} counts no cycles: leave out --backend, or give it [cycles]")
+        cycles = dataclasses.replace(self.study.cycles, backend=backend)
+        return dataclasses.replace(self, study=dataclasses.replace(self.study, cycles=cycles))
 
     def error(self, where: tuple[str, ...], message: str) -> UserError:
         """An error of a key or value, with its line. `where` is the path of keys, and a value as the last part."""

@@ -120,7 +120,9 @@ def _study(name: str, *libraries: str, **decided: Any) -> Entry:
     decided = decided or {"designs": tuple(Design(design.config, point.overrides) for point in points_of(file))}
     report = f"out/{name}/study.json"
     options = (option for library in libraries for option in ("--library", f"{library.lower()}={library}"))
-    command = ("colonnade", "explore", str(path), *options, "--output", f"out/{name}")
+    # Figures are of the RTL, with which the cycle model is compared
+    backend = ("--backend", "rtl") if file.study.cycles else ()
+    command = ("colonnade", "explore", str(path), *backend, *options, "--output", f"out/{name}")
     return Entry(name, design.config, {"": command}, design.set, report, libraries, **decided)
 
 

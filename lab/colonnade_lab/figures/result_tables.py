@@ -166,6 +166,8 @@ def cycle_errors(data: Data) -> str:
     """Errors of the cycle model by part, and the frame of the largest one."""
     found, rows = data.result("cycles"), []
     for part, (designs, frames) in CYCLE_PARTS.items():
+        if part not in found:
+            continue
         counted = [CountedFrame(**frame) for frame in found[part]["frames"]]
         mean, worst = mean_and_worst([frame.error for frame in counted])
         at = next(frame for frame in counted if frame.error == worst)
@@ -253,6 +255,9 @@ CYCLE_PARTS = {
     "tiny": ("`tiny`", "two meshes, 640×480"),
     "scaling": ("`edge`, a field changed", "bunny, teapot, 320×240"),
     "ablation": ("one column, scene on chip", "bunny, teapot, 160×120"),
+    "features": ("`edge` with fewer features", "bunny, armadillo, 320×240"),
+    "precisions": ("`edge`, precision or units changed", "bunny, 640×480"),
+    "trees": ("`tiny` with nodes of 4 and of 2 children, without a tree", "eight meshes, 50 to 2,000 triangles, 32×24"),
     "rooms": ("`edge`", "whole rooms, 640×480"),
     "gather": ("`edge`", "gathered light, 640×480"),
 }

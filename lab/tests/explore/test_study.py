@@ -8,12 +8,14 @@ from pathlib import Path
 import pytest
 from colonnade.common.errors import UserError
 from colonnade.common.limits import MAX_DESIGNS
+from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 
 from colonnade_lab.explore import work
+from colonnade_lab.explore.explore import Exploration
 from colonnade_lab.explore.figures import columns
 from colonnade_lab.explore.plan import Plan
-from colonnade_lab.explore.points import grid_size, manifests_of, point_of, points_of
+from colonnade_lab.explore.points import Point, grid_size, manifests_of, point_of, points_of
 from colonnade_lab.explore.result import figures_of
 from colonnade_lab.explore.search import check_search
 from colonnade_lab.explore.study_file import StudyFile, line_of, load_study
@@ -264,18 +266,49 @@ def test_odd_values_are_refused_in_a_line_with_file_and_key(tmp_path: Path) -> N
                 assert not any(bad in value for bad in ("1979", "07:32", "\\u", "nan", "inf")), (key, value)
 
 
+def plan_of_cycles(folder: Path, table: str, more: str = "") -> tuple[Plan, list[Point], dict[str, Manifest]]:
+    """The plan of a study of cycles, its points and their manifests."""
+    (folder / "object.toml").write_text('mesh.name = "cube"\n')
+    text = STUDY.replace('baseline = "32b32s64d"\n', "").replace("[quality]\ndists = false", table) + more
+    file = study(folder, text)
+    points = points_of(file)
+    return Plan(file, {}), points, manifests_of(file, points)
+
+
 def test_cycles_are_counted_by_the_model(tmp_path: Path) -> None:
     """With the keys that the RTL's frames have, and without a simulator."""
-    (tmp_path / "object.toml").write_text('mesh.name = "cube"\n')
-    text = STUDY.replace('baseline = "32b32s64d"\n', "").replace(
-        "[quality]\ndists = false", '[cycles]\nbackend = "model"'
-    )
-    file = study(tmp_path, text)
-    plan = Plan(file, {})
-    point = points_of(file)[0]
-    manifest = manifests_of(file, [point])[point.name]
-    (job,) = plan.jobs(point, manifest, None).cycles.values()
+    plan, (point, *_), manifests = plan_of_cycles(tmp_path, "[cycles]")
+    jobs = plan.jobs(point, manifests[point.name], None)
+    (job,) = jobs.all()
     assert job.kind.name == "counted" and "verilator" not in job.kind.needs
     work.counted(tmp_path, **job.arguments)
     result = figures_of(tmp_path)
     assert result["cycles"] > 32 * 24 and result["rays_per_cycle_in_box"] > 0 and result["bottleneck"]
+    frame = jobs.entry(plan, {job.key: tmp_path})["workloads"]["cube"]
+    assert frame["is_modelled"] and frame["cycles"] == result["cycles"] and frame["rtl_cycles"] is None
+
+
+def kinds_of(table: str, folder: Path, more: str = "") -> list[list[str]]:
+    """The kinds of jobs of each point of a study of cycles."""
+    plan, _, _ = plan_of_cycles(folder, table, more)
+    return [[job.kind.name for job in point.all()] for point in Exploration(plan.file, {}).points]
+
+
+def test_the_rtl_checks_the_first_and_the_last_point(tmp_path: Path) -> None:
+    both, model, rtl = ["counted", "cycles"], ["counted"], ["cycles"]
+    assert kinds_of("[cycles]", tmp_path) == [both, model, model, both]
+    assert kinds_of("[cycles]\ncheck = false", tmp_path) == [model] * 4
+    assert kinds_of('[cycles]\nbackend = "rtl"', tmp_path) == [rtl] * 4
+
+
+def test_the_rtl_takes_points_that_the_model_does_not_know(tmp_path: Path) -> None:
+    found = kinds_of("[cycles]", tmp_path, '\n[[point]]\nname = "slices"\nset = { "units.extraSlices" = true }\n')
+    assert found == [["cycles"], ["counted"], ["counted"], ["counted"], ["counted", "cycles"]]
+
+
+def test_the_command_chooses_the_backend(tmp_path: Path) -> None:
+    plan, points, manifests = plan_of_cycles(tmp_path, "[cycles]")
+    rtl = Plan(plan.file.with_backend("rtl"), {}).jobs(points[0], manifests[points[0].name], None, is_checked=True)
+    assert [job.kind.name for job in rtl.all()] == ["cycles"]
+    with pytest.raises(UserError, match="counts no cycles"):
+        study(tmp_path, STUDY).with_backend("rtl")

@@ -56,6 +56,7 @@ _POWER = {
 
 _CYCLES = {
     "cycles": ("cycles", ",.0f"),
+    "rtl_cycles": ("of the RTL", ",.0f"),
     "rays_per_cycle_in_box": ("in-box rays per cycle", ".3f"),
     "bottleneck": ("bottleneck", None),
 }
@@ -135,6 +136,7 @@ def workload_figures(figures: Mapping[str, Any]) -> list[tuple[str, str]]:
         "dists_baseline": ("DISTS against the baseline", "{:.4f}"),
         "rays_per_cycle_in_box": ("in-box rays per cycle", "{:.3f}"),
         "cycles": ("cycles", "{:,.0f}"),
+        "rtl_cycles": ("cycles of the RTL", "{:,.0f}"),
     }
     found = [(label, form.format(figures[key])) for key, (label, form) in known.items() if is_number(figures.get(key))]
     errors = figures.get("error_bits") or []
