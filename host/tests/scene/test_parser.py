@@ -44,8 +44,8 @@ def test_every_scene_of_the_project_is_read() -> None:
 
 def test_the_page_of_the_scene_file_has_all_keys_and_their_defaults() -> None:
     """A key without a default stands in the row without a value."""
-    page = (ROOT / "docs" / "host.md").read_text().split("| table of the scene |")[1].split("\n\n")[0]
-    rows = [line.strip("| ").split(" | ") for line in page.splitlines()[2:]]
+    page = (ROOT / "docs" / "host.md").read_text().split("|table of the scene|")[1].split("\n\n")[0]
+    rows = [line.strip("|").split("|") for line in page.splitlines()[2:]]
     scene = Scene(MeshSource("cube"), placement=Placement())
     assert [re.findall("`([a-z]+)`", row[0])[0] for row in rows] == _TABLES
     for row in rows:
