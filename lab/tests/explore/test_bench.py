@@ -35,6 +35,7 @@ meshes = ["cube", "torus"]
 size = [16, 12]
 
 [cycles]
+backend = "rtl"
 """
 
 NOT_FOUND = "cycles needs verilator: sudo apt-get install verilator"
