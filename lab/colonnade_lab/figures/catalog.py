@@ -9,8 +9,8 @@ from typing import Any
 
 from colonnade.design.toolchain import project_root
 
-from colonnade_lab.evaluation.cycle_errors import PARTS
 from colonnade_lab.evaluation.light.user_rooms import REPORT as USERS_ROOMS
+from colonnade_lab.explore.cycle_errors import PARTS
 from colonnade_lab.explore.points import points_of
 from colonnade_lab.explore.study_file import load_study
 

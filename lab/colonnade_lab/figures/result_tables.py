@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from colonnade_lab.common.markdown import markdown
-from colonnade_lab.evaluation.cycle_errors import CountedFrame, mean_and_worst
+from colonnade_lab.explore.cycle_errors import CountedFrame, mean_and_worst
 from colonnade_lab.figures.catalog import CLASSES, MARCHES, SAMPLES, catalog
 from colonnade_lab.figures.data import Data, commands_of
 from colonnade_lab.figures.facts import MEGAHERTZ, PRESETS, facts, text

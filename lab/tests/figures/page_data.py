@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from colonnade_lab.evaluation.bench import design_result, mesh_result
-from colonnade_lab.evaluation.cycle_errors import PARTS
+from colonnade_lab.explore.cycle_errors import PARTS
 from colonnade_lab.figures.catalog import MARCHES, SAMPLES
 from colonnade_lab.ppa.power.sums import KINDS
 
