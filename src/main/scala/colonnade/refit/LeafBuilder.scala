@@ -26,11 +26,11 @@ final class LeafBuilder(config: ColonnadeConfig) extends Module {
   private val entry     = Reg(new RefitEntry(config))
   private val vertices  = Reg(Vec(Leaf.maxVertices, new RefitVertex(config)))
   private val deltas    = Reg(Vec(Leaf.maxVertices, Vec3(SInt((deltaBits + 1).W)))) // from vertex 0
-  private val fits    = Reg(Vec(2, Bool())) // all deltas fit a near, a far pair
-  private val low     = Reg(Vec3(UInt(geometry.vertexBits.W)))
-  private val high    = Reg(Vec3(UInt(geometry.vertexBits.W)))
-  private val isWhole = RegInit(false.B)
-  private val step    = steps.bits
+  private val fits      = Reg(Vec(2, Bool()))                                       // all deltas fit a near, a far pair
+  private val low       = Reg(Vec3(UInt(geometry.vertexBits.W)))
+  private val high      = Reg(Vec3(UInt(geometry.vertexBits.W)))
+  private val isWhole   = RegInit(false.B)
+  private val step      = steps.bits
 
   steps.ready := !isWhole || items.ready
   when(steps.ready) { isWhole := steps.valid && step.isLast }
