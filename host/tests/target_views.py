@@ -18,8 +18,9 @@ from colonnade.registers.frame import frame_registers
 from colonnade.registers.target_view import TargetView, rotation_of
 from colonnade.registers.view_file import view_file
 from colonnade.scene.model import Light, MeshSource, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.samples import Point, samples_of_frame
-from colonnade.scene.view import PlacedLight, View, make_view, place
+from colonnade.scene.view import PlacedLight, View, make_view, world_view
 from colonnade.scene_image.file import SceneImage
 from colonnade.scene_image.packer import pack
 
@@ -44,10 +45,10 @@ class Design:
         self.scene = dataclasses.replace(SCENE, more_lights=SCENE.more_lights[: lights - 1])
         self.image: SceneImage = pack(load_mesh("teapot:3"), self.manifest)
         self.header = self.image.header
-        self.placed = place(self.scene, self.header.extent, WIDTH, HEIGHT)
+        self.placed = world_view(Placed(self.scene, self.header.extent), WIDTH, HEIGHT)
         self.registers = frame_registers(self.scene, self.header, self.manifest, WIDTH, HEIGHT)
         self.file = view_file(self.placed, self.registers, (WIDTH, HEIGHT), self.header, self.manifest)
-        self.view = make_view(self.scene, self.header.extent, WIDTH, HEIGHT, self.header.materials)
+        self.view = make_view(Placed(self.scene, self.header.extent), WIDTH, HEIGHT, self.header.materials)
 
     @classmethod
     def golden(cls, name: str) -> Design:

@@ -16,13 +16,12 @@ from colonnade.environment.light_cube import LightCube
 from colonnade.environment.surround import Surround
 from colonnade.maps.room_light import room_light
 from colonnade.mesh.load import load_mesh
-from colonnade.scene.model import Placement, Scene
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.model import Placement
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import exposed
 from colonnade.scene.room_lights import lights_of
 from colonnade.scene.samples import samples_of_frame
-from colonnade.scene.view import place
+from colonnade.scene.view import world_view
 from colonnade.scene_image.environment import map_memories
 from PIL import Image
 
@@ -87,11 +86,10 @@ def samples() -> dict[int, dict[str, Any]]:
 
 def _light(ready: DeviceScene) -> dict[str, Any]:
     """The light around the object in a room: a cube in the axes of the world, and lamps, in the device's numbers."""
-    scene, maps, extent = ready.scene, ready.maps, ready.image.header.extent
-    assert maps is not None and isinstance(ready.unseen, Surround)
-    lights = lights_of(scene, extent, maps.environment)
-    middle = object_pose(scene, extent, maps.environment).to_world(extent.centre)
-    cube = room_light(maps.environment, maps.image, lights, middle, True, ready.unseen).cube
+    scene, maps, unseen = ready.scene, ready.maps, ready.lit.unseen
+    assert maps is not None and isinstance(unseen, Surround)
+    lights = lights_of(ready.lit.placed)
+    cube = room_light(maps.environment, maps.image, lights, ready.lit.placed.middle, True, unseen).cube
     lamps = [
         {
             "position": light.position.tolist(),
@@ -110,9 +108,8 @@ def _light(ready: DeviceScene) -> dict[str, Any]:
 
 def _poses(ready: DeviceScene) -> dict[str, Any]:
     """Camera and object in the world, metres; the camera's fx, cx, cy and fy are in heights of the frame."""
-    scene: Scene = ready.scene
     width, height = SIZES[1]
-    placed = place(scene, ready.image.header.extent, width, height, ready.environment)
+    placed = world_view(ready.lit.placed, width, height)
     right, up, toward = placed.camera.axes
     assert ready.environment is not None
     room = ready.environment

@@ -39,6 +39,7 @@ def light(room: Path, count: int, output: Path | None, json_file: Path | None) -
     from colonnade.environment.photo_colours import photo_colours
     from colonnade.mesh.load import load_mesh
     from colonnade.scene.model import Background, MeshSource, Scene
+    from colonnade.scene.object_pose import Placed
     from colonnade.scene.room_lights import lights_of, scene_text
 
     environment = load_environment(room)
@@ -48,7 +49,7 @@ def light(room: Path, count: int, output: Path | None, json_file: Path | None) -
         fit = fitted_lights(environment, count)
     colours = photo_colours(environment, fit.lights)
     default = Scene(MeshSource("teapot"), background=Background(room=room))
-    before = relit_psnr(environment, lights_of(default, load_mesh("teapot").extent, environment))
+    before = relit_psnr(environment, lights_of(Placed(default, load_mesh("teapot").extent, environment)))
     echo(
         f"# {environment.name}, relit without shadows, against its photo: {fit.psnr:.1f} dB; ambient light alone"
         f" {fit.ambient_psnr:.1f} dB, the default light of scenes {before:.1f} dB."

@@ -14,19 +14,15 @@ from colonnade.environment.light_cube import LARGEST, LightCube
 from colonnade.environment.lights import RoomLight
 from colonnade.environment.panorama import Panorama
 from colonnade.environment.seen_light import FINE
-from colonnade.environment.surround import Surround
 from colonnade.maps.room_light import room_light
-from colonnade.scene.object_pose import Pose, object_pose
+from colonnade.scene.lit_room import LitRoom
+from colonnade.scene.object_pose import Pose
 from colonnade.scene.room_lights import lights_of
 from colonnade.scene_image.file import LoadSection, SceneImage
 from colonnade.scene_image.header import LoadedMemory
 
 if TYPE_CHECKING:
-    from colonnade.environment.model import Environment
     from colonnade.maps.image import AttributeImage
-    from colonnade.mesh.materials.mesh import Extent
-    from colonnade.scene.model import Scene
-
 
 #: The device's memory of the light cube.
 MEMORY = "light.cube"
@@ -36,16 +32,7 @@ LAST_PARALLAX = 3
 _REPORTED_LOSS = 0.02
 
 
-def scene_cube(
-    scene: Scene,
-    extent: Extent,
-    room: Environment | None,
-    image: AttributeImage | None,
-    relit: bool,
-    unseen: Panorama | Surround | None = None,
-    second: Environment | None = None,
-    is_noted: bool = False,
-) -> LightCube | None:
+def scene_cube(lit: LitRoom, image: AttributeImage | None, relit: bool, is_noted: bool = False) -> LightCube | None:
     """The light that rays meet that leave the object, by directions of mesh space; None for a scene that gathers none.
 
     In a room it is the room's light at the middle of the object, elsewhere a panorama's, or the ambient light.
@@ -53,19 +40,16 @@ def scene_cube(
     `exposure`.
 
     Args:
-        scene: With lights and a place for the object, as in `LitRoom`.
-        extent: Bounds of the mesh.
-        room: The room with the colours that rays see.
-        image: Its encoded maps.
+        lit: The scene in its room.
+        image: The encoded maps of the room.
         relit: The frame shows the room under the scene's lights, not its photo.
-        unseen: The light that no photo shows (`LitRoom.unseen`).
-        second: Another view of the room (`LitRoom.second`).
         is_noted: Note what no picture shows, and what the cube cannot hold.
     """
+    scene, placed, room, unseen, second = lit.scene, lit.placed, lit.environment, lit.unseen, lit.second
     if scene.paths.gather == 0:
         return None
-    pose, distance = object_pose(scene, extent, room), np.inf
-    point, lights = pose.to_world(extent.centre), lights_of(scene, extent, room)
+    pose, point, extent, distance = placed.pose, placed.middle, placed.extent, np.inf
+    lights = lights_of(placed)
     if room is not None and image is not None:
         light = room_light(room, image, lights.brighter(scene.headroom), point, not relit, unseen, second)
         if is_noted and not isinstance(unseen, Panorama):

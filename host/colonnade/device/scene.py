@@ -19,16 +19,17 @@ from colonnade.device.gathered_light import scene_cube, with_cube
 from colonnade.device.packed_objects import MovingInstances, pack_objects, placed_image
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
-from colonnade.registers.frame import frame_registers
+from colonnade.registers.frame import placed_registers
 from colonnade.registers.frame_file import frame_file
 from colonnade.registers.view_file import view_file
 from colonnade.scene.cameras import check_camera
 from colonnade.scene.joined_mesh import with_transform
-from colonnade.scene.lit_room import device_room, fixed_in_world, lit_room, next_view, photo_strength, view_photo
+from colonnade.scene.lit_room import LitRoom, device_room, fixed_in_world, lit_room, view_photo
 from colonnade.scene.model import Camera, Scene, Transform
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, stated_triangles, with_materials
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.passes import frame_passes
-from colonnade.scene.view import View, make_view, place, rendered_materials
+from colonnade.scene.view import View, make_view, rendered_materials, world_view
 from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.device_image import device_image, maps_image
 from colonnade.scene_image.dram_image import dram_image
@@ -38,8 +39,6 @@ from colonnade.scene_image.packer import check_triangles
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
     from colonnade.environment.model import Environment, EnvironmentCamera
-    from colonnade.environment.panorama import Panorama
-    from colonnade.environment.surround import Surround
     from colonnade.mesh.materials.mesh import Mesh
     from colonnade.scene_image.file import SceneImage
 
@@ -49,25 +48,19 @@ class DeviceScene:
     """A scene that is ready for a design.
 
     Attributes:
-        scene: With lights, a place for the object, and the headroom of the room's colours.
+        lit: The scene in its room, with the bounds of the mesh in `image`.
         manifest: The design's manifest.
         image: Records of the mesh, textures, and maps of the room.
         maps: The room and its encoded maps; None without a room.
         photo: The photo of the frames' view, sRGB, uint8 [rows, columns, 3]; None without one.
-        unseen: The light that no photo shows (`LitRoom.unseen`).
-        second: Another view of the room (`LitRoom.second`).
         mesh: The mesh, with the materials that the device shows; None: unknown.
-        strength: Of the object's shadow on the photo, uint8 [rows, columns]; None: it is whole.
     """
 
-    scene: Scene
+    lit: LitRoom
     manifest: Manifest
     image: SceneImage
     maps: EncodedEnvironment | None
     photo: NDArray[np.uint8] | None = None
-    unseen: Panorama | Surround | None = None
-    strength: NDArray[np.uint8] | None = None
-    second: Environment | None = None
     mesh: Mesh | None = None
 
     @classmethod
@@ -113,7 +106,7 @@ class DeviceScene:
                 check_camera(scene, room, size)
         photo = view_photo(scene, room, size)
         lights, surfaces = int(manifest.config["frame"]["lights"]), rendered_materials(mesh.materials, scene)
-        lit = lit_room(scene, room, mesh.extent, lights, relit, progress, surfaces)
+        lit = lit_room(Placed(scene, mesh.extent, room), lights, relit, progress, surfaces)
         maps = None if lit.environment is None else EncodedEnvironment.of(lit.environment, manifest, encode or encoder)
         mesh = with_materials(lit.scene, mesh, SurfaceFeatures.of(manifest))
         materials = rendered_materials(mesh.materials, lit.scene)
@@ -123,10 +116,9 @@ class DeviceScene:
             image = with_environment(image, maps, manifest)
         if manifest.gathers:
             held = None if maps is None else maps.image
-            cube = scene_cube(lit.scene, mesh.extent, lit.environment, held, relit, lit.unseen, lit.second, True)
-            image = with_cube(image, cube)
+            image = with_cube(image, scene_cube(lit, held, relit, is_noted=True))
         mesh = replace(mesh, materials=materials).posed(scene.motion_progress)
-        return cls(lit.scene, manifest, image, maps, photo, lit.unseen, lit.strength, lit.second, mesh)
+        return cls(lit, manifest, image, maps, photo, mesh)
 
     def seen_in(self, room: Environment, encode: Encode, relit: bool = False) -> DeviceScene:
         """The scene in another view of its room: object and lights stay in the world, camera and maps are new.
@@ -136,17 +128,13 @@ class DeviceScene:
             encode: Encodes its maps.
             relit: As in `of`.
         """
-        assert self.environment is not None
-        extent = self.image.header.extent
-        scene = replace(fixed_in_world(self.scene, extent, self.environment), frame_camera=None)
-        maps = EncodedEnvironment.of(next_view(scene, extent, room, relit), self.manifest, encode)
+        lit = self.lit.seen_in(room, relit)
+        assert lit.environment is not None
+        maps = EncodedEnvironment.of(lit.environment, self.manifest, encode)
         image = with_environment(self.image, maps, self.manifest)
         if self.manifest.gathers:
-            image = with_cube(
-                image, scene_cube(scene, extent, maps.environment, maps.image, relit, self.unseen, self.second)
-            )
-        strength = photo_strength(scene, room, extent, relit)
-        return replace(self, scene=scene, image=image, maps=maps, photo=room.photo, strength=strength)
+            image = with_cube(image, scene_cube(lit, maps.image, relit))
+        return replace(self, lit=lit, image=image, maps=maps, photo=room.photo)
 
     def lit_at(self, pose: Scene, relit: bool = False) -> DeviceScene:
         """The scene at a pose of its motion: its light cube, the records of its clip, the places of its instances.
@@ -156,7 +144,7 @@ class DeviceScene:
             relit: As in `of`.
         """
         held = None if self.maps is None else self.maps.image
-        cube = scene_cube(pose, self.image.header.extent, self.environment, held, relit, self.unseen, self.second)
+        cube = scene_cube(self.lit.with_scene(pose), held, relit)
         image = self.image.posed(pose.motion_progress)
         mesh = None if self.mesh is None else self.mesh.posed(pose.motion_progress)
         return replace(self, image=image if cube is None else with_cube(image, cube), mesh=mesh)
@@ -168,9 +156,9 @@ class DeviceScene:
             camera: Its lens, for pictures of the maps' size, and its pose.
             photo: The picture that it took; None: the room is drawn from its maps.
         """
-        assert self.environment is not None
-        scene = fixed_in_world(self.scene, self.image.header.extent, self.environment)
-        return replace(self, scene=replace(scene, frame_camera=camera), photo=photo, strength=None)
+        fixed = fixed_in_world(self.lit.placed).scene
+        lit = replace(self.lit.with_scene(replace(fixed, frame_camera=camera)), strength=None)
+        return replace(self, lit=lit, photo=photo)
 
     @checked
     def with_camera(self, camera: Camera) -> DeviceScene:
@@ -179,8 +167,8 @@ class DeviceScene:
         Args:
             camera: In a room it has a position; frames then show the room as its maps have it.
         """
-        moved = replace(self, scene=replace(self.scene, camera=camera, frame_camera=None))
-        return moved if self.environment is None else replace(moved, photo=None, strength=None)
+        moved = self.with_scene(replace(self.scene, camera=camera, frame_camera=None))
+        return moved if self.environment is None else replace(moved, lit=replace(moved.lit, strength=None), photo=None)
 
     @checked
     def with_transform(self, number: int, transform: Transform, *, relit: bool = False) -> DeviceScene:
@@ -208,20 +196,39 @@ class DeviceScene:
         mesh = with_transform(self.mesh, number - 1, transform)
         scene = replace(self.scene, objects=tuple(objects))
         image = placed_image(self.image, mesh, self.manifest)
-        return replace(self, scene=scene, mesh=mesh, image=image, strength=None).lit_at(scene, relit)
+        lit = replace(self.lit, placed=Placed(scene, mesh.extent, self.environment), strength=None)
+        return replace(self, lit=lit, mesh=mesh, image=image).lit_at(scene, relit)
 
     def passes(self, scene: Scene | None = None, exposure: float = 0.0, number: int = 0) -> list[Scene]:
         """The passes of a frame (`frame_passes`) at another moment of `scene`; None: of `scene` itself."""
         return frame_passes(scene or self.scene, self.image.header.materials, exposure, number)
 
     @property
+    def scene(self) -> Scene:
+        """The scene: with lights, a place for the object, and the headroom of the room's colours."""
+        return self.lit.scene
+
+    @property
     def environment(self) -> Environment | None:
         """The room with the colours that rays see; None without a room."""
-        return None if self.maps is None else self.maps.environment
+        return self.lit.environment
+
+    @property
+    def strength(self) -> NDArray[np.uint8] | None:
+        """Of the object's shadow on the photo, uint8 [rows, columns]; None: it is whole."""
+        return self.lit.strength
+
+    def with_scene(self, scene: Scene) -> DeviceScene:
+        """With other settings of the scene that change neither image nor light."""
+        return replace(self, lit=self.lit.with_scene(scene))
+
+    def _placed(self, scene: Scene | None) -> Placed:
+        """`scene`, another moment or sample of the scene, in the room; None: the scene itself."""
+        return self.lit.placed if scene is None else self.lit.placed.with_scene(scene)
 
     @checked
     def registers(self, size: Size, scene: Scene | None = None, *, composited: bool = False) -> dict[str, int]:
-        """The registers of a frame (`frame_registers`).
+        """The registers of a frame (`placed_registers`).
 
         Args:
             size: Width and height, pixels.
@@ -233,7 +240,8 @@ class DeviceScene:
             UserError: The frame or a distance is out of the hardware's range, or the design lacks a feature.
         """
         shows_room = not composited or self.environment is None or self.photo is None
-        return frame_registers(scene or self.scene, self.image.header, self.manifest, *size, self.maps, shows_room)
+        placed = self._placed(scene)
+        return placed_registers(placed, self.image.header, self.manifest, *size, self.maps, shows_room)
 
     @checked
     def frame_photo(self, size: Size) -> NDArray[np.uint8] | None:
@@ -301,13 +309,12 @@ class DeviceScene:
         Raises:
             UserError: See `view_file`.
         """
-        placed = place(self.scene, self.image.header.extent, *size, self.environment)
+        world = world_view(self.lit.placed, *size)
         registers = self.registers(size, composited=composited)
         occlusion = self.scene.background.occlusion
-        return view_file(placed, registers, size, self.image.header, self.manifest, self.maps, occlusion)
+        return view_file(world, registers, size, self.image.header, self.manifest, self.maps, occlusion)
 
     @checked
     def view(self, size: Size, scene: Scene | None = None) -> View:
         """The view of a frame; arguments as in `registers`."""
-        header = self.image.header
-        return make_view(scene or self.scene, header.extent, *size, header.materials, self.environment)
+        return make_view(self._placed(scene), *size, self.image.header.materials)

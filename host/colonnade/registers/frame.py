@@ -19,6 +19,7 @@ from colonnade.registers.target_view import TargetView
 from colonnade.registers.view_file import still_file
 from colonnade.registers.watchdog import watchdog_cycles
 from colonnade.scene.model import Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import View, make_view
 from colonnade.scene_image.header import ImageHeader
 
@@ -34,26 +35,39 @@ def frame_registers(
     environment: EncodedEnvironment | None = None,
     relit: bool = True,
 ) -> dict[str, int]:
+    """The registers of a scene that nothing else is computed of; arguments are as in `placed_registers`."""
+    room = None if environment is None else environment.environment
+    placed = Placed(scene, header.extent, room)
+    return placed_registers(placed, header, manifest, width, height, environment, relit)
+
+
+def placed_registers(
+    placed: Placed,
+    header: ImageHeader,
+    manifest: Manifest,
+    width: int,
+    height: int,
+    environment: EncodedEnvironment | None = None,
+    relit: bool = True,
+) -> dict[str, int]:
     """Compute all rw registers of a frame by name; signed registers have signed values.
 
     Args:
-        scene: The scene.
+        placed: The scene in its room.
         header: Header of the mesh's scene image.
         manifest: The design's manifest.
         width: Width of the frame, pixels.
         height: Height of the frame, pixels.
-        environment: The scene's room and its encoded maps.
+        environment: The room and its encoded maps.
         relit: Render the whole room, not only the pixels whose light the object may block.
 
     Raises:
         UserError: The frame or a distance is out of the hardware's range, or the design lacks a feature.
     """
     check_size((width, height), manifest)
-    view = make_view(
-        scene, header.extent, width, height, header.materials, None if environment is None else environment.environment
-    )
+    view = make_view(placed, width, height, header.materials)
     registers = registers_of(view, header, manifest, environment, relit)
-    if scene.sample.layer != "surface":  # The object alone
+    if placed.scene.sample.layer != "surface":  # The object alone
         registers |= dict.fromkeys((name for name in registers if name.startswith("environment.window.")), 0)
     if manifest.config["columnBvhMemory"]["cache"]:
         registers["dram.page"] = 0
@@ -67,7 +81,7 @@ def registers_of(
     environment: EncodedEnvironment | None = None,
     relit: bool = True,
 ) -> dict[str, int]:
-    """Compute the registers of a view; the watchdog's is 0. Arguments are as in `frame_registers`.
+    """Compute the registers of a view; the watchdog's is 0. Arguments are as in `placed_registers`.
 
     Raises:
         UserError: A distance is out of the hardware's range, or the design lacks a feature.

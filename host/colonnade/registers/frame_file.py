@@ -18,7 +18,7 @@ def frame_file(registers: Mapping[str, int], manifest: Manifest) -> bytes:
     """The file that sets all rw registers of a frame.
 
     Args:
-        registers: Values of `frame_registers`, by name.
+        registers: Values of `placed_registers`, by name.
         manifest: The design's manifest.
     """
     writes = [pair for name, value in registers.items() for pair in manifest.registers[name].encode(value)]

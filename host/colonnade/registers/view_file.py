@@ -25,7 +25,7 @@ from colonnade.registers.view_words import (
 )
 from colonnade.scene.cameras import WorldCamera
 from colonnade.scene.object_pose import Pose
-from colonnade.scene.view import PlacedLight, PlacedScene
+from colonnade.scene.view import PlacedLight, WorldView
 
 if TYPE_CHECKING:
     from colonnade.design.manifest import Manifest
@@ -40,7 +40,7 @@ _NUMBERS = ("macBits", "sceneBits", "gridFraction", "coordinateBits", "boxPadLog
 
 
 def view_file(
-    placed: PlacedScene,
+    world: WorldView,
     registers: Mapping[str, int],
     size: tuple[int, int],
     header: ImageHeader,
@@ -51,7 +51,7 @@ def view_file(
     """The file for a scene whose object, lights and camera may move.
 
     Args:
-        placed: Poses and lights of the start.
+        world: Poses and lights of the start.
         registers: All registers of the start; registers that the target does not compute stay.
         size: Width and height of the start, pixels.
         header: Header of the mesh's scene image.
@@ -65,7 +65,7 @@ def view_file(
     step = grid_step(header, manifest)
     words: list[int] | None = None
     if room is not None:
-        metres, pose = placed.pose.scale / step, room.environment.camera_to_world
+        metres, pose = world.pose.scale / step, room.environment.camera_to_world
         words = [
             registers["environment.isMapCamera"],
             *map_words(room, metres, pose[:, :3], pose[:, 3]),
@@ -73,7 +73,7 @@ def view_file(
         ]
     origin = np.array(header.frame.offset) * step
     samples = gather_names() if registers.get("gather.bounces", 0) else []
-    return _file(placed, registers, size, header, manifest, (step / placed.pose.scale, origin), words, samples)
+    return _file(world, registers, size, header, manifest, (step / world.pose.scale, origin), words, samples)
 
 
 def still_file(
@@ -105,7 +105,7 @@ def still_file(
     def in_grid(point: Floats) -> Floats:
         return np.asarray((point - offset) * unit)
 
-    placed = PlacedScene(
+    world = WorldView(
         Pose(np.eye(3), 1.0, np.zeros(3)),
         _camera_of(view, in_grid(view.origin)),
         tuple(
@@ -123,7 +123,7 @@ def still_file(
             *map_words(room, 1 / (metre * step), linear / metre, in_grid(view.view_to_mesh[:, 3])),
             *(*[0] * 12, WINDOW_CONSTANT, 0, 0, 0, 1, 0, 0),
         ]
-    return _file(placed, registers, (view.width, view.height), header, manifest, (step / unit, np.zeros(3)), words, [])
+    return _file(world, registers, (view.width, view.height), header, manifest, (step / unit, np.zeros(3)), words, [])
 
 
 def _camera_of(view: View, position: Floats) -> WorldCamera:
@@ -134,7 +134,7 @@ def _camera_of(view: View, position: Floats) -> WorldCamera:
 
 
 def _file(
-    placed: PlacedScene,
+    world: WorldView,
     registers: Mapping[str, int],
     size: tuple[int, int],
     header: ImageHeader,
@@ -149,7 +149,7 @@ def _file(
     registers of sample points, if passes set them.
     """
     numbers = manifest.numbers
-    frame, lights = manifest.config["frame"], placed.lights
+    frame, lights = manifest.config["frame"], world.lights
     blocks = computed_blocks(len(lights), room is not None)
     addresses = [_address(manifest, block) for block in blocks]
     is_constant = room is not None and room[WINDOW_WORD] == WINDOW_CONSTANT
@@ -166,8 +166,8 @@ def _file(
         *position_words(grid[1] * 2.0 ** (16 - POSITION_FRACTION), "the mesh's origin"),
         *header.bounds_low,
         *header.bounds_high,
-        *object_words(placed.pose),
-        *camera_words(placed.camera, size),
+        *object_words(world.pose),
+        *camera_words(world.camera, size),
         *(word for light in lights for word in light_words(light)),
         *([] if room is None else room),
         *(word for pair in constants for word in pair),

@@ -89,7 +89,7 @@ class HostFrame:
     @cached_property
     def sky(self) -> Floats | None:
         """What is behind the object in place of the device's background (`sky_of`)."""
-        return sky_of(self.passes, self.prepared.image.header.extent, self.size)
+        return sky_of(self.prepared.lit.placed, self.passes, self.size)
 
     def pixels(self, passes: FramePasses, is_whole: bool = True) -> npt.NDArray[np.uint8]:
         """The picture of passes, as `RenderResult.pixels` has it; with passes to come it is not filtered."""

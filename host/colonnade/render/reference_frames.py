@@ -33,6 +33,7 @@ from colonnade.scene.cameras import check_camera
 from colonnade.scene.lit_room import LitRoom, lit_room, scene_room, view_photo
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.passes import frame_passes
 from colonnade.scene.view import make_view, rendered_materials, with_overrides
 
@@ -139,12 +140,12 @@ def traced_frames(
     if look is not None:
         look.tell(maps)
     surfaces = rendered_materials(mesh.materials, poses[0])
-    room = lit_room(poses[0], maps, mesh.extent, max_lights, options.relit, progress, surfaces)
+    room = lit_room(Placed(poses[0], mesh.extent, maps), max_lights, options.relit, progress, surfaces)
     backdrop = room_backdrop(room, layout, options.truth, progress)
     for number, pose in enumerate(poses):
         begun = time.perf_counter()
-        lit = replace(room, scene=room.scene.at(pose.motion_progress))
-        cube = _light_cube(lit, mesh, layout, options.relit, number == 0)
+        lit = room.with_scene(room.scene.at(pose.motion_progress))
+        cube = _light_cube(lit, layout, options.relit, number == 0)
         if number == 0:
             tell_defaults(options.note, maps)
         materials = with_overrides(mesh.materials, lit.scene.material)
@@ -153,7 +154,7 @@ def traced_frames(
         layers: dict[str, Accumulation] = {}
         rays: Counter[str] = Counter()
         for one in passes:
-            view = make_view(one, mesh.extent, *size, mesh.materials, room.environment)
+            view = make_view(lit.placed.with_scene(one), *size, mesh.materials)
             if cube is not None and view.gather is not None:
                 view = replace(view, gather=replace(view.gather, cube=cube))
             found = render_reference(mesh, view, progress, backdrop)
@@ -164,18 +165,16 @@ def traced_frames(
             layers[layer] = layers[layer] + sums if layer in layers else sums
         assert first is not None
         sums = layers.pop("surface").with_layers(layers.values())
-        image = composited(sums, photo, room.strength, look, number, sky_of(passes, mesh.extent, size))
+        image = composited(sums, photo, room.strength, look, number, sky_of(lit.placed, passes, size))
         yield TracedFrame(image, first, sums, dict(rays), time.perf_counter() - begun)
 
 
-def _light_cube(
-    room: LitRoom, mesh: Mesh, layout: AttributeLayout | None, relit: bool, is_noted: bool
-) -> LightCube | None:
+def _light_cube(room: LitRoom, layout: AttributeLayout | None, relit: bool, is_noted: bool) -> LightCube | None:
     environment = room.environment
     image = None
     if room.scene.paths.gather and environment is not None:
         image = encoded_environment(environment, _layout_for(environment, layout), encoder=None)
-    return scene_cube(room.scene, mesh.extent, environment, image, relit, room.unseen, room.second, is_noted)
+    return scene_cube(room, image, relit, is_noted)
 
 
 def _layout_for(environment: Environment, layout: AttributeLayout | None) -> AttributeLayout:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import Progress
@@ -78,7 +76,7 @@ def within_budget(
     missing = len(scene.lights) - scene.pass_lights if scene.pass_lights else 0
     hidden += f"; {missing} of {len(scene.lights)} lights do not show" if missing > 0 else ""
     note = joined(note, budget.note + (hidden if budget.samples == 1 else ""))
-    return replace(prepared, scene=scene.with_samples(budget.samples)), note
+    return prepared.with_scene(scene.with_samples(budget.samples)), note
 
 
 def tell_defaults(line: str | None, room: Environment | None) -> None:

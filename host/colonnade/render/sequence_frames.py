@@ -79,7 +79,7 @@ def sequence_frames(
             with progress.step(f"{title}: reading and encoding"):
                 prepared = next(scenes)
                 if samples is not None:
-                    prepared = replace(prepared, scene=prepared.scene.with_samples(samples))
+                    prepared = prepared.with_scene(prepared.scene.with_samples(samples))
             prepared, note = within_budget(prepared, size, note, progress)
             samples = prepared.scene.frame.samples
             with progress.step(f"{title}: computing the registers"):

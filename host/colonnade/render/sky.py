@@ -12,20 +12,20 @@ from colonnade.common.frame_size import Size
 from colonnade.common.types import Floats
 from colonnade.environment.panorama import Panorama
 from colonnade.environment.panorama_file import read_panorama
-from colonnade.mesh.materials.mesh import Extent
 from colonnade.scene.model import Scene
-from colonnade.scene.view import place
+from colonnade.scene.object_pose import Placed
+from colonnade.scene.view import world_view
 
 #: Passes whose rays count, at most.
 _PASSES = 16
 
 
-def sky_of(passes: Sequence[Scene], extent: Extent, size: Size) -> Floats | None:
+def sky_of(placed: Placed, passes: Sequence[Scene], size: Size) -> Floats | None:
     """What the pixels of a frame show of the panorama, the mean over its passes; None if the scene shows none.
 
     Args:
+        placed: The scene.
         passes: The scene at each pass of the frame.
-        extent: Bounds of the mesh.
         size: Width and height, pixels.
 
     Returns:
@@ -40,7 +40,7 @@ def sky_of(passes: Sequence[Scene], extent: Extent, size: Size) -> Floats | None
     x, y = np.arange(size[0])[None, :, None], np.arange(size[1])[:, None, None]
     total = np.zeros((size[1], size[0], 3))
     for one in surfaces:
-        camera = place(one, extent, *size).camera
+        camera = world_view(placed.with_scene(one), *size).camera
         rays = camera.corner + x * camera.step_x + y * camera.step_y
         total += panorama.at(rays.reshape(-1, 3)).reshape(total.shape)
     exposure = 1.0 if background.panorama_exposure is None else background.panorama_exposure

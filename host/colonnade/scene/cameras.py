@@ -13,7 +13,7 @@ from colonnade.common.errors import UserError
 from colonnade.common.types import Floats
 from colonnade.common.vectors import unit_vectors
 from colonnade.scene.model import Camera, Scene
-from colonnade.scene.object_pose import Pose
+from colonnade.scene.object_pose import Placed, Pose
 from colonnade.scene.samples import Point
 
 if TYPE_CHECKING:
@@ -43,44 +43,41 @@ class WorldCamera:
     axes: Floats
 
 
-def start_camera(
-    scene: Scene, pose: Pose, extent: Extent, width: int, height: int, environment: Environment | None
-) -> WorldCamera:
+def start_camera(placed: Placed, width: int, height: int) -> WorldCamera:
     """The camera at the start of a scene's motion, for an object with the pose of the start.
 
     Raises:
         UserError: The camera's position equals its target, or the frame does not have the proportions of the room.
     """
+    scene, room = placed.scene, placed.room
     camera = scene.camera
-    if environment is None:
-        return scene_camera(camera, pose, extent, width, height)
+    if room is None:
+        return scene_camera(camera, placed.start, placed.extent, width, height)
     if scene.frame_camera is not None or camera.position is None:
-        return environment_camera(environment, width, height, scene.frame_camera)
-    target = pose.to_world(extent.centre) if camera.target is None else np.array(camera.target)
-    return _looking(camera, np.array(camera.position), target, _lens(camera, width, height, environment))
+        return environment_camera(room, width, height, scene.frame_camera)
+    target = placed.start.to_world(placed.extent.centre) if camera.target is None else np.array(camera.target)
+    return _looking(camera, np.array(camera.position), target, _lens(camera, width, height, room))
 
 
-def moved_camera(
-    scene: Scene, start: WorldCamera, centre: Floats, width: int, height: int, environment: Environment | None
-) -> WorldCamera:
+def moved_camera(placed: Placed, start: WorldCamera, width: int, height: int) -> WorldCamera:
     """The camera at a scene's progress.
 
     Args:
-        scene: The scene; its motion may move the camera.
+        placed: The scene, whose motion may move the camera. Without a target the start's lies at the depth of the
+            middle of the object.
         start: The camera of the start.
-        centre: Centre of the object's cube at the start, world space; its depth is the start's target's if the
-            scene names none.
         width: Width of the frame, pixels.
         height: Height of the frame, pixels.
-        environment: The room of the scene.
 
     Raises:
         UserError: The camera's position equals its target.
     """
+    scene, environment = placed.scene, placed.room
     keys, progress = scene.motion.camera, scene.motion_progress
     if not keys or (progress == 0.0 and keys[0].at > 0.0):
         return start
     camera, forward = scene.camera, -start.axes[2]
+    centre = placed.start.to_world(placed.extent.centre)
     target = start.position + max(float((centre - start.position) @ forward), 1e-3) * forward
     if camera.target is not None:
         target = np.array(camera.target)

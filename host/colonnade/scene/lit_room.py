@@ -20,7 +20,7 @@ from colonnade.environment.sunlight import Sunlight
 from colonnade.maps.encoded import layout_of
 from colonnade.mesh.materials.materials import MeshMaterial, is_lit
 from colonnade.scene.model import Colour
-from colonnade.scene.object_pose import object_pose, standing_points, with_free_placement
+from colonnade.scene.object_pose import Placed, standing_points, with_free_placement
 from colonnade.scene.panorama_light import panorama_light
 from colonnade.scene.room_lights import as_vector, lights_of, with_lights
 from colonnade.scene.sun import sun_alone
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from colonnade.environment.model import Environment
     from colonnade.environment.panorama import Panorama
     from colonnade.environment.surround import Surround
-    from colonnade.mesh.materials.mesh import Extent
     from colonnade.scene.model import Scene
 
 #: Share of the pixels darker than the photo from which a note reports it.
@@ -51,8 +50,8 @@ class LitRoom:
     """A scene and its room, ready for a view.
 
     Attributes:
-        scene: With lights, a place for the object, and the headroom of `environment`.
-        environment: With the colours that rays see; None without a room.
+        placed: The scene with lights, a place for the object, and the headroom of the room's colours; the room with
+            the colours that rays see.
         albedo: The room with its albedo, as its folder has it; None without a room.
         colours: How the photo's colours were made; None where the colours are the albedo.
         unseen: The light that no photo shows, without the scene's lights: a panorama, or walls that were fitted; None
@@ -61,13 +60,35 @@ class LitRoom:
         second: Another view of the room, which shows further directions; None without one.
     """
 
-    scene: Scene
-    environment: Environment | None = None
+    placed: Placed
     albedo: Environment | None = None
     colours: PhotoColours | None = None
     unseen: Panorama | Surround | None = None
     strength: NDArray[np.uint8] | None = None
     second: Environment | None = None
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+        return self.placed.scene
+
+    @property
+    def environment(self) -> Environment | None:
+        """The room with the colours that rays see; None without a room."""
+        return self.placed.room
+
+    def with_scene(self, scene: Scene) -> LitRoom:
+        """With other settings of the scene, in the same light."""
+        return replace(self, placed=self.placed.with_scene(scene))
+
+    def seen_in(self, room: Environment, relit: bool) -> LitRoom:
+        """In another view of the room: object, lights and headroom stay in the world, the camera is the view's."""
+        scene = replace(fixed_in_world(self.placed).scene, frame_camera=None)
+        placed = Placed(scene, self.placed.extent, room)
+        colours = _photo_colours(placed, relit, scene.headroom)
+        seen = placed if colours is None else placed.with_colours(colours.environment)
+        strength = photo_strength(placed, relit)
+        return replace(self, placed=seen, albedo=room, colours=colours, strength=strength)
 
 
 def scene_room(scene: Scene) -> Environment | None:
@@ -108,9 +129,7 @@ def view_photo(scene: Scene, room: Environment | None, size: tuple[int, int] | N
 
 
 def lit_room(
-    scene: Scene,
-    room: Environment | None,
-    extent: Extent,
+    placed: Placed,
     max_lights: int,
     relit: bool,
     progress: Progress = QUIET,
@@ -121,9 +140,7 @@ def lit_room(
     They come from its panorama, or are fitted to the photo of its room.
 
     Args:
-        scene: The scene.
-        room: Its room (`scene_room`).
-        extent: Bounds of the mesh, for lights relative to it.
+        placed: The scene in its room (`scene_room`).
         max_lights: Lights of the design.
         relit: The frame shows the room under the scene's lights, not its photo.
         progress: Shows the fit.
@@ -133,19 +150,19 @@ def lit_room(
         UserError: The object cannot stand in the room, or `background.colours` asks for a photo that it lacks;
             or the panorama cannot be read.
     """
-    scene = with_free_placement(scene, extent, room)
-    object_pose(scene, extent, room)  # Errors of the scene come before notes and long work
+    placed = with_free_placement(placed)
+    scene, room, _ = placed.scene, placed.room, placed.pose  # Its errors come before notes and long work
     if room is not None:
         room.tell_notes()
-    around = panorama_light(scene, extent, room, max_lights)
+    around = panorama_light(placed, max_lights)
     second = _second_view(scene)
     unseen: Panorama | Surround | None = None
     if around is not None:
         scene, unseen = around.scene, around.panorama
     if room is None:
-        return LitRoom(scene, unseen=unseen)
+        return LitRoom(placed.with_scene(scene), unseen=unseen)
     if not scene.names_light and (around is None or not around.has_lights):
-        scene, walls = _with_fitted_lights(scene, room, extent, max_lights, progress)
+        scene, walls = _with_fitted_lights(placed.with_scene(scene), max_lights, progress)
         unseen = unseen or walls
     if scene.places_camera and (scene.background.photo is None or relit):
         can_have_photo = not relit and not scene.motion.camera
@@ -157,18 +174,18 @@ def lit_room(
         scene = replace(scene, ambient=Colour(as_vector(_OPEN * np.array(scene.ambient.colour))))
     # Gathered light has the photo's own scale, so a headroom is for what marched rays alone show
     is_shown = scene.paths.gather == 0 or not any(map(is_lit, materials))
-    colours = _photo_colours(scene, room, extent, relit, None if is_shown else 1.0)
-    strength = photo_strength(scene, room, extent, relit)
+    placed = placed.with_scene(scene)
+    colours = _photo_colours(placed, relit, None if is_shown else 1.0)
+    strength = photo_strength(placed, relit)
     if colours is None:
-        return LitRoom(scene, room, room, unseen=unseen, strength=strength, second=second)
+        return LitRoom(placed, room, unseen=unseen, strength=strength, second=second)
     if colours.clamped > _REPORTED_CLAMPED and scene.names_light and scene.paths.gather == 0:
         notes.tell(
             f"{colours.clamped:.1%} of the pixels of room {room.name} are too dark under the scene's lights to show its"
             " photo in reflections: raise ambient.colour, or leave out [light] and [ambient], so that they are fitted"
         )
-    return LitRoom(
-        replace(scene, headroom=colours.headroom), colours.environment, room, colours, unseen, strength, second
-    )
+    placed = placed.with_scene(replace(scene, headroom=colours.headroom)).with_colours(colours.environment)
+    return LitRoom(placed, room, colours, unseen, strength, second)
 
 
 def _second_view(scene: Scene) -> Environment | None:
@@ -185,33 +202,25 @@ def _second_view(scene: Scene) -> Environment | None:
     return second
 
 
-def fixed_in_world(scene: Scene, extent: Extent, room: Environment) -> Scene:
+def fixed_in_world(placed: Placed) -> Placed:
     """The scene with object and lights at their places in the world, for other views of its room.
 
     Args:
-        scene: With a place for the object and lights, as in `LitRoom`; one that is fixed stays so.
-        extent: Bounds of the mesh.
-        room: The view from which they are placed.
+        placed: In the view from which they are placed, as in `LitRoom`; a scene that is fixed stays so.
     """
-    first, *more = world_positions(scene, extent, room)
+    scene, room = placed.scene, placed.room
+    assert room is not None
+    first, *more = world_positions(placed)
     if scene.standing_points is None and scene.placement is not None and scene.placement.stand_at is not None:
         scene = replace(scene, standing_points=standing_points(scene, room))
     lights = tuple(
         replace(light, position=as_vector(place)) for light, place in zip(scene.more_lights, more, strict=True)
     )
-    return replace(scene, light=replace(scene.light, position=as_vector(first)), more_lights=lights)
+    light = replace(scene.light, position=as_vector(first))
+    return placed.with_scene(replace(scene, light=light, more_lights=lights))
 
 
-def next_view(scene: Scene, extent: Extent, room: Environment, relit: bool) -> Environment:
-    """Another view of a room, with the colours that rays see; the scene is `fixed_in_world`.
-
-    Lights and headroom are the scene's, so that only the room changes.
-    """
-    colours = _photo_colours(scene, room, extent, relit, scene.headroom)
-    return room if colours is None else colours.environment
-
-
-def photo_strength(scene: Scene, room: Environment, extent: Extent, relit: bool) -> NDArray[np.uint8] | None:
+def photo_strength(placed: Placed, relit: bool) -> NDArray[np.uint8] | None:
     """The strength of the object's shadow on the photo of a room, uint8 [height, width].
 
     None, and whole, for a camera that is not the maps'; and unless the scene wants something else, for lights
@@ -220,6 +229,8 @@ def photo_strength(scene: Scene, room: Environment, extent: Extent, relit: bool)
     Raises:
         UserError: `background.shadows` asks for a photo or an albedo map that the room lacks.
     """
+    scene, room = placed.scene, placed.room
+    assert room is not None
     wanted = scene.background.shadows
     if wanted == "photo" and (room.photo is None or not room.has_albedo):
         raise UserError(
@@ -231,26 +242,23 @@ def photo_strength(scene: Scene, room: Environment, extent: Extent, relit: bool)
     if wanted == "whole" or (wanted is None and scene.names_light):
         return None
     if room.has_albedo:
-        return shadow_strength(room, lights_of(scene, extent, room))
+        return shadow_strength(room, lights_of(placed))
     sun = Sunlight.of(room)
     return None if sun is None else sun.strength()
 
 
-def _photo_colours(
-    scene: Scene, room: Environment, extent: Extent, relit: bool, headroom: float | None = None
-) -> PhotoColours | None:
+def _photo_colours(placed: Placed, relit: bool, headroom: float | None) -> PhotoColours | None:
     """The colours that show a room's photo; None where rays see its albedo."""
-    wanted = scene.background.colours
+    room, wanted = placed.room, placed.scene.background.colours
+    assert room is not None
     if wanted == "photo" and room.photo is None:
         raise UserError(f"background.colours is photo, but room {room.name} has no photo.png or render.png")
     if wanted == "albedo" or room.photo is None or (wanted is None and relit):
         return None
-    return photo_colours(room, lights_of(scene, extent, room), headroom)
+    return photo_colours(room, lights_of(placed), headroom)
 
 
-def _with_fitted_lights(
-    scene: Scene, room: Environment, extent: Extent, max_lights: int, progress: Progress
-) -> tuple[Scene, Surround | None]:
+def _with_fitted_lights(placed: Placed, max_lights: int, progress: Progress) -> tuple[Scene, Surround | None]:
     """The scene with fitted lights.
 
     If it gathers light, they are fitted beside the room's walls, and have an area: no photo tells their size,
@@ -259,10 +267,12 @@ def _with_fitted_lights(
     from colonnade.environment.fitted_lights import fitted_lights
     from colonnade.environment.light_fit import DEFAULT_LIGHTS
 
+    scene, room = placed.scene, placed.room
+    assert room is not None
     if room.photo is None:
         room.tell("lights", f"no photo to fit lights to, one beside the object and ambient light 0.1 {_KEYS}")
         return scene, None
-    if (sunny := sun_alone(scene, extent, room)) is not None:
+    if (sunny := sun_alone(placed)) is not None:
         room.tell("lights", f"the sun overhead, as the photo shows sun and shade {_KEYS}")
         return replace(with_lights(scene, sunny), fits_lights=scene.paths.gather > 0), None
     with progress.step("fitting lights to the photo"):
@@ -271,8 +281,7 @@ def _with_fitted_lights(
     room.tell("lights", f"ambient light and {count} point light{'' if count == 1 else 's'} fitted to the photo {_KEYS}")
     lights = fit.lights
     if scene.paths.gather:
-        middle = object_pose(scene, extent, room).to_world(extent.centre)
-        lights = replace(lights, lights=tuple(_with_area(light, middle) for light in lights.lights))
+        lights = replace(lights, lights=tuple(_with_area(light, placed.middle) for light in lights.lights))
     return replace(with_lights(scene, lights), fits_lights=scene.paths.gather > 0), fit.surround
 
 

@@ -1,9 +1,9 @@
-"""The object's pose: transforms between mesh space, world space and a room's view space."""
+"""The object's pose in its room: transforms between mesh space, world space and a room's view space."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,15 +55,72 @@ class Pose:
         return np.column_stack([linear, self.to_mesh(camera_to_world[:, 3])])
 
 
-def object_pose(scene: Scene, extent: Extent, environment: Environment | None) -> Pose:
-    """The pose of the scene's mesh at its motion's progress: by its transform, or standing in a room.
+@dataclass(frozen=True)
+class Placed:
+    """A scene in its room, and the pose of its object there.
+
+    What is derived by `with_scene` and `with_colours` shares the poses, so that each is computed once.
+
+    Attributes:
+        scene: The scene, at its motion's progress and its sample.
+        extent: Bounds of its mesh (`Mesh.extent`, or an image header's).
+        room: The room of its background; None without one.
+    """
+
+    scene: Scene
+    extent: Extent
+    room: Environment | None = None
+    _poses: dict[Hashable, Pose] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def with_scene(self, scene: Scene) -> Placed:
+        """With other settings of the scene: another moment, pass, light or place of the object."""
+        return self._sharing(Placed(scene, self.extent, self.room))
+
+    def with_colours(self, room: Environment) -> Placed:
+        """With other colours of the room, whose geometry stays."""
+        return self._sharing(Placed(self.scene, self.extent, room))
+
+    def _sharing(self, other: Placed) -> Placed:
+        object.__setattr__(other, "_poses", self._poses)
+        return other
+
+    @property
+    def pose(self) -> Pose:
+        """The object's pose at the motion's progress (`object_pose`).
+
+        Raises:
+            UserError: See `object_pose`.
+        """
+        return self._pose_at(self.scene.motion_progress)
+
+    @property
+    def start(self) -> Pose:
+        """The object's pose at the start of the motion."""
+        return self._pose_at(0.0)
+
+    @property
+    def middle(self) -> Floats:
+        """World position of the middle of the object, float64 [3]."""
+        return self.pose.to_world(self.extent.centre)
+
+    def _pose_at(self, progress: float) -> Pose:
+        one = self.scene
+        objects, up = bool(one.objects), one.camera.up
+        of = (one.transform, one.placement, one.motion, one.standing_points, objects, up, progress)
+        if of not in self._poses:
+            self._poses[of] = object_pose(self.with_scene(one.at(progress)))
+        return self._poses[of]
+
+
+def object_pose(placed: Placed) -> Pose:
+    """The pose of a scene's mesh at its motion's progress: by its transform, or standing in a room.
 
     The joined mesh of several objects is in world space already; the motion moves it as one.
 
     Raises:
         UserError: A pixel is outside the room's maps, or the motion does not match the kind of pose.
     """
-    scene = with_free_placement(scene, extent, environment)
+    scene, extent, environment = with_free_placement(placed).scene, placed.extent, placed.room
     placement, motion, progress = scene.placement, scene.motion, scene.motion_progress
     rotation = rotation_matrix(scene.transform)
     if environment is None or placement is None:
@@ -94,18 +151,18 @@ def standing_points(scene: Scene, environment: Environment) -> tuple[Vector, Vec
     return interpolate(first, last, 0.0), interpolate(first, last, 1.0)
 
 
-def with_free_placement(scene: Scene, extent: Extent, environment: Environment | None) -> Scene:
-    """The scene with the place that is chosen for an object that stands in a room without a given one.
+def with_free_placement(placed: Placed) -> Placed:
+    """With the place that is chosen for an object that stands in a room without a given one.
 
     Raises:
         UserError: No level surface in view has room for the object.
     """
-    placement = _placement(scene, environment)
-    if environment is None or placement is None or placement.stand_at is not None:
-        return scene
-    return replace(
-        scene, placement=free_placement(placement, rotation_matrix(scene.transform), extent, environment, "object")
-    )
+    scene, room = placed.scene, placed.room
+    placement = _placement(scene, room)
+    if room is None or placement is None or placement.stand_at is not None:
+        return placed
+    placement = free_placement(placement, rotation_matrix(scene.transform), placed.extent, room, "object")
+    return placed.with_scene(replace(scene, placement=placement))
 
 
 def free_placement(

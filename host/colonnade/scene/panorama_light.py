@@ -17,14 +17,13 @@ from colonnade.environment.panorama_file import read_panorama
 from colonnade.environment.panorama_lights import DistantLight, split_lights
 from colonnade.environment.photo_colours import MAX_INTENSITY
 from colonnade.environment.seen_light import FINE, SeenLight, texel_weights
-from colonnade.scene.object_pose import object_pose
 from colonnade.scene.room_lights import with_lights
 from colonnade.scene.sun import with_sun
 
 if TYPE_CHECKING:
     from colonnade.environment.model import Environment
-    from colonnade.mesh.materials.mesh import Extent
     from colonnade.scene.model import Scene
+    from colonnade.scene.object_pose import Placed
 
 #: Lights that are found for frames of several samples, at most: passes share them.
 MOST_LIGHTS = 8
@@ -49,24 +48,21 @@ class PanoramaLight:
     has_lights: bool
 
 
-def panorama_light(scene: Scene, extent: Extent, room: Environment | None, max_lights: int) -> PanoramaLight | None:
+def panorama_light(placed: Placed, max_lights: int) -> PanoramaLight | None:
     """Read the panorama of a scene, and find its lights if the scene names none; None for a scene without one.
 
     Args:
-        scene: With a place for the object.
-        extent: Bounds of the mesh.
-        room: Its room; None without one.
+        placed: With a place for the object.
         max_lights: Lights of the design.
 
     Raises:
         UserError: The panorama cannot be read.
     """
-    background = scene.background
+    scene, room, background = placed.scene, placed.room, placed.scene.background
     if background.panorama is None:
         return None
     panorama = read_panorama(background.panorama, background.panorama_yaw)
-    pose = object_pose(scene, extent, room)
-    point, name = pose.to_world(extent.centre), background.panorama.name
+    point, name = placed.middle, background.panorama.name
     seen = None if room is None or room.photo is None else SeenLight.of(room, point)
     exposure = background.panorama_exposure
     if exposure is None:
@@ -87,9 +83,8 @@ def panorama_light(scene: Scene, extent: Extent, room: Environment | None, max_l
     found, rest = split_lights(panorama, max_lights if scene.frame.samples == 1 else MOST_LIGHTS)
     if not found and seen is not None and panorama.is_cut_off:
         return PanoramaLight(scene, rest, False)
-    if room is not None:
-        found = with_sun(found, rest, scene, extent, room)
-    lights = _placed(found, room, point, extent.edge * pose.scale, seen)
+    found = with_sun(found, rest, placed)
+    lights = _placed(found, room, point, placed.extent.edge * placed.pose.scale, seen)
     ambient = _mean(rest, seen).clip(max=MAX_INTENSITY)
     scene = replace(with_lights(scene, RoomLights(ambient.round(4), tuple(lights))), pass_lights=max_lights)
     count = len(lights)

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.environment.lights import RoomLight, RoomLights
 from colonnade.scene.model import Colour, Light, PointLight, Scene, Vector
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import world_positions
 
-if TYPE_CHECKING:
-    from colonnade.environment.model import Environment
-    from colonnade.mesh.materials.mesh import Extent
 
-
-def lights_of(scene: Scene, extent: Extent, environment: Environment | None) -> RoomLights:
+def lights_of(placed: Placed) -> RoomLights:
     """The lights of a scene at the start of its motion."""
-    scene = scene.at(0.0)
-    positions = world_positions(scene, extent, environment)
+    scene = placed.scene.at(0.0)
+    positions = world_positions(placed.with_scene(scene))
     return RoomLights(
         np.array(scene.ambient.colour),
         tuple(

@@ -1,20 +1,19 @@
 """The view: camera, lights and settings of a frame in mesh space, as floats.
 
-The reference renderer uses it directly; `colonnade.registers.frame.frame_registers` rounds it to registers.
+The reference renderer uses it directly; `colonnade.registers.frame.placed_registers` rounds it to registers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from colonnade.common.types import Floats
 from colonnade.environment.light_cube import LightCube
 from colonnade.mesh.materials.materials import MARKS, PLAIN, MeshMaterial, as_rendered, in_layer, in_pass, is_lit
-from colonnade.mesh.materials.mesh import Extent
 from colonnade.scene.cameras import (
     WorldCamera,
     camera_axes,
@@ -24,10 +23,7 @@ from colonnade.scene.cameras import (
     through_lens,
 )
 from colonnade.scene.model import Material, PointLight, Scene
-from colonnade.scene.object_pose import Pose, object_pose
-
-if TYPE_CHECKING:
-    from colonnade.environment.model import Environment
+from colonnade.scene.object_pose import Placed, Pose
 
 _UP = (0.0, 1.0, 0.0)
 
@@ -121,8 +117,8 @@ class View:
 
 
 @dataclass(frozen=True)
-class PlacedScene:
-    """Object, camera and lights of one frame in world space.
+class WorldView:
+    """The view of one frame, in world space.
 
     Attributes:
         pose: The object's pose.
@@ -135,17 +131,16 @@ class PlacedScene:
     lights: tuple[PlacedLight, ...]
 
 
-def place(scene: Scene, extent: Extent, width: int, height: int, environment: Environment | None = None) -> PlacedScene:
-    """Place object, camera and lights of a scene at its motion's progress and its sample.
+def world_view(placed: Placed, width: int, height: int) -> WorldView:
+    """Object, camera and lights of a scene at its motion's progress and its sample.
 
     Cameras and lights that are relative to the object keep their positions from the start of the motion.
     Arguments are as in `make_view`.
     """
-    pose = object_pose(scene, extent, environment)
-    start = object_pose(scene.at(0.0), extent, environment)
-    centre, edge = start.to_world(extent.centre), extent.edge * start.scale
-    first = start_camera(scene, start, extent, width, height, environment)
-    camera = moved_camera(scene, first, centre, width, height, environment)
+    scene, environment, pose = placed.scene, placed.room, placed.pose
+    centre, edge = placed.start.to_world(placed.extent.centre), placed.extent.edge * placed.start.scale
+    first = start_camera(placed, width, height)
+    camera = moved_camera(placed, first, width, height)
     if scene.camera.aperture > 0:
         camera = through_lens(camera, scene.camera, centre, scene.sample.lens)
     # In a room, light does not depend on where the scene's camera stands
@@ -155,29 +150,20 @@ def place(scene: Scene, extent: Extent, width: int, height: int, environment: En
     )
     shift_x, shift_y = scene.sample.pixel
     corner = camera.corner + shift_x * camera.step_x + shift_y * camera.step_y
-    return PlacedScene(pose, replace(camera, corner=corner), lights)
+    return WorldView(pose, replace(camera, corner=corner), lights)
 
 
-def make_view(
-    scene: Scene,
-    extent: Extent,
-    width: int,
-    height: int,
-    materials: tuple[MeshMaterial, ...] = (PLAIN,),
-    environment: Environment | None = None,
-) -> View:
+def make_view(placed: Placed, width: int, height: int, materials: tuple[MeshMaterial, ...] = (PLAIN,)) -> View:
     """Make the view of a scene at its motion's progress and its sample.
 
     Args:
-        scene: What to render.
-        extent: Bounds of the mesh (`Mesh.extent`, or an image header's).
+        placed: What to render. In a room its camera is used unless the scene places one.
         width: Width of the frame, pixels.
         height: Height of the frame, pixels.
         materials: Materials of the mesh; the scene's values override them.
-        environment: The room of `scene.background`, whose camera is then used unless the scene places one.
     """
-    placed = place(scene, extent, width, height, environment)
-    pose, camera = placed.pose, placed.camera
+    scene, world = placed.scene, world_view(placed, width, height)
+    pose, camera = world.pose, world.camera
     has_highlights = scene.sample.layer in MARKS
     gathers = scene.paths.gather > 0 and not has_highlights
     return View(
@@ -191,7 +177,7 @@ def make_view(
             PlacedLight(
                 pose.to_mesh(light.position), light.colour, None if light.reach is None else light.reach / pose.scale
             )
-            for light in placed.lights
+            for light in world.lights
         ),
         materials=_dimmed(
             tuple(
@@ -205,10 +191,10 @@ def make_view(
         background=np.array(scene.background.colour) * scene.exposure,
         flat=scene.material.flat,
         shadows=scene.light.shadows,
-        shadow_offset=None if scene.light.shadow_offset is None else scene.light.shadow_offset * extent.edge,
+        shadow_offset=None if scene.light.shadow_offset is None else scene.light.shadow_offset * placed.extent.edge,
         shadow_transmittance=scene.paths.shadow_transmittance,
         bounces=scene.paths.bounces,
-        view_to_mesh=None if environment is None else pose.from_view(environment.camera_to_world),
+        view_to_mesh=None if placed.room is None else pose.from_view(placed.room.camera_to_world),
         shift=scene.sample.pixel,
         occlusion=scene.background.occlusion,
         is_map_camera=not scene.places_camera,
@@ -238,15 +224,12 @@ def rendered_materials(materials: Sequence[MeshMaterial], scene: Scene) -> tuple
     return tuple(as_rendered(one, scene.paths.gather > 0) for one in with_overrides(materials, scene.material))
 
 
-def world_positions(scene: Scene, extent: Extent, environment: Environment | None) -> list[Floats]:
+def world_positions(placed: Placed) -> list[Floats]:
     """World positions of a scene's lights, float64 [3] each; of a light with a radius its middle."""
-    start = object_pose(scene.at(0.0), extent, environment)
-    if environment is None:
-        camera = start_camera(scene, start, extent, 1, 1, None)
-    else:
-        camera = environment_camera(environment, environment.width, environment.height)
+    room, start, extent = placed.room, placed.start, placed.extent
+    camera = start_camera(placed, 1, 1) if room is None else environment_camera(room, room.width, room.height)
     centre, edge = start.to_world(extent.centre), extent.edge * start.scale
-    return [_world_position(light, camera.axes, centre, edge) for light in scene.lights]
+    return [_world_position(light, camera.axes, centre, edge) for light in placed.scene.lights]
 
 
 def _world_position(light: PointLight, axes: Floats, centre: Floats, edge: float) -> Floats:

@@ -31,7 +31,7 @@ from colonnade.scene.model import Camera, Scene
 from colonnade.scene.model.values import WorldVector
 from colonnade.scene.parser import is_mesh_file, load_scene
 from colonnade.scene.passes import exposed
-from colonnade.scene.view import place
+from colonnade.scene.view import world_view
 from colonnade.scene_image.file import SceneImage
 from colonnade.viewer.camera_table import save_camera
 
@@ -203,10 +203,10 @@ class Session:
         scene = self._scene
         if at is not None:
             pose = scene.scene.at(at)
-            scene = replace(scene.lit_at(pose), scene=pose)
+            scene = scene.lit_at(pose).with_scene(pose)
         if camera is not None:
             scene = scene.with_camera(_moved(scene.scene.camera, camera))
-        scene = replace(scene, scene=scene.scene.with_samples(samples))
+        scene = scene.with_scene(scene.scene.with_samples(samples))
         number = self._number if history is not None else 0
         passes = scene.passes(exposure=scene.scene.opening(1), number=number)
         denoise = (scene.scene.frame.denoise or False) if samples > 1 or history is not None else False
@@ -337,11 +337,10 @@ class Session:
         return scene.with_camera(_moved(camera, ViewCamera(view["position"], view["target"])))
 
     def _described(self, scene: DeviceScene) -> dict[str, Any]:
-        extent, own = scene.image.header.extent, scene.scene.camera
-        placed = place(scene.scene, extent, *self.size, scene.environment)
-        camera = placed.camera
-        centre = placed.pose.to_world(extent.centre) if own.target is None else np.array(own.target)
-        depth = max(float((camera.position - centre) @ camera.axes[2]), 1e-3 * extent.edge * placed.pose.scale)
+        placed, own = scene.lit.placed, scene.scene.camera
+        camera = world_view(placed, *self.size).camera
+        centre = placed.middle if own.target is None else np.array(own.target)
+        depth = max(float((camera.position - centre) @ camera.axes[2]), 1e-3 * placed.extent.edge * placed.pose.scale)
         return {
             "scene": self.file.name,
             "size": list(self.size),

@@ -40,7 +40,7 @@ from colonnade.scene.model import (
     Transform,
     Vector,
 )
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.samples import CENTRE, Sample
 from colonnade.scene.view import make_view, with_overrides
 from colonnade.scene_image.environment import with_environment
@@ -216,7 +216,7 @@ def test_a_room_after_an_abort_is_right() -> None:
 
 def sunken(scene: Scene, held: EncodedEnvironment, extent: Extent) -> Scene:
     """The scene with its object 15 cm lower."""
-    pose = object_pose(scene, extent, held.environment)
+    pose = Placed(scene, extent, held.environment).pose
     x, y, z = (float(value) for value in pose.translate)
     turn = (0.0, scene.placement.turn if scene.placement else 0.0, 0.0)
     return replace(scene, placement=None, transform=Transform(turn, pose.scale, (x, y - 0.15, z)))
@@ -233,7 +233,7 @@ def test_a_standing_object_keeps_its_foot(room: str, encoder: Encoder, mesh: str
     image = with_environment(pack(load_mesh(mesh), manifest), held, manifest)
     scene = replace(TABLE, placement=PLACEMENTS[room], background=Background(room=ROOMS / room))
     registers = frame_registers(scene, image.header, manifest, 640, 480, held, relit=False)
-    view = make_view(scene, image.header.extent, 640, 480, image.header.materials, held.environment)
+    view = make_view(Placed(scene, image.header.extent, held.environment), 640, 480, image.header.materials)
     tested = registers | tolerance_registers(view, held, image.header, manifest) | {"environment.occlusion": 1}
     without = render_model(manifest, image, registers | {"environment.occlusion": 0})
     assert without.is_object.sum() > 500

@@ -27,7 +27,7 @@ from colonnade.render.reference_frames import traced_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.lit_room import LitRoom, lit_room
 from colonnade.scene.model import Background, Camera, Colour, Light, Material, MeshSource, Paths, Placement, Scene
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.samples import samples_of_frame
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.file import SceneImage
@@ -274,7 +274,7 @@ def test_a_panorama_is_the_light_without_a_room(tmp_path: Path, told: list[str])
     assert told == []
     prepared = DeviceScene.of(replace(scene, names_light=False).with_samples(1), manifest)
     extent, light = prepared.image.header.extent, prepared.scene.light
-    to_light = np.array(light.position) - object_pose(scene, extent, None).to_world(extent.centre)
+    to_light = np.array(light.position) - Placed(scene, extent).pose.to_world(extent.centre)
     assert to_light[1] > 0.999 * np.linalg.norm(to_light) and light.radius > 0
     solid = 2 * np.pi * (1 - np.cos(np.pi / 50))
     assert light.colour == pytest.approx([solid * (25 - 1) / np.pi] * 3, rel=0.02)
@@ -309,8 +309,8 @@ def test_in_a_room_a_panorama_is_what_the_photo_does_not_show(tmp_path: Path, to
     image = encoded_environment(room, AttributeLayout(room.width, room.height))
 
     def lit_cube(scene: Scene) -> tuple[LitRoom, np.ndarray]:
-        lit = lit_room(scene, room, extent, 2, False)
-        cube = scene_cube(lit.scene, extent, room, image, False, lit.unseen, is_noted=True)
+        lit = lit_room(Placed(scene, extent, room), 2, False)
+        cube = scene_cube(replace(lit, placed=Placed(lit.scene, extent, room)), image, False, is_noted=True)
         assert cube is not None
         return lit, cube.texels.reshape(-1, 3)
 
@@ -325,7 +325,7 @@ def test_in_a_room_a_panorama_is_what_the_photo_does_not_show(tmp_path: Path, to
     assert (np.abs(one - grey) < 0.002).all(axis=1).mean() > 0.3, "the others are the panorama's"
     named = panorama_scene(tmp_path / "named.exr", 0.5, IN_ROOM)
     for relit, share in ((False, 0.85), (True, 1.0)):
-        ambient = lit_room(named, room, extent, 2, relit).scene.ambient.colour
+        ambient = lit_room(Placed(named, extent, room), 2, relit).scene.ambient.colour
         assert ambient == pytest.approx([share * value for value in IN_ROOM.ambient.colour]), "of the panorama"
     notes.flush()
     lines = "\n".join(told)

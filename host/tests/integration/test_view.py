@@ -15,7 +15,8 @@ from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.view_file import view_file
 from colonnade.scene.model import Light, MeshSource, Scene
-from colonnade.scene.view import place
+from colonnade.scene.object_pose import Placed
+from colonnade.scene.view import world_view
 from colonnade.scene_image.packer import pack
 
 ROOT = toolchain.project_root()
@@ -36,7 +37,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scene = Scene(MeshSource(name="teapot:3"), more_lights=(Light((1.0, 2.0, 0.5), falloff=2.0),))
     header = pack(load_mesh("teapot:3"), manifest).header
     registers = frame_registers(scene, header, manifest, 640, 480)
-    file = view_file(place(scene, header.extent, 640, 480), registers, (640, 480), header, manifest)
+    file = view_file(world_view(Placed(scene, header.extent), 640, 480), registers, (640, 480), header, manifest)
     written = [register for register in manifest.registers.values() if register.access == "rw"]
     first, last = written[0], max(written, key=lambda register: register.address)
     folder = tmp_path_factory.mktemp("table")

@@ -27,8 +27,9 @@ from colonnade.mesh.load import load_mesh
 from colonnade.registers.instances import instance_registers
 from colonnade.registers.target_view import TargetView
 from colonnade.registers.view_words import camera_values, position_values
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
-from colonnade.scene.view import place
+from colonnade.scene.view import world_view
 
 #: A cache that holds all records: a frame that does not invalidate it reads old ones.
 IN_DRAM = (f"columnBvhMemory.cache={json.dumps(CACHE | {'lines': 64, 'sharedLines': 256})}",)
@@ -57,7 +58,7 @@ def test_the_viewer_renders_the_orbit_of_its_camera(tmp_path: Path, case: str) -
     arguments += ("scene",) if overrides else ()
     memory, (line,) = run_driver(tmp_path, design, files, "interrupt", "image", "view", *arguments, program="viewer")
     assert line[:4] == [str(count), "frames", "of", "24x16,"] and float(line[4]) > 0
-    placed = place(scene.scene, scene.image.header.extent, *size, None)
+    placed = world_view(Placed(scene.scene, scene.image.header.extent), *size)
     camera, (right, _, back) = placed.camera, placed.camera.axes
     depth = float((camera.position - placed.pose.translate) @ back)
     sideways = Rotation.from_rotvec(elevation * right, degrees=True)

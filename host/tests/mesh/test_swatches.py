@@ -18,6 +18,7 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
 from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, MeshSource, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view
 
 SWATCHES = np.random.default_rng(5).integers(0, 256, (1, 256, 3), dtype=np.uint8)
@@ -74,7 +75,7 @@ def test_a_swatch_map_is_as_near_to_the_reference_as_plain_colours(tmp_path: Pat
     )  # fmt: skip
     manifest = manifest_for("small").manifest
     size = (160, 120)
-    reference = render_reference(mesh, make_view(scene, mesh.extent, *size, mesh.materials))
+    reference = render_reference(mesh, make_view(Placed(scene, mesh.extent), *size, mesh.materials))
     found = psnr(encode_srgb(reference.image), encode_srgb(render_model(scene, mesh, manifest, size).image))
     print(f"256 swatches: {found:.1f} dB")
     assert found > 45.0

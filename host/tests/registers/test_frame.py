@@ -17,6 +17,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.registers.watchdog import TREE_VISITS
 from colonnade.scene.model import Camera, Light, Material, MeshSource, Scene, Transform
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.samples import Sample
 from colonnade.scene.view import make_view, with_overrides
 from colonnade.scene_image.file import SceneImage
@@ -67,7 +68,7 @@ def test_rays_are_those_of_the_float_camera(make_manifest: MakeManifest, mac: in
     scene = dataclasses.replace(SCENE, transform=Transform((10.0, 120.0, -40.0), 3.0, (1.0, -2.0, 0.5)))
     header = pack(TEAPOT, manifest).header
     registers = frame_registers(scene, header, manifest, 640, 480)
-    view = make_view(scene, header.extent, 640, 480)
+    view = make_view(Placed(scene, header.extent), 640, 480)
     for x, y in ((0, 0), (639, 0), (0, 479), (639, 479), (320, 240)):
         exact = unit(view.direction + x * view.step_x + y * view.step_y)
         np.testing.assert_allclose(unit(ray(registers, x, y)), exact, atol=tolerance)
@@ -89,7 +90,7 @@ def test_pixel_0_0_is_at_the_top_left(manifest: Manifest, image: SceneImage) -> 
 
 @pytest.mark.parametrize(("width", "height"), [(640, 480), (480, 480), (200, 600)])
 def test_a_framed_object_is_centred_with_the_requested_height(width: int, height: int) -> None:
-    view = make_view(SCENE, TEAPOT.extent, width, height)
+    view = make_view(Placed(SCENE, TEAPOT.extent), width, height)
     basis = np.stack([view.step_x, view.step_y, view.direction], axis=1)
     x, y, depth = np.linalg.solve(basis, (TEAPOT.vertices - view.origin).T)
     x, y = x / depth + 0.5, y / depth + 0.5
@@ -104,7 +105,7 @@ def test_the_light_is_relative_to_cube_and_camera() -> None:
     scene = dataclasses.replace(SCENE, camera=Camera(direction=(0.0, 0.0, 1.0)), light=Light(offset=(1.2, 1.6, 1.5)))
     extent = TEAPOT.extent
     expected = extent.centre + extent.edge * np.array([1.2, 1.6, 1.5])
-    np.testing.assert_allclose(make_view(scene, extent, 64, 48).light, expected)
+    np.testing.assert_allclose(make_view(Placed(scene, extent), 64, 48).light, expected)
 
 
 @settings(max_examples=60)

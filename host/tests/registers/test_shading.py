@@ -14,6 +14,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.registers.frame import frame_registers, registers_of
 from colonnade.scene.model import Light, Material, MeshSource, Paths, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view
 from colonnade.scene_image.packer import pack
 
@@ -86,7 +87,7 @@ def test_too_many_materials_are_refused(make_manifest: Callable[..., Manifest]) 
     manifest = make_manifest()
     mesh = load_mesh("cube")
     header = pack(mesh, manifest).header
-    view = make_view(SCENE, mesh.extent, 32, 24, (MeshMaterial(),) * 3)
+    view = make_view(Placed(SCENE, mesh.extent), 32, 24, (MeshMaterial(),) * 3)
     with pytest.raises(UserError, match=r"the scene has 3 materials, the hardware supports 2: .*frame.materials"):
         registers_of(view, header, manifest)
 

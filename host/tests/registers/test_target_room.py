@@ -43,8 +43,8 @@ from colonnade.registers.target_view import TargetView
 from colonnade.registers.view_file import view_file
 from colonnade.registers.view_room import WINDOW_NEAR, WINDOW_SHADOW, WINDOW_WORD
 from colonnade.scene.model import Background, Light, MeshSource, Scene, Transform
-from colonnade.scene.object_pose import Pose
-from colonnade.scene.view import Gather, View, make_view, place
+from colonnade.scene.object_pose import Placed, Pose
+from colonnade.scene.view import Gather, View, make_view, world_view
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 
@@ -103,9 +103,9 @@ class Room:
             background=Background(room=ROOMS / name),
         )
         size = (WIDTH, HEIGHT)
-        placed = place(scene, self.header.extent, *size, self.environment)
+        placed = world_view(Placed(scene, self.header.extent, self.environment), *size)
         registers = frame_registers(scene, self.header, self.manifest, *size, self.maps, relit=False)
-        self.view = make_view(scene, self.header.extent, *size, self.header.materials, self.environment)
+        self.view = make_view(Placed(scene, self.header.extent, self.environment), *size, self.header.materials)
         self.file = view_file(placed, registers, size, self.header, self.manifest, self.maps)
 
     @property

@@ -30,6 +30,7 @@ from colonnade.registers.frame import frame_registers
 from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view, with_overrides
 from colonnade.scene_image.packer import pack
 
@@ -192,7 +193,7 @@ def test_the_reference_interpolates_between_the_corners(weights: list[float], se
     colours[0] = random.random((3, 3))
     materials = (MeshMaterial(albedo=(0.5, 0.5, 1.0), has_corner_colours=True), MeshMaterial(albedo=(0.1, 0.2, 0.3)))
     mesh = replace(mesh, materials=materials, face_materials=np.array([0, 1], np.uint8), corner_colours=colours)
-    view = make_view(Scene(MeshSource(name="square")), mesh.extent, 8, 8, mesh.materials)
+    view = make_view(Placed(Scene(MeshSource(name="square")), mesh.extent), 8, 8, mesh.materials)
     origins = mix @ mesh.vertices[mesh.faces] + (0.0, 0.0, 1.0)
     points = PlacedObject(mesh, view).points(np.array([0, 1]), origins, np.array([[0.0, 0.0, -1.0]] * 2))
     np.testing.assert_allclose(points.albedo[0], mix @ colours[0] * (0.5, 0.5, 1.0), atol=1e-9)
@@ -203,7 +204,7 @@ def quality(mesh: Mesh, manifest: Manifest, material: Material) -> float:
     """PSNR of the model's frame against the reference's, which knows all colours."""
     camera = Camera(position=(1.5, 1.2, 3.4), target=(0.0, 0.0, 0.0), fov=38.0)
     scene = Scene(MeshSource(name="cube"), camera=camera, light=Light(), background=SKY, material=material)
-    truth = make_view(scene, mesh.extent, *SIZE, mesh.materials)
+    truth = make_view(Placed(scene, mesh.extent), *SIZE, mesh.materials)
     device = render_model(scene, mesh, manifest, SIZE)
     return psnr(encode_srgb(render_reference(mesh, truth).image), encode_srgb(device.image))
 

@@ -16,6 +16,7 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
 from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, MeshSource, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view
 
 SIZE = (320, 240)
@@ -89,7 +90,7 @@ def frame_quality(mesh: Mesh, truth: Mesh) -> float:
     camera = Camera(position=(2.2, 2.2, 4.2), target=(0.0, -0.3, 0.0), fov=35.0)
     light = Light(offset=(0.2, 0.5, 0.1))
     scene = Scene(MeshSource(name="cube"), camera=camera, light=light, background=Background((0.25, 0.45, 0.7)))
-    view = make_view(scene, truth.extent, *SIZE, truth.materials)
+    view = make_view(Placed(scene, truth.extent), *SIZE, truth.materials)
     device = render_model(scene, mesh, manifest_for("small").manifest, SIZE)
     return psnr(encode_srgb(render_reference(truth, view).image), encode_srgb(device.image))
 

@@ -18,6 +18,7 @@ from colonnade.reference.render import render_reference
 from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, MeshSource, Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, with_materials
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view
 
 SIZE = (160, 120)
@@ -53,7 +54,7 @@ def lamp() -> Mesh:
 @pytest.mark.parametrize("config", ["16b16s32d", "32b32s64d"])
 def test_the_device_shows_the_emission_of_the_reference(config: str) -> None:
     mesh = lamp()
-    view = make_view(SCENE, mesh.extent, *SIZE, mesh.materials)
+    view = make_view(Placed(SCENE, mesh.extent), *SIZE, mesh.materials)
     truth = encode_srgb(render_reference(mesh, view).image)
     found, dark = (
         psnr(truth, encode_srgb(render_model(SCENE, mesh, manifest_for(config, options).manifest, SIZE).image))

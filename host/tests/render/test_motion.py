@@ -24,7 +24,7 @@ from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.model import MeshSource, Motion, Scene
-from colonnade.scene.object_pose import object_pose, rotation_about
+from colonnade.scene.object_pose import Placed, rotation_about
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import make_view
 
@@ -107,7 +107,7 @@ def test_an_object_turns_by_itself_only_where_nothing_else_moves(folder: Path, t
 
     def rotations(motion: str) -> list[NDArray[np.float64]]:
         scene = load_scene(scene_file(folder, text, motion))
-        return [object_pose(scene.at(share), extent, room if text != ALONE else None).rotation for share in (0.0, 0.3)]
+        return [Placed(scene.at(share), extent, room if text != ALONE else None).pose.rotation for share in (0.0, 0.3)]
 
     np.testing.assert_array_equal(*rotations(motion))
     for turning in ("", "motion.shutter = 0.5\n", f"motion.turn = 360.0\n{motion}"):
@@ -146,7 +146,7 @@ def test_a_turned_object_keeps_its_middle_and_its_vertical(
     text = ALONE + f"camera.up = {list(up)}\ntransform = {{rotate = [10.0, 20.0, 30.0], scale = 2.0}}\n"
     file = scene_file(tmp_path_factory.getbasetemp(), text, f"[motion]\nturn = {degrees}\n")
     scene, extent = load_scene(file), load_mesh("teapot:2").extent
-    start, turned = object_pose(scene, extent, None), object_pose(scene.at(share), extent, None)
+    start, turned = Placed(scene, extent).pose, Placed(scene.at(share), extent).pose
     np.testing.assert_allclose(turned.to_world(extent.centre), start.to_world(extent.centre), atol=1e-9)
     rotation = rotation_about(up, degrees * share)
     np.testing.assert_allclose(turned.rotation, rotation @ start.rotation, atol=1e-12)
@@ -158,8 +158,8 @@ def test_camera_and_lights_stay_where_they_are(folder: Path) -> None:
     """A framing camera and a light near the object do not follow its motion."""
     motion = "[motion]\ntranslate = [3.0, 0.0, 1.0]\nturn = 45.0\n"
     scene, mesh = load_scene(scene_file(folder, 'mesh.name = "teapot:2"\n', motion)), load_mesh("teapot:2")
-    start, end = (make_view(scene.at(share), mesh.extent, *SIZE) for share in (0.0, 1.0))
-    poses = [object_pose(scene.at(share), mesh.extent, None) for share in (0.0, 1.0)]
+    start, end = (make_view(Placed(scene.at(share), mesh.extent), *SIZE) for share in (0.0, 1.0))
+    poses = [Placed(scene.at(share), mesh.extent).pose for share in (0.0, 1.0)]
     np.testing.assert_allclose(poses[0].to_world(start.origin), poses[1].to_world(end.origin), atol=1e-9)
     np.testing.assert_allclose(poses[0].to_world(start.light), poses[1].to_world(end.light), atol=1e-9)
     assert not np.allclose(start.origin, end.origin)
@@ -182,7 +182,7 @@ def test_an_invalid_motion_is_one_line(folder: Path, text: str, motion: str, mes
     file = scene_file(folder, text, motion)
     environment = load_environment(folder / "rooms" / "attic") if "rooms/attic" in text else None
     with pytest.raises(UserError, match=message):
-        object_pose(load_scene(file), load_mesh("teapot:2").extent, environment)
+        _ = Placed(load_scene(file), load_mesh("teapot:2").extent, environment).pose
 
 
 def run(*arguments: object) -> Result:

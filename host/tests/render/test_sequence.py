@@ -40,7 +40,7 @@ from colonnade.render.host_frame import HostFrame
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.scene.model import Transform
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
 
 SIZE, VIEWS, STEP, NOISE = (96, 72), 3, 0.2, 0.004
@@ -104,7 +104,7 @@ def test_a_frame_is_the_still_of_its_room_with_the_object_in_the_world(
     rooms = [load_environment(folder / str(number)) for number in range(VIEWS)]
     first = DeviceScene.of(load_scene(folder / "albedo.toml", folder), manifest, room=rooms[0], encoder="live").scene
     mesh = load_mesh("teapot:3")
-    pose = object_pose(first, mesh.extent, rooms[0])
+    pose = Placed(first, mesh.extent, rooms[0]).pose
     x, y, z = pose.translate
     centre, edge = pose.to_world(mesh.extent.centre), mesh.extent.edge * pose.scale
     axes = rooms[0].camera_to_world[:, :3] * [1, -1, -1]
@@ -135,7 +135,7 @@ def test_the_object_stays_where_it_is_while_the_camera_moves(folder: Path, frame
         encoder="live",
     ).scene
     extent = load_mesh("teapot:3").extent
-    centre = object_pose(scene, extent, sequence.room(0)).to_world(extent.centre)
+    centre = Placed(scene, extent, sequence.room(0)).pose.to_world(extent.centre)
     places = []
     for camera, frame in zip(sequence.cameras, frames, strict=True):
         seen = (centre - camera.to_world[:, 3]) @ camera.to_world[:, :3]
@@ -162,7 +162,7 @@ def test_an_object_and_a_light_move_while_the_camera_does(
     sequence, extent = load_sequence(folder / "sequence.toml"), load_mesh("teapot:3").extent
     scene, room = load_scene(folder / "moved.toml", folder), sequence.room(0)
     for share, camera, frame, result in zip((0.0, 0.5, 1.0), sequence.cameras, seen, found, strict=True):
-        pose = object_pose(scene.at(share), extent, room)
+        pose = Placed(scene.at(share), extent, room).pose
         centre = (pose.to_world(extent.centre) - camera.to_world[:, 3]) @ camera.to_world[:, :3]
         expected = centre[:2] / centre[2] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
         rows, columns = np.nonzero(result.object_mask)
@@ -254,7 +254,7 @@ def test_a_camera_of_a_capture_has_any_pose_and_lens(folder: Path) -> None:
         encoder="live",
     )
     view = prepared.seen_by(camera, None).view(SIZE)
-    pose = object_pose(prepared.scene, prepared.image.header.extent, sequence.room(0))
+    pose = Placed(prepared.scene, prepared.image.header.extent, sequence.room(0)).pose
     np.testing.assert_allclose(view.origin, pose.to_mesh(camera.to_world[:, 3]), atol=1e-9)
     x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
     rays = view.direction + x[..., None] * view.step_x + y[..., None] * view.step_y

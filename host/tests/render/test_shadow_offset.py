@@ -14,6 +14,7 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
 from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Camera, Light, MeshSource, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view
 
 SIZE = (320, 240)
@@ -37,7 +38,7 @@ def quality(mesh: Mesh, precision: str, offset: float | None = None) -> float:
     camera = Camera(position=(0.25, 0.35, 0.6), target=(0.0, 0.08, 0.0), fov=40.0)
     scene = Scene(MeshSource(name="cube"), camera=camera, light=light)
     device = render_model(scene, mesh, manifest_for(precision, ("columnBvhMemory.depth=131072",)).manifest, SIZE)
-    reference = render_reference(mesh, make_view(scene, mesh.extent, *SIZE, mesh.materials))
+    reference = render_reference(mesh, make_view(Placed(scene, mesh.extent), *SIZE, mesh.materials))
     return psnr(encode_srgb(reference.image), encode_srgb(device.image))
 
 

@@ -22,6 +22,7 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
 from colonnade.render.device_frames import render_model
 from colonnade.scene.model import Background, Camera, Light, Material, MeshSource, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view
 
 SIZE = (320, 240)
@@ -87,7 +88,7 @@ def duck(folder: Path) -> Path:
 def reference(painting: int, kind: Kind) -> np.ndarray:
     """The reference's frame of a sphere."""
     mesh = sphere(painting)
-    view = make_view(replace(SCENE, material=Material(kind=kind)), mesh.extent, *SIZE, mesh.materials)
+    view = make_view(Placed(replace(SCENE, material=Material(kind=kind)), mesh.extent), *SIZE, mesh.materials)
     return encode_srgb(render_reference(mesh, view).image)
 
 
@@ -123,7 +124,7 @@ def test_more_bytes_keep_more_of_a_texture() -> None:
 def test_a_duck_shows_its_coat(tmp_path: Path) -> None:
     mesh = load_mesh(duck(tmp_path))
     assert mesh.textures[0].size == (1024, 1024)
-    view = make_view(SCENE, mesh.extent, *SIZE, mesh.materials)
+    view = make_view(Placed(SCENE, mesh.extent), *SIZE, mesh.materials)
     expected = encode_srgb(render_reference(mesh, view).image)
     found = psnr(expected, device_frame(mesh, "32b32s64d", settings(16384), Material()))
     print(f"duck, a picture of 3,145,728 bytes in 16,384: {found:.1f} dB")

@@ -22,7 +22,7 @@ from colonnade.quality.image_metrics import psnr
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
 
 SIZE = (96, 72)
@@ -104,7 +104,7 @@ def test_a_light_anywhere(folder: Path, place: str, kind: str) -> None:
     mesh, environment = load_mesh("teapot:4"), load_environment(folder / "attic")
     where: Callable[..., np.ndarray] = LIGHTS[place]
     position = where(
-        object_pose(load_scene(folder / "scene.toml"), mesh.extent, environment), mesh, environment
+        Placed(load_scene(folder / "scene.toml"), mesh.extent, environment).pose, mesh, environment
     ).tolist()
     text = STANDING + f'light = {{position = {position}, falloff = 0.5}}\nmaterial.kind = "{kind}"\n'
     model, reference = both(folder, text)

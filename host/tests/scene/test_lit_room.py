@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
+import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
 
 import numpy as np
 import pytest
@@ -28,9 +31,9 @@ from colonnade.render.composite import composited
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
-from colonnade.scene.lit_room import lit_room
+from colonnade.scene.lit_room import LitRoom, lit_room
 from colonnade.scene.model import Background, Colour, Light, MeshSource, Paths, Scene
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import Placed, object_pose
 from colonnade.scene.parser import load_scene
 
 SIZE = (96, 72)
@@ -80,7 +83,7 @@ def test_found_lights_cast_no_shadow_where_the_photo_has_one(folder: Path) -> No
     room = load_environment(folder / "attic")
     extent, scene = load_mesh("teapot:4").extent, Scene(MeshSource("teapot:4"), background=Background(room=folder))
     strengths = [
-        lit_room(replace(scene, names_light=names), one, extent, 2, relit).strength
+        lit_room(Placed(replace(scene, names_light=names), extent, one), 2, relit).strength
         for names, one, relit in (
             (True, room, False),
             (False, replace(room, has_albedo=False), False),
@@ -123,14 +126,16 @@ def test_a_photo_that_is_too_bright_for_the_lights_of_a_scene_is_noted(folder: P
     dim = replace(load_scene(folder / "scene.toml"), ambient=Colour((0.001,) * 3), light=Light(colour=(0.001,) * 3))
     for scene in (replace(dim, paths=Paths(gather=1)), replace(dim, names_light=False), dim):
         assert not any("too dark" in line for line in told)
-        lit_room(scene, room, extent, 1, False)
+        lit_room(Placed(scene, extent, room), 1, False)
     assert any("too dark under the scene's lights" in line and "raise ambient.colour" in line for line in told)
 
 
 def test_what_a_room_lacks_is_noted(folder: Path, told: list[str]) -> None:
     room = replace(load_environment(folder / "dark"), notes=("its depth is estimated", "its albedo is derived"))
     lit_room(
-        Scene(MeshSource("cube"), background=Background(room=folder / "dark")), room, load_mesh("cube").extent, 1, False
+        Placed(Scene(MeshSource("cube"), background=Background(room=folder / "dark")), load_mesh("cube").extent, room),
+        1,
+        False,
     )
     notes.flush()
     assert told == ["room dark: its depth is estimated; its albedo is derived"]
@@ -241,16 +246,16 @@ def test_fitted_lights_have_an_area_that_mirrors_do_not_see(folder: Path) -> Non
     """Only where light is gathered: other frames have one sample, or the lights of `colonnade light`."""
     room, extent = load_environment(folder / "attic"), load_mesh("teapot:4").extent
     scene = Scene(MeshSource("teapot:4"), background=Background(room=folder), names_light=False)
-    hard = lit_room(scene, room, extent, 2, False).scene
+    hard = lit_room(Placed(scene, extent, room), 2, False).scene
     assert [light.radius for light in hard.lights] == [0.0] * len(hard.lights) and not hard.fits_lights
-    soft = lit_room(replace(scene, paths=Paths(gather=1)), room, extent, 2, False).scene
-    middle = object_pose(soft, extent, room).to_world(extent.centre)
+    soft = lit_room(Placed(replace(scene, paths=Paths(gather=1)), extent, room), 2, False).scene
+    middle = Placed(soft, extent, room).pose.to_world(extent.centre)
     for light in soft.lights:
         assert light.position is not None
         assert light.radius == pytest.approx(0.2 * np.linalg.norm(np.array(light.position) - middle), abs=1e-3)
     assert soft.blurs == [], "no key of the scene asks for several samples"
     for known, marks in ((soft, False), (replace(soft, fits_lights=False), True)):
-        cube = scene_cube(known, extent, room, None, False)
+        cube = scene_cube(LitRoom(Placed(known, extent, room)), None, False)
         assert cube is not None and cube.lights is not None and cube.lights.any() == marks
 
 
@@ -273,3 +278,29 @@ def test_a_second_view_needs_a_room_a_photo_and_gathered_light(folder: Path, tol
         frame(folder, MIRROR + LAMP + 'background.second_view = "dark"\n')
     frame(folder, MIRROR + LAMP + UNGATHERED + 'background.second_view = "attic"\n')
     assert "has no effect: the scene gathers no light" in told[-1]
+
+
+def entries(run: Callable[[], object]) -> list[float]:
+    """The progress along the motion at each entry of `object_pose`."""
+    found: list[float] = []
+
+    def profile(frame: FrameType, event: str, _: object) -> None:
+        if event == "call" and frame.f_code is object_pose.__code__:
+            found.append(frame.f_locals["placed"].scene.motion_progress)
+
+    before = sys.getprofile()
+    sys.setprofile(profile)
+    try:
+        run()
+    finally:
+        sys.setprofile(before)
+    return found
+
+
+@pytest.mark.parametrize("gather", [0, 1])
+def test_the_pose_of_a_moment_is_computed_once(folder: Path, gather: int) -> None:
+    """From the fit of lights to the registers of all passes."""
+    moves = f"paths.gather = {gather}\nmotion = {{stand_at = [44, 46], turn = 40.0}}\n"
+    (folder / "scene.toml").write_text(MIRROR + moves)
+    request = RenderRequest(folder / "scene.toml", "small", SMALL_MAPS, "model", SIZE, samples=4, frames=2)
+    assert entries(lambda: list(render_frames(replace(request, encoder="live")))) == [0.0, 1.0]

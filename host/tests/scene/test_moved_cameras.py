@@ -15,8 +15,9 @@ from colonnade.environment.load import load_environment
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.cameras import WorldCamera, environment_camera
 from colonnade.scene.model import Camera, CameraKey, MeshSource, Motion, Scene, Vector
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
-from colonnade.scene.view import place
+from colonnade.scene.view import world_view
 
 SIZE = (96, 72)
 EXTENT = load_mesh("teapot:4").extent
@@ -34,7 +35,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def camera(scene: Scene, progress: float, room: Path | None = None) -> WorldCamera:
     environment = None if room is None else load_environment(room)
-    return place(scene.at(progress), EXTENT, *SIZE, environment).camera
+    return world_view(Placed(scene.at(progress), EXTENT, environment), *SIZE).camera
 
 
 def vector(values: Floats) -> Vector:
@@ -89,7 +90,7 @@ def test_a_moving_camera_is_no_closed_motion() -> None:
 
 
 def test_lights_beside_the_object_stay_while_the_camera_moves() -> None:
-    first, last = (place(MOVING.at(progress), EXTENT, *SIZE).lights[0].position for progress in (0.0, 1.0))
+    first, last = (world_view(Placed(MOVING.at(progress), EXTENT), *SIZE).lights[0].position for progress in (0.0, 1.0))
     np.testing.assert_array_equal(first, last)
 
 

@@ -24,7 +24,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.scene.joined_mesh import joined_mesh
 from colonnade.scene.model import Material, MeshSource, Motion, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene.object_mesh import object_mesh
-from colonnade.scene.object_pose import object_pose, rotation_about, rotation_matrix
+from colonnade.scene.object_pose import Placed, rotation_about, rotation_matrix
 from colonnade.scene.parser import load_scene
 from colonnade.scene.standing import Footprint, free_place, surface_point
 
@@ -74,7 +74,7 @@ def test_clips_of_objects_play_where_they_are_placed(tmp_path: Path) -> None:
     assert scene.is_animated and joined.clip is not None and own.clip is not None
     assert joined.clip.duration == own.clip.duration
     parts = np.split(np.arange(len(joined.clip.positions)), np.cumsum([len(own.clip.positions), len(cube.vertices)]))
-    turned = object_pose(Scene(moving, transform=place), own.extent, None)
+    turned = Placed(Scene(moving, transform=place), own.extent).pose
     for time in (0.0, 0.4 * own.clip.duration, own.clip.duration):
         pose, alone = joined.clip.pose(time), own.clip.pose(time)
         found = joined.clip.vertices(pose.matrices, pose.weights)
@@ -95,7 +95,7 @@ def test_an_object_moves_by_itself_about_its_centre() -> None:
     scene = objects(SceneObject(mesh=MeshSource("cube"), transform=place, motion=keys), sphere)
     joined, cube = joined_mesh(scene, None), load_mesh("cube")
     assert scene.is_animated and not scene.is_still and joined.clip is not None
-    start = object_pose(Scene(MeshSource("cube"), transform=place), cube.extent, None)
+    start = Placed(Scene(MeshSource("cube"), transform=place), cube.extent).pose
     for progress, turn, lean, shift in ((0.0, 0, 0, (0, 0)), (0.25, 45, 0, (0.5, 0)), (0.75, 225, 15, (0.5, 0.25))):
         pose = joined.clip.pose(progress * joined.clip.duration)
         found = joined.clip.vertices(pose.matrices, pose.weights)
@@ -193,9 +193,9 @@ def test_objects_turn_about_their_common_centre_if_asked(tmp_path: Path) -> None
     extent = joined_mesh(still, None).extent
     assert still.motion.is_still and not turning.motion.is_still
     points = extent.centre + np.array([[0.0, 0, 0], [0, 2, 0], [1, 0, 0]])
-    np.testing.assert_allclose(object_pose(still.at(1.0), extent, None).to_world(points), points)
+    np.testing.assert_allclose(Placed(still.at(1.0), extent).pose.to_world(points), points)
     turned = extent.centre + np.array([[0.0, 0, 0], [0, 2, 0], [0, 0, -1]])
-    np.testing.assert_allclose(object_pose(turning.at(1.0), extent, None).to_world(points), turned, atol=1e-12)
+    np.testing.assert_allclose(Placed(turning.at(1.0), extent).pose.to_world(points), turned, atol=1e-12)
 
 
 def test_objects_without_a_place_stand_apart_on_level_surfaces(room: Environment) -> None:

@@ -16,7 +16,7 @@ from colonnade.common.types import Floats
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import MARKS, MeshMaterial
 from colonnade.scene.model import Camera, Light, MeshSource, Motion, Paths, PointLight, Scene
-from colonnade.scene.object_pose import object_pose
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import frame_passes, light_shares, of_a_device
 from colonnade.scene.samples import CENTRE, PERIOD, Sample, disc_point, samples_of_frame, square_points
@@ -84,7 +84,7 @@ def test_discs_are_squares_of_equal_area(x: float, y: float) -> None:
 
 
 def view_of(scene: Scene, sample: Sample) -> View:
-    return make_view(replace(scene, sample=sample), EXTENT, *SIZE)
+    return make_view(Placed(replace(scene, sample=sample), EXTENT), *SIZE)
 
 
 def direction(view: View, x: float, y: float) -> Floats:
@@ -113,7 +113,7 @@ def test_rays_through_the_lens_meet_in_the_plane_in_focus(focus: float | None) -
 @pytest.mark.parametrize("light", [Light(radius=0.5), Light(position=(3.0, 8.0, 1.0), radius=0.5)])
 def test_an_area_light_is_a_disc_that_faces_the_object(light: Light) -> None:
     scene = replace(TEAPOT, light=light)
-    middle, pose = view_of(scene, CENTRE).light, object_pose(scene, EXTENT, None)
+    middle, pose = view_of(scene, CENTRE).light, Placed(scene, EXTENT).pose
     np.testing.assert_allclose(middle, view_of(replace(TEAPOT, light=replace(light, radius=0.0)), CENTRE).light)
     for sample in samples_of_frame(16, 1):
         offset = (view_of(scene, sample).light - middle) * pose.scale
@@ -164,7 +164,7 @@ def test_other_layers_have_a_pass_after_four_of_surfaces(samples: int, kinds: st
 @pytest.mark.parametrize(("falloff", "distance"), [(0.0, 3.0), (2.0, 3.0), (2.0, 0.4)])
 def test_highlights_are_of_the_light_that_marks_do_not_show(falloff: float, distance: float) -> None:
     """Which is that of a disc with the radiance 1 of the device, or of all of the mark's in glass."""
-    x, y, z = object_pose(TEAPOT, EXTENT, None).to_world(EXTENT.centre)
+    x, y, z = Placed(TEAPOT, EXTENT).pose.to_world(EXTENT.centre)
     light = Light(colour=(2.0, 0.05, 0.0), position=(x, y + distance, z), radius=0.3, falloff=falloff or None)
     scene = replace(TEAPOT, light=light, exposure=0.5)
     scene = replace(scene, paths=Paths(gather=1))
@@ -244,13 +244,13 @@ def test_a_scene_has_the_lights_that_were_found_in_the_mean_of_its_passes() -> N
     colours = ((0.9, 0.8, 0.7), (0.3, 0.3, 0.4), (0.1, 0.2, 0.1))
     first, *more = (PointLight((float(index), 3.0, 0.0), colour=own) for index, own in enumerate(colours))
     scene = replace(TEAPOT, light=Light(first.position, colour=first.colour), more_lights=tuple(more))
-    every = make_view(scene, EXTENT, *SIZE).lights
+    every = make_view(Placed(scene, EXTENT), *SIZE).lights
     assert len(every) == 3
     shared = replace(scene, pass_lights=2).with_samples(8)
-    assert len(make_view(shared, EXTENT, *SIZE).lights) == 2, "a frame of one pass has the brightest"
+    assert len(make_view(Placed(shared, EXTENT), *SIZE).lights) == 2, "a frame of one pass has the brightest"
     sums = np.zeros((3, 3))
     for one in frame_passes(shared):
-        view = make_view(one, EXTENT, *SIZE)
+        view = make_view(Placed(one, EXTENT), *SIZE)
         assert len(view.lights) == 2
         for light in view.lights:
             sums += [light.colour * np.allclose(light.position, other.position) for other in every]

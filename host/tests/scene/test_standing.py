@@ -15,7 +15,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.reference.embree import RayTracer
 from colonnade.reference.render import primary_directions
 from colonnade.scene.model import Background, MeshSource, Placement, Scene
-from colonnade.scene.object_pose import with_free_placement
+from colonnade.scene.object_pose import Placed, with_free_placement
 from colonnade.scene.view import make_view
 
 ROOMS = Path(__file__).parents[3] / "scenes" / "rooms"
@@ -37,8 +37,8 @@ def test_the_chosen_place_shows_the_object_whole_and_not_tiny(name: str, size: f
     """Nothing of the room stands before it; it has a share of the picture, and a margin to its edge."""
     room, mesh = room_of(name), load_mesh("teapot:3")
     scene = Scene(MeshSource("teapot:3"), placement=Placement(size=size), background=Background(room=ROOMS))
-    scene = with_free_placement(scene, mesh.extent, room)
-    view = make_view(scene, mesh.extent, room.width, room.height, mesh.materials, room)
+    scene = with_free_placement(Placed(scene, mesh.extent, room)).scene
+    view = make_view(Placed(scene, mesh.extent, room), room.width, room.height, mesh.materials)
     directions = primary_directions(view, slice(0, view.height)).reshape(-1, 3)
     origins = np.broadcast_to(view.origin, directions.shape)
     tracer = RayTracer(mesh)

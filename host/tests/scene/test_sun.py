@@ -17,6 +17,7 @@ from colonnade.environment.panorama_lights import DistantLight
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.lit_room import photo_strength
 from colonnade.scene.model import Background, MeshSource, Scene, Transform
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.sun import sun_alone, with_sun
 
 ROOM, UP = yard(), np.array([0.0, 1.0, 0.0])
@@ -33,7 +34,7 @@ def scene(x: float) -> Scene:
 
 @pytest.mark.parametrize(("x", "share"), [(1.7, 1.0), (0.0, 0.0)])
 def test_a_panorama_in_the_shade_has_the_sun_overhead(x: float, share: float, told: list[str]) -> None:
-    (sun,) = with_sun([], Panorama(np.full((8, 16, 3), 1.0) * SHADE), scene(x), EXTENT, ROOM)
+    (sun,) = with_sun([], Panorama(np.full((8, 16, 3), 1.0) * SHADE), Placed(scene(x), EXTENT, ROOM))
     np.testing.assert_array_equal(sun.direction, UP)
     np.testing.assert_allclose(sun.colour, share * SUN, rtol=0.15)
     assert sun.is_far
@@ -46,7 +47,7 @@ def test_a_panorama_in_the_sun_tells_its_direction() -> None:
     high = DistantLight(np.array([0.6, 0.8, 0.0]), 9 * SUN, 0.01)
     low = DistantLight(np.array([1.0, 0.0, 0.0]), SUN, 0.1)
     shade = Panorama(np.full((8, 16, 3), 1.0) * SHADE)
-    sun, other = with_sun([low, high], shade, scene(1.7), EXTENT, ROOM)
+    sun, other = with_sun([low, high], shade, Placed(scene(1.7), EXTENT, ROOM))
     np.testing.assert_array_equal(sun.direction, high.direction)
     np.testing.assert_allclose(sun.colour, SUN / 0.8, rtol=0.15)
     assert other is low
@@ -54,20 +55,22 @@ def test_a_panorama_in_the_sun_tells_its_direction() -> None:
 
 def test_a_photo_alone_has_sun_and_shade() -> None:
     for x, share in ((1.7, 1.0), (0.0, 0.0)):
-        found = sun_alone(scene(x), EXTENT, ROOM)
+        found = sun_alone(Placed(scene(x), EXTENT, ROOM))
         assert found is not None
         (sun,) = found.lights
         np.testing.assert_allclose(sun.colour, share * SUN / SHADE * found.ambient, atol=0.15)
         assert sun.falloff is None and sun.position[1] > 10
-    assert sun_alone(scene(0.0), EXTENT, yard(has_shadows=False)) is None
+    assert sun_alone(Placed(scene(0.0), EXTENT, yard(has_shadows=False))) is None
 
 
 def test_an_object_takes_no_sun_away_in_the_shade() -> None:
     found = replace(scene(0.0), names_light=False)
     room = replace(ROOM, has_albedo=False)
-    strength = photo_strength(found, room, EXTENT, relit=False)
+    strength = photo_strength(Placed(found, EXTENT, room), relit=False)
     assert strength is not None
     x, is_ground = world_surface(room)[0][..., 0], room.depth < WALL
     assert strength[is_ground & (np.abs(x) > 1.3)].min() == WHOLE
     assert strength[is_ground & (np.abs(x) < 0.7)].max() < WHOLE / 2
-    assert photo_strength(found, replace(yard(has_shadows=False), has_albedo=False), EXTENT, relit=False) is None
+    assert (
+        photo_strength(Placed(found, EXTENT, replace(yard(has_shadows=False), has_albedo=False)), relit=False) is None
+    )

@@ -13,6 +13,7 @@ from colonnade.maps.encoded import EncodedEnvironment
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import registers_of
 from colonnade.scene.model import Camera, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.room_lights import as_vector
 from colonnade.scene.standing import surface_point
 from colonnade.scene.view import make_view
@@ -68,7 +69,7 @@ def room_frames(
             scene = placed_scene(mesh_name, material, environment, PLACEMENTS[room])
             if moved:
                 scene = replace(scene, camera=moved_camera(scene, environment))
-            view = make_view(scene, mesh.extent, width, height, mesh.materials, environment)
+            view = make_view(Placed(scene, mesh.extent, environment), width, height, mesh.materials)
             packed = with_environment(pack(mesh, manifest, view.materials), encoded, manifest)
             registers = registers_of(view, packed.header, manifest, encoded)
             for share in ROWS if moved else (1.0,):

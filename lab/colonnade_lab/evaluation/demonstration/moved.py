@@ -25,8 +25,9 @@ from colonnade.render.host_frame import HostFrame
 from colonnade.render.passes import model_passes
 from colonnade.render.sequence_frames import sequence_scenes
 from colonnade.scene.model import Camera, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.passes import exposed
-from colonnade.scene.view import place
+from colonnade.scene.view import world_view
 from colonnade.scene_image.device_image import load_cycles
 from numpy.typing import NDArray
 
@@ -64,7 +65,7 @@ def cameras(scene: Scene, size: tuple[int, int], frames: int) -> list[Environmen
     """The cameras of the frames of a scene whose camera has a position, for maps of a size."""
     extent, found = load_mesh("cube").extent, []
     for share in scene.frame_progress(frames):
-        camera = place(scene.at(share), extent, *size).camera
+        camera = world_view(Placed(scene.at(share), extent), *size).camera
         right, up, back = camera.axes
         fx, fy = (1 / float(np.linalg.norm(step)) for step in (camera.step_x, camera.step_y))
         pose = np.column_stack([right, -up, -back, camera.position])
@@ -99,7 +100,7 @@ def run(
             pose, begun = prepared.scene.at(share), time.perf_counter()
             prepared.image.posed(share)
             refit_ms = 1e3 * (time.perf_counter() - begun)
-            posed = replace(prepared.lit_at(pose), scene=pose)
+            posed = prepared.lit_at(pose).with_scene(pose)
             passes = tuple(posed.passes(pose, scene.opening(frames), number))
             look = CameraLook.of(pose, posed.photo, size)
             frame = HostFrame(posed, size, passes, denoise="atrous", look=look, number=number, history=history)

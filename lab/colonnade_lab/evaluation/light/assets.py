@@ -23,6 +23,7 @@ from colonnade.mesh.files.catalog import VARIABLE
 from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import make_view
 from numpy.typing import NDArray
@@ -113,7 +114,7 @@ def write_jobs(folder: Path, files: list[Path]) -> None:
         lines += ["[background]", f"colour = {list(_AROUND)}", "[paths]", "gather = 1"]
         lines += ["[frame]", f"width = {SIZE[0]}", f"height = {SIZE[1]}", f"samples = {SAMPLES}"]
         scene.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        view = make_view(load_scene(scene), extent, *SIZE)
+        view = make_view(Placed(load_scene(scene), extent), *SIZE)
         plan: dict[str, Any] = {"size": SIZE, "around": _AROUND, "lamp": _LAMP, "falloff": falloff, "parts": []}
         for key in ("origin", "direction", "step_x", "step_y", "light"):
             plan[key] = getattr(view, key).tolist()

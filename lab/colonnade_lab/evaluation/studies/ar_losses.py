@@ -172,6 +172,7 @@ def study_frames(
     from colonnade.maps.layout import AttributeLayout
     from colonnade.mesh.load import load_mesh
     from colonnade.reference.environment.decoded import float_plane_march
+    from colonnade.scene.object_pose import Placed
     from colonnade.scene.view import make_view
 
     by_frame = {}
@@ -186,7 +187,9 @@ def study_frames(
         for name, (mesh_name, material) in OBJECTS.items():
             mesh = meshes[mesh_name]
             scene = placed_scene(mesh_name, material, environment, PLACEMENTS.get(environment.name, Placement()))
-            view = make_view(scene, mesh.extent, environment.width, environment.height, mesh.materials, environment)
+            view = make_view(
+                Placed(scene, mesh.extent, environment), environment.width, environment.height, mesh.materials
+            )
             device = device_frame(mesh, view, EncodedEnvironment(environment, image), manifest)
             measured = losses(mesh, view, environment, image, march, device, with_dists, progress)
             by_frame[f"{environment.name}: {name}"] = measured.by_loss

@@ -21,6 +21,7 @@ from colonnade.design.toolchain import project_root, require_program
 from colonnade.reference.embree import RayTracer
 from colonnade.reference.render import primary_directions
 from colonnade.scene.object_mesh import object_mesh
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
 from colonnade.scene.view import make_view
 
@@ -73,7 +74,7 @@ def study_mesh(name: str, progress: Progress = QUIET) -> dict[str, CpuBaseline]:
     """
     scene = load_scene(project_root() / "scenes" / "object.toml").with_mesh(name)
     mesh = object_mesh(scene)
-    view = make_view(scene, mesh.extent, *SIZE, mesh.materials)
+    view = make_view(Placed(scene, mesh.extent), *SIZE, mesh.materials)
     directions = primary_directions(view, slice(0, view.height))
     origins = np.broadcast_to(view.origin, directions.shape)
     in_box = int(RayTracer(mesh).enters_box(origins, directions)[0].sum())

@@ -131,6 +131,7 @@ def measure(
     from colonnade.maps.layout import AttributeLayout
     from colonnade.registers.frame import registers_of
     from colonnade.render.composite import composited
+    from colonnade.scene.object_pose import Placed
     from colonnade.scene.view import make_view
     from colonnade.scene_image.environment import with_environment
     from colonnade.scene_image.packer import pack
@@ -141,7 +142,7 @@ def measure(
     hardware = f"physicalAttributeMemory={json.dumps(layout.to_config())}"
     manifest = manifest_for(config, (hardware,), progress).manifest
     scene = standing(case, mesh)
-    view = make_view(scene, mesh.extent, environment.width, environment.height, mesh.materials, environment)
+    view = make_view(Placed(scene, mesh.extent, environment), environment.width, environment.height, mesh.materials)
     packed = with_environment(pack(mesh, manifest, view.materials), encoded, manifest)
     registers = registers_of(view, packed.header, manifest, encoded, relit=False)
     frame = render_model(manifest, packed, registers)

@@ -33,6 +33,7 @@ from colonnade.reference.object import PlacedObject
 from colonnade.reference.render import primary_directions
 from colonnade.scene.lit_room import LitRoom, lit_room, scene_room
 from colonnade.scene.model import Background, Light, Material, MeshSource, Placement, Scene
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.room_lights import lights_of
 from numpy.typing import NDArray
 
@@ -140,7 +141,7 @@ def study_light(
         }
         for choice, (names_light, colours) in choices.items():
             scene = _scene(folder, names_light, colours)
-            room = lit_room(scene, scene_room(scene), mesh.extent, DEFAULT_LIGHTS, False, progress)
+            room = lit_room(Placed(scene, mesh.extent, scene_room(scene)), DEFAULT_LIGHTS, False, progress)
             assert room.environment is not None
             quality, frame = _measure(mesh, room, progress)
             reports[f"{room.environment.name}: {choice}"] = quality
@@ -225,7 +226,7 @@ def _measure(mesh: Mesh, room: LitRoom, progress: Progress) -> tuple[LightQualit
     layout = AttributeLayout(width=environment.width, height=environment.height)
     image = encoded_environment(environment, layout)
     manifest = manifest_for("small", (f"physicalAttributeMemory={json.dumps(layout.to_config())}",), progress).manifest
-    view = make_view(room.scene, mesh.extent, environment.width, environment.height, mesh.materials, environment)
+    view = make_view(room.placed, environment.width, environment.height, mesh.materials)
     sources = backdrops(environment, image, float_plane_march(environment, image))
     references = [
         render_reference(mesh, view, progress, sources[name]).image for name in ("full", "clustering", "both")
@@ -321,7 +322,7 @@ def _relit(room: LitRoom, mesh: Mesh, image: AttributeImage) -> tuple[float, flo
 
     environment = room.environment
     assert environment is not None and environment.photo is not None
-    lights = lights_of(room.scene, mesh.extent, environment)
+    lights = lights_of(room.placed)
     scaled = replace(
         lights,
         ambient=lights.ambient * room.scene.headroom,

@@ -16,6 +16,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import MAX_PSNR
 from colonnade.reference.environment.decoded import BoundingPlanes, decoded_depth, float_plane_march
 from colonnade.scene.model import Material, Placement
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view
 
 from colonnade_lab.evaluation.region_metrics import compare_regions, frame_regions
@@ -37,7 +38,7 @@ def image(environment: Environment) -> AttributeImage:
 def measured(environment: Environment, image: AttributeImage) -> Losses:
     mesh, march = load_mesh("teapot:4"), float_plane_march(environment, image)
     scene = placed_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
-    view = make_view(scene, mesh.extent, 160, 120, mesh.materials, environment)
+    view = make_view(Placed(scene, mesh.extent, environment), 160, 120, mesh.materials)
     first = losses(mesh, view, environment, image, march, with_dists=False)
     device = first.pictures["both"].image
     return losses(mesh, view, environment, image, march, device, with_dists=False)
@@ -91,7 +92,7 @@ def test_the_device_shows_the_reconstructed_room_within_rounding(
     """The rows `fixed point` and `device`, from the model's frame of the same scene."""
     mesh = load_mesh("teapot:4")
     scene = placed_scene("teapot:4", Material("mirror", (0.9, 0.9, 0.9)), environment, Placement((79.5, 71.0), 0.4))
-    view = make_view(scene, mesh.extent, 160, 120, mesh.materials, environment)
+    view = make_view(Placed(scene, mesh.extent, environment), 160, 120, mesh.materials)
     hardware = f"physicalAttributeMemory={json.dumps(image.layout.to_config())}"
     frame = device_frame(
         mesh, view, EncodedEnvironment(environment, image), manifest_for("small", (hardware,)).manifest

@@ -8,6 +8,7 @@ import numpy as np
 from colonnade.mesh.load import load_mesh
 from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.render import render_reference
+from colonnade.scene.object_pose import Placed
 from colonnade.scene.view import make_view
 
 from colonnade_lab.evaluation.studies.furnished_rooms import FURNISHED
@@ -41,7 +42,7 @@ def test_the_reference_hides_what_furniture_hides() -> None:
     case = replace(FURNISHED["chest"], mesh="teapot:4")
     made, mesh = case.room("chest", *SIZE), load_mesh(case.mesh)
     backdrop = full_backdrop(made.environment)
-    view = make_view(standing(case, mesh), mesh.extent, *SIZE, mesh.materials, made.environment)
+    view = make_view(Placed(standing(case, mesh), mesh.extent, made.environment), *SIZE, mesh.materials)
     meets, visible = true_occlusion(mesh, view, made)
     shown = render_reference(mesh, view, backdrop=backdrop).object_mask
     assert (shown == visible)[meets].mean() > 0.99 and not shown[~meets].any()
