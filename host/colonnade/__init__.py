@@ -13,7 +13,7 @@ __all__ = ["Device", "DeviceScene", "ModelDevice", "RenderResult", "Scene", "She
 
 _MODULES = {
     "Device": "device.device",
-    "DeviceScene": "device.scene",
+    "DeviceScene": "scene.prepared.device_scene",
     "ModelDevice": "device.device",
     "RenderResult": "render.result",
     "Scene": "api.scene",

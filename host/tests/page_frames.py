@@ -12,14 +12,14 @@ from playwright.sync_api import Page
 
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.device.gathered_light import with_cube
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.light_cube import LightCube
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import exposed
+from colonnade.scene.prepared.device_scene import DeviceScene
+from colonnade.scene.prepared.gathered_light import with_cube
 from colonnade.scene_image.environment import with_environment
 from colonnade.scene_image.packer import pack
 

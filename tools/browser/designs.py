@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 ROOT = Path(__file__).resolve().parents[2]
 DESIGNS = ("small", "edge", "lean", "tiny")

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from bundle import base64_text
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.light_cube import LightCube
 from colonnade.environment.surround import Surround
 from colonnade.maps.room_light import room_light
@@ -19,6 +18,7 @@ from colonnade.mesh.load import load_mesh
 from colonnade.scene.model import Placement
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import exposed
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene.room_lights import lights_of
 from colonnade.scene.samples import samples_of_frame
 from colonnade.scene.view import world_view

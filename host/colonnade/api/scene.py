@@ -19,7 +19,6 @@ from colonnade.common.limits import MAX_DEPTH
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.config_name import Overrides
 from colonnade.design.generator import manifest_for
-from colonnade.device.scene import DeviceScene
 from colonnade.maps.encoders import Encoder
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.frames import render_frames
@@ -29,6 +28,7 @@ from colonnade.render.room_defaults import tell_without_defaults
 from colonnade.scene import model
 from colonnade.scene.parser import read_tables, scene_file, scene_of
 from colonnade.scene.passes import of_a_device
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 Table = Annotated[Mapping[str, Any], "a dict, as a table of a scene file"]
 Tables = Annotated[Table | Sequence[Table], "a dict or a list of dicts, as tables of a scene file"]

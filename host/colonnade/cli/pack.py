@@ -89,10 +89,10 @@ def pack(
     from colonnade.common.frame_size import parse_size
     from colonnade.common.ledger import declare_output
     from colonnade.design.generator import manifest_for
-    from colonnade.device.scene import DeviceScene
     from colonnade.render.room_defaults import tell_without_defaults
     from colonnade.scene.parser import load_scene
     from colonnade.scene.passes import of_a_device
+    from colonnade.scene.prepared.device_scene import DeviceScene
     from colonnade.scene_image.dram_image import line_layout
     from colonnade.scene_image.file import check_image_file, image_file
     from colonnade.scene_image.inspect import describe, print_report

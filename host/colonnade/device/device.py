@@ -23,7 +23,7 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest, value_range
 from colonnade.device.bit_exact import loaded_model, model_frame
-from colonnade.device.scene import DeviceScene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.file import SceneImage
 
 Pixels = NDArray[np.uint8]

@@ -13,7 +13,6 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import design_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.device import require_no_errors
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.history import History
@@ -24,6 +23,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.render.samples import tell_defaults, within_budget
 from colonnade.scene.model import Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.inspect import coarse_line, dense_line, lost_line
 
 

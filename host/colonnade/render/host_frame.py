@@ -17,7 +17,6 @@ from colonnade.common.framebuffer import Frame
 from colonnade.common.image_io import encode_srgb
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.composite import composited
 from colonnade.render.hit_faces import hit_faces
@@ -25,6 +24,7 @@ from colonnade.render.report import FrameReport
 from colonnade.render.result import RenderResult
 from colonnade.render.sky import sky_of
 from colonnade.scene.model import Denoiser, Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene.samples import CENTRE
 
 if TYPE_CHECKING:

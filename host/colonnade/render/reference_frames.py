@@ -14,7 +14,6 @@ from colonnade.common.errors import UserError
 from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
-from colonnade.device.gathered_light import scene_cube
 from colonnade.environment.light_cube import LightCube
 from colonnade.maps.cache import encoded_environment
 from colonnade.maps.encoded import layout_of
@@ -35,6 +34,7 @@ from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, with_materials
 from colonnade.scene.object_pose import Placed
 from colonnade.scene.passes import frame_passes
+from colonnade.scene.prepared.gathered_light import scene_cube
 from colonnade.scene.view import make_view, rendered_materials, with_overrides
 
 if TYPE_CHECKING:

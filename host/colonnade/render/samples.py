@@ -5,11 +5,11 @@ from __future__ import annotations
 from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.progress import Progress
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.model import Environment
 from colonnade.render.budget import MAX_BUDGET_SAMPLES, Budget
 from colonnade.render.request import RenderRequest
 from colonnade.scene.model import Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene.samples import PHOTO_SAMPLES
 
 #: Name the defaults to who has not chosen.

@@ -11,7 +11,6 @@ from colonnade.common.errors import UserError
 from colonnade.common.frame_size import Size
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.model import Environment
 from colonnade.environment.sequence import Sequence
 from colonnade.maps.cache import encoded_environment
@@ -27,6 +26,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.render.result import RenderResult
 from colonnade.render.samples import tell_defaults, within_budget
 from colonnade.scene.model import Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 #: What keyframes cost.
 _BETWEEN = (

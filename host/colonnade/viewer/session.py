@@ -20,7 +20,6 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import manifest_for
 from colonnade.device.device import ModelDevice
-from colonnade.device.scene import DeviceScene
 from colonnade.maps.encoders import Encoder
 from colonnade.render.camera_look import CameraLook
 from colonnade.render.history import History
@@ -31,6 +30,7 @@ from colonnade.scene.model import Camera, Scene
 from colonnade.scene.model.values import WorldVector
 from colonnade.scene.parser import is_mesh_file, load_scene
 from colonnade.scene.passes import exposed
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene.view import world_view
 from colonnade.scene_image.file import SceneImage
 from colonnade.viewer.camera_table import save_camera

@@ -15,10 +15,10 @@ from colonnade.common.image_io import decode_srgb
 from colonnade.common.srgb import srgb_from_linear
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.cameras import camera_axes
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene.samples import samples_of_frame
 
 pytestmark = NEEDS_PAGE

@@ -19,12 +19,12 @@ from textured_files import png
 
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.files.catalog import VARIABLE
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import as_rendered, in_layer
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.packer import pack
 

@@ -15,8 +15,8 @@ from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
 from colonnade.device.cycle_model import NotedFrame, bounce_cycles, design_values
-from colonnade.device.scene import DeviceScene
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 ROOT = Path(__file__).parents[3]
 #: Fields of a design that the cycle model takes: the least and the greatest value.

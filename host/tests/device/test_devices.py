@@ -16,12 +16,12 @@ from colonnade.common.errors import UserError
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device import console
 from colonnade.device.device import Device, ModelDevice
-from colonnade.device.scene import DeviceScene
 from colonnade.device.shell_device import ShellDevice
 from colonnade.device.shell_simulator import SharedMemory, SimulatedTransport
 from colonnade.device.transport import LitexTransport, UioTransport
 from colonnade.mesh.load import load_mesh
 from colonnade.scene.model import MeshSource, Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.device_image import device_image
 
 SIZE = (20, 6)

@@ -15,8 +15,6 @@ from colonnade.common.accumulation import FramePasses
 from colonnade.common.errors import UserError
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import render_model
-from colonnade.device.gathered_light import scene_cube
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
 from colonnade.maps.cache import encoded_environment
 from colonnade.maps.layout import AttributeLayout
@@ -28,6 +26,8 @@ from colonnade.render.request import RenderRequest
 from colonnade.scene.lit_room import LitRoom, lit_room
 from colonnade.scene.model import Background, Camera, Colour, Light, Material, MeshSource, Paths, Placement, Scene
 from colonnade.scene.object_pose import Placed
+from colonnade.scene.prepared.device_scene import DeviceScene
+from colonnade.scene.prepared.gathered_light import scene_cube
 from colonnade.scene.samples import samples_of_frame
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.file import SceneImage

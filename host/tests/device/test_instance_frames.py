@@ -13,10 +13,10 @@ from instance_worlds import World, transform
 
 from colonnade.design.generator import design_for
 from colonnade.device.bit_exact import model_frame
-from colonnade.device.scene import DeviceScene
 from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.scene.model import Material, MeshSource, SceneObject, Transform
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 LIVE = Path(__file__).parents[3] / "scenes" / "live.toml"
 KINDS = ("rigid", "scaled", "mirrored", "sheared")

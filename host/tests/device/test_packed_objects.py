@@ -19,7 +19,6 @@ from colonnade.common.types import Floats
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.materials.texture import Texture
 from colonnade.quality.image_metrics import psnr
 from colonnade.registers.instances import instance_registers, transform_values, unit_transform
@@ -27,6 +26,7 @@ from colonnade.render.hit_faces import hit_faces
 from colonnade.scene.model import Camera, Material, MeshSource, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.object_pose import rotation_about
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.file import SceneImage
 
 SIZE = (120, 90)

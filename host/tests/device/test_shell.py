@@ -14,12 +14,12 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
-from colonnade.device.scene import DeviceScene
 from colonnade.device.shell import Bus, ShellFrame, render_shell
 from colonnade.mesh.load import load_mesh
 from colonnade.registers.frame import frame_registers
 from colonnade.render.composite import composited
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.packer import pack
 
 WIDTH, HEIGHT = 28, 21

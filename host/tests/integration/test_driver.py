@@ -23,7 +23,6 @@ from colonnade.common.image_io import resized_photo
 from colonnade.design import toolchain
 from colonnade.design.generator import GeneratedDesign, shell_design_for
 from colonnade.device.bit_exact import render_model
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.sequence import load_sequence
 from colonnade.integration.design_header import design_header
 from colonnade.integration.register_table import register_table
@@ -35,6 +34,7 @@ from colonnade.registers.frame_file import frame_file
 from colonnade.registers.target_view import TargetView
 from colonnade.render.sequence_frames import sequence_scenes
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.device_image import device_image, load_cycles, maps_image
 from colonnade.scene_image.dram_image import dram_image
 from colonnade.scene_image.packer import pack

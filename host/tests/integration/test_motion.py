@@ -13,8 +13,8 @@ from driver_runs import CACHE
 from target_programs import MACHINE, NEEDS_QEMU, QEMU, build, hash_of
 
 from colonnade.design.generator import manifest_for
-from colonnade.device.scene import DeviceScene
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 FRAMES, DEVICE_BASE, RECORD_BYTES = 10, 0x8000, 32
 DESCRIBED = """

@@ -19,8 +19,6 @@ from colonnade.design import toolchain
 from colonnade.design.generator import shell_design_for
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.device.packed_objects import MovingInstances
-from colonnade.device.scene import DeviceScene
 from colonnade.integration.design_header import design_header
 from colonnade.integration.register_table import register_table
 from colonnade.mesh.load import load_mesh
@@ -29,6 +27,8 @@ from colonnade.registers.target_view import TargetView
 from colonnade.registers.view_words import camera_values, position_values
 from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
+from colonnade.scene.prepared.packed_objects import MovingInstances
 from colonnade.scene.view import world_view
 
 #: A cache that holds all records: a frame that does not invalidate it reads old ones.

@@ -13,11 +13,11 @@ from gltf_documents import READ
 from colonnade.common.errors import UserError
 from colonnade.design import toolchain
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh import load
 from colonnade.mesh.files import formats
 from colonnade.mesh.load import load_mesh, stated_triangles
 from colonnade.scene.model import MeshSource, Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 PLY = (

@@ -9,10 +9,10 @@ import pytest
 from target_views import GOLDEN, HEIGHT, WIDTH
 
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.registers.target_view import TargetView
 from colonnade.registers.view_names import camera_names, gather_names, light_names
 from colonnade.scene.model import Light, MeshSource, Paths, Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene.samples import samples_of_frame
 
 COUNTS = (1, 2, 4, 8, 16, 32, 64)

@@ -12,13 +12,13 @@ from click.testing import CliRunner
 from colonnade.cli.main import cli
 from colonnade.common.progress import QUIET
 from colonnade.design.generator import manifest_for
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import MeshMaterial
 from colonnade.render.budget import CLOCK, Budget, rounded
 from colonnade.render.frames import render, render_frames
 from colonnade.render.request import RenderRequest
 from colonnade.scene.model import FrameSize, Light, Material, MeshSource, Paths, Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 SIZE = (24, 18)
 GATHERS = Scene(MeshSource(name="teapot:4"), paths=Paths(gather=1), frame=FrameSize(*SIZE))

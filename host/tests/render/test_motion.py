@@ -17,7 +17,6 @@ from PIL import Image
 
 from colonnade.cli.main import cli
 from colonnade.common.errors import UserError
-from colonnade.device import scene as device_scene
 from colonnade.environment.load import load_environment
 from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render, render_frames
@@ -26,6 +25,7 @@ from colonnade.render.result import RenderResult
 from colonnade.scene.model import MeshSource, Motion, Scene
 from colonnade.scene.object_pose import Placed, rotation_about
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared import device_scene
 from colonnade.scene.view import make_view
 
 SIZE = (32, 24)

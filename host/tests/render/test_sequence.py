@@ -25,7 +25,6 @@ from colonnade.common.image_io import encode_srgb
 from colonnade.common.progress import Progress
 from colonnade.design.generator import manifest_for
 from colonnade.device.bit_exact import render_model
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.derived_albedo import derived_albedo, hue_lights
 from colonnade.environment.load import load_environment
 from colonnade.environment.sequence import load_sequence
@@ -42,6 +41,7 @@ from colonnade.render.result import RenderResult
 from colonnade.scene.model import Transform
 from colonnade.scene.object_pose import Placed
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 SIZE, VIEWS, STEP, NOISE = (96, 72), 3, 0.2, 0.004
 #: One unit, and an attribute memory for maps of this size.

@@ -21,9 +21,6 @@ from colonnade.common import notes
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import decode_srgb, encode_srgb
 from colonnade.design.generator import manifest_for
-from colonnade.device import scene as device_scene
-from colonnade.device.gathered_light import scene_cube
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
 from colonnade.mesh.load import load_mesh
 from colonnade.quality.image_metrics import psnr
@@ -35,6 +32,9 @@ from colonnade.scene.lit_room import LitRoom, lit_room
 from colonnade.scene.model import Background, Colour, Light, MeshSource, Paths, Scene
 from colonnade.scene.object_pose import Placed, object_pose
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared import device_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
+from colonnade.scene.prepared.gathered_light import scene_cube
 
 SIZE = (96, 72)
 

@@ -15,7 +15,6 @@ from colonnade.common.progress import QUIET
 from colonnade.design import toolchain
 from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.device_frames import device_frames, render_model
@@ -23,6 +22,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.scene.model import Camera, FrameSize, MeshSource, Motion, ObjectKey, Scene, SceneObject, Transform
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.clip_file import NO_VERTEX
 from colonnade.scene_image.file import SceneImage

@@ -19,9 +19,9 @@ import pytest
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import VERSION, Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.device.scene import DeviceScene
 from colonnade.registers.frame_file import read_frame_file
 from colonnade.scene.model import MeshSource, Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.file import SceneImage
 
 DATA = Path(__file__).parents[1] / "data" / "formats"

@@ -115,7 +115,7 @@ def _one(
     """Count and print a frame."""
     from colonnade.common.errors import UserError
     from colonnade.device.cycle_model import DRAM_LATENCY
-    from colonnade.device.scene import DeviceScene
+    from colonnade.scene.prepared.device_scene import DeviceScene
 
     from colonnade_lab.evaluation.cycles import frame_cycles
 

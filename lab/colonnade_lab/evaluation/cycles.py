@@ -15,10 +15,10 @@ from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.device.cycle_model import DRAM_INTERVAL, DRAM_LATENCY, NotedFrame
 from colonnade.device.device import require_no_errors
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.report import counted_report
 from colonnade.scene.model import Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.dram_image import moved_bytes
 
 from colonnade_lab.evaluation.throughput import figures

@@ -14,12 +14,12 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign, design_for
 from colonnade.design.toolchain import cache_directory, project_root
 from colonnade.device.device import require_no_errors
-from colonnade.device.scene import DeviceScene
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.verilator import Stalls, render_rtl
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.render.report import frame_report, mesh_report
 from colonnade.scene.model import Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.dram_image import moved_bytes
 from colonnade.scene_image.file import SceneImage
 

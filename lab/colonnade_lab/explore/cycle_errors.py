@@ -12,9 +12,9 @@ from colonnade.design.generator import manifest_for
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
 from colonnade.device.cycle_model import NotedFrame, knows_design
-from colonnade.device.scene import DeviceScene
 from colonnade.scene.model import Scene
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 from colonnade_lab.evaluation.room_frames import room_frames
 from colonnade_lab.explore.frames import Frame

@@ -37,8 +37,8 @@ def reference(folder: Path, *, scene: Scene, mesh: Mesh, size: Size) -> None:
 
 def picture(folder: Path, *, config: str, overrides: Sequence[str], scene: Scene, mesh: Mesh, size: Size) -> None:
     """Render a frame with the bit-exact model. Error bits, counters and the records of the scene are in the result."""
-    from colonnade.device.scene import DeviceScene
     from colonnade.render.device_frames import render_model
+    from colonnade.scene.prepared.device_scene import DeviceScene
     from colonnade.scene_image.packer import memory_use
 
     with _configuration(config) as path:
@@ -96,7 +96,7 @@ def cycles(
 
 def counted(folder: Path, *, config: str, overrides: Sequence[str], scene: Scene, mesh: Mesh, size: Size) -> None:
     """Count the cycles of a frame with the cycle model."""
-    from colonnade.device.scene import DeviceScene
+    from colonnade.scene.prepared.device_scene import DeviceScene
 
     from colonnade_lab.evaluation.bench import mesh_result
     from colonnade_lab.evaluation.cycles import frame_cycles

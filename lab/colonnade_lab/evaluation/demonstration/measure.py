@@ -13,7 +13,6 @@ from colonnade.design.generator import GeneratedDesign
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.device.device import require_no_errors
-from colonnade.device.scene import DeviceScene
 from colonnade.device.verilator import render_rtl
 from colonnade.environment.model import Environment
 from colonnade.environment.sequence import Sequence
@@ -27,6 +26,7 @@ from colonnade.render.passes import model_passes
 from colonnade.render.sequence_frames import sequence_scenes
 from colonnade.scene.model import Scene
 from colonnade.scene.passes import exposed
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.device_image import load_cycles
 from numpy.typing import NDArray
 

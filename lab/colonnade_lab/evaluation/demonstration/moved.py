@@ -14,7 +14,6 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import GeneratedDesign
 from colonnade.device.bit_exact import loaded_model, model_frame
 from colonnade.device.device import require_no_errors
-from colonnade.device.scene import DeviceScene
 from colonnade.device.verilator import render_rtl
 from colonnade.environment.model import EnvironmentCamera
 from colonnade.environment.sequence import Sequence
@@ -27,6 +26,7 @@ from colonnade.render.sequence_frames import sequence_scenes
 from colonnade.scene.model import Camera, Scene
 from colonnade.scene.object_pose import Placed
 from colonnade.scene.passes import exposed
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene.view import world_view
 from colonnade.scene_image.device_image import load_cycles
 from numpy.typing import NDArray

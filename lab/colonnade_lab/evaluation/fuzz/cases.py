@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from colonnade.design.manifest import Manifest
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.mesh.materials.texture import Texture
 from colonnade.scene.model import Background, Camera, Colour, Light, Material, MeshSource, Paths, Scene
 from colonnade.scene.object_mesh import object_mesh
+from colonnade.scene.prepared.device_scene import DeviceScene
 from colonnade.scene_image.file import SceneImage
 
 #: Width and height of a legal frame, pixels.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from colonnade.design.manifest import Manifest
-from colonnade.device.gathered_light import MEMORY as LIGHT_CUBE
+from colonnade.scene.prepared.gathered_light import MEMORY as LIGHT_CUBE
 from colonnade.scene_image.file import LoadSection
 
 from colonnade_lab.evaluation.fuzz.cases import Case

@@ -10,11 +10,11 @@ import numpy.typing as npt
 from colonnade.common.types import Bytes
 from colonnade.design.manifest import Field, Manifest, value_range
 from colonnade.design.toolchain import project_root
-from colonnade.device.gathered_light import MEMORY as LIGHT_CUBE
-from colonnade.device.scene import DeviceScene
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene.model import Background, Light, Material, MeshSource, Paths, Placement, Scene, SceneObject
+from colonnade.scene.prepared.device_scene import DeviceScene
+from colonnade.scene.prepared.gathered_light import MEMORY as LIGHT_CUBE
 from colonnade.scene_image.file import LoadSection
 
 from colonnade_lab.evaluation.fuzz.cases import GATHERED, Case, patchwork

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from colonnade.common.errors import UserError
 from colonnade.design.manifest import Manifest, Register, value_range
-from colonnade.device.scene import DeviceScene
 from colonnade.scene.model import Camera, Colour, Light, Material, MeshSource, Paths, Scene, SceneObject, Transform
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 from colonnade_lab.evaluation.fuzz.cases import SIZE, SKY, Case
 from colonnade_lab.evaluation.fuzz.registers import Registers, reachable

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from colonnade.design.manifest import Manifest, Register, value_range
-from colonnade.device.gathered_light import MEMORY as LIGHT_CUBE
+from colonnade.scene.prepared.gathered_light import MEMORY as LIGHT_CUBE
 from colonnade.scene_image.dram_image import PAGE_BYTES
 
 from colonnade_lab.evaluation.fuzz.cases import Case

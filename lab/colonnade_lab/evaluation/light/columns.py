@@ -16,7 +16,6 @@ from colonnade.common.image_io import decode_srgb, encode_srgb, read_picture, re
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.generator import manifest_for
 from colonnade.device.device import require_no_errors
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.load import load_environment
 from colonnade.environment.model import Environment
 from colonnade.environment.panorama_file import read_radiance
@@ -28,6 +27,7 @@ from colonnade.render.request import RenderRequest
 from colonnade.scene.model import Denoiser
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import exposed
+from colonnade.scene.prepared.device_scene import DeviceScene
 from numpy.typing import NDArray
 
 from colonnade_lab.evaluation.light import files

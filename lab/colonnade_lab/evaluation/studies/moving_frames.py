@@ -21,7 +21,6 @@ from colonnade.common.progress import QUIET, Progress
 from colonnade.common.types import Floats
 from colonnade.design.manifest import Manifest
 from colonnade.device.bit_exact import render_model
-from colonnade.device.scene import DeviceScene
 from colonnade.environment.model import Environment, EnvironmentCamera
 from colonnade.maps.layout import AttributeLayout
 from colonnade.maps.live import encode_still
@@ -32,6 +31,7 @@ from colonnade.reference.environment.depth_mesh import full_backdrop
 from colonnade.reference.render import render_reference
 from colonnade.render.composite import composited
 from colonnade.scene.model import Background, Colour, Light, Material, MeshSource, Placement, Scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 from numpy.typing import NDArray
 
 from colonnade_lab.common.markdown import markdown

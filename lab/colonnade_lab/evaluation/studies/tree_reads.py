@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from colonnade.design.generator import manifest_for
 from colonnade.design.toolchain import project_root
-from colonnade.device.scene import DeviceScene
 from colonnade.render.device_frames import render_model
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 from colonnade_lab.common.markdown import markdown
 from colonnade_lab.evaluation.bench import MESHES, geometric_mean

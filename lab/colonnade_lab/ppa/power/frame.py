@@ -14,7 +14,6 @@ from colonnade.design.frame_limits import check_size
 from colonnade.design.generator import GeneratedDesign
 from colonnade.design.manifest import Manifest
 from colonnade.design.toolchain import project_root
-from colonnade.device.scene import DeviceScene
 from colonnade.device.simulator_build import build_simulator
 from colonnade.device.simulator_sources import TRACER
 from colonnade.device.verilator import write_job
@@ -22,6 +21,7 @@ from colonnade.mesh.materials.mesh import Mesh
 from colonnade.scene.model import Scene
 from colonnade.scene.object_mesh import object_mesh
 from colonnade.scene.parser import load_scene
+from colonnade.scene.prepared.device_scene import DeviceScene
 
 from colonnade_lab.ppa.netlist.hierarchy import LEVELS, TRIANGLES
 from colonnade_lab.ppa.power.recording import Recording

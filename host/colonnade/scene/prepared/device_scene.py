@@ -15,8 +15,6 @@ from colonnade.common.framebuffer_formats import photo_lines
 from colonnade.common.image_io import resized_photo
 from colonnade.common.progress import QUIET, Progress
 from colonnade.design.frame_limits import check_size
-from colonnade.device.gathered_light import scene_cube, with_cube
-from colonnade.device.packed_objects import MovingInstances, pack_objects, placed_image
 from colonnade.maps.encoded import Encode, EncodedEnvironment, check_layout
 from colonnade.maps.encoders import Encoder
 from colonnade.registers.frame import placed_registers
@@ -29,6 +27,8 @@ from colonnade.scene.model import Camera, Scene, Transform
 from colonnade.scene.object_mesh import SurfaceFeatures, object_mesh, stated_triangles, with_materials
 from colonnade.scene.object_pose import Placed
 from colonnade.scene.passes import frame_passes
+from colonnade.scene.prepared.gathered_light import scene_cube, with_cube
+from colonnade.scene.prepared.packed_objects import MovingInstances, pack_objects, placed_image
 from colonnade.scene.view import View, make_view, rendered_materials, world_view
 from colonnade.scene_image.bending import Bending
 from colonnade.scene_image.device_image import device_image, maps_image

@@ -1,0 +1,1 @@
+"""A scene as a design renders it: with an image and registers."""
