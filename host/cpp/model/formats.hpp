@@ -119,7 +119,7 @@ struct Node {
     std::array<std::array<std::uint8_t, nodeChildren>, 3> low, high; ///< planes of the children, by axis
     std::array<std::int32_t, 3> origin;
     std::uint32_t first;
-    std::array<std::int8_t, 3> exponent;
+    std::array<std::uint8_t, 3> exponent;
     bool isLegal;
     std::uint8_t nodes, leaves; ///< children of each kind, in this order, at consecutive records from `first`
 
@@ -160,7 +160,7 @@ public:
         bool isMarked = true;
         for (int axis = 0; axis < 3; ++axis) {
             // 2 · origin + 2^exponent: the lowest set bit is the exponent's
-            result.exponent[axis] = static_cast<std::int8_t>(corner[axis] == 0 ? 0 : bitLength(static_cast<UnsignedWide>(corner[axis] & -corner[axis])) - 1);
+            result.exponent[axis] = static_cast<std::uint8_t>(corner[axis] == 0 ? 0 : bitLength(static_cast<UnsignedWide>(corner[axis] & -corner[axis])) - 1);
             result.origin[axis] = static_cast<std::int32_t>((corner[axis] & (corner[axis] - 1)) >> 1);
             isMarked = isMarked && corner[axis] != 0 && result.exponent[axis] <= maxExponent_;
         }
