@@ -20,8 +20,12 @@ TARGET = ("-target", "wasm32-wasi", "-O2", "-DNDEBUG", "-ffp-contract=off")
 #: A throw ends the module: it has no exceptions.
 PLAIN = ("-std=gnu++17", "-fno-exceptions", "-fno-rtti", "-Wno-keyword-macro", "-Wno-unused-value")
 CPP = (*PLAIN, "-Dthrow=__builtin_trap(),")
-#: Sources that run once for a scene: compiled for size, not for speed.
-SMALL = ("colonnade_pack", "colonnade_surfaces", "colonnade_environment")
+#: Sources that run once for a scene, or for microseconds once a frame: compiled for size, not for speed.
+SMALL = (
+    *("colonnade_pack", "colonnade_surfaces", "colonnade_environment", "colonnade_instances", "colonnade_motion"),
+    *("colonnade_mesh_build", "colonnade_mesh_file", "colonnade_motion_bend", "colonnade_view"),
+    *("colonnade_view_file", "colonnade_view_outline", "colonnade_view_poses", "colonnade_words"),
+)
 Source = tuple[str, Path, tuple[str, ...]]
 SOURCES: tuple[Source, ...] = (
     *(
