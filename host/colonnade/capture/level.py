@@ -33,14 +33,14 @@ _BELOW, _DEPTH_BELOW = 0.03, 0.15
 _LEAST_SHARE = 0.02
 #: Without a plane the floor is below this share of the points.
 _LOWEST = 0.01
-#: Sines of the largest roll of cameras whose recording shows a level plane, and of how far they look up, and down.
-_ROLL, _UPWARDS, _DOWNWARDS = 0.34, 0.26, 0.94
+#: Of cameras whose recording shows a level plane: tangent of the largest roll, sines of how far they look up, and down.
+_ROLL, _UPWARDS, _DOWNWARDS = 0.36, 0.26, 0.94
 #: Length of the mean of the cameras' up vectors from which on they have a common one.
 _COMMON_UP = 0.25
 #: Weights of the cameras' roll against the normals of walls, and of their mean up against their roll.
 _ROLL_WEIGHT, _UP_WEIGHT = 0.02, 0.05
 #: Sines of the largest angle between a wall and the vertical, in each step of the search.
-_UPRIGHT = (0.64, 0.5, 0.34, 0.17, 0.17, 0.17)
+_UPRIGHT = (0.77, 0.5, 0.34, 0.17, 0.17, 0.17)
 
 
 @dataclass(frozen=True)
@@ -137,8 +137,9 @@ def _on(plane: _Plane) -> str:
 def _without_floor(seen: _Surface, overhead: Floats) -> tuple[Floats, str]:
     """The vertical of the largest level plane that cameras without much roll see from above, or the walls'.
 
-    A wall in front of a camera that looks down has a normal that points down in the picture, and one at its side is
-    out of the allowed roll, so neither is taken for a level plane.
+    A wall in front of a camera that looks down has a normal that points down in the picture. One that a camera looks
+    up at is as a level plane far below it, and one at its side as that of a camera with much roll, so none is taken
+    for a level plane.
 
     Args:
         seen: What the frames show.
@@ -147,11 +148,8 @@ def _without_floor(seen: _Surface, overhead: Floats) -> tuple[Floats, str]:
     Returns:
         A unit vector, and what it is from.
     """
-    rolls, pitches = (seen.normals @ seen.cameras[:, :, axis].T for axis in (0, 2))
-    pitch = pitches.mean(axis=1)
-    is_level = (np.square(rolls).mean(axis=1) < _ROLL**2) & (pitch > -_DOWNWARDS) & (pitch < _UPWARDS)
-    plane = _largest_plane(seen, is_level & (seen.normals @ overhead > 0), is_low=False)
-    if plane is not None:
+    plane = _largest_plane(seen, _are_level(seen.normals, seen.cameras), is_low=False)
+    if plane is not None and _are_level(plane.normal[np.newaxis], seen.cameras).all():
         return plane.normal, f"the largest level plane, on which {plane.share:.0%} of the surface lie"
     rights = seen.cameras[:, :, 0]
     held = rights.T @ rights / len(rights) - _UP_WEIGHT * np.outer(overhead, overhead)
@@ -161,6 +159,14 @@ def _without_floor(seen: _Surface, overhead: Floats) -> tuple[Floats, str]:
         up = _least(walls.T @ walls / max(len(seen.normals), 1) + _ROLL_WEIGHT * held, overhead)
         share = len(walls) / max(len(seen.normals), 1)
     return up, f"cameras without roll, to which {share:.0%} of the surface are upright"
+
+
+def _are_level(normals: Floats, cameras: Floats) -> NDArray[np.bool_]:
+    """Whether cameras see surfaces as level ones from above: bool [n] for normals [n, 3] and axes [frames, 3, 3]."""
+    right, down, forward = (normals @ cameras[:, :, axis].T for axis in range(3))
+    pitch, upright = forward.mean(axis=1), np.square(down).mean(axis=1)
+    is_pitched = (pitch > -_DOWNWARDS) & (pitch < _UPWARDS) & (down.mean(axis=1) < 0)
+    return np.asarray(is_pitched & (np.square(right).mean(axis=1) < _ROLL**2 * upright))
 
 
 def _least(form: Floats, towards: Floats) -> Floats:
