@@ -84,7 +84,8 @@ def write_job(folder: Path, design: GeneratedDesign, settings: Mapping[str, Any]
     (folder / "job.json").write_text(json.dumps(job))
 
 
-@pytest.mark.parametrize("case", ["scratchpad", pytest.param("scene in DRAM", marks=pytest.mark.matrix)])
+@pytest.mark.matrix
+@pytest.mark.parametrize("case", ["scratchpad", "scene in DRAM"])
 def test_the_shell_in_icarus(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bus_bytes, overrides, settings = CASES[case]
     design = shell_design_for("tiny", overrides, bus_bytes=bus_bytes, pixel_stream="streamed" in settings["tests"])

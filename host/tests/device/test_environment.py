@@ -158,10 +158,17 @@ MOVES = (
 
 
 @pytest.mark.verilator
-@pytest.mark.parametrize("kind", [pytest.param("diffuse", marks=pytest.mark.matrix), "glass"])
-def test_hardware_sees_the_rooms_of_the_model_from_any_camera(kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("glass", ()),
+        pytest.param("diffuse", IN_ROOM, marks=pytest.mark.matrix),
+        pytest.param("glass", IN_ROOM, marks=pytest.mark.matrix),
+    ],
+)
+def test_hardware_sees_the_rooms_of_the_model_from_any_camera(kind: str, options: tuple[str, ...]) -> None:
     """Relit and in the shadow window, with an object that the room hides; and maps whose registers are any bits."""
-    design = design_for("small", IN_ROOM)
+    design = design_for("small", options)
     held = live_maps(ROOMS / "living", design.manifest)
     mesh, material = load_mesh("teapot:4"), Material(kind=kind)
     image = with_environment(
@@ -194,9 +201,10 @@ def test_hardware_sees_the_rooms_of_the_model_from_any_camera(kind: str) -> None
 
 
 @pytest.mark.verilator
-def test_a_room_after_an_abort_is_right() -> None:
+@pytest.mark.parametrize("options", [(), pytest.param(IN_ROOM, marks=pytest.mark.matrix)], ids=["small", "pipelines"])
+def test_a_room_after_an_abort_is_right(options: tuple[str, ...]) -> None:
     """Pixels are in all stages when the watchdog aborts: none is in the next frame."""
-    design = design_for("small", IN_ROOM)
+    design = design_for("small", options)
     held = live_maps(ROOMS / "living", design.manifest)
     mesh, material = load_mesh("teapot:4"), Material(kind="glass")
     image = with_environment(

@@ -123,7 +123,9 @@ SHINY = [
 ]
 
 
-@pytest.mark.parametrize("case", SHINY, ids=lambda case: case[0])
+@pytest.mark.parametrize(
+    "case", [*SHINY[:3], pytest.param(SHINY[3], marks=pytest.mark.matrix)], ids=lambda case: case[0]
+)
 def test_mirrors_glass_and_lights_equal_the_model(
     case: tuple[str, str, tuple[str, ...], Material, tuple[Light, ...]],
 ) -> None:

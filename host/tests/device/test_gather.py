@@ -62,10 +62,11 @@ def gathering(registers: dict[str, int], bounces: int, seed: int) -> dict[str, i
     ("options", "in_room"),
     [
         (ALONE, False),
-        (IN_ROOM, True),
+        ((), True),
+        pytest.param(IN_ROOM, True, marks=pytest.mark.matrix),
         pytest.param((*IN_ROOM, *MANY), True, marks=pytest.mark.matrix),
     ],
-    ids=["one column", "in a room", "many paths in a room"],
+    ids=["one column", "in a room", "pipelines in a room", "many paths in a room"],
 )
 def test_hardware_gathers_what_the_model_gathers(options: tuple[str, ...], in_room: bool) -> None:
     """All kinds of materials, also where no bounce is traced; no, one and four gathered rays; a stalled sink."""

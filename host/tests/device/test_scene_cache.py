@@ -61,7 +61,7 @@ SHAPES = {
 @pytest.mark.parametrize(
     "shape",
     [
-        "one of everything",
+        pytest.param("one of everything", marks=pytest.mark.matrix),
         pytest.param("two columns", marks=pytest.mark.matrix),
         "four banks and two buses",
         pytest.param("no shared cache", marks=pytest.mark.matrix),
@@ -90,6 +90,7 @@ def test_no_frame_depends_on_the_memory(shape: str) -> None:
     assert_same(second, expected)
 
 
+@pytest.mark.matrix
 def test_frames_of_the_preset_for_fpgas() -> None:
     """Its timing slices change no pixel and no counter of events, with the slow memory of a board."""
     design = design_for("fpga")
@@ -104,7 +105,10 @@ def test_frames_of_the_preset_for_fpgas() -> None:
 
 @pytest.mark.parametrize(
     "shape",
-    ["one of everything", "four banks and two buses", pytest.param("no shared cache", marks=pytest.mark.matrix)],
+    [
+        "four banks and two buses",
+        *(pytest.param(shape, marks=pytest.mark.matrix) for shape in ("one of everything", "no shared cache")),
+    ],
 )
 def test_the_port_moves_the_beats_of_the_lines_that_are_counted(tmp_path: Path, shape: str) -> None:
     """Whole beats: a line of 64 bytes moves 128 over a bus of 128."""

@@ -57,6 +57,7 @@ def test_frames_in_memory_are_those_of_the_model(design: GeneratedDesign, bus: B
         assert not any(value for name, value in frame.values.items() if name.startswith("errors."))
 
 
+@pytest.mark.matrix
 def test_a_scene_in_dram_is_read_by_the_second_master() -> None:
     """A frame whose reads fail ends and says so, and the next one is right. Reads overtake each other."""
     cache = {"lines": 8, "ways": 2, "misses": 4, "sharedLines": 16, "sharedWays": 2, "sharedMisses": 8}

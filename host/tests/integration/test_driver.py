@@ -187,7 +187,8 @@ MAPS = {"width": 96, "height": 72, "mapBytes": 4096, "planeBytes": 4096}
 MAP_OVERRIDES = ("array.columns=2", "frame.maxBounces=1", f"physicalAttributeMemory={json.dumps(MAPS)}")
 
 
-@pytest.mark.parametrize("mode", ["interrupt", pytest.param("poll", marks=pytest.mark.matrix)])
+@pytest.mark.matrix
+@pytest.mark.parametrize("mode", ["interrupt", "poll"])
 def test_maps_of_another_view_are_loaded_between_frames(tmp_path: Path, mode: str) -> None:
     """The frame after that is the one of a device that has never had others; a soft reset keeps the maps."""
     design = shell_design_for("tiny", MAP_OVERRIDES, bus_bytes=16)

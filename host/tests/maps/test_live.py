@@ -163,6 +163,7 @@ def test_noise_of_depth_widens_the_tolerance() -> None:
     assert used[1] <= 16 < used[0]
 
 
+@pytest.mark.matrix
 @pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed")
 def test_words_do_not_depend_on_the_build(tmp_path: Path) -> None:
     """Without optimisation, vectors and undefined behaviour: the same words in every frame."""

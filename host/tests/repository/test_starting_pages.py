@@ -27,7 +27,7 @@ def run_page(page: str, *options: str, environment: Mapping[str, str]) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("page", ["newcomer", "soc"])
+@pytest.mark.parametrize("page", ["newcomer", pytest.param("soc", marks=pytest.mark.matrix)])
 def test_the_commands_of_a_starting_page_print_what_it_says(page: str) -> None:
     run_page(page, environment=simulator_build.build_environment() | QUICK)
 

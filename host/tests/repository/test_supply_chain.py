@@ -82,7 +82,7 @@ def test_locks_contain_no_urls(file: str | Path) -> None:
     assert not re.search('(?<!"url": "https)://', (ROOT / file).read_text())
 
 
-@pytest.mark.parametrize("installer", ["uv", "pip"])
+@pytest.mark.parametrize("installer", ["uv", pytest.param("pip", marks=pytest.mark.matrix)])
 @pytest.mark.parametrize("altered", [False, True])
 def test_only_the_locked_file_is_installed(tmp_path: Path, altered: bool, installer: str) -> None:
     wheel = tmp_path / "tiny-1.0-py3-none-any.whl"

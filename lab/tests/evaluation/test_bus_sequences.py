@@ -20,7 +20,7 @@ IN_ROOM = ("array.columns=2", 'physicalAttributeMemory={"width":96,"height":72}'
 @pytest.mark.parametrize(
     ("overrides", "sequences"),
     [
-        pytest.param(PLAIN, 140, id="scene in memories"),
+        pytest.param(PLAIN, 140, id="scene in memories", marks=pytest.mark.matrix),
         pytest.param(CACHED, 70, id="scene in DRAM", marks=pytest.mark.matrix),
         pytest.param(PLAIN, 10_000, id="scene in memories, many", marks=pytest.mark.matrix),
         pytest.param(IN_ROOM, 2_000, id="with maps of a room, many", marks=pytest.mark.matrix),

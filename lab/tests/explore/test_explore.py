@@ -122,6 +122,7 @@ def figures(content: dict[str, Any]) -> dict[str, Any]:
     return {point["name"]: (point["figures"], point["workloads"]) for point in content["points"]}
 
 
+@pytest.mark.matrix
 def test_a_study_killed_in_the_middle_continues_gives_the_same_numbers_and_is_extended(
     again: Path, explored_study: Explored
 ) -> None:

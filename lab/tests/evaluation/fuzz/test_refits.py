@@ -70,6 +70,7 @@ def test_what_a_plan_does(bench: RefitBench) -> None:
     assert effect(*[leaf] * 128) == (False, {1}) and effect(*[leaf] * 129) == (True, {1})
 
 
+@pytest.mark.matrix
 @pytest.mark.verilator
 def test_unit_and_driver_agree_on_refits() -> None:
     """Long version: ``colonnade fuzz --refit --cases 1000 --config tiny --set 'columnBvhMemory.cache=…'``."""
@@ -81,6 +82,7 @@ def test_unit_and_driver_agree_on_refits() -> None:
     assert report["sums"]["refits"] == 240 and report["sums"]["records"] > 10_000
 
 
+@pytest.mark.matrix
 @pytest.mark.verilator
 def test_wrong_records_bounds_and_errors_are_found_by_their_seed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A bit of a record; a bound; an effect of plans that the unit does not have."""

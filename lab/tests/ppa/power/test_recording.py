@@ -104,6 +104,7 @@ RAY_PORTS = {
 }
 
 
+@pytest.mark.matrix
 @pytest.mark.verilator
 def test_a_batch_is_recorded_from_its_first_run_to_the_end_of_the_last_one() -> None:
     overrides = ("array.rows=2", "units.triangleRows=2", "units.pathContexts=64")
