@@ -185,8 +185,15 @@ inline int testBoxes(const Ray& ray, const Node& node, std::int64_t tMax, const 
     return hasNarrowBoxes(n) ? BoxTests<std::int32_t>(ray, n).test(node, limit, entered) : BoxTests<std::int64_t>(ray, n).test(node, limit, entered);
 }
 
+/// The watertight test of Woop, Benthin and Wald (2013). With vertices p relative to the origin in the ray's own axes:
+///     x' = x - Sx·z, y' = y - Sy·z     shear; the ray is the z axis
+///     U = x1·y2 - y1·x2, V = x2·y0 - y2·x0, W = x0·y1 - y0·x1     twice the area beside each edge, exact
+///     t = z0 + (V·(z1 - z0) + W·(z2 - z0)) / (U + V + W)
+/// U, V and W of one sign, or 0: the ray's line crosses the triangle.
+///
 /// Tests a triangle; true if it is the closest hit so far, and then updates `best`, which begins as `Hit::none`. `crossesTriangle`, if any, becomes true if the ray's line crosses it.
 template <class Product> bool testTriangle(const Ray& ray, const std::array<Vector, 3>& vertices, std::uint64_t id, const Numbers& n, Hit& best, bool* crossesTriangle) {
+    // Translate to the ray's origin, permute and shear
     std::array<std::int64_t, 3> x, y, z;
     for (int i = 0; i < 3; ++i) {
         Vector p;
@@ -199,17 +206,20 @@ template <class Product> bool testTriangle(const Ray& ray, const std::array<Vect
         y[i] = static_cast<std::int64_t>(p[1] - nearestEven<Product>(Product(ray.shear[1]) * z[i], n.shearFraction));
     }
 
+    // Edge functions: exact, so that triangles with a common edge leave no gap
     const std::array<Product, 3> edges = {Product(x[1]) * y[2] - Product(y[1]) * x[2], Product(x[2]) * y[0] - Product(y[2]) * x[0],
                                           Product(x[0]) * y[1] - Product(y[0]) * x[1]};
     const bool anyNegative = edges[0] < 0 || edges[1] < 0 || edges[2] < 0, anyPositive = edges[0] > 0 || edges[1] > 0 || edges[2] > 0;
     if (anyNegative == anyPositive) return false;
     if (crossesTriangle) *crossesTriangle = true;
 
+    // Barycentric weights: the areas, with one exponent
     std::array<UnsignedOf<Product>, 3> areas;
     for (int i = 0; i < 3; ++i) areas[i] = magnitude(edges[i]);
     const int drop = bitLength(areas[0] + areas[1] + areas[2]) - n.weightBits;
     std::array<std::int64_t, 3> weights;
     for (int i = 0; i < 3; ++i) weights[i] = static_cast<std::int64_t>(drop >= 0 ? areas[i] >> drop : areas[i] << -drop);
+    // Distance: a quotient of normalised numbers, rounded towards z of the first vertex
     const Wide sum = Wide(weights[0]) + weights[1] + weights[2];
     const Wide numerator = Wide(weights[1]) * (Wide(z[1]) - z[0]) + Wide(weights[2]) * (Wide(z[2]) - z[0]);
 

@@ -4,8 +4,8 @@ import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 
-/** An object with a transform of its own; docs/numbers.md, section 10. */
-final class ObjectInstance(config: ColonnadeConfig) extends Bundle {
+/** An object with a transform of its own; docs/numbers.md, section 10. After a reset `scene.instances` is 0. */
+final class ObjectInstance(config: ColonnadeConfig) extends Bundle with WithoutReset {
 
   /** `matrix` · 2^-shift leads from the grid of the world to the object's. */
   val matrix = Vec(3, Vec3(SInt(ObjectInstance.matrixBits.W)))

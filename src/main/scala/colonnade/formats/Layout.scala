@@ -8,10 +8,23 @@ import colonnade.numbers.Fixed
   * @param name     flattened by `.` and `[i]`
   * @param offset   number of its lowest bit; bit 0 is the least significant
   * @param fraction fraction bits, 0 for integers
+  * @param hasReset it is in no [[WithoutReset]]
   */
-final case class Field(name: String, offset: Int, width: Int, signed: Boolean, fraction: Int) {
+final case class Field(
+    name:     String,
+    offset:   Int,
+    width:    Int,
+    signed:   Boolean,
+    fraction: Int,
+    hasReset: Boolean = true
+) {
   def end: Int = offset + width
 }
+
+/** Of registers: a reset leaves them as they are. The device reads them after the host has written a register with a
+  * reset, such as their number.
+  */
+trait WithoutReset
 
 /** The bit positions of the numbers in a Chisel type, derived from its definition, which is the only one.
   *
@@ -36,7 +49,7 @@ object Layout {
       val offsets           = elements.scanLeft(offset)(_ + _.getWidth)
       names.zip(elements).zip(offsets).reverse.flatMap { case ((field, element), at) =>
         place(element, prefix + field, at)
-      }
+      }.map(field => field.copy(hasReset = field.hasReset && !record.isInstanceOf[WithoutReset]))
     case signed: SInt => Seq(Field(name, offset, signed.getWidth, signed = true, fraction = 0))
     case other        => Seq(Field(name, offset, other.getWidth, signed = false, fraction = 0))
   }

@@ -121,10 +121,8 @@ final class RegisterFile[S <: Bundle with SceneRegisters, D <: Bundle with BusyR
     (register.width - word * RegisterMap.dataBits).min(RegisterMap.dataBits)
 
   private def storage(register: Register): UInt = Cat((0 until register.words).reverse.map { word =>
-    val bits = wordBits(register, word)
-    // After a reset no instance is on
-    val reset = !register.name.startsWith("instances[")
-    val value = (if (reset) RegInit(0.U(bits.W)) else Reg(UInt(bits.W)))
+    val bits  = wordBits(register, word)
+    val value = (if (register.hasReset) RegInit(0.U(bits.W)) else Reg(UInt(bits.W)))
       .suggestName(s"${register.name.replaceAll("[.\\[]", "_").replace("]", "")}_$word")
     when(writes && io.register.address === (register.address + word).U) {
       value := io.register.writeData(bits - 1, 0)

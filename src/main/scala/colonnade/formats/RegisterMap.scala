@@ -17,15 +17,17 @@ object Access {
   * @param address word address of its lowest 32 bits
   * @param words   number of consecutive words, low word first
   * @param limit   maximum value in the device, see [[RegisterLimits]]; None if all values are legal
+  * @param hasReset a reset clears it
   */
 final case class Register(
-    name:    String,
-    address: Int,
-    words:   Int,
-    width:   Int,
-    signed:  Boolean,
-    access:  Access,
-    limit:   Option[BigInt]
+    name:     String,
+    address:  Int,
+    words:    Int,
+    width:    Int,
+    signed:   Boolean,
+    access:   Access,
+    limit:    Option[BigInt],
+    hasReset: Boolean
 )
 
 /** Addresses of all registers. Each number starts at its own word.
@@ -94,7 +96,8 @@ object RegisterMap {
       number.width,
       number.signed,
       block.access,
-      limits.get(number.name)
+      limits.get(number.name),
+      number.hasReset
     )
   }
 
