@@ -48,7 +48,7 @@ live: setup ## objects that move in a room, a mirror before a moving camera: vid
 	@$(venv)/python tools/live
 
 browser: setup ## the packer and the model as one HTML file, out/browser/index.html
-	@tools/zig-environment
+	@tools/environment zig
 	@$(venv)/python tools/browser
 
 check: setup ## formatters, linters, types, layers, derived files
@@ -70,7 +70,7 @@ lock: setup ## make host/locks and project/dependencies.sha256 again
 	@tools/lock
 
 format: setup ## let the formatters rewrite the sources
-	@tools/lint-environment
+	@tools/environment lint
 	@git ls-files '*.c' '*.h' '*.cpp' '*.hpp' | xargs .cache/lint-environment/bin/clang-format -i
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host lab

@@ -31,7 +31,7 @@ def require_verilator() -> None:
     answer = subprocess.run(["verilator", "--version"], capture_output=True, text=True, check=True).stdout
     found = re.match(r"Verilator (\d+)\.(\d+)", answer)
     if found is None or (int(found[1]), int(found[2])) < MINIMUM_VERILATOR:
-        advice = 'PATH="$(tools/verilator-environment):$PATH" make -C examples cocotb SIMULATOR=verilator'
+        advice = 'PATH="$(tools/environment verilator):$PATH" make -C examples cocotb SIMULATOR=verilator'
         sys.exit(f"cocotb needs Verilator 5.036 or newer, not {answer.strip()}; run: {advice}")
 
 

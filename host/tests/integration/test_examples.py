@@ -47,8 +47,8 @@ needs_icarus = pytest.mark.skipif(shutil.which("iverilog") is None, reason="no i
 @pytest.fixture
 def new_verilator(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that cocotb takes, on PATH."""
-    program = EXAMPLES.parent / "tools" / "verilator-environment"
-    folder = subprocess.run([program], check=True, capture_output=True, text=True).stdout.strip()
+    program = EXAMPLES.parent / "tools" / "environment"
+    folder = subprocess.run([program, "verilator"], check=True, capture_output=True, text=True).stdout.strip()
     monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
 
 
@@ -123,4 +123,4 @@ def test_cocotb_refuses_an_old_verilator(tmp_path: Path) -> None:
     command = [sys.executable, EXAMPLES / "cocotb" / "run.py", "verilator", *(["none"] * 4)]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PATH": str(tmp_path)})
     assert done.returncode == 1
-    assert "cocotb needs Verilator 5.036 or newer" in done.stderr and "tools/verilator-environment" in done.stderr
+    assert "cocotb needs Verilator 5.036 or newer" in done.stderr and "tools/environment verilator" in done.stderr

@@ -25,7 +25,7 @@ for line in open(sys.argv[1]):
 def require_yosys() -> None:
     """Raise a `UserError` if this interpreter has no Yosys, whose version is part of what it makes."""
     if importlib.util.find_spec("pyosys") is None:
-        raise UserError("colonnade ppa needs Yosys: run tools/ppa-environment, which installs pyosys")
+        raise UserError("colonnade ppa needs Yosys: run tools/environment ppa, which installs pyosys")
 
 
 def abc_program() -> Path:
@@ -34,12 +34,12 @@ def abc_program() -> Path:
 
 
 def _python() -> Path:
-    """The interpreter that has Yosys: this one, or the one of `tools/proof-environment`."""
+    """The interpreter that has Yosys: this one, or the one of `tools/environment proof`."""
     if importlib.util.find_spec("pyosys") is not None:
         return Path(sys.executable)
     apart = project_root() / ".cache" / "proof-environment" / "bin" / "python"
     if not apart.exists():
-        raise UserError("Yosys is not installed: run tools/proof-environment")
+        raise UserError("Yosys is not installed: run tools/environment proof")
     return apart
 
 

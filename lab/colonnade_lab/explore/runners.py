@@ -66,7 +66,7 @@ class LocalRunner:
         """The program that is not installed here."""
         for name in job.kind.needs:
             if name == "yosys" and importlib.util.find_spec("pyosys") is None:
-                return f"{job.kind.name} needs Yosys: run tools/ppa-environment"
+                return f"{job.kind.name} needs Yosys: run tools/environment ppa"
             if name == "verilator" and shutil.which("verilator") is None:
                 return f"{job.kind.name} needs verilator: sudo apt-get install verilator"
         return None

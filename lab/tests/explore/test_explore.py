@@ -409,7 +409,7 @@ def test_what_is_missing_is_refused_before_the_first_job(
     study.write_text(study.read_text().replace(old, new))
     if message is None:
         monkeypatch.setitem(sys.modules, "pyosys", None)
-        message = "area needs Yosys: run tools/ppa-environment"
+        message = "area needs Yosys: run tools/environment ppa"
     result = CliRunner().invoke(cli, ["explore", str(study), "--output", str(study.parent / "out")])
     assert result.exit_code == 2
     hostile.one_error_line(result.stderr, message)

@@ -262,7 +262,7 @@ def test_missing_yosys_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     result = CliRunner().invoke(cli, ["ppa", "--config", "tiny"])
     assert result.exit_code == 2
-    assert "tools/ppa-environment" in result.stderr
+    assert "tools/environment ppa" in result.stderr
 
 
 @pytest.mark.parametrize("text", ["", "library (a) {", "no cells"])
@@ -273,7 +273,7 @@ def test_an_invalid_liberty_is_rejected(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.matrix
-@pytest.mark.skipif(importlib.util.find_spec("pyosys") is None, reason="no Yosys: run tools/ppa-environment")
+@pytest.mark.skipif(importlib.util.find_spec("pyosys") is None, reason="no Yosys: run tools/environment ppa")
 def test_gates_of_tiny_match_the_recorded_ones() -> None:
     """Detects unintended changes of the area; `tools/figures gates` records new values."""
 

@@ -14,7 +14,7 @@ from colonnade_lab.units.verilog import Modules
 try:
     yosys.abc_program()
 except UserError:
-    pytest.skip("no Yosys: run tools/proof-environment", allow_module_level=True)
+    pytest.skip("no Yosys: run tools/environment proof", allow_module_level=True)
 
 UNIT = """module Adder(
   input        clock,

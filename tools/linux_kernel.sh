@@ -1,33 +1,10 @@
 #!/usr/bin/env bash
-# Makes what tools/linux boots into .cache/linux: Debian's kernel for arm64 and busybox, and the kernel's UIO driver, which
-# Debian leaves out, compiled from Debian's source of the same kernel. Installs system packages as root, otherwise prints
-# the command to type. apt fetches the packages and checks Debian's signatures; they are not installed.
+# Makes what tools/linux boots: Debian's kernel for arm64 and busybox, and the kernel's UIO driver, which Debian leaves out,
+# compiled from Debian's source of the same kernel. apt fetches the packages and checks Debian's signatures; they are not
+# installed. Usage: tools/linux_kernel.sh FOLDER, after tools/environment linux
 set -euo pipefail
 . "$(dirname "${BASH_SOURCE[0]}")/programs.sh"
-cd "$root"
-environment="$root/.cache/linux"
-
-missing_linux_packages() {
-  local missing=()
-  has qemu-system-aarch64 || missing+=(qemu-system-arm)
-  has aarch64-linux-gnu-gcc || missing+=(gcc-aarch64-linux-gnu)
-  [ -e /usr/aarch64-linux-gnu/lib/libc.a ] || [ -e /usr/lib/aarch64-linux-gnu/libc.a ] || missing+=(libc6-dev-arm64-cross)
-  has dtc || missing+=(device-tree-compiler)
-  has cpio || missing+=(cpio)
-  has xz || missing+=(xz-utils)
-  echo "${missing[*]}"
-}
-
-packages="$(missing_linux_packages)"
-if [ -n "$packages" ]; then
-  if [ "$(id -u)" -ne 0 ] || ! has apt-get; then die "programs are missing; run: sudo apt-get install $packages"; fi
-  echo "colonnade: installing $packages"
-  mkdir -p .cache
-  # shellcheck disable=SC2086 # a list of package names
-  DEBIAN_FRONTEND=noninteractive apt-get -o Dpkg::Lock::Timeout=300 install -y --no-install-recommends $packages \
-    </dev/null >.cache/apt-linux.log 2>&1 || die "apt-get install $packages failed: see .cache/apt-linux.log"
-fi
-[ ! -e "$environment/ready" ] || exit 0
+environment="$1"
 
 # apt with lists of its own, so that a foreign architecture does not become one of this system.
 { has apt-get && has dpkg-deb; } || die "Debian's kernel is fetched by apt-get, which is not here"
