@@ -139,23 +139,29 @@ missing_packages() {
   echo "${missing[*]}"
 }
 
+# A setting of pip's files; nothing if they have none.
+pip_setting() {
+  { "$(dirname "$uv")/python" -m pip config list 2>/dev/null || true; } | sed -n "s/^[a-z]*\.$1='\(.*\)'\$/\1/p" | tail -n 1
+}
+
 # Installs a lock of host/locks into an environment: by uv, or by pip where .venv has no uv yet or uv fails. Both reject
 # files whose hash is not in the lock.
 # Usage: install_locked ENVIRONMENT LOCK [OPTION OF BOTH]…
 install_locked() {
-  local environment="$1" lock="$2" log="$root/.cache/pip-$2.log" different="" index place sources=()
+  local environment="$1" lock="$2" log="$root/.cache/pip-$2.log" different="" index certificates place sources=()
   shift 2
   mkdir -p "$root/.cache"
   set -- --no-deps --require-hashes "$@" -r "$root/host/locks/$lock.txt"
   export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_INPUT=1
   if [ -x "$uv" ]; then
-    # uv does not read where pip's settings look for packages.
-    index="$("$(dirname "$uv")/python" -m pip config get global.index-url 2>/dev/null || true)"
-    index="${PIP_INDEX_URL:-$index}"
+    # uv does not read where pip's settings look for packages, and whose certificates they trust.
+    index="${PIP_INDEX_URL:-$(pip_setting index-url)}"
+    certificates="${PIP_CERT:-$(pip_setting cert)}"
     [ -z "$index" ] || sources+=(--default-index "$index")
     for place in ${PIP_FIND_LINKS:-}; do sources+=(--find-links "$place"); done
     [ -z "${PIP_NO_INDEX:-}" ] || sources+=(--no-index)
-    "$uv" pip install --python "$environment/bin/python" "${sources[@]}" "$@" >"$log" 2>&1 </dev/null && return
+    SSL_CERT_FILE="${certificates:-${SSL_CERT_FILE:-}}" "$uv" pip install --python "$environment/bin/python" "${sources[@]}" "$@" \
+      >"$log" 2>&1 </dev/null && return
     different="$(sed -nE 's/.*Hash mismatch for `([^`]*)`.*/\1/p' "$log" | head -n 1)"
   fi
   if [ -z "$different" ]; then
