@@ -3,7 +3,12 @@
 /** The tab reads so many triangles; the command line reads more. */
 const MOST_TRIANGLES = 4_000_000;
 
-/** Collects polygons as fans of triangles. */
+/** Refuses a mesh of too many triangles. */
+export function checkTriangles(count) {
+  if (count > MOST_TRIANGLES) throw new Error(`the mesh has more than ${MOST_TRIANGLES.toLocaleString("en")} triangles: the command line reads larger ones`);
+}
+
+/** Collects the triangles of glTF primitives. */
 export class Corners {
   constructor() {
     this.faces = [];
@@ -23,24 +28,22 @@ export class Corners {
   }
 
   /** `material`: a number; `uvs`, `metalUvs`, `emissiveUvs`: positions in its textures; null for none, as of normals and colours, of `relief` and of `alphas`. */
-  add(vertices, normals, colours, material = 0, uvs = null, metalUvs = null, emissiveUvs = null, relief = null, alphas = null) {
-    for (let i = 1; i + 1 < vertices.length; ++i) {
-      this.materials.push(material);
-      this.reliefs.push(relief);
-      this.hasOwnColours.push(Number(Boolean(colours)));
-      for (const corner of [0, i, i + 1]) {
-        this.faces.push(vertices[corner]);
-        this.alphas.push(alphas?.[corner] ?? 1);
-        this.normals.push(...(normals?.[corner] ?? [0, 0, 0]));
-        this.colours.push(...(colours?.[corner] ?? [1, 1, 1]));
-        this.uvs.push(...(uvs?.[corner] ?? [0, 0]));
-        this.metalUvs.push(...(metalUvs?.[corner] ?? [0, 0]));
-        this.emissiveUvs.push(...(emissiveUvs?.[corner] ?? [0, 0]));
-      }
+  add(vertices, normals, colours, material, uvs, metalUvs, emissiveUvs, relief, alphas) {
+    this.materials.push(material);
+    this.reliefs.push(relief);
+    this.hasOwnColours.push(Number(Boolean(colours)));
+    this.faces.push(...vertices);
+    for (const corner of [0, 1, 2]) {
+      this.alphas.push(alphas?.[corner] ?? 1);
+      this.normals.push(...(normals?.[corner] ?? [0, 0, 0]));
+      this.colours.push(...(colours?.[corner] ?? [1, 1, 1]));
+      this.uvs.push(...(uvs?.[corner] ?? [0, 0]));
+      this.metalUvs.push(...(metalUvs?.[corner] ?? [0, 0]));
+      this.emissiveUvs.push(...(emissiveUvs?.[corner] ?? [0, 0]));
     }
-    if (this.faces.length > 3 * MOST_TRIANGLES) throw new Error(`the mesh has more than ${MOST_TRIANGLES.toLocaleString("en")} triangles: the command line reads larger ones`);
-    this.hasNormals ||= Boolean(normals?.some(Boolean));
-    this.hasColours ||= Boolean(colours?.some(Boolean));
+    checkTriangles(this.faces.length / 3);
+    this.hasNormals ||= Boolean(normals);
+    this.hasColours ||= Boolean(colours);
   }
 
   /** The numbers of the faces' normal maps, -1 for none, positions in them and tangents of three corners each. */

@@ -231,6 +231,11 @@ export class Library {
     );
   }
 
+  /** The alpha of a texture by another picture. */
+  mask({ pixels, alpha, ...mask }, { width, height }) {
+    return this.result([pixels, alpha], Uint8Array, width * height, (p, a, to) => this.wasm.colonnade_read_mask(p, a, mask.width, mask.height, width, height, to));
+  }
+
   /** Values, of which those of equal kinds are merged until so many are left. */
   merged(values, weights, kinds, left) {
     return this.result([Float64Array.from(values), Float64Array.from(weights), Int32Array.from(kinds)], Float64Array, values.length, (v, w, k, to) => this.wasm.colonnade_model_merge(v, w, k, values.length, left, to));

@@ -182,14 +182,14 @@ function openFiles(promise) {
   queue.add("Reading the files", async () => {
     const files = new Map(await Promise.all([...(await promise)].map(async (file) => /** @type {const} */ ([file.name, new Uint8Array(await file.arrayBuffer())]))));
     const names = [...files.keys()];
-    const mesh = names.find((name) => /\.(obj|ply|glb|gltf)$/i.test(name));
+    const mesh = names.find((name) => /\.(obj|ply|stl|off|glb|gltf)$/i.test(name));
     if (!mesh && names.some((name) => /\.(jpe?g|png|webp|npy)$/i.test(name))) return openRoom(roomFiles(files), files);
     const name = mesh ?? names[0];
     if (name !== undefined) await readFile(name, files.get(name), files);
   });
 }
 
-const openTeapot = () => readFile("teapot.ply", page.teapot, new Map());
+const openTeapot = () => readFile("teapot.ply", null, new Map());
 
 // Controls, and the link
 
@@ -335,11 +335,11 @@ function drawn() {
 
 async function start() {
   const texts = JSON.parse(element("data").textContent);
-  const [code, json, teapot] = await Promise.all([texts.module, texts.data, texts.teapot].map(unpack));
+  const [code, json] = await Promise.all([texts.module, texts.data].map(unpack));
   data = JSON.parse(new TextDecoder().decode(json));
   // Links have names: those of objects are none
   for (const name of ["manifests", "rooms", "views", "sliders", "cycles"]) Object.setPrototypeOf(data[name], null);
-  Object.assign(page, { module: code, teapot });
+  page.module = code;
   for (const name of Object.keys(data.rooms)) form.elements.room.add(new Option(name));
   for (const name of ["light", "bounces"]) [form.elements[name].min, form.elements[name].max] = RANGES[name];
   listDesigns(data);

@@ -16,7 +16,7 @@ export const shownEmission = (emission) => emission.map((value) => value / Math.
 export const microfacetAlbedo = (roughness) => 1 - roughness ** 4 / (0.25 + 0.9 * roughness ** 2 + 0.55 * roughness ** 4);
 
 /** The pixels of a picture's bytes, red, green and blue, and their alpha; null if all are opaque. */
-async function decodedPicture(bytes) {
+export async function decodedPicture(bytes) {
   const bitmap = await createImageBitmap(new Blob([bytes]), { premultiplyAlpha: "none", colorSpaceConversion: "none" });
   const { width, height } = bitmap;
   if (width * height > MOST_PIXELS) throw new Error("too large");
@@ -27,8 +27,8 @@ async function decodedPicture(bytes) {
   return { width, height, alpha: alpha.some((value) => value < 255) ? alpha : null, pixels: Uint8Array.from({ length: 3 * width * height }, (_, i) => data[4 * Math.floor(i / 3) + (i % 3)]) };
 }
 
-/** Decodes the pictures of a mesh's textures; surfaces of one that cannot be have their plain colours. */
-export async function decodePictures(mesh, decodePicture = decodedPicture) {
+/** The mesh with its textures' pictures decoded; surfaces of one that cannot be have their plain colours. */
+export async function decodePictures(mesh, decodePicture) {
   for (const texture of mesh.textures ?? []) Object.assign(texture, texture.picture ? await decodePicture(texture.picture).catch(() => null) : null);
   const isMissing = (use) => use && !mesh.textures[use.texture].pixels;
   for (const material of mesh.materials ?? [])
@@ -38,8 +38,14 @@ export async function decodePictures(mesh, decodePicture = decodedPicture) {
         mesh.notes.push("pictures of textures are missing, damaged or of another format than PNG, JPEG and WebP: their surfaces have plain colours");
       }
   if (mesh.relief) mesh.relief.mapOf = mesh.relief.mapOf.map((map) => (map < 0 || isMissing(mesh.relief.maps[map]) ? -1 : map));
-  while ((mesh.textures ?? []).reduce((sum, { pixels }) => sum + (pixels?.length ?? 0) / 3, 0) > KEPT_PIXELS) mesh.textures.forEach(halve);
+  keptWithin(mesh.textures ?? []);
   mesh.notes = [...new Set(mesh.notes)];
+  return mesh;
+}
+
+/** Halves textures until they have no more pixels than are kept. */
+export function keptWithin(textures) {
+  while (textures.reduce((sum, { pixels }) => sum + (pixels?.length ?? 0) / 3, 0) > KEPT_PIXELS) textures.forEach(halve);
 }
 
 /** Every second pixel of a texture, as the mean of the four. */

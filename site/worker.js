@@ -9,7 +9,7 @@ import { resizedPhoto } from "./photo.js";
 import { prepareRoom, roomBox } from "./room.js";
 import { renderRtl } from "./rtl.js";
 import { Sums, codeOf } from "./sums.js";
-import { decodePictures, surfacesOf } from "./surfaces.js";
+import { surfacesOf } from "./surfaces.js";
 
 /** A band has this many rows, or fewer: a worker listens again after so many pixels. */
 const [BAND, BAND_PIXELS] = [4, 2560];
@@ -52,9 +52,7 @@ export function serve(scope) {
     },
     /** `animation`: the number of that which moves the mesh, or null; unless given the first. */
     async read({ name, bytes, files, animation }) {
-      const found = readMesh(name, bytes, files, animation);
-      await decodePictures(found);
-      read = prepared(library, found);
+      read = prepared(library, await readMesh(library, name, bytes, files, animation));
       const { vertices, faces, colours, materials, animations, animation: own, notes } = read;
       return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, hasMaterials: Boolean(materials), animations, animation: own, notes };
     },

@@ -7,6 +7,7 @@ void bind_environment(nb::module_& module);
 void bind_bvh(nb::module_& module);
 void bind_clip(nb::module_& module);
 void bind_driver(nb::module_& module);
+void bind_files(nb::module_& module);
 void bind_fixed_order(nb::module_& module);
 void bind_instances(nb::module_& module);
 void bind_leaf(nb::module_& module);
@@ -25,6 +26,7 @@ NB_MODULE(_core, module) {
     bind_bvh(module);
     bind_clip(module);
     bind_driver(module);
+    bind_files(module);
     bind_fixed_order(module);
     bind_instances(module);
     bind_leaf(module);

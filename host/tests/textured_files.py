@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from colonnade.mesh.files.formats import read_surface
+from colonnade.mesh.materials.materials import MeshMaterial
+
 #: Red, green, blue, white, from the upper left corner on.
 FOUR = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
 
@@ -46,3 +49,10 @@ def gltf(folder: Path, pixels: np.ndarray = FOUR, **changes: Any) -> Path:
     }
     (folder / "a.gltf").write_text(json.dumps(document | changes))
     return folder / "a.gltf"
+
+
+def of_mtl(folder: Path, *lines: str) -> MeshMaterial:
+    """The material of lines of an MTL file, whose colours are linear."""
+    (folder / "a.mtl").write_text("\n".join(("# Blender", "newmtl a", *lines)))
+    (folder / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+    return read_surface(folder / "a.obj").surface.materials[1]

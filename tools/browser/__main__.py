@@ -14,31 +14,16 @@ import bundle
 import colonnade
 import designs
 import module
-import numpy as np
 import rooms
 import rtl
 import studies
 from colonnade.common.atomic_files import replacing
 from colonnade.design.manifest import Manifest
-from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials.mesh import Mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 OUTPUT = ROOT / "out" / "browser"
 #: The design whose RTL the page has.
 RTL = "tiny"
-
-
-def ply(mesh: Mesh) -> bytes:
-    """A mesh as a PLY file with exact positions, without normals."""
-    head = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\nproperty double x\n"
-        f"property double y\nproperty double z\nelement face {len(mesh.faces)}\n"
-        "property list uchar int vertex_indices\nend_header\n"
-    )
-    faces = np.zeros(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
-    faces["count"], faces["corners"] = 3, mesh.faces
-    return head.encode() + mesh.vertices.astype("<f8").tobytes() + faces.tobytes()
 
 
 def main() -> None:
@@ -71,7 +56,6 @@ def main() -> None:
         "module": code.read_bytes(),
         "data": json.dumps(data, separators=(",", ":")).encode(),
         "rtl": rtl_code.read_bytes(),
-        "teapot": ply(load_mesh("teapot")),
     }
     for name, text in (
         ("index.html", bundle.page(contents)),

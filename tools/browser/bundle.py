@@ -14,7 +14,7 @@ SITE = ROOT / "site"
 #: Modules after the modules that they import.
 WORKER = (
     *("design", "library", "corners", "gltfchecks", "gltfdocument", "photo", "surfaces", "coverage", "gltfmaterials"),
-    *("gltfclip", "gltf", "meshes", "sums", "depth", "encoder", "room", "rtl", "worker"),
+    *("gltfclip", "gltf", "polygons", "meshes", "sums", "depth", "encoder", "room", "rtl", "worker"),
 )
 PAGE = (
     *("camera", "design", "photo", "surfaces", "roomview", "path", "panels", "orbit", "queue", "renderer", "state"),

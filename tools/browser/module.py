@@ -23,7 +23,7 @@ CPP = (*PLAIN, "-Dthrow=__builtin_trap(),")
 #: Sources that run once for a scene, or for microseconds once a frame: compiled for size, not for speed.
 SMALL = (
     *("colonnade_pack", "colonnade_surfaces", "colonnade_environment", "colonnade_instances", "colonnade_motion"),
-    *("colonnade_mesh_build", "colonnade_mesh_file", "colonnade_motion_bend", "colonnade_view"),
+    *("colonnade_mesh_build", "colonnade_mesh_file", "colonnade_motion_bend", "colonnade_read", "colonnade_view"),
     *("colonnade_view_file", "colonnade_view_outline", "colonnade_view_poses", "colonnade_words"),
 )
 Source = tuple[str, Path, tuple[str, ...]]
@@ -40,6 +40,7 @@ SOURCES: tuple[Source, ...] = (
 HEADERS = (
     LIBRARY / "colonnade_model.h",
     LIBRARY / "colonnade_environment.h",
+    LIBRARY / "colonnade_read.h",
     LIVE / "live.h",
     DRIVER / "include" / "colonnade_view.h",
 )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from colonnade import _core
 from colonnade.common.limits import KEPT_TEXTURE_PIXELS, MAX_PIXELS
 from colonnade.common.terminal_text import one_line
 
@@ -28,6 +29,14 @@ class Loss:
         return Loss(f"{noun} is {what}", f"{plural or noun + 's'} are {what}", instead)
 
 
+#: The words of those that the readers of ``cpp/mesh/files`` count, too.
+_WORDS = _core.losses()
+
+
+def _shared(name: str) -> Loss:
+    return Loss(*_WORDS[name])
+
+
 TEXTURES = Loss.of("texture", "not shown", "only textures of the base colour are")
 #: Textures of glTF materials by their key.
 MAPS = {
@@ -38,33 +47,23 @@ MAPS = {
     "occlusionTexture": Loss.of("occlusion map", "not shown", "ambient light reaches all surfaces"),
     "emissiveTexture": Loss.of("emission map", "averaged", "a face emits one of four colours"),
 }
-TEXTURE_OBJ = Loss.of("texture map", "not shown", "only map_Kd is")
 OUTSIDE_PICTURES = Loss.of(
     "picture of a texture",
     "outside of the mesh's folder",
     "surfaces have their base colour; copies in the folder are read",
     "pictures of textures",
 )
-NO_PICTURES = Loss.of("picture of a texture", "missing", "surfaces have their base colour", "pictures of textures")
-PICTURE_FORMATS = Loss.of(
-    "picture of a texture", "not readable", "pictures must be PNG, JPEG, WebP or TGA", "pictures of textures"
-)
-DAMAGED_PICTURES = Loss.of(
-    "picture of a texture", "truncated or damaged", "surfaces have their base colour", "pictures of textures"
-)
+NO_PICTURES = _shared("NO_PICTURES")
+PICTURE_FORMATS = _shared("PICTURE_FORMATS")
+DAMAGED_PICTURES = _shared("DAMAGED_PICTURES")
 LARGE_PICTURES = Loss.of(
     "picture of a texture", "too large", f"a picture may have {MAX_PIXELS:,} pixels", "pictures of textures"
 )
 NO_MAP_UVS = Loss.of(
     "face with a normal map", "smooth", "texture coordinates of the map are missing", "faces with a normal map"
 )
-NO_UVS = Loss.of(
-    "face of a textured material", "untextured", "texture coordinates are missing", "faces of a textured material"
-)
-TEXTURED_COLOURS = Loss.of("colour of a textured face", "not shown", "textures are", "colours of textured faces")
-TEXTURE_OPTIONS = Loss.of(
-    "option of a texture map", "not used", "only -s, -o and -clamp are", "options of texture maps"
-)
+NO_UVS = _shared("NO_UVS")
+TEXTURED_COLOURS = _shared("TEXTURED_COLOURS")
 LIGHTS = Loss.of("light", "not used", "the scene file has the lights")
 CAMERAS = Loss.of("camera", "not used", "the scene file has the camera")
 ANIMATIONS = Loss.of("animation", "not played", "nodes stand as the file places them")
@@ -96,78 +95,44 @@ MATERIAL_GROUPS = Loss.of(
     "group of materials or colours", "not read", "faces have the default material", "groups of materials or colours"
 )
 WRAPS = Loss.of("wrap of a texture", "not used", "pictures repeat", "wraps of textures")
-LINES = Loss.of("line primitive", "not shown", "only faces are rendered")
-POINTS = Loss.of("point primitive", "not shown", "only faces are rendered")
-CURVES = Loss.of("free-form curve or surface", "not shown", "only faces are rendered", "free-form curves and surfaces")
-BLENDED = Loss.of(
-    "partly transparent material",
-    "not blended",
-    "from alpha 1/2 on it is opaque, else a tinted pane or not shown",
-)
+LINES = _shared("LINES")
+POINTS = _shared("POINTS")
+BLENDED = _shared("BLENDED")
 COVERED = Loss.of(
     "partly transparent material",
     "not blended",
     "from alpha 1/2 on it is opaque, else a tinted pane: frame.samples of 2 or more blend it",
 )
 COARSE_CUTS = Loss.of("alpha mask", "cut coarsely", "outlines have more detail than the mesh may have faces")
-EMISSION = Loss.of(
-    "emissive mirror or glass", "not emitting", "only diffuse surfaces do", "emissive mirrors or glasses"
-)
-BRIGHT = Loss(
-    "material shines brighter than the hardware shows",
-    "materials shine brighter than the hardware shows",
-    "the largest channel of an emission is 1",
-)
+EMISSION = _shared("EMISSION")
+BRIGHT = _shared("BRIGHT")
 UNLIT = Loss.of("unlit material", "lit", "a matt surface has its base colour")
 ROUGH_MIRROR = Loss.of("slightly rough metal", "a perfect mirror", "paths.gather = 1 renders blurred reflections")
 ROUGH_METAL = Loss.of("rough metal", "diffuse", "paths.gather = 1 renders blurred reflections")
 ROUGH_GLASS = Loss.of("rough glass", "perfectly clear", "paths.gather = 1 renders its roughness", "rough glasses")
 ROUGHEST_GLASS = Loss.of("rough glass", "as rough as 1/2", "no glass is rougher", "rough glasses")
 PARTLY_METAL = Loss.of("partly metallic material", "rounded to diffuse or mirror", "1/2 and above is a mirror")
-PARTLY_GLASS = Loss.of("partly transmissive material", "rounded to opaque or glass", "above 1/2 is glass")
+PARTLY_GLASS = _shared("PARTLY_GLASS")
 LAMPS = Loss.of("slightly rough surface", "without highlights", "frame.samples of 2 or more render those of lamps")
 COATS = Loss.of("glossy material", "matt", "paths.gather = 1 and frame.samples of 2 or more render its reflections")
 CLEAR_COATS = Loss.of(
     "clear coat", "not shown", "paths.gather = 1 and frame.samples of 2 or more render its reflections"
 )
-HIGHLIGHTS = Loss.of("glossy material", "diffuse", "highlights are not rendered")
-NEGATIVE_SHININESS = Loss.of(
-    "material's negative Ns", "taken as 0", "highlights are not rendered", "materials' negative Ns"
-)
-NO_VALUES = Loss.of(
-    "value of a material", "not read", "a colour has three numbers, others have one", "values of materials"
-)
-CLIPPED_COLOURS = Loss.of("colour of a vertex", "clipped", "colours are from 0 to 1", "colours of vertices")
-DARK_COLOURS = Loss.of("colour of a vertex", "black", "colours are finite numbers", "colours of vertices")
-SOME_COLOURS = Loss.of("colour of a vertex", "not shown", "not all vertices have one", "colours of vertices")
-NO_MATERIALS = Loss.of("file of materials", "missing", "faces have the default material", "files of materials")
-UNKNOWN_MATERIALS = Loss.of("material name", "not defined", "faces have the default material")
-GROUPS = Loss.of("smoothing group", "not used", "edges are smooth up to the crease angle")
+CLIPPED_COLOURS = _shared("CLIPPED_COLOURS")
 SCENES = Loss.of("further scene", "not shown", "only the default scene is rendered")
 #: A line without a number, the last one: most open surfaces are single-sided, and few are seen from behind.
 BACKS = "open single-sided surfaces are shown from behind: viewers show their front only"
-SHORT_FACES = Loss.of(
-    "face of fewer than three corners", "left out", "they have no area", "faces of fewer than three corners"
-)
-CROSSED = Loss(
-    "polygon crosses or folds over itself",
-    "polygons cross or fold over themselves",
-    "triangles may overlap",
-)
+SHORT_FACES = _shared("SHORT_FACES")
+CROSSED = _shared("CROSSED")
 SPARE_CORNERS = Loss.of(
     "corner after the last triangle", "left out", "a triangle has three", "corners after the last triangle"
 )
-SPARE_BYTES = Loss.of(
-    "byte after the last facet", "not read", "the header has the number of facets", "bytes after the last facet"
-)
-FACET_COLOURS = Loss.of("facet colour", "not shown", "STL has no standard for them")
 COLOURS = Loss(
     "colour of vertices or faces is the albedo of its faces",
     "colours of vertices or faces are the albedo of their faces",
     "a face has one colour, the mean of its corners",
 )
-ALPHA = Loss.of("partly transparent vertex", "opaque", "transparency is not rendered", "partly transparent vertices")
-FACE_ALPHA = Loss.of("partly transparent face", "opaque", "transparency is not rendered")
+ALPHA = _shared("ALPHA")
 FLIPPED = Loss(
     "face has normals that point to its back", "faces have normals that point to their back", "they are negated"
 )
@@ -177,15 +142,11 @@ REPLACED = Loss(
     "corner normals point to the back of their face",
     _COMPUTED,
 )
-MISSING = Loss("corner has no normal", "corners have no normal", _COMPUTED)
+MISSING = _shared("MISSING")
 MIXED = Loss.of(
     "closed part with mixed winding", "repaired", "all faces point outward", "closed parts with mixed winding"
 )
 INVERTED = Loss.of("inside-out closed part", "turned outward", "the faces are reversed")
-
-SURPLUS = Loss.of(
-    "value beyond those of the header", "not read", "a row has those of the header", "values beyond those of the header"
-)
 
 
 def shrunk_textures(factor: int) -> Loss:
@@ -198,11 +159,6 @@ def shrunk_textures(factor: int) -> Loss:
 def smooth_normals(degrees: float) -> Loss:
     """The loss of normal maps with more detail than corner normals show, so many degrees in the root mean square."""
     return Loss.of("normal map", "smoothed", f"corner normals differ from it by {degrees:.0f} degrees")
-
-
-def unread_properties(names: Sequence[str], has_more: bool) -> Loss:
-    """The loss of properties of a PLY file, of which some are named."""
-    return Loss.of("property", "not read", ", ".join(names) + (" …" if has_more else ""), "properties")
 
 
 def unread_part(reason: str) -> Loss:

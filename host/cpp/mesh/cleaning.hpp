@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "files/losses.hpp"
 #include "winding.hpp"
 
 namespace colonnade::mesh {
@@ -40,13 +41,6 @@ inline std::string whyUnclean(const RawMesh& raw) {
             if (isUsed[i]) largest = std::max(largest, std::fabs(component));
         }
     return largest > 1e100 ? "the mesh has coordinates beyond 1e100: scale it down" : "";
-}
-
-/// A number with a comma after each third digit from the end.
-inline std::string grouped(std::size_t number) {
-    std::string text = std::to_string(number);
-    for (std::size_t end = text.size(); end > 3; end -= 3) text.insert(end - 3, ",");
-    return text;
 }
 
 /// `sourceFaces`: the number of faces of the file, for messages.

@@ -16,7 +16,7 @@ for (const each of [library, other]) each.open(manifest);
 const result = {};
 for (const name of job.files) {
   try {
-    const mesh = prepared(library, readMesh(name, Uint8Array.from(readFileSync(`${folder}/${name}`)), new Map(), job.animation));
+    const mesh = prepared(library, await readMesh(library, name, Uint8Array.from(readFileSync(`${folder}/${name}`)), new Map(), job.animation));
     const packed = library.pack(mesh, surfacesOf(library, mesh, { manifest, gathers: false, headroom: 1 }));
     const [rest, clip] = [library.records(packed), library.clipFile()];
     writeFileSync(`${folder}/${name}.rest`, rest);

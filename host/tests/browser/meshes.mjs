@@ -12,7 +12,7 @@ library.open(job.manifest);
 const result = {};
 for (const name of readdirSync(folder).filter((each) => each !== "job.json")) {
   try {
-    const mesh = readMesh(name, Uint8Array.from(readFileSync(`${folder}/${name}`)), new Map(), null);
+    const mesh = await readMesh(library, name, Uint8Array.from(readFileSync(`${folder}/${name}`)), new Map(), null);
     library.pack(mesh);
     const corners = [...mesh.faces].flatMap((vertex) => [...mesh.vertices.subarray(3 * vertex, 3 * vertex + 3)]);
     result[name] = { corners, normals: mesh.normals && [...mesh.normals], colours: mesh.colours && [...mesh.colours] };

@@ -7,7 +7,7 @@ import { prepared } from "../../../site/coverage.js";
 import { registerWrites } from "../../../site/design.js";
 import { Library } from "../../../site/library.js";
 import { readMesh } from "../../../site/meshes.js";
-import { decodePictures, surfacesOf } from "../../../site/surfaces.js";
+import { surfacesOf } from "../../../site/surfaces.js";
 import { tableRegisters } from "../../../site/view.js";
 
 const folder = process.argv[2];
@@ -15,16 +15,17 @@ const read = (name) => Uint8Array.from(readFileSync(name));
 const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
 const library = await Library.from(readFileSync(job.module));
 library.open(job.manifest);
-const found = readMesh(job.file, read(job.path), new Map(job.files.map((name) => [name, read(`${job.beside}/${name}`)])), job.animation ?? null);
 let number = -1;
-await decodePictures(found, async (bytes) => {
+const decode = async (bytes) => {
   ++number;
   if (!job.pictures) return void writeFileSync(`${folder}/picture-${number}`, bytes);
   const { width, height, hasAlpha } = job.pictures[number];
   const rgba = read(`${folder}/${number}.bin`);
   const channels = (first, count) => Uint8Array.from({ length: count * width * height }, (_, i) => rgba[4 * Math.floor(i / count) + first + (i % count)]);
   return { width, height, pixels: channels(0, 3), alpha: hasAlpha ? channels(3, 1) : null };
-});
+};
+const files = new Map(job.files.map((name) => [name, read(`${job.beside}/${name}`)]));
+const found = await readMesh(library, job.file, read(job.path), files, job.animation ?? null, decode);
 if (job.pictures) render(prepared(library, found));
 
 function render(mesh) {

@@ -72,17 +72,19 @@ def test_files_are_read_and_what_is_left_out_is_said(context: BrowserContext, tm
     with tab.another_frame():
         page.set_input_files("#file", tmp_path / "four.obj")
         expect(page.locator("#mesh")).to_have_text("four.obj")
-        expect(page.locator("#notes")).to_have_text("lines, points and curves are left out")
+        expect(page.locator("#notes")).to_have_text("1 line primitive is not shown: only faces are rendered")
     assert page.evaluate("[colonnade.packed.triangles, colonnade.mesh.hasColours]") == [4, True]
     colours = np.reshape(tab.picture()["colours"], (-1, 3))
     assert len(np.unique(colours, axis=0)) > 50
     # A drop, of a file that is none
     tab.drop("broken.ply", "ply nothing")
-    expect(page.locator("#error")).to_have_text("this is no PLY file")
+    expect(page.locator("#error")).to_have_text("broken.ply cannot be read as a mesh: its PLY header has no end")
     tab.drop(
         "huge.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\nproperty float x\nend_header\n"
     )
-    expect(page.locator("#error")).to_have_text("huge.ply is damaged, or no PLY file")
+    expect(page.locator("#error")).to_have_text(
+        "mesh huge.ply is truncated: its header states 999,999,999,999 rows of vertex, the file ends before"
+    )
     tab.drop("cycle.gltf", json.dumps(triangle_document() | {"nodes": [{"children": [0]}]}))
     expect(page.locator("#error")).to_have_text("mesh cycle.gltf: node 0 is its own ancestor: export it again")
     with tab.another_frame():

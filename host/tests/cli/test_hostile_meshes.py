@@ -108,7 +108,7 @@ CASES = {
     "obj-index-digits": Case(OBJ, "but the file has", {"x.obj": f"{POINTS}f 1 2 {'9' * 400}\n"}),
     "obj-index-text": Case(OBJ, "not an integer", {"x.obj": f"{POINTS}f a b c\n"}),
     "obj-index-float": Case(OBJ, "not an integer", {"x.obj": f"{POINTS}f 1.5 2 3\n"}),
-    "obj-index-5000-digits": Case(OBJ, "not an integer", {"x.obj": f"{POINTS}f 1 2 {'9' * 5000}\n"}),
+    "obj-index-5000-digits": Case(OBJ, "but the file has 3 vertices", {"x.obj": f"{POINTS}f 1 2 {'9' * 5000}\n"}),
     "obj-two-corners": Case(OBJ, "x.obj", {"x.obj": f"{POINTS}f 1 2\n"}),
     "obj-nan": Case(OBJ, "not a finite number", {"x.obj": "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}),
     "obj-infinite": Case(OBJ, "not a finite number", {"x.obj": "v 1e999 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}),

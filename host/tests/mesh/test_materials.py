@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
-from textured_files import gltf
+from textured_files import gltf, of_mtl
 from trimesh.visual.material import PBRMaterial
 
 from colonnade.common.errors import UserError
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials.materials import PLAIN, MeshMaterial, from_gltf, from_mtl
+from colonnade.mesh.materials.materials import PLAIN, MeshMaterial, from_gltf
 
 
 def test_gltf_materials() -> None:
@@ -65,15 +65,18 @@ def test_an_emission_beyond_1_keeps_its_hue_and_is_noted(tmp_path: Path) -> None
         assert [one.partition(": ")[2] for one in mesh.notes] == [note]
 
 
-def test_mtl_materials() -> None:
-    assert from_mtl({"kd": [0.1, 0.2, 0.3], "illum": ["2"]}) == MeshMaterial("diffuse", (0.1, 0.2, 0.3))
-    assert from_mtl({"kd": [0.1, 0.2, 0.3], "pm": ["1.0"]}).kind == "mirror"
-    assert from_mtl({"illum": ["3"]}) == MeshMaterial("mirror", PLAIN.albedo)
-    assert from_mtl({"d": ["0.1"], "ni": ["1.0"], "tf": ["1", "0.5", "2"]}) == MeshMaterial("glass", (1.0, 0.5, 1.0))
-    assert from_mtl({"tr": ["0.8"], "ni": ["1.45"]}) == MeshMaterial("glass", PLAIN.albedo, 1.45)
-    assert from_mtl({"tr": ["1.0"]}) == PLAIN  # as MeshLab writes opaque ones
-    assert from_mtl({"tr": ["0.9"], "d": ["1"]}) == PLAIN
-    assert from_mtl({"kd": "noise", "d": ["nan"], "illum": []}) == PLAIN
+def test_mtl_materials(tmp_path: Path) -> None:
+    for lines, material in (
+        (["Kd 0.1 0.2 0.3", "illum 2"], MeshMaterial("diffuse", (0.1, 0.2, 0.3))),
+        (["Kd 0.1 0.2 0.3", "Pm 1.0"], MeshMaterial("mirror", (0.1, 0.2, 0.3))),
+        (["illum 3"], MeshMaterial("mirror", PLAIN.albedo)),
+        (["d 0.1", "Ni 1.0", "Tf 1 0.5 2"], MeshMaterial("glass", (1.0, 0.5, 1.0))),
+        (["Tr 0.8", "Ni 1.45"], MeshMaterial("glass", PLAIN.albedo, 1.45)),
+        (["Tr 1.0"], PLAIN),  # as MeshLab writes opaque ones
+        (["Tr 0.9", "d 1"], PLAIN),
+        (["Kd noise", "d -", "illum"], PLAIN),
+    ):
+        assert of_mtl(tmp_path, *lines) == material, lines
 
 
 @pytest.mark.parametrize("texture", [{}, {"baseColorTexture": {"index": 0}}], ids=["plain", "textured"])
@@ -130,7 +133,14 @@ def test_an_obj_file_keeps_its_materials_apart(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("head", "is_linear"),
-    [("", False), ("# Blender 4.2.0 MTL File: 'a.blend'\n", True), ("# Blenderer\n", False), ("\n#Blender\n", True)],
+    [
+        ("", False),
+        ("# Blender 4.2.0 MTL File: 'a.blend'\n", True),
+        ("# Blender: linear colours\n", True),
+        ("\n#Blender\n", True),
+        ("# Blenderer\n", False),
+        ("# Blender\u00e4\n", False),
+    ],
 )
 def test_colours_of_mtl_files_are_srgb_but_of_blender(tmp_path: Path, head: str, is_linear: bool) -> None:
     """Most viewers take Kd as sRGB; Blender writes and reads linear colours."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+from textured_files import of_mtl
 
 from colonnade.mesh.load import load_mesh
 from colonnade.mesh.materials.materials import (
@@ -16,7 +18,6 @@ from colonnade.mesh.materials.materials import (
     MeshMaterial,
     as_rendered,
     from_gltf,
-    from_mtl,
     in_layer,
 )
 from colonnade.mesh.materials.palette import with_rendered_metal
@@ -82,23 +83,23 @@ def test_a_metal_is_a_mirror_up_to_where_diffuse_is_nearer() -> None:
     assert abs(crossing - MIRROR_ROUGHNESS) < 0.05
 
 
-def test_rough_metal_is_diffuse_without_gathered_light() -> None:
+def test_rough_metal_is_diffuse_without_gathered_light(tmp_path: Path) -> None:
     for roughness, kind in ((0.0, "mirror"), (0.35, "mirror"), (0.36, "diffuse"), (1.0, "diffuse")):
         surface = {"baseColorFactor": [1.0, 0.8, 0.3, 1.0], "roughnessFactor": roughness}
         found = from_gltf({"pbrMetallicRoughness": surface})
         assert found == MeshMaterial("mirror", (1.0, 0.8, 0.3), roughness=roughness)
-        assert from_mtl({"pm": ["1"], "pr": [str(roughness)]}).roughness == roughness
+        assert of_mtl(tmp_path, "Pm 1", f"Pr {roughness}").roughness == roughness
         assert as_rendered(found, gathers=False) == MeshMaterial(kind, (1.0, 0.8, 0.3))
         assert as_rendered(found, gathers=True) == found
         assert in_layer(found, "surface").kind == (ROUGH_METAL if roughness > 0.25 else "mirror")
 
 
-def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered() -> None:
+def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered(tmp_path: Path) -> None:
     """In one layer its own colour, in the other its coat; what has none is black there."""
     for roughness, coat in ((0.0, 0.25), (0.3, 0.3), (0.49, 0.49), (0.5, 0.0), (1.0, 0.0)):
         surface = {"baseColorFactor": [1.0, 0.8, 0.3, 1.0], "roughnessFactor": roughness, "metallicFactor": 0.0}
         found = from_gltf({"pbrMetallicRoughness": surface})
-        assert found.roughness == coat == from_mtl({"pr": [str(roughness)]}).roughness
+        assert found.roughness == coat == of_mtl(tmp_path, f"Pr {roughness}").roughness
         matt = MeshMaterial("diffuse", (1.0, 0.8, 0.3))
         assert as_rendered(found, gathers=False) == matt == in_layer(as_rendered(found, gathers=True), "surface")
         layer = in_layer(replace(as_rendered(found, gathers=True), has_corner_colours=True), "coat")
@@ -117,12 +118,12 @@ def test_a_glossy_dielectric_has_a_coat_where_light_is_gathered() -> None:
         assert [in_layer(glass, layer) for layer in LAYERS] == [glass, BLACK, BLACK, highlight, BLACK]
 
 
-def test_what_rough_surfaces_lose_is_named() -> None:
+def test_what_rough_surfaces_lose_is_named(tmp_path: Path) -> None:
     """Without gathered light all of it; with it what is rougher than glass can be."""
     mesh = load_mesh("cube")
     materials = (*(MeshMaterial("mirror", roughness=roughness) for roughness in (0.05, 0.2, 0.3, 0.5)), MeshMaterial())
     glass = from_gltf({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}}})
-    assert glass.roughness == 1.0 and from_mtl({"d": ["0"], "pr": ["0.2"]}).roughness == 0.2
+    assert glass.roughness == 1.0 and of_mtl(tmp_path, "d 0", "Pr 0.2").roughness == 0.2
     mesh = replace(mesh, materials=(*materials, glass))
     glossy = replace(mesh, materials=(MeshMaterial(roughness=0.3),))
     assert "glossy material is matt" in with_rendered_metal(glossy, True)[1][0]

@@ -5,12 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from colonnade.mesh.geometry.teapot import patches, tessellate
+from colonnade.mesh.geometry.teapot import tessellate
 from colonnade.mesh.load import load_mesh
-
-
-def test_it_has_32_patches() -> None:
-    assert patches().shape == (32, 4, 4, 3)
 
 
 @pytest.mark.parametrize("level", [2, 3, 10])

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from textured_files import of_mtl
 
 from colonnade.common import notes
 from colonnade.common.image_io import encode_srgb
 from colonnade.design.generator import manifest_for
 from colonnade.mesh.load import load_mesh
-from colonnade.mesh.materials.materials import MeshMaterial, from_gltf, from_mtl
+from colonnade.mesh.materials.materials import MeshMaterial, from_gltf
 from colonnade.mesh.materials.mesh import Mesh
 from colonnade.quality.image_metrics import psnr
 from colonnade.reference.render import render_reference
@@ -31,7 +33,7 @@ SCENE = Scene(
 )
 
 
-def test_gltf_and_mtl_materials_emit() -> None:
+def test_gltf_and_mtl_materials_emit(tmp_path: Path) -> None:
     strength = {"extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4.0}}}
     surface = {"pbrMetallicRoughness": {"metallicFactor": 0.0}, "emissiveFactor": [0.1, 0.2, 0.5]}
     assert from_gltf(surface).emission == (0.1, 0.2, 0.5)
@@ -39,8 +41,8 @@ def test_gltf_and_mtl_materials_emit() -> None:
     assert from_gltf({**surface, "pbrMetallicRoughness": {"roughnessFactor": 0.0}}) == MeshMaterial(
         "mirror", (1.0, 1.0, 1.0)
     )
-    assert from_mtl({"ke": ["0.25", "0", "3"]}).emission == pytest.approx((0.25 / 3, 0.0, 1.0))
-    assert from_mtl({"ke": ["1", "1", "1"], "d": "0.2"}).emission == (0.0, 0.0, 0.0)
+    assert of_mtl(tmp_path, "Ke 0.25 0 3").emission == pytest.approx((0.25 / 3, 0.0, 1.0))
+    assert of_mtl(tmp_path, "Ke 1 1 1", "d 0.2").emission == (0.0, 0.0, 0.0)
 
 
 def lamp() -> Mesh:

@@ -61,13 +61,15 @@ def test_the_image_is_of_the_base_of_continuous_integration() -> None:
     assert f"FROM ${{BASE}} AS {development['build']['target']}\n" in dockerfile
 
 
-@pytest.mark.parametrize("failing", ["", "tools/check", "tools/paper", "make"])
+@pytest.mark.parametrize("failing", ["", "tools/check", "tools/paper", "tools/reader-fuzz", "make"])
 def test_a_failed_check_or_test_fails_continuous_integration(failing: str, tmp_path: Path) -> None:
     """The same script with programs that only say their names; GitHub's workflow also runs the checks of minutes."""
     shutil.copytree(ROOT / ".ci", tmp_path / ".ci")
     for folder in ("tools", ".cache"):
         (tmp_path / folder).mkdir()
-    programs = "tools/system-packages tools/test-packages tools/driver-fuzz tools/check tools/paper make"
+    programs = (
+        "tools/system-packages tools/test-packages tools/driver-fuzz tools/reader-fuzz tools/check tools/paper make"
+    )
     for name in programs.split():
         (tmp_path / name).write_text(f'#!/bin/sh\necho "{name} $*"\nexit {int(name == failing)}\n')
         (tmp_path / name).chmod(0o755)

@@ -44,26 +44,14 @@ def read_surface(path: Path, animation: Animation | None = None) -> MeshFile:
         from colonnade.mesh.files.gltf import read_gltf
 
         surface = read_gltf(content, path, references, losses, animation)
-    elif kind == ".obj":
-        from colonnade.mesh.files.obj import read_obj
-
-        surface = read_obj(content, path, references, losses)
-    elif kind == ".ply":
-        from colonnade.mesh.files.ply import read_ply
-
-        surface = read_ply(content, path, references, losses)
-    elif kind == ".off":
-        from colonnade.mesh.files.off import read_off
-
-        surface = read_off(content, path, losses)
     elif kind in TRIMESH_SUFFIXES:
         from colonnade.mesh.files.trimesh_files import read_by_trimesh
 
         surface = read_by_trimesh(content, path, references, losses)
     else:
-        from colonnade.mesh.files.stl import read_stl
+        from colonnade.mesh.files.polygon_files import read_polygons
 
-        surface = read_stl(content, path, losses)
+        surface = read_polygons(content, path, references, losses)
     if len(surface.faces) == 0:
         raise UserError(f"mesh {path} has no faces: {'; '.join(losses.lines()) or 'it holds no polygons'}")
     return MeshFile(surface, losses)

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import math
-import re
 from itertools import product
 from pathlib import Path, PurePosixPath
 
 from colonnade.common.errors import UserError
-from colonnade.common.input_files import exists, read_input, text_of
+from colonnade.common.input_files import exists, read_input
 from colonnade.common.limits import MAX_MESH_BYTES, MAX_PICTURE_BYTES, MAX_TEXT_BYTES
 from colonnade.mesh import losses as lost
 from colonnade.mesh.losses import Losses
-
-#: A line of an MTL file with numbers, which must be finite.
-_NUMBERS = re.compile(r"(?im)^[ \t]*(k[asde]|tf|ni|ns|d|tr|illum|p[rmsc]\w*)[ \t]+(.*)$")
 
 
 class _OutsideFolder(UserError):
@@ -31,17 +26,17 @@ class References:
         self._parent = mesh.parent.resolve()
         self._folders = [self._parent]
 
-    def materials(self, name: str) -> str | None:
-        """The checked text of an MTL file; None if it is missing.
+    def materials(self, name: str) -> tuple[bytes, Path] | None:
+        """The content of an MTL file, and its place; None if it is missing.
 
         Raises:
-            UserError: The file cannot be read, is outside the folder, or has a number that is negative or not finite.
+            UserError: The file cannot be read, or is outside the folder.
         """
         path = self._find(name)
         if path is None:
             return None
         self._folders.append(path.parent)
-        return _checked_mtl(text_of(read_input(path, "the materials", MAX_TEXT_BYTES * 16)), path)
+        return read_input(path, "the materials", MAX_TEXT_BYTES * 16), path
 
     def buffer(self, name: str) -> bytes | None:
         """The content of a glTF buffer; None if it is missing.
@@ -101,19 +96,3 @@ def _in_any_case(folder: Path, name: str) -> Path:
     for part in PurePosixPath(name).parts:
         (folder,) = (one for one in folder.iterdir() if one.name.casefold() == part.casefold())
     return folder
-
-
-def _checked_mtl(text: str, path: Path) -> str:
-    """Refuse an MTL file with a number that is negative or not finite; Ns may be negative."""
-    for line in _NUMBERS.finditer(text):
-        for word in line[2].split():
-            try:
-                number = float(word)
-            except ValueError:
-                break
-            if not math.isfinite(number) or (number < 0 and line[1].lower() != "ns"):
-                row = text.count("\n", 0, line.start()) + 1
-                raise UserError(
-                    f"{path}, line {row}: {line[0].strip()}: a material's numbers must be finite and not negative"
-                )
-    return text

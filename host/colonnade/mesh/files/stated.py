@@ -11,8 +11,9 @@ from colonnade.common.limits import MAX_MESH_BYTES
 from colonnade.mesh.files.gltf_document import GltfDocument
 from colonnade.mesh.files.gltf_nodes import triangles_of
 from colonnade.mesh.files.resolver import References
-from colonnade.mesh.files.stl import FACET_BYTES, HEADER_BYTES
 
+#: Bytes before the facets of a binary STL file, and of a facet.
+HEADER_BYTES, FACET_BYTES = 84, 50
 #: Bytes in which a header ends.
 _HEAD = 1 << 16
 

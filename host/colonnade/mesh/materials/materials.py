@@ -20,7 +20,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, Literal, get_args
 
 from colonnade.mesh import losses as lost
@@ -54,8 +53,6 @@ USED_EXTENSIONS = (
 )
 #: Textures whose readers count what is lost of them.
 _READ_TEXTURES = ("baseColorTexture", "diffuseTexture", "normalTexture")
-#: Values of MTL files that are used, and how many numbers each has.
-_MTL_VALUES = {"Kd": 3, "Ke": 3, "Tf": 3, "illum": 1, "d": 1, "Tr": 1, "Ni": 1, "Pm": 1, "Pr": 1}
 #: What coats reflect, and glass of lights: between 0.04, where it faces the eye, and 0.09, the mean over a sphere.
 COAT_REFLECTANCE = 0.06
 #: Roughness from which on mirrors and glass have highlights: the device's narrowest lobe's.
@@ -280,42 +277,6 @@ def gltf_emission(material: Mapping[str, Any]) -> Vector:
     return red, green, blue
 
 
-def from_mtl(entries: Mapping[str, Any]) -> MeshMaterial:
-    """Convert a material of an MTL file, given its values by lower-case keyword as `parse_mtl` does."""
-
-    first = partial(_first, entries)
-
-    colour = _colour(entries.get("kd"), PLAIN.albedo)
-    model = first("illum", 2.0)
-    if _opacity(entries) < 0.5 or model in (4.0, 6.0, 7.0, 9.0):
-        tint, roughness = _colour(entries.get("tf"), colour), _share(first("pr", 0.0))
-        return MeshMaterial("glass", tint, _ior(first("ni", GLASS_IOR)), roughness=roughness)
-    alpha = Alpha(_opacity(entries)) if "map_d" in entries else None
-    is_metal = first("pm", 0.0) >= 0.5 or model in (3.0, 5.0)
-    if is_metal:
-        roughness = _share(first("pr", 0.0))
-        emission = _shown_emission(_mtl_emission(entries)) if roughness > MIRROR_ROUGHNESS else DARK
-        return MeshMaterial("mirror", colour, emission=emission, alpha=alpha, roughness=roughness)
-    emission = _shown_emission(_mtl_emission(entries))
-    return MeshMaterial("diffuse", colour, emission=emission, alpha=alpha, roughness=coat_roughness(first("pr", 1.0)))
-
-
-def _mtl_emission(entries: Mapping[str, Any]) -> Vector:
-    return _colour(entries.get("ke"), DARK, math.inf)
-
-
-def _opacity(entries: Mapping[str, Any]) -> float:
-    """The opacity of a material of an MTL file: `d`, else 1 - `Tr`; `Tr` of 1 is opaque, as MeshLab writes it."""
-    transparency = _first(entries, "tr", 0.0)
-    return _first(entries, "d", 1.0 if transparency >= 1.0 else 1.0 - transparency)
-
-
-def _first(entries: Mapping[str, Any], key: str, default: float) -> float:
-    """The first number of a value of an MTL file."""
-    value = entries.get(key)
-    return _number(value[0] if isinstance(value, list | tuple) and value else value, default)
-
-
 def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
     """What a picture does not show of a material of a glTF file's JSON, apart from its extensions.
 
@@ -334,42 +295,6 @@ def gltf_losses(material: Mapping[str, Any]) -> list[tuple[Loss, int]]:
         found.append((lost.PARTLY_GLASS, 1))
     elif 0.0 < metallic < 1.0:
         found.append((lost.PARTLY_METAL, 1))
-    return found
-
-
-def mtl_losses(entries: Mapping[str, Any]) -> list[tuple[Loss, int]]:
-    """What a picture does not show of a material of an MTL file, given as for `from_mtl`."""
-
-    first = partial(_first, entries)
-
-    kind = from_mtl(entries).kind
-    maps = [
-        key
-        for key in entries
-        if (key.startswith("map_") and key not in ("map_kd", "map_d"))
-        or key in ("bump", "disp", "decal", "refl", "norm")
-    ]
-    found = [(lost.TEXTURE_OBJ, len(maps))]
-    emission = _mtl_emission(entries)
-    if any(emission) and not _is_lit(from_mtl(entries)):
-        found.append((lost.EMISSION, 1))
-    elif max(emission) > 1.0:
-        found.append((lost.BRIGHT, 1))
-    opacity = _opacity(entries)
-    if 0.0 < opacity < 1.0 and "tf" not in entries:
-        found.append((lost.PARTLY_GLASS if kind == "glass" else lost.BLENDED, 1))
-    if kind == "diffuse" and first("illum", 2.0) >= 2 and any(_colour(entries.get("ks"), (0.0, 0.0, 0.0))):
-        found.append((lost.HIGHLIGHTS, 1))
-    return found
-
-
-def unread_values(entries: Mapping[str, Any]) -> list[str]:
-    """The values of a material of an MTL file that `from_mtl` replaces by defaults, each with its keyword."""
-    found = []
-    for keyword, count in _MTL_VALUES.items():
-        words = entries.get(keyword.lower(), [0.0] * count)
-        if len(words) < count or any(math.isnan(_number(word, math.nan)) for word in words[:count]):
-            found.append(" ".join((keyword, *map(str, words))))
     return found
 
 

@@ -1,4 +1,4 @@
-"""The content of a mesh file before cleaning, and its assembly from polygons."""
+"""The content of a mesh file before cleaning."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from colonnade.common import fixed_order
-from colonnade.common.srgb import linear_from_srgb
 from colonnade.common.types import Floats, Indices
 from colonnade.mesh.clips.faces import ClipFaces
-from colonnade.mesh.geometry.polygons import triangulate
-from colonnade.mesh.losses import CLIPPED_COLOURS, CROSSED, DARK_COLOURS, SHORT_FACES, TEXTURED_COLOURS, Losses
 from colonnade.mesh.materials.materials import PLAIN, MeshMaterial
 from colonnade.mesh.materials.relief import Relief
 from colonnade.mesh.materials.texture import Texture
@@ -135,75 +132,6 @@ class RawSurface:
     def material_index(self) -> Indices:
         """`face_materials`, or zeros, int64 [m]."""
         return np.zeros(len(self.faces), dtype=np.int64) if self.face_materials is None else self.face_materials
-
-
-def from_polygons(
-    vertices: Floats,
-    corners: Indices,
-    sizes: Indices,
-    losses: Losses,
-    *,
-    corner_normals: Floats | None = None,
-    materials: tuple[MeshMaterial, ...] = (PLAIN,),
-    polygon_materials: Indices | None = None,
-    vertex_colours: Floats | None = None,
-    polygon_colours: Floats | None = None,
-    textures: tuple[Texture, ...] = (),
-    corner_uvs: Floats | None = None,
-) -> RawSurface:
-    """Split polygons into triangles, with what they carry.
-
-    Args:
-        vertices: float64 [n, 3].
-        corners: Vertices of all polygons' corners, one polygon after the other, int64 [k], each below n.
-        sizes: Corners of each polygon, int64 [p].
-        losses: Counts polygons without area.
-        corner_normals: float64 [k, 3], 0 for none.
-        materials: The materials.
-        polygon_materials: int64 [p].
-        vertex_colours: float64 [n, 3], linear; not for polygons with a texture.
-        polygon_colours: float64 [p, 3], linear, NaN for none; before `vertex_colours`.
-        textures: Textures of the materials.
-        corner_uvs: Texture coordinates, float64 [k, 2].
-    """
-    split = triangulate(vertices[corners], sizes)
-    losses.add(SHORT_FACES, split.short)
-    losses.add(CROSSED, split.crossed)
-    faces = corners[split.corners]
-    colours = None if vertex_colours is None else vertex_colours[faces]
-    if polygon_colours is not None:
-        colours = np.repeat(polygon_colours[split.polygons][:, None], 3, axis=1)
-    if colours is not None and textures and polygon_materials is not None:
-        is_textured = np.array([material.texture is not None for material in materials])[polygon_materials]
-        hidden = is_textured[split.polygons]
-        losses.add(TEXTURED_COLOURS, int((hidden & (colours != 1.0).any(axis=(1, 2))).sum()))
-        colours = None if hidden.all() else np.where(hidden[:, None, None], np.nan, colours)
-    return RawSurface(
-        vertices=vertices,
-        faces=faces,
-        normals=None if corner_normals is None else corner_normals[split.corners],
-        materials=materials,
-        face_materials=None if polygon_materials is None else polygon_materials[split.polygons],
-        colours=colours,
-        textures=textures,
-        uvs=None if corner_uvs is None else corner_uvs[split.corners],
-    )
-
-
-def linear_colours(colours: Floats, white: float | None, losses: Losses) -> Floats:
-    """Linear colours of sRGB ones, float64 [n, 3]; what is clipped, or no number, is counted.
-
-    Args:
-        colours: float64 [n, 3].
-        white: Their largest value; None: 255 if one of them is above 2, else 1.
-        losses: Counts the colours that change.
-    """
-    finite = np.isfinite(colours)
-    if white is None:
-        white = 255.0 if bool((colours[finite] > 2.0).any()) else 1.0
-    losses.add(DARK_COLOURS, int((~finite).any(axis=1).sum()))
-    losses.add(CLIPPED_COLOURS, int((finite & ((colours < 0.0) | (colours > white))).any(axis=1).sum()))
-    return linear_from_srgb(np.clip(np.where(finite, colours, 0.0) / white, 0.0, 1.0))
 
 
 def joined(parts: Sequence[RawSurface]) -> RawSurface:

@@ -1,0 +1,146 @@
+// The readers of mesh files (cpp/mesh/files) for Python. Texts of files are bytes: their encoding is theirs.
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstring>
+#include <memory>
+#include <optional>
+
+#include "binding.hpp"
+#include "mesh/files/files.hpp"
+#include "mesh/teapot.hpp"
+
+using namespace nanobind::literals;
+using namespace colonnade;
+using namespace colonnade::binding;
+
+namespace {
+
+nb::bytes bytesOf(const std::string& text) { return nb::bytes(text.data(), text.size()); }
+mesh::Text textOf(const nb::bytes& bytes) { return {bytes.c_str(), bytes.size()}; }
+
+/// A numpy array of rows that have the bytes of these; None for none.
+template <class T, class Row> nb::object rowsOf(const std::vector<Row>& rows, std::initializer_list<std::size_t> inner) {
+    if (rows.empty()) return nb::none();
+    std::vector<std::size_t> shape{rows.size()};
+    shape.insert(shape.end(), inner.begin(), inner.end());
+    T* data = new T[rows.size() * sizeof(Row) / sizeof(T)];
+    std::memcpy(data, rows.data(), rows.size() * sizeof(Row));
+    const nb::capsule owner(data, [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
+    return nb::cast(Pixels<T>(data, shape.size(), shape.data(), owner));
+}
+
+class MeshFile {
+public:
+    MeshFile(const std::string& format, const nb::bytes& where) : reader_(mesh::readerOf(format, std::string(textOf(where)))) {
+        if (!reader_) throw std::invalid_argument("no such format");
+    }
+
+    void begin(const nb::bytes& data) {
+        refuse(released([&] { return reader_->begin(textOf(data)); }));
+    }
+    std::optional<nb::bytes> nextLibrary() {
+        std::string name;
+        if (!reader_->nextLibrary(name)) return {};
+        return bytesOf(name);
+    }
+    void giveLibrary(const std::optional<nb::bytes>& data, const nb::bytes& where) {
+        refuse(reader_->giveLibrary(data ? std::optional(textOf(*data)) : std::nullopt, std::string(textOf(where))));
+    }
+    nb::list pictures() {
+        refuse(reader_->needPictures());
+        nb::list found;
+        for (const auto& [name, isClamped] : reader_->pictures) found.append(nb::make_tuple(bytesOf(name), isClamped));
+        return found;
+    }
+    /// The surface as numpy arrays, None for those that are empty.
+    nb::dict finish(const std::vector<std::int32_t>& pictures) {
+        if (pictures.size() != reader_->pictures.size()) throw std::invalid_argument("the number of pictures differs");
+        refuse(released([&] { return reader_->finish(pictures); }));
+        const mesh::FileSurface& surface = reader_->surface;
+        nb::dict found;
+        found["vertices"] = rowsOf<double>(surface.vertices, {3});
+        found["faces"] = rowsOf<std::int32_t>(surface.faces, {3});
+        found["normals"] = rowsOf<double>(surface.normals, {3, 3});
+        found["colours"] = rowsOf<double>(surface.colours, {3, 3});
+        found["uvs"] = rowsOf<double>(surface.uvs, {3, 2});
+        found["face_materials"] = rowsOf<std::int32_t>(surface.faceMaterials, {});
+        nb::list materials, textures;
+        for (const mesh::FileMaterial& one : surface.materials)
+            materials.append(nb::make_tuple(static_cast<int>(one.kind), one.albedo, one.ior, one.roughness, one.emission, one.alpha, one.texture));
+        for (const mesh::FileTexture& one : surface.textures) textures.append(nb::make_tuple(one.picture, one.mask, one.isWhite));
+        found["materials"] = materials;
+        found["textures"] = textures;
+        return found;
+    }
+    /// What is lost since the last call: subject and verb in the singular and the plural, what is done instead, number, name.
+    nb::list losses() {
+        nb::list found;
+        for (const mesh::Losses::Entry& entry : reader_->losses.entries)
+            found.append(nb::make_tuple(entry.one, entry.several, bytesOf(entry.instead), entry.count, bytesOf(entry.name)));
+        reader_->losses.entries.clear();
+        return found;
+    }
+    nb::bytes refusal() const { return bytesOf(reader_->refusal); }
+
+private:
+    void refuse(bool isRead) {
+        if (!isRead) throw nb::value_error("the file is refused");
+    }
+
+    std::unique_ptr<mesh::MeshReader> reader_;
+};
+
+using Given = nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+using GivenAlpha = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+auto maskOf(const Given& pixels, const std::optional<GivenAlpha>& alpha, std::size_t height, std::size_t width) {
+    const mesh::Picture<std::uint8_t> picture{pixels.data(), static_cast<std::int64_t>(pixels.shape(0)), static_cast<std::int64_t>(pixels.shape(1)), 3, {}, {}, false};
+    const std::vector<std::uint8_t> mask = mesh::maskOf(picture, alpha ? alpha->data() : nullptr, static_cast<std::int64_t>(height), static_cast<std::int64_t>(width));
+    std::uint8_t* to;
+    auto result = makeArray<std::uint8_t>({height, width}, to);
+    std::copy(mask.begin(), mask.end(), to);
+    return result;
+}
+
+nb::dict losses() {
+    nb::dict found;
+    for (const auto& [name, loss] : mesh::lost::shared) found[name] = nb::make_tuple(loss->one, loss->several, loss->instead);
+    return found;
+}
+
+nb::tuple triangulate(const nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>& points,
+                      const nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>& sizes) {
+    const auto* rows = reinterpret_cast<const mesh::Vector*>(points.data());
+    std::size_t left = points.shape(0);
+    for (std::size_t i = 0; i < sizes.shape(0); left -= static_cast<std::size_t>(sizes.data()[i++]))
+        if (sizes.data()[i] < 0 || static_cast<std::size_t>(sizes.data()[i]) > left) throw std::invalid_argument("a polygon has no such corners");
+    const mesh::Triangles found =
+        released([&] { return mesh::triangulate({sizes.data(), sizes.data() + sizes.shape(0)}, [&](std::int64_t corner) { return rows[corner]; }); });
+    return nb::make_tuple(rowsOf<std::int64_t>(found.corners, {3}), rowsOf<std::int64_t>(found.polygons, {}), found.shorts, found.crossed, found.tests, found.error);
+}
+
+nb::tuple teapot(int level) {
+    const mesh::RawMesh mesh = mesh::teapot(level);
+    return nb::make_tuple(rowsOf<double>(mesh.vertices, {3}), rowsOf<std::int32_t>(mesh.faces, {3}));
+}
+
+} // namespace
+
+void bind_files(nb::module_& module) {
+    nb::class_<MeshFile>(module, "MeshFile", "The reader of a file in steps (mesh/files/reader.hpp); a ValueError has the line `refusal`.")
+        .def(nb::init<const std::string&, const nb::bytes&>(), "format"_a, "where"_a)
+        .def("begin", &MeshFile::begin, "data"_a)
+        .def("next_library", &MeshFile::nextLibrary)
+        .def("give_library", &MeshFile::giveLibrary, "data"_a.none(), "where"_a)
+        .def("pictures", &MeshFile::pictures)
+        .def("finish", &MeshFile::finish, "pictures"_a)
+        .def("losses", &MeshFile::losses)
+        .def("refusal", &MeshFile::refusal);
+    module.def("mask_of", &maskOf, "pixels"_a, "alpha"_a.none(), "height"_a, "width"_a, "The alpha of a texture by another picture, uint8 [height, width].");
+    module.def("teapot", &teapot, "level"_a, "Vertices and faces of the teapot.");
+    module.def("losses", &losses, "The words of losses that several readers count, by name.");
+    module.def("triangulate", &triangulate, "points"_a, "sizes"_a,
+               "Corners and polygon of each triangle, polygons that are short, or cross themselves, tests for ears, and an error.");
+}

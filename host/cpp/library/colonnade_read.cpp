@@ -1,0 +1,98 @@
+#include "colonnade_read.h"
+
+#include "mesh/files/files.hpp"
+#include "mesh/teapot.hpp"
+
+using namespace colonnade;
+
+namespace {
+
+std::unique_ptr<mesh::MeshReader> reader;
+std::string text;
+std::vector<double> materials;
+
+const char* kept(const std::string& value) {
+    text = value;
+    return text.c_str();
+}
+
+const char* refusalUnless(bool isRead) { return isRead ? nullptr : reader->refusal.c_str(); }
+
+template <class Number, class Row> const Number* numbersOf(const std::vector<Row>& rows) { return rows.empty() ? nullptr : reinterpret_cast<const Number*>(rows.data()); }
+
+} // namespace
+
+const char* colonnade_read_begin(const char* format, const char* name, const std::uint8_t* bytes, std::uint32_t count) {
+    reader = mesh::readerOf(format, name);
+    return refusalUnless(reader->begin({reinterpret_cast<const char*>(bytes), count}));
+}
+
+const char* colonnade_read_library(void) {
+    std::string name;
+    return reader->nextLibrary(name) ? kept(name) : nullptr;
+}
+
+const char* colonnade_read_materials(const char* name, const std::uint8_t* bytes, std::uint32_t count) {
+    return refusalUnless(reader->giveLibrary(bytes ? std::optional(mesh::Text(reinterpret_cast<const char*>(bytes), count)) : std::nullopt, name));
+}
+
+const char* colonnade_read_picture(std::uint32_t index, std::int32_t* isClamped) {
+    if (index == 0) reader->needPictures();
+    if (index >= reader->pictures.size()) return nullptr;
+    *isClamped = reader->pictures[index].isClamped;
+    return reader->pictures[index].name.c_str();
+}
+
+void colonnade_read_lost(std::uint32_t index, std::uint32_t loss) {
+    static constexpr const mesh::Loss* losses[]{&mesh::lost::noPictures, &mesh::lost::pictureFormats, &mesh::lost::damagedPictures};
+    reader->losses.add(*losses[loss], 1, reader->pictures[index].name);
+}
+
+const char* colonnade_read_finish(const std::int32_t* numbers, colonnade_read* to) {
+    if (!reader->finish({numbers, numbers + reader->pictures.size()})) return reader->refusal.c_str();
+    const mesh::FileSurface& surface = reader->surface;
+    materials.clear();
+    for (const mesh::FileMaterial& one : surface.materials)
+        for (const double value : {static_cast<double>(one.kind), one.albedo[0], one.albedo[1], one.albedo[2], one.ior, one.roughness, one.emission[0], one.emission[1],
+                                   one.emission[2], one.alpha.value_or(-1), static_cast<double>(one.texture)})
+            materials.push_back(value);
+    static std::vector<std::int32_t> textures;
+    textures.clear();
+    for (const mesh::FileTexture& one : surface.textures)
+        for (const std::int32_t value : {one.picture, one.mask, std::int32_t{one.isWhite}}) textures.push_back(value);
+    const auto count = [](const auto& rows) { return static_cast<std::uint32_t>(rows.size()); };
+    *to = {numbersOf<double>(surface.vertices),
+           count(surface.vertices),
+           numbersOf<std::int32_t>(surface.faces),
+           count(surface.faces),
+           numbersOf<double>(surface.normals),
+           numbersOf<double>(surface.colours),
+           numbersOf<double>(surface.uvs),
+           numbersOf<std::int32_t>(surface.faceMaterials),
+           materials.data(),
+           count(surface.materials),
+           numbersOf<std::int32_t>(textures),
+           count(surface.textures)};
+    return nullptr;
+}
+
+const char* colonnade_read_note(std::uint32_t index) {
+    const std::vector<std::string> lines = reader->losses.lines();
+    return index < lines.size() ? kept(lines[index]) : nullptr;
+}
+
+void colonnade_read_teapot(std::uint32_t level, colonnade_read* to) {
+    static mesh::RawMesh made;
+    made = mesh::teapot(static_cast<int>(level));
+    *to = {};
+    to->vertices = made.vertices[0].data();
+    to->vertex_count = static_cast<std::uint32_t>(made.vertices.size());
+    to->faces = made.faces[0].data();
+    to->face_count = static_cast<std::uint32_t>(made.faces.size());
+}
+
+void colonnade_read_mask(const std::uint8_t* pixels, const std::uint8_t* alpha, std::uint32_t maskWidth, std::uint32_t maskHeight, std::uint32_t width,
+                         std::uint32_t height, std::uint8_t* to) {
+    const std::vector<std::uint8_t> mask = mesh::maskOf({pixels, maskHeight, maskWidth, 3, {}, {}, false}, alpha, height, width);
+    std::copy(mask.begin(), mask.end(), to);
+}
