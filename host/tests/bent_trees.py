@@ -206,7 +206,7 @@ def walk(records: Any, root: int, tree: Tree) -> Iterator[ReadNode]:
 
 
 def swept(records: Any, root: int, tree: Tree, vertex_bits: int) -> Any:
-    """The records of nodes from those of their children alone, from the last to the first."""
+    """The records of nodes from their children's alone, from the last to the first."""
     result, boxes = records.copy(), {}
     for node in reversed(list(walk(records, root, tree))):
         found = []

@@ -177,7 +177,7 @@ def write_stray_scanner(folder: Path, recording: Recording) -> Path:
 
 
 def write_tum(folder: Path, recording: Recording) -> Path:
-    """The lens of a TUM folder is that of its camera: `TUM_LENS`."""
+    """The lens of a TUM folder is its camera's: `TUM_LENS`."""
     target = folder / "rgbd_dataset"
     for name in ("rgb", "depth"):
         (target / name).mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""Frames of the RTL are those of the bit-exact model."""
+"""Frames of the RTL equal the bit-exact model's."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def assert_equal(rtl: Frame, model: Frame) -> None:
 def equal_frames(
     design: GeneratedDesign, image: SceneImage, registers: Sequence[Mapping[str, int]], stalls: Stalls
 ) -> list[Frame]:
-    """The frames of the RTL, each of which is that of the model."""
+    """The frames of the RTL, each of which equals the model's."""
     frames = list(render_rtl(design, image, list(registers), stalls).frames)
     for frame, settings in zip(frames, registers, strict=True):
         assert_equal(frame, render_model(design.manifest, image, settings))

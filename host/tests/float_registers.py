@@ -1,4 +1,4 @@
-"""Registers of a view in floats: the oracle of those that ``driver/src/colonnade_view.c`` computes in integers."""
+"""Registers of a view in floats: the oracle of what ``driver/src/colonnade_view.c`` computes in integers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hostile and odd glTF files, for the host's reader and for that of the browser tab."""
+"""Hostile and odd glTF files, for the host's reader and for the browser tab's."""
 
 from __future__ import annotations
 

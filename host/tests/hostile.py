@@ -45,7 +45,7 @@ class Case:
     Attributes:
         arguments: Arguments of ``colonnade``.
         says: Expected part of the error line.
-        files: Additional files to those of `world`, by path.
+        files: Files in addition to `world`'s, by path.
         environment: Environment variables.
         status: Exit status.
     """

@@ -42,7 +42,7 @@ def host_frame(
     light: LightCube | None = None,
     progress: float = 0.0,
 ) -> Any:
-    """The host's frame of the registers that the page wrote; those of the mesh are the host's.
+    """The host's frame of the registers that the page wrote; the mesh's are the host's.
 
     Args:
         light: Around the object, in its axes, of a room whose light is gathered.

@@ -117,7 +117,7 @@ def test_an_error_of_a_file_shows_at_once_and_the_mesh_stays(context: BrowserCon
     expect(page.locator("#busy")).to_be_hidden()
     tab.wait(frames)
     assert page.locator("#mesh").inner_text() == "teapot.ply" and page.locator("#error").is_visible()
-    # The mesh of before is that of the next material, too
+    # The mesh of before is also the next material's
     with tab.another_frame():
         page.select_option("select[name=material]", "glass")
     assert page.evaluate("colonnade.packed.triangles") == 6320

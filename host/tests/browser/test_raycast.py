@@ -1,4 +1,4 @@
-"""Ray casts of `rays.js`, with three-mesh-bvh's interface, are those of Python."""
+"""Ray casts of `rays.js`, with three-mesh-bvh's interface, equal Python's."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class Read:
 
 
 class AxiMemory:
-    """Reads of one id are answered in order, those of different ids in any order, beat by beat.
+    """Reads of one id are answered in order, reads of different ids in any order, beat by beat.
 
     Attributes:
         bytes: The content, from address 0.

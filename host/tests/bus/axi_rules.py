@@ -48,7 +48,7 @@ class Channel:
             assert set(bits) <= {"0", "1"}, f"{self.name}{field} is {bits}"
 
 
-#: Fields of the channels that a master drives, and of those that a slave drives.
+#: Fields of the channels that a master drives, and of the slave's.
 MASTER = {"aw": ("addr", "id", "len", "size", "burst", "prot"), "w": ("data", "strb", "last")}
 MASTER["ar"] = MASTER["aw"]
 SLAVE_LITE = {"b": ("resp",), "r": ("data", "resp")}

@@ -234,7 +234,7 @@ async def failed_transfers_end_and_the_next_frame_is_right(dut: Any) -> None:
 
 @cocotb.test(timeout_time=PATIENCE * PERIOD, timeout_unit="ns")
 async def a_flipped_bit_ends_the_frame_and_the_next_is_right(dut: Any) -> None:
-    """In the memories of the column's caches, or in those of the shared cache; a bit of each record of a line."""
+    """In the memories of the column's caches, or of the shared cache; a bit of each record of a line."""
     shell = Shell(dut, stall=0, latency=10)
     await shell.begin()
     await shell.set_frame()

@@ -83,7 +83,7 @@ def test_every_format_gives_poses_lens_and_depth(living: Recording, tmp_path: Pa
         assert np.allclose(times, [0.0, 1 / 30, 2 / 30], atol=1e-4)
         for camera, pose in zip(sequence.cameras, living.poses, strict=True):
             assert np.allclose([camera.fx, camera.fy, camera.cx, camera.cy], truth.lens, atol=1e-3)
-            # The vertical and the height are those of the room; the direction about the vertical is free
+            # The vertical and the height are the room's; the direction about the vertical is free
             assert np.degrees(np.arccos(np.clip(camera.to_world[1, :3] @ pose[1, :3], -1, 1))) < 0.3, name
             assert abs(camera.to_world[1, 3] - pose[1, 3]) < 0.015, name
         for number in (1, 2):
@@ -104,7 +104,7 @@ def test_every_format_gives_poses_lens_and_depth(living: Recording, tmp_path: Pa
 
 
 def test_the_first_frame_is_a_room(living: Recording, tmp_path: Path) -> None:
-    """Its derived maps are near those of the room, and a command takes it."""
+    """Its derived maps are near the room's, and a command takes it."""
     output = tmp_path / "out"
     _, notes = converted(write_transforms(tmp_path, living), output, "--frames", "0-0")
     assert "there is no normal.png" in notes and "there is no albedo.png" in notes

@@ -55,7 +55,7 @@ def frame(boxes: Boxes, pose: Floats, size: tuple[int, int] = (128, 96)) -> Fram
 
 
 def off(levelling: Levelling, turn: Floats | None = None) -> float:
-    """Degrees between the vertical that was found in a turned world and that of the boxes."""
+    """Degrees between the vertical that was found in a turned world and the boxes'."""
     true = np.array([0.0, 1.0, 0.0]) if turn is None else turn[:, 1]
     return float(np.degrees(np.arccos(np.clip(levelling.rotation[1] @ true, -1.0, 1.0))))
 

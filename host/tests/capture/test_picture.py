@@ -31,7 +31,7 @@ def test_a_plane_stays_a_plane(photo: tuple[int, int], size: tuple[int, int]) ->
     width, height = size
     scale = min(photo[1] / width, photo[0] / height)
     left, top = (photo[1] - scale * width) / 2, (photo[0] - scale * height) / 2
-    # Outside the centres of the outermost samples the depth is that of the edge
+    # Outside the centres of the outermost samples the depth is the edge's
     u = ((left + (np.arange(width) + 0.5) * scale) / photo[1]).clip(0.5 / columns, 1 - 0.5 / columns)
     v = ((top + (np.arange(height) + 0.5) * scale) / photo[0]).clip(0.5 / rows, 1 - 0.5 / rows)
     depth = plane(pixels(columns, columns), pixels(rows, rows))

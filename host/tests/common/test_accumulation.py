@@ -96,7 +96,7 @@ def test_counters_add_up_levels_do_not_and_errors_are_kept() -> None:
 
 
 def test_the_strength_of_shadows_is_a_part_of_them() -> None:
-    """None is the photo, the whole is the ratio's; of the samples of a pixel only those of the photo count."""
+    """None is the photo, the whole is the ratio's; of the samples of a pixel only the photo's count."""
     ratio = np.full((1, 1, 3), 1024, dtype=np.uint32)
     colour = np.full((1, 1, 3), 4095, dtype=np.uint32)
     samples = [Accumulation.of_pixels(colour, np.array([[on]]), ratio, WHITE, UNSHADOWED) for on in (True, False)]

@@ -17,7 +17,7 @@ SHAPE = (256, 33)
 
 @pytest.fixture(scope="module")
 def frame() -> Frame:
-    """Pixels in columns, whose ratios are those of the first column."""
+    """Pixels in columns, whose ratios are the first column's."""
     random = np.random.default_rng(5)
     colour = random.integers(0, 4096, (*SHAPE, 3)).astype(np.uint16)
     ratio = np.repeat(random.integers(0, 2 * UNSHADOWED, (SHAPE[0], 1, 3)), SHAPE[1], axis=1).astype(np.uint16)

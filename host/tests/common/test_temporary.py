@@ -1,4 +1,4 @@
-"""Temporary folders are removed after use; the next use removes those of killed processes."""
+"""Temporary folders are removed after use; the next use removes killed processes' folders."""
 
 from __future__ import annotations
 

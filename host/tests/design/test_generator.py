@@ -80,7 +80,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def release(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """What a wheel carries: presets, the manifest of `tiny` and a jar; Java is that of `checkout`."""
+    """What a wheel carries: presets, the manifest of `tiny` and a jar; Java is `checkout`'s."""
     root = tmp_path / "site-packages" / "colonnade" / "data"
     (root / "manifests" / "tiny").mkdir(parents=True)
     (root / "manifests" / "tiny" / "manifest.json").write_text(json.dumps({**MANIFEST, "configHash": "released"}))

@@ -39,7 +39,7 @@ CASES = {
 
 
 class Machine:
-    """Linux as files, whose ioctl answers as those of displays and of the console do."""
+    """Linux as files, whose ioctl answers as displays and the console do."""
 
     def __init__(self, folder: Path, described: str) -> None:
         self.modes: list[str] = []

@@ -33,7 +33,7 @@ POSITION = "camera.position.x"
 
 @pytest.fixture(autouse=True)
 def no_display(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Displays of this machine are not those of the devices here."""
+    """Displays of this machine are not the devices' here."""
     monkeypatch.setattr(console, "ROOT", tmp_path)
 
 
@@ -48,7 +48,7 @@ def packed(design: GeneratedDesign) -> DeviceScene:
 
 
 class Recorded:
-    """A transport whose accesses to registers are recorded, but for those of a sleep: reads that repeat the one before,
+    """A transport whose accesses to registers are recorded, except a sleep's: reads that repeat the one before,
     and what enables the interrupt."""
 
     def __init__(self, transport: Any) -> None:

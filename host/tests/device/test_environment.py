@@ -134,7 +134,7 @@ def test_ambient_light_shows_the_decoded_albedo(options: tuple[str, ...]) -> Non
 
 
 def moved(scene: Scene, held: EncodedEnvironment, by: tuple[float, float, float], degrees: float = 0.0) -> Scene:
-    """The scene from a camera beside that of the maps: metres right, down and forward; turned right."""
+    """The scene from a camera beside the maps': metres right, down and forward; turned right."""
     to_world = held.environment.camera_to_world
     position = to_world[:, 3] + to_world[:, :3] @ by
     target = position + 2.0 * to_world[:, :3] @ (np.sin(np.radians(degrees)), 0.0, np.cos(np.radians(degrees)))
@@ -147,7 +147,7 @@ def vector(values: Floats) -> Vector:
     return x, y, z
 
 
-#: Cameras beside that of the maps: at it, before and behind it, far aside, turned away.
+#: Cameras beside the maps': at it, before and behind it, far aside, turned away.
 MOVES = (
     ((0.0, 0.0, 0.0), 0.0),
     ((0.15, 0.0, 0.2), 3.0),

@@ -121,7 +121,7 @@ def test_what_cannot_gather_is_refused() -> None:
 
 
 def test_room_pixels_near_the_object_gather_its_light() -> None:
-    """The ratios of the model are those of the reference, in the window and beside it."""
+    """The ratios of the model are the reference's, in the window and beside it."""
     design, size = manifest_for("small").manifest, (80, 60)
     scene = replace(IN_ROOM, material=Material(albedo=(0.8, 0.1, 0.1))).with_samples(4)
     prepared = DeviceScene.of(scene, design, encoder="live")
@@ -181,7 +181,7 @@ def test_mirrors_and_glass_in_a_room_are_those_of_the_reference() -> None:
 
 @pytest.mark.parametrize("backend", ["model", "reference"])
 def test_rays_that_bring_more_than_white_count_whole(backend: str, tmp_path: Path) -> None:
-    """Half of the directions are 3.2, those of the others dark: an albedo of 0.5 shows a mean of 0.8, not 0.5."""
+    """Half of the directions are 3.2, the others dark: an albedo of 0.5 shows a mean of 0.8, not 0.5."""
     sky = Background(panorama=side_lit(tmp_path / "side.exr", 3.2, 0.0), panorama_exposure=1.0)
     plain = Material(albedo=(0.5, 0.5, 0.5))
     scene = replace(SCENE, mesh=MeshSource(name="sphere"), material=plain, background=sky, paths=Paths(gather=1))
@@ -244,7 +244,7 @@ def test_highlights_are_those_of_the_reference() -> None:
 
 
 def side_lit(path: Path, bright: float = 0.4, dim: float = 0.02) -> Path:
-    """A panorama whose right half, that of +x, is brighter than the left one."""
+    """A panorama whose right half, at +x, is brighter than the left one."""
     pixels = np.full((32, 64, 3), dim, np.float32)
     pixels[:, 32:] = bright
     output = OpenImageIO.ImageOutput.create(str(path))

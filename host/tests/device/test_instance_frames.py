@@ -1,4 +1,4 @@
-"""Frames of instances: the RTL's are those of the model, in pixels, hits and counters."""
+"""Frames of instances: the RTL's equal the model's, in pixels, hits and counters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Objects as instances: pictures are those of one mesh, and an object moves while the records stay."""
+"""Objects as instances: pictures equal one mesh's, and an object moves while the records stay."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def test_instances_move_and_bend_as_the_objects_of_one_mesh(tmp_path: Path, mani
 
 
 def test_registers_of_a_motion_are_those_of_the_target(tmp_path: Path, manifest: Manifest) -> None:
-    """Word by word: of the clip file, whose times are those of the host."""
+    """Word by word: of the clip file, whose times are the host's."""
     keys = (ObjectKey(0.5, turn=40.0, translate=(0.2, 0.3, 0.0)), ObjectKey(rotate=(20.0, 0.0, 60.0)))
     bent = replace(OBJECTS[2], mesh=MeshSource(path=arm().write(tmp_path / "arm.gltf"), animation="bend"))
     prepared = DeviceScene.of(scene(OBJECTS[0], replace(OBJECTS[1], motion=keys), bent), manifest)

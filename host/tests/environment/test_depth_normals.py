@@ -1,4 +1,4 @@
-"""Normals of depth maps: exact on planes, and far better than those of windows where depth is noisy."""
+"""Normals of depth maps: exact on planes, and far better than windows' where depth is noisy."""
 
 from __future__ import annotations
 

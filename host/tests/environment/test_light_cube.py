@@ -77,7 +77,7 @@ def test_a_word_holds_its_light_to_a_hundredth(texel: list[float]) -> None:
 @settings(max_examples=30)
 @given(DIRECTION, st.floats(0.0, 0.6))
 def test_a_light_is_where_it_is(direction: list[float], radius: float) -> None:
-    """In its directions and near them, for those that see lights; its texels keep their light for the others."""
+    """In its directions and near them, for paths that see lights; its texels keep their light for the others."""
     middle = unit_vectors(np.array([direction]))[0]
     cube = LightCube(np.full((6, FACE, FACE, 3), 0.25)).with_lights([(middle, radius)])
     directions = unit_vectors(np.random.default_rng(3).normal(size=(2000, 3)))

@@ -1,4 +1,4 @@
-"""Grain and blur of photos: those that were added to pictures without any."""
+"""Grain and blur of photos, as added to pictures without any."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_noise_of_a_frame_is_that_of_the_photo() -> None:
 @pytest.mark.parametrize("name", SMOOTH[:2])
 @pytest.mark.parametrize("noise", [0.0, 2.0])
 def test_blur_is_measured(name: str, noise: float) -> None:
-    """With that of the picture itself; a little too small is no harm."""
+    """With the picture's own; a little too small is no harm."""
     own = measured_blur(picture(name))
     for blur in (0.8, 1.2, 1.8):
         soft = ndimage.gaussian_filter(picture(name).astype(float), (blur, blur, 0.0))

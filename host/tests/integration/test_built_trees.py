@@ -31,7 +31,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @dataclass
 class Built:
-    """A tree, vertices of its leaves, the cost of its first pose; for each other one those of both trees."""
+    """A tree, vertices of its leaves, the cost of its first pose; for each other one both trees' costs."""
 
     tree: Tree
     leaves: Any
@@ -55,7 +55,7 @@ def built(program: Path, triangles: Any, materials: Any, *poses: Any) -> Built:
 
 
 def reads(records: Any, root: int, tree: Tree) -> float:
-    """Nodes that a ray through the bounds reads on average: the areas of their boxes by that of the root."""
+    """Nodes that a ray through the bounds reads on average: the areas of their boxes by the root's."""
 
     def half_area(low: Any, high: Any) -> float:
         x, y, z = np.array(high) - np.array(low)

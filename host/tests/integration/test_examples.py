@@ -39,7 +39,7 @@ def output(design: GeneratedDesign, tmp_path_factory: pytest.TempPathFactory) ->
     return folder
 
 
-#: Of a device for rays with two columns, whose ids and arbiters are those of any number.
+#: Of a device for rays with two columns, whose ids and arbiters stand for any number.
 COLUMNS = "tiny --set array.columns=2 --set frame.rays=true --set units.rayInterval=1 --set units.pathContexts=64"
 needs_icarus = pytest.mark.skipif(shutil.which("iverilog") is None, reason="no iverilog: apt-get install iverilog")
 

@@ -17,7 +17,7 @@ ALLOWED = re.compile(r"colonnade_\w+|__(u?div|u?mod|mul|ashl|ashr|lshr)di3|mem(c
 
 @pytest.mark.parametrize("compiler", ["gcc", pytest.param(RISCV, marks=NEEDS_RISCV)], ids=["this machine", "RV32IM"])
 def test_nothing_is_allocated_and_no_float_is_used(tmp_path: Path, compiler: str) -> None:
-    """Undefined symbols are those of 64-bit integers, and no instruction is one of the floating-point unit."""
+    """Undefined symbols are for 64-bit integers, and no instruction is one of the floating-point unit."""
     machine = MACHINE if compiler == RISCV else ["-mno-sse", "-mno-80387", "-mno-mmx"]
     for source in SOURCES:
         target = tmp_path / f"{source.stem}.o"

@@ -23,7 +23,7 @@ ROOT = toolchain.project_root()
 
 FRAMES, COUNTED = 2000, 10
 DEVICE_BASE = 0x8000
-#: Functions of the library, of one object, two lights and the camera; signed divisions are those of the test.
+#: Functions of the library, of one object, two lights and the camera; signed divisions are the test's.
 LIBRARY = re.compile(
     r"colonnade_|find_|is_pose|is_place|set_|check_camera|write_word|compute|clip|__udivdi3|memcpy|memset"
 )

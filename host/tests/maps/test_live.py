@@ -1,4 +1,4 @@
-"""The live encoder: legal maps of any room, equal words of every build, losses near those of the offline encoder."""
+"""The live encoder: legal maps of any room, equal words of every build, losses near the offline encoder's."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_maps_of_any_room_are_legal(data: st.DataObject) -> None:
 
 
 def test_planes_and_colours_of_a_box_are_exact() -> None:
-    """Also those of later frames, whose palette, planes and ids come from the frames before."""
+    """Also of later frames, whose palette, planes and ids come from the frames before."""
     encoder, ids = LiveEncoder(LAYOUT), []
     for step in range(4):
         room = box_room(0.05 * step, 0.02 * step)
@@ -205,7 +205,7 @@ def test_equal_frames_give_equal_words() -> None:
 
 @pytest.mark.parametrize(("room", "decibels", "degrees"), [("living", 0.5, 0.15), ("attic", 0.7, 0.15)])
 def test_losses_of_rooms_are_near_those_of_the_offline_encoder(room: str, decibels: float, degrees: float) -> None:
-    """The offline losses are those of docs/background.md."""
+    """The offline losses are as in docs/background.md."""
     environment = load_environment(ROOMS / room)
     image = encode_still(environment, AttributeLayout())
     assert_legal(image)

@@ -92,7 +92,7 @@ def corners_of(mesh: Mesh, time: float) -> np.ndarray:
 
 @pytest.mark.parametrize(("node", "tolerance"), [(4, 0.07), (5, 1e-9), (6, 1e-9)])
 def test_pieces_of_faces_move_with_them(tmp_path: Path, node: int, tolerance: float) -> None:
-    """Those of nodes and morph targets stay on their face; those of a skin bend between its corners."""
+    """Pieces by nodes and morph targets stay on their face; a skin's bend between its corners."""
     document = painted()
     document.json["scenes"] = [{"nodes": [0, node]}]
     path = document.write(tmp_path / "cut.gltf")
@@ -167,7 +167,7 @@ def library(names: tuple[str | None, ...], clip: str = "wave") -> Document:
 
 
 def named() -> Document:
-    """`arm` whose joints have names, and those of other nodes."""
+    """`arm` whose joints have names, and other nodes' names."""
     document = arm()
     for node, name in zip(document.json["nodes"], ("root", "hip", "knee", "foot", "leg", "hip", "jelly"), strict=True):
         node["name"] = name

@@ -1,4 +1,4 @@
-"""Draco-compressed primitives are those that were compressed, and a hostile stream is one line of an error."""
+"""Draco-compressed primitives equal the originals, and a hostile stream is one line of an error."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ def test_whole_numbers_are_scaled_as_their_accessor_says(tmp_path: Path) -> None
 
 
 def test_all_primitives_are_decoded_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also those that share a stream."""
+    """Also primitives that share a stream."""
     arrays, faces, stream = ball()
     calls = []
     monkeypatch.setattr(

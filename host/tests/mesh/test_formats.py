@@ -113,7 +113,7 @@ def test_normals_of_obj_ply_off_and_gltf(tmp_path: Path) -> None:
 def test_normals_of_a_transformed_node_stay_normal(
     tmp_path_factory: pytest.TempPathFactory, scale: tuple[float, ...], rotation: tuple[float, ...]
 ) -> None:
-    """The normals of a flat face are those of the transformed face, also under mirrored and uneven scaling."""
+    """The normals of a flat face are the transformed face's, also under mirrored and uneven scaling."""
     tilted = POINTS[:3] + np.array([[0.0, 0, 0], [0, 0, 0.5], [0, 0, -0.7]])
     normal = np.cross(tilted[1] - tilted[0], tilted[2] - tilted[0])
     length = float(np.linalg.norm(rotation))

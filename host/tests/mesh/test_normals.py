@@ -13,7 +13,7 @@ from colonnade.mesh.materials.mesh import Mesh
 
 
 def heights(mesh: Mesh) -> np.ndarray:
-    """Cosine between each corner's normal and that of its face, float64 [m, 3]."""
+    """Cosine between each corner's normal and its face's, float64 [m, 3]."""
     return np.einsum("mcx,mx->mc", mesh.corner_normals, face_normals(mesh.vertices, mesh.faces))
 
 

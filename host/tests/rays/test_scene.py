@@ -213,7 +213,7 @@ def test_batches_that_are_none_are_refused() -> None:
 
 
 def test_a_sensor_makes_the_rays_of_a_fan() -> None:
-    """Sums of any bits, also those that wrap; rows that end in the middle of a thread's rays."""
+    """Sums of any bits, also if they wrap; rows that end in the middle of a thread's rays."""
     scene, random = Scene(*mesh_of("torus"), refine=False), np.random.default_rng(3)
     for width, count in ((64, 130), (1024, 4500)):
         corner, right, down = units = random.integers(0, 1 << 32, size=(3, 3))

@@ -43,7 +43,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def environment(folder: Path, device: str | None) -> dict[str, str]:
-    """Variables that name the design's file, and that of a device."""
+    """Variables that name the design's file, and a device's."""
     texts = {"DESIGN": design_text(manifest_for(*DESIGN).manifest)} | ({} if device is None else {"DEVICE": device})
     for name, text in texts.items():
         (folder / name).write_text(text)

@@ -26,7 +26,7 @@ def rays() -> _core.Rays:
 
 
 def reads(rays: _core.Rays, some: Floats, columns: int, flight: int, caches: Sequence[int]) -> tuple[int, int]:
-    """Records and lines; a cache has lines and ways, first those of a column."""
+    """Records and lines; a cache has lines and ways, first a column's."""
     found = rays.traffic(some, 0, ALL_MASKS, False, [columns, flight, *caches, 4])
     return found["reads"], found["lines"]
 

@@ -32,7 +32,7 @@ WIDTHS = {"matrix": 25, "shift": 6, "normal": 16, "root": 32, "materialBase": 8,
 
 
 def linear_part(random: np.random.Generator, kind: str) -> Floats:
-    """In units of cubes, so that a placed cube is within that of the world."""
+    """In units of cubes, so that a placed cube is within the world's."""
     if kind == "thin":
         turns = [np.linalg.qr(random.normal(size=(3, 3)))[0] for _ in range(2)]
         linear = turns[0] @ np.diag([1.0, random.uniform(0.01, 1.0), 0.01]) @ turns[1]

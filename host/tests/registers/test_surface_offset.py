@@ -112,7 +112,7 @@ def hits_of_their_own_plane(precision: str, divisions: int, seed: int, share: fl
     first = model.trace(origins, directions)
     place = np.searchsorted(ids, first)
 
-    # From there off the surface, at angles to the plane beyond that of the rounded normals and slopes
+    # From there off the surface, at angles to the plane beyond the rounded normals' and slopes'
     offset = round(share * surface_offset(numbers, image.header.largest_triangle))
     least = 2.0**-11 + 2**0.5 * (2.0 ** -numbers["shearDigits"] + 2.0 ** (1 - numbers["mantissaBits"]))
     starts, leaving = [], []

@@ -1,4 +1,4 @@
-"""Camera and lights that the target computes in integers, against those that the host computes in floats."""
+"""Camera and lights that the target computes in integers, against the host's in floats."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_the_scene_of_the_file_is_that_of_the_host(design: Design) -> None:
 
 
 def test_the_soc_finds_the_poses_of_the_file(design: Design) -> None:
-    """Camera and light as its scripts read them are those of the file: setting them changes nothing."""
+    """Camera and light as its scripts read them are the file's: setting them changes nothing."""
     places = runpy.run_path(str(ROOT / "soc" / "litex" / "view_places.py"))
     camera = struct.unpack_from("<3q9i4q2I", design.file, 4 * places["CAMERA"])
     light = struct.unpack_from("<3q3IQ", design.file, 4 * places["LIGHT"])

@@ -1,4 +1,4 @@
-"""Samples by a budget of time: one number for model and RTL, that of a true estimate."""
+"""Samples by a budget of time: one number for model and RTL, by a true estimate."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ def test_soft_shadows_converge_to_the_reference(folder: Path) -> None:
     assert found == sorted(found)
     assert found[1] > found[0] + 4 and found[2] > found[1] + 4
     assert found[3] > 50, found
-    # Points that have nothing to do with those of the model
+    # Points that have nothing to do with the model's
     independent = encode_srgb(of(file, "reference", samples=81).image)
     assert psnr(independent, frames[3]) > 40
 
@@ -183,7 +183,7 @@ def test_the_photo_shows_through_in_proportion(folder: Path) -> None:
 
 
 def test_an_object_in_a_photo_has_several_samples_unless_named(folder: Path, told: list[str]) -> None:
-    """The default is that of four samples, and is reported; a mirror's salt and pepper goes."""
+    """The default is four samples', and is reported; a mirror's salt and pepper goes."""
 
     def rendered(text: str, **options: Any) -> RenderResult:
         return render(RenderRequest(scene_file(folder, text), "small", SMALL_MAPS, "model", (96, 72), **options))

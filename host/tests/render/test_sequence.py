@@ -1,4 +1,4 @@
-"""An object in the frames of a moving camera: it stays in the world, and each frame is that of its room."""
+"""An object in the frames of a moving camera: it stays in the world, and each frame is its room's."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def frames(folder: Path) -> list[RenderResult]:
 
 def test_the_first_frame_is_the_still_of_its_room(folder: Path, frames: list[RenderResult]) -> None:
     still = replace(request_of(folder, "albedo"), sequence=None, frames=1, background=folder / "0")
-    # The sequence's noise is that of a sensor, and a still has exact depth: only the tolerance of planes differs
+    # The sequence's noise is a sensor's, and a still has exact depth: only the tolerance of planes differs
     exact = load_sequence(folder / "sequence.toml")
     exact.content = replace(exact.content, depth_noise=0.0)
     (first,) = render_frames(replace(request_of(folder, "albedo"), sequence=exact, frames=1))
@@ -99,7 +99,7 @@ def test_the_first_frame_is_the_still_of_its_room(folder: Path, frames: list[Ren
 def test_a_frame_is_the_still_of_its_room_with_the_object_in_the_world(
     folder: Path, frames: list[RenderResult]
 ) -> None:
-    """The maps are those of an encoder that has seen the frames before."""
+    """The maps come from an encoder that has seen the frames before."""
     manifest = manifest_for("small", ROOM).manifest
     rooms = [load_environment(folder / str(number)) for number in range(VIEWS)]
     first = DeviceScene.of(load_scene(folder / "albedo.toml", folder), manifest, room=rooms[0], encoder="live").scene
@@ -235,7 +235,7 @@ def test_between_keyframes_a_frame_has_its_camera_and_photo_and_the_maps_before(
 
 
 def test_a_camera_of_a_capture_has_any_pose_and_lens(folder: Path) -> None:
-    """Rolled, with its centre aside: the rays of a frame between keyframes are those of its camera."""
+    """Rolled, with its centre aside: the rays of a frame between keyframes are its camera's."""
     text = re.sub(
         r"^(cx|fy) = (.*)$",
         lambda found: f"{found[1]} = {1.1 * float(found[2])}",

@@ -19,7 +19,7 @@ from colonnade.scene.model import Background, Camera, MeshSource, Scene
 from colonnade.scene.parser import load_scene
 from colonnade.scene.passes import of_a_device
 
-#: Colours of the four quarters around, from that of -z on to the right, and of the sky above 45 degrees, sRGB.
+#: Colours of the four quarters around, from -z on to the right, and of the sky above 45 degrees, sRGB.
 QUARTERS, ABOVE = [(200, 40, 40), (40, 200, 40), (40, 40, 200), (200, 200, 40)], (255, 255, 255)
 
 

@@ -1,4 +1,4 @@
-"""tools/site points the links of every page at the site's pages, and refuses those that lead nowhere."""
+"""tools/site points the links of every page at the site's pages, and refuses links that lead nowhere."""
 
 from __future__ import annotations
 

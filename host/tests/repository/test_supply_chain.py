@@ -119,7 +119,9 @@ def test_only_the_locked_file_is_installed(tmp_path: Path, altered: bool, instal
 def test_uv_gets_the_index_and_the_certificates_of_pips_settings(tmp_path: Path) -> None:
     """Else it fails behind a mirror or a proxy, and pip, which is slow, installs all packages."""
     (tmp_path / "pip.conf").write_text("[global]\ncert = /etc/some.pem\nindex-url = https://mirror.invalid/simple\n")
-    done = bash("pip_setting cert; pip_setting index-url; pip_setting proxy", PIP_CONFIG_FILE=str(tmp_path / "pip.conf"))
+    done = bash(
+        "pip_setting cert; pip_setting index-url; pip_setting proxy", PIP_CONFIG_FILE=str(tmp_path / "pip.conf")
+    )
     assert (done.returncode, done.stdout) == (0, "/etc/some.pem\nhttps://mirror.invalid/simple\n")
 
 

@@ -12,7 +12,7 @@ from colonnade.scene.object_pose import rotation_about
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("length", [5e-324, 1e-320, 1e-200, 1.0, 1e12])
 def test_the_length_of_a_direction_does_not_matter(length: float) -> None:
-    """Neither the view's nor that of up."""
+    """Neither the view's nor up's."""
     axes = np.stack(camera_axes(np.array([length, 0.0, 0.0]), (0.0, length, 0.0)))
     assert axes.tolist() == [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
 

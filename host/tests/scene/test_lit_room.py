@@ -218,7 +218,7 @@ def test_colours_need_a_room_with_a_photo(folder: Path) -> None:
 def test_the_truth_of_a_room_replaces_its_depth_map(folder: Path) -> None:
     text, truth = MIRROR + LAMP, folder / "attic.ply"
     by_map, by_mesh = frame(folder, text, "reference"), frame(folder, text, "reference", truth=truth)
-    # The attic's maps are those of its mesh, so only what the camera did not see may differ
+    # The attic's maps are its mesh's, so only what the camera did not see may differ
     assert decibels(by_map, by_mesh) > 28
     background = ~by_map.object_mask
     assert decibels(by_map, by_mesh, background) > 40

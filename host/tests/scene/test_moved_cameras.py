@@ -1,4 +1,4 @@
-"""Cameras that a motion moves, and those of a room that are not that of its maps."""
+"""Cameras that a motion moves, and cameras of a room other than its maps'."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests of scene images whose mesh bends: the records at rest, those of every pose, and frames of the model."""
+"""Tests of scene images whose mesh bends: the records at rest and in every pose, and frames of the model."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def is_pair(corners: Integers) -> bool:
 
 
 def check_tree(tree: Bvh, vertices: Integers, faces: Integers, box_bits: int) -> None:
-    """Traverse the tree and check each box against those of its ancestors."""
+    """Traverse the tree and check each box against its ancestors'."""
     seen: list[int] = []
     maximum = (1 << 28, -1)
     tasks = [(0, np.full(3, -1), np.full(3, maximum[0]), 0, 1)]

@@ -17,7 +17,7 @@ import pytest
 from colonnade.viewer.server import ViewServer
 from colonnade.viewer.session import Session
 
-#: A request is a line, headers and a body; PAGE, HOST and PORT stand for those of the server.
+#: A request is a line, headers and a body; PAGE, HOST and PORT stand for the server's.
 JSON = "Content-Type: application/json"
 CAMERA = '{"position": [1, 2, 3], "target": [0, 0, 0]}'
 NO_CAMERA = "six numbers describe a camera"

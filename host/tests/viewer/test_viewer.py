@@ -1,4 +1,4 @@
-"""`colonnade view`: its frames are those of `render`, an edited file is loaded, the camera is saved into it."""
+"""`colonnade view`: its frames are `render`'s, an edited file is loaded, the camera is saved into it."""
 
 from __future__ import annotations
 

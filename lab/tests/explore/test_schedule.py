@@ -21,7 +21,7 @@ from colonnade_lab.explore.schedule import Schedule
 
 
 class FakeRunner:
-    """Answers at once with the identity of the job, and fails those that say so."""
+    """Answers at once with the identity of the job, and fails jobs that say so."""
 
     parallel = 2
     state = "running"

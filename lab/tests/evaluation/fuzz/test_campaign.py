@@ -89,7 +89,7 @@ def test_inverted_bounds_are_as_empty_for_a_pipeline_as_for_the_model() -> None:
 
 @pytest.mark.parametrize("config", ["small", "fpga"])
 def test_every_register_is_reached(config: str) -> None:
-    """All but `EXCLUDED`; those of a room in a frame that shows one."""
+    """All but `EXCLUDED`; a room's in a frame that shows one."""
     manifest = manifest_for(config).manifest
     cases = legal_cases(manifest) + environment_cases(manifest)[:1]
     reached: set[str] = set()

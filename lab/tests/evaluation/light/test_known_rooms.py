@@ -39,7 +39,7 @@ def test_every_room_is_stored() -> None:
 
 @pytest.mark.parametrize("kind", REPORT)
 def test_a_users_room_follows_from_its_seed(kind: str) -> None:
-    """So rooms for tuning are none of those that are reported."""
+    """So rooms for tuning are none of the reported ones."""
 
     def corners(room: KnownRoom) -> np.ndarray:
         return np.concatenate([part.vertices for part in room.parts()])

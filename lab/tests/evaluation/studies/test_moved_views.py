@@ -1,4 +1,4 @@
-"""Generated rooms from cameras beside that of the maps."""
+"""Generated rooms from cameras beside the maps'."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def test_power_belongs_to_the_innermost_unit() -> None:
 
 
 def test_a_path_unit_counts_with_the_rays_of_its_row() -> None:
-    """The energies of all units add up to that of a ray, with each part of a column counted once."""
+    """The energies of all units add up to a ray's, with each part of a column counted once."""
     counts = {"pixels": 40, "rays": 60, "rays_in_box": 50, "hits": 20}
     shares = {"TraversalUnit": 1.0, "PathUnit": 0.2, "PathHits": 0.2}
     window = Window(10, 110, counts, traced=10, shares=shares, records_share=0.2)
