@@ -12,9 +12,6 @@ import numpy as np
 from colonnade.common.errors import UserError
 from colonnade.common.types import Floats, Indices
 
-#: Corners of a concave polygon, at most.
-MAX_CORNERS = 2000
-
 
 @dataclass(frozen=True)
 class Triangles:
