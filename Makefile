@@ -75,7 +75,7 @@ format: setup ## let the formatters rewrite the sources
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host lab
 	@$(venv)/ruff format host lab
-	@$(venv)/ruff format --config host/pyproject.toml tools/usage.py tools/host_python.py tools/supply_chain tools/site tools/browser tools/diagrams tools/layers-* tools/vocabulary tools/frame-digests tools/mutations tools/unit-bench tools/distribution tools/configuration-keys tools/starting-pages tools/doors tools/ray-suites tools/ray_suites
+	@$(venv)/ruff format --config host/pyproject.toml tools/usage.py tools/host_python.py tools/supply_chain tools/site tools/browser tools/diagrams tools/layers-* tools/vocabulary tools/frame-digests tools/mutations tools/unit-bench tools/distribution tools/configuration-keys tools/lines tools/starting-pages tools/doors tools/ray-suites tools/ray_suites
 
 clean: ## remove everything that was built, fetched or cached
 	@rm -rf .venv .tools .cache out target project/target project/project test_run_dir build host/build

@@ -2,8 +2,8 @@
  *
  * usage: rays /dev/uio0 IMAGE BATCHES RESULTS [SCENE]
  *
- * IMAGE, BATCHES and SCENE, of a device with its scene in DRAM, come from examples/rays/batches.py. RESULTS receives tags and
- * hits. colonnade_design.h comes from `colonnade registers`, for the design in the chip. */
+ * IMAGE, BATCHES and SCENE, of a device with its scene in DRAM, come from examples/rays/batches.py. RESULTS receives
+ * tags and hits. colonnade_design.h comes from `colonnade registers`, for the design in the chip. */
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -42,7 +42,8 @@ int main(int argc, char **argv) {
     for (uint32_t i = 0; i < file->batch_count; ++i) {
         const struct colonnade_rays_batch batch = batches_at(file, i, begin, results);
         uint64_t slot;
-        if (colonnade_next_batch(&ring, &slot) == COLONNADE_BUSY) target_check("wait", colonnade_wait_batches(&ring, ATTEMPTS));
+        if (colonnade_next_batch(&ring, &slot) == COLONNADE_BUSY)
+            target_check("wait", colonnade_wait_batches(&ring, ATTEMPTS));
         target_check("ring", colonnade_next_batch(&ring, &slot));
         memcpy(target.memory + (slot - target.base), &batch, sizeof batch);
         target_check("submit", colonnade_submit(&ring));

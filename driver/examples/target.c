@@ -5,7 +5,8 @@ enum { ATTEMPTS = 6000 }; /* of a tenth of a second at most */
 
 void target_load(struct target *target, struct colonnade *device, const char *name) {
     target_check("device", colonnade_probe(device, &target->bus, &colonnade_design));
-    colonnade_acknowledge(device, COLONNADE_FRAME_DONE | COLONNADE_IMAGE_DONE | COLONNADE_ERROR); /* of an earlier program */
+    colonnade_acknowledge(device,
+                          COLONNADE_FRAME_DONE | COLONNADE_IMAGE_DONE | COLONNADE_ERROR); /* of an earlier program */
     /* Also of an event that comes before the wait for it: who counts interrupts sees each */
     colonnade_enable_interrupts(device, COLONNADE_IMAGE_DONE);
     const uint32_t bytes = target_put(target, name);

@@ -64,8 +64,8 @@ static void end(int signal) {
     _exit(128 + signal);
 }
 
-/* Whether a display shows a part of the memory; `line` is the display's if it begins there. colonnade.device.console is the
- * same rule in Python. */
+/* Whether a display shows a part of the memory; `line` is the display's if it begins there. colonnade.device.console is
+ * the same rule in Python. */
 static bool is_displayed(struct target *target) {
     bool is_shown = false;
     for (int number = 0; number < DISPLAYS; ++number) {

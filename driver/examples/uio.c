@@ -24,7 +24,8 @@ static struct colonnade_frame read_frame(char **argv, bool is_moved) {
     }
     target_check(argv[3], colonnade_view_open(&view, &colonnade_design, file, bytes));
     struct colonnade_pose pose = view.object;
-    for (int axis = 0; axis < 3; ++axis) pose.position[axis] += strtol(argv[5 + axis], NULL, 10) * (INT64_C(1) << 32) / 1000;
+    for (int axis = 0; axis < 3; ++axis)
+        pose.position[axis] += strtol(argv[5 + axis], NULL, 10) * (INT64_C(1) << 32) / 1000;
     target_check("pose", colonnade_view_set_object(&view, &pose));
     target_check("pose", colonnade_view_frame(&view, writes, sizeof writes / 8, &frame));
     return frame;
@@ -44,7 +45,8 @@ int main(int argc, char **argv) {
            colonnade_counter(&device, COLONNADE_COUNTER_CYCLES));
     FILE *output = fopen(argv[4], "wb");
     if (output == NULL) target_fail(argv[4], "cannot be written");
-    for (uint32_t line = 0; line < frame.height; ++line) fwrite(target.memory + (size_t)line * stride, 4, frame.width, output);
+    for (uint32_t line = 0; line < frame.height; ++line)
+        fwrite(target.memory + (size_t)line * stride, 4, frame.width, output);
     if (fclose(output) != 0) target_fail(argv[4], "cannot be written");
     return 0;
 }

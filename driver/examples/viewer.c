@@ -1,14 +1,15 @@
 /* A viewer under Linux, without DRM: renders into the device's memory, which is the display's (docs/soc.md), while
  * keys orbit the object.
  *
- * usage: viewer /dev/uio0 IMAGE VIEW [SCENE]               keys of the terminal: a d w s or arrows orbit, + - come nearer,
- *                                                          r goes back, q ends
+ * usage: viewer /dev/uio0 IMAGE VIEW [SCENE]               keys of the terminal: a d w s or arrows orbit, + and -
+ *                                                          come nearer, r goes back, q ends
  *        viewer /dev/uio0 IMAGE VIEW --keys KEYS [SCENE]   a frame for the view and one after each key
  *        viewer /dev/uio0 IMAGE VIEW --turn N [SCENE]      N frames around the object
  *        viewer /dev/uio0 IMAGE VIEW --play N CLIP [SCENE] N frames of a mesh that bends, or of objects that move
  *
- * SCENE has the records of a scene in DRAM, whose meshes may bend: by the unit of the shell, if it has one. It prints frames a
- * second. IMAGE, VIEW, CLIP and SCENE come from `colonnade pack`; colonnade_design.h from `colonnade registers`. */
+ * SCENE has the records of a scene in DRAM, whose meshes may bend: by the unit of the shell, if it has one. It prints
+ * frames a second. IMAGE, VIEW, CLIP and SCENE come from `colonnade pack`; colonnade_design.h from
+ * `colonnade registers`. */
 #define _POSIX_C_SOURCE 200809L
 
 #include <errno.h>
@@ -99,7 +100,8 @@ static struct colonnade_camera orbiting(const struct colonnade_view *view, const
     double axes[3][3], away[3], depth = 0;
     for (int axis = 0; axis < 3; ++axis)
         for (int i = 0; i < 3; ++i) axes[axis][i] = from->pose.rotation[i][axis] / ONE;
-    for (int i = 0; i < 3; ++i) depth += axes[2][i] * (double)(view->object.position[i] - from->pose.position[i]) / METRE;
+    for (int i = 0; i < 3; ++i)
+        depth += axes[2][i] * (double)(view->object.position[i] - from->pose.position[i]) / METRE;
     for (int i = 0; i < 3; ++i) away[i] = -orbit->distance * depth * axes[2][i];
     const double right[3] = {axes[0][0], axes[0][1], axes[0][2]};
     double *const vectors[4] = {axes[0], axes[1], axes[2], away};
@@ -148,7 +150,8 @@ struct play {
     struct colonnade_motion motion;
     uint32_t roots[2], records; /* of a mesh that bends: of its two copies; of both */
     struct colonnade_motion_memory memory;
-    struct colonnade_refit_job jobs[COLONNADE_INSTANCES]; /* of meshes, for the unit; without one they have no entries */
+    struct colonnade_refit_job
+        jobs[COLONNADE_INSTANCES]; /* of meshes, for the unit; without one they have no entries */
     struct colonnade_instance instances[2][COLONNADE_INSTANCES];
 };
 
@@ -180,8 +183,8 @@ static enum colonnade_error copy_mesh(struct play *play, uint32_t bytes) {
                                play->memory.path);
 }
 
-/* Plans the refits of a mesh by the unit, which reads vertices and plan in the device's memory, from byte `at` on. Answers
- * the first byte behind them; `at` for a mesh that is too deep for the unit, or without space. */
+/* Plans the refits of a mesh by the unit, which reads vertices and plan in the device's memory, from byte `at` on.
+ * Answers the first byte behind them; `at` for a mesh that is too deep for the unit, or without space. */
 static uint64_t plan_refits(const struct target *target, struct play *play, uint32_t clip, uint64_t at) {
     const struct colonnade_mesh *mesh = play->is_mesh ? &play->mesh : &play->motion.meshes[clip];
     const uint32_t root = play->is_mesh ? 0 : play->motion.roots[clip][0];
@@ -203,8 +206,10 @@ static uint64_t plan_refits(const struct target *target, struct play *play, uint
     return end;
 }
 
-/* Puts the records of a scene behind a frame of so many bytes, and the second copies of meshes that bend behind them. */
-static void put_scene(struct target *target, struct colonnade *device, struct play *play, const char *name, uint64_t frame) {
+/* Puts the records of a scene behind a frame of so many bytes, and the second copies of meshes that bend behind them.
+ */
+static void put_scene(struct target *target, struct colonnade *device, struct play *play, const char *name,
+                      uint64_t frame) {
     const struct colonnade_mesh *mesh = &play->mesh;
     const uint64_t at = (frame + PAGE - 1) / PAGE * PAGE;
     const uint64_t copy = play->is_mesh ? (uint64_t)RECORD_BYTES * mesh->records : play->motion.copy_bytes;
@@ -225,8 +230,8 @@ static void put_scene(struct target *target, struct colonnade *device, struct pl
 }
 
 /* Bends a mesh in the copy at `root`, which no frame reads: by the unit of the shell, if it has one. */
-static void bend(const struct target *target, struct colonnade *device, const struct play *play, uint32_t clip, uint32_t time,
-                 uint32_t root) {
+static void bend(const struct target *target, struct colonnade *device, const struct play *play, uint32_t clip,
+                 uint32_t time, uint32_t root) {
     const struct colonnade_mesh *mesh = play->is_mesh ? &play->mesh : &play->motion.meshes[clip];
     const struct colonnade_motion_memory *memory = &play->memory;
     struct colonnade_refit_job job = play->jobs[clip];
@@ -270,8 +275,8 @@ static uint32_t move_objects(const struct target *target, struct colonnade *devi
 }
 
 /* Finds the registers of a frame: the view's, then the moving objects'. */
-static void find_frames(const struct target *target, struct colonnade *device, struct colonnade_view *view, struct play *play,
-                        uint32_t number, uint32_t count, struct colonnade_frame frames[2]) {
+static void find_frames(const struct target *target, struct colonnade *device, struct colonnade_view *view,
+                        struct play *play, uint32_t number, uint32_t count, struct colonnade_frame frames[2]) {
     static uint8_t writes[8 * WRITES], moves[8 * COLONNADE_MOTION_WRITES];
     const uint32_t duration = play->is_mesh ? play->mesh.duration : play->motion.duration;
     const uint32_t time = (uint32_t)((uint64_t)duration * number / count);
@@ -328,7 +333,8 @@ int main(int argc, char **argv) {
     if ((turns || plays) && (count < 1 || count > 1000000)) target_fail(option, "has a number of frames, 1 to 1000000");
     if (plays) open_clip(&play, argv[6]);
     if (colonnade_design.scene_page != 0 && scene == NULL)
-        target_fail("SCENE", "is missing: this device has its scene in DRAM; give the file of pack --dram-image at the end");
+        target_fail("SCENE",
+                    "is missing: this device has its scene in DRAM; give the file of pack --dram-image at the end");
     if (colonnade_design.scene_page == 0 && scene != NULL)
         target_fail(scene, "is for a scene in DRAM, and this device holds its scene on chip: leave it out");
     target_check(argv[3], colonnade_view_open(&view, &colonnade_design, file, target_read(argv[3], file, sizeof file)));

@@ -2,8 +2,8 @@
 /* Driver of the Colonnade device in its AXI4 shell: docs/driver.md.
  *
  * It allocates nothing, uses no floating point, and keeps no state but what it is given. Pointers are the caller's,
- * and are not kept beyond the call, but for `bus` and `design` of `colonnade_probe`. What a call fills is filled when it
- * returns COLONNADE_OK, and unchanged otherwise. It makes no access that the shell would refuse. */
+ * and are not kept beyond the call, but for `bus` and `design` of `colonnade_probe`. What a call fills is filled when
+ * it returns COLONNADE_OK, and unchanged otherwise. It makes no access that the shell would refuse. */
 #ifndef COLONNADE_H
 #define COLONNADE_H
 
@@ -24,21 +24,21 @@ enum colonnade_error {
     COLONNADE_NOT_A_FRAME,     /* no frame file, or one of another version */
     COLONNADE_TRUNCATED,       /* a file is shorter or longer than it says */
     COLONNADE_TOO_LARGE,       /* an image or a framebuffer leaves its window, lines overlap, a frame is larger than the
-                                  * device's, or a view's capacity is too small */
-    COLONNADE_MISALIGNED,      /* an image's address or size is no multiple of 128, or a base or stride of no tile row */
-    COLONNADE_BAD_REGISTER,    /* a frame sets a word that is no frame register, or more words than there are */
-    COLONNADE_BAD_FORMAT,      /* a framebuffer's format is none of enum colonnade_format */
-    COLONNADE_NO_FRAME,        /* a start without colonnade_set_frame before it */
-    COLONNADE_BUSY,            /* not now: a frame is queued, an image is loading, a reset is under way, or the shell
-                                  * cannot take all registers before the frame that runs has ended */
-    COLONNADE_TIMEOUT,         /* the event has not come */
-    COLONNADE_BUS_RESPONSE,    /* the memory answered with an error */
-    COLONNADE_BAD_SECTION,     /* an image has a section for a memory that the device lacks, or one that is too long */
-    COLONNADE_BAD_LENGTH,      /* an image's sections do not fill it */
-    COLONNADE_NO_PHOTO,        /* no photo: shell 1.0, or no environment; no strengths: a shell before 1.3 */
-    COLONNADE_FRAME_INVALID,   /* the device has an error bit: colonnade_device_errors */
-    COLONNADE_NO_SCENE,        /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not;
-                                * or meshes that bend have no second copy */
+                                * device's, or a view's capacity is too small */
+    COLONNADE_MISALIGNED,    /* an image's address or size is no multiple of 128, or a base or stride of no tile row */
+    COLONNADE_BAD_REGISTER,  /* a frame sets a word that is no frame register, or more words than there are */
+    COLONNADE_BAD_FORMAT,    /* a framebuffer's format is none of enum colonnade_format */
+    COLONNADE_NO_FRAME,      /* a start without colonnade_set_frame before it */
+    COLONNADE_BUSY,          /* not now: a frame is queued, an image is loading, a reset is under way, or the shell
+                              * cannot take all registers before the frame that runs has ended */
+    COLONNADE_TIMEOUT,       /* the event has not come */
+    COLONNADE_BUS_RESPONSE,  /* the memory answered with an error */
+    COLONNADE_BAD_SECTION,   /* an image has a section for a memory that the device lacks, or one that is too long */
+    COLONNADE_BAD_LENGTH,    /* an image's sections do not fill it */
+    COLONNADE_NO_PHOTO,      /* no photo: shell 1.0, or no environment; no strengths: a shell before 1.3 */
+    COLONNADE_FRAME_INVALID, /* the device has an error bit: colonnade_device_errors */
+    COLONNADE_NO_SCENE,      /* the scene lies in DRAM, and colonnade_set_scene has not said where; or it does not;
+                              * or meshes that bend have no second copy */
     /* Of colonnade_view.h */
     COLONNADE_NOT_A_VIEW, /* no view file, or one of another version, or numbers that no design has */
     COLONNADE_BAD_POSE,   /* a rotation is none, or a position is beyond 2^28 metres */
@@ -71,9 +71,9 @@ enum colonnade_format { COLONNADE_XRGB8888, COLONNADE_RGB565, COLONNADE_LINEAR16
 struct colonnade_bus {
     uint32_t (*read)(void *context, uint32_t address);
     void (*write)(void *context, uint32_t address, uint32_t value);
-    /* Sleeps until the interrupt or for a while; NULL: the driver polls without a pause. Each call is an attempt. The driver
-     * has enabled the events that it waits for, and no others. A handler of the program's own may disable them all, and
-     * acknowledges none. A `wait` without a limit of its own does not return from a device that hangs. */
+    /* Sleeps until the interrupt or for a while; NULL: the driver polls without a pause. Each call is an attempt. The
+     * driver has enabled the events that it waits for, and no others. A handler of the program's own may disable them
+     * all, and acknowledges none. A `wait` without a limit of its own does not return from a device that hangs. */
     void (*wait)(void *context);
     void *context;
 };
@@ -96,9 +96,9 @@ struct colonnade_design {
     uint32_t posted_writes; /* writes to the device's registers that the shell takes while a frame runs */
     uint32_t scene_page;    /* byte address of `dram.page` and of `control.invalidate`; 0 if no scene lies in DRAM */
     uint32_t invalidate;
-    uint32_t rays_tail, rays_head;                    /* of a device for rays, like the next ones; 0: it has frames */
-    uint32_t bounds, scene, placement, ring;          /* first words of these groups; `scene` also with a scene in DRAM */
-    uint32_t map_count;                               /* memories of a room's maps; 0: the device has no room */
+    uint32_t rays_tail, rays_head;           /* of a device for rays, like the next ones; 0: it has frames */
+    uint32_t bounds, scene, placement, ring; /* first words of these groups; `scene` also with a scene in DRAM */
+    uint32_t map_count;                      /* memories of a room's maps; 0: the device has no room */
     struct colonnade_memory maps[COLONNADE_MAX_MAPS]; /* an image's section for maps[i] has the target i + 1 */
 };
 
@@ -163,16 +163,17 @@ enum colonnade_error colonnade_check_maps(const struct colonnade_design *design,
 /* Loads an image and waits for its end, as colonnade_wait does. Acknowledges imageDone and error. */
 enum colonnade_error colonnade_load(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
 
-/* Loads the maps of another view or room, as colonnade_load does. The scene, textures and registers stay. The registers of
- * the next frame must be these maps'. An image that the processor does not see must hold maps alone. */
-enum colonnade_error colonnade_load_maps(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts);
+/* Loads the maps of another view or room, as colonnade_load does. The scene, textures and registers stay. The registers
+ * of the next frame must be these maps'. An image that the processor does not see must hold maps alone. */
+enum colonnade_error colonnade_load_maps(struct colonnade *device, const struct colonnade_image *image,
+                                         uint32_t attempts);
 
 /* Reads a frame file of `bytes` bytes, and fills `frame`, which points into it. */
 enum colonnade_error colonnade_open_frame(const struct colonnade_design *design, const void *data, size_t bytes,
                                           struct colonnade_frame *frame);
 
-/* Says where the records lie that `colonnade pack --dram-image` writes: a multiple of 4096. It holds for all frames that are
- * set or started from now on. Call it again, also with the same address, when the records have changed. */
+/* Says where the records lie that `colonnade pack --dram-image` writes: a multiple of 4096. It holds for all frames
+ * that are set or started from now on. Call it again, also with the same address, when the records have changed. */
 enum colonnade_error colonnade_set_scene(struct colonnade *device, uint64_t address);
 
 /* Writes the registers of a frame that colonnade_open_frame has filled, also while another one runs: at least once, and
@@ -183,11 +184,12 @@ enum colonnade_error colonnade_set_frame(struct colonnade *device, const struct 
  * colonnade_set_frame. */
 enum colonnade_error colonnade_set_photo(struct colonnade *device, const struct colonnade_photo *photo);
 
-/* Starts the frame that is set; while one runs, it is queued. What the processor has written to memory before is there. */
+/* Starts the frame that is set; while one runs, it is queued. What the processor has written to memory before is there.
+ */
 enum colonnade_error colonnade_start(struct colonnade *device, const struct colonnade_framebuffer *framebuffer);
 
-/* Waits until one of `events` has come, `attempts` polls or waits at most. It is not acknowledged. While the bus's `wait`
- * sleeps, these events alone raise the interrupt; then `interrupt.enable` is as it was before the call. */
+/* Waits until one of `events` has come, `attempts` polls or waits at most. It is not acknowledged. While the bus's
+ * `wait` sleeps, these events alone raise the interrupt; then `interrupt.enable` is as it was before the call. */
 enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, uint32_t attempts);
 
 /* Whether the last frame that ended is valid, and if not, why: its framebuffer's errors first, then the device's. */
@@ -199,7 +201,8 @@ void colonnade_acknowledge(struct colonnade *device, uint32_t events);
 /* Chooses the events that raise the interrupt while the driver does not wait; other bits are left out. */
 void colonnade_enable_interrupts(struct colonnade *device, uint32_t events);
 
-/* Resets the device in any state, and polls until it is idle, `attempts` times at most; the frame registers are 0 then. */
+/* Resets the device in any state, and polls until it is idle, `attempts` times at most; the frame registers are 0 then.
+ */
 enum colonnade_error colonnade_reset(struct colonnade *device, uint32_t attempts);
 
 /* A bit for each error of the last frame, bit n for number n of colonnade_design.h. */

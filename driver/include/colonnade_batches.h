@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Batches of a device for rays (docs/rays.md) in its AXI4 shell. As colonnade.h, which probes, loads and resets it: nothing is
- * allocated, and no floating point is used. */
+/* Batches of a device for rays (docs/rays.md) in its AXI4 shell. As colonnade.h, which probes, loads and resets it:
+ * nothing is allocated, and no floating point is used. */
 #ifndef COLONNADE_BATCHES_H
 #define COLONNADE_BATCHES_H
 
@@ -19,8 +19,8 @@ struct colonnade_ring {
     uint32_t tail; /* batches that were submitted, modulo 2^16 */
 };
 
-/* Writes where a scene lies among the rays, and clears errors and counters. Its records were loaded: by colonnade_load, or by
- * colonnade_set_scene. COLONNADE_BUSY: batches run. */
+/* Writes where a scene lies among the rays, and clears errors and counters. Its records were loaded: by colonnade_load,
+ * or by colonnade_set_scene. COLONNADE_BUSY: batches run. */
 enum colonnade_error colonnade_set_rays(struct colonnade *device, const struct colonnade_rays_image *image);
 
 /* Opens a ring of 2^`size_log` slots, 1 to 15, of which all but one take batches. Batches, rays, hits and tags lie in
@@ -31,10 +31,12 @@ enum colonnade_error colonnade_open_ring(struct colonnade_ring *ring, struct col
 /* The bus address of the slot for the next batch; COLONNADE_BUSY: all are taken. */
 enum colonnade_error colonnade_next_batch(const struct colonnade_ring *ring, uint64_t *slot);
 
-/* Hands over the batch at that slot, also while others run. What the processor has written to memory before is there. */
+/* Hands over the batch at that slot, also while others run. What the processor has written to memory before is there.
+ */
 enum colonnade_error colonnade_submit(struct colonnade_ring *ring);
 
-/* Waits until all batches have ended, `attempts` polls or waits at most for each. Their tags tell which of them failed. */
+/* Waits until all batches have ended, `attempts` polls or waits at most for each. Their tags tell which of them failed.
+ */
 enum colonnade_error colonnade_wait_batches(struct colonnade_ring *ring, uint32_t attempts);
 
 #ifdef __cplusplus

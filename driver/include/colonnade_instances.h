@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Registers of objects with transforms of their own: docs/driver.md.
  *
- * Integers only: no allocation, no floating point, no library. The same transforms give the same words on every processor. */
+ * Integers only: no allocation, no floating point, no library. The same transforms give the same words on every
+ * processor. */
 #ifndef COLONNADE_INSTANCES_H
 #define COLONNADE_INSTANCES_H
 
@@ -51,7 +52,8 @@ uint32_t colonnade_instance_root(const struct colonnade_world *world);
 /* Places an object. Errors: a transform that scales an axis to nothing, or makes the object too small for the world,
  * or lets it leave the world's cube. */
 enum colonnade_error colonnade_find_instance(const struct colonnade_world *world, const struct colonnade_object *object,
-                                             const struct colonnade_transform *transform, struct colonnade_instance *instance);
+                                             const struct colonnade_transform *transform,
+                                             struct colonnade_instance *instance);
 
 /* What all instances share: `bounds`, vertex units, and `shading.offset`, grid steps. */
 struct colonnade_shared {

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Meshes that bend: docs/driver.md.
  *
- * Integers only: no allocation, no floating point, no library. The same clip gives the same records on every processor. */
+ * Integers only: no allocation, no floating point, no library. The same clip gives the same records on every processor.
+ */
 #ifndef COLONNADE_MESH_H
 #define COLONNADE_MESH_H
 
@@ -16,8 +17,8 @@ enum {
     COLONNADE_MESH_NO_VERTEX = 0xFFFF /* upper half of a leaf's fourth vertex, if it is a triangle */
 };
 
-/* A clip: vertices, what moves them, and the leaves that have them. Only the functions below read and write it. It points
- * into the clip file. */
+/* A clip: vertices, what moves them, and the leaves that have them. Only the functions below read and write it. It
+ * points into the clip file. */
 struct colonnade_mesh {
     int32_t vertex_bits, delta_bits, box_bits, address_bits;
     uint32_t leaf_records; /* a leaf's: 2 with corner colours, else 1 */
@@ -51,8 +52,8 @@ struct colonnade_refit {
 };
 
 /* Reads a clip file, which `colonnade pack --clip-file` writes. */
-enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const struct colonnade_design *design, const void *data,
-                                         size_t bytes);
+enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const struct colonnade_design *design,
+                                         const void *data, size_t bytes);
 
 /* The bones' matrices and the weights of morph targets at a time, 2^-16 s; the clip repeats. */
 void colonnade_mesh_pose(const struct colonnade_mesh *mesh, uint32_t time, int32_t *pose);
@@ -63,25 +64,26 @@ uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh);
 enum colonnade_error colonnade_mesh_skin(const struct colonnade_mesh *mesh, const int32_t *pose,
                                          struct colonnade_vertex *vertices);
 
-/* Makes a copy of the mesh's records for another root, since nodes hold addresses. `from` and `copy` point at the roots, which
- * have the addresses `from_root` and `root`; they do not overlap. `path` is as for colonnade_mesh_refit. */
+/* Makes a copy of the mesh's records for another root, since nodes hold addresses. `from` and `copy` point at the
+ * roots, which have the addresses `from_root` and `root`; they do not overlap. `path` is as for colonnade_mesh_refit.
+ */
 enum colonnade_error colonnade_mesh_copy(const struct colonnade_mesh *mesh, const uint32_t *from, uint32_t from_root,
                                          uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path);
 
-/* Writes vertices into a copy of the mesh's records, whose root has the address `root`. Each record is written once; of the
- * tree none changes its place or its kind. `copy` points at the root, in the device's order of bytes, low byte first; `path`
- * has space for mesh->depth nodes. No frame may
- * read the copy meanwhile, and the next one that does needs `control.invalidate`. A copy that is refused as
- * COLONNADE_OTHER_RECORDS may be written in part. */
+/* Writes vertices into a copy of the mesh's records, whose root has the address `root`. Each record is written once; of
+ * the tree none changes its place or its kind. `copy` points at the root, in the device's order of bytes, low byte
+ * first; `path` has space for mesh->depth nodes. No frame may read the copy meanwhile, and the next one that does needs
+ * `control.invalidate`. A copy that is refused as COLONNADE_OTHER_RECORDS may be written in part. */
 enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
                                           uint32_t *copy, uint32_t root, struct colonnade_mesh_node *path,
                                           struct colonnade_refit *result);
 
 enum { COLONNADE_MESH_WRITES = 3 };
 
-/* The pairs of words of a frame that reads the copy at `root`, of a scene that is this mesh alone: they invalidate the caches.
- * `records` is the number of all records of the scene with its copies, `writes` has space for COLONNADE_MESH_WRITES pairs.
- * Answers their number, 0 if the scene lies on chip. Set them by colonnade_set_frame after a view's. */
+/* The pairs of words of a frame that reads the copy at `root`, of a scene that is this mesh alone: they invalidate the
+ * caches. `records` is the number of all records of the scene with its copies, `writes` has space for
+ * COLONNADE_MESH_WRITES pairs. Answers their number, 0 if the scene lies on chip. Set them by colonnade_set_frame after
+ * a view's. */
 uint32_t colonnade_mesh_writes(const struct colonnade_design *design, uint32_t root, uint32_t records, uint8_t *writes);
 
 enum {
@@ -90,10 +92,11 @@ enum {
     COLONNADE_LINE_VERTICES = 4 /* of a line, which the unit reads at once */
 };
 
-/* Writes the plan of a refit in hardware: what `refit.plan` points at, the same for all copies and all poses. Answers its
- * entries; with `plan` NULL it only counts them. `lines` has space for a word for each line of vertices. */
+/* Writes the plan of a refit in hardware: what `refit.plan` points at, the same for all copies and all poses. Answers
+ * its entries; with `plan` NULL it only counts them. `lines` has space for a word for each line of vertices. */
 enum colonnade_error colonnade_mesh_plan(const struct colonnade_mesh *mesh, const uint32_t *copy, uint32_t root,
-                                         struct colonnade_mesh_node *path, uint32_t *lines, uint32_t *plan, uint32_t *entries);
+                                         struct colonnade_mesh_node *path, uint32_t *lines, uint32_t *plan,
+                                         uint32_t *entries);
 
 /* A refit for the unit of the shell: bus addresses, and numbers. What the processor has written there is in memory. */
 struct colonnade_refit_job {
@@ -107,8 +110,8 @@ struct colonnade_refit_job {
 /* Starts a refit, also while a frame runs that does not read this copy. With an error nothing is written. */
 enum colonnade_error colonnade_refit_start(struct colonnade *device, const struct colonnade_refit_job *job);
 
-/* Waits for its end, `attempts` polls at most: the unit has no interrupt. `result` has no cost. After an error of the unit,
- * COLONNADE_BUS_RESPONSE or, of a plan, COLONNADE_OTHER_RECORDS, the copy may be written in part. */
+/* Waits for its end, `attempts` polls at most: the unit has no interrupt. `result` has no cost. After an error of the
+ * unit, COLONNADE_BUS_RESPONSE or, of a plan, COLONNADE_OTHER_RECORDS, the copy may be written in part. */
 enum colonnade_error colonnade_refit_wait(struct colonnade *device, uint32_t attempts, struct colonnade_refit *result);
 
 /* A triangle of the program's own. */
@@ -125,15 +128,16 @@ struct colonnade_leaf {
     bool is_clear;
 };
 
-/* Pairs triangles along edges, each with the neighbour that gives the smallest box, of 32 at an edge. Answers the number of
- * leaves. `layout` is any clip of the design. Space: `leaves` for count, scratch vertex_count + 4 * count words. */
+/* Pairs triangles along edges, each with the neighbour that gives the smallest box, of 32 at an edge. Answers the
+ * number of leaves. `layout` is any clip of the design. Space: `leaves` for count, scratch vertex_count + 4 * count
+ * words. */
 uint32_t colonnade_mesh_pairs(const struct colonnade_mesh *layout, const struct colonnade_vertex *vertices,
                               uint32_t vertex_count, const struct colonnade_triangle *triangles, uint32_t count,
                               struct colonnade_leaf *leaves, uint32_t *scratch);
 
-/* Builds a tree over leaves, by the places of vertices; colonnade_mesh_refit writes its boxes. `mesh` is a copy of any clip of
- * the design, and becomes the leaves': it can be refitted and planned, and has no pose. Space: leaf_words 16 bytes and
- * scratch 4 words a leaf, copy at most 2 records a leaf. Packed ids are new ones. */
+/* Builds a tree over leaves, by the places of vertices; colonnade_mesh_refit writes its boxes. `mesh` is a copy of any
+ * clip of the design, and becomes the leaves': it can be refitted and planned, and has no pose. Space: leaf_words 16
+ * bytes and scratch 4 words a leaf, copy at most 2 records a leaf. Packed ids are new ones. */
 void colonnade_mesh_build(struct colonnade_mesh *mesh, const struct colonnade_vertex *vertices,
                           const struct colonnade_leaf *leaves, uint32_t count, uint8_t *leaf_words, uint32_t *copy,
                           uint32_t root, uint32_t *scratch);

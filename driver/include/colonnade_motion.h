@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Objects that move by a clip file of instances: docs/driver.md.
  *
- * Integers only: no allocation, no floating point, no library. The same file gives the same words on every processor. */
+ * Integers only: no allocation, no floating point, no library. The same file gives the same words on every processor.
+ */
 #ifndef COLONNADE_MOTION_H
 #define COLONNADE_MOTION_H
 
@@ -45,31 +46,34 @@ struct colonnade_motion_memory {
 enum colonnade_error colonnade_motion_open(struct colonnade_motion *motion, const struct colonnade_design *design,
                                            const void *data, size_t bytes);
 
-/* Makes the second copies of meshes that bend, behind the scene: `bytes` bytes, which `colonnade pack --dram-image` writes. */
-enum colonnade_error colonnade_motion_copy(struct colonnade_motion *motion, const struct colonnade_motion_memory *memory,
-                                           uint32_t bytes);
+/* Makes the second copies of meshes that bend, behind the scene: `bytes` bytes, which `colonnade pack --dram-image`
+ * writes. */
+enum colonnade_error colonnade_motion_copy(struct colonnade_motion *motion,
+                                           const struct colonnade_motion_memory *memory, uint32_t bytes);
 
 /* The transforms of all objects at a time, 2^-16 s; the motion repeats. */
-void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t time, struct colonnade_transform *transforms);
+void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t time,
+                                 struct colonnade_transform *transforms);
 
-/* Moves an object by a program's own pose: turns it about `pivot`, then shifts it, in the axes and the metres of the view's
- * world, 2^-30 and 2^-32 m. */
+/* Moves an object by a program's own pose: turns it about `pivot`, then shifts it, in the axes and the metres of the
+ * view's world, 2^-30 and 2^-32 m. */
 enum colonnade_error colonnade_motion_move(const struct colonnade_view *view, const struct colonnade_pose *move,
                                            const int64_t pivot[3], struct colonnade_transform *transform);
 
 /* The registers of all objects: `transforms`, also of the program's own, give `instances`. */
-enum colonnade_error colonnade_motion_find(const struct colonnade_motion *motion, const struct colonnade_transform *transforms,
+enum colonnade_error colonnade_motion_find(const struct colonnade_motion *motion,
+                                           const struct colonnade_transform *transforms,
                                            struct colonnade_instance *instances);
 
-/* Has instances read the copy of each mesh that bends that `last` does not: the instances of the last frame that was started,
- * NULL: none. Its root is roots[i] for motion->meshes[i]. With COLONNADE_BUSY a frame is queued, so that both copies are
- * read. For programs that refit by the unit. */
+/* Has instances read the copy of each mesh that bends that `last` does not: the instances of the last frame that was
+ * started, NULL: none. Its root is roots[i] for motion->meshes[i]. With COLONNADE_BUSY a frame is queued, so that both
+ * copies are read. For programs that refit by the unit. */
 enum colonnade_error colonnade_motion_swap(const struct colonnade_motion *motion, const struct colonnade *device,
                                            const struct colonnade_instance *last, struct colonnade_instance *instances,
                                            uint32_t roots[COLONNADE_INSTANCES]);
 
-/* Bends meshes as they are at a time, 2^-16 s, in the copies of colonnade_motion_swap. Each plays once, from the start of the
- * motion, and stays at its end. No frame may show instances of a call that fails. */
+/* Bends meshes as they are at a time, 2^-16 s, in the copies of colonnade_motion_swap. Each plays once, from the start
+ * of the motion, and stays at its end. No frame may show instances of a call that fails. */
 enum colonnade_error colonnade_motion_bend(const struct colonnade_motion *motion, const struct colonnade *device,
                                            const struct colonnade_motion_memory *memory, uint32_t time,
                                            const struct colonnade_instance *last, struct colonnade_instance *instances);

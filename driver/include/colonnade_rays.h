@@ -3,9 +3,9 @@
  *
  * Unlike the driver below it, this library allocates, and computes in double. Positions and distances are in the
  * application's unit; t counts lengths of a ray's direction, which may have any. A call that fails changes nothing;
- * `colonnade_rays_error` says what to do. Calls may come from any thread, but while a call changes or commits a scene no
- * other one of that scene runs. Queries of a scene run at the same time on the model, one after the other on a device;
- * the model traces thousands of rays in several threads. */
+ * `colonnade_rays_error` says what to do. Calls may come from any thread, but while a call changes or commits a scene
+ * no other one of that scene runs. Queries of a scene run at the same time on the model, one after the other on a
+ * device; the model traces thousands of rays in several threads. */
 #ifndef COLONNADE_RAYS_H
 #define COLONNADE_RAYS_H
 
@@ -19,8 +19,9 @@ extern "C" {
 enum colonnade_rays_status {
     COLONNADE_RAYS_OK,
     COLONNADE_RAYS_BAD_DESIGN, /* the design has a line that is none, or lacks one */
-    COLONNADE_RAYS_BAD_MESH, /* a vertex is not finite, an index has no vertex, a wrong count, no face has an area, too many vanish */
-    COLONNADE_RAYS_NO_MESH,       /* the scene has no mesh of this number */
+    COLONNADE_RAYS_BAD_MESH, /* a vertex is not finite, an index has no vertex, a wrong count, no face has an area, too
+                                many vanish */
+    COLONNADE_RAYS_NO_MESH,  /* the scene has no mesh of this number */
     COLONNADE_RAYS_DOES_NOT_FIT,  /* more records, triangles or stack entries than the design has */
     COLONNADE_RAYS_NOT_COMMITTED, /* a scene changed after its last commit */
     COLONNADE_RAYS_BAD_BATCH,     /* misaligned, empty, over 2^24 rays, or of an unknown mode */
@@ -66,7 +67,8 @@ struct colonnade_rays_sensor {
 };
 
 /* A hit in memory, 16 bytes. u, v are the weights of the second and third corner of the triangle as the device has it.
- * A miss has t = tfar, u = v = 0. `id`: bits 0 to 29 the device's number of the triangle, or one of the values below. */
+ * A miss has t = tfar, u = v = 0. `id`: bits 0 to 29 the device's number of the triangle, or one of the values below.
+ */
 struct colonnade_rays_response {
     float t;
     uint32_t id;
@@ -82,7 +84,7 @@ struct colonnade_rays_ray {
     double origin[3], tnear, direction[3], tfar;
 };
 struct colonnade_rays_hit {
-    double t, u, v;      /* of the face as the application has it: u, v are the weights of its second and third corner */
+    double t, u, v; /* of the face as the application has it: u, v are the weights of its second and third corner */
     uint32_t mesh, face; /* UINT32_MAX: a miss, with t = tfar */
     uint32_t flags;      /* COLONNADE_RAYS_BACK_SIDE, COLONNADE_RAYS_NON_OPAQUE */
     uint32_t ray;        /* index of the ray */
@@ -118,13 +120,14 @@ struct colonnade_rays_device;
 struct colonnade_rays_scene;
 
 /* Opens a device of a design: lines "number NAME VALUE" and "layout RECORD FIELD OFFSET WIDTH SIGNED" of its manifest.
- * `design` NULL: `edge`, and for a scene of which it drops more than one face in a hundred `edge` with vertices of 24 bits.
- * `backend` NULL: the model. The device is NULL if there is no memory, and otherwise has the error. */
+ * `design` NULL: `edge`, and for a scene of which it drops more than one face in a hundred `edge` with vertices of 24
+ * bits. `backend` NULL: the model. The device is NULL if there is no memory, and otherwise has the error. */
 int colonnade_rays_open(const char *design, const struct colonnade_rays_backend *backend,
                         struct colonnade_rays_device **device);
-/* Opens the device that the environment names (simulated.cpp). COLONNADE_RAYS_DESIGN is a file with the design, or not set.
- * COLONNADE_RAYS_DEVICE is one with a simulated device: lines "program PATH" and "argument WORD", then "register NAME
- * ADDRESS BITS SIGNED ACCESS"; without it the model answers. A failure prints a line on stderr, and `*device` is NULL. */
+/* Opens the device that the environment names (simulated.cpp). COLONNADE_RAYS_DESIGN is a file with the design, or not
+ * set. COLONNADE_RAYS_DEVICE is one with a simulated device: lines "program PATH" and "argument WORD", then "register
+ * NAME ADDRESS BITS SIGNED ACCESS"; without it the model answers. A failure prints a line on stderr, and `*device` is
+ * NULL. */
 int colonnade_rays_open_environment(struct colonnade_rays_device **device);
 /* Closes a device, after its scenes. */
 void colonnade_rays_close(struct colonnade_rays_device *device);
@@ -143,7 +146,8 @@ void colonnade_rays_scene_free(struct colonnade_rays_scene *scene);
 int colonnade_rays_mesh_add(struct colonnade_rays_scene *scene, const double *vertices, size_t vertex_count,
                             const uint32_t *faces, size_t face_count, uint32_t *mesh);
 /* Moves the vertices of a mesh: `vertex_count` is what it has. */
-int colonnade_rays_mesh_update(struct colonnade_rays_scene *scene, uint32_t mesh, const double *vertices, size_t vertex_count);
+int colonnade_rays_mesh_update(struct colonnade_rays_scene *scene, uint32_t mesh, const double *vertices,
+                               size_t vertex_count);
 /* Removes a mesh; its number is not used again. */
 int colonnade_rays_mesh_remove(struct colonnade_rays_scene *scene, uint32_t mesh);
 /* Leaves a mesh out of the scene, or takes it in. */
@@ -151,11 +155,13 @@ int colonnade_rays_mesh_enable(struct colonnade_rays_scene *scene, uint32_t mesh
 /* Rays with a bit in common with the mask, at first all ones, may hit the mesh. */
 int colonnade_rays_mesh_mask(struct colonnade_rays_scene *scene, uint32_t mesh, uint32_t mask);
 /* `is_opaque` [face_count], which is what the mesh has; NULL, 0: all are. */
-int colonnade_rays_mesh_opacity(struct colonnade_rays_scene *scene, uint32_t mesh, const uint8_t *is_opaque, size_t face_count);
-/* Packs the scene and loads it. A scene without faces has no hits. One in which more than one face in a hundred vanishes
- * on the device's grid is refused. */
+int colonnade_rays_mesh_opacity(struct colonnade_rays_scene *scene, uint32_t mesh, const uint8_t *is_opaque,
+                                size_t face_count);
+/* Packs the scene and loads it. A scene without faces has no hits. One in which more than one face in a hundred
+ * vanishes on the device's grid is refused. */
 int colonnade_rays_commit(struct colonnade_rays_scene *scene);
-/* Faces that vanish on the grid of the committed scene, so that no ray hits them; not those thinner than 2^-36 of the box. */
+/* Faces that vanish on the grid of the committed scene, so that no ray hits them; not those thinner than 2^-36 of the
+ * box. */
 int colonnade_rays_dropped(const struct colonnade_rays_scene *scene, size_t *faces);
 /* The box of the committed scene. */
 int colonnade_rays_bounds(const struct colonnade_rays_scene *scene, double low[3], double high[3]);
@@ -171,11 +177,13 @@ int colonnade_rays_closest(struct colonnade_rays_scene *scene, const struct colo
 int colonnade_rays_occluded(struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
                             uint32_t mode, uint32_t mask, uint8_t *is_occluded);
 /* All hits of all rays, by ray and t, at most `most` a ray. `hits` has room for `capacity`; `*found` may be more. */
-int colonnade_rays_all(struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count, uint32_t mode,
-                       uint32_t mask, size_t most, struct colonnade_rays_hit *hits, size_t capacity, size_t *found);
+int colonnade_rays_all(struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
+                       uint32_t mode, uint32_t mask, size_t most, struct colonnade_rays_hit *hits, size_t capacity,
+                       size_t *found);
 /* t, u, v of hits in double, from the meshes' own vertices, or a neighbour's where these say no: 1, as at first. */
 void colonnade_rays_refine(struct colonnade_rays_scene *scene, int is_refined);
-/* An order of the rays in which near ones follow each other: origins in Morton order, then the octant of the direction. */
+/* An order of the rays in which near ones follow each other: origins in Morton order, then the octant of the direction.
+ */
 int colonnade_rays_order(const struct colonnade_rays_scene *scene, const struct colonnade_rays_ray *rays, size_t count,
                          uint32_t *order);
 /* Hands over a batch as it is. The mask of its mode is the device's: of the low 8 bits of the meshes' masks, if no

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Registers of a frame from poses: docs/driver.md.
  *
- * Integers only: no allocation, no floating point, no library. The same poses give the same words on every processor. */
+ * Integers only: no allocation, no floating point, no library. The same poses give the same words on every processor.
+ */
 #ifndef COLONNADE_VIEW_H
 #define COLONNADE_VIEW_H
 
@@ -33,7 +34,8 @@ struct colonnade_pose {
     int32_t rotation[3][3]; /* 2^-30, [row][column] */
 };
 
-/* A pinhole camera; its own axes are x right, y down, z forward. The centre of pixel (x, y) is at (x + 1/2, y + 1/2). */
+/* A pinhole camera; its own axes are x right, y down, z forward. The centre of pixel (x, y) is at (x + 1/2, y + 1/2).
+ */
 struct colonnade_camera {
     struct colonnade_pose pose;
     int64_t fx, fy; /* focal lengths, 2^-32 pixels, from 1/16 to 2^24 pixels */
@@ -98,8 +100,8 @@ struct colonnade_view {
 };
 
 /* Reads a view file, which `colonnade pack --view-file` writes. Poses and lights are its scene's. */
-enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design, const void *data,
-                                         size_t bytes);
+enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design,
+                                         const void *data, size_t bytes);
 
 /* The rotation of a unit quaternion x, y, z, w, 2^-30 each. */
 enum colonnade_error colonnade_rotation(int32_t rotation[3][3], const int32_t quaternion[4]);
@@ -109,12 +111,14 @@ enum colonnade_error colonnade_view_set_camera(struct colonnade_view *view, cons
 /* Where the object is, 2^-32 m; until the first call it is where the file has it. */
 enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, const struct colonnade_pose *object);
 /* The bounds of what moves within the object's cube, vertex units; until the first call they are the file's. */
-enum colonnade_error colonnade_view_set_bounds(struct colonnade_view *view, const int32_t low[3], const int32_t high[3]);
+enum colonnade_error colonnade_view_set_bounds(struct colonnade_view *view, const int32_t low[3],
+                                               const int32_t high[3]);
 /* Light `index` of the scene, 0 to its count - 1; until the first call it is the file's. */
-enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index, const struct colonnade_light *light);
+enum colonnade_error colonnade_view_set_light(struct colonnade_view *view, uint32_t index,
+                                              const struct colonnade_light *light);
 
-/* Pass `index` of a frame of 1, 2, 4, ... 64 passes: the host's pixel shift and sample points (docs/sampling.md). It holds
- * until the next call, whatever moves; until the first one a frame has one pass. */
+/* Pass `index` of a frame of 1, 2, 4, ... 64 passes: the host's pixel shift and sample points (docs/sampling.md). It
+ * holds until the next call, whatever moves; until the first one a frame has one pass. */
 enum colonnade_error colonnade_view_set_sample(struct colonnade_view *view, uint32_t index, uint32_t count);
 
 /* Computes the registers. `frame` has changes from the accepted ones, in `writes`, which has space for `capacity`

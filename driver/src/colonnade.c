@@ -61,7 +61,8 @@ enum colonnade_error colonnade_load(struct colonnade *device, const struct colon
     return load(device, image, attempts, colonnade_check_image);
 }
 
-enum colonnade_error colonnade_load_maps(struct colonnade *device, const struct colonnade_image *image, uint32_t attempts) {
+enum colonnade_error colonnade_load_maps(struct colonnade *device, const struct colonnade_image *image,
+                                         uint32_t attempts) {
     return load(device, image, attempts, colonnade_check_maps);
 }
 
@@ -69,8 +70,8 @@ static uint32_t word(const uint8_t *at) {
     return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
-/* Whether registers and framebuffer may change now, and the next frame may be started. If so, makes sure of `writes` writes
- * to the device: while a frame runs they wait in a queue, which is empty when a frame begins. */
+/* Whether registers and framebuffer may change now, and the next frame may be started. If so, makes sure of `writes`
+ * writes to the device: while a frame runs they wait in a queue, which is empty when a frame begins. */
 static bool takes_a_frame(struct colonnade *device, uint32_t writes) {
     uint32_t status = get(device, REGISTER(status));
     if (status == 0) return true;
@@ -214,7 +215,8 @@ enum colonnade_error colonnade_reset(struct colonnade *device, uint32_t attempts
 
 uint32_t colonnade_device_errors(struct colonnade *device) {
     uint32_t bits = 0;
-    for (uint32_t i = 0; i < device->design->error_count; ++i) bits |= (get(device, device->design->errors + 4 * i) & 1u) << i;
+    for (uint32_t i = 0; i < device->design->error_count; ++i)
+        bits |= (get(device, device->design->errors + 4 * i) & 1u) << i;
     return bits;
 }
 

@@ -24,7 +24,8 @@ static inline void set_wide(const struct colonnade *device, uint32_t address, ui
 
 /* Whether `bytes` bytes at `address` lie in a window of bus addresses. No sum overflows. */
 static inline bool contains(const struct colonnade_window *window, uint64_t address, uint64_t bytes) {
-    return window->end >> 40 == 0 && address >= window->base && address <= window->end && bytes <= window->end - address;
+    return window->end >> 40 == 0 && address >= window->base && address <= window->end &&
+           bytes <= window->end - address;
 }
 
 #endif

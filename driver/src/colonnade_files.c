@@ -13,7 +13,8 @@ static bool is_magic(const uint8_t *bytes, const char *magic) {
 }
 
 enum colonnade_error colonnade_check_header(const struct colonnade_design *design, const uint8_t *bytes, size_t size,
-                                            size_t least, const char *magic, uint32_t version, enum colonnade_error other) {
+                                            size_t least, const char *magic, uint32_t version,
+                                            enum colonnade_error other) {
     if (size < 8) return COLONNADE_TRUNCATED;
     if (!is_magic(bytes, magic)) return other;
     if (size < least) return COLONNADE_TRUNCATED;

@@ -105,11 +105,13 @@ static bool find_linear(const struct colonnade_transform *transform, struct line
     shift_to(linear->cofactors, COFACTOR_BITS);
     for (int i = 0; i < 9; ++i) high[i / 3][i % 3] = (int32_t)(linear->cofactors[i / 3][i % 3] >> 32);
     linear->determinant = 0;
-    for (int i = 0; i < 3; ++i) linear->determinant += colonnade_product(m[i][0] * ((int64_t)1 << 32), linear->cofactors[i][0]);
+    for (int i = 0; i < 3; ++i)
+        linear->determinant += colonnade_product(m[i][0] * ((int64_t)1 << 32), linear->cofactors[i][0]);
     linear->most = stretch(linear->rows);
     linear->most_of_cofactors = stretch(high) + 3;     /* by the floors */
     const uint64_t share = (uint64_t)1844674407370956; /* 1e-4, 2^-64 */
-    return colonnade_magnitude(linear->determinant) > colonnade_multiply_high(linear->most * linear->most_of_cofactors, share);
+    return colonnade_magnitude(linear->determinant) >
+           colonnade_multiply_high(linear->most * linear->most_of_cofactors, share);
 }
 
 /* value / 2^bits, rounded up; bits may be negative, if the result has 63 bits. */
@@ -117,11 +119,12 @@ static int64_t round_up(int64_t value, int bits) {
     return bits > 0 ? -colonnade_floor(-value, bits) : colonnade_shift_left(value, -bits);
 }
 
-/* Whether a ray from the reach of the world's cube starts in the object's scene: 1.5 * sqrt(3) * the cube's edge, by the least
- * stretch, is below 2^(scene_bits - 1) steps. */
+/* Whether a ray from the reach of the world's cube starts in the object's scene: 1.5 * sqrt(3) * the cube's edge, by
+ * the least stretch, is below 2^(scene_bits - 1) steps. */
 static bool is_large(const struct colonnade_world *world, const struct linear *linear) {
     const int down = world->vertex_bits + world->grid_fraction + 1 - world->scene_bits - linear->exponent - 14;
-    const uint64_t size = colonnade_magnitude(linear->determinant), reach = linear->most_of_cofactors * 42567; /* 2^-14 */
+    const uint64_t size = colonnade_magnitude(linear->determinant),
+                   reach = linear->most_of_cofactors * 42567; /* 2^-14 */
     return down > 0 ? size >> (down < 63 ? down : 63) > reach : size > reach >> (down > -63 ? -down : 63);
 }
 
@@ -172,8 +175,8 @@ static uint32_t *put_normal(uint32_t *to, const struct linear *linear) {
 }
 
 /* The least distance from the surface, by the stretches (docs/numbers.md), at most the edge of the cube. */
-static int64_t find_offset(const struct colonnade_world *world, const struct linear *linear, uint64_t own, uint64_t reciprocal,
-                           int up) {
+static int64_t find_offset(const struct colonnade_world *world, const struct linear *linear, uint64_t own,
+                           uint64_t reciprocal, int up) {
     const int64_t cube = (int64_t)1 << (world->vertex_bits + LENGTH_BITS);
     const int steps = world->grid_fraction - LENGTH_BITS;
     if (own >> (world->vertex_bits + world->grid_fraction) != 0) return cube;
@@ -196,7 +199,8 @@ uint32_t colonnade_instance_root(const struct colonnade_world *world) {
 }
 
 enum colonnade_error colonnade_find_instance(const struct colonnade_world *world, const struct colonnade_object *object,
-                                             const struct colonnade_transform *transform, struct colonnade_instance *instance) {
+                                             const struct colonnade_transform *transform,
+                                             struct colonnade_instance *instance) {
     const int64_t cube = (int64_t)1 << (world->vertex_bits + LENGTH_BITS), unit = 1 << LENGTH_BITS;
     struct linear linear;
     struct colonnade_instance found;
@@ -227,7 +231,8 @@ enum colonnade_error colonnade_find_instance(const struct colonnade_world *world
     *to++ = object->material_base;
 
     const int64_t least = find_offset(world, &linear, object->offset, reciprocal, up);
-    const int64_t cells = (1 << CELL_BITS) - 1, most_offset = (int64_t)1 << (world->vertex_bits + world->grid_fraction - 2);
+    const int64_t cells = (1 << CELL_BITS) - 1,
+                  most_offset = (int64_t)1 << (world->vertex_bits + world->grid_fraction - 2);
     const int64_t offset = round_up(least, LENGTH_BITS - world->grid_fraction);
     found.offset = (uint64_t)(offset < most_offset ? offset : most_offset);
     for (int axis = 0; axis < 3; ++axis) {

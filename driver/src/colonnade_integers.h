@@ -70,7 +70,8 @@ static inline uint64_t colonnade_reciprocal(uint64_t value) {
     return estimate + (first * error >> 31);
 }
 
-/* value * factor * 2^-scale to nearest; `limit`, with the sign of value, if it is larger. |value| < 2^63, limit < 2^62. */
+/* value * factor * 2^-scale to nearest; `limit`, with the sign of value, if it is larger. |value| < 2^63, limit < 2^62.
+ */
 static inline int64_t colonnade_scaled(int64_t value, const struct colonnade_factor *factor, int scale, int64_t limit) {
     if (value == 0) return 0;
     const uint64_t size = colonnade_magnitude(value);
@@ -113,8 +114,8 @@ struct colonnade_extent {
     bool is_empty;
 };
 
-/* Widens a rectangle to the point (point[0], point[1]) / point[2]. Answers whether the point lies before the eye, by more
- * than 2^-20 of its distance from it. |point| < 2^63. */
+/* Widens a rectangle to the point (point[0], point[1]) / point[2]. Answers whether the point lies before the eye, by
+ * more than 2^-20 of its distance from it. |point| < 2^63. */
 static inline bool colonnade_include(struct colonnade_extent *extent, const int64_t point[3]) {
     const int down = colonnade_block_length(point) - 31;
     struct colonnade_ratio ratio[2];
@@ -137,6 +138,8 @@ static inline uint32_t colonnade_bits(int64_t value, int width) {
     return (uint32_t)value & (width < 32 ? ((uint32_t)1 << width) - 1 : UINT32_MAX);
 }
 
-static inline bool colonnade_is_within(int64_t value, int64_t low, int64_t high) { return low <= value && value <= high; }
+static inline bool colonnade_is_within(int64_t value, int64_t low, int64_t high) {
+    return low <= value && value <= high;
+}
 
 #endif

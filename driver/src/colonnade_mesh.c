@@ -77,8 +77,8 @@ static uint32_t planes(const int32_t box[3], int32_t below, const int exponent[3
 }
 
 /* Writes a node from its children's boxes; where they lie stays. Answers its own box. */
-static void write_node(const struct colonnade_mesh *mesh, const struct colonnade_mesh_node *node, uint32_t *to, int32_t low[3],
-                       int32_t high[3]) {
+static void write_node(const struct colonnade_mesh *mesh, const struct colonnade_mesh_node *node, uint32_t *to,
+                       int32_t low[3], int32_t high[3]) {
     const int box_bits = mesh->box_bits;
     const int32_t most = ((int32_t)1 << box_bits) - 1;
     const uint32_t children = node->children;
@@ -96,7 +96,8 @@ static void write_node(const struct colonnade_mesh *mesh, const struct colonnade
         high[axis] = largest;
         exponent[axis] = shift;
     }
-    /* No plane is below the origin or further than `most` above it: sums and differences of all three carry nothing over */
+    /* No plane is below the origin or further than `most` above it: sums and differences of all three carry nothing
+     * over */
     const uint32_t origins = planes(low, 0, exponent, box_bits);
     const uint32_t raised = origins - ((uint32_t)1 << 2 * box_bits | (uint32_t)1 << box_bits | 1);
     for (uint32_t child = 0; child < children; ++child) {
@@ -105,7 +106,8 @@ static void write_node(const struct colonnade_mesh *mesh, const struct colonnade
     }
     colonnade_pad(&writer, to, 6 * COLONNADE_MESH_CHILDREN * (uint32_t)box_bits);
     for (int axis = 3; axis-- > 0;) {
-        const uint32_t bits = (uint32_t)mesh->vertex_bits + 1, doubled = (uint32_t)(low[axis] >> exponent[axis]) * 2 + 1;
+        const uint32_t bits = (uint32_t)mesh->vertex_bits + 1,
+                       doubled = (uint32_t)(low[axis] >> exponent[axis]) * 2 + 1;
         colonnade_put(&writer, colonnade_low_bits(doubled << exponent[axis], bits), bits);
     }
     colonnade_put_node_head(mesh, &writer, to, node->first, children - node->nodes, node->nodes);
@@ -168,7 +170,8 @@ enum colonnade_error colonnade_mesh_copy(const struct colonnade_mesh *mesh, cons
     for (size_t i = 0; i < (size_t)RECORD_WORDS * mesh->records; ++i) copy[i] = from[i];
     for (struct colonnade_mesh_node *node; (node = colonnade_mesh_next(&walk)) != NULL;) {
         uint32_t *to = copy + (size_t)RECORD_WORDS * (node->address - from_root);
-        const uint32_t change = node->first ^ (node->first - from_root + root), low = colonnade_node_head(mesh), at = low % 32;
+        const uint32_t change = node->first ^ (node->first - from_root + root), low = colonnade_node_head(mesh),
+                       at = low % 32;
         to[low / 32] ^= change << at;
         if (at + (uint32_t)mesh->address_bits > 32) to[low / 32 + 1] ^= change >> (32 - at);
     }
@@ -202,7 +205,8 @@ enum colonnade_error colonnade_mesh_refit(const struct colonnade_mesh *mesh, con
     return error;
 }
 
-uint32_t colonnade_mesh_writes(const struct colonnade_design *design, uint32_t root, uint32_t records, uint8_t *writes) {
+uint32_t colonnade_mesh_writes(const struct colonnade_design *design, uint32_t root, uint32_t records,
+                               uint8_t *writes) {
     /* `scene.root` is behind `scene.recordCount`, the first word of its group */
     const uint32_t pairs[COLONNADE_MESH_WRITES][2] = {
         {design->invalidate, 1}, {design->scene, records}, {design->scene + 4, root}};

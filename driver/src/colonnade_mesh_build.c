@@ -37,16 +37,17 @@ static void to_places(uint32_t *counts, uint32_t keys) {
     }
 }
 
-/* Sorts edges by the vertex at which they begin, then that at which they end, then their number. Answers in `ends` where the
- * edges of each first vertex end. Vertices of `leaves` are memory meanwhile. */
-static void sort_edges(const struct colonnade_triangle *triangles, uint32_t count, uint32_t *ends, uint32_t vertex_count,
-                       uint32_t *sorted, struct colonnade_leaf *leaves) {
+/* Sorts edges by the vertex at which they begin, then that at which they end, then their number. Answers in `ends`
+ * where the edges of each first vertex end. Vertices of `leaves` are memory meanwhile. */
+static void sort_edges(const struct colonnade_triangle *triangles, uint32_t count, uint32_t *ends,
+                       uint32_t vertex_count, uint32_t *sorted, struct colonnade_leaf *leaves) {
     for (uint32_t end = 2; end-- > 0;) {
         for (uint32_t i = 0; i < vertex_count; ++i) ends[i] = 0;
         for (uint32_t i = 0; i < 3 * count; ++i) ++ends[at_edge(triangles, i, end)];
         to_places(ends, vertex_count);
         for (uint32_t i = 0; i < 3 * count; ++i) {
-            const uint32_t edge = end == 1 ? i : leaves[i / 3].vertices[i % 3], place = ends[at_edge(triangles, edge, end)]++;
+            const uint32_t edge = end == 1 ? i : leaves[i / 3].vertices[i % 3],
+                           place = ends[at_edge(triangles, edge, end)]++;
             if (end == 1) leaves[place / 3].vertices[place % 3] = edge;
             else sorted[place] = edge;
         }
@@ -81,7 +82,8 @@ uint32_t colonnade_mesh_pairs(const struct colonnade_mesh *layout, const struct 
         *leaf = (struct colonnade_leaf){
             {own->vertices[0], own->vertices[1], own->vertices[2], UINT32_MAX}, own->material, own->is_clear};
         for (uint32_t corner = 0; corner < 3; ++corner) {
-            const uint32_t a = own->vertices[corner], b = own->vertices[(corner + 1) % 3], c = own->vertices[(corner + 2) % 3];
+            const uint32_t a = own->vertices[corner], b = own->vertices[(corner + 1) % 3],
+                           c = own->vertices[(corner + 2) % 3];
             const uint32_t begin = b == 0 ? 0 : ends[b - 1], end = end_of(triangles, sorted, begin, ends[b], a);
             for (uint32_t k = end; k > begin && end - k < MOST_NEIGHBOURS; --k) {
                 const uint32_t edge = sorted[k - 1], other = edge / 3, pair[4] = {a, b, c, at_edge(triangles, edge, 2)};
@@ -197,7 +199,8 @@ void colonnade_mesh_build(struct colonnade_mesh *mesh, const struct colonnade_ve
             writer = (struct colonnade_writer){record, 0, 0};
             colonnade_put_leaf_head(&writer, record, leaf->material | (uint32_t)leaf->is_clear << 8, 0);
             for (uint32_t k = 0; k < 4 * LEAF_WORDS; ++k)
-                leaf_words[4 * (size_t)LEAF_WORDS * mesh->leaves + k] = (uint8_t)(leaf->vertices[k / 4] >> (8 * (k % 4)));
+                leaf_words[4 * (size_t)LEAF_WORDS * mesh->leaves + k] =
+                    (uint8_t)(leaf->vertices[k / 4] >> (8 * (k % 4)));
             ++mesh->leaves;
         }
         next += children;

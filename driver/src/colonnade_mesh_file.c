@@ -6,8 +6,8 @@
 enum { VERSION = 1, HEADER_WORDS = 12, NUMBER_WORDS = 16, FIELDS = 85, FIELD_WORD = HEADER_WORDS + NUMBER_WORDS };
 enum { FIXED_WORDS = FIELD_WORD + (FIELDS + 3) / 4, MOST = 1 << 24 };
 
-/* The bit behind vectors of so many fields that follow one another from a bit on, the last field of each lowest; more than a
- * record has, if their places, which it reads, are others. */
+/* The bit behind vectors of so many fields that follow one another from a bit on, the last field of each lowest; more
+ * than a record has, if their places, which it reads, are others. */
 static int follow(const uint8_t **places, int vectors, int size, int width, int bit) {
     bool is_good = true;
     for (int vector = 0; vector < vectors; ++vector, *places += size)
@@ -106,15 +106,16 @@ bool colonnade_are_keys(const struct colonnade_keys *keys) {
         if (colonnade_word(at, 0) < last || (key == 0 && colonnade_word(at, 0) != 0)) return false;
         last = colonnade_word(at, 0);
         for (size_t i = 0; i < keys->numbers; ++i)
-            if (colonnade_magnitude(colonnade_signed_word(at, 1 + i)) >> (i < keys->of_matrices ? MATRIX_BITS : TARGET_BITS) !=
+            if (colonnade_magnitude(colonnade_signed_word(at, 1 + i)) >>
+                    (i < keys->of_matrices ? MATRIX_BITS : TARGET_BITS) !=
                 0)
                 return false;
     }
     return last == keys->duration;
 }
 
-enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const struct colonnade_design *design, const void *data,
-                                         size_t bytes) {
+enum colonnade_error colonnade_mesh_open(struct colonnade_mesh *mesh, const struct colonnade_design *design,
+                                         const void *data, size_t bytes) {
     const uint8_t *words = data;
     const enum colonnade_error error =
         colonnade_check_header(design, words, bytes, 4 * FIXED_WORDS, "CLNDCLIP", VERSION, COLONNADE_NOT_A_CLIP);

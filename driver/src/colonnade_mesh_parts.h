@@ -41,12 +41,14 @@ static inline uint32_t colonnade_repeated(uint32_t time, uint32_t duration) {
 /* The numbers at a time, 2^-16 s; keys repeat. */
 void colonnade_find_pose(const struct colonnade_keys *keys, uint32_t time, int32_t *pose);
 
-/* A walk over the tree of a copy. Children of a node are beside each other, nodes first; subtrees follow depth first. */
+/* A walk over the tree of a copy. Children of a node are beside each other, nodes first; subtrees follow depth first.
+ */
 struct colonnade_mesh_walk {
     const struct colonnade_mesh *mesh;
     const uint32_t *copy;
     struct colonnade_mesh_node *path;
-    uint32_t root, next, leaf, open; /* the next record and leaf to be met; nodes on the path. At first `next` is `root` */
+    uint32_t root, next, leaf,
+        open; /* the next record and leaf to be met; nodes on the path. At first `next` is `root` */
 };
 
 /* The next node, after all nodes below it; NULL at the end, or where the tree is not the clip's. */
@@ -54,7 +56,8 @@ struct colonnade_mesh_node *colonnade_mesh_next(struct colonnade_mesh_walk *walk
 /* Whether the walk has met the clip's tree. */
 enum colonnade_error colonnade_mesh_end(const struct colonnade_mesh_walk *walk);
 
-/* Words that may lie anywhere: themselves if they lie at a multiple of 4, where one instruction reads a word, else a copy. */
+/* Words that may lie anywhere: themselves if they lie at a multiple of 4, where one instruction reads a word, else a
+ * copy. */
 static inline const uint8_t *colonnade_aligned(const uint8_t *words, size_t count, uint32_t *copy) {
 #ifdef __GNUC__
     if (__builtin_expect((uintptr_t)words % 4 == 0, 1)) return __builtin_assume_aligned(words, 4);
@@ -87,7 +90,9 @@ static inline uint32_t colonnade_leaf_head(const uint32_t *record) {
 }
 
 /* The lowest bits of a number, less than 32. */
-static inline uint32_t colonnade_low_bits(uint32_t value, uint32_t count) { return value & (((uint32_t)1 << count) - 1); }
+static inline uint32_t colonnade_low_bits(uint32_t value, uint32_t count) {
+    return value & (((uint32_t)1 << count) - 1);
+}
 
 /* Writes a record from its lowest bit on, each word once. */
 struct colonnade_writer {

@@ -62,7 +62,8 @@ static void add_leaf(struct plan *plan, const uint8_t *words, const uint32_t *re
 }
 
 enum colonnade_error colonnade_mesh_plan(const struct colonnade_mesh *mesh, const uint32_t *copy, uint32_t root,
-                                         struct colonnade_mesh_node *path, uint32_t *lines, uint32_t *plan, uint32_t *entries) {
+                                         struct colonnade_mesh_node *path, uint32_t *lines, uint32_t *plan,
+                                         uint32_t *entries) {
     struct colonnade_mesh_walk walk = {mesh, copy, path, root, root, 0, 0};
     struct plan to = {lines, plan, 0, 0};
     uint32_t boxes = 0;
@@ -71,7 +72,8 @@ enum colonnade_error colonnade_mesh_plan(const struct colonnade_mesh *mesh, cons
         const uint32_t leaves = node->children - node->nodes;
         for (uint32_t i = 0; i < leaves; ++i) {
             const uint32_t at = node->first - root + node->nodes + i * mesh->leaf_records;
-            add_leaf(&to, mesh->leaf_words + 4 * (size_t)LEAF_WORDS * (node->leaf + i), copy + (size_t)RECORD_WORDS * at, at);
+            add_leaf(&to, mesh->leaf_words + 4 * (size_t)LEAF_WORDS * (node->leaf + i),
+                     copy + (size_t)RECORD_WORDS * at, at);
         }
         if (boxes + leaves > COLONNADE_PLAN_BOXES) return COLONNADE_TOO_DEEP;
         boxes += leaves + 1 - node->children;

@@ -5,7 +5,9 @@
 
 enum { OCTAHEDRAL_ONE = (1 << (OCTAHEDRAL_BITS - 1)) - 1 };
 
-uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh) { return MATRIX_WORDS * mesh->bones + mesh->targets; }
+uint32_t colonnade_mesh_pose_words(const struct colonnade_mesh *mesh) {
+    return MATRIX_WORDS * mesh->bones + mesh->targets;
+}
 
 void colonnade_find_pose(const struct colonnade_keys *keys, uint32_t time, int32_t *pose) {
     const size_t stride = 4 * (1 + (size_t)keys->numbers);
@@ -26,7 +28,8 @@ void colonnade_find_pose(const struct colonnade_keys *keys, uint32_t time, int32
 }
 
 void colonnade_mesh_pose(const struct colonnade_mesh *mesh, uint32_t time, int32_t *pose) {
-    const struct colonnade_keys keys = {mesh->key_words, mesh->keys, colonnade_mesh_pose_words(mesh), 0, mesh->duration};
+    const struct colonnade_keys keys = {mesh->key_words, mesh->keys, colonnade_mesh_pose_words(mesh), 0,
+                                        mesh->duration};
     colonnade_find_pose(&keys, time, pose);
 }
 
@@ -54,7 +57,8 @@ static void limit(int32_t vector[3], int bits) {
     for (int axis = 0; axis < 3; ++axis) vector[axis] >>= down;
 }
 
-/* Adds the changes of a vertex, the first of which is `*next`, and moves on behind them. Answers whether it stays in bounds. */
+/* Adds the changes of a vertex, the first of which is `*next`, and moves on behind them. Answers whether it stays in
+ * bounds. */
 static bool morph(const struct colonnade_mesh *mesh, const int32_t *weights, uint32_t vertex, uint32_t *next,
                   struct bound *bound) {
     int64_t sums[6] = {0};
@@ -130,7 +134,8 @@ static void find_blend(const int32_t *pose, const uint8_t *halves, struct blend 
 static void encode(int32_t vector[3], int16_t code[2]) {
     limit(vector, 20);
     uint32_t size[3], sum = 0;
-    for (int axis = 0; axis < 3; ++axis) sum += size[axis] = (uint32_t)(vector[axis] < 0 ? -vector[axis] : vector[axis]);
+    for (int axis = 0; axis < 3; ++axis)
+        sum += size[axis] = (uint32_t)(vector[axis] < 0 ? -vector[axis] : vector[axis]);
     code[0] = code[1] = 0;
     if (sum == 0) return;
     for (int i = 0; i < 2; ++i) size[i] = (2 * OCTAHEDRAL_ONE * size[i] + sum) / (2 * sum);

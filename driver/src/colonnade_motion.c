@@ -47,9 +47,10 @@ static bool read_numbers(struct colonnade_motion *motion, const uint8_t *bytes) 
     return colonnade_is_within(world->vertex_bits, 10, 24) && colonnade_is_within(world->grid_fraction, -11, 51) &&
            colonnade_is_within(world->vertex_bits + world->grid_fraction, 13, 61) &&
            colonnade_is_within(world->scene_bits, 16, 72) && motion->instance_words >= 1 &&
-           motion->instance_words <= colonnade_instance_words(world) && motion->offset_words <= 2 && motion->objects >= 1 &&
-           motion->objects <= COLONNADE_INSTANCES && motion->keys >= 1 && motion->keys <= 1 << 24 &&
-           colonnade_is_within(motion->shift, 0, POSITION_BITS) && motion->clips <= COLONNADE_INSTANCES;
+           motion->instance_words <= colonnade_instance_words(world) && motion->offset_words <= 2 &&
+           motion->objects >= 1 && motion->objects <= COLONNADE_INSTANCES && motion->keys >= 1 &&
+           motion->keys <= 1 << 24 && colonnade_is_within(motion->shift, 0, POSITION_BITS) &&
+           motion->clips <= COLONNADE_INSTANCES;
 }
 
 static bool are_objects(const struct colonnade_motion *motion) {
@@ -116,7 +117,8 @@ enum colonnade_error colonnade_motion_open(struct colonnade_motion *motion, cons
     return COLONNADE_OK;
 }
 
-void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t time, struct colonnade_transform *transforms) {
+void colonnade_motion_transforms(const struct colonnade_motion *motion, uint32_t time,
+                                 struct colonnade_transform *transforms) {
     const struct colonnade_keys keys = keys_of(motion);
     int32_t pose[MATRIX_WORDS * COLONNADE_INSTANCES];
     colonnade_find_pose(&keys, time, pose);
@@ -158,7 +160,8 @@ enum colonnade_error colonnade_motion_move(const struct colonnade_view *view, co
         for (int row = 0; row < 3; ++row) column[row] = view->object.rotation[row][b];
         for (int row = 0; row < 3; ++row) half[row] = turned(move->rotation[row], column);
         for (int a = 0; a < 3; ++a) {
-            const int32_t axis[3] = {view->object.rotation[0][a], view->object.rotation[1][a], view->object.rotation[2][a]};
+            const int32_t axis[3] = {view->object.rotation[0][a], view->object.rotation[1][a],
+                                     view->object.rotation[2][a]};
             rows[a][b] = (int32_t)turned(axis, half);
         }
     }
@@ -180,12 +183,14 @@ enum colonnade_error colonnade_motion_move(const struct colonnade_view *view, co
     return COLONNADE_OK;
 }
 
-enum colonnade_error colonnade_motion_find(const struct colonnade_motion *motion, const struct colonnade_transform *transforms,
+enum colonnade_error colonnade_motion_find(const struct colonnade_motion *motion,
+                                           const struct colonnade_transform *transforms,
                                            struct colonnade_instance *instances) {
     for (uint32_t i = 0; i < motion->objects; ++i) {
         struct colonnade_object object;
         read_object(motion, i, &object);
-        const enum colonnade_error error = colonnade_find_instance(&motion->world, &object, &transforms[i], &instances[i]);
+        const enum colonnade_error error =
+            colonnade_find_instance(&motion->world, &object, &transforms[i], &instances[i]);
         if (error != COLONNADE_OK) return error;
     }
     return COLONNADE_OK;
@@ -216,11 +221,12 @@ uint32_t colonnade_motion_writes(const struct colonnade_motion *motion, const st
     uint8_t *to = writes;
     for (uint32_t i = 0; i < motion->objects; ++i)
         for (uint32_t word = 0; word < motion->instance_words; ++word)
-            to = append(to, motion->instances_address + motion->instance_words * i + word, instances[i].words[word], is_known,
-                        old[i].words[word]);
+            to = append(to, motion->instances_address + motion->instance_words * i + word, instances[i].words[word],
+                        is_known, old[i].words[word]);
     for (uint32_t axis = 0; axis < 3; ++axis) {
         to = append(to, motion->bounds_address + axis, (uint32_t)now.low[axis], is_known, (uint32_t)last.low[axis]);
-        to = append(to, motion->bounds_address + 3 + axis, (uint32_t)now.high[axis], is_known, (uint32_t)last.high[axis]);
+        to = append(to, motion->bounds_address + 3 + axis, (uint32_t)now.high[axis], is_known,
+                    (uint32_t)last.high[axis]);
     }
     for (uint32_t word = 0; word < motion->offset_words; ++word)
         to = append(to, motion->offset_address + word, (uint32_t)(now.offset >> (32 * word)), is_known,

@@ -8,8 +8,8 @@ static uint32_t *records_at(const struct colonnade_motion_memory *memory, uint32
     return memory->scene + (size_t)RECORD_WORDS * root;
 }
 
-enum colonnade_error colonnade_motion_copy(struct colonnade_motion *motion, const struct colonnade_motion_memory *memory,
-                                           uint32_t bytes) {
+enum colonnade_error colonnade_motion_copy(struct colonnade_motion *motion,
+                                           const struct colonnade_motion_memory *memory, uint32_t bytes) {
     const uint32_t records = bytes / (4 * RECORD_WORDS);
     uint32_t roots[COLONNADE_INSTANCES], end = records;
     if (motion->invalidate_address == 0) return COLONNADE_NO_SCENE;
@@ -49,7 +49,8 @@ enum colonnade_error colonnade_motion_swap(const struct colonnade_motion *motion
 
 enum colonnade_error colonnade_motion_bend(const struct colonnade_motion *motion, const struct colonnade *device,
                                            const struct colonnade_motion_memory *memory, uint32_t time,
-                                           const struct colonnade_instance *last, struct colonnade_instance *instances) {
+                                           const struct colonnade_instance *last,
+                                           struct colonnade_instance *instances) {
     uint32_t roots[COLONNADE_INSTANCES];
     enum colonnade_error error = colonnade_motion_swap(motion, device, last, instances, roots);
     time = colonnade_repeated(time, motion->duration);
@@ -59,7 +60,8 @@ enum colonnade_error colonnade_motion_bend(const struct colonnade_motion *motion
         colonnade_mesh_pose(mesh, time < mesh->duration ? time : mesh->duration, memory->pose);
         error = colonnade_mesh_skin(mesh, memory->pose, memory->vertices);
         if (error == COLONNADE_OK)
-            error = colonnade_mesh_refit(mesh, memory->vertices, records_at(memory, roots[i]), roots[i], memory->path, &result);
+            error = colonnade_mesh_refit(mesh, memory->vertices, records_at(memory, roots[i]), roots[i], memory->path,
+                                         &result);
     }
     return error;
 }

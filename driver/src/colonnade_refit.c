@@ -4,7 +4,8 @@
 
 enum { LINE_BYTES = 64, RECORD_BYTES = 32, PLAN_BYTES = 4 * COLONNADE_PLAN_WORDS, ADDRESS_BITS = 40, COUNT_BITS = 24 };
 
-/* Whether `count` items of so many bytes from an address on leave the space of addresses, where the unit would go on at 0. */
+/* Whether `count` items of so many bytes from an address on leave the space of addresses, where the unit would go on at
+ * 0. */
 static bool passes_end(uint64_t address, uint64_t bytes, uint32_t count) {
     return address >> ADDRESS_BITS != 0 || address + bytes * count > (uint64_t)1 << ADDRESS_BITS;
 }
@@ -12,11 +13,14 @@ static bool passes_end(uint64_t address, uint64_t bytes, uint32_t count) {
 enum colonnade_error colonnade_refit_start(struct colonnade *device, const struct colonnade_refit_job *job) {
     if ((device->capabilities & COLONNADE_SHELL__CAPABILITIES__REFIT_bm) == 0) return COLONNADE_NO_REFIT;
     if ((job->plan | job->vertices) % LINE_BYTES != 0 || job->records % RECORD_BYTES != 0) return COLONNADE_MISALIGNED;
-    const uint32_t lines = job->vertex_count / COLONNADE_LINE_VERTICES + (job->vertex_count % COLONNADE_LINE_VERTICES != 0);
-    if ((job->entries | lines | job->count | job->root) >> COUNT_BITS != 0 || passes_end(job->plan, PLAN_BYTES, job->entries) ||
-        passes_end(job->vertices, LINE_BYTES, lines) || passes_end(job->records, RECORD_BYTES, job->count))
+    const uint32_t lines =
+        job->vertex_count / COLONNADE_LINE_VERTICES + (job->vertex_count % COLONNADE_LINE_VERTICES != 0);
+    if ((job->entries | lines | job->count | job->root) >> COUNT_BITS != 0 ||
+        passes_end(job->plan, PLAN_BYTES, job->entries) || passes_end(job->vertices, LINE_BYTES, lines) ||
+        passes_end(job->records, RECORD_BYTES, job->count))
         return COLONNADE_TOO_LARGE;
-    if (get(device, REGISTER(status)) & COLONNADE_SHELL__STATUS__ISRESETTING_bm || get(device, REGISTER(refit_status)) != 0)
+    if (get(device, REGISTER(status)) & COLONNADE_SHELL__STATUS__ISRESETTING_bm ||
+        get(device, REGISTER(refit_status)) != 0)
         return COLONNADE_BUSY;
     set_wide(device, REGISTER(refit_plan_low), job->plan);
     set_wide(device, REGISTER(refit_vertices_low), job->vertices);

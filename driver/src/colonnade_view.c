@@ -3,7 +3,8 @@
 #include "colonnade_view_parts.h"
 #include "colonnade_words.h"
 
-int colonnade_find_blocks(const struct colonnade_view_scene *scene, struct colonnade_block blocks[COLONNADE_MAX_BLOCKS]) {
+int colonnade_find_blocks(const struct colonnade_view_scene *scene,
+                          struct colonnade_block blocks[COLONNADE_MAX_BLOCKS]) {
     const uint32_t words = colonnade_mac_words(scene);
     blocks[0] = (struct colonnade_block){scene->frame_address, VIEW_FRAME, COLONNADE_VIEW_FRAME};
     blocks[1] = (struct colonnade_block){scene->camera_address, VIEW_CAMERA, 12 * words + 1};
@@ -82,17 +83,19 @@ static void set_light(struct colonnade_view *view, uint32_t index) {
     words[4] = (uint32_t)(exponent < -limit - 1 ? -limit - 1 : exponent) & (2 * (uint32_t)limit + 1);
 }
 
-/* Directions times fx * fy need no division: (x + 1/2 - cx) * fy * right + (y + 1/2 - cy) * fx * down + fx * fy * forward;
- * the sample's shift moves the centre of a pixel.
- * One division scales them, so that the largest component in the frame is 2^(macBits - 2). */
-static void set_directions(struct colonnade_view *view, const struct colonnade_work *work, struct colonnade_view_rays *rays) {
+/* Directions times fx * fy need no division: (x + 1/2 - cx) * fy * right + (y + 1/2 - cy) * fx * down + fx * fy *
+ * forward; the sample's shift moves the centre of a pixel. One division scales them, so that the largest component in
+ * the frame is 2^(macBits - 2). */
+static void set_directions(struct colonnade_view *view, const struct colonnade_work *work,
+                           struct colonnade_view_rays *rays) {
     const struct colonnade_view_scene *scene = &view->scene;
     const struct colonnade_camera *camera = &view->camera;
     const int bits = scene->mac_bits;
     const int64_t to_x = COLONNADE_PIXEL / 2 + view->sample.shift[0] - camera->cx;
     const int64_t to_y = COLONNADE_PIXEL / 2 + view->sample.shift[1] - camera->cy;
-    const int up = 62 - colonnade_bit_length((uint64_t)camera->fx | (uint64_t)camera->fy | colonnade_magnitude(to_x) |
-                                             colonnade_magnitude(to_y) | (uint64_t)(camera->width | camera->height) << 32);
+    const int up =
+        62 - colonnade_bit_length((uint64_t)camera->fx | (uint64_t)camera->fy | colonnade_magnitude(to_x) |
+                                  colonnade_magnitude(to_y) | (uint64_t)(camera->width | camera->height) << 32);
     const int64_t fx = camera->fx << up, fy = camera->fy << up;
     const int64_t factors[5] = {colonnade_product(colonnade_shift_left(to_x, up), fy),
                                 colonnade_product(colonnade_shift_left(to_y, up), fx), colonnade_product(fx, fy),
@@ -113,7 +116,8 @@ static void set_directions(struct colonnade_view *view, const struct colonnade_w
         const int64_t size = top > -low ? top : -low; /* at a corner of the frame */
         if ((uint64_t)size > most) most = (uint64_t)size;
     }
-    /* Steps larger than the directions, in a frame of few pixels, are scaled to their largest value, 2^(bits - 1) - 2 */
+    /* Steps larger than the directions, in a frame of few pixels, are scaled to their largest value, 2^(bits - 1) - 2
+     */
     const uint64_t step_x = colonnade_largest(along_x), step_y = colonnade_largest(along_y);
     const uint64_t step = step_x > step_y ? step_x : step_y;
     const bool by_step = step > 2 * most - (most >> (bits - 3));

@@ -62,11 +62,11 @@ static bool read_numbers(struct reader *reader, struct colonnade_view_scene *sce
     scene->environment_address = read_word(reader);
     scene->window_address = read_word(reader);
     scene->gather_address = read_word(reader);
-    return colonnade_is_within(scene->mac_bits, 16, MAC_BITS) && colonnade_is_within(scene->scene_bits, 16, SCENE_BITS) &&
-           is_fraction && colonnade_is_within(scene->grid_fraction, -12, 19) &&
-           colonnade_is_within(scene->coordinate_bits, 4, 13) && colonnade_is_within(scene->box_pad_log, 0, 24) &&
-           colonnade_is_within(scene->mantissa_bits, 8, 32) && colonnade_is_within(scene->vertex_bits, 8, 24) &&
-           scene->max_width <= 4096 && scene->max_height <= 4096;
+    return colonnade_is_within(scene->mac_bits, 16, MAC_BITS) &&
+           colonnade_is_within(scene->scene_bits, 16, SCENE_BITS) && is_fraction &&
+           colonnade_is_within(scene->grid_fraction, -12, 19) && colonnade_is_within(scene->coordinate_bits, 4, 13) &&
+           colonnade_is_within(scene->box_pad_log, 0, 24) && colonnade_is_within(scene->mantissa_bits, 8, 32) &&
+           colonnade_is_within(scene->vertex_bits, 8, 24) && scene->max_width <= 4096 && scene->max_height <= 4096;
 }
 
 static bool read_mesh(struct reader *reader, struct colonnade_view_scene *scene) {
@@ -96,12 +96,12 @@ static bool read_room(struct reader *reader, struct colonnade_view_scene *scene)
     scene->tile_size = read_word(reader);
     scene->tile_columns = read_word(reader);
     scene->tile_rows = read_word(reader);
-    return is_good && colonnade_is_place(scene->room_low) && colonnade_is_place(scene->room_high) && scene->tile_size >= 1 &&
-           scene->tile_size <= 4096 && scene->tile_columns <= 4096 && scene->tile_rows <= 4096;
+    return is_good && colonnade_is_place(scene->room_low) && colonnade_is_place(scene->room_high) &&
+           scene->tile_size >= 1 && scene->tile_size <= 4096 && scene->tile_columns <= 4096 && scene->tile_rows <= 4096;
 }
 
-enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design, const void *data,
-                                         size_t bytes) {
+enum colonnade_error colonnade_view_open(struct colonnade_view *view, const struct colonnade_design *design,
+                                         const void *data, size_t bytes) {
     const size_t words = bytes / 4;
     enum colonnade_error error =
         colonnade_check_header(design, data, bytes, 4 * FIXED_WORDS, "CLNDVIEW", VERSION, COLONNADE_NOT_A_VIEW);
@@ -151,7 +151,8 @@ enum colonnade_error colonnade_view_open(struct colonnade_view *view, const stru
     for (int i = 0; i < block_count; ++i)
         if (!colonnade_are_frame_registers(design, blocks[i].address, blocks[i].count)) return COLONNADE_BAD_REGISTER;
     for (size_t i = 0; i < scene->constants; ++i)
-        if (!colonnade_are_frame_registers(design, colonnade_word(scene->writes, 2 * i), 1)) return COLONNADE_BAD_REGISTER;
+        if (!colonnade_are_frame_registers(design, colonnade_word(scene->writes, 2 * i), 1))
+            return COLONNADE_BAD_REGISTER;
 
     error = colonnade_check_camera(scene, &camera);
     found.camera = camera;

@@ -20,7 +20,8 @@ static void find_box(struct colonnade_view *view, const struct colonnade_work *w
         const int64_t eye = colonnade_shift_left(colonnade_nearest(work->eye[axis], 16 + shift), shift);
         const int64_t low = scene->low[axis] - pad, high = scene->high[axis] + pad;
         planes[axis][0] = (fraction < 0 ? colonnade_floor(low, -fraction) : colonnade_shift_left(low, fraction)) - eye;
-        planes[axis][1] = (fraction < 0 ? -colonnade_floor(-high, -fraction) : colonnade_shift_left(high, fraction)) - eye;
+        planes[axis][1] =
+            (fraction < 0 ? -colonnade_floor(-high, -fraction) : colonnade_shift_left(high, fraction)) - eye;
         most |= colonnade_magnitude(planes[axis][0]) | colonnade_magnitude(planes[axis][1]);
     }
     int down = colonnade_bit_length(most) - 29;
@@ -31,10 +32,10 @@ static void find_box(struct colonnade_view *view, const struct colonnade_work *w
     }
 }
 
-/* The half-plane of the pixels whose rays lie on one side of a plane through the eye: normal * ray >= 0. The normal has no
- * component along an axis. Answers whether it cuts the frame. */
-static bool find_half_plane(const struct colonnade_view *view, const struct colonnade_view_rays *rays, const int32_t normal[3],
-                            int axis, int32_t half_plane[3]) {
+/* The half-plane of the pixels whose rays lie on one side of a plane through the eye: normal * ray >= 0. The normal has
+ * no component along an axis. Answers whether it cuts the frame. */
+static bool find_half_plane(const struct colonnade_view *view, const struct colonnade_view_rays *rays,
+                            const int32_t normal[3], int axis, int32_t half_plane[3]) {
     const int b = (axis + 1) % 3, c = (axis + 2) % 3;
     const int32_t *step_x = rays->step_x, *step_y = rays->step_y, *direction = rays->first;
     const int64_t x = (int64_t)normal[b] * step_x[b] + (int64_t)normal[c] * step_x[c];
@@ -107,8 +108,9 @@ static uint32_t clip(int64_t pixel, uint32_t size) {
     return pixel > (int64_t)size ? size : (uint32_t)pixel;
 }
 
-/* The pixels around the corners of the box, a pixel wider; the whole frame if the box reaches behind the camera, none if it
- * lies there. A corner is at x = (step_y x first) * corner / d, y = (first x step_x) * corner / d with d = (step_x x step_y)
+/* The pixels around the corners of the box, a pixel wider; the whole frame if the box reaches behind the camera, none
+ * if it lies there. A corner is at x = (step_y x first) * corner / d, y = (first x step_x) * corner / d with d =
+ * (step_x x step_y)
  * * corner. */
 static void set_rectangle(struct colonnade_view *view, const struct colonnade_view_rays *rays, const struct box *box) {
     const uint32_t size[2] = {view->camera.width, view->camera.height};

@@ -42,7 +42,8 @@ static inline uint32_t colonnade_mac_words(const struct colonnade_view_scene *sc
 }
 
 /* Sets such a register to value * 2^shift, which has `more_mac_bits` below at most, and answers the place behind it. */
-static inline uint32_t *colonnade_set_mac(const struct colonnade_view_scene *scene, uint32_t *words, int64_t value, int shift) {
+static inline uint32_t *colonnade_set_mac(const struct colonnade_view_scene *scene, uint32_t *words, int64_t value,
+                                          int shift) {
     const uint64_t bits = (uint64_t)value << shift;
     if (scene->more_mac_bits == 0) {
         *words++ = colonnade_bits(value, scene->mac_bits);
@@ -65,7 +66,8 @@ struct colonnade_block {
 };
 
 /* Finds the blocks; answers their number. */
-int colonnade_find_blocks(const struct colonnade_view_scene *scene, struct colonnade_block blocks[COLONNADE_MAX_BLOCKS]);
+int colonnade_find_blocks(const struct colonnade_view_scene *scene,
+                          struct colonnade_block blocks[COLONNADE_MAX_BLOCKS]);
 
 /* Whether rows are unit and at right angles, to 2^-20, and right-handed, and the position is in the world. */
 bool colonnade_is_pose(const struct colonnade_pose *pose);
@@ -77,13 +79,15 @@ bool colonnade_is_place(const int64_t position[3]);
 bool colonnade_is_lens(int64_t fx, int64_t fy, int64_t cx, int64_t cy);
 
 /* Whether a scene's device renders the picture of a camera. */
-enum colonnade_error colonnade_check_camera(const struct colonnade_view_scene *scene, const struct colonnade_camera *camera);
+enum colonnade_error colonnade_check_camera(const struct colonnade_view_scene *scene,
+                                            const struct colonnade_camera *camera);
 
 /* A point of the world on the object's grid, 2^-16 steps. Answers whether it is in the hardware's range. */
 bool colonnade_find_on_grid(const struct colonnade_view *view, const int64_t point[3], int64_t steps[3]);
 
 /* Axes and eye of a pose. Answers whether the eye is in the hardware's range. */
-bool colonnade_find_sight(const struct colonnade_view *view, const struct colonnade_pose *pose, struct colonnade_work *work);
+bool colonnade_find_sight(const struct colonnade_view *view, const struct colonnade_pose *pose,
+                          struct colonnade_work *work);
 
 /* The scaled rays of a picture, as whole numbers, from the registers. */
 struct colonnade_view_rays {

@@ -25,7 +25,8 @@ bool colonnade_is_pose(const struct colonnade_pose *pose) {
             length += (int64_t)row[axis] * row[axis];
             angle += (int64_t)row[axis] * next[axis];
         }
-        if (!colonnade_is_within(length, one - error, one + error) || !colonnade_is_within(angle, -error, error)) return false;
+        if (!colonnade_is_within(length, one - error, one + error) || !colonnade_is_within(angle, -error, error))
+            return false;
         const int32_t *second = pose->rotation[1], *third = pose->rotation[2];
         const int b = (i + 1) % 3, c = (i + 2) % 3;
         const int64_t minor = (int64_t)second[b] * third[c] - (int64_t)second[c] * third[b];
@@ -34,7 +35,8 @@ bool colonnade_is_pose(const struct colonnade_pose *pose) {
     return volume > 0 && colonnade_is_place(pose->position);
 }
 
-enum colonnade_error colonnade_check_camera(const struct colonnade_view_scene *scene, const struct colonnade_camera *camera) {
+enum colonnade_error colonnade_check_camera(const struct colonnade_view_scene *scene,
+                                            const struct colonnade_camera *camera) {
     if (!colonnade_is_pose(&camera->pose)) return COLONNADE_BAD_POSE;
     if (!colonnade_is_lens(camera->fx, camera->fy, camera->cx, camera->cy) || camera->width == 0 || camera->height == 0)
         return COLONNADE_BAD_LENS;
@@ -54,7 +56,8 @@ enum colonnade_error colonnade_rotation(int32_t rotation[3][3], const int32_t qu
     int32_t twice[3][4];
     for (int i = 0; i < 3; ++i)
         for (int j = i; j < 4; ++j) {
-            const int64_t product = colonnade_nearest((int64_t)quaternion[i] * quaternion[j], COLONNADE_ROTATION_BITS - 1);
+            const int64_t product =
+                colonnade_nearest((int64_t)quaternion[i] * quaternion[j], COLONNADE_ROTATION_BITS - 1);
             twice[i][j] = (int32_t)colonnade_nearest(product * (2 * one - norm), COLONNADE_ROTATION_BITS);
             if (j < 3) twice[j][i] = twice[i][j];
         }
@@ -81,7 +84,8 @@ enum colonnade_error colonnade_view_set_object(struct colonnade_view *view, cons
     return COLONNADE_OK;
 }
 
-enum colonnade_error colonnade_view_set_bounds(struct colonnade_view *view, const int32_t low[3], const int32_t high[3]) {
+enum colonnade_error colonnade_view_set_bounds(struct colonnade_view *view, const int32_t low[3],
+                                               const int32_t high[3]) {
     const int64_t most = ((int64_t)1 << view->scene.vertex_bits) - 1;
     for (int axis = 0; axis < 3; ++axis)
         if (!colonnade_is_within(low[axis], 0, high[axis]) || high[axis] > most) return COLONNADE_OUTSIDE;

@@ -48,10 +48,12 @@ static bool set_projection(struct colonnade_view *view, const struct colonnade_w
 
     uint32_t *to = colonnade_computed(view) + VIEW_ENVIRONMENT;
     for (int i = 0; i < 9; ++i) to = colonnade_set_mac(scene, to, colonnade_nearest(matrix[i / 3][i % 3], down), more);
-    for (int row = 0; row < 3; ++row) to = colonnade_set_mac(scene, to, colonnade_nearest(offset[row], whole + shift), more);
+    for (int row = 0; row < 3; ++row)
+        to = colonnade_set_mac(scene, to, colonnade_nearest(offset[row], whole + shift), more);
     *to++ = (uint32_t)(shift + scene->more_grid_bits);
     *to++ = (uint32_t)scaled & (2 * (uint32_t)limit + 1);
-    for (int i = 0; i < 9; ++i) *to++ = colonnade_bits(colonnade_nearest(work->axes[i % 3][i / 3], 60 - ROTATION_FRACTION), 16);
+    for (int i = 0; i < 9; ++i)
+        *to++ = colonnade_bits(colonnade_nearest(work->axes[i % 3][i / 3], 60 - ROTATION_FRACTION), 16);
     return true;
 }
 
@@ -84,7 +86,8 @@ static void find_lengths(const struct colonnade_view *view, const struct colonna
         walls[axis][1] = colonnade_scaled(scene->room_high[axis] - eye, &scene->steps, 16, limit);
         for (int side = 0; side < 2; ++side)
             most |= colonnade_magnitude(planes[axis][side]) | colonnade_magnitude(walls[axis][side]);
-        for (uint32_t i = 0; i < scene->lights; ++i) most |= colonnade_magnitude(work->lights[i][axis] - work->eye[axis]);
+        for (uint32_t i = 0; i < scene->lights; ++i)
+            most |= colonnade_magnitude(work->lights[i][axis] - work->eye[axis]);
         for (int i = 0; i < 3; ++i) {
             lengths->rows[0][i][axis] = (int32_t)colonnade_nearest(work->axes[i][axis], 30);
             lengths->rows[1][i][axis] = view->object.rotation[i][axis];
@@ -103,10 +106,11 @@ static void find_lengths(const struct colonnade_view *view, const struct colonna
 }
 
 /* Corners of the object's box with a margin, in vertex units, along the axes of the camera (0) or of the world (1). */
-static void find_corners(const struct colonnade_view_scene *scene, const struct lengths *lengths, int which, int32_t margin,
-                         int32_t corners[8][3]) {
-    const int32_t wider = (int32_t)colonnade_nearest(colonnade_shift_left(margin, scene->grid_fraction + 16), lengths->unit) +
-                          (margin != 0 ? 2 : 0); /* the rounding of corners and lights */
+static void find_corners(const struct colonnade_view_scene *scene, const struct lengths *lengths, int which,
+                         int32_t margin, int32_t corners[8][3]) {
+    const int32_t wider =
+        (int32_t)colonnade_nearest(colonnade_shift_left(margin, scene->grid_fraction + 16), lengths->unit) +
+        (margin != 0 ? 2 : 0); /* the rounding of corners and lights */
     for (int corner = 0; corner < 8; ++corner)
         for (int i = 0; i < 3; ++i) {
             int32_t point[3];
@@ -143,14 +147,16 @@ static void unite(struct region *region, const struct region *other) {
     if (region->is_whole) return;
     if (region->extent.is_empty) region->extent = other->extent;
     for (int i = 0; i < 2; ++i) {
-        if (colonnade_is_less(other->extent.low[i], region->extent.low[i])) region->extent.low[i] = other->extent.low[i];
-        if (colonnade_is_less(region->extent.high[i], other->extent.high[i])) region->extent.high[i] = other->extent.high[i];
+        if (colonnade_is_less(other->extent.low[i], region->extent.low[i]))
+            region->extent.low[i] = other->extent.low[i];
+        if (colonnade_is_less(region->extent.high[i], other->extent.high[i]))
+            region->extent.high[i] = other->extent.high[i];
     }
 }
 
-/* Where the shadow of the box by one light may be seen. The shadow is {c + t (c - L)} with c in the box and t >= 0; all of
- * the room's surface is on the inner side of each wall. Where all corners' rays go towards a wall, the part of the shadow
- * on its inner side is in the hull of the corners and of the points where these rays meet the wall. */
+/* Where the shadow of the box by one light may be seen. The shadow is {c + t (c - L)} with c in the box and t >= 0; all
+ * of the room's surface is on the inner side of each wall. Where all corners' rays go towards a wall, the part of the
+ * shadow on its inner side is in the hull of the corners and of the points where these rays meet the wall. */
 static struct region find_shadow(const struct lengths *lengths, uint32_t light, const struct colonnade_extent *box,
                                  int32_t corners[8][3], int32_t in_world[8][3]) {
     struct region region = {*box, false};
@@ -270,7 +276,8 @@ static struct cover find_cover(const struct colonnade_view *view, const struct l
         if (!is_before) continue;
         const int64_t focal = scene->map_lens[i], centre = scene->map_lens[2 + i];
         const int32_t tile = (int32_t)scene->tile_size;
-        const int32_t low = find_pixel(extent.low[i], focal, centre) - 1, high = find_pixel(extent.high[i], focal, centre) + 1;
+        const int32_t low = find_pixel(extent.low[i], focal, centre) - 1,
+                      high = find_pixel(extent.high[i], focal, centre) + 1;
         cover.low[i] = clip(low / tile, tiles[i]);
         cover.high[i] = high < 0 ? 0 : clip(high / tile + 1, tiles[i]);
     }
@@ -278,9 +285,10 @@ static struct cover find_cover(const struct colonnade_view *view, const struct l
 }
 
 /* The room may hide the object where a tile under its box is nearer than the box's end; from a camera other than
- * the maps', always. The tolerance is twice the largest error of the tiles around the object, from 1/400 of the distance to
- * a tenth of the edge. The lengths are from the maps' camera. */
-static void set_occlusion(struct colonnade_view *view, const struct colonnade_work *work, const struct lengths *lengths) {
+ * the maps', always. The tolerance is twice the largest error of the tiles around the object, from 1/400 of the
+ * distance to a tenth of the edge. The lengths are from the maps' camera. */
+static void set_occlusion(struct colonnade_view *view, const struct colonnade_work *work,
+                          const struct lengths *lengths) {
     const struct colonnade_view_scene *scene = &view->scene;
     uint32_t *words = colonnade_computed(view) + VIEW_WINDOW + 4;
     const int tolerance_words = scene->scene_bits + scene->more_grid_bits > 42 ? 2 : 1;

@@ -89,7 +89,8 @@ enum colonnade_error colonnade_view_set_sample(struct colonnade_view *view, uint
         sample->shift[axis] = ((int64_t)(2 * point[axis] + 1) - (int64_t)count) * (COLONNADE_PIXEL / 2 / count);
     for (uint32_t ray = 0; ray < COLONNADE_VIEW_RAYS; ++ray) {
         find_point(count == 1 ? 0 : orders[view->scene.lights + ray][count - 2 + index], count, point);
-        for (int axis = 0; axis < 2; ++axis) sample->points[ray][axis] = (uint8_t)((2 * point[axis] + 1) * (128 / count));
+        for (int axis = 0; axis < 2; ++axis)
+            sample->points[ray][axis] = (uint8_t)((2 * point[axis] + 1) * (128 / count));
     }
     return COLONNADE_OK;
 }

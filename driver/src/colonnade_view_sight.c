@@ -20,7 +20,8 @@ bool colonnade_find_on_grid(const struct colonnade_view *view, const int64_t poi
     return true;
 }
 
-bool colonnade_find_sight(const struct colonnade_view *view, const struct colonnade_pose *pose, struct colonnade_work *work) {
+bool colonnade_find_sight(const struct colonnade_view *view, const struct colonnade_pose *pose,
+                          struct colonnade_work *work) {
     for (int i = 0; i < 3; ++i)
         for (int axis = 0; axis < 3; ++axis) {
             work->axes[i][axis] = 0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Words of files, and the header that all files begin with. Words are read byte by byte, so that files may lie anywhere. */
+/* Words of files, and the header that all files begin with. Words are read byte by byte, so that files may lie
+ * anywhere. */
 #ifndef COLONNADE_WORDS_H
 #define COLONNADE_WORDS_H
 
@@ -21,7 +22,8 @@ static inline void colonnade_write_word(uint8_t *bytes, uint32_t value) {
 
 /* A name of eight letters, the version, the size, and the format hash. `other` answers another name or version. */
 enum colonnade_error colonnade_check_header(const struct colonnade_design *design, const uint8_t *bytes, size_t size,
-                                            size_t least, const char *magic, uint32_t version, enum colonnade_error other);
+                                            size_t least, const char *magic, uint32_t version,
+                                            enum colonnade_error other);
 
 /* Whether `count` words from a word address on are frame registers. */
 bool colonnade_are_frame_registers(const struct colonnade_design *design, uint32_t address, uint32_t count);

@@ -61,18 +61,21 @@ int main(void) {
         {0x1040, 2, {0x1000, (uint64_t)1 << 41}, COLONNADE_TOO_LARGE},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; ++i)
-        CHECK(colonnade_open_ring(&ring, &device, wrong[i].address, wrong[i].size_log, &wrong[i].window) == wrong[i].error);
+        CHECK(colonnade_open_ring(&ring, &device, wrong[i].address, wrong[i].size_log, &wrong[i].window) ==
+              wrong[i].error);
     CHECK(shell.writes == 0);
 
     /* Where the scene lies */
     const struct colonnade_rays_image image = {NULL, 77, 32, {1, 2, 3}, {4, 5, 6}, 7, -8, {9, -10, (int64_t)11 << 32}};
     CHECK(colonnade_set_rays(&device, &image) == COLONNADE_OK);
-    static const uint32_t expected[] = {1, 2, 3, 4, 5, 6, 77, 0, 7, (uint32_t)-8, 9, 0, (uint32_t)-10, 0xFFFFFFFF, 0, 11};
+    static const uint32_t expected[] = {1,          2, 3, 4, 5, 6, 77, 0, 7, (uint32_t)-8, 9, 0, (uint32_t)-10,
+                                        0xFFFFFFFF, 0, 11};
     CHECK(memcmp(shell.device + FIRST, expected, sizeof expected) == 0 && shell.device[0] == 1);
 
     /* All slots but one, around the end of the ring and of the count */
     CHECK(colonnade_open_ring(&ring, &device, 0x1040, 2, &window) == COLONNADE_OK);
-    CHECK(shell.device[RING] == 0x1040 && shell.device[RING + 2] == 2 && shell.registers[AT(rays_windowEnd_low)] == 0x3000);
+    CHECK(shell.device[RING] == 0x1040 && shell.device[RING + 2] == 2 &&
+          shell.registers[AT(rays_windowEnd_low)] == 0x3000);
     for (uint32_t i = 0; i < COUNT; ++i) {
         CHECK(colonnade_next_batch(&ring, &slot) == COLONNADE_OK && slot == 0x1040 + 64 * ((2 + i) % 4));
         CHECK(colonnade_submit(&ring) == COLONNADE_OK && shell.device[TAIL] == ((0xFFFF + i) & 0xFFFF));

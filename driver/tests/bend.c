@@ -1,8 +1,9 @@
-/* Meshes of a motion that bend, against a device that reads records through a cache and keeps them until it is invalidated.
- * Prints nothing and returns 0, or the line that failed. Run it under the address sanitizer.
+/* Meshes of a motion that bend, against a device that reads records through a cache and keeps them until it is
+ * invalidated. Prints nothing and returns 0, or the line that failed. Run it under the address sanitizer.
  *
- * usage: bend CLIP SCENE INSTANCES INVALIDATE COUNT    files of `colonnade pack`, word addresses of the first instance's
- *                                                      registers, control.invalidate and scene.recordCount */
+ * usage: bend CLIP SCENE INSTANCES INVALIDATE COUNT    files of `colonnade pack`, word addresses of the first
+ *                                                      instance's registers, control.invalidate and scene.recordCount
+ */
 #include "check.h"
 #include "colonnade_motion.h"
 #include "colonnade_shell.h"

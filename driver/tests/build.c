@@ -1,7 +1,7 @@
-/* Trees over triangles, and their cost as they bend. Input, numbers: bits of vertices, deltas, planes and addresses; the places
- * of all fields; numbers of vertices, triangles and poses; four numbers of each triangle; five of each vertex in each pose.
- * Output, of the first pose: leaves, records, depth; vertices of leaves; words of records; the cost. Then of each other pose the
- * cost of that tree, and of one that is built for it. */
+/* Trees over triangles, and their cost as they bend. Input, numbers: bits of vertices, deltas, planes and addresses;
+ * the places of all fields; numbers of vertices, triangles and poses; four numbers of each triangle; five of each
+ * vertex in each pose. Output, of the first pose: leaves, records, depth; vertices of leaves; words of records; the
+ * cost. Then of each other pose the cost of that tree, and of one that is built for it. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

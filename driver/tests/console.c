@@ -1,7 +1,7 @@
 /* target_uio.c on a Linux of files: which displays show the device's memory, and what becomes of the console.
  *
- * usage: console BASE SIZE DISPLAYS...   a display is START:BYTES:LINE, "absent", "denied" or "unknown"; "no-console" and
- *                                        "deaf" (KDSETMODE fails) are of the machine
+ * usage: console BASE SIZE DISPLAYS...   a display is START:BYTES:LINE, "absent", "denied" or "unknown"; "no-console"
+ *                                        and "deaf" (KDSETMODE fails) are of the machine
  *
  * Prints the line, and each mode of the console. */
 #define _POSIX_C_SOURCE 200809L
@@ -57,7 +57,9 @@ static int test_ioctl(int file, unsigned long request, ...) {
     }
     struct fb_fix_screeninfo *display = va_arg(arguments, struct fb_fix_screeninfo *);
     va_end(arguments);
-    return sscanf(displays[file], "%lx:%x:%u", &display->smem_start, &display->smem_len, &display->line_length) == 3 ? 0 : -1;
+    return sscanf(displays[file], "%lx:%x:%u", &display->smem_start, &display->smem_len, &display->line_length) == 3
+               ? 0
+               : -1;
 }
 
 #define open test_open

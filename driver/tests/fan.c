@@ -1,5 +1,5 @@
-/* Counts the branches of colonnade_mesh_pairs, which is compiled with -fsanitize-coverage=trace-pc, over triangles around a
- * vertex or an edge: fan TRIANGLES vertex|edge. Output: leaves, branches. */
+/* Counts the branches of colonnade_mesh_pairs, which is compiled with -fsanitize-coverage=trace-pc, over triangles
+ * around a vertex or an edge: fan TRIANGLES vertex|edge. Output: leaves, branches. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* libFuzzer on the driver (tools/driver-fuzz): calls in any order with files that end where their memory ends, against
- * shell.c, which ends the program at an access that the shell refuses. An input chooses the calls, how they go wrong, and
- * how fast the device is. */
+ * shell.c, which ends the program at an access that the shell refuses. An input chooses the calls, how they go wrong,
+ * and how fast the device is. */
 #include "fuzz.h"
 #include "shell.h"
 
@@ -97,9 +97,11 @@ static void load(struct colonnade *device) {
     size_t bytes;
     uint8_t *file = make_file("CLNDLOAD", 32 * (1 + take() % 4), &bytes);
     const uint64_t address = take_address();
-    const struct colonnade_image image = {take() < 192 ? file : NULL, (uint32_t)bytes, address, take_window(address, bytes)};
+    const struct colonnade_image image = {take() < 192 ? file : NULL, (uint32_t)bytes, address,
+                                          take_window(address, bytes)};
     const bool maps = take() % 2 != 0;
-    const bool is_right = (maps ? colonnade_check_maps : colonnade_check_image)(device->design, file, bytes) == COLONNADE_OK;
+    const bool is_right =
+        (maps ? colonnade_check_maps : colonnade_check_image)(device->design, file, bytes) == COLONNADE_OK;
     const enum colonnade_error error = (maps ? colonnade_load_maps : colonnade_load)(device, &image, take() % 16);
     CHECK(error != COLONNADE_BUSY || shell.writes == writes);
     CHECK(error != COLONNADE_OK || is_right || image.data == NULL);
@@ -166,7 +168,8 @@ static void probe(struct colonnade *device, const struct colonnade_bus *bus) {
     shell.registers[word] = value;
 }
 
-static void call(struct colonnade *device, const struct colonnade_bus *bus, uint8_t **file, struct colonnade_frame *frame) {
+static void call(struct colonnade *device, const struct colonnade_bus *bus, uint8_t **file,
+                 struct colonnade_frame *frame) {
     const uint32_t which = take() % 16, enabled = shell.registers[AT(interrupt_enable)];
     pace = take();
     pace = pace < 64 ? 0 : pace < 128 ? 2 : pace;

@@ -1,8 +1,9 @@
-/* Fuzzer of meshes that bend (tools/driver-fuzz): an input chooses the numbers of a clip file, each legal, from usual ones to
- * all of them extreme at once, and a tree over its leaves; in some files it then changes words or the length, and in some
- * trees records. File and records end where their memory ends. A legal file opens; a vertex is on the grid, and the same if the
- * file begins in the middle of a word; a refit of the tree succeeds, twice with the same records, and changes nothing behind them. In a motion, a frame's copy of the mesh stays
- * as it is while the next frame's bends. */
+/* Fuzzer of meshes that bend (tools/driver-fuzz): an input chooses the numbers of a clip file, each legal, from usual
+ * ones to all of them extreme at once, and a tree over its leaves; in some files it then changes words or the length,
+ * and in some trees records. File and records end where their memory ends. A legal file opens; a vertex is on the grid,
+ * and the same if the file begins in the middle of a word; a refit of the tree succeeds, twice with the same records,
+ * and changes nothing behind them. In a motion, a frame's copy of the mesh stays as it is while the next frame's bends.
+ */
 #include "colonnade_motion.h"
 #include "fuzz.h"
 
@@ -84,7 +85,8 @@ static void add_clip(void) {
     for (int i = 0; i < 12; ++i) add(head[i]);
     const int bits[] = {vertex_bits, delta_bits, box_bits, ADDRESS_BITS};
     for (int i = 0; i < 4; ++i) add(bits[i]);
-    const uint32_t numbers[] = {step, record_count, depth, vertices, leaf_count, bones, targets, changes, keys, 0, 15, 10};
+    const uint32_t numbers[] = {step,    record_count, depth, vertices, leaf_count, bones,
+                                targets, changes,      keys,  0,        15,         10};
     for (int i = 0; i < 12; ++i) add(numbers[i]);
     const size_t duration = file.count - 3;
     add_fields();
@@ -124,7 +126,8 @@ static void add_clip(void) {
 
 static bool damage(void) {
     if (take() >= 96) return false;
-    for (uint32_t i = 1 + take() % 3; i > 0; --i) file.words[below((uint32_t)file.count)] = take() < 128 ? take32() : take();
+    for (uint32_t i = 1 + take() % 3; i > 0; --i)
+        file.words[below((uint32_t)file.count)] = take() < 128 ? take32() : take();
     return true;
 }
 
@@ -169,7 +172,8 @@ static void check_motion(const struct colonnade_mesh *mesh, bool is_legal) {
                                              malloc(sizeof *memory.path * mesh->depth),
                                              malloc(4 * (size_t)colonnade_mesh_pose_words(mesh))};
     uint32_t *before = malloc(2 * bytes);
-    CHECK(memory.scene != NULL && memory.vertices != NULL && memory.path != NULL && memory.pose != NULL && before != NULL);
+    CHECK(memory.scene != NULL && memory.vertices != NULL && memory.path != NULL && memory.pose != NULL &&
+          before != NULL);
     motion.roots[0][0] = from;
     memcpy(memory.scene, records, bytes);
     enum colonnade_error error = colonnade_motion_copy(&motion, &memory, (uint32_t)bytes);

@@ -1,14 +1,15 @@
-/* Fuzzer of objects that move (tools/driver-fuzz): an input chooses the numbers of a clip file of instances, each legal, from
- * usual ones to all of them extreme at once; in some files it then changes words or the length. The file ends where its memory
- * ends. A legal file opens; words fit their registers, boxes and bounds are in the cube and in order, changed words with those
- * before are the words of a whole frame. */
+/* Fuzzer of objects that move (tools/driver-fuzz): an input chooses the numbers of a clip file of instances, each
+ * legal, from usual ones to all of them extreme at once; in some files it then changes words or the length. The file
+ * ends where its memory ends. A legal file opens; words fit their registers, boxes and bounds are in the cube and in
+ * order, changed words with those before are the words of a whole frame. */
 #include "colonnade_motion.h"
 #include "fuzz.h"
 
 enum { MOST_WORDS = 4000, FIRST = 100, END = 900, BOUNDS = 880, OFFSET = 890 };
 
-static const struct colonnade_design design = {
-    .format_hash = {1, 2, 3, 4, 5, 6, 7, 0xFFFFFFFF}, .frame_registers = 0x8000 + 4 * FIRST, .device_end = 0x8000 + 4 * END};
+static const struct colonnade_design design = {.format_hash = {1, 2, 3, 4, 5, 6, 7, 0xFFFFFFFF},
+                                               .frame_registers = 0x8000 + 4 * FIRST,
+                                               .device_end = 0x8000 + 4 * END};
 
 static uint32_t extremes; /* of 256 numbers */
 
@@ -38,7 +39,8 @@ static void add_motion(void) {
     file.count = 0;
     for (int i = 0; i < 12; ++i) add(head[i]);
     for (int i = 0; i < 3; ++i) add(world[i]);
-    add(FIRST), add(BOUNDS), add(OFFSET), add(colonnade_instance_words(&numbers)), add(below(3)), add(objects), add(keys);
+    add(FIRST), add(BOUNDS), add(OFFSET), add(colonnade_instance_words(&numbers)), add(below(3)), add(objects),
+        add(keys);
     const size_t duration = file.count;
     add(0), add(shift), add(0);
     for (uint32_t i = 0; i < objects; ++i) {
@@ -64,7 +66,8 @@ static void add_motion(void) {
 
 static bool damage(void) {
     if (take() >= 96) return false;
-    for (uint32_t i = 1 + take() % 3; i > 0; --i) file.words[below((uint32_t)file.count)] = take() < 128 ? take32() : take();
+    for (uint32_t i = 1 + take() % 3; i > 0; --i)
+        file.words[below((uint32_t)file.count)] = take() < 128 ? take32() : take();
     return true;
 }
 
@@ -119,7 +122,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         CHECK(writes != NULL);
         colonnade_motion_transforms(&motion, take() < 16 ? take32() : below(200000), transforms);
         const enum colonnade_error error = colonnade_motion_find(&motion, transforms, now);
-        CHECK(error == COLONNADE_OK || error == COLONNADE_FLAT || error == COLONNADE_TOO_SMALL || error == COLONNADE_OUTSIDE);
+        CHECK(error == COLONNADE_OK || error == COLONNADE_FLAT || error == COLONNADE_TOO_SMALL ||
+              error == COLONNADE_OUTSIDE);
         for (uint32_t i = 0; error == COLONNADE_OK && i < motion.objects; ++i) check_instance(&motion.world, &now[i]);
         if (error == COLONNADE_OK) {
             const uint32_t changed = colonnade_motion_writes(&motion, now, has_frame ? last : NULL, writes);

@@ -1,13 +1,23 @@
-/* Fuzzer of registers from poses (tools/driver-fuzz): an input chooses the numbers of a view file, each legal, from usual
- * ones to all of them extreme at once; in some files it then changes words or the length. The file ends where its memory
- * ends. A legal file opens; what a refused call would fill stays as it was; a frame writes frame registers of the design
- * alone, each at most once; and the device has all registers of the frame, though only words that differ are written. */
+/* Fuzzer of registers from poses (tools/driver-fuzz): an input chooses the numbers of a view file, each legal, from
+ * usual ones to all of them extreme at once; in some files it then changes words or the length. The file ends where its
+ * memory ends. A legal file opens; what a refused call would fill stays as it was; a frame writes frame registers of
+ * the design alone, each at most once; and the device has all registers of the frame, though only words that differ are
+ * written. */
 #include <math.h>
 
 #include "colonnade_view.h"
 #include "fuzz.h"
 
-enum { FRAME = 40, CAMERA = 80, LIGHTS = 120, ENVIRONMENT = 220, WINDOW = 260, GATHER = 270, CONSTANTS = 280, END = 284 };
+enum {
+    FRAME = 40,
+    CAMERA = 80,
+    LIGHTS = 120,
+    ENVIRONMENT = 220,
+    WINDOW = 260,
+    GATHER = 270,
+    CONSTANTS = 280,
+    END = 284
+};
 enum { MOST_WORDS = 400, CALLS = 10 };
 
 static const int64_t one = (int64_t)1 << 32, most_place = ((int64_t)1 << 60) - 1;
@@ -63,7 +73,8 @@ static struct colonnade_pose take_pose(void) {
         parts[i] = take() < 64 ? 0 : (int)take() - 128;
         square += parts[i] * parts[i];
     }
-    for (int i = 0; i < 4; ++i) quaternion[i] = (int32_t)((square > 0 ? parts[i] / sqrt(square) : i == 3) * (double)(1 << 30));
+    for (int i = 0; i < 4; ++i)
+        quaternion[i] = (int32_t)((square > 0 ? parts[i] / sqrt(square) : i == 3) * (double)(1 << 30));
     CHECK(colonnade_rotation(pose.rotation, quaternion) == COLONNADE_OK);
     if (take() < extremes) pose.rotation[take() % 3][take() % 3] += (int32_t)pick(-200, 200);
     for (int axis = 0; axis < 3; ++axis) pose.position[axis] = coordinate(8);
@@ -84,7 +95,8 @@ static int64_t lens_number(int i) {
 
 static void add_scene(bool has_room, bool gathers) {
     const uint32_t head[] = {0x444E4C43, 0x57454956, 3, 0, 1, 2, 3, 4, 5, 6, 7, 0xFFFFFFFF};
-    const uint32_t environment = has_room ? ENVIRONMENT : 0, window = has_room ? WINDOW : 0, gather = gathers ? GATHER : 0;
+    const uint32_t environment = has_room ? ENVIRONMENT : 0, window = has_room ? WINDOW : 0,
+                   gather = gathers ? GATHER : 0;
     const uint32_t addresses[] = {FRAME, CAMERA, LIGHTS, environment, window, gather};
     const int64_t scene_bits = number(take() % 2 != 0 ? 30 : 43, 16, 72), vertex_bits = number(16, 8, 24);
     const int64_t width = number(640, 1, 4096), height = number(480, 1, 4096);

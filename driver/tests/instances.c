@@ -21,7 +21,8 @@ static int32_t number(int bits) {
 static struct colonnade_transform make_transform(const struct colonnade_world *world, bool is_extreme) {
     struct colonnade_transform transform = {{{0}}, -32 - (int32_t)(next() % 3), {0}};
     for (int i = 0; i < 9; ++i) transform.linear[i / 3][i % 3] = is_extreme ? (int32_t)next() : number(29);
-    for (int axis = 0; axis < 3; ++axis) transform.position[axis] = ((int64_t)1 << (world->vertex_bits + 19)) + number(30);
+    for (int axis = 0; axis < 3; ++axis)
+        transform.position[axis] = ((int64_t)1 << (world->vertex_bits + 19)) + number(30);
     if (!is_extreme) return transform;
     for (int axis = 0; axis < 3; ++axis) {
         const uint64_t high = next(), low = next();
@@ -34,7 +35,8 @@ static struct colonnade_transform make_transform(const struct colonnade_world *w
 }
 
 static uint32_t result(void) {
-    static const struct colonnade_world worlds[] = {{16, 5, 32}, {16, 13, 40}, {16, -3, 24}, {24, 37, 72}, {10, 51, 72}};
+    static const struct colonnade_world worlds[] = {
+        {16, 5, 32}, {16, 13, 40}, {16, -3, 24}, {24, 37, 72}, {10, 51, 72}};
     struct colonnade_instance instances[COLONNADE_INSTANCES];
     for (uint32_t frame = 0; frame < FRAMES; ++frame) {
         const struct colonnade_world *world = &worlds[frame % 5];

@@ -3,8 +3,8 @@
  * usage: live IMAGE FRAMES
  *
  * Of frame N, the file maps.N has new maps, or is missing; view.N is a view file, whose registers are computed here, or
- * frame.N a frame file; photo.N is the photo, XRGB8888, in lines of whole tile rows. Prints the place of each frame, and the
- * cycles of its load and of its rendering.
+ * frame.N a frame file; photo.N is the photo, XRGB8888, in lines of whole tile rows. Prints the place of each frame,
+ * and the cycles of its load and of its rendering.
  *
  * Memory: image, maps and photo, each in its own pages, then framebuffers in windows of their size; a page of untouched
  * memory is around each of these. */
@@ -89,7 +89,8 @@ int main(int argc, char **argv) {
         expect(colonnade_wait(&device, COLONNADE_FRAME_DONE, ATTEMPTS), COLONNADE_OK, "a frame");
         colonnade_acknowledge(&device, COLONNADE_FRAME_DONE | COLONNADE_ERROR);
         expect(colonnade_result(&device), COLONNADE_OK, "a frame");
-        fprintf(stderr, "frame %" PRIu64 " %" PRIu32 " load %" PRIu64 " render %" PRIu64 "\n", place, stride, loading, waited);
+        fprintf(stderr, "frame %" PRIu64 " %" PRIu32 " load %" PRIu64 " render %" PRIu64 "\n", place, stride, loading,
+                waited);
         place += pages(bytes) + PAGE;
     }
     printf("dump memory 0 %" PRIu64 "\n", place);

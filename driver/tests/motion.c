@@ -1,5 +1,5 @@
-/* Frames of the motion in motion_table.h, with a mesh that bends in two copies: prints a hash of all records, roots and writes
- * of registers; 0 if a call has another result than it should. */
+/* Frames of the motion in motion_table.h, with a mesh that bends in two copies: prints a hash of all records, roots and
+ * writes of registers; 0 if a call has another result than it should. */
 #include "colonnade_motion.h"
 #include "bare.h"
 #include "colonnade_shell.h"
@@ -47,8 +47,10 @@ static uint32_t result(void) {
     const struct colonnade_bus bus = {.read = read_status};
     const struct colonnade device = {.bus = &bus};
     const struct colonnade_motion_memory memory = {scene, vertices, path, pose};
-    struct colonnade_design design = {
-        .frame_registers = FRAME_REGISTERS, .device_end = DEVICE_END, .invalidate = INVALIDATE, .scene = SCENE_REGISTERS};
+    struct colonnade_design design = {.frame_registers = FRAME_REGISTERS,
+                                      .device_end = DEVICE_END,
+                                      .invalidate = INVALIDATE,
+                                      .scene = SCENE_REGISTERS};
     for (size_t i = 0; i < 32; ++i) design.format_hash[i / 4] |= (uint32_t)clip_table[16 + i] << (8 * (i % 4));
     expect(colonnade_motion_open(&motion, &design, clip_table, sizeof clip_table), COLONNADE_OK);
     expect(colonnade_motion_copy(&motion, &memory, SCENE_BYTES), COLONNADE_OK);

@@ -1,6 +1,6 @@
-/* Plans and refits of meshes for the spec of the unit. Input: numbers of a mesh, as below; the places of all fields; four
- * vertices of each leaf; five numbers of each vertex; the words of each record. Output: entries of the plan and its words; flat
- * pairs, bounds; the words of each record. */
+/* Plans and refits of meshes for the spec of the unit. Input: numbers of a mesh, as below; the places of all fields;
+ * four vertices of each leaf; five numbers of each vertex; the words of each record. Output: entries of the plan and
+ * its words; flat pairs, bounds; the words of each record. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -100,7 +100,8 @@ uint32_t shell_read(void *context, uint32_t address) {
     struct shell *shell = context;
     ++shell->accesses;
     if (address >= DEVICE_BASE) {
-        require(address % 4 == 0 && address < shell->design->device_end, "no register of the device", shell, address, 0);
+        require(address % 4 == 0 && address < shell->design->device_end, "no register of the device", shell, address,
+                0);
         return shell->device[(address - DEVICE_BASE) / 4];
     }
     require(words[find(shell, address, 0)].access != WRITE_ONLY, "a read of a write-only register", shell, address, 0);
@@ -110,7 +111,9 @@ uint32_t shell_read(void *context, uint32_t address) {
 static void command(struct shell *shell, uint32_t value) {
     uint32_t *status = &shell->registers[AT(status)];
     switch (value) {
-    case START: require((*status & (QUEUED | LOADING | RESETTING)) == 0, "a start", shell, 4 * AT(control), value); break;
+    case START:
+        require((*status & (QUEUED | LOADING | RESETTING)) == 0, "a start", shell, 4 * AT(control), value);
+        break;
     case LOAD: require(*status == 0, "a load", shell, 4 * AT(control), value); break;
     default:
         require(value == RESET, "no command", shell, 4 * AT(control), value);
@@ -126,8 +129,8 @@ static void command(struct shell *shell, uint32_t value) {
 static void write_rays(struct shell *shell, uint32_t address, uint32_t value) {
     uint32_t *status = &shell->registers[AT(status)];
     const bool is_tail = address == shell->design->rays_tail;
-    require(is_tail || address == DEVICE_BASE || address >= shell->design->frame_registers, "no register of rays", shell,
-            address, value);
+    require(is_tail || address == DEVICE_BASE || address >= shell->design->frame_registers, "no register of rays",
+            shell, address, value);
     require(*status == 0 || (is_tail && *status == RUNNING), "a register of the device", shell, address, value);
     if (is_tail && value != shell->device[(shell->design->rays_head - DEVICE_BASE) / 4]) *status = RUNNING;
     shell->device[(address - DEVICE_BASE) / 4] = value;
@@ -173,8 +176,8 @@ void shell_write(void *context, uint32_t address, uint32_t value) {
     case READ_ONLY: require(false, "a write to a read-only register", shell, address, value); break;
     case NOT_LOADING: require((status & LOADING) == 0, "a register of the image", shell, address, value); break;
     case WITH_ENVIRONMENT:
-        require((shell->registers[AT(capabilities)] & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0, "no environment",
-                shell, address, value);
+        require((shell->registers[AT(capabilities)] & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0,
+                "no environment", shell, address, value);
         require(changes, "a register of the photo", shell, address, value);
         break;
     case IDLE: require(status == 0, "a register of batches", shell, address, value); break;

@@ -1,4 +1,5 @@
-/* The shell as docs/bus-shell.md describes it to a driver: the program ends by abort() at an access that the shell refuses. */
+/* The shell as docs/bus-shell.md describes it to a driver: the program ends by abort() at an access that the shell
+ * refuses. */
 #ifndef COLONNADE_TESTS_SHELL_H
 #define COLONNADE_TESTS_SHELL_H
 

@@ -1,10 +1,11 @@
 /* The driver against a simulated device: commands of the shell's test bench go to the standard output, its answers come
- * from the standard input. Renders a frame in each format, two of them queued, and then tries what the device has to refuse.
+ * from the standard input. Renders a frame in each format, two of them queued, and then tries what the device has to
+ * refuse.
  *
  * usage: simulated IMAGE FRAME interrupt|poll [SCENE | MAPS OTHER FRAME]
  *
- * SCENE has the records of a scene in DRAM. After three frames the device loads MAPS, but first OTHER, an image of maps of
- * another format, which it has to refuse; frames from then on are the last FRAME's.
+ * SCENE has the records of a scene in DRAM. After three frames the device loads MAPS, but first OTHER, an image of maps
+ * of another format, which it has to refuse; frames from then on are the last FRAME's.
  *
  * Memory: the image at PAGE, scene or maps behind it, then framebuffers, each in a window of its size.
  * A page of untouched memory is around each of them. */
@@ -20,10 +21,10 @@ static void render(struct colonnade *device, const struct colonnade_framebuffer 
             colonnade_counter(device, COLONNADE_COUNTER_HITS));
 }
 
-/* Loads maps into a device that has rendered frames; the scene stays. What is no image of maps, or of another format, is
- * refused, by the driver and, where it does not see the image, by the device. */
-static void load_maps(struct colonnade *device, const struct colonnade_image *scene, const char *maps, const char *other,
-                      uint64_t place) {
+/* Loads maps into a device that has rendered frames; the scene stays. What is no image of maps, or of another format,
+ * is refused, by the driver and, where it does not see the image, by the device. */
+static void load_maps(struct colonnade *device, const struct colonnade_image *scene, const char *maps,
+                      const char *other, uint64_t place) {
     size_t bytes, other_bytes;
     void *data = read_file(maps, &bytes), *other_data = read_file(other, &other_bytes);
     struct colonnade_image image = {other_data, (uint32_t)other_bytes, place, {place, place + other_bytes}};
@@ -31,7 +32,8 @@ static void load_maps(struct colonnade *device, const struct colonnade_image *sc
     expect(colonnade_load_maps(device, &image, ATTEMPTS), COLONNADE_OTHER_FORMAT, "maps of another format");
     image.data = NULL;
     printf("store %s %" PRIu64 "\n", other, place);
-    expect(colonnade_load_maps(device, &image, ATTEMPTS), COLONNADE_OTHER_FORMAT, "maps of another format by the device");
+    expect(colonnade_load_maps(device, &image, ATTEMPTS), COLONNADE_OTHER_FORMAT,
+           "maps of another format by the device");
     image = (struct colonnade_image){data, (uint32_t)bytes, place, {place, place + bytes}};
     printf("store %s %" PRIu64 "\n", maps, place);
     expect(colonnade_load_maps(device, &image, ATTEMPTS), COLONNADE_OK, "load maps");
@@ -91,7 +93,8 @@ int main(int argc, char **argv) {
         free(frame_data);
         frame_data = read_file(argv[6], &frame_bytes);
         load_maps(&device, &image, argv[4], argv[5], maps_place);
-        expect(colonnade_open_frame(&colonnade_design, frame_data, frame_bytes, &frame), COLONNADE_OK, "second frame file");
+        expect(colonnade_open_frame(&colonnade_design, frame_data, frame_bytes, &frame), COLONNADE_OK,
+               "second frame file");
         expect(colonnade_set_frame(&device, &frame), COLONNADE_OK, "set a frame of new maps");
         const uint64_t bytes = (uint64_t)4 * columns * frame.height;
         render(&device, &(struct colonnade_framebuffer){place, columns * 4, COLONNADE_XRGB8888, {place, place + bytes}},
@@ -100,7 +103,8 @@ int main(int argc, char **argv) {
     }
 
     /* A soft reset in the middle of a frame; then the device lacks a frame, and takes one again */
-    struct colonnade_framebuffer last = {place, columns * 4, COLONNADE_XRGB8888, {place, place + 4 * columns * frame.height}};
+    struct colonnade_framebuffer last = {
+        place, columns * 4, COLONNADE_XRGB8888, {place, place + 4 * columns * frame.height}};
     expect(colonnade_start(&device, &last), COLONNADE_OK, "start before a reset");
     uint32_t sets = 0; /* while it runs: as many as fit, none in part */
     while (colonnade_set_frame(&device, &frame) == COLONNADE_OK) ++sets;

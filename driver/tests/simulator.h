@@ -1,5 +1,5 @@
-/* The driver's bus to a simulated device: commands of the shell's test bench go to the standard output, its answers come
- * from the standard input. */
+/* The driver's bus to a simulated device: commands of the shell's test bench go to the standard output, its answers
+ * come from the standard input. */
 #ifndef SIMULATOR_H
 #define SIMULATOR_H
 

@@ -294,9 +294,11 @@ static void test_scenes(struct shell *shell, struct colonnade *device) {
 static void test_photos(struct shell *shell, struct colonnade *device) {
     struct colonnade_photo photo = {4096, 64, {4096, 4096 + 2 * 64}, false};
     shell->registers[AT(version)] = 0x00010000;
-    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO && colonnade_set_photo(device, NULL) == COLONNADE_OK);
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO &&
+          colonnade_set_photo(device, NULL) == COLONNADE_OK);
     shell->registers[AT(version)] = 0x00010001;
-    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO && colonnade_set_photo(device, NULL) == COLONNADE_OK);
+    CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_PHOTO &&
+          colonnade_set_photo(device, NULL) == COLONNADE_OK);
     shell->registers[AT(capabilities)] = COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm;
     CHECK(colonnade_probe(device, bus_of(shell), &design) == COLONNADE_OK);
     CHECK(colonnade_set_photo(device, &photo) == COLONNADE_NO_FRAME);
@@ -322,7 +324,8 @@ static void test_photos(struct shell *shell, struct colonnade *device) {
     CHECK(colonnade_set_photo(device, NULL) == COLONNADE_OK && shell->registers[AT(photo_enabled)] == 0);
 }
 
-/* While a frame runs the shell queues so many writes: `busy` comes before one of them is refused, and before half a set. */
+/* While a frame runs the shell queues so many writes: `busy` comes before one of them is refused, and before half a
+ * set. */
 static void test_posted_writes(struct shell *shell, struct colonnade *device) {
     static const uint8_t writes[16] = {8, 0, 0, 0, 1, 0, 0, 0, 11, 0, 0, 0, 2};
     const struct colonnade_frame frame = {writes, 2, 10, 2};

@@ -1,5 +1,5 @@
-/* The machine of driver/examples/target.h that is a simulated device: simulator.h. Its memory is the file "ram", from PAGE on.
- * A frame is dumped to "frame.N" when the next one starts, the memory at the end. */
+/* The machine of driver/examples/target.h that is a simulated device: simulator.h. Its memory is the file "ram", from
+ * PAGE on. A frame is dumped to "frame.N" when the next one starts, the memory at the end. */
 #define _POSIX_C_SOURCE 200809L
 
 #include "target.h"

@@ -63,7 +63,8 @@ int main(void) {
     CHECK(*status == COLONNADE_FRAME_DONE);
     CHECK(colonnade_load(&device, &image, 1) == COLONNADE_OK && sleeps == 2 && *enable == 0);
 
-    /* The program has enabled others, and one of them has come: it ends no sleep, and raises the interrupt afterwards */
+    /* The program has enabled others, and one of them has come: it ends no sleep, and raises the interrupt afterwards
+     */
     start(&device, sleep_until_interrupt);
     colonnade_enable_interrupts(&device, COLONNADE_IMAGE_DONE | COLONNADE_ERROR);
     *status = COLONNADE_ERROR;

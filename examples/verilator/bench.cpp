@@ -1,10 +1,10 @@
-// A bench of ColonnadeAxi in Verilator: the driver in C on its registers, and a memory behind m_axi. Copy it, and replace
-// what your system has: the accesses (Bus), the memory (Memory), the driver's calls (main).
+// A bench of ColonnadeAxi in Verilator: the driver in C on its registers, and a memory behind m_axi. Copy it, and
+// replace what your system has: the accesses (Bus), the memory (Memory), the driver's calls (main).
 //
 // usage: bench IMAGE FRAME OUTPUT [+backdoor=FOLDER]
 //
-// IMAGE and FRAME come from `colonnade pack`, OUTPUT receives lines of XRGB8888. With +backdoor the records are in the column
-// memories already (backdoor.py), and nothing is loaded through the bus.
+// IMAGE and FRAME come from `colonnade pack`, OUTPUT receives lines of XRGB8888. With +backdoor the records are in the
+// column memories already (backdoor.py), and nothing is loaded through the bus.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -37,7 +37,8 @@ Bytes readFile(const std::string& name) {
     return Bytes(std::istreambuf_iterator<char>(file), {});
 }
 
-/// The memory behind m_axi: two ranges of bytes. Answers come in order, kLatency cycles after the address or the last data.
+/// The memory behind m_axi: two ranges of bytes. Answers come in order, kLatency cycles after the address or the last
+/// data.
 class Memory {
 public:
     explicit Memory(VColonnadeAxi& top) : top_(top) {}
@@ -216,7 +217,8 @@ int main(int argc, char** argv) {
     check("set frame", colonnade_set_frame(&device, &frame));
     const std::uint32_t tile = colonnade_design.tile_size, stride = (frame.width + tile - 1) / tile * tile * 4;
     memory.framebuffer.resize(std::size_t{stride} * frame.height);
-    const colonnade_framebuffer framebuffer = {kFramebuffer, stride, COLONNADE_XRGB8888, {kFramebuffer, kFramebuffer + memory.framebuffer.size()}};
+    const colonnade_framebuffer framebuffer = {
+        kFramebuffer, stride, COLONNADE_XRGB8888, {kFramebuffer, kFramebuffer + memory.framebuffer.size()}};
     const std::uint64_t begin = bus.cycles();
     check("start", colonnade_start(&device, &framebuffer));
     check("wait", colonnade_wait(&device, COLONNADE_FRAME_DONE, kAttempts));

@@ -38,15 +38,17 @@ packer::QuantisedMesh meshOf(const Integers& vertices, const Integers& faces) {
         mesh.faces.push_back({faces(i, 0), faces(i, 1), faces(i, 2)});
         mesh.meshFaces.push_back(static_cast<std::int64_t>(i));
         for (const std::int32_t vertex : mesh.faces.back())
-            if (vertex < 0 || static_cast<std::size_t>(vertex) >= vertices.shape(0)) throw std::invalid_argument("a face names a vertex that does not exist");
+            if (vertex < 0 || static_cast<std::size_t>(vertex) >= vertices.shape(0))
+                throw std::invalid_argument("a face names a vertex that does not exist");
     }
     return mesh;
 }
 
-nb::dict buildBvh(const Integers& vertices, const Integers& faces, int children, int boxBits, int stackDepth, const colonnade::binding::FieldTuples& layouts,
-                  int normalFraction) {
+nb::dict buildBvh(const Integers& vertices, const Integers& faces, int children, int boxBits, int stackDepth,
+                  const colonnade::binding::FieldTuples& layouts, int normalFraction) {
     if (faces.shape(0) == 0) throw std::invalid_argument("no triangles");
-    if (children < 2 || children > nodeChildren || boxBits < 1 || boxBits > 16) throw std::invalid_argument("unsupported tree parameters");
+    if (children < 2 || children > nodeChildren || boxBits < 1 || boxBits > 16)
+        throw std::invalid_argument("unsupported tree parameters");
     const packer::QuantisedMesh mesh = meshOf(vertices, faces);
     const std::vector<std::array<colonnade::mesh::Vector, 3>> normals(mesh.faces.size());
     const std::vector<std::uint8_t> zeros(mesh.faces.size());
@@ -86,6 +88,8 @@ nb::dict buildBvh(const Integers& vertices, const Integers& faces, int children,
 }  // namespace
 
 void bind_bvh(nb::module_& module) {
-    module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "children"_a, "box_bits"_a, "stack_depth"_a, "layouts"_a, "normal_fraction"_a,
-               "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the arrays of tests/trees.py.");
+    module.def("build_bvh", &buildBvh, "vertices"_a, "faces"_a, "children"_a, "box_bits"_a, "stack_depth"_a,
+               "layouts"_a, "normal_fraction"_a,
+               "Builds the tree over triangles: vertices int32 [n, 3] in vertex units, faces int32 [m, 3]. Returns the "
+               "arrays of tests/trees.py.");
 }

@@ -29,7 +29,8 @@ constexpr std::uint32_t attempts = 0xFFFFFFFF, resetAttempts = 100000;
 
 class Driver {
 public:
-    Driver(nb::object transport, const std::array<std::uint32_t, 8>& formatHash, const std::map<std::string, std::uint32_t>& numbers, const Memories& maps)
+    Driver(nb::object transport, const std::array<std::uint32_t, 8>& formatHash,
+           const std::map<std::string, std::uint32_t>& numbers, const Memories& maps)
         : transport_(std::move(transport)), bus_{&read, &write, &wait, this} {
         std::copy(formatHash.begin(), formatHash.end(), design_.format_hash);
         design_.device_end = numbers.at("device_end");
@@ -62,7 +63,8 @@ public:
     }
 
     std::string load(const nb::bytes& image, std::uint64_t address, Window window, bool isMaps) {
-        const colonnade_image described{image.c_str(), static_cast<std::uint32_t>(image.size()), address, {window.first, window.second}};
+        const colonnade_image described{
+            image.c_str(), static_cast<std::uint32_t>(image.size()), address, {window.first, window.second}};
         return run([&] { return (isMaps ? colonnade_load_maps : colonnade_load)(&device_, &described, attempts); });
     }
 
@@ -88,7 +90,8 @@ public:
     }
 
     std::string start(std::uint64_t base, std::uint32_t stride, std::uint32_t format, Window window) {
-        const colonnade_framebuffer framebuffer{base, stride, static_cast<colonnade_format>(format), {window.first, window.second}};
+        const colonnade_framebuffer framebuffer{
+            base, stride, static_cast<colonnade_format>(format), {window.first, window.second}};
         return run([&] { return colonnade_start(&device_, &framebuffer); });
     }
 
@@ -102,7 +105,8 @@ public:
 
     using Axes = std::array<std::int32_t, 3>;
 
-    std::string setRays(const Axes& low, const Axes& high, std::size_t count, std::uint32_t mantissa, std::int32_t exponent, const std::array<std::int64_t, 3>& base) {
+    std::string setRays(const Axes& low, const Axes& high, std::size_t count, std::uint32_t mantissa,
+                        std::int32_t exponent, const std::array<std::int64_t, 3>& base) {
         colonnade_rays_image image{nullptr, count, 0, {}, {}, mantissa, exponent, {}};
         std::copy(low.begin(), low.end(), image.bounds_low);
         std::copy(high.begin(), high.end(), image.bounds_high);
@@ -154,8 +158,8 @@ public:
     }
 
 private:
-    /// Makes a call of the driver. An exception of an access ends it: further accesses are not made and read as ones, so that
-    /// waits end, and the exception goes on when the driver, which is C, has returned.
+    /// Makes a call of the driver. An exception of an access ends it: further accesses are not made and read as ones,
+    /// so that waits end, and the exception goes on when the driver, which is C, has returned.
     template <class Call> std::string run(Call call) {
         const colonnade_error error = call();
         if (problem_) std::rethrow_exception(std::exchange(problem_, nullptr));
@@ -175,7 +179,8 @@ private:
     static Driver& of(void* context) { return *static_cast<Driver*>(context); }
 
     static std::uint32_t read(void* context, std::uint32_t address) {
-        return of(context).access([&] { return nb::cast<std::uint32_t>(of(context).transport_.attr("read32")(address)); });
+        return of(context).access(
+            [&] { return nb::cast<std::uint32_t>(of(context).transport_.attr("read32")(address)); });
     }
 
     static void write(void* context, std::uint32_t address, std::uint32_t value) {
@@ -198,8 +203,9 @@ private:
 
 void bind_driver(nb::module_& module) {
     nb::class_<Driver>(module, "Driver")
-        .def(nb::init<nb::object, const std::array<std::uint32_t, 8>&, const std::map<std::string, std::uint32_t>&, const Memories&>(), "transport"_a, "format_hash"_a,
-             "numbers"_a, "maps"_a)
+        .def(nb::init<nb::object, const std::array<std::uint32_t, 8>&, const std::map<std::string, std::uint32_t>&,
+                      const Memories&>(),
+             "transport"_a, "format_hash"_a, "numbers"_a, "maps"_a)
         .def("probe", &Driver::probe)
         .def("load", &Driver::load, "image"_a, "address"_a, "window"_a, "is_maps"_a)
         .def("set_scene", &Driver::setScene, "address"_a)

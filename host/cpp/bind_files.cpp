@@ -21,7 +21,8 @@ nb::bytes bytesOf(const std::string& text) { return nb::bytes(text.data(), text.
 mesh::Text textOf(const nb::bytes& bytes) { return {bytes.c_str(), bytes.size()}; }
 
 /// A numpy array of rows that have the bytes of these; None for none.
-template <class T, class Row> nb::object rowsOf(const std::vector<Row>& rows, std::initializer_list<std::size_t> inner) {
+template <class T, class Row>
+nb::object rowsOf(const std::vector<Row>& rows, std::initializer_list<std::size_t> inner) {
     if (rows.empty()) return nb::none();
     std::vector<std::size_t> shape{rows.size()};
     shape.insert(shape.end(), inner.begin(), inner.end());
@@ -33,7 +34,8 @@ template <class T, class Row> nb::object rowsOf(const std::vector<Row>& rows, st
 
 class MeshFile {
 public:
-    MeshFile(const std::string& format, const nb::bytes& where) : reader_(mesh::readerOf(format, std::string(textOf(where)))) {
+    MeshFile(const std::string& format, const nb::bytes& where)
+        : reader_(mesh::readerOf(format, std::string(textOf(where)))) {
         if (!reader_) throw std::invalid_argument("no such format");
     }
 
@@ -68,17 +70,21 @@ public:
         found["face_materials"] = rowsOf<std::int32_t>(surface.faceMaterials, {});
         nb::list materials, textures;
         for (const mesh::FileMaterial& one : surface.materials)
-            materials.append(nb::make_tuple(static_cast<int>(one.kind), one.albedo, one.ior, one.roughness, one.emission, one.alpha, one.texture));
-        for (const mesh::FileTexture& one : surface.textures) textures.append(nb::make_tuple(one.picture, one.mask, one.isWhite));
+            materials.append(nb::make_tuple(static_cast<int>(one.kind), one.albedo, one.ior, one.roughness,
+                                            one.emission, one.alpha, one.texture));
+        for (const mesh::FileTexture& one : surface.textures)
+            textures.append(nb::make_tuple(one.picture, one.mask, one.isWhite));
         found["materials"] = materials;
         found["textures"] = textures;
         return found;
     }
-    /// What is lost since the last call: subject and verb in the singular and the plural, what is done instead, number, name.
+    /// What is lost since the last call: subject and verb in the singular and the plural, what is done instead, number,
+    /// name.
     nb::list losses() {
         nb::list found;
         for (const mesh::Losses::Entry& entry : reader_->losses.entries)
-            found.append(nb::make_tuple(entry.one, entry.several, bytesOf(entry.instead), entry.count, bytesOf(entry.name)));
+            found.append(
+                nb::make_tuple(entry.one, entry.several, bytesOf(entry.instead), entry.count, bytesOf(entry.name)));
         reader_->losses.entries.clear();
         return found;
     }
@@ -96,8 +102,15 @@ using Given = nb::ndarray<const std::uint8_t, nb::shape<-1, -1, 3>, nb::c_contig
 using GivenAlpha = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 auto maskOf(const Given& pixels, const std::optional<GivenAlpha>& alpha, std::size_t height, std::size_t width) {
-    const mesh::Picture<std::uint8_t> picture{pixels.data(), static_cast<std::int64_t>(pixels.shape(0)), static_cast<std::int64_t>(pixels.shape(1)), 3, {}, {}, false};
-    const std::vector<std::uint8_t> mask = mesh::maskOf(picture, alpha ? alpha->data() : nullptr, static_cast<std::int64_t>(height), static_cast<std::int64_t>(width));
+    const mesh::Picture<std::uint8_t> picture{pixels.data(),
+                                              static_cast<std::int64_t>(pixels.shape(0)),
+                                              static_cast<std::int64_t>(pixels.shape(1)),
+                                              3,
+                                              {},
+                                              {},
+                                              false};
+    const std::vector<std::uint8_t> mask = mesh::maskOf(
+        picture, alpha ? alpha->data() : nullptr, static_cast<std::int64_t>(height), static_cast<std::int64_t>(width));
     std::uint8_t* to;
     auto result = makeArray<std::uint8_t>({height, width}, to);
     std::copy(mask.begin(), mask.end(), to);
@@ -106,7 +119,8 @@ auto maskOf(const Given& pixels, const std::optional<GivenAlpha>& alpha, std::si
 
 nb::dict losses() {
     nb::dict found;
-    for (const auto& [name, loss] : mesh::lost::shared) found[name] = nb::make_tuple(loss->one, loss->several, loss->instead);
+    for (const auto& [name, loss] : mesh::lost::shared)
+        found[name] = nb::make_tuple(loss->one, loss->several, loss->instead);
     return found;
 }
 
@@ -115,10 +129,14 @@ nb::tuple triangulate(const nb::ndarray<const double, nb::shape<-1, 3>, nb::c_co
     const auto* rows = reinterpret_cast<const mesh::Vector*>(points.data());
     std::size_t left = points.shape(0);
     for (std::size_t i = 0; i < sizes.shape(0); left -= static_cast<std::size_t>(sizes.data()[i++]))
-        if (sizes.data()[i] < 0 || static_cast<std::size_t>(sizes.data()[i]) > left) throw std::invalid_argument("a polygon has no such corners");
-    const mesh::Triangles found =
-        released([&] { return mesh::triangulate({sizes.data(), sizes.data() + sizes.shape(0)}, [&](std::int64_t corner) { return rows[corner]; }); });
-    return nb::make_tuple(rowsOf<std::int64_t>(found.corners, {3}), rowsOf<std::int64_t>(found.polygons, {}), found.shorts, found.crossed, found.tests, found.error);
+        if (sizes.data()[i] < 0 || static_cast<std::size_t>(sizes.data()[i]) > left)
+            throw std::invalid_argument("a polygon has no such corners");
+    const mesh::Triangles found = released([&] {
+        return mesh::triangulate({sizes.data(), sizes.data() + sizes.shape(0)},
+                                 [&](std::int64_t corner) { return rows[corner]; });
+    });
+    return nb::make_tuple(rowsOf<std::int64_t>(found.corners, {3}), rowsOf<std::int64_t>(found.polygons, {}),
+                          found.shorts, found.crossed, found.tests, found.error);
 }
 
 nb::tuple teapot(int level) {
@@ -129,7 +147,8 @@ nb::tuple teapot(int level) {
 } // namespace
 
 void bind_files(nb::module_& module) {
-    nb::class_<MeshFile>(module, "MeshFile", "The reader of a file in steps (mesh/files/reader.hpp); a ValueError has the line `refusal`.")
+    nb::class_<MeshFile>(module, "MeshFile",
+                         "The reader of a file in steps (mesh/files/reader.hpp); a ValueError has the line `refusal`.")
         .def(nb::init<const std::string&, const nb::bytes&>(), "format"_a, "where"_a)
         .def("begin", &MeshFile::begin, "data"_a)
         .def("next_library", &MeshFile::nextLibrary)
@@ -138,9 +157,11 @@ void bind_files(nb::module_& module) {
         .def("finish", &MeshFile::finish, "pictures"_a)
         .def("losses", &MeshFile::losses)
         .def("refusal", &MeshFile::refusal);
-    module.def("mask_of", &maskOf, "pixels"_a, "alpha"_a.none(), "height"_a, "width"_a, "The alpha of a texture by another picture, uint8 [height, width].");
+    module.def("mask_of", &maskOf, "pixels"_a, "alpha"_a.none(), "height"_a, "width"_a,
+               "The alpha of a texture by another picture, uint8 [height, width].");
     module.def("teapot", &teapot, "level"_a, "Vertices and faces of the teapot.");
     module.def("losses", &losses, "The words of losses that several readers count, by name.");
     module.def("triangulate", &triangulate, "points"_a, "sizes"_a,
-               "Corners and polygon of each triangle, polygons that are short, or cross themselves, tests for ears, and an error.");
+               "Corners and polygon of each triangle, polygons that are short, or cross themselves, tests for ears, "
+               "and an error.");
 }

@@ -18,26 +18,33 @@ namespace {
 template <class T> using Matrices = nb::ndarray<const T, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-FOR_WIDE_VECTORS_TOO void multiply(const float* a, const float* b, float* out, std::size_t rows, std::size_t inner, std::size_t columns, bool isTransposed) {
+FOR_WIDE_VECTORS_TOO void multiply(const float* a, const float* b, float* out, std::size_t rows, std::size_t inner,
+                                   std::size_t columns, bool isTransposed) {
     fixed_order::product(a, b, out, rows, inner, columns, isTransposed);
 }
 
-FOR_WIDE_VECTORS_TOO void multiply(const double* a, const double* b, double* out, std::size_t rows, std::size_t inner, std::size_t columns, bool isTransposed) {
+FOR_WIDE_VECTORS_TOO void multiply(const double* a, const double* b, double* out, std::size_t rows, std::size_t inner,
+                                   std::size_t columns, bool isTransposed) {
     fixed_order::product(a, b, out, rows, inner, columns, isTransposed);
 }
 
-FOR_WIDE_VECTORS_TOO void powers(const double* x, double y, double* out, std::size_t count) { fixed_order::power(x, y, out, count); }
+FOR_WIDE_VECTORS_TOO void powers(const double* x, double y, double* out, std::size_t count) {
+    fixed_order::power(x, y, out, count);
+}
 
 /// Of stacks; the first one's matrices may be transposed.
 template <class T> Pixels<T> product(const Matrices<T>& a, const Matrices<T>& b, bool isTransposed) {
-    const std::size_t count = a.shape(0), rows = a.shape(isTransposed ? 2 : 1), inner = a.shape(isTransposed ? 1 : 2), columns = b.shape(2);
-    if (b.shape(0) != count || b.shape(1) != inner) throw std::invalid_argument("the shapes of the matrices do not fit");
+    const std::size_t count = a.shape(0), rows = a.shape(isTransposed ? 2 : 1), inner = a.shape(isTransposed ? 1 : 2),
+                      columns = b.shape(2);
+    if (b.shape(0) != count || b.shape(1) != inner)
+        throw std::invalid_argument("the shapes of the matrices do not fit");
     T* out;
     auto result = makeArray({count, rows, columns}, out);
     const T *first = a.data(), *second = b.data();
     nb::gil_scoped_release release;
     for (std::size_t i = 0; i < count; ++i)
-        multiply(first + i * rows * inner, second + i * inner * columns, out + i * rows * columns, rows, inner, columns, isTransposed);
+        multiply(first + i * rows * inner, second + i * inner * columns, out + i * rows * columns, rows, inner, columns,
+                 isTransposed);
     return result;
 }
 
@@ -76,7 +83,10 @@ void bind_fixed_order(nb::module_& module) {
     module.def("power", &power, "x"_a, "y"_a);
     module.def("arccos", [](const Numbers& x) { return eachOf(x, fixed_order::arccos); }, "x"_a);
     module.def(
-        "cosine", [](const Numbers& x, int quarters) { return eachOf(x, [quarters](double value) { return fixed_order::cosine(value, quarters); }); }, "x"_a,
-        "quarters"_a);
+        "cosine",
+        [](const Numbers& x, int quarters) {
+            return eachOf(x, [quarters](double value) { return fixed_order::cosine(value, quarters); });
+        },
+        "x"_a, "quarters"_a);
     module.def("arctan2", &arctan2, "y"_a, "x"_a);
 }

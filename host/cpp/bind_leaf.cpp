@@ -8,10 +8,12 @@ using namespace colonnade::binding;
 
 namespace {
 
-template <class T, int Columns> using Table = nb::ndarray<const T, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
+template <class T, int Columns> using Table =
+    nb::ndarray<const T, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
 
 /// Rows of a result, each from a row of values.
-template <class Array, class Row> Pixels<std::int64_t> rowsOf(const Array& values, std::size_t columns, const Row& row) {
+template <class Array, class Row>
+Pixels<std::int64_t> rowsOf(const Array& values, std::size_t columns, const Row& row) {
     std::int64_t* to;
     auto result = makeArray<std::int64_t>({values.shape(0), columns}, to);
     nb::gil_scoped_release release;
@@ -62,18 +64,22 @@ void bind_leaf(nb::module_& module) {
     module.def(
         "corner_normals",
         [](const Table<std::int64_t, 2>& codes, int fraction) {
-            return rowsOf(codes, 3, [fraction](const std::int64_t* code) { return directionOf({code[0], code[1]}, fraction); });
+            return rowsOf(codes, 3,
+                          [fraction](const std::int64_t* code) { return directionOf({code[0], code[1]}, fraction); });
         },
         "codes"_a, "fraction"_a, "Normals of codes int64 [n, 2], with so many fraction bits: int64 [n, 3].");
     module.def(
         "geometric_normals",
         [](const Table<std::int64_t, 9>& triangles, int fraction) {
             return rowsOf(triangles, 3, [fraction](const std::int64_t* v) {
-                return geometricNormal({Vector{v[0], v[1], v[2]}, Vector{v[3], v[4], v[5]}, Vector{v[6], v[7], v[8]}}, fraction);
+                return geometricNormal({Vector{v[0], v[1], v[2]}, Vector{v[3], v[4], v[5]}, Vector{v[6], v[7], v[8]}},
+                                       fraction);
             });
         },
-        "triangles"_a, "fraction"_a, "Normals of triangles by their vertices, vertex units, int64 [n, 9]: int64 [n, 3].");
+        "triangles"_a, "fraction"_a,
+        "Normals of triangles by their vertices, vertex units, int64 [n, 9]: int64 [n, 3].");
     module.def("leaves", &leavesOf, "records"_a, "layouts"_a, "fraction"_a,
-               "What leaf records uint8 [n, bytes] hold: triangles and material int64 [n], vertices and normals int64 [n, 2, 3, 3] by triangle and corner, geometric "
+               "What leaf records uint8 [n, bytes] hold: triangles and material int64 [n], vertices and normals int64 "
+               "[n, 2, 3, 3] by triangle and corner, geometric "
                "normals int64 [n, 2, 3]. Of a leaf of one triangle the second one means nothing.");
 }

@@ -35,7 +35,8 @@ template <class T> nb::ndarray<nb::numpy, T> makeRows(std::size_t rows, std::siz
 
 class TargetMesh {
 public:
-    TargetMesh(const std::array<std::uint32_t, 8>& formatHash, const nb::bytes& file) : file_(file.c_str(), file.size()) {
+    TargetMesh(const std::array<std::uint32_t, 8>& formatHash, const nb::bytes& file)
+        : file_(file.c_str(), file.size()) {
         colonnade_design design{};
         std::copy(formatHash.begin(), formatHash.end(), design.format_hash);
         check(colonnade_mesh_open(&mesh_, &design, file_.data(), file_.size()));
@@ -54,7 +55,8 @@ public:
         check(colonnade_mesh_skin(&mesh_, pose.data(), vertices.data()));
         std::int32_t* positions;
         std::int16_t* normals;
-        auto result = std::make_tuple(makeRows<std::int32_t>(vertices.size(), 3, positions), makeRows<std::int16_t>(vertices.size(), 2, normals));
+        auto result = std::make_tuple(makeRows<std::int32_t>(vertices.size(), 3, positions),
+                                      makeRows<std::int16_t>(vertices.size(), 2, normals));
         for (const colonnade_vertex& vertex : vertices) {
             positions = std::copy(vertex.position, vertex.position + 3, positions);
             normals = std::copy(vertex.normal, vertex.normal + 2, normals);
@@ -62,8 +64,10 @@ public:
         return result;
     }
 
-    auto refit(const Given<std::int32_t, nb::shape<-1, 3>>& positions, const Given<std::int16_t, nb::shape<-1, 2>>& normals,
-               const nb::ndarray<std::uint32_t, nb::shape<-1, recordWords>, nb::c_contig, nb::device::cpu>& copy, std::uint32_t root) const {
+    auto refit(const Given<std::int32_t, nb::shape<-1, 3>>& positions,
+               const Given<std::int16_t, nb::shape<-1, 2>>& normals,
+               const nb::ndarray<std::uint32_t, nb::shape<-1, recordWords>, nb::c_contig, nb::device::cpu>& copy,
+               std::uint32_t root) const {
         if (positions.shape(0) != mesh_.vertices || normals.shape(0) != mesh_.vertices || copy.shape(0) < mesh_.records)
             throw std::invalid_argument("vertices or records of another clip");
         std::vector<colonnade_vertex> vertices(mesh_.vertices);
@@ -74,7 +78,8 @@ public:
         std::vector<colonnade_mesh_node> path(mesh_.depth);
         colonnade_refit found;
         check(colonnade_mesh_refit(&mesh_, vertices.data(), copy.data(), root, path.data(), &found));
-        return std::make_tuple(Corner{found.low[0], found.low[1], found.low[2]}, Corner{found.high[0], found.high[1], found.high[2]}, found.flat_pairs);
+        return std::make_tuple(Corner{found.low[0], found.low[1], found.low[2]},
+                               Corner{found.high[0], found.high[1], found.high[2]}, found.flat_pairs);
     }
 
     auto plan(const Given<std::uint32_t, nb::shape<-1, recordWords>>& copy, std::uint32_t root) const {

@@ -14,12 +14,15 @@ namespace {
 
 class Model {
 public:
-    Model(const Values& numbers, const FieldTuples& layouts, const Values& limits) : numbers_(numbers), device_(numbers_, layoutsOf(layouts), limits) {}
+    Model(const Values& numbers, const FieldTuples& layouts, const Values& limits)
+        : numbers_(numbers), device_(numbers_, layoutsOf(layouts), limits) {}
 
     void load(const Records& records) { device_.load(records.data(), records.shape(0), records.shape(1)); }
 
     /// Adds a physical-attribute memory to the device.
-    void addEnvironment(const Values& sizes, const FieldTuples& layouts) { environment_ = std::make_unique<AttributeImage>(AttributeSizes(sizes), layoutsOf(layouts)); }
+    void addEnvironment(const Values& sizes, const FieldTuples& layouts) {
+        environment_ = std::make_unique<AttributeImage>(AttributeSizes(sizes), layoutsOf(layouts));
+    }
 
     void loadEnvironment(const std::string& memory, const Records& words) {
         if (!environment_) throw std::invalid_argument("there is no physical-attribute memory");
@@ -104,7 +107,8 @@ public:
         std::int64_t* ids;
         auto result = makeArray<std::int64_t>({origins.shape(0)}, ids);
         for (std::size_t i = 0; i < origins.shape(0); ++i) {
-            const Hit hit = device_.trace(prepareRay(requestOf(origins, directions, i), device_.frame().bounds, numbers_));
+            const Hit hit =
+                device_.trace(prepareRay(requestOf(origins, directions, i), device_.frame().bounds, numbers_));
             ids[i] = hit.found ? static_cast<std::int64_t>(hit.id) : -1;
         }
         return nb::cast(result);
@@ -134,7 +138,8 @@ public:
     }
 
     /// Sets up rays and tests each against its own box, for comparison with exact arithmetic.
-    nb::dict testBoxes(const Vectors& origins, const Vectors& directions, const Vectors& corners, const Vectors& exponents, const Vectors& low, const Vectors& high) {
+    nb::dict testBoxes(const Vectors& origins, const Vectors& directions, const Vectors& corners,
+                       const Vectors& exponents, const Vectors& low, const Vectors& high) {
         const std::size_t count = origins.shape(0);
         bool *enters, *isHit;
         std::int64_t *heading, *origin, *shear;
@@ -217,39 +222,60 @@ private:
 void bind_model(nb::module_& module) {
     nb::class_<Model>(module, "Model", "The untimed, bit-exact model of the device.")
         .def(nb::init<const Values&, const FieldTuples&, const Values&>(), "numbers"_a, "layouts"_a, "limits"_a,
-             "From the manifest's numbers (with stackDepth, bvh), record layouts (record -> field -> (offset, width, signed)) and register limits.")
+             "From the manifest's numbers (with stackDepth, bvh), record layouts (record -> field -> (offset, width, "
+             "signed)) and register limits.")
         .def("load", &Model::load, "records"_a, "Loads the column memory: uint8 [records, bytes].")
-        .def("add_environment", &Model::addEnvironment, "sizes"_a, "layouts"_a, "Adds a physical-attribute memory with the manifest's attribute sizes and layouts.")
+        .def("add_environment", &Model::addEnvironment, "sizes"_a, "layouts"_a,
+             "Adds a physical-attribute memory with the manifest's attribute sizes and layouts.")
         .def("load_environment", &Model::loadEnvironment, "memory"_a, "words"_a,
              "Loads one of its memories, by its name in the manifest: uint8 [words, bytes], low byte first.")
-        .def("add_texture", &Model::addTexture, "sizes"_a, "layouts"_a, "Adds a texture memory with the manifest's texture sizes and layouts.")
-        .def("load_texture", &Model::loadTexture, "memory"_a, "words"_a, "As load_environment, for a memory of the textures.")
+        .def("add_texture", &Model::addTexture, "sizes"_a, "layouts"_a,
+             "Adds a texture memory with the manifest's texture sizes and layouts.")
+        .def("load_texture", &Model::loadTexture, "memory"_a, "words"_a,
+             "As load_environment, for a memory of the textures.")
         .def("load_cube", &Model::loadCube, "words"_a, "Loads the light cube: uint8 [words, bytes], low byte first.")
-        .def("start", &Model::start, "registers"_a, "Starts a frame: loads the registers (name -> value); clears counters and errors.")
-        .def(
-            "rows", &Model::rows, "first"_a, "last"_a,
-            "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, instance int64 or -1, distance float64 in vertex units.")
+        .def("start", &Model::start, "registers"_a,
+             "Starts a frame: loads the registers (name -> value); clears counters and errors.")
+        .def("rows", &Model::rows, "first"_a, "last"_a,
+             "Pixels of rows first..last-1: colour uint16 [h, w, 3] linear, ratio uint16 [h, w, 3] of light with the "
+             "object over light without it (4096 is 1), is_object bool, triangle int64 packed id or -1, instance int64 "
+             "or -1, distance float64 in vertex units.")
         .def("trace", &Model::trace, "origins"_a, "directions"_a,
-             "Packed ids of the closest hits, int64 [n], -1 for a miss. Origins and directions: int64 [n, 3], grid steps.")
+             "Packed ids of the closest hits, int64 [n], -1 for a miss. Origins and directions: int64 [n, 3], grid "
+             "steps.")
+        .def("nearest", &Model::nearest, "origins"_a, "directions"_a,
+             "The same hits as `trace`: triangle (packed id) and instance int64 [n], -1 for a miss; distance int64 [n] "
+             "along the dominant axis, grid steps; start int64 [n, 3], "
+             "where rays from the hit begin, grid steps; normal int64 [n, 3], geometric, against the ray, 11 fraction "
+             "bits.")
+        .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a,
+             "high"_a,
+             "Tests each ray against one box (planes corner + (low << exponent), corner + (high << exponent), vertex "
+             "units). Returns enters (the object's box), is_hit, "
+             "and the prepared ray in its permuted frame: heading int64 [n, 4] (axis, three signs), origin int64 [n, "
+             "3], shear int64 [n, 2].")
+        .def("note_work", &Model::noteWork, "height"_a,
+             "Renders the rows of the frame, and notes the work of the device's units instead of pixels.")
         .def(
-            "nearest", &Model::nearest, "origins"_a, "directions"_a,
-            "The same hits as `trace`: triangle (packed id) and instance int64 [n], -1 for a miss; distance int64 [n] along the dominant axis, grid steps; start int64 [n, 3], "
-            "where rays from the hit begin, grid steps; normal int64 [n, 3], geometric, against the ray, 11 fraction bits.")
-        .def("test_boxes", &Model::testBoxes, "origins"_a, "directions"_a, "corners"_a, "exponents"_a, "low"_a, "high"_a,
-             "Tests each ray against one box (planes corner + (low << exponent), corner + (high << exponent), vertex units). Returns enters (the object's box), is_hit, "
-             "and the prepared ray in its permuted frame: heading int64 [n, 4] (axis, three signs), origin int64 [n, 3], shear int64 [n, 2].")
-        .def("note_work", &Model::noteWork, "height"_a, "Renders the rows of the frame, and notes the work of the device's units instead of pixels.")
-        .def(
-            "cycles", [](const Model& model, const Values& design, int latency, int interval) { return model.cycles(design, {latency, interval}); }, "design"_a,
-            "latency"_a, "interval"_a,
-            "Counters of the noted frame, by name, with timing-dependent ones. `design`: its configuration by paths, numbers and `recordBytes`; DRAM's latency and the cycles between its beats.")
+            "cycles",
+            [](const Model& model, const Values& design, int latency, int interval) {
+                return model.cycles(design, {latency, interval});
+            },
+            "design"_a, "latency"_a, "interval"_a,
+            "Counters of the noted frame, by name, with timing-dependent ones. `design`: its configuration by paths, "
+            "numbers and `recordBytes`; DRAM's latency and the cycles between its beats.")
         .def("counters", &Model::counters, "Timing-independent counters since `start`, by name.")
         .def("errors", &Model::errors, "Sticky error bits since `start`, by name.");
     module.def(
         "bounce_cycles",
         [](const Values& design) -> Values {
             const cycles::BounceCycles bounces = cycles::Design(design).bounceCycles;
-            return {{"mirror", bounces.mirror}, {"totalReflection", bounces.totalReflection}, {"behind", bounces.glassFromBehind}, {"front", bounces.glassFromFront}};
+            return {{"mirror", bounces.mirror},
+                    {"totalReflection", bounces.totalReflection},
+                    {"behind", bounces.glassFromBehind},
+                    {"front", bounces.glassFromFront}};
         },
-        "design"_a, "Cycles of a bounce unit on a design, as of `Model.cycles`. ValueError for one that the cycle model does not know.");
+        "design"_a,
+        "Cycles of a bounce unit on a design, as of `Model.cycles`. ValueError for one that the cycle model does not "
+        "know.");
 }

@@ -24,19 +24,31 @@ template <class T> using Eights = nb::ndarray<const T, nb::shape<-1, 8>, nb::c_c
 template <class T> using Threes = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 template <class T> using Column = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-const colonnade_rays_ray* raysOf(const Eights<double>& rays) { return reinterpret_cast<const colonnade_rays_ray*>(rays.data()); }
+const colonnade_rays_ray* raysOf(const Eights<double>& rays) {
+    return reinterpret_cast<const colonnade_rays_ray*>(rays.data());
+}
 
-/// A device in Python as a backend: `colonnade.rays.device.RayDevice`. Its errors wait for the end of the library's call.
+/// A device in Python as a backend: `colonnade.rays.device.RayDevice`. Its errors wait for the end of the library's
+/// call.
 class PythonDevice {
 public:
     explicit PythonDevice(nb::object device) : device_(std::move(device)) {}
 
     colonnade_rays_backend backend() {
         return {this,
-                [](void* self, const colonnade_rays_image* image) { return call(self, [&](PythonDevice& device) { return device.load(*image); }); },
-                [](void* self, const colonnade_rays_batch* batch) { return call(self, [&](PythonDevice& device) { return device.submit(*batch); }); },
-                [](void* self) { return std::exchange(static_cast<PythonDevice*>(self)->status_, static_cast<int>(COLONNADE_RAYS_OK)); },
-                [](void* self, colonnade_rays_sums* sums) { call(self, [&](PythonDevice& device) { return device.read(*sums); }); },
+                [](void* self, const colonnade_rays_image* image) {
+                    return call(self, [&](PythonDevice& device) { return device.load(*image); });
+                },
+                [](void* self, const colonnade_rays_batch* batch) {
+                    return call(self, [&](PythonDevice& device) { return device.submit(*batch); });
+                },
+                [](void* self) {
+                    return std::exchange(static_cast<PythonDevice*>(self)->status_,
+                                         static_cast<int>(COLONNADE_RAYS_OK));
+                },
+                [](void* self, colonnade_rays_sums* sums) {
+                    call(self, [&](PythonDevice& device) { return device.read(*sums); });
+                },
                 nullptr};
     }
 
@@ -57,17 +69,19 @@ private:
     }
 
     int load(const colonnade_rays_image& image) {
-        device_.attr("load")(rays::registersOf(image), nb::bytes(image.records, image.record_count * image.record_bytes), image.record_count);
+        device_.attr("load")(rays::registersOf(image),
+                             nb::bytes(image.records, image.record_count * image.record_bytes), image.record_count);
         return COLONNADE_RAYS_OK;
     }
 
     int submit(const colonnade_rays_batch& batch) {
         const auto* const rays = reinterpret_cast<const char*>(batch.rays);
-        const nb::tuple found =
-            nb::cast<nb::tuple>(device_.attr("submit")(nb::bytes(&batch, sizeof batch), nb::bytes(rays, rays::rayBytes(batch)), rays::responseBytes(batch)));
+        const nb::tuple found = nb::cast<nb::tuple>(device_.attr("submit")(
+            nb::bytes(&batch, sizeof batch), nb::bytes(rays, rays::rayBytes(batch)), rays::responseBytes(batch)));
         const auto hits = nb::cast<nb::bytes>(found[1]);
         if (hits.size() != rays::responseBytes(batch))
-            throw std::invalid_argument("the device answers " + std::to_string(hits.size()) + " bytes in place of " + std::to_string(rays::responseBytes(batch)));
+            throw std::invalid_argument("the device answers " + std::to_string(hits.size()) + " bytes in place of " +
+                                        std::to_string(rays::responseBytes(batch)));
         std::memcpy(reinterpret_cast<void*>(batch.hits), hits.data(), hits.size());
         const auto tag = nb::cast<std::uint32_t>(found[0]);
         if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = tag;
@@ -108,12 +122,15 @@ public:
         check(colonnade_rays_mesh_add(scene_, vertices.data(), vertices.shape(0), faces.data(), faces.shape(0), &mesh));
         return mesh;
     }
-    void update(std::uint32_t mesh, const Threes<double>& vertices) { check(colonnade_rays_mesh_update(scene_, mesh, vertices.data(), vertices.shape(0))); }
+    void update(std::uint32_t mesh, const Threes<double>& vertices) {
+        check(colonnade_rays_mesh_update(scene_, mesh, vertices.data(), vertices.shape(0)));
+    }
     void remove(std::uint32_t mesh) { check(colonnade_rays_mesh_remove(scene_, mesh)); }
     void enable(std::uint32_t mesh, bool isEnabled) { check(colonnade_rays_mesh_enable(scene_, mesh, isEnabled)); }
     void mask(std::uint32_t mesh, std::uint32_t mask) { check(colonnade_rays_mesh_mask(scene_, mesh, mask)); }
     void opacity(std::uint32_t mesh, const std::optional<Column<std::uint8_t>>& isOpaque) {
-        check(colonnade_rays_mesh_opacity(scene_, mesh, isOpaque ? isOpaque->data() : nullptr, isOpaque ? isOpaque->size() : 0));
+        check(colonnade_rays_mesh_opacity(scene_, mesh, isOpaque ? isOpaque->data() : nullptr,
+                                          isOpaque ? isOpaque->size() : 0));
     }
     void refine(bool isRefined) { colonnade_rays_refine(scene_, isRefined); }
     void commit() {
@@ -140,7 +157,9 @@ public:
     nb::dict closest(const Eights<double>& rays, std::uint32_t mode, std::uint32_t mask) {
         std::vector<colonnade_rays_hit> hits(rays.shape(0));
         inParts(rays.shape(0), [&](std::size_t first, std::size_t count) {
-            check(released([&] { return colonnade_rays_closest(scene_, raysOf(rays) + first, count, mode, mask, hits.data() + first); }));
+            check(released([&] {
+                return colonnade_rays_closest(scene_, raysOf(rays) + first, count, mode, mask, hits.data() + first);
+            }));
             number(hits.data() + first, count, first);
         });
         return columns(hits);
@@ -153,7 +172,10 @@ public:
             for (bool isShort = true; isShort;) {
                 hits.resize(before + found);
                 const std::size_t capacity = found;
-                check(released([&] { return colonnade_rays_all(scene_, raysOf(rays) + first, rayCount, mode, mask, most, hits.data() + before, capacity, &found); }));
+                check(released([&] {
+                    return colonnade_rays_all(scene_, raysOf(rays) + first, rayCount, mode, mask, most,
+                                              hits.data() + before, capacity, &found);
+                }));
                 isShort = found > capacity;
             }
             hits.resize(before + found);
@@ -165,8 +187,10 @@ public:
         bool* isOccluded;
         auto result = makeArray<bool>({rays.shape(0)}, isOccluded);
         inParts(rays.shape(0), [&](std::size_t first, std::size_t count) {
-            check(
-                released([&] { return colonnade_rays_occluded(scene_, raysOf(rays) + first, count, mode, mask, reinterpret_cast<std::uint8_t*>(isOccluded) + first); }));
+            check(released([&] {
+                return colonnade_rays_occluded(scene_, raysOf(rays) + first, count, mode, mask,
+                                               reinterpret_cast<std::uint8_t*>(isOccluded) + first);
+            }));
         });
         return result;
     }
@@ -178,7 +202,8 @@ public:
     }
 
     /// What the caches of an array read for rays: records, and lines from DRAM.
-    Values traffic(const Eights<double>& rays, std::uint32_t mode, std::uint32_t mask, bool isOcclusion, const std::array<std::size_t, 7>& shape) {
+    Values traffic(const Eights<double>& rays, std::uint32_t mode, std::uint32_t mask, bool isOcclusion,
+                   const std::array<std::size_t, 7>& shape) {
         const rays::Traffic found = released([&] {
             const auto reads = rays::readsOf(*scene_, raysOf(rays), rays.shape(0), mode, mask, isOcclusion);
             return rays::trafficOf(reads, {shape[0], shape[1], shape[2], shape[3], shape[4], shape[5], shape[6]});
@@ -187,7 +212,8 @@ public:
     }
 
     /// A batch of `count` rays from memory: the bytes of its records or its sensor in, the bytes of its responses out.
-    Pixels<std::uint8_t> submit(const Column<std::uint8_t>& rays, std::uint32_t count, std::uint32_t mode, const std::array<float, 3>& origin, float tnear, float tfar) {
+    Pixels<std::uint8_t> submit(const Column<std::uint8_t>& rays, std::uint32_t count, std::uint32_t mode,
+                                const std::array<float, 3>& origin, float tnear, float tfar) {
         struct alignas(64) Line {
             std::uint8_t bytes[64];
         };
@@ -226,8 +252,13 @@ public:
         colonnade_rays_counters(device_, &c);
         if (python_) python_->raise();
         const auto value = [](std::uint64_t count) { return static_cast<std::int64_t>(count); };
-        return {{"rays", value(c.rays)},          {"raysRefused", value(c.rays_refused)},     {"raysInBox", value(c.rays_in_box)},     {"nodeReads", value(c.node_reads)},
-                {"boxTests", value(c.box_tests)}, {"triangleTests", value(c.triangle_tests)}, {"deepestStack", value(c.deepest_stack)}};
+        return {{"rays", value(c.rays)},
+                {"raysRefused", value(c.rays_refused)},
+                {"raysInBox", value(c.rays_in_box)},
+                {"nodeReads", value(c.node_reads)},
+                {"boxTests", value(c.box_tests)},
+                {"triangleTests", value(c.triangle_tests)},
+                {"deepestStack", value(c.deepest_stack)}};
     }
 
 private:
@@ -285,9 +316,12 @@ private:
     colonnade_rays_scene* scene_ = nullptr;
 };
 
-/// Rays in the device's integers, for comparison with exact arithmetic: kind, origin [3], direction [3], tMin, tMax, product, exponent.
-nb::list converted(const Values& numbers, const Eights<float>& rays, bool isLocal, std::uint32_t mantissa, int exponent, const std::array<std::int64_t, 3>& base) {
-    const rays::RayConverter converter(Numbers(numbers), static_cast<int>(lookUp(numbers, "directionBits")), {mantissa, exponent, base});
+/// Rays in the device's integers, for comparison with exact arithmetic: kind, origin [3], direction [3], tMin, tMax,
+/// product, exponent.
+nb::list converted(const Values& numbers, const Eights<float>& rays, bool isLocal, std::uint32_t mantissa, int exponent,
+                   const std::array<std::int64_t, 3>& base) {
+    const rays::RayConverter converter(Numbers(numbers), static_cast<int>(lookUp(numbers, "directionBits")),
+                                       {mantissa, exponent, base});
     nb::list result;
     for (std::size_t i = 0; i < rays.shape(0); ++i) {
         colonnade_rays_record record;
@@ -308,7 +342,9 @@ nb::list converted(const Values& numbers, const Eights<float>& rays, bool isLoca
 } // namespace
 
 void bind_rays(nb::module_& module) {
-    nb::class_<Rays>(module, "Rays", "A device that traces rays, with one scene: the calls of colonnade_rays.h, on the bit-exact model or a device.")
+    nb::class_<Rays>(
+        module, "Rays",
+        "A device that traces rays, with one scene: the calls of colonnade_rays.h, on the bit-exact model or a device.")
         .def(nb::init<const std::optional<std::string>&, nb::object>(), "design"_a.none(), "device"_a = nb::none())
         .def("add", &Rays::add, "vertices"_a, "faces"_a)
         .def("update", &Rays::update, "mesh"_a, "vertices"_a)
@@ -326,8 +362,8 @@ void bind_rays(nb::module_& module) {
         .def("occluded", &Rays::occluded, "rays"_a, "mode"_a, "mask"_a)
         .def("order", &Rays::order, "rays"_a)
         .def("traffic", &Rays::traffic, "rays"_a, "mode"_a, "mask"_a, "is_occlusion"_a, "shape"_a)
-        .def("submit", &Rays::submit, "rays"_a, "count"_a, "mode"_a, "origin"_a = std::array<float, 3>{}, "tnear"_a = 0.0f,
-             "tfar"_a = std::numeric_limits<float>::infinity())
+        .def("submit", &Rays::submit, "rays"_a, "count"_a, "mode"_a, "origin"_a = std::array<float, 3>{},
+             "tnear"_a = 0.0f, "tfar"_a = std::numeric_limits<float>::infinity())
         .def("face", &Rays::face, "id"_a)
         .def("counters", &Rays::counters);
     module.def("convert_rays", &converted, "numbers"_a, "rays"_a, "is_local"_a, "mantissa"_a, "exponent"_a, "base"_a);

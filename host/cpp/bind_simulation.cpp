@@ -12,7 +12,8 @@ namespace {
 
 class RaySimulation {
 public:
-    RaySimulation(const std::string& registers, int commands, int answers, int errors) : simulation_(registers, {commands, answers, errors}) {}
+    RaySimulation(const std::string& registers, int commands, int answers, int errors)
+        : simulation_(registers, {commands, answers, errors}) {}
 
     void load(const rays::RegisterValues& values, const nb::bytes& records, std::size_t count) {
         const auto* const data = static_cast<const std::uint8_t*>(records.data());
@@ -24,7 +25,8 @@ public:
         if (batch.size() != sizeof words) throw std::invalid_argument("a batch has 64 bytes");
         std::memcpy(&words, batch.data(), sizeof words);
         std::string hits(size, '\0');
-        const std::uint32_t tag = released([&] { return simulation_.submit(words, rays.data(), rays.size(), hits.data(), size); });
+        const std::uint32_t tag =
+            released([&] { return simulation_.submit(words, rays.data(), rays.size(), hits.data(), size); });
         return nb::make_tuple(tag, nb::bytes(hits.data(), size));
     }
 
@@ -48,6 +50,9 @@ void bind_simulation(nb::module_& module) {
     nb::class_<rays::DeviceRegisters>(module, "RayRegisters")
         .def(nb::init<const std::string&>(), "registers"_a)
         .def(
-            "sums", [](const rays::DeviceRegisters& registers, const Read& read) { return registers.sums(read); }, "read"_a)
-        .def("keep_sums", [](rays::DeviceRegisters& registers, const Read& read) { registers.keepSums(read); }, "read"_a);
+            "sums", [](const rays::DeviceRegisters& registers, const Read& read) { return registers.sums(read); },
+            "read"_a)
+        .def(
+            "keep_sums", [](rays::DeviceRegisters& registers, const Read& read) { registers.keepSums(read); },
+            "read"_a);
 }

@@ -34,7 +34,9 @@ colonnade_pose poseOf(const Position& position, const Rotation& rotation) {
 
 class TargetView {
 public:
-    TargetView(const std::array<std::uint32_t, 8>& formatHash, std::uint32_t first, std::uint32_t end, const nb::bytes& file) : file_(file.c_str(), file.size()) {
+    TargetView(const std::array<std::uint32_t, 8>& formatHash, std::uint32_t first, std::uint32_t end,
+               const nb::bytes& file)
+        : file_(file.c_str(), file.size()) {
         colonnade_design design{};
         std::copy(formatHash.begin(), formatHash.end(), design.format_hash);
         design.frame_registers = deviceBase + 4 * first;
@@ -43,8 +45,8 @@ public:
         writes_.resize(8 * std::size_t{colonnade_view_most_writes(&view_)});
     }
 
-    void setCamera(const Position& position, const Rotation& rotation, std::int64_t fx, std::int64_t fy, std::int64_t cx, std::int64_t cy, std::uint32_t width,
-                   std::uint32_t height) {
+    void setCamera(const Position& position, const Rotation& rotation, std::int64_t fx, std::int64_t fy,
+                   std::int64_t cx, std::int64_t cy, std::uint32_t width, std::uint32_t height) {
         const colonnade_camera camera{poseOf(position, rotation), fx, fy, cx, cy, width, height};
         check(colonnade_view_set_camera(&view_, &camera));
     }
@@ -54,9 +56,12 @@ public:
         check(colonnade_view_set_object(&view_, &pose));
     }
 
-    void setBounds(const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high) { check(colonnade_view_set_bounds(&view_, low.data(), high.data())); }
+    void setBounds(const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high) {
+        check(colonnade_view_set_bounds(&view_, low.data(), high.data()));
+    }
 
-    auto move(const Position& shift, const Rotation& rotation, const Position& pivot, const Rotation& linear, std::int32_t exponent, const Position& position) const {
+    auto move(const Position& shift, const Rotation& rotation, const Position& pivot, const Rotation& linear,
+              std::int32_t exponent, const Position& position) const {
         const colonnade_pose pose = poseOf(shift, rotation), from = poseOf(position, linear);
         colonnade_transform transform{{}, exponent, {}};
         std::copy(&from.rotation[0][0], &from.rotation[0][0] + 9, &transform.linear[0][0]);
@@ -64,10 +69,12 @@ public:
         check(colonnade_motion_move(&view_, &pose, pivot.data(), &transform));
         Rotation moved;
         std::copy(&transform.linear[0][0], &transform.linear[0][0] + 9, moved.begin());
-        return std::make_tuple(moved, transform.exponent, Position{transform.position[0], transform.position[1], transform.position[2]});
+        return std::make_tuple(moved, transform.exponent,
+                               Position{transform.position[0], transform.position[1], transform.position[2]});
     }
 
-    void setLight(std::uint32_t index, const Position& position, const std::array<std::uint32_t, 3>& colour, std::uint64_t reach) {
+    void setLight(std::uint32_t index, const Position& position, const std::array<std::uint32_t, 3>& colour,
+                  std::uint64_t reach) {
         colonnade_light light{{}, {}, reach};
         std::copy(position.begin(), position.end(), light.position);
         std::copy(colour.begin(), colour.end(), light.colour);
@@ -103,8 +110,10 @@ Rotation rotationOf(const std::array<std::int32_t, 4>& quaternion) {
 
 void bind_view(nb::module_& module) {
     nb::class_<TargetView>(module, "TargetView")
-        .def(nb::init<const std::array<std::uint32_t, 8>&, std::uint32_t, std::uint32_t, const nb::bytes&>(), "format_hash"_a, "first"_a, "end"_a, "file"_a)
-        .def("set_camera", &TargetView::setCamera, "position"_a, "rotation"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a)
+        .def(nb::init<const std::array<std::uint32_t, 8>&, std::uint32_t, std::uint32_t, const nb::bytes&>(),
+             "format_hash"_a, "first"_a, "end"_a, "file"_a)
+        .def("set_camera", &TargetView::setCamera, "position"_a, "rotation"_a, "fx"_a, "fy"_a, "cx"_a, "cy"_a,
+             "width"_a, "height"_a)
         .def("set_object", &TargetView::setObject, "position"_a, "rotation"_a)
         .def("set_bounds", &TargetView::setBounds, "low"_a, "high"_a)
         .def("move", &TargetView::move, "shift"_a, "rotation"_a, "pivot"_a, "linear"_a, "exponent"_a, "position"_a)

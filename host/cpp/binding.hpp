@@ -39,7 +39,8 @@ template <class Function> auto released(const Function& function) {
 inline std::map<std::string, Layout> layoutsOf(const FieldTuples& tuples) {
     std::map<std::string, Layout> layouts;
     for (const auto& [record, fields] : tuples)
-        for (const auto& [name, field] : fields) layouts[record][name] = {std::get<0>(field), std::get<1>(field), std::get<2>(field)};
+        for (const auto& [name, field] : fields)
+            layouts[record][name] = {std::get<0>(field), std::get<1>(field), std::get<2>(field)};
     return layouts;
 }
 

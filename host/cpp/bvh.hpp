@@ -1,7 +1,7 @@
 /// The binary tree over leaves, from which every tree layout is derived.
 ///
-/// Splits are binned by a surface-area heuristic, and exact sweeps of few leaves. All costs are exact integers, so a mesh
-/// gives the same tree on every machine. The order of the leaves, left first, defines the triangles' packed ids.
+/// Splits are binned by a surface-area heuristic, and exact sweeps of few leaves. All costs are exact integers, so a
+/// mesh gives the same tree on every machine. The order of the leaves, left first, defines the triangles' packed ids.
 #pragma once
 
 #include <algorithm>
@@ -61,8 +61,8 @@ inline unsigned balancedHeight(std::uint64_t leaves) {
     return height;
 }
 
-/// Expected reads in a subtree of each number of leaf records up to `most`, relative to one: the power 3/5, as an integer.
-/// Rays stop at a hit, so they do not read in proportion to the records.
+/// Expected reads in a subtree of each number of leaf records up to `most`, relative to one: the power 3/5, as an
+/// integer. Rays stop at a hit, so they do not read in proportion to the records.
 inline std::vector<std::uint32_t> readWeights(std::uint64_t most) {
     std::vector<std::uint32_t> weights{0};
     Cost weight = 0;
@@ -74,7 +74,8 @@ inline std::vector<std::uint32_t> readWeights(std::uint64_t most) {
     return weights;
 }
 
-/// Builds the binary tree. No leaf is deeper than `heightLimit` (0: no limit), which must be at least the balanced height.
+/// Builds the binary tree. No leaf is deeper than `heightLimit` (0: no limit), which must be at least the balanced
+/// height.
 class BinaryBuilder {
 public:
     BinaryBuilder(const std::vector<Box>& boxes, unsigned heightLimit)
@@ -128,13 +129,17 @@ private:
         return static_cast<std::int32_t>(tree_.nodes.size() - 1);
     }
 
-    Cost cost(std::uint64_t leftArea, std::uint64_t leftRecords, std::uint64_t rightArea, std::uint64_t rightRecords) const {
+    Cost cost(std::uint64_t leftArea, std::uint64_t leftRecords, std::uint64_t rightArea,
+              std::uint64_t rightRecords) const {
         return Cost{leftArea} * weights_[leftRecords] + Cost{rightArea} * weights_[rightRecords];
     }
 
-    bool fits(std::uint64_t left, std::uint64_t right, unsigned height) const { return balancedHeight(left) <= height && balancedHeight(right) <= height; }
+    bool fits(std::uint64_t left, std::uint64_t right, unsigned height) const {
+        return balancedHeight(left) <= height && balancedHeight(right) <= height;
+    }
 
-    /// Partitions `order[begin, end)` into two sides that each fit a tree of `height`; returns the start of the right side.
+    /// Partitions `order[begin, end)` into two sides that each fit a tree of `height`; returns the start of the right
+    /// side.
     std::uint32_t partition(std::uint32_t begin, std::uint32_t end, unsigned height) {
         const std::uint32_t count = end - begin;
         if (count < sweepBelow) {
@@ -168,12 +173,14 @@ private:
         return begin + (count + 1) / 2;
     }
 
-    int binOf(std::uint32_t leaf, int axis, const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high) const {
+    int binOf(std::uint32_t leaf, int axis, const std::array<std::int32_t, 3>& low,
+              const std::array<std::int32_t, 3>& high) const {
         const std::int64_t offset = std::int64_t{boxes_[leaf].centre2(axis)} - low[axis];
         return static_cast<int>(offset * bins / (std::int64_t{high[axis]} - low[axis] + 1));
     }
 
-    Split binned(std::uint32_t begin, std::uint32_t end, const std::array<std::int32_t, 3>& low, const std::array<std::int32_t, 3>& high, unsigned height) const {
+    Split binned(std::uint32_t begin, std::uint32_t end, const std::array<std::int32_t, 3>& low,
+                 const std::array<std::int32_t, 3>& high, unsigned height) const {
         Split best;
         for (int axis = 0; axis < 3; ++axis) {
             if (low[axis] == high[axis]) continue;

@@ -9,10 +9,12 @@
 //   cell   x y                                            -> id isIllegal
 //   plane  id                                             -> a b c exponent
 //   boundingPlane index                                     -> a b c exponent albedo[3] normal[3]
-//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY boundingPlanes tolerance isMapCamera isSeen pixel[2] hitDistance origin[3] direction[3]
-//                                                         -> kind x y entry isHidden travel travelExponent steps point[3] albedo[3] normal[3] hidesObject isIllegal
-//          the point hit by the ray, or with isSeen the point visible in the pixel, whose ray it is; all 0 for a miss. hidesObject: it is nearer
-//          than hitDistance
+//   march  matrix[9] offset[3] offsetShift exponent rotation[9] stepX stepY boundingPlanes tolerance isMapCamera
+//          isSeen pixel[2] hitDistance origin[3] direction[3]
+//                                                         -> kind x y entry isHidden travel travelExponent steps
+//                                                            point[3] albedo[3] normal[3] hidesObject isIllegal
+//          the point hit by the ray, or with isSeen the point visible in the pixel, whose ray it is; all 0 for a
+//          miss. hidesObject: it is nearer than hitDistance
 #pragma once
 #include <map>
 #include <optional>
@@ -26,7 +28,9 @@ namespace colonnade {
 /// Holds the maps and replies to queries about them.
 class EnvironmentQueries {
 public:
-    void begin(const std::map<std::string, std::int64_t>& sizes, const std::map<std::string, Layout>& layouts) { image_.emplace(AttributeSizes(sizes), layouts); }
+    void begin(const std::map<std::string, std::int64_t>& sizes, const std::map<std::string, Layout>& layouts) {
+        image_.emplace(AttributeSizes(sizes), layouts);
+    }
 
     void load(std::istream& words) {
         std::string memory;
@@ -35,7 +39,8 @@ public:
         std::vector<std::uint8_t> bytes;
         for (std::string digits; words >> digits; ++count) {
             digits.insert(0, 2 * stride - digits.size(), '0');
-            for (std::size_t end = 2 * stride; end > 0; end -= 2) bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
+            for (std::size_t end = 2 * stride; end > 0; end -= 2)
+                bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
         }
         image().load(memory, bytes.data(), count, stride);
     }
@@ -44,7 +49,8 @@ public:
     const std::optional<AttributeImage>& maps() const { return image_; }
 
     bool knows(const std::string& kind) const {
-        return kind == "albedo" || kind == "normal" || kind == "tile" || kind == "cell" || kind == "plane" || kind == "boundingPlane" || kind == "march";
+        return kind == "albedo" || kind == "normal" || kind == "tile" || kind == "cell" || kind == "plane" ||
+               kind == "boundingPlane" || kind == "march";
     }
 
     Reply reply(const std::string& kind, Query& query, const Numbers& numbers) {
@@ -76,7 +82,9 @@ public:
     }
 
 private:
-    static Reply& put(Reply& reply, const PlaneWord& plane) { return reply << plane.a << plane.b << plane.c << plane.e; }
+    static Reply& put(Reply& reply, const PlaneWord& plane) {
+        return reply << plane.a << plane.b << plane.c << plane.e;
+    }
 
     Reply march(Query& query, const Numbers& numbers) {
         EnvironmentView view{};

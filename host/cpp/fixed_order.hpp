@@ -11,10 +11,12 @@
 
 namespace colonnade::fixed_order {
 
-/// Product of matrices: out [rows, columns] = a [rows, inner] · b [inner, columns], all row-major, or a transposed. Each
-/// element is summed by ascending inner index. Elements of a block are summed side by side, which does not change any sum.
-template <class T>
-inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows, std::size_t inner, std::size_t columns, bool isTransposed) {
+/// Product of matrices: out [rows, columns] = a [rows, inner] · b [inner, columns], all row-major, or a transposed.
+/// Each element is summed by ascending inner index. Elements of a block are summed side by side, which does not change
+/// any sum.
+template <class T> inline __attribute__((always_inline)) void product(const T* a, const T* b, T* out, std::size_t rows,
+                                                                      std::size_t inner, std::size_t columns,
+                                                                      bool isTransposed) {
     constexpr std::size_t lanes = 32 / sizeof(T), down = 4, across = 2 * lanes;
     typedef T Lanes __attribute__((vector_size(32)));
     const auto load = [](const T* from) __attribute__((always_inline)) {
@@ -22,7 +24,8 @@ inline __attribute__((always_inline)) void product(const T* a, const T* b, T* ou
         std::memcpy(&values, from, sizeof values);
         return values;
     };
-    const std::size_t wholeColumns = columns - columns % across, rowStep = isTransposed ? 1 : inner, step = isTransposed ? rows : 1;
+    const std::size_t wholeColumns = columns - columns % across, rowStep = isTransposed ? 1 : inner,
+                      step = isTransposed ? rows : 1;
     for (std::size_t row = 0; row < rows; row += down) {
         // A block beyond the last row sums that one again
         const std::size_t height = std::min(down, rows - row);
@@ -38,7 +41,8 @@ inline __attribute__((always_inline)) void product(const T* a, const T* b, T* ou
                     sums[i][1] += factor * second;
                 }
             }
-            for (std::size_t i = 0; i < height; ++i) std::memcpy(out + (row + i) * columns + column, sums[i], sizeof sums[i]);
+            for (std::size_t i = 0; i < height; ++i)
+                std::memcpy(out + (row + i) * columns + column, sums[i], sizeof sums[i]);
         }
         for (std::size_t column = wholeColumns; column < columns; ++column) {
             T sums[down] = {};
@@ -78,7 +82,8 @@ template <std::size_t count> inline __attribute__((always_inline)) void logs(con
 }
 
 /// Exponentials, side by side, as a number near 1 and an exponent of 2; relative error below 2^-48 for |x| < 64.
-template <std::size_t count> inline __attribute__((always_inline)) void exps(const double* x, double* near, double* twos) {
+template <std::size_t count>
+inline __attribute__((always_inline)) void exps(const double* x, double* near, double* twos) {
     double rest[count];
     for (std::size_t i = 0; i < count; ++i) {
         twos[i] = std::floor(x[i] * 1.4426950408889634 + 0.5);
@@ -128,7 +133,8 @@ inline __attribute__((always_inline)) void power(const double* x, double y, doub
         }
         if (isPlain) exps<block>(product, near, twos);
         for (std::size_t i = 0; i < block; ++i) {
-            const std::uint64_t bits = isPlain ? static_cast<std::uint64_t>(static_cast<std::int64_t>(twos[i]) + 1023) << 52 : 0;
+            const std::uint64_t bits =
+                isPlain ? static_cast<std::uint64_t>(static_cast<std::int64_t>(twos[i]) + 1023) << 52 : 0;
             double scale;
             std::memcpy(&scale, &bits, sizeof scale);
             out[done + i] = isPlain ? near[i] * scale : power(x[done + i], y);
@@ -139,7 +145,8 @@ inline __attribute__((always_inline)) void power(const double* x, double y, doub
 
 /// Angle of the vector (x, y), -pi to pi; error below 2^-50.
 inline double arctan2(double y, double x) {
-    const double pi = 3.14159265358979324, acrossX = std::fabs(x), acrossY = std::fabs(y), longer = std::max(acrossX, acrossY);
+    const double pi = 3.14159265358979324, acrossX = std::fabs(x), acrossY = std::fabs(y),
+                 longer = std::max(acrossX, acrossY);
     if (!(longer > 0)) return 0;
     double tangent = std::min(acrossX, acrossY) / longer;
     // Halve the angle twice: tan(a/2) = t / (1 + sqrt(1 + t²))

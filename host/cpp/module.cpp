@@ -21,7 +21,9 @@ void bind_surroundings(nb::module_& module);
 void bind_view(nb::module_& module);
 
 NB_MODULE(_core, module) {
-    module.doc() = "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, rays, registers and meshes as a target computes them.";
+    module.doc() =
+        "Packer, bit-exact model of the device, live encoder, arithmetic in a fixed order, the driver, rays, registers "
+        "and meshes as a target computes them.";
     bind_environment(module);
     bind_bvh(module);
     bind_clip(module);

@@ -18,7 +18,8 @@ public:
         if (!(words_ >> word)) throw std::invalid_argument("a query has too few values");
         const bool isNegative = word[0] == '-';
         UnsignedWide value = 0;
-        for (std::size_t i = isNegative; i < word.size(); ++i) value = value * 10 + static_cast<unsigned>(word[i] - '0');
+        for (std::size_t i = isNegative; i < word.size(); ++i)
+            value = value * 10 + static_cast<unsigned>(word[i] - '0');
         return isNegative ? -static_cast<Wide>(value) : static_cast<Wide>(value);
     }
     std::int64_t number() { return static_cast<std::int64_t>(wide()); }
@@ -56,7 +57,8 @@ inline std::pair<std::vector<std::uint8_t>, std::size_t> readRecordBytes(std::is
     std::vector<std::uint8_t> bytes;
     std::size_t count = 0;
     for (std::string digits; words >> digits; ++count)
-        for (std::size_t end = digits.size(); end > 0; end -= 2) bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
+        for (std::size_t end = digits.size(); end > 0; end -= 2)
+            bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(end - 2, 2), nullptr, 16)));
     if (count == 0) throw std::invalid_argument("the scene has no records");
     return {bytes, count};
 }
@@ -65,7 +67,8 @@ class Reply {
 public:
     Reply& operator<<(Wide value) {
         std::string digits;
-        for (UnsignedWide rest = magnitude(value); rest != 0 || digits.empty(); rest /= 10) digits += static_cast<char>('0' + static_cast<int>(rest % 10));
+        for (UnsignedWide rest = magnitude(value); rest != 0 || digits.empty(); rest /= 10)
+            digits += static_cast<char>('0' + static_cast<int>(rest % 10));
         if (value < 0) digits += '-';
         std::reverse(digits.begin(), digits.end());
         text_ += text_.empty() ? digits : " " + digits;

@@ -1,6 +1,7 @@
 // Queries of the RTL specs about rays of applications (docs/numbers.md, section 9); floats are their bits.
 //
-//   ray    mantissa exponent base[3] isLocal, record[8]  -> kind tMin tMax origin[3] direction[3], kind: legal, refused, out of range
+//   ray    mantissa exponent base[3] isLocal, record[8]  -> kind tMin tMax origin[3] direction[3], kind: legal,
+//       refused, out of range
 //   hit    mantissa exponent dominant entry t weights[3] -> t u v
 //   image  low[3] high[3] mantissa exponent base[3], hexadecimal records: loads a scene; no reply
 //   batch  mode count origin[3] tnear tfar, words of its rays or its sensor -> words of its hits
@@ -23,7 +24,9 @@ inline std::uint32_t bitsOf(float value) {
     return bits;
 }
 
-inline rays::Placement readPlacement(Query& query) { return {static_cast<std::uint32_t>(query.number()), static_cast<int>(query.number()), {}}; }
+inline rays::Placement readPlacement(Query& query) {
+    return {static_cast<std::uint32_t>(query.number()), static_cast<int>(query.number()), {}};
+}
 
 inline colonnade_rays_record readRecord(Query& query) {
     colonnade_rays_record record;
@@ -61,7 +64,8 @@ inline void replyHit(Query& query, const Numbers& n, int directionBits) {
 /// Batches of rays in a scene.
 class RayBatches {
 public:
-    void load(Query& query, std::istream& words, const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts) {
+    void load(Query& query, std::istream& words, const Numbers& numbers, int directionBits,
+              const std::map<std::string, Layout>& layouts) {
         colonnade_rays_image image{};
         for (auto* bounds : {image.bounds_low, image.bounds_high})
             for (int a = 0; a < 3; ++a) bounds[a] = static_cast<std::int32_t>(query.number());
@@ -83,14 +87,18 @@ public:
         batch.tnear = floatOf(query.number());
         batch.tfar = floatOf(query.number());
         const std::uint32_t form = batch.mode & COLONNADE_RAYS_RESPONSE;
-        const std::size_t words = batch.mode & COLONNADE_RAYS_SENSOR ? 16 : batch.count * (batch.mode & COLONNADE_RAYS_FAN ? 4 : 8);
-        const std::size_t hitWords = form == COLONNADE_RAYS_OCCLUDED ? (batch.count + 63) / 64 * 2 : batch.count * (form == COLONNADE_RAYS_HITS ? 4 : 2);
+        const std::size_t words =
+            batch.mode & COLONNADE_RAYS_SENSOR ? 16 : batch.count * (batch.mode & COLONNADE_RAYS_FAN ? 4 : 8);
+        const std::size_t hitWords = form == COLONNADE_RAYS_OCCLUDED
+                                         ? (batch.count + 63) / 64 * 2
+                                         : batch.count * (form == COLONNADE_RAYS_HITS ? 4 : 2);
         std::vector<Line> rays(words / 16 + 1), hits(hitWords / 16 + 1);
         for (std::size_t i = 0; i < words; ++i) rays[i / 16].words[i % 16] = static_cast<std::uint32_t>(query.number());
         batch.rays = reinterpret_cast<std::uintptr_t>(rays.data());
         batch.hits = reinterpret_cast<std::uintptr_t>(hits.data());
         rays::Sums sums;
-        if (model_->run(batch, sums) == COLONNADE_RAYS_BAD_BATCH) throw std::invalid_argument("the model refuses the batch");
+        if (model_->run(batch, sums) == COLONNADE_RAYS_BAD_BATCH)
+            throw std::invalid_argument("the model refuses the batch");
         Reply reply;
         for (std::size_t i = 0; i < hitWords; ++i) reply << hits[i / 16].words[i % 16];
         reply.print();

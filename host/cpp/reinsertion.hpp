@@ -1,8 +1,9 @@
-/// Reinsertion: moves subtrees of the binary tree to where they add the least area (Bittner, Hapala and Havran 2013, "Fast
-/// Insertion-Based Optimization of Bounding Volume Hierarchies"; search of Meister and Bittner 2018, "Parallel Reinsertion for
-/// Bounding Volume Hierarchy Optimization").
+/// Reinsertion: moves subtrees of the binary tree to where they add the least area (Bittner, Hapala and Havran 2013,
+/// "Fast Insertion-Based Optimization of Bounding Volume Hierarchies"; search of Meister and Bittner 2018, "Parallel
+/// Reinsertion for Bounding Volume Hierarchy Optimization").
 ///
-/// Areas are exact integers and subtrees move one by one, so the result is the same on every machine. Leaves keep their triangles.
+/// Areas are exact integers and subtrees move one by one, so the result is the same on every machine. Leaves keep their
+/// triangles.
 #pragma once
 
 #include <numeric>
@@ -16,7 +17,8 @@ namespace colonnade::bvh {
 inline std::vector<unsigned> heights(const BinaryTree& tree) {
     std::vector<unsigned> height(tree.nodes.size(), 0);
     for (std::size_t i = tree.nodes.size(); i-- > 0;)
-        if (const BinaryNode& node = tree.nodes[i]; !node.isLeaf()) height[i] = 1 + std::max(height[node.left], height[node.right]);
+        if (const BinaryNode& node = tree.nodes[i]; !node.isLeaf())
+            height[i] = 1 + std::max(height[node.left], height[node.right]);
     return height;
 }
 
@@ -24,7 +26,8 @@ class Reinsertion {
 public:
     /// No leaf becomes deeper than `heightLimit`, which must be at least the height of the tree.
     Reinsertion(BinaryTree&& tree, unsigned heightLimit)
-        : heightLimit_(heightLimit), height_(heights(tree)), order_(std::move(tree.order)), nodes_(std::move(tree.nodes)), parent_(nodes_.size(), -1) {
+        : heightLimit_(heightLimit), height_(heights(tree)), order_(std::move(tree.order)),
+          nodes_(std::move(tree.nodes)), parent_(nodes_.size(), -1) {
         for (std::size_t i = 0; i < nodes_.size(); ++i)
             if (!nodes_[i].isLeaf()) parent_[nodes_[i].left] = parent_[nodes_[i].right] = static_cast<std::int32_t>(i);
     }
@@ -35,7 +38,8 @@ public:
         for (std::size_t i = 0; i < nodes_.size(); ++i) area[i] = nodes_[i].box.halfArea();
         std::vector<std::int32_t> subtrees(nodes_.size());
         std::iota(subtrees.begin(), subtrees.end(), 0);
-        std::stable_sort(subtrees.begin(), subtrees.end(), [&](std::int32_t one, std::int32_t other) { return area[one] > area[other]; });
+        std::stable_sort(subtrees.begin(), subtrees.end(),
+                         [&](std::int32_t one, std::int32_t other) { return area[one] > area[other]; });
         for (const std::int32_t subtree : subtrees)
             if (subtree != root_) reinsert(subtree);
         return inDepthFirstOrder();
@@ -56,7 +60,9 @@ private:
 
     static Area areaOf(const Box& box) { return static_cast<Area>(box.halfArea()); }
 
-    void updateHeight(std::int32_t node) { height_[node] = 1 + std::max(height_[nodes_[node].left], height_[nodes_[node].right]); }
+    void updateHeight(std::int32_t node) {
+        height_[node] = 1 + std::max(height_[nodes_[node].left], height_[nodes_[node].right]);
+    }
 
     std::int32_t siblingOf(std::int32_t node) const {
         const BinaryNode& parent = nodes_[parent_[node]];
@@ -75,7 +81,8 @@ private:
         unsigned level = 0;
         for (std::int32_t node = parent; node != root_; node = parent_[node]) ++level;
 
-        // Search beside each ancestor, the pivot. Removing the subtree saves its parent, and shrinks the ancestors below the pivot
+        // Search beside each ancestor, the pivot. Removing the subtree saves its parent, and shrinks the ancestors
+        // below the pivot
         Area best = 0, saving = areaOf(nodes_[parent].box);
         std::int32_t target = -1;
         unsigned visited = 0;
@@ -91,7 +98,8 @@ private:
                 ++visited;
                 const BinaryNode& node = nodes_[candidate.node];
                 const Area saving = candidate.saving - areaOf(joined(node.box, box));
-                if (saving > best && candidate.level + 1 + std::max(height_[subtree], height_[candidate.node]) <= heightLimit_) {
+                if (saving > best &&
+                    candidate.level + 1 + std::max(height_[subtree], height_[candidate.node]) <= heightLimit_) {
                     best = saving;
                     target = candidate.node;
                 }
@@ -146,7 +154,9 @@ private:
             tasks.pop_back();
             const auto index = static_cast<std::int32_t>(tree.nodes.size());
             BinaryNode node = nodes_[task.node];
-            if (task.parent >= 0) (tree.nodes[task.parent].left < 0 ? tree.nodes[task.parent].left : tree.nodes[task.parent].right) = index;
+            if (task.parent >= 0)
+                (tree.nodes[task.parent].left < 0 ? tree.nodes[task.parent].left : tree.nodes[task.parent].right) =
+                    index;
             if (node.isLeaf()) {
                 const auto begin = static_cast<std::uint32_t>(tree.order.size());
                 tree.order.insert(tree.order.end(), order_.begin() + node.begin, order_.begin() + node.end);
@@ -171,4 +181,4 @@ private:
     std::int32_t root_ = 0;
 };
 
-}  // namespace colonnade::bvh
+} // namespace colonnade::bvh

@@ -7,7 +7,9 @@
 
 namespace colonnade {
 
-inline double linearFromSrgb(double encoded) { return encoded <= 0.04045 ? encoded / 12.92 : fixed_order::power((encoded + 0.055) / 1.055, 2.4); }
+inline double linearFromSrgb(double encoded) {
+    return encoded <= 0.04045 ? encoded / 12.92 : fixed_order::power((encoded + 0.055) / 1.055, 2.4);
+}
 
 inline double srgbFromLinear(double linear) {
     const double value = std::clamp(linear, 0.0, 1.0);

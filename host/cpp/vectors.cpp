@@ -1,23 +1,30 @@
 // Expected values for the RTL specs: replies to each query, a line on standard input, with a line of integers.
 //
 //   numbers key=value ...                                   (first line; no reply)
-//   setup  isShadow origin[3] direction[3] low[3] high[3] -> enters axis negative[3] origin[3] boxOrigin[3] shear[2] reciprocal[2] exponent[2] entry limit
-//   box    axis negative[3] boxOrigin[3] reciprocal[2] exponent[2] limit, origin[3] exponent[3] nodes leaves (low[3] high[3])*4
+//   setup  isShadow origin[3] direction[3] low[3] high[3] -> enters axis negative[3] origin[3] boxOrigin[3] shear[2]
+//       reciprocal[2] exponent[2] entry limit
+//   box    axis negative[3] boxOrigin[3] reciprocal[2] exponent[2] limit, origin[3] exponent[3] nodes leaves (low[3]
+//          high[3])*4
 //                                                         -> tests count (slot near)*count
 //   triangle axis negative[3] origin[3] shear[2] vertices[9] -> isHit t weights[3] backSide
 //   limit  t                                              -> tMaxUnits
 //   closest tMax count (t id)*count                       -> isHit t id, of the hits of a ray
-//   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat shadows
+//   shade  axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat
+//          shadows
 //          count, count * (position[3] colour[3] reachMantissa reachExponent)
 //                                                         -> origin[3], count * (direct[3] needsShadowRay)
 //   cornercolour weights[3] colours[9]                    -> colour[3]
-//   lightenvironment point[3] normal[3] offset shadows count, count * (position[3] colour[3] reachMantissa reachExponent)
+//   lightenvironment point[3] normal[3] offset shadows count, count * (position[3] colour[3] reachMantissa
+//       reachExponent)
 //                                                         -> as shade, for a point of the environment
-//   bounce axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat kind etaFront etaBack reflectance
-//                                                         -> isRefraction origin[3] direction[3] reflection[3] fresnelWeight
+//   bounce axis negative[3] origin[3] shear[2] t weights[3] backSide normals[9] geometricNormal[3] offset flat kind
+//       etaFront etaBack reflectance
+//                                                         -> isRefraction origin[3] direction[3] reflection[3]
+//                                                            fresnelWeight
 //   cornernormal u v                                      -> normal[3]
 //   geometricnormal vertices[9]                           -> normal[3]
-//   leaf   words[n], n = 8 up to 19 vertex bits, 32 bits each, low ones first         -> format isClear material vertices[4][3] normals[4][2]; missing ones are 0
+//   leaf   words[n], n = 8 up to 19 vertex bits, 32 bits each, low ones first         -> format isClear material
+//       vertices[4][3] normals[4][2]; missing ones are 0
 //   leafface triangle words[n]                            -> material normals[9] geometricNormal[3]
 //   newleaf isPair isClear material vertices[4][3] normals[4][2]
 //                                                         -> words[n]; all 0 if the vertices are too far apart
@@ -30,7 +37,8 @@
 //   pixel  x y                                            -> colour[3] isObject triangle distance ratio[3]
 //          with an environment if its lines precede the registers
 //
-// Environment maps: see environment_queries.hpp; instances: see instance_queries.hpp; rays of applications: see ray_queries.hpp.
+// Environment maps: see environment_queries.hpp; instances: see instance_queries.hpp; rays of applications: see
+// ray_queries.hpp.
 #include <optional>
 #include <sstream>
 
@@ -48,7 +56,8 @@ void replyRaySetup(Query& query, const Numbers& n) {
     const bool isShadow = query.number() != 0;
     RayRequest request{query.wideVector(), {}, 0};
     request.direction = query.wideVector();
-    request.tMax = isShadow ? static_cast<Wide>(magnitude(request.direction[dominantAxis(request.direction)])) : n.unlimited();
+    request.tMax =
+        isShadow ? static_cast<Wide>(magnitude(request.direction[dominantAxis(request.direction)])) : n.unlimited();
     Bounds bounds{query.vector(), {}};
     bounds.high = query.vector();
     const Ray ray = prepareRay(request, bounds, n);
@@ -174,7 +183,8 @@ using LeafBytes = std::vector<std::uint8_t>;
 Leaf readLeaf(Query& query, const LeafFields& fields) {
     LeafBytes record(4 * fields.words());
     for (std::size_t word = 0; word < fields.words(); ++word)
-        for (std::int64_t byte = 0, bits = query.number(); byte < 4; ++byte) record[4 * word + byte] = static_cast<std::uint8_t>(bits >> 8 * byte);
+        for (std::int64_t byte = 0, bits = query.number(); byte < 4; ++byte)
+            record[4 * word + byte] = static_cast<std::uint8_t>(bits >> 8 * byte);
     return readLeaf(fields, record.data());
 }
 
@@ -206,7 +216,8 @@ void replyNewLeaf(Query& query, const LeafFields& fields, const Numbers& n) {
         normal.u = query.number();
         normal.v = query.number();
     }
-    const std::optional<LeafFormat> format = isPair ? packer::formatOf(fields, leaf, n.normalFraction) : LeafFormat::triangle;
+    const std::optional<LeafFormat> format =
+        isPair ? packer::formatOf(fields, leaf, n.normalFraction) : LeafFormat::triangle;
     LeafBytes record(4 * fields.words());
     if (format) {
         leaf.format = *format;

@@ -8,8 +8,8 @@
 
 namespace colonnade::bvh {
 
-/// Flat arrays of the nodes and of the leaves, by rising address. The children of a node are at consecutive addresses: nodes, then
-/// leaves. Subtrees follow depth first.
+/// Flat arrays of the nodes and of the leaves, by rising address. The children of a node are at consecutive addresses:
+/// nodes, then leaves. Subtrees follow depth first.
 struct WideTree {
     std::vector<std::uint32_t> nodeAddress;        ///< the root's is 0
     std::vector<std::uint32_t> origin;             ///< nodes × 3, vertex units
@@ -18,26 +18,30 @@ struct WideTree {
     std::vector<std::uint32_t> first;              ///< nodes; address of the first child
     std::vector<std::uint8_t> nodeCount, leafCount; ///< nodes; children of each kind
     std::vector<std::uint32_t> leafAddress;
-    std::vector<std::uint32_t> leafFirst, leafTriangleCount;  ///< leaves: position of the first triangle in the order, and their number
+    std::vector<std::uint32_t> leafFirst,
+        leafTriangleCount;  ///< leaves: position of the first triangle in the order, and their number
     unsigned depth = 0;                                      ///< nodes on the longest path from the root
     unsigned stackBound = 0;                                 ///< largest number of stack entries that a ray can need
-    double cost = 0;                                         ///< expected record reads of a random ray through the root box
+    double cost = 0; ///< expected record reads of a random ray through the root box
 
     std::size_t nodes() const { return first.size(); }
     std::size_t leaves() const { return leafFirst.size(); }
 };
 
-/// Replaces the binary nodes by wide nodes with the least sum of areas, which is the expected number of node reads (Ylitie,
-/// Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs"). Dynamic programming over the binary tree finds it, within a limit of the stack.
+/// Replaces the binary nodes by wide nodes with the least sum of areas, which is the expected number of node reads
+/// (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs"). Dynamic
+/// programming over the binary tree finds it, within a limit of the stack.
 class Collapser {
 public:
-    /// `most`: children of a node, 2 to `nodeChildren`. `stackDepth`: at least the height of the tree, which is the least stack bound
-    /// of all collapses. `leafRecords`: records of a leaf.
+    /// `most`: children of a node, 2 to `nodeChildren`. `stackDepth`: at least the height of the tree, which is the
+    /// least stack bound of all collapses. `leafRecords`: records of a leaf.
     Collapser(const BinaryTree& tree, unsigned most, unsigned boxBits, unsigned stackDepth, unsigned leafRecords)
-        : tree_(tree), most_(most), boxBits_(boxBits), stackDepth_(stackDepth), leafRecords_(leafRecords), heights_(heights(tree)), free_(tree.nodes.size()) {
+        : tree_(tree), most_(most), boxBits_(boxBits), stackDepth_(stackDepth), leafRecords_(leafRecords),
+          heights_(heights(tree)), free_(tree.nodes.size()) {
         for (std::size_t i = tree.nodes.size(); i-- > 0;)
             if (!tree.nodes[i].isLeaf())
-                for (unsigned slots = 1; slots < most_; ++slots) free_[i][slots - 1] = findForm(static_cast<std::int32_t>(i), slots, unlimited);
+                for (unsigned slots = 1; slots < most_; ++slots)
+                    free_[i][slots - 1] = findForm(static_cast<std::int32_t>(i), slots, unlimited);
     }
 
     WideTree collapse() {
@@ -50,7 +54,7 @@ public:
             unsigned depth, stack;
         };
         std::vector<Task> tasks{{0, 0, 1, stackDepth_}};
-        std::uint32_t end = 0;  // of the addresses that are taken
+        std::uint32_t end = 0; // of the addresses that are taken
         append(wide, end++);
         while (!tasks.empty()) {
             const Task task = tasks.back();
@@ -58,7 +62,8 @@ public:
             wide.depth = std::max(wide.depth, task.depth);
             wide.cost += static_cast<double>(tree_.nodes[task.binary].box.halfArea()) / rootArea;
             std::vector<std::int32_t> children = childrenOf(task.binary, task.stack);
-            const auto leaves = std::stable_partition(children.begin(), children.end(), [&](std::int32_t child) { return !tree_.nodes[child].isLeaf(); });
+            const auto leaves = std::stable_partition(children.begin(), children.end(),
+                                                      [&](std::int32_t child) { return !tree_.nodes[child].isLeaf(); });
             const unsigned below = task.stack - static_cast<unsigned>(children.size() - 1);
             quantise(wide, task.index, tree_.nodes[task.binary].box, children);
             wide.first[task.index] = end;
@@ -142,7 +147,9 @@ private:
     }
 
     /// The cost without a limit of the stack, which no form within a limit goes below.
-    Cost freeCost(std::int32_t index, unsigned slots) const { return tree_.nodes[index].isLeaf() ? 0 : free_[index][slots - 1].cost; }
+    Cost freeCost(std::int32_t index, unsigned slots) const {
+        return tree_.nodes[index].isLeaf() ? 0 : free_[index][slots - 1].cost;
+    }
 
     /// A wide node in place of a binary node.
     struct WideNode {
@@ -153,7 +160,9 @@ private:
     WideNode asNode(std::int32_t index, unsigned stack) {
         WideNode best;
         for (unsigned children = std::min(most_, stack + 1); children >= 2; --children) {
-            if (stack != unlimited && split(index, children, unlimited).form.cost + tree_.nodes[index].box.halfArea() > best.form.cost) continue;
+            if (stack != unlimited &&
+                split(index, children, unlimited).form.cost + tree_.nodes[index].box.halfArea() > best.form.cost)
+                continue;
             const Form below = split(index, children, stack - (children - 1)).form;
             if (!below.isFeasible()) continue;
             const Form whole{below.cost + tree_.nodes[index].box.halfArea(), below.bound + children - 1};
@@ -180,12 +189,13 @@ private:
 
     void addForm(std::int32_t index, unsigned slots, unsigned stack, std::vector<std::int32_t>& children) {
         if (slots == 1 || tree_.nodes[index].isLeaf()) children.push_back(index);
-        else if (split(index, slots, stack).form < form(index, slots - 1, stack)) addSplit(index, slots, stack, children);
+        else if (split(index, slots, stack).form < form(index, slots - 1, stack))
+            addSplit(index, slots, stack, children);
         else addForm(index, slots - 1, stack, children);
     }
 
-    /// Rounds child boxes outward to multiples of 2^exponent, and the node's low corner down to one. The lattice of a child lies
-    /// in its parent's, so the rounded boxes of children give the same node as their exact boxes.
+    /// Rounds child boxes outward to multiples of 2^exponent, and the node's low corner down to one. The lattice of a
+    /// child lies in its parent's, so the rounded boxes of children give the same node as their exact boxes.
     void quantise(WideTree& wide, std::size_t index, const Box& box, const std::vector<std::int32_t>& children) const {
         const std::int64_t maximum = (std::int64_t{1} << boxBits_) - 1;
         for (int a = 0; a < 3; ++a) {
@@ -209,7 +219,9 @@ private:
     unsigned stackBound(const WideTree& wide) const {
         std::vector<unsigned> bound(wide.nodes(), 0);
         for (std::size_t node = wide.nodes(); node-- > 0;) {
-            const auto child = bound.begin() + (std::lower_bound(wide.nodeAddress.begin(), wide.nodeAddress.end(), wide.first[node]) - wide.nodeAddress.begin());
+            const auto child =
+                bound.begin() + (std::lower_bound(wide.nodeAddress.begin(), wide.nodeAddress.end(), wide.first[node]) -
+                                 wide.nodeAddress.begin());
             const unsigned deepest = wide.nodeCount[node] ? *std::max_element(child, child + wide.nodeCount[node]) : 0;
             bound[node] = wide.nodeCount[node] + wide.leafCount[node] - 1u + deepest;
         }
@@ -219,8 +231,8 @@ private:
     const BinaryTree& tree_;
     const unsigned most_, boxBits_, stackDepth_, leafRecords_;
     const std::vector<unsigned> heights_;
-    std::vector<std::array<Form, 3>> free_;             ///< forms without a limit of the stack, by node and slots
-    std::unordered_map<std::uint64_t, Form> limited_;  ///< forms within a stack, by node, slots and stack
+    std::vector<std::array<Form, 3>> free_; ///< forms without a limit of the stack, by node and slots
+    std::unordered_map<std::uint64_t, Form> limited_; ///< forms within a stack, by node, slots and stack
 };
 
 /// The triangles of a leaf; the second one may be `noTriangle`.
@@ -230,8 +242,8 @@ constexpr std::uint32_t noTriangle = UINT32_MAX;
 /// A wide tree and the order of its triangles.
 struct Bvh {
     WideTree tree;
-    std::vector<std::uint32_t> order;  ///< the triangle index of each packed id
-    unsigned heightLimit = 0;          ///< height limit that the stack required; 0 for none
+    std::vector<std::uint32_t> order; ///< the triangle index of each packed id
+    unsigned heightLimit = 0; ///< height limit that the stack required; 0 for none
 };
 
 /// The triangles in the order of their leaves, of which the nodes have their ranges then.
@@ -249,9 +261,10 @@ inline std::vector<std::uint32_t> orderOfTriangles(BinaryTree& tree, const std::
     return order;
 }
 
-/// Builds the tree over leaves; `boxes` are the triangles'. If the binary tree is higher than the stack is deep, it is built
-/// again with that limit. The caller must check whether the returned tree fits the stack.
-inline Bvh build(const std::vector<Box>& boxes, const std::vector<LeafTriangles>& leaves, unsigned most, unsigned boxBits, unsigned stackDepth, unsigned leafRecords) {
+/// Builds the tree over leaves; `boxes` are the triangles'. If the binary tree is higher than the stack is deep, it is
+/// built again with that limit. The caller must check whether the returned tree fits the stack.
+inline Bvh build(const std::vector<Box>& boxes, const std::vector<LeafTriangles>& leaves, unsigned most,
+                 unsigned boxBits, unsigned stackDepth, unsigned leafRecords) {
     std::vector<Box> boxesOfLeaves(leaves.size());
     for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf)
         for (const std::uint32_t triangle : leaves[leaf])
@@ -266,4 +279,4 @@ inline Bvh build(const std::vector<Box>& boxes, const std::vector<LeafTriangles>
     return {std::move(wide), std::move(order), isTooHigh ? limit : 0};
 }
 
-}  // namespace colonnade::bvh
+} // namespace colonnade::bvh

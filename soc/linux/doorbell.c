@@ -1,5 +1,6 @@
-/* Registers in an emulated machine's memory: a doorbell in their last word, which no register has, tells the device of each
- * access, since the emulator does not. The linker puts this between the examples and their accesses to map 0 of UIO
+/* Registers in an emulated machine's memory: a doorbell in their last word, which no register has, tells the device of
+ * each access, since the emulator does not. The linker puts this between the examples and their accesses to map 0 of
+ * UIO
  * (--wrap, docs/soc.md); everything else of them is as on a board. */
 #define _POSIX_C_SOURCE 200809L
 

@@ -26,7 +26,8 @@ void cycle() {
             colours[3 * pixel] = top->io_pixels_0_bits_colour_r;
             colours[3 * pixel + 1] = top->io_pixels_0_bits_colour_g;
             colours[3 * pixel + 2] = top->io_pixels_0_bits_colour_b;
-            triangles[pixel] = top->io_pixels_0_bits_isObject ? static_cast<std::int32_t>(top->io_pixels_0_bits_hit_triangle) : -1;
+            triangles[pixel] =
+                top->io_pixels_0_bits_isObject ? static_cast<std::int32_t>(top->io_pixels_0_bits_hit_triangle) : -1;
         }
     }
     top->clock = !top->clock; // registers have both edges

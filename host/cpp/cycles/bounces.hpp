@@ -1,4 +1,5 @@
-// shading/BounceQueue.scala, BouncePipeline.scala, and the one bounce unit of SequentialShader.scala: hits on mirrors and glass.
+// shading/BounceQueue.scala, BouncePipeline.scala, and the one bounce unit of SequentialShader.scala: hits on mirrors
+// and glass.
 #pragma once
 #include <vector>
 
@@ -11,7 +12,8 @@ namespace colonnade::cycles {
 class Bounces {
 public:
     explicit Bounces(const Design& design)
-        : hasMirrorPipeline_(!design.isSequentialShader), cycles_(design.bounceCycles), idleFrom_(design.isSequentialShader ? 1 : glassUnits) {}
+        : hasMirrorPipeline_(!design.isSequentialShader), cycles_(design.bounceCycles),
+          idleFrom_(design.isSequentialShader ? 1 : glassUnits) {}
 
     /// A hit comes from the shader, at a cycle that is not before those of other hits.
     void push(Cycle at, int path, const PathStep& surface) { queue_.push(at, {path, &surface}); }
@@ -60,10 +62,12 @@ private:
         return surface.isBehind ? cycles_.glassFromBehind : cycles_.glassFromFront;
     }
 
-    /// BouncePipeline.units; ShadingPipeline.scala: places of its BounceQueue; MirrorPipeline.scala: four intervals of three cycles, and two to its queue's output.
+    /// BouncePipeline.units; ShadingPipeline.scala: places of its BounceQueue; MirrorPipeline.scala: four intervals of
+    /// three cycles, and two to its queue's output.
     static constexpr int glassUnits = 4, queuePlaces = 6;
     static constexpr Cycle mirrorPipelineCycles = 4 * 3 + 2;
-    /// BouncePipeline.scala chooses a result, BounceQueue.scala reads what it has stored of the surface, and BounceScheduler.scala takes it.
+    /// BouncePipeline.scala chooses a result, BounceQueue.scala reads what it has stored of the surface, and
+    /// BounceScheduler.scala takes it.
     static constexpr Cycle answerCycles = 3;
 
     bool hasMirrorPipeline_;

@@ -1,4 +1,5 @@
-// environment/EnvironmentMarches.scala and EnvironmentRays.scala: the marches of a column, and its pipeline of directly seen pixels.
+// environment/EnvironmentMarches.scala and EnvironmentRays.scala: the marches of a column, and its pipeline of directly
+// seen pixels.
 #pragma once
 #include <vector>
 
@@ -8,7 +9,8 @@
 
 namespace colonnade::cycles {
 
-/// The channel for tiles and cells of the maps that some columns share: environment/AttributeArbiter.scala, CellLookup.scala. A cell of a tile of several planes takes two cycles.
+/// The channel for tiles and cells of the maps that some columns share: environment/AttributeArbiter.scala,
+/// CellLookup.scala. A cell of a tile of several planes takes two cycles.
 class CellChannel {
 public:
     /// A request of a cycle, or of two: returns how long it waits for those before it.
@@ -30,13 +32,15 @@ private:
 class Environment {
 public:
     Environment(const Design& design, CellChannel& cells)
-        : squareCycles_(design.columnsPerCopy > 1 ? 11 : 9), fetchCycles_(8), cells_(cells), marches_(static_cast<std::size_t>(design.marches)) {}
+        : squareCycles_(design.columnsPerCopy > 1 ? 11 : 9), fetchCycles_(8), cells_(cells),
+          marches_(static_cast<std::size_t>(design.marches)) {}
 
     /// A request of each kind is accepted.
     bool acceptsDirect() const { return directWaits_ < 0; }
     bool acceptsMarch() const { return marchWaits_ < 0; }
 
-    /// A cycle. `request`: the path whose request comes, or -1; `isStored`: a ray is stored, so that no answer is taken. Returns the path that is answered, or -1.
+    /// A cycle. `request`: the path whose request comes, or -1; `isStored`: a ray is stored, so that no answer is
+    /// taken. Returns the path that is answered, or -1.
     int step(Cycle now, int request, const PathStep* lookup, const FrameWork& work, bool isStored) {
         // Answers of the last stage, in its order
         int answered = -1;
@@ -60,7 +64,8 @@ public:
         // Hits of marches, one at a time
         if (hitPath_ < 0) {
             std::uint32_t finished = 0;
-            for (std::size_t i = 0; i < marches_.size(); ++i) finished |= static_cast<std::uint32_t>(marches_[i].path >= 0 && marches_[i].ends <= now) << i;
+            for (std::size_t i = 0; i < marches_.size(); ++i)
+                finished |= static_cast<std::uint32_t>(marches_[i].path >= 0 && marches_[i].ends <= now) << i;
             const int granted = hits_.grant(finished);
             if (granted >= 0) {
                 hits_.take(granted);
@@ -130,11 +135,14 @@ private:
         int requests = 0, cells = 0;
     };
 
-    /// docs/march.md, cycles; TileProgram.scala, CellProgram.scala, PlaneTest.scala. A row of steps without a plane of the maps ends at the bounding planes.
+    /// docs/march.md, cycles; TileProgram.scala, CellProgram.scala, PlaneTest.scala. A row of steps without a plane of
+    /// the maps ends at the bounding planes.
     Cycle cyclesOf(const MarchWork& march) const {
         const Cycle before = march.isFromCamera ? 66 + 13 * Cycle(march.outside) + (march.outside ? 9 : 0) : 92;
-        const Cycle squares = squareCycles_ * Cycle(march.flatTiles + march.cells) + 3 * Cycle(march.tiles) + 6 * Cycle(march.planes) + 22 * Cycle(march.cellTiles);
-        return before + squares + fetchCycles_ * Cycle(march.fetches) + 4 * Cycle(march.behind) + 11 * Cycle(march.boundingPlanes) + 12 * Cycle(march.approached) + 23;
+        const Cycle squares = squareCycles_ * Cycle(march.flatTiles + march.cells) + 3 * Cycle(march.tiles) +
+                              6 * Cycle(march.planes) + 22 * Cycle(march.cellTiles);
+        return before + squares + fetchCycles_ * Cycle(march.fetches) + 4 * Cycle(march.behind) +
+               11 * Cycle(march.boundingPlanes) + 12 * Cycle(march.approached) + 23;
     }
 
     static constexpr int pipelinePlaces = 15;

@@ -61,7 +61,8 @@ struct TilePosition {
 class TileScheduler {
 public:
     /// `size`: of a tile, pixels; `divides`: tiles are handed out as sixteenths (frame/TileDivider.scala).
-    TileScheduler(PixelKind kind, int levels, unsigned size, bool divides) : kind_(kind), divides_(divides), size_(size), scan_(levels) {}
+    TileScheduler(PixelKind kind, int levels, unsigned size, bool divides)
+        : kind_(kind), divides_(divides), size_(size), scan_(levels) {}
 
     void start(unsigned width, unsigned height) {
         width_ = width, height_ = height;
@@ -85,7 +86,8 @@ public:
             if (kindOf(second_) != kind_) leaves = true;
             else {
                 const unsigned parts = divides_ ? 16 : 1, edge = size_ / 4;
-                const TilePosition square{second_.x * size_ + edge * ((part_ & 1) | (part_ >> 1 & 2)), second_.y * size_ + edge * ((part_ >> 1 & 1) | (part_ >> 2 & 2))};
+                const TilePosition square{second_.x * size_ + edge * ((part_ & 1) | (part_ >> 1 & 2)),
+                                          second_.y * size_ + edge * ((part_ >> 1 & 1) | (part_ >> 2 & 2))};
                 const bool isInside = square.x < width_ && square.y < height_;
                 if (isInside && hasPlace) queue_.push(square);
                 if (!isInside || hasPlace) part_ = part_ + 1 == parts ? 0 : part_ + 1;
@@ -112,20 +114,26 @@ private:
 /// A column with its walkers.
 class Column {
 public:
-    Column(const Design& design, const FrameWork& work, const FrameSettings& settings, CellChannel& cells, unsigned width, unsigned height,
-           const std::vector<PixelKind>& kinds)
-        : design_(design), hasEnvironment_(settings.hasEnvironment), width_(width), height_(height), kinds_(kinds), scan_(log2(design.tileSize)),
-          backgroundScan_(log2(design.tileSize)), environmentScan_(log2(design.tileSize)), paths(design, work, settings, cells) {
+    Column(const Design& design, const FrameWork& work, const FrameSettings& settings, CellChannel& cells,
+           unsigned width, unsigned height, const std::vector<PixelKind>& kinds)
+        : design_(design), hasEnvironment_(settings.hasEnvironment), width_(width), height_(height), kinds_(kinds),
+          scan_(log2(design.tileSize)), backgroundScan_(log2(design.tileSize)), environmentScan_(log2(design.tileSize)),
+          paths(design, work, settings, cells) {
         for (int row = 0; row < design.rows; ++row) units.emplace_back(design, work, row);
-        for (int row = 0; row < design.rows; row += design.triangleRows) groups.emplace_back(design, std::min(design.triangleRows, design.rows - row));
+        for (int row = 0; row < design.rows; row += design.triangleRows)
+            groups.emplace_back(design, std::min(design.triangleRows, design.rows - row));
         for (int bank = 0; bank < design.banks; ++bank) banks.emplace_back(design, bank);
     }
 
     bool takesObjectTile() const { return !scan_.isBusy() || (scan_.isLast() && (!scan_.isInside() || firstIsOpen())); }
-    bool takesBackgroundTile() const { return !backgroundScan_.isBusy() || (backgroundScan_.isLast() && (!backgroundScan_.isInside() || backgroundQueue_ < 2)); }
+    bool takesBackgroundTile() const {
+        return !backgroundScan_.isBusy() ||
+               (backgroundScan_.isLast() && (!backgroundScan_.isInside() || backgroundQueue_ < 2));
+    }
 
     bool takesEnvironmentTile() const {
-        return !environmentScan_.isBusy() || (environmentScan_.isLast() && (!environmentScan_.isInside() || environmentQueue_.count() < 2));
+        return !environmentScan_.isBusy() ||
+               (environmentScan_.isLast() && (!environmentScan_.isInside() || environmentQueue_.count() < 2));
     }
 
     /// The tiles that come in a cycle, or null.
@@ -144,7 +152,8 @@ public:
         const int offered = paths.offeredRay(now);
         if (offered >= 0 && !paths.missesBox()) {
             std::uint32_t free = 0;
-            for (std::size_t row = 0; row < units.size(); ++row) free |= static_cast<std::uint32_t>(units[row].isFree()) << row;
+            for (std::size_t row = 0; row < units.size(); ++row)
+                free |= static_cast<std::uint32_t>(units[row].isFree()) << row;
             target = rayBus_.grant(free & ~(busRow_ >= 0 ? 1u << busRow_ : 0));
             if (target >= 0) {
                 rayBus_.take(target);
@@ -154,7 +163,8 @@ public:
         const bool raySent = offered >= 0 && (paths.missesBox() || target >= 0);
         const int result = result_;
         std::uint32_t results = 0;
-        for (std::size_t row = 0; row < units.size(); ++row) results |= static_cast<std::uint32_t>(units[row].hasResult()) << row;
+        for (std::size_t row = 0; row < units.size(); ++row)
+            results |= static_cast<std::uint32_t>(units[row].hasResult()) << row;
         const int granted = resultBus_.grant(results);
         result_ = -1;
         if (granted >= 0) {
@@ -165,7 +175,8 @@ public:
 
         // Triangle groups, then traversal units
         for (std::size_t g = 0; g < groups.size(); ++g) {
-            const std::size_t first = g * static_cast<std::size_t>(design_.triangleRows), rows = static_cast<std::size_t>(groups[g].rows());
+            const std::size_t first = g * static_cast<std::size_t>(design_.triangleRows),
+                              rows = static_cast<std::size_t>(groups[g].rows());
             Candidate candidate{};
             bool comes = false;
             std::uint32_t waits = 0;
@@ -182,7 +193,8 @@ public:
                 TraversalUnit& unit = units[first + i];
                 TraversalUnit::Arrival arrival;
                 if (busRow_ == static_cast<int>(first + i)) arrival = arriving_;
-                unit.step(now, broadcasts, arrival, end.row == static_cast<int>(i) ? end.context : -1, groups[g].grantedRow() == static_cast<int>(i));
+                unit.step(now, broadcasts, arrival, end.row == static_cast<int>(i) ? end.context : -1,
+                          groups[g].grantedRow() == static_cast<int>(i));
             }
         }
         busRow_ = target;
@@ -197,7 +209,9 @@ public:
         const bool backgroundLeaves = !rejectedLeaves && !pixelLeaves && backgroundQueue_ > 0;
         const bool environmentLeaves = paths.environmentLeaves();
         PathUnit::Position position;
-        if (accepts) position = {static_cast<std::int64_t>(position_.y) * width_ + position_.x, position_.x, position_.y, inObjectTile_};
+        if (accepts)
+            position = {static_cast<std::int64_t>(position_.y) * width_ + position_.x, position_.x, position_.y,
+                        inObjectTile_};
         paths.step(now, broadcasts, position, result, pixelLeaves);
         walk(accepts, rejectedLeaves, backgroundLeaves, environmentLeaves, tiles);
         const bool leaves = isCollected_;
@@ -209,7 +223,8 @@ public:
             const RecordFetch& fetch = units[static_cast<std::size_t>(row)].fetch;
             if (fetch.requests()) requests[static_cast<std::size_t>(design_.bankOf(fetch.requested()))] |= 1u << row;
         }
-        if (paths.requests()) requests[static_cast<std::size_t>(design_.bankOf(paths.requested()))] |= 1u << design_.rows;
+        if (paths.requests())
+            requests[static_cast<std::size_t>(design_.bankOf(paths.requested()))] |= 1u << design_.rows;
         for (std::size_t bank = 0; bank < banks.size(); ++bank) {
             std::uint32_t asking = requests[bank];
             int row = -1;
@@ -235,7 +250,9 @@ public:
     static int log2(int value) { return 31 - __builtin_clz(static_cast<unsigned>(value)); }
 
 private:
-    std::uint32_t addressOf(int row) const { return row < design_.rows ? units[static_cast<std::size_t>(row)].fetch.requested() : paths.requested(); }
+    std::uint32_t addressOf(int row) const {
+        return row < design_.rows ? units[static_cast<std::size_t>(row)].fetch.requested() : paths.requested();
+    }
     PixelKind kindAt(const TilePosition& p) const { return kinds_[static_cast<std::size_t>(p.y) * width_ + p.x]; }
     bool firstIsOpen() const { return !hasFirst_ || secondIsOpen(); }
     bool secondIsOpen() const { return !hasSecond_ || tested_.count() < 2; }
@@ -247,7 +264,10 @@ private:
     }
 
     /// A pixel of a tile of the environment outside its window is rejected.
-    bool rejectsEnvironment() const { return others_.isEmpty() && !environmentQueue_.isEmpty() && kindAt(environmentQueue_.front()) == PixelKind::background; }
+    bool rejectsEnvironment() const {
+        return others_.isEmpty() && !environmentQueue_.isEmpty() &&
+               kindAt(environmentQueue_.front()) == PixelKind::background;
+    }
 
     /// frame/TileWalker.scala, EnvironmentWalker.scala, PixelMixer.scala and BackgroundWalker.scala.
     void walk(bool accepts, bool rejectedLeaves, bool backgroundLeaves, bool environmentLeaves, const Tiles& tiles) {
@@ -257,7 +277,8 @@ private:
         if (accepts) hasPosition_ = false;
         bool isEnvironment = false;
         if (hasEnvironment_ && !environmentQueue_.isEmpty()) {
-            isEnvironment = kindAt(environmentQueue_.front()) != PixelKind::background && environmentInFlight_ != std::max(1, design_.pathContexts / 2);
+            isEnvironment = kindAt(environmentQueue_.front()) != PixelKind::background &&
+                            environmentInFlight_ != std::max(1, design_.pathContexts / 2);
             if (isEnvironment && isOpen) {
                 position_ = environmentQueue_.front();
                 hasPosition_ = true;
@@ -287,9 +308,12 @@ private:
         if (second) hasSecond_ = hasFirst_, second_ = first_;
         if (first) hasFirst_ = scan_.isInside(), first_ = {origin_.x + scan_.x(), origin_.y + scan_.y()};
         if (scan_.isBusy() && (!scan_.isInside() || first)) scan_.step();
-        if (tiles.object) startScan(scan_, origin_, *tiles.object, hasEnvironment_ ? design_.tileSize / 4 : design_.tileSize);
+        if (tiles.object)
+            startScan(scan_, origin_, *tiles.object, hasEnvironment_ ? design_.tileSize / 4 : design_.tileSize);
 
-        if (environmentScan_.isInside() && hadPlace) environmentQueue_.push({environmentOrigin_.x + environmentScan_.x(), environmentOrigin_.y + environmentScan_.y()});
+        if (environmentScan_.isInside() && hadPlace)
+            environmentQueue_.push(
+                {environmentOrigin_.x + environmentScan_.x(), environmentOrigin_.y + environmentScan_.y()});
         if (environmentScan_.isBusy() && (!environmentScan_.isInside() || hadPlace)) environmentScan_.step();
         if (tiles.environment) startScan(environmentScan_, environmentOrigin_, *tiles.environment, design_.tileSize);
 
@@ -328,19 +352,24 @@ public:
 /// A frame.
 class FrameSimulation {
 public:
-    FrameSimulation(const Design& design, const DramDesign& dram, const FrameWork& work, const FrameSettings& settings, unsigned width, unsigned height,
-                    std::vector<PixelKind> kinds, std::vector<PixelKind> tiles)
+    FrameSimulation(const Design& design, const DramDesign& dram, const FrameWork& work, const FrameSettings& settings,
+                    unsigned width, unsigned height, std::vector<PixelKind> kinds, std::vector<PixelKind> tiles)
         : design_(design), kinds_(std::move(kinds)), tiles_(std::move(tiles)), width_(width), height_(height),
           tilesWide_((width + static_cast<unsigned>(design.tileSize) - 1) / static_cast<unsigned>(design.tileSize)),
-          schedulers_{TileScheduler(PixelKind::object, tileLevels(design), static_cast<unsigned>(design.tileSize), settings.hasEnvironment),
-                      TileScheduler(PixelKind::background, tileLevels(design), static_cast<unsigned>(design.tileSize), false),
-                      TileScheduler(PixelKind::environment, tileLevels(design), static_cast<unsigned>(design.tileSize), false)},
+          schedulers_{
+              TileScheduler(PixelKind::object, tileLevels(design), static_cast<unsigned>(design.tileSize),
+                            settings.hasEnvironment),
+              TileScheduler(PixelKind::background, tileLevels(design), static_cast<unsigned>(design.tileSize), false),
+              TileScheduler(PixelKind::environment, tileLevels(design), static_cast<unsigned>(design.tileSize), false)},
           dram_(design, dram) {
         cells_.resize(static_cast<std::size_t>((design.columns + design.columnsPerCopy - 1) / design.columnsPerCopy));
         for (int i = 0; i < design.columns; ++i)
-            columns_.push_back(std::make_unique<Column>(design_, work, settings, cells_[static_cast<std::size_t>(i / design.columnsPerCopy)], width, height, kinds_));
+            columns_.push_back(std::make_unique<Column>(design_, work, settings,
+                                                        cells_[static_cast<std::size_t>(i / design.columnsPerCopy)],
+                                                        width, height, kinds_));
         if (design.hasCache)
-            for (int bank = 0; bank < design.banks; ++bank) shared_.push_back(std::make_unique<SharedBank>(design_, bank));
+            for (int bank = 0; bank < design.banks; ++bank)
+                shared_.push_back(std::make_unique<SharedBank>(design_, bank));
     }
 
     CycleCounters run() {
@@ -354,7 +383,9 @@ public:
             left -= static_cast<std::uint64_t>(pixels);
         }
         CycleCounters counters{{"cycles", now - 1}};
-        const auto add = [&counters](const char* name, std::uint64_t count) { counters[name] += static_cast<std::int64_t>(count); };
+        const auto add = [&counters](const char* name, std::uint64_t count) {
+            counters[name] += static_cast<std::int64_t>(count);
+        };
         for (const auto& column : columns_) {
             add("raysInBox", column->raysInBox);
             add("recordReads", column->recordReads);
@@ -390,7 +421,9 @@ public:
     }
 
 private:
-    static int tileLevels(const Design& design) { return std::max(1, design.coordinateBits - Column::log2(design.tileSize)); }
+    static int tileLevels(const Design& design) {
+        return std::max(1, design.coordinateBits - Column::log2(design.tileSize));
+    }
 
     int step(Cycle now) {
         const auto kindOf = [&](const TilePosition& tile) { return tiles_[tile.y * tilesWide_ + tile.x]; };
@@ -414,13 +447,18 @@ private:
         // What the shared cache announces is known before it moves
         int pixels = 0;
         for (std::size_t i = 0; i < columns_.size(); ++i) {
-            for (std::size_t bank = 0; bank < shared_.size(); ++bank) announced_[bank] = shared_[bank]->announced(static_cast<int>(i));
+            for (std::size_t bank = 0; bank < shared_.size(); ++bank)
+                announced_[bank] = shared_[bank]->announced(static_cast<int>(i));
             announcements_[i] = announced_;
         }
         if (!shared_.empty()) stepMemory(now);
         for (std::size_t i = 0; i < columns_.size(); ++i) {
-            const auto of = [&](std::size_t kind) { return taker[kind] == static_cast<int>(i) ? &tile[kind] : nullptr; };
-            pixels += columns_[i]->step(now, {of(0), of(1), of(2)}, [&](int bank) -> const Announcement& { return announcements_[i][static_cast<std::size_t>(bank)]; });
+            const auto of = [&](std::size_t kind) {
+                return taker[kind] == static_cast<int>(i) ? &tile[kind] : nullptr;
+            };
+            pixels += columns_[i]->step(now, {of(0), of(1), of(2)}, [&](int bank) -> const Announcement& {
+                return announcements_[i][static_cast<std::size_t>(bank)];
+            });
         }
         for (std::size_t kind = 0; kind < kinds; ++kind) schedulers_[kind].step(taker[kind], kindOf);
         return pixels;
@@ -434,14 +472,16 @@ private:
         // An address, through a queue
         if (addressBank_ >= 0) dram_.read(now, addressBank_);
         std::uint32_t reads = 0;
-        for (std::size_t bank = 0; bank < shared_.size(); ++bank) reads |= static_cast<std::uint32_t>(shared_[bank]->reads()) << bank;
+        for (std::size_t bank = 0; bank < shared_.size(); ++bank)
+            reads |= static_cast<std::uint32_t>(shared_[bank]->reads()) << bank;
         addressBank_ = addresses_.grant(reads);
         if (addressBank_ >= 0) {
             addresses_.take(addressBank_);
             shared_[static_cast<std::size_t>(addressBank_)]->takeRead();
         }
         for (std::size_t bank = 0; bank < shared_.size(); ++bank)
-            shared_[bank]->step([&](int column) -> ColumnBank& { return columns_[static_cast<std::size_t>(column)]->banks[bank]; });
+            shared_[bank]->step(
+                [&](int column) -> ColumnBank& { return columns_[static_cast<std::size_t>(column)]->banks[bank]; });
     }
 
     const Design design_;

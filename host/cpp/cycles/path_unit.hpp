@@ -19,15 +19,18 @@ struct FrameSettings {
 class PathUnit {
 public:
     PathUnit(const Design& design, const FrameWork& work, const FrameSettings& settings, CellChannel& cells)
-        : design_(design), work_(work), settings_(settings), paths_(static_cast<std::size_t>(design.pathContexts)), free_(design.isLarge()), ended_(design.isLarge()),
-          next_(design.isLarge()), last_(design.isLarge()), done_(design.isLarge()), camera_(design.isLarge()), others_(design.isLarge()), resumable_(design.isLarge()),
-          generator_(design), setup_(design), slots_(std::min(16, design.pathContexts)), fetch_(design, design.rows, slots_, std::min(2, design.recordBuffers)),
-          bounces_(design), pixelQueue_(design.isLarge() ? 3 : 1), environment_(design, cells) {
+        : design_(design), work_(work), settings_(settings), paths_(static_cast<std::size_t>(design.pathContexts)),
+          free_(design.isLarge()), ended_(design.isLarge()), next_(design.isLarge()), last_(design.isLarge()),
+          done_(design.isLarge()), camera_(design.isLarge()), others_(design.isLarge()), resumable_(design.isLarge()),
+          generator_(design), setup_(design), slots_(std::min(16, design.pathContexts)),
+          fetch_(design, design.rows, slots_, std::min(2, design.recordBuffers)), bounces_(design),
+          pixelQueue_(design.isLarge() ? 3 : 1), environment_(design, cells) {
         idleCount_ = design.pathContexts;
         for (int i = 0; i < design.pathContexts; ++i) idle_.add(i);
     }
 
-    /// The ray that ray set-up offers to the traversal units, or misses the box: the context of its path, or -1; its step.
+    /// The ray that ray set-up offers to the traversal units, or misses the box: the context of its path, or -1; its
+    /// step.
     int offeredRay(Cycle now) const { return setup_.offered(now); }
     std::uint32_t stepOf(int path) const { return at(path).ray; }
 
@@ -60,9 +63,10 @@ public:
         shadowFires_ = hasPlace && hasShadow_;
         bounceFires_ = hasPlace && !hasShadow_ && bounced_.has(now);
         const bool waitsForBounce = bounced_.has(now);
-        generatorBypasses_ = settings_.hasEnvironment && generator_.hasRay() && work_.steps[at(generator_.ray()).step].kind == PathStep::Kind::lookup;
-        rayLeavesGenerator_ =
-            generator_.hasRay() && !(settings_.hasEnvironment && waitsForBounce) && (generatorBypasses_ || (hasPlace && !shadowFires_ && !waitsForBounce));
+        generatorBypasses_ = settings_.hasEnvironment && generator_.hasRay() &&
+                             work_.steps[at(generator_.ray()).step].kind == PathStep::Kind::lookup;
+        rayLeavesGenerator_ = generator_.hasRay() && !(settings_.hasEnvironment && waitsForBounce) &&
+                              (generatorBypasses_ || (hasPlace && !shadowFires_ && !waitsForBounce));
     }
 
     /// A pixel that is accepted: its index, -1 for none; its place; it is of a tile of the object.
@@ -75,7 +79,8 @@ public:
     /// A pixel of a tile of the environment leaves.
     bool environmentLeaves() const { return environmentLeaves_; }
 
-    /// The rest of a cycle. `result`: the path whose trace has ended, or -1; `pixelLeaves`: the pixel that waits is taken.
+    /// The rest of a cycle. `result`: the path whose trace has ended, or -1; `pixelLeaves`: the pixel that waits is
+    /// taken.
     void step(Cycle now, const Broadcasts& broadcasts, const Position& pixel, int result, bool pixelLeaves) {
         const std::int64_t position = pixel.index;
         const int phase = static_cast<int>(now % 3);
@@ -140,7 +145,8 @@ public:
         }
         if (again >= 0) {
             const std::uint32_t leaf = work_.steps[at(slot_[static_cast<std::size_t>(again)].path).step].first;
-            fetch_.begin(again, againKind == 2 ? RecordKind::colours : RecordKind::leaf, againKind == 2 ? leaf + 1 : leaf);
+            fetch_.begin(again, againKind == 2 ? RecordKind::colours : RecordKind::leaf,
+                         againKind == 2 ? leaf + 1 : leaf);
         }
         if (!hits_.isEmpty() && hits_.front().at <= now && usedSlots_ != (1u << slots_) - 1) {
             const int slot = __builtin_ctz(~usedSlots_), path = hits_.front().value;
@@ -245,7 +251,8 @@ public:
     std::uint32_t requested() const { return recordRequests_.front(); }
     void accept() { recordRequests_.pop(); }
 
-    std::uint64_t idleContexts = 0, busyShader = 0, contextsRaySetup = 0, contextsShading = 0, waitRecord = 0, waitUnit = 0, raysEnvironment = 0;
+    std::uint64_t idleContexts = 0, busyShader = 0, contextsRaySetup = 0, contextsShading = 0, waitRecord = 0,
+                  waitUnit = 0, raysEnvironment = 0;
     std::uint64_t busyEnvironment() const { return environment_.busy; }
     std::uint64_t snoopHits() const { return fetch_.snoopHits; }
     std::uint64_t busySetup() const { return setup_.busy; }
@@ -253,8 +260,10 @@ public:
 private:
     struct Path {
         std::uint32_t step = 0, ray = 0, end = 0;
-        /// It has left no surface of the object; it is at a point of the environment, that of its pixel; it has gathered, and goes back there; its Fresnel reflection is resolved.
-        bool isStraight = true, isOfRoom = false, hasGathered = false, goesBack = false, isInFresnel = false, isShadowed = false, inObjectTile = true;
+        /// It has left no surface of the object; it is at a point of the environment, that of its pixel; it has
+        /// gathered, and goes back there; its Fresnel reflection is resolved.
+        bool isStraight = true, isOfRoom = false, hasGathered = false, goesBack = false, isInFresnel = false,
+             isShadowed = false, inObjectTile = true;
     };
     struct Slot {
         int path;
@@ -327,7 +336,8 @@ private:
     void stepEnvironment(Cycle now) {
         // A ray from the camera goes first, if it is accepted
         const bool directIsOpen = settings_.isMapCamera ? environment_.acceptsDirect() : environment_.acceptsMarch();
-        const bool isCamera = cameraNow_ >= 0 && directIsOpen, isOther = !isCamera && othersNow_ >= 0 && environment_.acceptsMarch();
+        const bool isCamera = cameraNow_ >= 0 && directIsOpen,
+                   isOther = !isCamera && othersNow_ >= 0 && environment_.acceptsMarch();
         const int request = isCamera ? cameraNow_ : isOther ? othersNow_ : -1;
         camera_.end(isCamera);
         others_.end(isOther);
@@ -335,7 +345,8 @@ private:
         if (isOther) pending_.remove(othersNow_);
         raysEnvironment += request >= 0;
         const bool stores = rayLeavesGenerator_ || bounceFires_;
-        const int answered = environment_.step(now, request, request >= 0 ? &work_.steps[at(request).step] : nullptr, work_, stores);
+        const int answered =
+            environment_.step(now, request, request >= 0 ? &work_.steps[at(request).step] : nullptr, work_, stores);
         if (answered >= 0) {
             Path& path = at(answered);
             const PathStep& lookup = work_.steps[path.step];
@@ -360,11 +371,13 @@ private:
         }
     }
 
-    /// shading/ColourUnit.scala takes a path; a shadowed pixel of the environment needs ShadowRatios.scala, for one pixel at a time.
+    /// shading/ColourUnit.scala takes a path; a shadowed pixel of the environment needs ShadowRatios.scala, for one
+    /// pixel at a time.
     void takeEnd(Cycle now, int index) {
         const Path& path = at(index);
         const Cycle slots = slotsOf(index);
-        const bool needsRatio = path.isOfRoom && (path.isStraight || path.goesBack) && (path.isShadowed || path.goesBack);
+        const bool needsRatio =
+            path.isOfRoom && (path.isStraight || path.goesBack) && (path.isShadowed || path.goesBack);
         const Cycle starts = std::max(now + 1, needsRatio ? ratioOpens_ : 0);
         colourOpens_ = starts + std::max<Cycle>(slots, 2) - 1;
         if (!needsRatio) return colours_.push(starts + slots + 6, index);
@@ -377,7 +390,9 @@ private:
         const Path& path = at(index);
         const PathStep& step = work_.steps[path.step];
         const bool isRay = step.kind == PathStep::Kind::ray;
-        const bool isLit = isRay ? step.isShadow || path.isOfRoom : step.kind == PathStep::Kind::surface ? step.material == PathStep::Material::diffuse : step.isHit;
+        const bool isLit = isRay                                  ? step.isShadow || path.isOfRoom
+                           : step.kind == PathStep::Kind::surface ? step.material == PathStep::Material::diffuse
+                                                                  : step.isHit;
         return 3 * (isLit ? lightsOn() : 1) + (hasNext(path) ? 3 : 0);
     }
 
@@ -409,7 +424,8 @@ private:
         }
     }
 
-    /// shading/SequentialShader.scala: the geometry of a hit, then root and quotient of each light that the surface faces.
+    /// shading/SequentialShader.scala: the geometry of a hit, then root and quotient of each light that the surface
+    /// faces.
     void enterSequentialShader(Cycle now) {
         const bool takesPoint = !takesFace_ && isOffered_ && now >= shaderOpens_;
         if (settings_.hasEnvironment) choosePoint(takesPoint);
@@ -482,9 +498,11 @@ private:
     std::vector<Path> paths_;
     Set idle_, resolve_, shadowTest_, ending_, complete_, fromCamera_, pending_, resumes_, points_;
     Choice free_, ended_, next_, last_, done_, camera_, others_, resumable_;
-    int freeNow_ = -1, endedNow_ = -1, nextNow_ = -1, lastNow_ = -1, doneNow_ = -1, offers_ = -1, cameraNow_ = -1, othersNow_ = -1, resumeNow_ = -1;
+    int freeNow_ = -1, endedNow_ = -1, nextNow_ = -1, lastNow_ = -1, doneNow_ = -1, offers_ = -1, cameraNow_ = -1,
+        othersNow_ = -1, resumeNow_ = -1;
     int idleCount_, inSetup_ = 0, inShader_ = 0;
-    bool missesBox_ = false, raySent_ = false, rayLeavesGenerator_ = false, shadowFires_ = false, bounceFires_ = false, generatorBypasses_ = false, isOffered_ = false;
+    bool missesBox_ = false, raySent_ = false, rayLeavesGenerator_ = false, shadowFires_ = false, bounceFires_ = false,
+         generatorBypasses_ = false, isOffered_ = false;
     int chosenPoint_ = -1, chosenBefore_ = -1;
     Cycle resumeOpens_ = 0;
     RayGenerator generator_;

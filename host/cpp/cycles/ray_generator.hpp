@@ -8,7 +8,8 @@ namespace colonnade::cycles {
 /// ray/RayGenerator.scala: how many cycles a pixel takes behind the one before it.
 class RayGenerator {
 public:
-    RayGenerator(const Design& design) : topBit_(design.coordinateBits), tileSize_(static_cast<unsigned>(design.tileSize)) {}
+    RayGenerator(const Design& design)
+        : topBit_(design.coordinateBits), tileSize_(static_cast<unsigned>(design.tileSize)) {}
 
     bool isReady(bool rayLeaves) const { return !inFront_ || moves(rayLeaves); }
     bool hasRay() const { return inBack_; }
@@ -39,7 +40,8 @@ public:
 
     static int morton(unsigned x, unsigned y) {
         int code = 0;
-        for (int bit = 0; bit < 8; ++bit) code |= static_cast<int>((x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1));
+        for (int bit = 0; bit < 8; ++bit)
+            code |= static_cast<int>((x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1));
         return code;
     }
 

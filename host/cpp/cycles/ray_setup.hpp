@@ -8,7 +8,8 @@
 
 namespace colonnade::cycles {
 
-/// ray/RaySetupPipeline.scala: a ray a cycle, all stages in step; or SequentialRaySetup.scala: up to three rays, in a normaliser, dividers and the entry.
+/// ray/RaySetupPipeline.scala: a ray a cycle, all stages in step; or SequentialRaySetup.scala: up to three rays, in a
+/// normaliser, dividers and the entry.
 class RaySetup {
 public:
     RaySetup(const Design& design) : design_(design), stages_(static_cast<std::size_t>(design.setupStages), -1) {}
@@ -51,14 +52,17 @@ private:
     bool isSettled(Cycle now) const { return normaliser_.path >= 0 && now >= normaliser_.settles; }
     bool entryIsOpen(bool leaves) const { return entry_.path < 0 || leaves; }
     bool isLeft(Cycle now, bool leaves) const {
-        return isSettled(now) && (!normaliser_.hasMantissas || !divides() || divisionTaken_) && (!normaliser_.hasRay || entryIsOpen(leaves));
+        return isSettled(now) && (!normaliser_.hasMantissas || !divides() || divisionTaken_) &&
+               (!normaliser_.hasRay || entryIsOpen(leaves));
     }
 
     void stepSequential(Cycle now, bool leaves, int entering, const PathStep* ray) {
         busy += entry_.path >= 0;
-        const bool settled = isSettled(now), left = isLeft(now, leaves), loads = settled && normaliser_.hasRay && entryIsOpen(leaves),
+        const bool settled = isSettled(now), left = isLeft(now, leaves),
+                   loads = settled && normaliser_.hasRay && entryIsOpen(leaves),
                    starts = settled && normaliser_.hasMantissas && (!divides() || divisionTaken_);
-        const bool isAnswered = entry_.path >= 0 && !entry_.hasQuotients && now >= entry_.begins + 3 && divides() && now >= divisionEnds_;
+        const bool isAnswered =
+            entry_.path >= 0 && !entry_.hasQuotients && now >= entry_.begins + 3 && divides() && now >= divisionEnds_;
         if (isAnswered) {
             // Behind the quotients, all steps but those before
             entry_.hasQuotients = true;

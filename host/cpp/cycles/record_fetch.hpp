@@ -24,7 +24,8 @@ public:
         RecordKind kind = RecordKind::node;
     };
 
-    RecordFetch(const Design& design, int row, int contexts, int buffers) : snooping_(design.snooping), row_(row), contexts_(contexts), buffers_(buffers) {
+    RecordFetch(const Design& design, int row, int contexts, int buffers)
+        : snooping_(design.snooping), row_(row), contexts_(contexts), buffers_(buffers) {
         all_ = static_cast<std::uint32_t>((1 << buffers) - 1);
     }
 
@@ -42,7 +43,8 @@ public:
         for (std::uint32_t rest = snooping_ ? new_ & pending_ : 0; rest; rest &= rest - 1) {
             const auto context = static_cast<std::size_t>(__builtin_ctz(rest));
             for (int k = 0; k < buffers_; ++k) {
-                if (!((full_ | reserved_) >> k & 1) || bufferAddress_[static_cast<std::size_t>(k)] != address_[context]) continue;
+                if (!((full_ | reserved_) >> k & 1) || bufferAddress_[static_cast<std::size_t>(k)] != address_[context])
+                    continue;
                 present |= 1u << context;
                 if (full_ >> k & 1) {
                     used |= 1u << k;
@@ -52,7 +54,8 @@ public:
             }
         }
         new_ = 0;
-        for (std::uint32_t rest = hasRecord_; rest; rest &= rest - 1) used |= 1u << buffer_[static_cast<std::size_t>(__builtin_ctz(rest))];
+        for (std::uint32_t rest = hasRecord_; rest; rest &= rest - 1)
+            used |= 1u << buffer_[static_cast<std::size_t>(__builtin_ctz(rest))];
         std::uint32_t available = all_ & ~reserved_ & ~(full_ & used);
 
         // Fill
@@ -61,18 +64,21 @@ public:
         std::array<std::uint32_t, 8> filledAddress;
         std::array<std::uint8_t, 16> source;
         for (std::uint32_t rest = hits; rest; rest &= rest - 1)
-            source[static_cast<std::size_t>(__builtin_ctz(rest))] = hitBuffer[static_cast<std::size_t>(__builtin_ctz(rest))];
+            source[static_cast<std::size_t>(__builtin_ctz(rest))] =
+                hitBuffer[static_cast<std::size_t>(__builtin_ctz(rest))];
         std::uint32_t emptied = 0, awaiters = 0, retriers = 0;
         for (int bank = 0; bank < banks; ++bank) {
             const Broadcast& broadcast = broadcasts[static_cast<std::size_t>(bank)];
             if (!broadcast.isValid) continue;
             std::uint32_t waiters = 0;
             for (std::uint32_t rest = pending_; rest; rest &= rest - 1)
-                if (address_[static_cast<std::size_t>(__builtin_ctz(rest))] == broadcast.address) waiters |= rest & -rest;
+                if (address_[static_cast<std::size_t>(__builtin_ctz(rest))] == broadcast.address)
+                    waiters |= rest & -rest;
             comes |= waiters;
             std::uint32_t awaiting = 0;
             for (std::uint32_t rest = reserved_; rest; rest &= rest - 1)
-                if (bufferAddress_[static_cast<std::size_t>(__builtin_ctz(rest))] == broadcast.address) awaiting |= rest & -rest;
+                if (bufferAddress_[static_cast<std::size_t>(__builtin_ctz(rest))] == broadcast.address)
+                    awaiting |= rest & -rest;
             if (broadcast.isLater) {
                 const bool isPinned = (awaiting & pinned_) != 0;
                 emptied |= awaiting & ~pinned_;
@@ -94,7 +100,8 @@ public:
             }
             if (slot >= 0) {
                 const std::uint32_t taken = (snooping_ ? waiters : waiters & issued_) & ~found;
-                for (std::uint32_t rest = taken; rest; rest &= rest - 1) source[static_cast<std::size_t>(__builtin_ctz(rest))] = static_cast<std::uint8_t>(slot);
+                for (std::uint32_t rest = taken; rest; rest &= rest - 1)
+                    source[static_cast<std::size_t>(__builtin_ctz(rest))] = static_cast<std::uint8_t>(slot);
                 found |= taken;
             }
             retriers |= waiters & ~found;
@@ -122,7 +129,8 @@ public:
         full_ |= filled;
         reserved_ &= ~filled & ~emptied;
         for (std::uint32_t rest = filled; rest; rest &= rest - 1)
-            bufferAddress_[static_cast<std::size_t>(__builtin_ctz(rest))] = filledAddress[static_cast<std::size_t>(__builtin_ctz(rest))];
+            bufferAddress_[static_cast<std::size_t>(__builtin_ctz(rest))] =
+                filledAddress[static_cast<std::size_t>(__builtin_ctz(rest))];
         for (std::uint32_t rest = found; rest; rest &= rest - 1) {
             const auto context = static_cast<std::size_t>(__builtin_ctz(rest));
             buffer_[context] = source[context];

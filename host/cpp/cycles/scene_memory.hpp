@@ -11,7 +11,8 @@ namespace colonnade::cycles {
 class TagStore {
 public:
     TagStore(int sets, int ways)
-        : sets_(static_cast<std::uint32_t>(sets)), ways_(ways), lines_(static_cast<std::size_t>(sets * ways), none), trees_(static_cast<std::size_t>(sets)) {}
+        : sets_(static_cast<std::uint32_t>(sets)), ways_(ways), lines_(static_cast<std::size_t>(sets * ways), none),
+          trees_(static_cast<std::size_t>(sets)) {}
 
     /// The way that holds a line, or -1.
     int find(std::uint32_t line) const {
@@ -52,7 +53,9 @@ public:
 private:
     static constexpr std::uint32_t none = ~std::uint32_t(0);
 
-    std::size_t at(std::uint32_t line, int way) const { return (line & (sets_ - 1)) * static_cast<std::size_t>(ways_) + static_cast<std::size_t>(way); }
+    std::size_t at(std::uint32_t line, int way) const {
+        return (line & (sets_ - 1)) * static_cast<std::size_t>(ways_) + static_cast<std::size_t>(way);
+    }
 
     std::uint32_t sets_;
     int ways_;
@@ -70,10 +73,12 @@ class ColumnBank {
 public:
     ColumnBank(const Design& design, int bank)
         : design_(design), bank_(bank), hasCache_(design.hasCache),
-          tags_(hasCache_ ? std::max(1, design.cache.lines / design.banks / design.cache.ways) : 1, hasCache_ ? design.cache.ways : 1),
+          tags_(hasCache_ ? std::max(1, design.cache.lines / design.banks / design.cache.ways) : 1,
+                hasCache_ ? design.cache.ways : 1),
           awaited_(hasCache_ ? static_cast<std::size_t>(design.cache.misses / design.banks) : 0),
           maxInFlight_(hasCache_ ? 3u + design.extraSlices : static_cast<unsigned>(design.readLatency + 1)),
-          readCycles_(hasCache_ ? 2 + design.extraSlices : design.readLatency), free_(static_cast<int>(awaited_.size())) {}
+          readCycles_(hasCache_ ? 2 + design.extraSlices : design.readLatency),
+          free_(static_cast<int>(awaited_.size())) {}
 
     /// The broadcast of this cycle.
     const Broadcast& broadcast() const { return broadcast_; }
@@ -86,9 +91,13 @@ public:
         return false;
     }
 
-    bool isReady() const { return inFlight_.count() < maxInFlight_ && (!hasCache_ || (blocked_ == 0 && free_ > static_cast<int>(accepted_))); }
+    bool isReady() const {
+        return inFlight_.count() < maxInFlight_ &&
+               (!hasCache_ || (blocked_ == 0 && free_ > static_cast<int>(accepted_)));
+    }
 
-    /// The rest of a cycle, after `requests` by row, of those that do not come, and the line that is announced. `row`: that is accepted, or -1; `address`: its record.
+    /// The rest of a cycle, after `requests` by row, of those that do not come, and the line that is announced. `row`:
+    /// that is accepted, or -1; `address`: its record.
     void step(Cycle now, int row, std::uint32_t address, const Announcement& announced) {
         broadcast_.isValid = false;
         if (!inFlight_.isEmpty() && inFlight_.front().answers <= now) {
@@ -204,19 +213,23 @@ private:
     Ring<Fill, 4> fills_;
 };
 
-/// DRAM behind the device's read port, as the simulator's harness models it: a constant latency, and a beat every `interval` cycles in the order of the reads.
+/// DRAM behind the device's read port, as the simulator's harness models it: a constant latency, and a beat every
+/// `interval` cycles in the order of the reads.
 class Dram {
 public:
     Dram(const Design& design, const DramDesign& dram)
         : latency_(dram.latency), interval_(dram.interval),
-          beats_(design.hasCache ? (lineRecords * static_cast<unsigned>(design.recordBytes) + static_cast<unsigned>(design.cache.busBytes) - 1) /
+          beats_(design.hasCache ? (lineRecords * static_cast<unsigned>(design.recordBytes) +
+                                    static_cast<unsigned>(design.cache.busBytes) - 1) /
                                        static_cast<unsigned>(design.cache.busBytes)
                                  : 1) {}
 
     void read(Cycle now, int bank) { reads_.push_back({now + 1 + latency_, bank, 0}); }
 
     /// The bank whose beat is offered in this cycle, or -1.
-    int offers(Cycle now) const { return !reads_.empty() && reads_.front().due <= now && next_ <= now ? reads_.front().bank : -1; }
+    int offers(Cycle now) const {
+        return !reads_.empty() && reads_.front().due <= now && next_ <= now ? reads_.front().bank : -1;
+    }
 
     /// The beat is taken; returns whether it was the last one of its line.
     bool take(Cycle now) {
@@ -245,11 +258,14 @@ public:
 
     SharedBank(const Design& design, int bank)
         : design_(design), bank_(bank), buses_((design.columns + columnsPerBus - 1) / columnsPerBus),
-          tags_(std::max(1, design.cache.sharedLines / design.banks / design.cache.sharedWays), design.cache.sharedWays),
+          tags_(std::max(1, design.cache.sharedLines / design.banks / design.cache.sharedWays),
+                design.cache.sharedWays),
           awaited_(static_cast<std::size_t>(design.cache.sharedMisses / design.banks)) {}
 
     /// What the bus of a column announces in this cycle.
-    const Announcement& announced(int column) const { return announced_[static_cast<std::size_t>(column / columnsPerBus)]; }
+    const Announcement& announced(int column) const {
+        return announced_[static_cast<std::size_t>(column / columnsPerBus)];
+    }
 
     /// The bank asks for a line of DRAM.
     bool reads() const { return awaited_[sender_].isUsed && !awaited_[sender_].isSent; }
@@ -270,9 +286,11 @@ public:
 
         // Nothing to do
         std::uint64_t requesters = 0;
-        for (int column = 0; column < design_.columns; ++column) requesters |= static_cast<std::uint64_t>(columns(column).requestsLine()) << (column & 63);
+        for (int column = 0; column < design_.columns; ++column)
+            requesters |= static_cast<std::uint64_t>(columns(column).requestsLine()) << (column & 63);
         const bool hasData = hasLine_;
-        if (requesters == 0 && !isWaiting_ && !buddyIsValid_ && !hasData && !isFilling_ && !isGathered_ && !gathers_ && busy_ == 0) {
+        if (requesters == 0 && !isWaiting_ && !buddyIsValid_ && !hasData && !isFilling_ && !isGathered_ && !gathers_ &&
+            busy_ == 0) {
             isFresh_ = true;
             return;
         }
@@ -300,7 +318,8 @@ public:
             std::uint32_t eligible = 0;
             for (int column = 0; column < design_.columns; ++column) {
                 const std::uint64_t bus = std::uint64_t(1) << (column / columnsPerBus);
-                const bool willBeFree = !(comes && (filled.buses & bus)) && ((busy_ & bus) != 0 || !(isWaiting_ && (asked_ & bus)));
+                const bool willBeFree =
+                    !(comes && (filled.buses & bus)) && ((busy_ & bus) != 0 || !(isWaiting_ && (asked_ & bus)));
                 eligible |= static_cast<std::uint32_t>((requesters >> column & 1) && willBeFree) << column;
             }
             granted = arbiter_.grant(eligible);
@@ -312,11 +331,13 @@ public:
         if (fills || delivers) {
             std::uint64_t others = 0;
             for (int column = 0; column < design_.columns; ++column)
-                if ((requesters >> column & 1) && columns(column).requestedLine() != announced) others |= std::uint64_t(1) << (column / columnsPerBus);
+                if ((requesters >> column & 1) && columns(column).requestedLine() != announced)
+                    others |= std::uint64_t(1) << (column / columnsPerBus);
             const std::uint64_t targets = fills ? filled.buses : asked_;
             if (targets) starts = targets | (usable & ~others);
         }
-        for (std::uint64_t rest = starts; rest; rest &= rest - 1) announced_[static_cast<std::size_t>(__builtin_ctzll(rest))] = {announced, true};
+        for (std::uint64_t rest = starts; rest; rest &= rest - 1)
+            announced_[static_cast<std::size_t>(__builtin_ctzll(rest))] = {announced, true};
 
         // Registers
         if (delivers) tags_.use(line_, way);
@@ -384,7 +405,8 @@ private:
     std::array<Announcement, maxBuses> announced_{};
     std::uint64_t busy_ = 0, asked_ = 0;
     std::uint32_t line_ = 0, buddy_ = 0;
-    bool isWaiting_ = false, isBuddy_ = false, buddyIsValid_ = false, isFilling_ = false, isFresh_ = true, hasLine_ = false, isGathered_ = false, gathers_ = false;
+    bool isWaiting_ = false, isBuddy_ = false, buddyIsValid_ = false, isFilling_ = false, isFresh_ = true,
+         hasLine_ = false, isGathered_ = false, gathers_ = false;
 };
 
 } // namespace colonnade::cycles

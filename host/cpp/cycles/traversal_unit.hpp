@@ -1,4 +1,5 @@
-// unit/TraversalUnit.scala: rays in contexts, box unit and stack, with the records that they visit as the model found them.
+// unit/TraversalUnit.scala: rays in contexts, box unit and stack, with the records that they visit as the model found
+// them.
 #pragma once
 #include "record_fetch.hpp"
 #include "triangles.hpp"
@@ -16,7 +17,9 @@ public:
     bool isIdle() const { return used_ == 0 && fetch.isIdle(); }
 
     /// The record that comes to the triangle units in this cycle, if any.
-    const Candidate* candidate() const { return grant_.context >= 0 && grant_.kind == RecordKind::leaf ? &candidate_ : nullptr; }
+    const Candidate* candidate() const {
+        return grant_.context >= 0 && grant_.kind == RecordKind::leaf ? &candidate_ : nullptr;
+    }
 
     /// A ray comes from the bus: the context of its path, and its step.
     struct Arrival {
@@ -24,7 +27,8 @@ public:
         std::uint32_t step = 0;
     };
 
-    /// A cycle. `ray`: that arrives, if any; `tested`: the context whose leaf has its last result, or -1; `mayGrantLeaf`: the group lets this row grant.
+    /// A cycle. `ray`: that arrives, if any; `tested`: the context whose leaf has its last result, or -1;
+    /// `mayGrantLeaf`: the group lets this row grant.
     void step(Cycle now, const Broadcasts& broadcasts, const Arrival& ray, int tested, bool mayGrantLeaf) {
         if (used_ == 0 && ray.path < 0 && fetch.isIdle()) {
             isTaken_ = false;
@@ -96,7 +100,8 @@ public:
         if (tested >= 0) {
             const auto context = static_cast<std::size_t>(tested);
             --inTriangles_;
-            if (isShadow_ >> tested & 1 && next_[context] + 1 == last_[context] && work_.steps[steps_[context]].isHit) occluded_ = tested;
+            if (isShadow_ >> tested & 1 && next_[context] + 1 == last_[context] && work_.steps[steps_[context]].isHit)
+                occluded_ = tested;
             else {
                 ++inBox_;
                 resumes_.push(static_cast<std::int8_t>(tested));
@@ -170,7 +175,8 @@ private:
     Candidate candidate_{};
     Ring<Tested, 16> boxes_;
     Ring<std::int8_t, 16> resumes_;
-    int inBox_ = 0, inTriangles_ = 0, beatsLeft_ = 0, secondLeft_ = 0, operation_ = -1, pushesDone_ = 0, resultContext_ = -1, occluded_ = -1, queued_ = -1;
+    int inBox_ = 0, inTriangles_ = 0, beatsLeft_ = 0, secondLeft_ = 0, operation_ = -1, pushesDone_ = 0,
+        resultContext_ = -1, occluded_ = -1, queued_ = -1;
     bool endsRay_ = false, resumedLast_ = false, hasQueued_ = false, isTaken_ = false;
 };
 

@@ -22,7 +22,8 @@ struct RecordEnd {
 /// One triangle unit, slot by slot.
 class TriangleUnit {
 public:
-    explicit TriangleUnit(const Design& design) : divisionCycles_(design.divisionSteps + 1), waitsForIssue_(design.extraSlices) {}
+    explicit TriangleUnit(const Design& design)
+        : divisionCycles_(design.divisionSteps + 1), waitsForIssue_(design.extraSlices) {}
 
     bool isOpen() const { return isOpen_; }
     bool isBusy() const { return step_ != Step::idle; }
@@ -35,7 +36,8 @@ public:
     };
     const Pending& offered() const { return pending_.front(); }
 
-    /// A cycle. `isTaken`: the result that is offered leaves; `candidate` comes, if any. Returns whether it takes a candidate in the next cycle.
+    /// A cycle. `isTaken`: the result that is offered leaves; `candidate` comes, if any. Returns whether it takes a
+    /// candidate in the next cycle.
     bool step(Cycle now, bool isTaken, const Candidate* candidate) {
         // Distances
         if (hit_ != Hit::none || isDividing_ || hasNumerator_ || hasWeights_) {
@@ -124,7 +126,8 @@ private:
     bool waitsForIssue_;
     Step step_ = Step::idle;
     Hit hit_ = Hit::none;
-    bool isOpen_ = false, hasRecord_ = false, isLoaded_ = false, hasWeights_ = false, hasNumerator_ = false, isDividing_ = false;
+    bool isOpen_ = false, hasRecord_ = false, isLoaded_ = false, hasWeights_ = false, hasNumerator_ = false,
+         isDividing_ = false;
     Cycle weightsEnd_ = 0, numeratorEnd_ = 0, divisionEnd_ = 0;
     std::int64_t slots_ = 0; // moves of the pipeline
     Candidate current_{};
@@ -139,7 +142,8 @@ public:
         for (int i = 0; i < design.triangleLanes; ++i) units_.emplace_back(design);
     }
 
-    /// A cycle. `candidate` comes in it, or null; `waits`: by row, whether a record waits. Returns the record whose last result its row takes.
+    /// A cycle. `candidate` comes in it, or null; `waits`: by row, whether a record waits. Returns the record whose
+    /// last result its row takes.
     RecordEnd step(Cycle now, const Candidate* candidate, std::uint32_t waits) {
         // Results: one is taken, and a group passes it on in the next cycle
         RecordEnd end;

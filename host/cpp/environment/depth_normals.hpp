@@ -1,9 +1,9 @@
 /// Normals of a depth map.
 ///
-/// A plane is linear in inverse depth: w = m · (x, y, 1) at the view ray (x, y, 1), and its normal is -m / |m|. Planes are
-/// fitted twice: in windows around each pixel, as large as the noise of the depth map asks for, of which the flattest of nine
-/// counts, so that a window does not reach across an edge; and to the whole map, where many windows agree, the largest first.
-/// A pixel takes the normal of the large plane that it lies on, else its window's.
+/// A plane is linear in inverse depth: w = m · (x, y, 1) at the view ray (x, y, 1), and its normal is -m / |m|. Planes
+/// are fitted twice: in windows around each pixel, as large as the noise of the depth map asks for, of which the
+/// flattest of nine counts, so that a window does not reach across an edge; and to the whole map, where many windows
+/// agree, the largest first. A pixel takes the normal of the large plane that it lies on, else its window's.
 #pragma once
 
 #include <algorithm>
@@ -18,22 +18,24 @@ namespace colonnade::environment {
 using Vector = std::array<double, 3>;
 
 struct Lens {
-    double fx, fy, cx, cy;  ///< pixels
+    double fx, fy, cx, cy; ///< pixels
 };
 
 struct DepthNormals {
-    std::vector<Vector> normals;  ///< unit, view space, facing the camera
-    int planes;                   ///< large ones
-    double onPlanes;              ///< share of the pixels that lie on one
+    std::vector<Vector> normals; ///< unit, view space, facing the camera
+    int planes; ///< large ones
+    double onPlanes; ///< share of the pixels that lie on one
 };
 
 /// Radius of the windows that measure the noise, and the least and largest radius of windows that give normals, pixels.
 constexpr int noiseRadius = 14, minRadius = 2, maxRadius = 11;
-/// Share of the windows that is flat; their largest residual is the noise. A residual of rounding alone counts as `leastNoise`.
+/// Share of the windows that is flat; their largest residual is the noise. A residual of rounding alone counts as
+/// `leastNoise`.
 constexpr double flatShare = 0.3, leastNoise = 1e-4;
 /// Slope error of a window that is accepted, radians, and distance over which a sensor's noise is correlated, pixels.
 constexpr double slopeError = 0.06, correlation = 2.5;
-/// Pixels that vote for large planes, about, a quarter of which are tried as their centres; votes of the smallest plane.
+/// Pixels that vote for large planes, about, a quarter of which are tried as their centres; votes of the smallest
+/// plane.
 constexpr double voters = 4800;
 constexpr int planeLimit = 128, leastVotes = 20;
 /// A pixel lies on a plane if its depth differs by this many times the noise, or by this share of the depth, and its
@@ -92,10 +94,12 @@ class DepthMap {
 public:
     /// `depth`: metres along z, filled; `holes`: pixels whose depth was filled from a neighbour.
     DepthMap(const double* depth, const std::uint8_t* holes, const Lens& lens, int width, int height)
-        : depth_(depth), holes_(holes), lens_(lens), width_(width), height_(height), size_(static_cast<std::size_t>(width) * height), rays_(size_) {
+        : depth_(depth), holes_(holes), lens_(lens), width_(width), height_(height),
+          size_(static_cast<std::size_t>(width) * height), rays_(size_) {
         for (std::size_t i = 0; i < size_; ++i) {
             const std::size_t column = i % width, row = i / width;
-            rays_[i] = {(static_cast<double>(column) + 0.5 - lens.cx) / lens.fx, (static_cast<double>(row) + 0.5 - lens.cy) / lens.fy, 1.0};
+            rays_[i] = {(static_cast<double>(column) + 0.5 - lens.cx) / lens.fx,
+                        (static_cast<double>(row) + 0.5 - lens.cy) / lens.fy, 1.0};
         }
     }
 
@@ -107,7 +111,8 @@ public:
             if (windows.holes[i] == 0) residuals.push_back(std::sqrt(windows.residual[i]) / windows.value[i]);
         });
         if (residuals.empty()) return leastNoise;
-        const auto flat = residuals.begin() + static_cast<std::ptrdiff_t>(flatShare * static_cast<double>(residuals.size() - 1));
+        const auto flat =
+            residuals.begin() + static_cast<std::ptrdiff_t>(flatShare * static_cast<double>(residuals.size() - 1));
         std::nth_element(residuals.begin(), flat, residuals.end());
         return std::max(*flat, leastNoise);
     }
@@ -147,8 +152,8 @@ public:
 private:
     using Pixels = std::vector<std::uint32_t>;
 
-    /// Planes fitted to inverse depth in the square window around each pixel, where it lies in the map: value at the centre,
-    /// slopes for a pixel, mean squared residual, share of holes.
+    /// Planes fitted to inverse depth in the square window around each pixel, where it lies in the map: value at the
+    /// centre, slopes for a pixel, mean squared residual, share of holes.
     struct Windows {
         int radius;
         std::vector<double> value, across, down, residual, holes;
@@ -171,7 +176,9 @@ private:
             for (int line = 0; line < lines; ++line) {
                 double* value = &values[static_cast<std::size_t>(line) * lineStep];
                 for (int i = 0; i < size; ++i) sums[i + 1] = sums[i] + value[static_cast<std::size_t>(i) * step];
-                for (int i = 0; i < size; ++i) value[static_cast<std::size_t>(i) * step] = sums[std::min(size, i + radius + 1)] - sums[std::max(0, i - radius)];
+                for (int i = 0; i < size; ++i)
+                    value[static_cast<std::size_t>(i) * step] =
+                        sums[std::min(size, i + radius + 1)] - sums[std::max(0, i - radius)];
             }
         };
         along(width_, height_, 1, width_);
@@ -200,11 +207,13 @@ private:
                        sumsOf([&](double, std::size_t i) { return holes_[i] ? 1.0 : 0.0; })};
         eachCentre(radius, [&](std::size_t i) {
             const double total = result.value[i];
-            double &value = result.value[i], &across = result.across[i], &down = result.down[i], &residual = result.residual[i];
+            double &value = result.value[i], &across = result.across[i], &down = result.down[i],
+                   &residual = result.residual[i];
             value = total / count;
             across = radius ? (across - u(i) * total) / spread : 0;
             down = radius ? (down - v(i) * total) / spread : 0;
-            residual = std::max(0.0, residual / count - value * value - (across * across + down * down) * spread / count);
+            residual =
+                std::max(0.0, residual / count - value * value - (across * across + down * down) * spread / count);
             result.holes[i] /= count;
         });
         return result;
@@ -222,9 +231,11 @@ private:
             for (const int dv : {0, -radius, radius})
                 for (const int du : {0, -radius, radius}) {
                     const int row = std::clamp(y + dv, radius, height_ - 1 - radius);
-                    const std::size_t other = static_cast<std::size_t>(row) * width_ + std::clamp(x + du, radius, width_ - 1 - radius);
+                    const std::size_t other =
+                        static_cast<std::size_t>(row) * width_ + std::clamp(x + du, radius, width_ - 1 - radius);
                     // A window around the pixel is preferred: it has the same noise and no preferred side
-                    const double cost = windows.residual[other] * (du == 0 && dv == 0 ? 1.0 : 1.5) + windows.holes[other];
+                    const double cost =
+                        windows.residual[other] * (du == 0 && dv == 0 ? 1.0 : 1.5) + windows.holes[other];
                     if (cost < least) {
                         least = cost;
                         centre = other;
@@ -244,7 +255,8 @@ private:
             Pixels pixels;
             for (int y = start; y < height_; y += stride)
                 for (int x = start; x < width_; x += stride)
-                    if (const std::size_t i = static_cast<std::size_t>(y) * width_ + x; !isUnknown[i]) pixels.push_back(static_cast<std::uint32_t>(i));
+                    if (const std::size_t i = static_cast<std::size_t>(y) * width_ + x; !isUnknown[i])
+                        pixels.push_back(static_cast<std::uint32_t>(i));
             return pixels;
         };
         const Pixels trials = grid(step, 2 * step);
@@ -260,7 +272,9 @@ private:
         for (std::size_t i = 0; i < trials.size(); ++i) votes[i] = supporters(local_[trials[i]]);
         std::vector<bool> isTaken(size_);
         while (static_cast<int>(planes.size()) < maxPlanes && !votes.empty()) {
-            const auto largest = std::max_element(votes.begin(), votes.end(), [](const auto& one, const auto& other) { return one.size() < other.size(); });
+            const auto largest = std::max_element(votes.begin(), votes.end(), [](const auto& one, const auto& other) {
+                return one.size() < other.size();
+            });
             Pixels found = *largest;
             if (found.size() < leastVotes) break;
             for (const std::uint32_t pixel : found) isTaken[pixel] = true;
@@ -272,7 +286,9 @@ private:
             for (const std::uint32_t pixel : found) isTaken[pixel] = true;
             if (found.size() >= leastVotes) planes.push_back(plane);
             const auto leave = [&](Pixels& pixels) {
-                pixels.erase(std::remove_if(pixels.begin(), pixels.end(), [&](std::uint32_t pixel) { return isTaken[pixel]; }), pixels.end());
+                pixels.erase(
+                    std::remove_if(pixels.begin(), pixels.end(), [&](std::uint32_t pixel) { return isTaken[pixel]; }),
+                    pixels.end());
             };
             leave(free);
             for (Pixels& own : votes) leave(own);
@@ -283,7 +299,9 @@ private:
     /// The plane with the least squared relative error of depth.
     Vector fitted(const Pixels& pixels) const {
         std::vector<Vector> points;
-        for (const std::uint32_t pixel : pixels) points.push_back({rays_[pixel][0] * depth_[pixel], rays_[pixel][1] * depth_[pixel], rays_[pixel][2] * depth_[pixel]});
+        for (const std::uint32_t pixel : pixels)
+            points.push_back(
+                {rays_[pixel][0] * depth_[pixel], rays_[pixel][1] * depth_[pixel], rays_[pixel][2] * depth_[pixel]});
         return fittedPlane(points.data(), points.size());
     }
 
@@ -300,7 +318,7 @@ private:
     int width_, height_;
     std::size_t size_;
     std::vector<Vector> rays_;
-    std::vector<Vector> local_;  ///< planes of the windows
+    std::vector<Vector> local_; ///< planes of the windows
     double tolerance_ = 0;
 };
 

@@ -23,7 +23,8 @@ public:
     std::vector<double> fitted(const PhotoPart& part, int width, int height) const {
         std::vector<double> result;
         result.reserve(static_cast<std::size_t>(width) * height);
-        const double across = static_cast<double>(width_) / part.photoWidth, down = static_cast<double>(height_) / part.photoHeight;
+        const double across = static_cast<double>(width_) / part.photoWidth,
+                     down = static_cast<double>(height_) / part.photoHeight;
         for (int y = 0; y < height; ++y)
             for (int x = 0; x < width; ++x)
                 result.push_back(at(std::clamp((part.left + (x + 0.5) * part.scale) * across - 0.5, 0.0, width_ - 1.0),
@@ -35,7 +36,9 @@ private:
     /// Neighbouring samples that differ by more than this share lie on different surfaces.
     static constexpr double sameSurface = 0.05;
 
-    double sample(int x, int y) const { return values_[static_cast<std::size_t>(std::min(y, height_ - 1)) * width_ + std::min(x, width_ - 1)]; }
+    double sample(int x, int y) const {
+        return values_[static_cast<std::size_t>(std::min(y, height_ - 1)) * width_ + std::min(x, width_ - 1)];
+    }
 
     /// On one surface linear in inverse depth, as planes are, else the nearest sample.
     double at(double u, double v) const {

@@ -6,11 +6,13 @@
 
 namespace colonnade::environment {
 
-/// Passes features along one line of pixels. Features are numbers of pixels, or -1; `across` is the line's own coordinate.
+/// Passes features along one line of pixels. Features are numbers of pixels, or -1; `across` is the line's own
+/// coordinate.
 class FeatureLine {
 public:
     FeatureLine(std::int32_t* features, std::int64_t count, bool isRow, std::int64_t width, std::int64_t across)
-        : features_(features), count_(count), stride_(isRow ? 1 : width), isRow_(isRow), width_(width), across_(across) {}
+        : features_(features), count_(count), stride_(isRow ? 1 : width), isRow_(isRow), width_(width),
+          across_(across) {}
 
     void pass() {
         for (std::int64_t i = 0; i < count_; ++i) {
@@ -22,7 +24,8 @@ public:
         if (kept_.empty()) return;
         std::size_t nearest = 0;
         for (std::int64_t i = 0; i < count_; ++i) {
-            while (nearest + 1 < kept_.size() && squaredTo(kept_[nearest + 1], i) < squaredTo(kept_[nearest], i)) ++nearest;
+            while (nearest + 1 < kept_.size() && squaredTo(kept_[nearest + 1], i) < squaredTo(kept_[nearest], i))
+                ++nearest;
             features_[i * stride_] = kept_[nearest];
         }
     }
@@ -33,7 +36,9 @@ private:
         const std::int64_t distance = (isRow_ ? feature / width_ : feature % width_) - across_;
         return distance * distance;
     }
-    std::int64_t squaredTo(std::int32_t feature, std::int64_t i) const { return (along(feature) - i) * (along(feature) - i) + across(feature); }
+    std::int64_t squaredTo(std::int32_t feature, std::int64_t i) const {
+        return (along(feature) - i) * (along(feature) - i) + across(feature);
+    }
     /// Whether no pixel of the line is nearer to the feature between two others.
     bool isHidden(std::int32_t before, std::int32_t feature, std::int32_t after) const {
         const std::int64_t a = along(feature) - along(before), b = along(after) - along(feature), c = a + b;

@@ -12,8 +12,8 @@
 
 namespace colonnade::environment {
 
-/// The surface that pixels show, row by row: positions, normals of the surface and of its shading, where it is seen, and
-/// how much of their distance two pixels may lie off a plane.
+/// The surface that pixels show, row by row: positions, normals of the surface and of its shading, where it is seen,
+/// and how much of their distance two pixels may lie off a plane.
 struct Guide {
     const Vector* position;
     const Vector* planes;
@@ -58,11 +58,13 @@ inline FilteredPixels wavelet(const Guide& guide, const NoisyPixels& noisy, int 
                     if (there != here) {
                         Vector way;
                         for (int i = 0; i < 3; ++i) way[i] = guide.position[there][i] - guide.position[here][i];
-                        const double off = std::abs(dot(way, guide.planes[here])), far = guide.plane * std::sqrt(dot(way, way)) + 1e-9;
+                        const double off = std::abs(dot(way, guide.planes[here])),
+                                     far = guide.plane * std::sqrt(dot(way, way)) + 1e-9;
                         double facing = std::max(0.0, dot(guide.normals[there], guide.normals[here]));
                         for (int square = 0; square < 3; ++square) facing *= facing;
                         if (facing == 0) continue;
-                        weight *= facing * std::exp(-off / far - std::abs(noisy.light[there] - noisy.light[here]) / noisy.deviation[here]);
+                        weight *= facing * std::exp(-off / far - std::abs(noisy.light[there] - noisy.light[here]) /
+                                                                     noisy.deviation[here]);
                     }
                     for (int i = 0; i < 3; ++i) sum[i] += weight * noisy.colour[there][i];
                     weights += weight;

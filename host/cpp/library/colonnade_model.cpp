@@ -24,11 +24,15 @@ const char* readDesign(std::istringstream& design) {
         if (kind == "number" || kind == "size" || kind == "textureSize") {
             std::int64_t value;
             design >> name >> value;
-            (kind == "number" ? library->numbers : kind == "size" ? library->mapSizes : library->textureSizes)[name] = value;
+            (kind == "number" ? library->numbers
+             : kind == "size" ? library->mapSizes
+                              : library->textureSizes)[name] = value;
         } else if (kind == "layout" || kind == "map" || kind == "textureMap") {
             Field field;
             design >> record >> name >> field.offset >> field.width >> field.isSigned;
-            (kind == "layout" ? library->format.layouts : kind == "map" ? library->mapLayouts : library->textureLayouts)[record][name] = field;
+            (kind == "layout" ? library->format.layouts
+             : kind == "map"  ? library->mapLayouts
+                              : library->textureLayouts)[record][name] = field;
         } else if (kind == "register") {
             Register each;
             std::int64_t limit;
@@ -67,7 +71,8 @@ const char* colonnade_model_load(const std::uint8_t* records, std::uint32_t coun
     return nullptr;
 }
 
-const char* colonnade_model_load_memory(const char* memory, const std::uint8_t* words, std::uint32_t count, std::uint32_t bytes) {
+const char* colonnade_model_load_memory(const char* memory, const std::uint8_t* words, std::uint32_t count,
+                                        std::uint32_t bytes) {
     if (memory == std::string("light.cube")) {
         if (bytes != LightCube::wordBytes) return "words of the light cube have 4 bytes";
         library->device->loadCube(words, count);
@@ -75,13 +80,15 @@ const char* colonnade_model_load_memory(const char* memory, const std::uint8_t* 
     }
     if (std::strncmp(memory, "texture.", 8) == 0) {
         if (library->textureSizes.empty()) return "this design has no memory for textures";
-        if (!library->texture) library->texture = std::make_unique<TextureImage>(library->textureSizes, library->textureLayouts);
+        if (!library->texture)
+            library->texture = std::make_unique<TextureImage>(library->textureSizes, library->textureLayouts);
         library->texture->load(memory, words, count, bytes);
         library->device->load(*library->texture);
         return nullptr;
     }
     if (library->mapSizes.empty()) return "this design has no memory for a room";
-    if (!library->maps) library->maps = std::make_unique<AttributeImage>(AttributeSizes(library->mapSizes), library->mapLayouts);
+    if (!library->maps)
+        library->maps = std::make_unique<AttributeImage>(AttributeSizes(library->mapSizes), library->mapLayouts);
     library->maps->load(memory, words, count, bytes);
     library->device->load(*library->maps);
     return nullptr;
@@ -100,15 +107,18 @@ const char* colonnade_model_start(const std::uint8_t* writes, std::uint32_t coun
     Registers registers;
     for (const Register& each : library->registers) {
         std::uint64_t bits = 0;
-        for (std::uint32_t word = 0; word < std::min(each.words, 2u); ++word) bits |= std::uint64_t{library->words[each.address + word]} << (32 * word);
+        for (std::uint32_t word = 0; word < std::min(each.words, 2u); ++word)
+            bits |= std::uint64_t{library->words[each.address + word]} << (32 * word);
         const int above = 64 - each.width;
-        registers[each.name] = each.isSigned ? static_cast<std::int64_t>(bits << above) >> above : static_cast<std::int64_t>(bits << above >> above);
+        registers[each.name] = each.isSigned ? static_cast<std::int64_t>(bits << above) >> above
+                                             : static_cast<std::int64_t>(bits << above >> above);
     }
     library->device->start(registers);
     return nullptr;
 }
 
-const char* colonnade_model_rows(std::uint32_t first, std::uint32_t last, std::uint16_t* colours, std::uint16_t* ratios, std::int32_t* triangles) {
+const char* colonnade_model_rows(std::uint32_t first, std::uint32_t last, std::uint16_t* colours, std::uint16_t* ratios,
+                                 std::int32_t* triangles) {
     const Frame& frame = library->device->frame();
     if (last > static_cast<std::uint32_t>(frame.height) || first > last) return "these rows are not those of the frame";
     for (std::uint32_t y = first; y < last; ++y)
@@ -146,8 +156,9 @@ const std::uint8_t* colonnade_model_records(void) { return library->records.data
 
 const double* colonnade_model_counters(void) {
     const Counters& from = library->device->counters;
-    const std::array<std::uint64_t, 11> values{from.raysPrimary, from.raysShadow, from.raysReflection, from.raysRefraction, from.raysGather,  from.raysInBox,
-                                               from.nodeReads,   from.boxTests,   from.triangleTests,  from.hits,           from.deepestStack};
+    const std::array<std::uint64_t, 11> values{
+        from.raysPrimary, from.raysShadow, from.raysReflection, from.raysRefraction, from.raysGather,  from.raysInBox,
+        from.nodeReads,   from.boxTests,   from.triangleTests,  from.hits,           from.deepestStack};
     std::copy(values.begin(), values.end(), library->counters.begin());
     return library->counters.data();
 }

@@ -1,5 +1,5 @@
-/* The packer and the bit-exact model without Python, behind C: docs/browser.md. With driver/include/colonnade_view.h, which
- * computes registers from poses, it renders meshes as a design does. One design at a time, from one thread. */
+/* The packer and the bit-exact model without Python, behind C: docs/browser.md. With driver/include/colonnade_view.h,
+ * which computes registers from poses, it renders meshes as a design does. One design at a time, from one thread. */
 #ifndef COLONNADE_MODEL_H
 #define COLONNADE_MODEL_H
 
@@ -16,7 +16,8 @@ struct colonnade_texture {
     int32_t width, height, wrap_u, wrap_v, is_nearest;
 };
 
-/* What faces of a mesh are: an entry of the material table, glass or not, and what their corners have, times a factor. */
+/* What faces of a mesh are: an entry of the material table, glass or not, and what their corners have, times a factor.
+ */
 struct colonnade_surface {
     int32_t entry, is_glass;
     int32_t texture;     /* of base colours, sRGB; -1: none */
@@ -30,18 +31,18 @@ struct colonnade_normal_map {
     float scale;
 };
 
-/* Values of a node over time. `path`: 0 translation, 1 rotation, 2 scale, 3 weights of morph targets. `interpolation`: 0 steps,
- * 1 lines, 2 cubic splines, of which each key has three values. Times are seconds; keys ascend. */
+/* Values of a node over time. `path`: 0 translation, 1 rotation, 2 scale, 3 weights of morph targets. `interpolation`:
+ * 0 steps, 1 lines, 2 cubic splines, of which each key has three values. Times are seconds; keys ascend. */
 struct colonnade_track {
     int32_t node, path, interpolation;
     uint32_t key_count, value_count;
     const double *times, *values;
 };
 
-/* What moves the vertices of a mesh. Of nodes: parents, −1 for none, and themselves, each after its parent; matrices to the
- * parents at rest, row by row, and their parts. Of bones: node, and matrix from where vertices are bound. Of vertices: where they
- * are bound, four bones and their weights, the largest first. Of morph targets: node, place among its weights, weight at rest. Of
- * their changes, by ascending vertex: target, vertex, what is added. */
+/* What moves the vertices of a mesh. Of nodes: parents, −1 for none, and themselves, each after its parent; matrices to
+ * the parents at rest, row by row, and their parts. Of bones: node, and matrix from where vertices are bound. Of
+ * vertices: where they are bound, four bones and their weights, the largest first. Of morph targets: node, place among
+ * its weights, weight at rest. Of their changes, by ascending vertex: target, vertex, what is added. */
 struct colonnade_clip {
     uint32_t node_count;
     const int32_t *parents, *order;
@@ -63,11 +64,12 @@ struct colonnade_clip {
     const double *changed_positions, *changed_normals;
 };
 
-/* `normals`: three for each face, of any length, 0 for none; or NULL. `colours`: linear red, green, blue at the corners, 0 to
- * 1; or NULL. `uvs`: two at each corner; NULL without textures. `surface_of`: of each face. With `map_count`, of each face: the number of
- * its normal map, -1 for none; at each corner two positions in it, and a tangent of the file, 0 for none, with the sign of the
- * bitangent. `clip`: what moves the vertices, which are in its rest pose, or NULL; then of each face the face of the file that it is a part of,
- * and the weights of that one's corners at each corner; `clip_faces` have the clip's vertices at the corners of the file's faces. */
+/* `normals`: three for each face, of any length, 0 for none; or NULL. `colours`: linear red, green, blue at the
+ * corners, 0 to 1; or NULL. `uvs`: two at each corner; NULL without textures. `surface_of`: of each face. With
+ * `map_count`, of each face: the number of its normal map, -1 for none; at each corner two positions in it, and a
+ * tangent of the file, 0 for none, with the sign of the bitangent. `clip`: what moves the vertices, which are in its
+ * rest pose, or NULL; then of each face the face of the file that it is a part of, and the weights of that one's
+ * corners at each corner; `clip_faces` have the clip's vertices at the corners of the file's faces. */
 struct colonnade_mesh {
     const double *vertices;
     uint32_t vertex_count;
@@ -130,11 +132,12 @@ struct colonnade_pieces {
 };
 
 struct colonnade_step {
-    int32_t kind;      /* 0 a ray, 1 a node is read, 2 a child's box, 3 a record of triangles is read, 4 a triangle, 5 a hit */
-    int32_t value;     /* ray: 0 primary, 1 shadow, 2 reflection, 3 refraction, 4 gathered; an address; a packed id */
-    int32_t is_hit;    /* box entered, triangle the closest so far */
-    int32_t is_leaf;   /* the child is a record of triangles */
-    double values[9];  /* vertex units: origin and direction, low and high, vertices; of a hit, t in grid steps */
+    int32_t
+        kind; /* 0 a ray, 1 a node is read, 2 a child's box, 3 a record of triangles is read, 4 a triangle, 5 a hit */
+    int32_t value; /* ray: 0 primary, 1 shadow, 2 reflection, 3 refraction, 4 gathered; an address; a packed id */
+    int32_t is_hit; /* box entered, triangle the closest so far */
+    int32_t is_leaf; /* the child is a record of triangles */
+    double values[9]; /* vertex units: origin and direction, low and high, vertices; of a hit, t in grid steps */
 };
 
 /* Every call but the last five returns NULL, or a text that says what is wrong. */
@@ -149,9 +152,10 @@ struct colonnade_step {
  *   textureSize, textureMap                       the same of the texture memory */
 const char *colonnade_model_open(const char *design);
 
-/* The vertices of a clip in its rest pose, and whether each of so many faces is mirrored there: its corners go backwards. `normals`, of
- * the corners of faces, follow them; or NULL. */
-const char *colonnade_model_rest(const struct colonnade_clip *clip, const int32_t *faces, uint32_t face_count, double *normals, double *vertices, uint8_t *is_mirrored);
+/* The vertices of a clip in its rest pose, and whether each of so many faces is mirrored there: its corners go
+ * backwards. `normals`, of the corners of faces, follow them; or NULL. */
+const char *colonnade_model_rest(const struct colonnade_clip *clip, const int32_t *faces, uint32_t face_count,
+                                 double *normals, double *vertices, uint8_t *is_mirrored);
 
 /* Cleans and packs a mesh, and loads it, with the atlas of its textures, into the model. */
 const char *colonnade_model_pack(const struct colonnade_mesh *mesh, struct colonnade_packed *packed);
@@ -162,18 +166,21 @@ const char *colonnade_model_load(const uint8_t *records, uint32_t count);
 /* Loads the clip file of these records; of 0 bytes: nothing moves. */
 const char *colonnade_model_load_clip(const uint8_t *file, uint32_t bytes);
 
-/* Writes a pose into the records, of a time in 2^-16 s. Answers how many pairs are too stretched for the normals of their corners. */
+/* Writes a pose into the records, of a time in 2^-16 s. Answers how many pairs are too stretched for the normals of
+ * their corners. */
 const char *colonnade_model_pose(uint32_t time, uint32_t *flat_pairs);
 
-/* Loads one of the memories of a room's maps or of textures, or the light cube, by its name in the manifest: `count` words of `bytes` bytes. */
+/* Loads one of the memories of a room's maps or of textures, or the light cube, by its name in the manifest: `count`
+ * words of `bytes` bytes. */
 const char *colonnade_model_load_memory(const char *memory, const uint8_t *words, uint32_t count, uint32_t bytes);
 
 /* Writes registers, pairs of word address and value, low byte first, and starts a frame. */
 const char *colonnade_model_start(const uint8_t *writes, uint32_t count);
 
-/* Renders rows first to last − 1: linear red, green, blue, the ratios of light with the object to light without it, 4096 for
- * 1, and the packed id or −1, of each pixel. */
-const char *colonnade_model_rows(uint32_t first, uint32_t last, uint16_t *colours, uint16_t *ratios, int32_t *triangles);
+/* Renders rows first to last − 1: linear red, green, blue, the ratios of light with the object to light without it,
+ * 4096 for 1, and the packed id or −1, of each pixel. */
+const char *colonnade_model_rows(uint32_t first, uint32_t last, uint16_t *colours, uint16_t *ratios,
+                                 int32_t *triangles);
 
 /* The steps of a pixel's rays; they are valid until the next call. */
 uint32_t colonnade_model_trace(uint32_t x, uint32_t y, const struct colonnade_step **steps);
@@ -182,23 +189,30 @@ uint32_t colonnade_model_trace(uint32_t x, uint32_t y, const struct colonnade_st
 const char *colonnade_model_cut(const struct colonnade_alpha *alpha, struct colonnade_cut *cut);
 
 /* Which of so many faces show one colour of a texture, 0 or 1, and the linear colours of their corners. */
-const char *colonnade_model_swatches(const struct colonnade_texture *texture, const double *uvs, uint32_t count, uint8_t *is_plain, double *colours);
+const char *colonnade_model_swatches(const struct colonnade_texture *texture, const double *uvs, uint32_t count,
+                                     uint8_t *is_plain, double *colours);
 
-/* Which of so many faces are metal, 0 or 1, and their mean roughness, by a metallic-roughness map: `uvs` of the corners, and
- * the factors of metallic and roughness. */
-const char *colonnade_model_metal(const struct colonnade_texture *map, const double *uvs, uint32_t count, const double *factors, uint8_t *is_metal, double *roughness);
+/* Which of so many faces are metal, 0 or 1, and their mean roughness, by a metallic-roughness map: `uvs` of the
+ * corners, and the factors of metallic and roughness. */
+const char *colonnade_model_metal(const struct colonnade_texture *map, const double *uvs, uint32_t count,
+                                  const double *factors, uint8_t *is_metal, double *roughness);
 
-/* What so many faces emit by an emission map, linear, at most four colours: `uvs` of the corners, and the faces' areas. */
-const char *colonnade_model_emission(const struct colonnade_texture *map, const double *uvs, const double *areas, uint32_t count, double *colours);
+/* What so many faces emit by an emission map, linear, at most four colours: `uvs` of the corners, and the faces' areas.
+ */
+const char *colonnade_model_emission(const struct colonnade_texture *map, const double *uvs, const double *areas,
+                                     uint32_t count, double *colours);
 
-/* Faces in pieces where what they emit by a map varies: factors of its channels, which faces show it, 0 or 1, `uvs` of the corners in
- * it, and the pieces that may be added. */
-const char *colonnade_model_emission_pieces(const struct colonnade_texture *map, const double *factors, const double *vertices, uint32_t vertex_count,
-                                            const int32_t *faces, uint32_t face_count, const uint8_t *shows, const double *uvs, int32_t budget,
-                                            struct colonnade_pieces *pieces);
+/* Faces in pieces where what they emit by a map varies: factors of its channels, which faces show it, 0 or 1, `uvs` of
+ * the corners in it, and the pieces that may be added. */
+const char *colonnade_model_emission_pieces(const struct colonnade_texture *map, const double *factors,
+                                            const double *vertices, uint32_t vertex_count, const int32_t *faces,
+                                            uint32_t face_count, const uint8_t *shows, const double *uvs,
+                                            int32_t budget, struct colonnade_pieces *pieces);
 
-/* Merges the nearest of values of equal kinds until so many are left, by their weights; `merged` has the new value of each. */
-const char *colonnade_model_merge(const double *values, const double *weights, const int32_t *kinds, uint32_t count, uint32_t left, double *merged);
+/* Merges the nearest of values of equal kinds until so many are left, by their weights; `merged` has the new value of
+ * each. */
+const char *colonnade_model_merge(const double *values, const double *weights, const int32_t *kinds, uint32_t count,
+                                  uint32_t left, double *merged);
 
 /* The words of a memory of textures for the packed mesh, each of whole bytes, low byte first. */
 const uint8_t *colonnade_model_texture(const char *memory);
@@ -209,8 +223,8 @@ const uint8_t *colonnade_model_records(void);
 /* The clip file of the packed mesh, and its bytes. */
 const uint8_t *colonnade_model_clip(uint32_t *bytes);
 
-/* Counters of the frame that the model has: primary, shadow, reflected, refracted, gathered and in-box rays, nodes read, boxes
- * tested, triangles tested, hits, deepest stack. */
+/* Counters of the frame that the model has: primary, shadow, reflected, refracted, gathered and in-box rays, nodes
+ * read, boxes tested, triangles tested, hits, deepest stack. */
 const double *colonnade_model_counters(void);
 
 #ifdef __cplusplus

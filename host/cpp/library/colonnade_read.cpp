@@ -18,7 +18,9 @@ const char* kept(const std::string& value) {
 
 const char* refusalUnless(bool isRead) { return isRead ? nullptr : reader->refusal.c_str(); }
 
-template <class Number, class Row> const Number* numbersOf(const std::vector<Row>& rows) { return rows.empty() ? nullptr : reinterpret_cast<const Number*>(rows.data()); }
+template <class Number, class Row> const Number* numbersOf(const std::vector<Row>& rows) {
+    return rows.empty() ? nullptr : reinterpret_cast<const Number*>(rows.data());
+}
 
 } // namespace
 
@@ -33,7 +35,8 @@ const char* colonnade_read_library(void) {
 }
 
 const char* colonnade_read_materials(const char* name, const std::uint8_t* bytes, std::uint32_t count) {
-    return refusalUnless(reader->giveLibrary(bytes ? std::optional(mesh::Text(reinterpret_cast<const char*>(bytes), count)) : std::nullopt, name));
+    return refusalUnless(reader->giveLibrary(
+        bytes ? std::optional(mesh::Text(reinterpret_cast<const char*>(bytes), count)) : std::nullopt, name));
 }
 
 const char* colonnade_read_picture(std::uint32_t index, std::int32_t* isClamped) {
@@ -44,7 +47,8 @@ const char* colonnade_read_picture(std::uint32_t index, std::int32_t* isClamped)
 }
 
 void colonnade_read_lost(std::uint32_t index, std::uint32_t loss) {
-    static constexpr const mesh::Loss* losses[]{&mesh::lost::noPictures, &mesh::lost::pictureFormats, &mesh::lost::damagedPictures};
+    static constexpr const mesh::Loss* losses[]{&mesh::lost::noPictures, &mesh::lost::pictureFormats,
+                                                &mesh::lost::damagedPictures};
     reader->losses.add(*losses[loss], 1, reader->pictures[index].name);
 }
 
@@ -53,8 +57,9 @@ const char* colonnade_read_finish(const std::int32_t* numbers, colonnade_read* t
     const mesh::FileSurface& surface = reader->surface;
     materials.clear();
     for (const mesh::FileMaterial& one : surface.materials)
-        for (const double value : {static_cast<double>(one.kind), one.albedo[0], one.albedo[1], one.albedo[2], one.ior, one.roughness, one.emission[0], one.emission[1],
-                                   one.emission[2], one.alpha.value_or(-1), static_cast<double>(one.texture)})
+        for (const double value : {static_cast<double>(one.kind), one.albedo[0], one.albedo[1], one.albedo[2], one.ior,
+                                   one.roughness, one.emission[0], one.emission[1], one.emission[2],
+                                   one.alpha.value_or(-1), static_cast<double>(one.texture)})
             materials.push_back(value);
     static std::vector<std::int32_t> textures;
     textures.clear();
@@ -91,8 +96,9 @@ void colonnade_read_teapot(std::uint32_t level, colonnade_read* to) {
     to->face_count = static_cast<std::uint32_t>(made.faces.size());
 }
 
-void colonnade_read_mask(const std::uint8_t* pixels, const std::uint8_t* alpha, std::uint32_t maskWidth, std::uint32_t maskHeight, std::uint32_t width,
-                         std::uint32_t height, std::uint8_t* to) {
-    const std::vector<std::uint8_t> mask = mesh::maskOf({pixels, maskHeight, maskWidth, 3, {}, {}, false}, alpha, height, width);
+void colonnade_read_mask(const std::uint8_t* pixels, const std::uint8_t* alpha, std::uint32_t maskWidth,
+                         std::uint32_t maskHeight, std::uint32_t width, std::uint32_t height, std::uint8_t* to) {
+    const std::vector<std::uint8_t> mask =
+        mesh::maskOf({pixels, maskHeight, maskWidth, 3, {}, {}, false}, alpha, height, width);
     std::copy(mask.begin(), mask.end(), to);
 }

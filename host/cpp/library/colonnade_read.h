@@ -1,5 +1,5 @@
-/* The readers of OBJ with MTL, PLY, STL and OFF (cpp/mesh/files/reader.hpp) behind C. One file at a time. Texts are UTF-8 if those of the
- * file are, and valid until the next call; a refusal is one line, NULL for none. */
+/* The readers of OBJ with MTL, PLY, STL and OFF (cpp/mesh/files/reader.hpp) behind C. One file at a time. Texts are
+ * UTF-8 if those of the file are, and valid until the next call; a refusal is one line, NULL for none. */
 #ifndef COLONNADE_READ_H
 #define COLONNADE_READ_H
 
@@ -9,10 +9,10 @@
 extern "C" {
 #endif
 
-/* The triangles of a file; arrays without one are NULL. Corners have three of `normals` and `colours`, NaN on faces without a colour, and two of
- * `uvs`. A material has eleven numbers: kind (0 diffuse, 1 mirror, 2 glass), albedo, index of refraction, roughness, emission, factor of alpha or
- * -1, texture or -1. A texture has three: the numbers that `finish` gave to the pictures of its colours and of its alpha, -1 for opaque, and
- * whether it is white. */
+/* The triangles of a file; arrays without one are NULL. Corners have three of `normals` and `colours`, NaN on faces
+ * without a colour, and two of `uvs`. A material has eleven numbers: kind (0 diffuse, 1 mirror, 2 glass), albedo, index
+ * of refraction, roughness, emission, factor of alpha or -1, texture or -1. A texture has three: the numbers that
+ * `finish` gave to the pictures of its colours and of its alpha, -1 for opaque, and whether it is white. */
 struct colonnade_read {
     const double *vertices;
     uint32_t vertex_count;
@@ -41,7 +41,8 @@ const char *colonnade_read_picture(uint32_t index, int32_t *is_clamped);
 /* Says that a picture is missing, 0, of an unknown format, 1, or damaged, 2. */
 void colonnade_read_lost(uint32_t index, uint32_t loss);
 
-/* Ends the file; `numbers` are those of the pictures, -1 for those that are lost. The surface is valid until the next file. */
+/* Ends the file; `numbers` are those of the pictures, -1 for those that are lost. The surface is valid until the next
+ * file. */
 const char *colonnade_read_finish(const int32_t *numbers, struct colonnade_read *surface);
 
 /* A line of what is lost of the file, NULL after the last one. */
@@ -50,8 +51,10 @@ const char *colonnade_read_note(uint32_t index);
 /* The teapot of the host (mesh/teapot.hpp), plain. */
 void colonnade_read_teapot(uint32_t level, struct colonnade_read *surface);
 
-/* The alpha of a texture of width times height pixels by another picture (maskOf); `alpha` is that of its pixels, or NULL. */
-void colonnade_read_mask(const uint8_t *pixels, const uint8_t *alpha, uint32_t mask_width, uint32_t mask_height, uint32_t width, uint32_t height, uint8_t *mask);
+/* The alpha of a texture of width times height pixels by another picture (maskOf); `alpha` is that of its pixels, or
+ * NULL. */
+void colonnade_read_mask(const uint8_t *pixels, const uint8_t *alpha, uint32_t mask_width, uint32_t mask_height,
+                         uint32_t width, uint32_t height, uint8_t *mask);
 
 #ifdef __cplusplus
 }

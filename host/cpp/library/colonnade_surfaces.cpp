@@ -19,7 +19,13 @@ const std::array<double, 256>& linearCodes() {
 }
 
 mesh::Picture<std::uint8_t> pictureOf(const colonnade_texture& texture) {
-    return {texture.pixels, texture.height, texture.width, 3, static_cast<mesh::Wrap>(texture.wrap_u), static_cast<mesh::Wrap>(texture.wrap_v), texture.is_nearest != 0};
+    return {texture.pixels,
+            texture.height,
+            texture.width,
+            3,
+            static_cast<mesh::Wrap>(texture.wrap_u),
+            static_cast<mesh::Wrap>(texture.wrap_v),
+            texture.is_nearest != 0};
 }
 
 } // namespace colonnade
@@ -42,7 +48,10 @@ struct PieceArrays {
         }
     }
 
-    colonnade_pieces view() const { return {static_cast<std::uint32_t>(owners.size()), owners.data(), weights.empty() ? nullptr : weights[0][0].data()}; }
+    colonnade_pieces view() const {
+        return {static_cast<std::uint32_t>(owners.size()), owners.data(),
+                weights.empty() ? nullptr : weights[0][0].data()};
+    }
 };
 
 PieceArrays pieceArrays;
@@ -55,7 +64,8 @@ struct Cut {
 
 } // namespace
 
-const char* colonnade_model_metal(const colonnade_texture* map, const double* uvs, std::uint32_t count, const double* factors, std::uint8_t* isMetal, double* roughness) {
+const char* colonnade_model_metal(const colonnade_texture* map, const double* uvs, std::uint32_t count,
+                                  const double* factors, std::uint8_t* isMetal, double* roughness) {
     for (std::uint32_t i = 0; i < count; ++i) {
         const mesh::FaceMetal face = mesh::metalOf(pictureOf(*map), uvs + 6 * i, factors);
         isMetal[i] = face.isMetal;
@@ -64,17 +74,20 @@ const char* colonnade_model_metal(const colonnade_texture* map, const double* uv
     return nullptr;
 }
 
-const char* colonnade_model_emission(const colonnade_texture* map, const double* uvs, const double* areas, std::uint32_t count, double* colours) {
+const char* colonnade_model_emission(const colonnade_texture* map, const double* uvs, const double* areas,
+                                     std::uint32_t count, double* colours) {
     const std::vector<mesh::Rgb> found = mesh::emissionOf(pictureOf(*map), uvs, areas, count, linearCodes().data());
     std::memcpy(colours, found.data(), found.size() * sizeof found[0]);
     return nullptr;
 }
 
-const char* colonnade_model_emission_pieces(const colonnade_texture* map, const double* factors, const double* vertices, std::uint32_t vertexCount,
-                                            const std::int32_t* faces, std::uint32_t faceCount, const std::uint8_t* shows, const double* uvs, std::int32_t budget,
-                                            colonnade_pieces* pieces) {
-    pieceArrays.assign(mesh::emissionPieces(pictureOf(*map), {factors[0], factors[1], factors[2]}, copied<mesh::Vector>(vertices, vertexCount),
-                                            copied<mesh::Face>(faces, faceCount), shows, uvs, budget, linearCodes().data()));
+const char* colonnade_model_emission_pieces(const colonnade_texture* map, const double* factors, const double* vertices,
+                                            std::uint32_t vertexCount, const std::int32_t* faces,
+                                            std::uint32_t faceCount, const std::uint8_t* shows, const double* uvs,
+                                            std::int32_t budget, colonnade_pieces* pieces) {
+    pieceArrays.assign(mesh::emissionPieces(
+        pictureOf(*map), {factors[0], factors[1], factors[2]}, copied<mesh::Vector>(vertices, vertexCount),
+        copied<mesh::Face>(faces, faceCount), shows, uvs, budget, linearCodes().data()));
     *pieces = pieceArrays.view();
     return nullptr;
 }
@@ -100,12 +113,19 @@ const char* colonnade_model_cut(const colonnade_alpha* from, colonnade_cut* to) 
     pieceArrays.assign(cut.found.pieces);
     const colonnade_pieces pieces = pieceArrays.view();
     if (from->alpha) cut.filled = coverage.filled();
-    *to = {cut.found.kinds.data(), pieces.count,        pieces.owners,    pieces.weights, cut.found.panes.empty() ? nullptr : &cut.found.panes[0].alpha,
-           cut.found.isCoarse,     cut.found.isBlended, cut.filled.data()};
+    *to = {cut.found.kinds.data(),
+           pieces.count,
+           pieces.owners,
+           pieces.weights,
+           cut.found.panes.empty() ? nullptr : &cut.found.panes[0].alpha,
+           cut.found.isCoarse,
+           cut.found.isBlended,
+           cut.filled.data()};
     return nullptr;
 }
 
-const char* colonnade_model_swatches(const colonnade_texture* texture, const double* uvs, std::uint32_t count, std::uint8_t* isPlain, double* colours) {
+const char* colonnade_model_swatches(const colonnade_texture* texture, const double* uvs, std::uint32_t count,
+                                     std::uint8_t* isPlain, double* colours) {
     const mesh::Swatches swatches(pictureOf(*texture), linearCodes().data());
     for (std::uint32_t i = 0; i < count; ++i) {
         mesh::Triangle own;
@@ -117,8 +137,10 @@ const char* colonnade_model_swatches(const colonnade_texture* texture, const dou
     return nullptr;
 }
 
-const char* colonnade_model_merge(const double* values, const double* weights, const std::int32_t* kinds, std::uint32_t count, std::uint32_t left, double* merged) {
-    const std::vector<double> found = mesh::mergedValues({values, values + count}, {weights, weights + count}, {kinds, kinds + count}, left);
+const char* colonnade_model_merge(const double* values, const double* weights, const std::int32_t* kinds,
+                                  std::uint32_t count, std::uint32_t left, double* merged) {
+    const std::vector<double> found =
+        mesh::mergedValues({values, values + count}, {weights, weights + count}, {kinds, kinds + count}, left);
     std::copy(found.begin(), found.end(), merged);
     return nullptr;
 }

@@ -85,7 +85,8 @@ template <class To, class From> std::vector<To> copied(const From* from, std::ui
     std::vector<To> values(count);
     if constexpr (std::is_arithmetic_v<To>) std::copy(from, from + count, values.begin());
     else
-        for (std::uint32_t i = 0; i < count; ++i) std::copy(from + values[i].size() * i, from + values[i].size() * (i + 1), values[i].begin());
+        for (std::uint32_t i = 0; i < count; ++i)
+            std::copy(from + values[i].size() * i, from + values[i].size() * (i + 1), values[i].begin());
     return values;
 }
 

@@ -12,7 +12,8 @@
 
 namespace colonnade::live {
 
-/// The mean of w times 16, its slopes (of 2^-34 a half pixel), its error against this plane, and the errors of a unit of w.
+/// The mean of w times 16, its slopes (of 2^-34 a half pixel), its error against this plane, and the errors of a unit
+/// of w.
 struct Block {
     std::int32_t sum, alongX, alongY, residual, metres;
     std::int64_t slopeX, slopeY;
@@ -22,20 +23,24 @@ struct Block {
 class DepthBlocks {
 public:
     DepthBlocks(int width, int height, int columns, int rows)
-        : width_(width), height_(height), stride_(16 * columns), lines_(16 * rows), depth_(static_cast<std::size_t>(stride_) * lines_), w_(depth_.size()),
-          lengths_(depth_.size()), blocks_(static_cast<std::size_t>(4 * columns) * 4 * rows) {}
+        : width_(width), height_(height), stride_(16 * columns), lines_(16 * rows),
+          depth_(static_cast<std::size_t>(stride_) * lines_), w_(depth_.size()), lengths_(depth_.size()),
+          blocks_(static_cast<std::size_t>(4 * columns) * 4 * rows) {}
 
     void read(const std::uint32_t* depth, const Camera& camera) {
         if (camera.fx != fx_ || camera.fy != fy_ || camera.cx != cx_ || camera.cy != cy_) measureRays(camera);
         std::uint32_t least = largestDepth;
         for (std::size_t i = 0; i < depth_.size(); ++i) {
-            const std::uint32_t z = depth[i] < leastDepth ? leastDepth : depth[i] > largestDepth ? largestDepth : depth[i];
+            const std::uint32_t z = depth[i] < leastDepth     ? leastDepth
+                                    : depth[i] > largestDepth ? largestDepth
+                                                              : depth[i];
             depth_[i] = z;
             least = z < least ? z : least;
         }
         unitLog_ = 6;
         while (std::uint32_t{2} << unitLog_ <= least) ++unitLog_;
-        for (int y = 0; y < lines_; ++y) inverseDepth(&depth_[offset(0, y)], stride_, std::uint32_t{1} << unitLog_, &w_[offset(0, y)]);
+        for (int y = 0; y < lines_; ++y)
+            inverseDepth(&depth_[offset(0, y)], stride_, std::uint32_t{1} << unitLog_, &w_[offset(0, y)]);
         for (int y = 0; y < blockRows(); ++y)
             for (int x = 0; x < blockColumns(); ++x) fit(x, y);
     }
@@ -62,7 +67,8 @@ public:
     /// By how much a block is off a plane: at its corner that is off most, steps of 2^-17 m.
     std::int64_t error(int block, const Plane& plane) const {
         const Block& b = blocks_[block];
-        const std::int64_t middle = std::abs(plane.at(xOf(block), yOf(block)) - (static_cast<std::int64_t>(b.sum) << (planeBits - wBits - 4)));
+        const std::int64_t middle =
+            std::abs(plane.at(xOf(block), yOf(block)) - (static_cast<std::int64_t>(b.sum) << (planeBits - wBits - 4)));
         const std::int64_t slopes = std::abs(plane.a - b.slopeX) + std::abs(plane.b - b.slopeY);
         return std::min<std::int64_t>((middle + 4 * slopes) >> (planeBits - wBits), 1 << 28) * b.metres >> 14;
     }
@@ -90,12 +96,14 @@ public:
             errorScales(&depth_[at], &lengths_[at], 16, scaleShift(), metres + 16 * y, cap + 16 * y);
         }
     }
-    /// The distance along the view ray from a pixel's surface to one at another w, steps of 2^-17 m: z · |1 - w z / unit| / w.
+    /// The distance along the view ray from a pixel's surface to one at another w, steps of 2^-17 m: z · |1 - w z /
+    /// unit| / w.
     std::int32_t rayError(int x, int y, std::int32_t w) const {
         const std::size_t at = offset(x, y);
         if (w <= 0) return INT32_MAX;
         const std::int64_t difference = std::abs(w - w_[at]), along = difference * depth_[at] / w;
-        return static_cast<std::int32_t>(std::min<std::int64_t>((std::min<std::int64_t>(along, INT32_MAX) * lengths_[at]) >> (8 + 16 - errorBits), INT32_MAX));
+        return static_cast<std::int32_t>(std::min<std::int64_t>(
+            (std::min<std::int64_t>(along, INT32_MAX) * lengths_[at]) >> (8 + 16 - errorBits), INT32_MAX));
     }
     int width() const { return width_; }
     int height() const { return height_; }
@@ -115,7 +123,8 @@ private:
             for (int x = 0; x < stride_; ++x) {
                 const double u = (x + 0.5 - cx_) / fx_, v = (y + 0.5 - cy_) / fy_;
                 const double across = u * u, down = v * v;
-                lengths_[offset(x, y)] = static_cast<std::uint16_t>(std::min(65535.0, 256 * std::sqrt(1 + across + down) + 0.5));
+                lengths_[offset(x, y)] =
+                    static_cast<std::uint16_t>(std::min(65535.0, 256 * std::sqrt(1 + across + down) + 0.5));
             }
     }
 
@@ -133,7 +142,8 @@ private:
         for (int y = 0; y < 4; ++y)
             for (int x = 0; x < 4; ++x) { // 80 times the distance from the plane
                 const std::int32_t on = 5 * sum + (2 * x - 3) * alongX + (2 * y - 3) * alongY;
-                residual += std::abs(80 * static_cast<std::int64_t>(first[static_cast<std::size_t>(y) * stride_ + x]) - on);
+                residual +=
+                    std::abs(80 * static_cast<std::int64_t>(first[static_cast<std::size_t>(y) * stride_ + x]) - on);
             }
         Block& block = blocks_[static_cast<std::size_t>(row) * blockColumns() + column];
         const std::size_t centre = offset(4 * column + 2, 4 * row + 2);
@@ -144,7 +154,8 @@ private:
         block.alongY = alongY;
         block.slopeX = static_cast<std::int64_t>(alongX) * (1 << (planeBits - wBits)) / 80;
         block.slopeY = static_cast<std::int64_t>(alongY) * (1 << (planeBits - wBits)) / 80;
-        block.residual = static_cast<std::int32_t>(std::min<std::int64_t>(residual / 1280 * block.metres >> 14, INT32_MAX));
+        block.residual =
+            static_cast<std::int32_t>(std::min<std::int64_t>(residual / 1280 * block.metres >> 14, INT32_MAX));
     }
 
     int width_, height_, stride_, lines_;

@@ -9,7 +9,9 @@
 
 namespace colonnade::live {
 
-inline std::int32_t divideRounded(std::int64_t value, std::int64_t by) { return static_cast<std::int32_t>((value + (value >= 0 ? by / 2 : -(by / 2))) / by); }
+inline std::int32_t divideRounded(std::int64_t value, std::int64_t by) {
+    return static_cast<std::int32_t>((value + (value >= 0 ? by / 2 : -(by / 2))) / by);
+}
 
 inline std::int32_t squareRoot(std::int64_t value) {
     std::int64_t root = 0;
@@ -19,12 +21,14 @@ inline std::int32_t squareRoot(std::int64_t value) {
 }
 
 inline std::int64_t product(const Point& a, const Point& b) {
-    return static_cast<std::int64_t>(a.at[0]) * b.at[0] + static_cast<std::int64_t>(a.at[1]) * b.at[1] + static_cast<std::int64_t>(a.at[2]) * b.at[2];
+    return static_cast<std::int64_t>(a.at[0]) * b.at[0] + static_cast<std::int64_t>(a.at[1]) * b.at[1] +
+           static_cast<std::int64_t>(a.at[2]) * b.at[2];
 }
 
 inline Point meanOf(const Cluster& cluster, const Point& otherwise) {
     if (cluster.count == 0) return otherwise;
-    return {{divideRounded(cluster.sum[0], cluster.count), divideRounded(cluster.sum[1], cluster.count), divideRounded(cluster.sum[2], cluster.count)}};
+    return {{divideRounded(cluster.sum[0], cluster.count), divideRounded(cluster.sum[1], cluster.count),
+             divideRounded(cluster.sum[2], cluster.count)}};
 }
 
 /// By how much the sum of the points' squared lengths exceeds their squared distances from a centre.
@@ -41,7 +45,8 @@ struct Halves {
 
     /// Each cell goes to the nearer of two centres.
     void assign(const Cells& cells, const std::int32_t* total, const Point& a, const Point& b) {
-        const std::int16_t axis[3] = {static_cast<std::int16_t>(b.at[0] - a.at[0]), static_cast<std::int16_t>(b.at[1] - a.at[1]),
+        const std::int16_t axis[3] = {static_cast<std::int16_t>(b.at[0] - a.at[0]),
+                                      static_cast<std::int16_t>(b.at[1] - a.at[1]),
                                       static_cast<std::int16_t>(b.at[2] - a.at[2])};
         split(cells, total, axis, static_cast<std::int32_t>((product(b, b) - product(a, a)) >> 1));
     }
@@ -66,12 +71,15 @@ inline Spread spreadOf(const std::int32_t c[6]) {
 }
 
 /// Splits the cells at their mean, and moves the means `rounds` times. False if they are all equal.
-inline bool halve(const Cells& cells, const std::int32_t* total, const std::int16_t* all, int rounds, Halves& halves, Point centres[2]) {
-    const Point mean{{divideRounded(total[0], cells.count), divideRounded(total[1], cells.count), divideRounded(total[2], cells.count)}};
+inline bool halve(const Cells& cells, const std::int32_t* total, const std::int16_t* all, int rounds, Halves& halves,
+                  Point centres[2]) {
+    const Point mean{{divideRounded(total[0], cells.count), divideRounded(total[1], cells.count),
+                      divideRounded(total[2], cells.count)}};
     std::int32_t matrix[6];
     covariances(cells, mean, all, matrix);
     const Spread spread = spreadOf(matrix);
-    std::int32_t longest = std::max({std::abs(spread.column[0]), std::abs(spread.column[1]), std::abs(spread.column[2])});
+    std::int32_t longest =
+        std::max({std::abs(spread.column[0]), std::abs(spread.column[1]), std::abs(spread.column[2])});
     centres[0] = centres[1] = mean;
     if (longest == 0) return false;
     int shift = 0;
@@ -105,9 +113,11 @@ inline void quarter(const Cells& cells, const Halves& halves, const Point twoCen
         covariances(cells, mean, mask, matrix);
         const Spread spread = spreadOf(matrix);
         // column / sqrt(variance · cells) is the deviation in half codes
-        const std::int32_t length = std::max(1, squareRoot(static_cast<std::int64_t>(spread.variance) * std::max(1, halves.clusters[k].count)));
+        const std::int32_t length =
+            std::max(1, squareRoot(static_cast<std::int64_t>(spread.variance) * std::max(1, halves.clusters[k].count)));
         for (int a = 0; a < 3; ++a) {
-            const std::int32_t step = static_cast<std::int32_t>(static_cast<std::int64_t>(spread.column[a]) * 2 / length);
+            const std::int32_t step =
+                static_cast<std::int32_t>(static_cast<std::int64_t>(spread.column[a]) * 2 / length);
             centres[2 * k].at[a] = mean.at[a] - step;
             centres[2 * k + 1].at[a] = mean.at[a] + step;
         }

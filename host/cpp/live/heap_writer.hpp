@@ -30,13 +30,15 @@ public:
         std::uint32_t slot = hash % slots;
         for (; sequences_[slot].count != 0; slot = (slot + 1) % slots) {
             const Sequence& sequence = sequences_[slot];
-            if (sequence.count == count && std::equal(words, words + count, heap_.begin() + sequence.address)) return sequence.address;
+            if (sequence.count == count && std::equal(words, words + count, heap_.begin() + sequence.address))
+                return sequence.address;
         }
         if (used_ + count > static_cast<int>(heap_.size())) return -1;
         std::copy(words, words + count, heap_.begin() + used_);
         sequences_[slot] = {used_, count};
         Pattern pattern{};
-        for (int i = 0; i < std::min(count, 16); ++i) pattern.bits[i >> 2] |= static_cast<std::uint64_t>(words[i]) << (16 * i & 48);
+        for (int i = 0; i < std::min(count, 16); ++i)
+            pattern.bits[i >> 2] |= static_cast<std::uint64_t>(words[i]) << (16 * i & 48);
         patterns_[count].push_back(pattern);
         used_ += count;
         return sequences_[slot].address;

@@ -3,9 +3,11 @@
 #include <algorithm>
 
 // Each loop is compiled for every processor, and once more for those with AVX2; the program takes the better one. The
-// values are the same. Sanitizers cannot instrument the choice, and other compilers than GCC for x86-64 do not offer it.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__) && !defined(COLONNADE_LIVE_ONE_PROCESSOR)
+// values are the same. Sanitizers cannot instrument the choice, and other compilers than GCC for x86-64 do not offer
+// it.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__) && \
+    defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && \
+    !defined(COLONNADE_LIVE_ONE_PROCESSOR)
 #define FOR_PROCESSORS __attribute__((target_clones("avx2", "default")))
 #else
 #define FOR_PROCESSORS
@@ -40,11 +42,13 @@ template <int n> INLINE void sums(const Cells& cells, std::int32_t sum[3], std::
     }
 }
 
-template <int n> INLINE void covariance(const Cells& cells, const Point& about, const std::int16_t* mask, std::int32_t out[6]) {
+template <int n>
+INLINE void covariance(const Cells& cells, const Point& about, const std::int16_t* mask, std::int32_t out[6]) {
     alignas(64) std::int16_t u[3][n];
     for (int a = 0; a < 3; ++a) {
         const std::int16_t middle = static_cast<std::int16_t>(about.at[a]);
-        for (int i = 0; i < n; ++i) u[a][i] = static_cast<std::int16_t>((static_cast<std::int16_t>(cells.axis[a][i] - middle) >> 1) & mask[i]);
+        for (int i = 0; i < n; ++i)
+            u[a][i] = static_cast<std::int16_t>((static_cast<std::int16_t>(cells.axis[a][i] - middle) >> 1) & mask[i]);
     }
     const auto product = [&](int a, int b) __attribute__((always_inline)) {
         std::int32_t sum = 0;
@@ -59,7 +63,8 @@ template <int n> INLINE void covariance(const Cells& cells, const Point& about, 
     out[5] = product(1, 2);
 }
 
-template <int n> INLINE Cluster split(const Cells& cells, const std::int16_t axis[3], std::int32_t threshold, std::int16_t* mask) {
+template <int n>
+INLINE Cluster split(const Cells& cells, const std::int16_t axis[3], std::int32_t threshold, std::int16_t* mask) {
     const std::int16_t ax = axis[0], ay = axis[1], az = axis[2];
     const std::int16_t *x = cells.axis[0], *y = cells.axis[1], *z = cells.axis[2];
     for (int i = 0; i < n; ++i) mask[i] = static_cast<std::int16_t>(-(ax * x[i] + ay * y[i] + az * z[i] > threshold));
@@ -111,7 +116,8 @@ template <int n> INLINE void four(const Cells& cells, const Point c[4], Cluster 
         for (int i = 0; i < n; ++i) which[i] = static_cast<std::uint8_t>(choice[i]);
 }
 
-template <int n> INLINE int addition(const std::int32_t* have, const std::int32_t* candidates, int count, std::int64_t& sum) {
+template <int n>
+INLINE int addition(const std::int32_t* have, const std::int32_t* candidates, int count, std::int64_t& sum) {
     int best = 0;
     std::int32_t least = INT32_MAX; // 256 saturated errors are below 2^25
     for (int k = 0; k < count; ++k) {
@@ -130,10 +136,12 @@ template <int n> INLINE int addition(const std::int32_t* have, const std::int32_
 } // namespace
 
 FOR_PROCESSORS int nearestEntry(const PaletteTable& palette, const Point& point) {
-    const std::int16_t x = static_cast<std::int16_t>(point.at[0]), y = static_cast<std::int16_t>(point.at[1]), z = static_cast<std::int16_t>(point.at[2]);
+    const std::int16_t x = static_cast<std::int16_t>(point.at[0]), y = static_cast<std::int16_t>(point.at[1]),
+                       z = static_cast<std::int16_t>(point.at[2]);
     alignas(64) std::int32_t keys[maxEntries];
     for (int i = 0; i < maxEntries; ++i) {
-        const std::int32_t distance = palette.half[i] - (palette.axis[0][i] * x + palette.axis[1][i] * y + palette.axis[2][i] * z);
+        const std::int32_t distance =
+            palette.half[i] - (palette.axis[0][i] * x + palette.axis[1][i] * y + palette.axis[2][i] * z);
         keys[i] = (distance >> 3) * maxEntries + i;
     }
     std::int32_t least = INT32_MAX;
@@ -166,7 +174,8 @@ FOR_PROCESSORS void covariances(const Cells& cells, const Point& about, const st
 #undef CALL
 }
 
-FOR_PROCESSORS Cluster above(const Cells& cells, const std::int16_t axis[3], std::int32_t threshold, std::int16_t* mask) {
+FOR_PROCESSORS Cluster
+    above(const Cells& cells, const std::int16_t axis[3], std::int32_t threshold, std::int16_t* mask) {
     Cluster cluster{};
 #define CALL(n) cluster = split<n>(cells, axis, threshold, mask)
     WITH_CELLS(cells.count, CALL)
@@ -180,7 +189,8 @@ FOR_PROCESSORS void nearestOfFour(const Cells& cells, const Point centres[4], Cl
 #undef CALL
 }
 
-FOR_PROCESSORS void planeErrors(const PlaneLine& line, const std::int32_t* w, const std::int32_t* metres, const std::int32_t* cap, std::int32_t* errors) {
+FOR_PROCESSORS void planeErrors(const PlaneLine& line, const std::int32_t* w, const std::int32_t* metres,
+                                const std::int32_t* cap, std::int32_t* errors) {
     for (int y = 0; y < 16; ++y) {
         const std::int32_t first = line.value + line.down * y;
         for (int x = 0; x < 16; ++x) {
@@ -201,7 +211,8 @@ FOR_PROCESSORS void sumSquares(const std::int32_t* fine, int edge, std::int32_t*
         }
 }
 
-FOR_PROCESSORS int bestAddition(const std::int32_t* have, const std::int32_t* candidates, int cells, int count, std::int64_t& sum) {
+FOR_PROCESSORS int bestAddition(const std::int32_t* have, const std::int32_t* candidates, int cells, int count,
+                                std::int64_t& sum) {
     int best = 0;
 #define CALL(n) best = addition<n>(have, candidates, count, sum)
     WITH_CELLS(cells, CALL)
@@ -218,14 +229,17 @@ FOR_PROCESSORS std::int64_t lowerErrors(std::int32_t* have, const std::int32_t* 
     return total;
 }
 
-// A quotient of whole numbers below 2^53, correctly rounded, is never rounded up to the next whole number here: the exact
-// one is below it by at least 1 / z, more than half a step of the quotient. So the result equals an integer division.
+// A quotient of whole numbers below 2^53, correctly rounded, is never rounded up to the next whole number here: the
+// exact one is below it by at least 1 / z, more than half a step of the quotient. So the result equals an integer
+// division.
 FOR_PROCESSORS void inverseDepth(const std::uint32_t* depth, int count, std::uint32_t unit, std::int32_t* w) {
     const double numerator = static_cast<double>(unit) * 4194304.0;
-    for (int i = 0; i < count; ++i) w[i] = static_cast<std::int32_t>(numerator / static_cast<double>(static_cast<std::int32_t>(depth[i])));
+    for (int i = 0; i < count; ++i)
+        w[i] = static_cast<std::int32_t>(numerator / static_cast<double>(static_cast<std::int32_t>(depth[i])));
 }
 
-FOR_PROCESSORS void errorScales(const std::uint32_t* depth, const std::uint16_t* lengths, int count, int shift, std::int32_t* metres, std::int32_t* cap) {
+FOR_PROCESSORS void errorScales(const std::uint32_t* depth, const std::uint16_t* lengths, int count, int shift,
+                                std::int32_t* metres, std::int32_t* cap) {
     for (int i = 0; i < count; ++i) {
         const std::uint64_t square = (static_cast<std::uint64_t>(depth[i]) * depth[i]) >> 16;
         const std::uint64_t scale = (square * lengths[i]) >> shift;

@@ -1,5 +1,6 @@
 /// Inner loops of the live encoder, for the compiler to vectorise. All arithmetic is on integers, without overflow, so
-/// a loop gives the same values in any order and with any vectors. kernels.cpp compiles each loop for several processors.
+/// a loop gives the same values in any order and with any vectors. kernels.cpp compiles each loop for several
+/// processors.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +25,8 @@ struct Cluster {
     std::int32_t count, sum[3];
 };
 
-/// A palette as the search reads it: coordinates, and half of the squared length. Entries beyond the palette are far away.
+/// A palette as the search reads it: coordinates, and half of the squared length. Entries beyond the palette are far
+/// away.
 struct PaletteTable {
     alignas(64) std::int16_t axis[3][maxEntries];
     alignas(64) std::int32_t half[maxEntries];
@@ -36,11 +38,12 @@ int nearestEntry(const PaletteTable& palette, const Point& point);
 /// Sum of the points, and sum of their squared lengths.
 void sumCells(const Cells& cells, std::int32_t sum[3], std::int64_t& squares);
 
-/// Means of 2×2 cells of a square of `edge` by `edge` cells, and the sum of squared distances from them, to 1/64 squared code
-/// a mean. The means of pixels are exact down to 4×4 pixels.
+/// Means of 2×2 cells of a square of `edge` by `edge` cells, and the sum of squared distances from them, to 1/64
+/// squared code a mean. The means of pixels are exact down to 4×4 pixels.
 std::int64_t halveCells(const std::int16_t* fine, int edge, std::int16_t* coarse);
 
-/// Covariances xx, yy, zz, xy, xz, yz of the points about a point, in half codes (1/8): sums over cells whose mask is -1.
+/// Covariances xx, yy, zz, xy, xz, yz of the points about a point, in half codes (1/8): sums over cells whose mask is
+/// -1.
 void covariances(const Cells& cells, const Point& about, const std::int16_t* mask, std::int32_t out[6]);
 
 /// The cluster of the points whose product with `axis` is above `threshold`; their mask is -1, the others' 0.
@@ -54,7 +57,8 @@ void nearestOfFour(const Cells& cells, const Point centres[4], Cluster clusters[
 struct PlaneLine {
     std::int32_t value, across, down;
 };
-void planeErrors(const PlaneLine& line, const std::int32_t* w, const std::int32_t* metres, const std::int32_t* cap, std::int32_t* errors);
+void planeErrors(const PlaneLine& line, const std::int32_t* w, const std::int32_t* metres, const std::int32_t* cap,
+                 std::int32_t* errors);
 
 /// Sums of 2×2 errors of a square of `edge` by `edge` cells.
 void sumSquares(const std::int32_t* fine, int edge, std::int32_t* coarse);
@@ -69,6 +73,7 @@ std::int64_t lowerErrors(std::int32_t* have, const std::int32_t* other, int cell
 void inverseDepth(const std::uint32_t* depth, int count, std::uint32_t unit, std::int32_t* w);
 
 /// Errors of one pixel a unit of w, 2^-9 m, and the difference of w that costs half a metre.
-void errorScales(const std::uint32_t* depth, const std::uint16_t* lengths, int count, int shift, std::int32_t* metres, std::int32_t* cap);
+void errorScales(const std::uint32_t* depth, const std::uint16_t* lengths, int count, int shift, std::int32_t* metres,
+                 std::int32_t* cap);
 
 } // namespace colonnade::live

@@ -9,8 +9,8 @@
 extern "C" {
 #endif
 
-/* Sizes of the maps and their memories, as in the section physicalAttributeMemory of a configuration. Tiles have 16 by 16
- * pixels. */
+/* Sizes of the maps and their memories, as in the section physicalAttributeMemory of a configuration. Tiles have 16 by
+ * 16 pixels. */
 typedef struct {
     int32_t width, height;               /* pixels, up to 4096 */
     int32_t palette_size, heap_words;    /* of the albedo map, and of the normal map; up to 256 and 8192 */
@@ -22,30 +22,31 @@ typedef struct {
  * repeats the last column and row. */
 typedef struct {
     const uint8_t* albedo;   /* three bytes a pixel, sRGB */
-    const uint8_t* normals;  /* three bytes a pixel, n * 127.5 + 127.5 in camera space: x right, y up, z towards the viewer */
+    const uint8_t*
+        normals;  /* three bytes a pixel, n * 127.5 + 127.5 in camera space: x right, y up, z towards the viewer */
     const uint32_t* depth;   /* along the optical axis, steps of 2^-16 m */
     double fx, fy, cx, cy;   /* pixels */
     double to_world[12];     /* view space (x right, y down, z forward) to world, three rows of four */
-    double tolerance;        /* of planes, metres: 0.006 for exact depth, about three times the sensor's noise otherwise */
+    double tolerance; /* of planes, metres: 0.006 for exact depth, about three times the sensor's noise otherwise */
 } colonnade_live_frame;
 
 typedef struct {
     uint32_t* descriptors; /* tiles */
-    uint64_t* palette;     /* palette_size */
-    uint16_t* heap;        /* heap_words */
+    uint64_t* palette; /* palette_size */
+    uint16_t* heap; /* heap_words */
 } colonnade_live_vectors;
 
 /* What an encoder writes; the caller owns the arrays. */
 typedef struct {
     colonnade_live_vectors albedo, normals;
     uint16_t* plane_descriptors; /* tiles */
-    uint64_t* planes;            /* planes */
-    uint16_t* plane_heap;        /* plane_heap_words */
-    uint64_t* bounding;          /* 3 * bounding_planes */
-    float* tile_error;           /* tiles: 90th percentile of the error of their depth, metres along the view rays */
-    float* tile_nearest;         /* tiles: least and largest depth of the planes, metres along the optical axis */
+    uint64_t* planes; /* planes */
+    uint16_t* plane_heap; /* plane_heap_words */
+    uint64_t* bounding; /* 3 * bounding_planes */
+    float* tile_error; /* tiles: 90th percentile of the error of their depth, metres along the view rays */
+    float* tile_nearest; /* tiles: least and largest depth of the planes, metres along the optical axis */
     float* tile_furthest;
-    double depth_unit;           /* metres */
+    double depth_unit; /* metres */
 } colonnade_live_maps;
 
 typedef struct colonnade_live colonnade_live;

@@ -47,7 +47,8 @@ private:
     std::vector<std::uint16_t> fields_, points_;
 };
 
-/// The storage of normals: unit vectors in view space, y down and z forward; the codes have y up and z towards the viewer.
+/// The storage of normals: unit vectors in view space, y down and z forward; the codes have y up and z towards the
+/// viewer.
 class NormalFields {
 public:
     /// New surfaces come into view with normals of their own, and walls fill their tiles with one.
@@ -112,20 +113,26 @@ public:
             if (sums[i].weight == 0) unused.push_back(i);
             else entries_[i] = mean(sums[i]);
         }
-        std::stable_sort(misfits.begin(), misfits.end(), [](const Misfit& a, const Misfit& b) { return a.error > b.error; });
-        for (std::size_t i = 0; i < unused.size() && i < misfits.size() && misfits[i].error > 0; ++i) entries_[unused[i]] = misfits[i].mean;
+        std::stable_sort(misfits.begin(), misfits.end(),
+                         [](const Misfit& a, const Misfit& b) { return a.error > b.error; });
+        for (std::size_t i = 0; i < unused.size() && i < misfits.size() && misfits[i].error > 0; ++i)
+            entries_[unused[i]] = misfits[i].mean;
     }
 
     /// Rotates all entries, which are directions, by a rotation in steps of 2^-14.
     void rotate(const std::int32_t rotation[9]) {
         for (Point& entry : entries_) {
             Point rotated;
-            for (int a = 0; a < 3; ++a) rotated.at[a] = divideRounded(product(Point{{rotation[3 * a], rotation[3 * a + 1], rotation[3 * a + 2]}}, entry), 1 << 14);
-            for (int a = 0; a < 3; ++a) entry.at[a] = std::clamp(rotated.at[a], -NormalFields::length, NormalFields::length);
+            for (int a = 0; a < 3; ++a)
+                rotated.at[a] = divideRounded(
+                    product(Point{{rotation[3 * a], rotation[3 * a + 1], rotation[3 * a + 2]}}, entry), 1 << 14);
+            for (int a = 0; a < 3; ++a)
+                entry.at[a] = std::clamp(rotated.at[a], -NormalFields::length, NormalFields::length);
         }
     }
 
-    /// Fits the entries to the cells of a level of all tiles: seeds as far as possible from each other, then Lloyd's steps.
+    /// Fits the entries to the cells of a level of all tiles: seeds as far as possible from each other, then Lloyd's
+    /// steps.
     void fit(const std::vector<TileSums>& tiles) {
         const std::vector<Bin> bins = histogram(tiles);
         std::vector<std::int64_t> distance(bins.size(), INT32_MAX);
@@ -137,7 +144,8 @@ public:
             std::int64_t most = -1;
             Point farthest = seed;
             for (std::size_t b = 0; b < bins.size(); ++b) {
-                const Point difference{{bins[b].mean.at[0] - seed.at[0], bins[b].mean.at[1] - seed.at[1], bins[b].mean.at[2] - seed.at[2]}};
+                const Point difference{{bins[b].mean.at[0] - seed.at[0], bins[b].mean.at[1] - seed.at[1],
+                                        bins[b].mean.at[2] - seed.at[2]}};
                 distance[b] = std::min(distance[b], product(difference, difference));
                 const std::int64_t weighted = distance[b] * (bins[b].sums.weight >> 8);
                 if (weighted > most) {

@@ -28,12 +28,15 @@ struct PlaneOutput {
 class PlaneMap {
 public:
     PlaneMap(int width, int height, int columns, int rows, int planes, int heapWords, int boundingPlanes)
-        : planes_(planes), boundingPlanes_(boundingPlanes), blocks_(width, height, columns, rows), regions_(std::min(planes - 1, maxPlanes - 1), columns, rows),
-          tiles_(columns, rows, heapWords), near_(static_cast<std::size_t>(columns) * rows) {}
+        : planes_(planes), boundingPlanes_(boundingPlanes), blocks_(width, height, columns, rows),
+          regions_(std::min(planes - 1, maxPlanes - 1), columns, rows), tiles_(columns, rows, heapWords),
+          near_(static_cast<std::size_t>(columns) * rows) {}
 
     /// Encodes a frame: depth in steps of 2^-16 m, colours of three bytes a pixel in sRGB.
-    void encode(const std::uint32_t* depth, const std::uint8_t* colours, const ColourFields& fields, const Camera& camera, double toleranceMetres, PlaneOutput& output) {
-        const std::int64_t tolerance = std::max<std::int64_t>(1, static_cast<std::int64_t>(toleranceMetres * (1 << errorBits)));
+    void encode(const std::uint32_t* depth, const std::uint8_t* colours, const ColourFields& fields,
+                const Camera& camera, double toleranceMetres, PlaneOutput& output) {
+        const std::int64_t tolerance =
+            std::max<std::int64_t>(1, static_cast<std::int64_t>(toleranceMetres * (1 << errorBits)));
         const double unitBefore = blocks_.unit();
         blocks_.read(depth, camera);
         if (isWarm_) move(camera, unitBefore);
@@ -62,7 +65,8 @@ private:
         for (int id = 0; id < maxPlanes; ++id) {
             if (table_.area[id] == 0) continue;
             DualVector dual = dualOf(table_.planes[id], camera_, blocks_.width(), blocks_.height(), unitBefore);
-            if (motion.apply(dual)) table_.planes[id] = planeOf(dual, camera, blocks_.width(), blocks_.height(), blocks_.unit());
+            if (motion.apply(dual))
+                table_.planes[id] = planeOf(dual, camera, blocks_.width(), blocks_.height(), blocks_.unit());
             else table_.area[id] = 0;
         }
     }
@@ -74,10 +78,12 @@ private:
             std::vector<std::uint8_t>& ids = near_[tile];
             ids.clear();
             const auto add = [&](int id) {
-                if (id >= 0 && std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(static_cast<std::uint8_t>(id));
+                if (id >= 0 && std::find(ids.begin(), ids.end(), id) == ids.end())
+                    ids.push_back(static_cast<std::uint8_t>(id));
             };
             for (int k = 0; k < tiles_.count(static_cast<int>(tile)); ++k) add(tiles_.id(static_cast<int>(tile), k));
-            const int first = static_cast<int>(tile) / tiles_.columns() * 4 * across + static_cast<int>(tile) % tiles_.columns() * 4;
+            const int first =
+                static_cast<int>(tile) / tiles_.columns() * 4 * across + static_cast<int>(tile) % tiles_.columns() * 4;
             for (int j = 0; j < 4; ++j)
                 for (int i = 0; i < 4; ++i) add(regions_.labels()[first + j * across + i]);
         }
@@ -90,7 +96,8 @@ private:
             std::uint8_t ids[256];
             tiles_.owners(tile, ids);
             const auto seen = [&](int x, int y) { // w, at most 16
-                const std::int64_t w = table_.planes[ids[16 * y + x]].at(2 * (left + x) + 1 - blocks_.width(), 2 * (top + y) + 1 - blocks_.height());
+                const std::int64_t w = table_.planes[ids[16 * y + x]].at(2 * (left + x) + 1 - blocks_.width(),
+                                                                         2 * (top + y) + 1 - blocks_.height());
                 return static_cast<std::int32_t>(std::clamp<std::int64_t>(w >> (planeBits - wBits), 0, 1 << 26));
             };
             std::int32_t errors[64], most = 0, least = 1 << 26;
@@ -115,13 +122,16 @@ private:
     }
 
     /// The bounding planes: a wall behind the camera, then the largest planes that nearly nothing lies beyond.
-    void bound(const std::uint8_t* colours, const ColourFields& fields, const Camera& camera, PlaneOutput& output) const {
+    void bound(const std::uint8_t* colours, const ColourFields& fields, const Camera& camera,
+               PlaneOutput& output) const {
         std::fill(output.bounding, output.bounding + 3 * boundingPlanes_, std::uint64_t{0});
         const int across = blocks_.blockColumns(), stride = 4 * across;
-        std::vector<std::int64_t> sums(4 * (maxPlanes + 1)); // linear fields of the blocks of each plane; the last: of all
+        std::vector<std::int64_t> sums(4 *
+                                       (maxPlanes + 1)); // linear fields of the blocks of each plane; the last: of all
         for (int row = 0; row < blocks_.blockRows(); row += 2)
             for (int column = 0; column < across; column += 2) {
-                const std::uint8_t* code = colours + 3 * (static_cast<std::size_t>(4 * row + 2) * stride + 4 * column + 2);
+                const std::uint8_t* code =
+                    colours + 3 * (static_cast<std::size_t>(4 * row + 2) * stride + 4 * column + 2);
                 Point point{{code[0] * 16, code[1] * 16, code[2] * 16}};
                 const std::uint64_t word = fields.word(point);
                 const int label = regions_.labels()[row * across + column];
@@ -136,8 +146,11 @@ private:
             std::uint64_t* words = output.bounding + 3 * entries++;
             std::uint64_t albedo = 0, direction = 0;
             for (int a = 0; a < 3; ++a) {
-                albedo |= static_cast<std::uint64_t>(divideRounded(sums[4 * owner + a], std::max<std::int64_t>(1, sums[4 * owner + 3]))) << fieldBits * a;
-                direction |= (static_cast<std::uint64_t>(Plane::whole(normal[a] * NormalFields::one)) & fieldMask) << fieldBits * a;
+                albedo |= static_cast<std::uint64_t>(
+                              divideRounded(sums[4 * owner + a], std::max<std::int64_t>(1, sums[4 * owner + 3])))
+                          << fieldBits * a;
+                direction |= (static_cast<std::uint64_t>(Plane::whole(normal[a] * NormalFields::one)) & fieldMask)
+                             << fieldBits * a;
             }
             words[0] = planeWord(plane);
             words[1] = albedo | direction << 36;
@@ -156,7 +169,8 @@ private:
             square = square + dual.q[2] * dual.q[2];
             const double length = std::sqrt(square);
             if (!(length > 0) || sums[4 * id + 3] == 0) continue;
-            // A block lies beyond by more than 5 cm if (q · P - 1) / |q| does; q · P is w on the plane by w of the block
+            // A block lies beyond by more than 5 cm if (q · P - 1) / |q| does; q · P is w on the plane by w of the
+            // block
             const std::int64_t reach = static_cast<std::int64_t>((1 + std::min(0.05 * length, 1000.0)) * 65536);
             int beyond = 0, seen = 0;
             for (int row = 0; row < blocks_.blockRows(); row += 2)

@@ -21,15 +21,18 @@ class PlaneTiles {
 public:
     PlaneTiles(int columns, int rows, int heapWords)
         : columns_(columns), rows_(rows), heapWords_(heapWords), tiles_(static_cast<std::size_t>(columns) * rows),
-          modes_{std::vector<std::int64_t>(tiles_.size() * planeModes), planeWords, planeModes}, selected_(tiles_.size()), heap_(heapWords) {}
+          modes_{std::vector<std::int64_t>(tiles_.size() * planeModes), planeWords, planeModes},
+          selected_(tiles_.size()), heap_(heapWords) {}
 
     /// Chooses the planes of all tiles; the table's are the device's.
-    void choose(const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table, std::int64_t tolerance, std::uint16_t* descriptors,
-                std::uint16_t* heap) {
+    void choose(const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table,
+                std::int64_t tolerance, std::uint16_t* descriptors, std::uint16_t* heap) {
         const std::vector<std::uint8_t> bySize = table.bySize();
         const std::int64_t least = budget_.price() * 5 / 8;
-        for (int tile = 0; tile < static_cast<int>(tiles_.size()); ++tile) fit(tile, blocks, labels, table, bySize, tolerance, least);
-        budget_.fill(modes_, heap_, heapWords_, [&](int tile, int mode) { return store(tile, mode, descriptors[tile]); });
+        for (int tile = 0; tile < static_cast<int>(tiles_.size()); ++tile)
+            fit(tile, blocks, labels, table, bySize, tolerance, least);
+        budget_.fill(modes_, heap_, heapWords_,
+                     [&](int tile, int mode) { return store(tile, mode, descriptors[tile]); });
         std::copy(heap_.words().begin(), heap_.words().end(), heap);
     }
 
@@ -39,9 +42,15 @@ public:
     int count(int tile) const { return planesOf[selected_[tile]]; }
     std::uint8_t id(int tile, int k) const { return tiles_[tile].ids[planesOf[selected_[tile]] / 2][k]; }
     void owners(int tile, std::uint8_t* ids) const {
-        const int mode = selected_[tile], set = planesOf[mode] / 2, edge = mode == 0 ? 1 : planeCells[mode] == 16 ? 4 : planeCells[mode] == 64 ? 8 : 16;
+        const int mode = selected_[tile], set = planesOf[mode] / 2,
+                  edge = mode == 0                ? 1
+                         : planeCells[mode] == 16 ? 4
+                         : planeCells[mode] == 64 ? 8
+                                                  : 16;
         for (int y = 0; y < 16; ++y)
-            for (int x = 0; x < 16; ++x) ids[16 * y + x] = tiles_[tile].ids[set][mode == 0 ? 0 : which(tile, mode, (y * edge / 16) * edge + x * edge / 16)];
+            for (int x = 0; x < 16; ++x)
+                ids[16 * y + x] =
+                    tiles_[tile].ids[set][mode == 0 ? 0 : which(tile, mode, (y * edge / 16) * edge + x * edge / 16)];
     }
 
 private:
@@ -51,10 +60,12 @@ private:
         std::uint8_t members[2][16 + 64 + 256];
     };
     static constexpr int startOf(int cells) { return cells == 16 ? 0 : cells == 64 ? 16 : 80; }
-    int which(int tile, int mode, int cell) const { return tiles_[tile].members[planesOf[mode] / 4][startOf(planeCells[mode]) + cell]; }
+    int which(int tile, int mode, int cell) const {
+        return tiles_[tile].members[planesOf[mode] / 4][startOf(planeCells[mode]) + cell];
+    }
 
-    void fit(int number, const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table, const std::vector<std::uint8_t>& bySize,
-             std::int64_t tolerance, std::int64_t least) {
+    void fit(int number, const DepthBlocks& blocks, const std::vector<std::int32_t>& labels, const PlaneTable& table,
+             const std::vector<std::uint8_t>& bySize, std::int64_t tolerance, std::int64_t least) {
         const int column = number % columns_, row = number / columns_, across = blocks.blockColumns();
         Tile& tile = tiles_[number];
         std::int64_t* costs = modes_.of(number);
@@ -85,10 +96,12 @@ private:
         for (int j = -3; j < 7; ++j)
             for (int i = -3; i < 7; ++i) {
                 const int y = 4 * row + j, x = 4 * column + i;
-                if ((i >= 0 && i < 4 && j >= 0 && j < 4) || x < 0 || y < 0 || x >= across || y >= blocks.blockRows()) continue;
+                if ((i >= 0 && i < 4 && j >= 0 && j < 4) || x < 0 || y < 0 || x >= across || y >= blocks.blockRows())
+                    continue;
                 vote(labels[y * across + x], i >= -1 && i <= 4 && j >= -1 && j <= 4 ? 2 : 1);
             }
-        for (std::size_t i = 0; count == 0 && i < bySize.size() && i < maxCandidates; ++i) vote(bySize[i], 1), count = static_cast<int>(i) + 1;
+        for (std::size_t i = 0; count == 0 && i < bySize.size() && i < maxCandidates; ++i)
+            vote(bySize[i], 1), count = static_cast<int>(i) + 1;
         if (count == 0) { // no plane at all
             tile.ids[0][0] = 0;
             costs[0] = 0;
@@ -103,8 +116,11 @@ private:
         std::int64_t leastSum = impossible;
         for (int k = 0; k < count; ++k) {
             const Plane& plane = table.planes[candidates[k]];
-            const auto limited = [](std::int64_t value, std::int64_t limit) { return static_cast<std::int32_t>(std::clamp(value, -limit, limit)); };
-            const PlaneLine line{limited(plane.at(left, top) >> 6, 1 << 30), limited(plane.a >> 5, 1 << 24), limited(plane.b >> 5, 1 << 24)};
+            const auto limited = [](std::int64_t value, std::int64_t limit) {
+                return static_cast<std::int32_t>(std::clamp(value, -limit, limit));
+            };
+            const PlaneLine line{limited(plane.at(left, top) >> 6, 1 << 30), limited(plane.a >> 5, 1 << 24),
+                                 limited(plane.b >> 5, 1 << 24)};
             planeErrors(line, w, metres, cap, &fine_[256 * k]);
             sumSquares(&fine_[256 * k], 16, &middle_[64 * k]);
             sumSquares(&middle_[64 * k], 8, &coarse_[16 * k]);
@@ -158,7 +174,8 @@ private:
             };
             costs[set == 1 ? 1 : 3] = assign(coarse_, 16);
             const std::int64_t cost = costs[set == 1 ? 2 : 4] = assign(middle_, 64);
-            if (cost > least * (planeWords[set == 1 ? 5 : 6] - planeWords[set == 1 ? 2 : 4])) costs[set == 1 ? 5 : 6] = assign(fine_, 256);
+            if (cost > least * (planeWords[set == 1 ? 5 : 6] - planeWords[set == 1 ? 2 : 4]))
+                costs[set == 1 ? 5 : 6] = assign(fine_, 256);
             if (cost <= least * (planeWords[3] - planeWords[1])) break;
         }
     }
@@ -174,7 +191,8 @@ private:
         std::uint16_t words[34] = {};
         words[0] = static_cast<std::uint16_t>(own.ids[set][0] | own.ids[set][1] << 8);
         if (set == 2) words[1] = static_cast<std::uint16_t>(own.ids[set][2] | own.ids[set][3] << 8);
-        for (int i = 0; i < cells; ++i) words[set + (i * set >> 4)] |= static_cast<std::uint16_t>(which(tile, mode, i) << (i * set & 15));
+        for (int i = 0; i < cells; ++i)
+            words[set + (i * set >> 4)] |= static_cast<std::uint16_t>(which(tile, mode, i) << (i * set & 15));
         const int pointer = heap_.put(words, planeWords[mode]);
         if (pointer < 0) return false;
         descriptor = static_cast<std::uint16_t>(mode | pointer << 3);

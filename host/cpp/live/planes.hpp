@@ -14,14 +14,16 @@ constexpr std::uint32_t leastDepth = 1 << 6, largestDepth = 1u << 28;
 /// Metres in the encoder's errors: steps of 2^-17 m.
 constexpr int errorBits = 17;
 
-/// w = a · X + b · Y + c with 34 fraction bits. X and Y are twice the distance from the picture's centre in pixels: odd at
-/// the centres of pixels, even at their corners.
+/// w = a · X + b · Y + c with 34 fraction bits. X and Y are twice the distance from the picture's centre in pixels: odd
+/// at the centres of pixels, even at their corners.
 struct Plane {
     std::int64_t a = 0, b = 0, c = 0;
 
     std::int64_t at(std::int64_t x, std::int64_t y) const { return a * x + b * y + c; }
 
-    static std::int64_t whole(double value) { return static_cast<std::int64_t>(std::floor(std::clamp(value, -4e12, 4e12) + 0.5)); }
+    static std::int64_t whole(double value) {
+        return static_cast<std::int64_t>(std::floor(std::clamp(value, -4e12, 4e12) + 0.5));
+    }
 };
 
 /// The word of a plane (docs/background.md); `plane` becomes the plane of this word.
@@ -29,7 +31,9 @@ inline std::uint64_t planeWord(Plane& plane) {
     // A and B are slopes per 1024 pixels = 2048 half pixels, so their fields are a >> (1 + e); C's is c >> (12 + e)
     std::int64_t* const values[3] = {&plane.a, &plane.b, &plane.c};
     const int shifts[3] = {planeBits - 22 - 11, planeBits - 22 - 11, planeBits - 22};
-    const auto field = [&](int i, int e) { return (*values[i] + (std::int64_t{1} << (shifts[i] + e - 1))) >> (shifts[i] + e); };
+    const auto field = [&](int i, int e) {
+        return (*values[i] + (std::int64_t{1} << (shifts[i] + e - 1))) >> (shifts[i] + e);
+    };
     constexpr std::int64_t half = 1 << 19;
     int exponent = 0;
     for (; exponent < 15; ++exponent) {
@@ -64,17 +68,20 @@ struct PlaneSums {
         blocks += o.blocks;
     }
 
-    /// The plane of least squares; false if the pixels lie on a line. Additions, products and quotients of doubles in this
-    /// order, none of them fused, so the plane is the same on every processor.
+    /// The plane of least squares; false if the pixels lie on a line. Additions, products and quotients of doubles in
+    /// this order, none of them fused, so the plane is the same on every processor.
     bool solve(Plane& plane) const {
-        const double count = static_cast<double>(n), meanX = static_cast<double>(x) / count, meanY = static_cast<double>(y) / count,
-                     meanW = static_cast<double>(w) / count;
-        const double varianceX = static_cast<double>(xx) / count - meanX * meanX, varianceY = static_cast<double>(yy) / count - meanY * meanY;
+        const double count = static_cast<double>(n), meanX = static_cast<double>(x) / count,
+                     meanY = static_cast<double>(y) / count, meanW = static_cast<double>(w) / count;
+        const double varianceX = static_cast<double>(xx) / count - meanX * meanX,
+                     varianceY = static_cast<double>(yy) / count - meanY * meanY;
         const double mixed = static_cast<double>(xy) / count - meanX * meanY;
-        const double alongX = static_cast<double>(xw) / count - meanX * meanW, alongY = static_cast<double>(yw) / count - meanY * meanW;
+        const double alongX = static_cast<double>(xw) / count - meanX * meanW,
+                     alongY = static_cast<double>(yw) / count - meanY * meanW;
         const double determinant = varianceX * varianceY - mixed * mixed;
         if (!(determinant > 1.0)) return false;
-        const double a = (alongX * varianceY - alongY * mixed) / determinant, b = (alongY * varianceX - alongX * mixed) / determinant;
+        const double a = (alongX * varianceY - alongY * mixed) / determinant,
+                     b = (alongY * varianceX - alongX * mixed) / determinant;
         const double c = (meanW - a * meanX) - b * meanY;
         constexpr double scale = 1 << (planeBits - wBits);
         plane = {Plane::whole(a * scale), Plane::whole(b * scale), Plane::whole(c * scale)};
@@ -104,7 +111,8 @@ inline Plane planeOf(const DualVector& dual, const Camera& camera, int width, in
     const double a = dual.q[0] / camera.fx, b = dual.q[1] / camera.fy;
     const double middle = dual.q[2] + a * (width / 2.0 - camera.cx);
     const double scale = (std::int64_t{1} << planeBits) * unit;
-    return {Plane::whole(a / 2 * scale), Plane::whole(b / 2 * scale), Plane::whole((middle + b * (height / 2.0 - camera.cy)) * scale)};
+    return {Plane::whole(a / 2 * scale), Plane::whole(b / 2 * scale),
+            Plane::whole((middle + b * (height / 2.0 - camera.cy)) * scale)};
 }
 
 /// How the view of one camera becomes another's: P' = rotation · (P - move).

@@ -32,13 +32,16 @@ struct PlaneTable {
 class RegionFinder {
 public:
     /// At most `most` planes, 1 to 127; `columns` tiles in a row.
-    RegionFinder(int most, int columns, int rows) : most_(most), columns_(columns), rows_(rows), labels_(static_cast<std::size_t>(16) * columns * rows) {}
+    RegionFinder(int most, int columns, int rows)
+        : most_(most), columns_(columns), rows_(rows), labels_(static_cast<std::size_t>(16) * columns * rows) {}
 
     /// The plane of each block, or `noPlane`.
     const std::vector<std::int32_t>& labels() const { return labels_; }
 
-    /// Updates the table, whose planes are in this frame's view already. `near[t]` are ids that tile t may show; tolerance in steps of 2^-17 m.
-    void find(const DepthBlocks& blocks, std::int64_t tolerance, const std::vector<std::vector<std::uint8_t>>& near, PlaneTable& table) {
+    /// Updates the table, whose planes are in this frame's view already. `near[t]` are ids that tile t may show;
+    /// tolerance in steps of 2^-17 m.
+    void find(const DepthBlocks& blocks, std::int64_t tolerance, const std::vector<std::vector<std::uint8_t>>& near,
+              PlaneTable& table) {
         std::fill(labels_.begin(), labels_.end(), noPlane);
         regions_.assign(maxPlanes, Region{});
         keep(blocks, 2 * tolerance, near, table);
@@ -54,7 +57,8 @@ private:
     };
 
     /// Blocks take a plane of the frame before that a tile around them showed.
-    void keep(const DepthBlocks& blocks, std::int64_t reach, const std::vector<std::vector<std::uint8_t>>& near, const PlaneTable& table) {
+    void keep(const DepthBlocks& blocks, std::int64_t reach, const std::vector<std::vector<std::uint8_t>>& near,
+              const PlaneTable& table) {
         for (int row = 0; row < rows_; ++row)
             for (int column = 0; column < columns_; ++column) {
                 std::uint8_t ids[64];
@@ -103,7 +107,8 @@ private:
             const std::int32_t tooSmall = maxTooSmall - pass; // does not seed a region of this pass again
             std::array<std::vector<int>, 16> bins;
             for (int block = 0; block < blocks.count(); ++block)
-                if (labels_[block] < 0 && blocks[block].residual < tolerance) bins[blocks[block].residual * 16 / tolerance].push_back(block);
+                if (labels_[block] < 0 && blocks[block].residual < tolerance)
+                    bins[blocks[block].residual * 16 / tolerance].push_back(block);
             for (const std::vector<int>& bin : bins)
                 for (const int seed : bin) {
                     if (labels_[seed] >= 0 || labels_[seed] == tooSmall) continue;
@@ -124,10 +129,13 @@ private:
                             refit *= 2;
                         }
                         const int x = block % across;
-                        const int neighbours[4] = {x > 0 ? block - 1 : -1, x + 1 < across ? block + 1 : -1, block - across, block + across};
+                        const int neighbours[4] = {x > 0 ? block - 1 : -1, x + 1 < across ? block + 1 : -1,
+                                                   block - across, block + across};
                         for (const int next : neighbours) {
-                            if (next < 0 || next >= blocks.count() || labels_[next] >= 0 || labels_[next] == tooSmall) continue;
-                            if (blocks[next].residual < tolerance && blocks.error(next, region.plane) * 2 < tolerance * 3) {
+                            if (next < 0 || next >= blocks.count() || labels_[next] >= 0 || labels_[next] == tooSmall)
+                                continue;
+                            if (blocks[next].residual < tolerance &&
+                                blocks.error(next, region.plane) * 2 < tolerance * 3) {
                                 labels_[next] = id;
                                 stack_.push_back(next);
                             }
@@ -158,7 +166,8 @@ private:
         std::vector<int> order, into(count, noPlane), kept;
         for (int i = 0; i < count; ++i)
             if (regions_[i].sums.blocks > 0) order.push_back(i);
-        std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return regions_[a].sums.blocks > regions_[b].sums.blocks; });
+        std::stable_sort(order.begin(), order.end(),
+                         [&](int a, int b) { return regions_[a].sums.blocks > regions_[b].sums.blocks; });
         for (const int i : order) {
             const int size = starts_[i + 1] - starts_[i], step = std::max(1, size / 12);
             const auto isOn = [&](const Plane& plane) {
@@ -191,7 +200,8 @@ private:
         std::vector<int> kept, closest(count, noPlane);
         for (int i = 0; i < count; ++i)
             if (into[i] == i) kept.push_back(i);
-        std::stable_sort(kept.begin(), kept.end(), [&](int a, int b) { return regions_[a].sums.blocks > regions_[b].sums.blocks; });
+        std::stable_sort(kept.begin(), kept.end(),
+                         [&](int a, int b) { return regions_[a].sums.blocks > regions_[b].sums.blocks; });
         if (static_cast<int>(kept.size()) > most_) {
             const int all = static_cast<int>(kept.size());
             std::vector<std::array<int, 4>> samples(all);
@@ -216,7 +226,8 @@ private:
                 for (int i = 0; i < all; ++i) {
                     if (isSelected[i]) continue;
                     std::int64_t error = 0;
-                    for (const int block : samples[i]) error += std::min(worst, blocks.error(block, regions_[kept[best]].plane));
+                    for (const int block : samples[i])
+                        error += std::min(worst, blocks.error(block, regions_[kept[best]].plane));
                     if (error / 4 < errors[i]) {
                         errors[i] = error / 4;
                         closest[kept[i]] = kept[best];

@@ -26,9 +26,11 @@ constexpr int vectorWords[vectorModes] = {0, 1, 4, 16, 2, 3, 9, 33};
 template <class Fields> class VectorMap {
 public:
     explicit VectorMap(const VectorSizes& sizes)
-        : sizes_(sizes), palette_(sizes.paletteSize), tiles_(sizes.tiles()), entries_(static_cast<std::size_t>(sizes.tiles()) * vectorModes),
-          modes_{std::vector<std::int64_t>(static_cast<std::size_t>(sizes.tiles()) * vectorModes), vectorWords, vectorModes}, selected_(sizes.tiles()),
-          heap_(sizes.heapWords) {
+        : sizes_(sizes), palette_(sizes.paletteSize), tiles_(sizes.tiles()),
+          entries_(static_cast<std::size_t>(sizes.tiles()) * vectorModes),
+          modes_{std::vector<std::int64_t>(static_cast<std::size_t>(sizes.tiles()) * vectorModes), vectorWords,
+                 vectorModes},
+          selected_(sizes.tiles()), heap_(sizes.heapWords) {
         std::fill(std::begin(all_), std::end(all_), std::int16_t{-1});
     }
 
@@ -37,14 +39,16 @@ public:
         const std::size_t stride = static_cast<std::size_t>(3) * sizes_.columns * sizes_.tileSize;
         for (int tile = 0; tile < sizes_.tiles(); ++tile) {
             const std::size_t row = tile / sizes_.columns, column = tile % sizes_.columns;
-            tiles_[tile].read(codes + row * sizes_.tileSize * stride + 3 * column * sizes_.tileSize, stride, sizes_.tileSize, Fields::space());
+            tiles_[tile].read(codes + row * sizes_.tileSize * stride + 3 * column * sizes_.tileSize, stride,
+                              sizes_.tileSize, Fields::space());
         }
         if (!isWarm_) palette_.fit(tiles_);
         else if (Fields::stepsFirst) palette_.step(tiles_);
         palette_.store(fields_, palette);
         const std::int64_t least = isWarm_ ? budget_.price() * 5 / 8 : 0;
         for (int tile = 0; tile < sizes_.tiles(); ++tile) fit(tile, least);
-        budget_.fill(modes_, heap_, sizes_.heapWords, [&](int tile, int mode) { return store(tile, mode, descriptors[tile]); });
+        budget_.fill(modes_, heap_, sizes_.heapWords,
+                     [&](int tile, int mode) { return store(tile, mode, descriptors[tile]); });
         std::memcpy(heap, heap_.words().data(), heap_.words().size() * sizeof(std::uint16_t));
         updatePalette();
         isWarm_ = true;
@@ -67,9 +71,11 @@ private:
         std::fill(costs, costs + vectorModes, impossible);
         std::int64_t cheapest = impossible;
         int words = 0;
-        // Whether finer cells or more entries than `cheapest` has may pay for a mode: even a perfect fit leaves what is within the cells
+        // Whether finer cells or more entries than `cheapest` has may pay for a mode: even a perfect fit leaves what is
+        // within the cells
         const auto mayPay = [&](int mode, int level) {
-            return cheapest == impossible || cheapest - sums.cost(sums.within(level)) > least * std::max(1, vectorWords[mode] - words);
+            return cheapest == impossible ||
+                   cheapest - sums.cost(sums.within(level)) > least * std::max(1, vectorWords[mode] - words);
         };
         const auto take = [&](int mode, std::int64_t cost) {
             costs[mode] = cost;
@@ -95,7 +101,8 @@ private:
     }
 
     std::int64_t costOf(const TileSums& sums, int level, std::int64_t explainedBy) const {
-        return sums.cost((std::max<std::int64_t>(sums.squares(level) - explainedBy, 0)) * sums.pixelsOf(level) + sums.within(level));
+        return sums.cost((std::max<std::int64_t>(sums.squares(level) - explainedBy, 0)) * sums.pixelsOf(level) +
+                         sums.within(level));
     }
 
     /// The two entries near the centres, once more near the means of their cells; the cost.
@@ -111,7 +118,8 @@ private:
             if (round > 0 && tried.at[0] == best.at[0] && tried.at[1] == best.at[1]) break;
             const Point &a = palette_[tried.at[0]], &b = palette_[tried.at[1]];
             taken_.assign(sums.cells(level), sums.sum(level).data(), a, b);
-            const std::int64_t triedCost = costOf(sums, level, explained(taken_.clusters[0], a) + explained(taken_.clusters[1], b));
+            const std::int64_t triedCost =
+                costOf(sums, level, explained(taken_.clusters[0], a) + explained(taken_.clusters[1], b));
             if (triedCost >= cost) break;
             cost = triedCost;
             best = tried;
@@ -159,10 +167,12 @@ private:
             // The first cell takes entry 0, so that equal patterns are equal words
             const std::int16_t flip = taken_.mask[0];
             Pattern pattern{};
-            for (int i = 0; i < cells; ++i) pattern.bits[i >> 6] |= static_cast<std::uint64_t>((taken_.mask[i] ^ flip) & 1) << (i & 63);
+            for (int i = 0; i < cells; ++i)
+                pattern.bits[i >> 6] |= static_cast<std::uint64_t>((taken_.mask[i] ^ flip) & 1) << (i & 63);
             const bool isSwapped = mode > 0 && share(sums, level, a, b, pattern);
             if ((flip != 0) != isSwapped) std::swap(own.at[0], own.at[1]);
-            for (int i = 0; i < std::max(1, cells / 16); ++i) words[i] = static_cast<std::uint16_t>(pattern.bits[i >> 2] >> (16 * i & 48));
+            for (int i = 0; i < std::max(1, cells / 16); ++i)
+                words[i] = static_cast<std::uint16_t>(pattern.bits[i >> 2] >> (16 * i & 48));
         } else {
             std::uint8_t rank[4], order[4] = {0, 1, 2, 3}, which[maxCells];
             std::stable_sort(order, order + 4, [&](int a, int b) { return own.at[a] < own.at[b]; });
@@ -176,23 +186,26 @@ private:
             Cluster clusters[4];
             nearestOfFour(sums.cells(level), points, clusters, which);
             words[0] = static_cast<std::uint16_t>(own.at[2] | own.at[3] << 8);
-            for (int i = 0; i < cells; ++i) words[1 + (i >> 3)] |= static_cast<std::uint16_t>(rank[which[i]] << (2 * i & 15));
+            for (int i = 0; i < cells; ++i)
+                words[1 + (i >> 3)] |= static_cast<std::uint16_t>(rank[which[i]] << (2 * i & 15));
         }
         const int pointer = mode == 0 ? words[0] : heap_.put(words, vectorWords[mode]);
         if (pointer < 0) return false;
-        descriptor = static_cast<std::uint32_t>(mode) | static_cast<std::uint32_t>(pointer) << 3 | static_cast<std::uint32_t>(own.at[0]) << 16 |
-                     static_cast<std::uint32_t>(own.at[1]) << 24;
+        descriptor = static_cast<std::uint32_t>(mode) | static_cast<std::uint32_t>(pointer) << 3 |
+                     static_cast<std::uint32_t>(own.at[0]) << 16 | static_cast<std::uint32_t>(own.at[1]) << 24;
         return true;
     }
 
-    /// Replaces a pattern by a stored one, or by its complement, if that costs less than its words. True for a complement.
+    /// Replaces a pattern by a stored one, or by its complement, if that costs less than its words. True for a
+    /// complement.
     bool share(const TileSums& sums, int level, const Point& a, const Point& b, Pattern& pattern) {
         const int cells = cellsOf(level), words = vectorWords[level];
         const std::int64_t most = budget_.price() * words;
         std::int32_t losses[maxCells]; // of a cell that takes the other entry, 1/256 squared code
         const std::int32_t lengths = static_cast<std::int32_t>(product(b, b) - product(a, a));
         const Point way{{b.at[0] - a.at[0], b.at[1] - a.at[1], b.at[2] - a.at[2]}};
-        for (int i = 0; i < cells; ++i) losses[i] = std::abs(lengths - 2 * static_cast<std::int32_t>(product(sums.point(level, i), way)));
+        for (int i = 0; i < cells; ++i)
+            losses[i] = std::abs(lengths - 2 * static_cast<std::int32_t>(product(sums.point(level, i), way)));
         Pattern best = pattern;
         bool isComplement = false;
         std::int64_t least = (most << costShift) / sums.weight() / sums.pixelsOf(level);
@@ -201,7 +214,8 @@ private:
                 std::int64_t loss = 0;
                 for (int part = 0; 64 * part < cells && loss < least; ++part) {
                     const std::uint64_t all = cells < 64 ? (std::uint64_t{1} << cells) - 1 : ~std::uint64_t{0};
-                    for (std::uint64_t other = (pattern.bits[part] ^ stored.bits[part] ^ (complement ? all : 0)); other != 0 && loss < least; other &= other - 1)
+                    for (std::uint64_t other = (pattern.bits[part] ^ stored.bits[part] ^ (complement ? all : 0));
+                         other != 0 && loss < least; other &= other - 1)
                         loss += losses[64 * part + __builtin_ctzll(other)];
                 }
                 if (loss >= least) continue;

@@ -1,8 +1,8 @@
 /// Cuts away what the alpha of a material does not show (docs/textures.md, "Alpha").
 ///
-/// A face whose texels are all below the cutoff is dropped. One with texels on both sides is split into four, the largest
-/// first, until its pieces are as small as a texel or there are too many. What is left is cut along a line, which is exact
-/// without a picture.
+/// A face whose texels are all below the cutoff is dropped. One with texels on both sides is split into four, the
+/// largest first, until its pieces are as small as a texel or there are too many. What is left is cut along a line,
+/// which is exact without a picture.
 #pragma once
 
 #include "coverage.hpp"
@@ -23,7 +23,8 @@ public:
     /// The shown parts of faces, of at most so many more; edges are not split below a length.
     std::vector<CutPiece> pieces(double smallest, std::int64_t budget) {
         std::vector<CutPiece> found, mixed;
-        for (std::size_t i = 0; i < faces_.size(); ++i) mixed.push_back({static_cast<std::int64_t>(i), {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}});
+        for (std::size_t i = 0; i < faces_.size(); ++i)
+            mixed.push_back({static_cast<std::int64_t>(i), {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}});
         while (true) {
             std::vector<double> edges;
             double largest = 0;
@@ -38,7 +39,8 @@ public:
             std::vector<std::size_t> selected;
             for (std::size_t i = 0; i < edges.size(); ++i)
                 if (edges[i] > 0.5 * largest) selected.push_back(i);
-            std::stable_sort(selected.begin(), selected.end(), [&](std::size_t a, std::size_t b) { return edges[a] > edges[b]; });
+            std::stable_sort(selected.begin(), selected.end(),
+                             [&](std::size_t a, std::size_t b) { return edges[a] > edges[b]; });
             selected.resize(std::min(selected.size(), static_cast<std::size_t>(std::max<std::int64_t>(budget, 0) / 3)));
             if (selected.empty()) break;
             budget -= 3 * static_cast<std::int64_t>(selected.size());
@@ -75,7 +77,8 @@ private:
 
     double longestEdge(const CutPiece& piece) const {
         const Corners own = weighted(piece.weights, faces_[piece.owner].corners);
-        return std::max({length(difference(own[0], own[2])), length(difference(own[1], own[0])), length(difference(own[2], own[1]))});
+        return std::max({length(difference(own[0], own[2])), length(difference(own[1], own[0])),
+                         length(difference(own[2], own[1]))});
     }
 
     static std::array<Corners, 4> quarters(const Corners& corners) {
@@ -109,7 +112,9 @@ private:
             const auto at = [&](int other) {
                 const double share = above[alone] / (above[alone] - above[other]);
                 Vector point;
-                for (int axis = 0; axis < 3; ++axis) point[axis] = piece.weights[alone][axis] + share * (piece.weights[other][axis] - piece.weights[alone][axis]);
+                for (int axis = 0; axis < 3; ++axis)
+                    point[axis] =
+                        piece.weights[alone][axis] + share * (piece.weights[other][axis] - piece.weights[alone][axis]);
                 return point;
             };
             const Vector first = at(next), second = at(last);
@@ -135,7 +140,8 @@ struct AlphaCut {
 };
 
 /// `paneFactor` of a blended material's alpha; nothing for a mask.
-inline AlphaCut cutAlpha(Coverage& coverage, const std::vector<CoveredFace>& faces, double smallest, std::int64_t budget, std::optional<double> paneFactor) {
+inline AlphaCut cutAlpha(Coverage& coverage, const std::vector<CoveredFace>& faces, double smallest,
+                         std::int64_t budget, std::optional<double> paneFactor) {
     AlphaCut cut{{}, {}, {}, false, false};
     std::vector<CoveredFace> mixed;
     std::vector<std::int64_t> owners;

@@ -15,12 +15,14 @@ constexpr std::int64_t atlasTile = 16;
 
 inline std::int64_t tiled(std::int64_t length) { return (length + atlasTile - 1) / atlasTile * atlasTile; }
 
-/// Regions of one scale. Where there is space it is above 1, and small ones are enlarged further, as a tile holds two or four
-/// colours.
+/// Regions of one scale. Where there is space it is above 1, and small ones are enlarged further, as a tile holds two
+/// or four colours.
 class AtlasRegions {
 public:
-    /// `pixels`: of the parts of textures that are shown, width and height; at most as many as tiles. `edge`: of the atlas, texels.
-    AtlasRegions(const std::vector<Pair>& pixels, std::int64_t edge) : edge_(edge), sizes_(pixels.size()), corners_(pixels.size()), scale_(fitted(pixels)) {}
+    /// `pixels`: of the parts of textures that are shown, width and height; at most as many as tiles. `edge`: of the
+    /// atlas, texels.
+    AtlasRegions(const std::vector<Pair>& pixels, std::int64_t edge)
+        : edge_(edge), sizes_(pixels.size()), corners_(pixels.size()), scale_(fitted(pixels)) {}
 
     /// Texels for each pixel of a texture that is not enlarged, along an axis.
     double scale() const { return scale_; }
@@ -35,7 +37,8 @@ private:
     /// Steps in the search for the scale.
     static constexpr int steps = 24;
 
-    /// Places the regions at the largest scale at which they fit, small ones enlarged where that costs the others little.
+    /// Places the regions at the largest scale at which they fit, small ones enlarged where that costs the others
+    /// little.
     double fitted(std::vector<Pair> pixels) {
         std::vector<bool> isSmall;
         for (const Pair& each : pixels) isSmall.push_back(each[0] <= small && each[1] <= small);
@@ -79,7 +82,8 @@ private:
             for (int axis = 0; axis < 2; ++axis) {
                 const double length = pixels[i][axis] * scale;
                 if (length > static_cast<double>(edge_) + 1e-6) return false;
-                sizes_[i][axis] = std::clamp<std::int64_t>(static_cast<std::int64_t>(std::ceil(length - 1e-6)), 1, edge_);
+                sizes_[i][axis] =
+                    std::clamp<std::int64_t>(static_cast<std::int64_t>(std::ceil(length - 1e-6)), 1, edge_);
             }
         const auto order = sortedIndices(sizes_.size(), [&](std::int64_t a, std::int64_t b) {
             const Cell &one = sizes_[a], &other = sizes_[b];

@@ -9,7 +9,8 @@
 
 namespace colonnade::mesh {
 
-/// A surface whose corner normals are those of its normal maps; `pieces` in the order of the faces that they are parts of.
+/// A surface whose corner normals are those of its normal maps; `pieces` in the order of the faces that they are parts
+/// of.
 struct BakedMesh {
     std::vector<Vector> vertices;  ///< distinct, ascending
     std::vector<Piece> pieces;
@@ -20,8 +21,8 @@ struct BakedMesh {
 class NormalBaker {
 public:
     /// `normals` have unit length, or 0 for none.
-    NormalBaker(std::vector<Vector> vertices, const std::vector<Face>& faces, std::vector<Corners> normals, const std::vector<NormalMap>& maps,
-                const std::vector<ReliefFace>& relief)
+    NormalBaker(std::vector<Vector> vertices, const std::vector<Face>& faces, std::vector<Corners> normals,
+                const std::vector<NormalMap>& maps, const std::vector<ReliefFace>& relief)
         : surface_(std::move(vertices), faces, std::move(normals), maps, relief) {}
 
     /// The surface, of at most so many faces more.
@@ -50,7 +51,8 @@ private:
     static constexpr double flat = 2e-3;
     static constexpr int fitSteps = 6;
 
-    /// Area times the mean square of what interpolated corners of pieces from one on differ from the map, 0 where little.
+    /// Area times the mean square of what interpolated corners of pieces from one on differ from the map, 0 where
+    /// little.
     std::vector<double> errorsFrom(std::size_t first, double width) const {
         const std::size_t count = surface_.pieces.pieces.size();
         std::size_t users = 0;
@@ -65,7 +67,8 @@ private:
             const std::vector<Vector> found = surface_.normalsAt(piece, samples, width);
             double spread = 0;
             for (std::size_t at = 0; at < points.size(); ++at) {
-                const Vector apart = difference(found[3 + at], weighted(points[at], Corners{found[0], found[1], found[2]}));
+                const Vector apart =
+                    difference(found[3 + at], weighted(points[at], Corners{found[0], found[1], found[2]}));
                 spread += dot(apart, apart);
             }
             spread /= static_cast<double>(points.size());
@@ -81,19 +84,23 @@ private:
         for (const Piece& piece : surface_.pieces.pieces)
             if (surface_.hasMap(piece)) area += surface_.pieces.area(piece);
         // Half an edge of as many equal faces: finer detail is not looked for
-        const double faces = static_cast<double>(surface_.pieces.pieces.size()) + static_cast<double>(std::max<std::int64_t>(budget, 0));
+        const double faces =
+            static_cast<double>(surface_.pieces.pieces.size()) + static_cast<double>(std::max<std::int64_t>(budget, 0));
         const double width = std::max(shortest, std::sqrt(area / faces) / 2);
         bisectWorst(surface_.pieces, shortest, budget, [&](std::size_t first) { return errorsFrom(first, width); });
     }
 
-    /// Normals at the corners. Those of one vertex and base normal are equal; where no face of theirs has a map, the base normal.
+    /// Normals at the corners. Those of one vertex and base normal are equal; where no face of theirs has a map, the
+    /// base normal.
     std::vector<Corners> fitted(const std::vector<Corners>& base, double& error) const {
         const std::vector<Piece>& pieces = surface_.pieces.pieces;
         std::vector<std::array<double, 4>> keys;
         for (std::size_t i = 0; i < pieces.size(); ++i)
             for (int corner = 0; corner < 3; ++corner)
-                keys.push_back({static_cast<double>(pieces[i].face[corner]), base[i][corner][0] + 0.0, base[i][corner][1] + 0.0, base[i][corner][2] + 0.0});
-        const std::vector<std::int64_t> order = sortedIndices(keys.size(), [&](std::int64_t a, std::int64_t b) { return keys[a] < keys[b]; });
+                keys.push_back({static_cast<double>(pieces[i].face[corner]), base[i][corner][0] + 0.0,
+                                base[i][corner][1] + 0.0, base[i][corner][2] + 0.0});
+        const std::vector<std::int64_t> order =
+            sortedIndices(keys.size(), [&](std::int64_t a, std::int64_t b) { return keys[a] < keys[b]; });
         std::vector<std::size_t> group(keys.size());
         std::size_t groups = 0;
         for (std::size_t i = 0; i < order.size(); ++i) {
@@ -104,7 +111,8 @@ private:
         for (std::size_t i = 0; i < keys.size(); ++i) isTouched[group[i]] |= surface_.hasMap(pieces[i / 3]);
         std::vector<std::size_t> users;
         for (std::size_t i = 0; i < pieces.size(); ++i)
-            if (isTouched[group[3 * i]] || isTouched[group[3 * i + 1]] || isTouched[group[3 * i + 2]]) users.push_back(i);
+            if (isTouched[group[3 * i]] || isTouched[group[3 * i + 1]] || isTouched[group[3 * i + 2]])
+                users.push_back(i);
         const std::vector<Vector> points = trianglePoints(ReliefSurface::stepsOf(users.size()));
         std::vector<std::vector<Vector>> targets;
         std::vector<double> areas, totals(isTouched.size());
@@ -116,7 +124,9 @@ private:
             for (int corner = 0; corner < 3; ++corner) totals[group[3 * i + corner]] += areas.back() * share;
         }
         std::vector<Vector> fit(isTouched.size());
-        const auto cornersOf = [&](std::size_t i) { return Corners{fit[group[3 * i]], fit[group[3 * i + 1]], fit[group[3 * i + 2]]}; };
+        const auto cornersOf = [&](std::size_t i) {
+            return Corners{fit[group[3 * i]], fit[group[3 * i + 1]], fit[group[3 * i + 2]]};
+        };
         for (int step = 0; step < fitSteps; ++step) {
             std::vector<Vector> sums(fit.size());
             for (std::size_t user = 0; user < users.size(); ++user) {
@@ -128,13 +138,15 @@ private:
                         for (int axis = 0; axis < 3; ++axis) moments[corner][axis] += points[at][corner] * left[axis];
                 }
                 for (int corner = 0; corner < 3; ++corner)
-                    for (int axis = 0; axis < 3; ++axis) sums[group[3 * users[user] + corner]][axis] += moments[corner][axis] * areas[user];
+                    for (int axis = 0; axis < 3; ++axis)
+                        sums[group[3 * users[user] + corner]][axis] += moments[corner][axis] * areas[user];
             }
             for (std::size_t i = 0; i < fit.size(); ++i)
                 for (int axis = 0; axis < 3; ++axis) fit[i][axis] += sums[i][axis] / (totals[i] > 0 ? totals[i] : 1.0);
         }
         std::vector<Corners> normals(base.size());
-        for (std::size_t i = 0; i < keys.size(); ++i) normals[i / 3][i % 3] = isTouched[group[i]] ? unit(fit[group[i]]) : unit(base[i / 3][i % 3]);
+        for (std::size_t i = 0; i < keys.size(); ++i)
+            normals[i / 3][i % 3] = isTouched[group[i]] ? unit(fit[group[i]]) : unit(base[i / 3][i % 3]);
         double squares = 0, area = 0;
         for (std::size_t user = 0; user < users.size(); ++user) {
             if (!surface_.hasMap(pieces[users[user]])) continue;

@@ -5,10 +5,12 @@
 
 namespace colonnade::mesh {
 
-/// Bisects pieces at their longest edge, on both sides of it, until none has an error, edges are too short, or there are so many more.
+/// Bisects pieces at their longest edge, on both sides of it, until none has an error, edges are too short, or there
+/// are so many more.
 /// @param shortest length of edges that are not split
 /// @param errorsFrom errors of all pieces from one on, 0 for those that may stay
-template <class ErrorsFrom> void bisectWorst(Pieces& pieces, double shortest, std::int64_t budget, ErrorsFrom errorsFrom) {
+template <class ErrorsFrom>
+void bisectWorst(Pieces& pieces, double shortest, std::int64_t budget, ErrorsFrom errorsFrom) {
     /// Pieces are split at the same time if their errors are at least this part of the largest one.
     constexpr double near = 0.25;
     if (budget <= 1) return;
@@ -21,7 +23,8 @@ template <class ErrorsFrom> void bisectWorst(Pieces& pieces, double shortest, st
         std::vector<std::int64_t> selected;
         for (std::size_t i = 0; i < splittable.size(); ++i)
             if (splittable[i] > least) selected.push_back(static_cast<std::int64_t>(i));
-        std::stable_sort(selected.begin(), selected.end(), [&](std::int64_t a, std::int64_t b) { return errors[a] > errors[b]; });
+        std::stable_sort(selected.begin(), selected.end(),
+                         [&](std::int64_t a, std::int64_t b) { return errors[a] > errors[b]; });
         selected.resize(std::min(selected.size(), static_cast<std::size_t>(budget / 2)));
         const PieceEdges edges(pieces);
         std::vector<std::uint8_t> marked = edges.closed(selected);

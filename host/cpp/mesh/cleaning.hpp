@@ -17,11 +17,11 @@ struct RawMesh {
 };
 
 struct CleanMesh {
-    std::string error;                  ///< why the mesh cannot be cleaned, beginning with "the mesh"; empty if it can
+    std::string error; ///< why the mesh cannot be cleaned, beginning with "the mesh"; empty if it can
     std::vector<Vector> vertices;
     std::vector<Face> faces;
-    std::vector<std::int64_t> sources;  ///< of each face, its index in the raw mesh
-    Winding winding;                    ///< reversed faces have the corners of their source backwards
+    std::vector<std::int64_t> sources; ///< of each face, its index in the raw mesh
+    Winding winding; ///< reversed faces have the corners of their source backwards
     CornerNormals normals;
 };
 
@@ -31,13 +31,15 @@ inline std::string whyUnclean(const RawMesh& raw) {
     std::vector<bool> isUsed(raw.vertices.size());
     for (const Face& face : raw.faces)
         for (const std::int32_t vertex : face) {
-            if (vertex < 0 || static_cast<std::size_t>(vertex) >= raw.vertices.size()) return "the mesh has a face that names a vertex that does not exist";
+            if (vertex < 0 || static_cast<std::size_t>(vertex) >= raw.vertices.size())
+                return "the mesh has a face that names a vertex that does not exist";
             isUsed[vertex] = true;
         }
     double largest = 0.0;
     for (std::size_t i = 0; i < raw.vertices.size(); ++i)
         for (const double component : raw.vertices[i]) {
-            if (isUsed[i] && !std::isfinite(component)) return "the mesh: vertex " + std::to_string(i) + " is not a finite number: repair the file";
+            if (isUsed[i] && !std::isfinite(component))
+                return "the mesh: vertex " + std::to_string(i) + " is not a finite number: repair the file";
             if (isUsed[i]) largest = std::max(largest, std::fabs(component));
         }
     return largest > 1e100 ? "the mesh has coordinates beyond 1e100: scale it down" : "";
@@ -72,7 +74,8 @@ inline CleanMesh clean(const RawMesh& raw, double leastCosine, std::size_t sourc
     for (std::size_t i = 0; i < corners.size(); ++i)
         for (int corner = 0; corner < 3; ++corner) corners[i][corner] = merged.index[number[raw.faces[i][corner]]];
     if (edge > 0) result.sources = dropFaces(scaled, corners);
-    if (result.sources.empty()) result.error = "the mesh has only degenerate triangles (" + grouped(sourceFaces) + ", all without area)";
+    if (result.sources.empty())
+        result.error = "the mesh has only degenerate triangles (" + grouped(sourceFaces) + ", all without area)";
     else if (edge < 1e-100) result.error = "the mesh is smaller than 1e-100: scale it up";
     if (!result.error.empty()) return result;
 
@@ -87,7 +90,8 @@ inline CleanMesh clean(const RawMesh& raw, double leastCosine, std::size_t sourc
     std::vector<Corners> authored;
     bool hasNormals = false;
     for (const std::int64_t source : result.sources) {
-        result.faces.push_back({renumbered[corners[source][0]], renumbered[corners[source][1]], renumbered[corners[source][2]]});
+        result.faces.push_back(
+            {renumbered[corners[source][0]], renumbered[corners[source][1]], renumbered[corners[source][2]]});
         if (!raw.normals.empty()) authored.push_back(raw.normals[source]);
         hasNormals = hasNormals || (!raw.normals.empty() && raw.normals[source] != Corners{});
     }

@@ -17,10 +17,15 @@ using Matrix = std::array<double, 16>;     ///< row by row, as the next
 using BoneMatrix = std::array<double, 12>;
 
 /// A vector of a matrix's linear part: axis 0 to 2.
-template <class M> Vector column(const M& matrix, std::size_t axis) { return {matrix[axis], matrix[4 + axis], matrix[8 + axis]}; }
-template <class M> Vector row(const M& matrix, std::size_t axis) { return {matrix[4 * axis], matrix[4 * axis + 1], matrix[4 * axis + 2]}; }
+template <class M> Vector column(const M& matrix, std::size_t axis) {
+    return {matrix[axis], matrix[4 + axis], matrix[8 + axis]};
+}
+template <class M> Vector row(const M& matrix, std::size_t axis) {
+    return {matrix[4 * axis], matrix[4 * axis + 1], matrix[4 * axis + 2]};
+}
 
-/// The columns of what transforms normals as a matrix transforms surfaces: its inverse transpose, times its determinant.
+/// The columns of what transforms normals as a matrix transforms surfaces: its inverse transpose, times its
+/// determinant.
 inline std::array<Vector, 3> cofactors(const BoneMatrix& matrix) {
     const Vector x = column(matrix, 0), y = column(matrix, 1), z = column(matrix, 2);
     return {cross(y, z), cross(z, x), cross(x, y)};
@@ -28,7 +33,8 @@ inline std::array<Vector, 3> cofactors(const BoneMatrix& matrix) {
 
 /// The point of a matrix's linear part and its translation.
 inline Vector moved(const BoneMatrix& matrix, const Vector& point) {
-    return {dot(row(matrix, 0), point) + matrix[3], dot(row(matrix, 1), point) + matrix[7], dot(row(matrix, 2), point) + matrix[11]};
+    return {dot(row(matrix, 0), point) + matrix[3], dot(row(matrix, 1), point) + matrix[7],
+            dot(row(matrix, 2), point) + matrix[11]};
 }
 
 inline Matrix product(const Matrix& a, const Matrix& b) {
@@ -49,7 +55,8 @@ public:
 
     /// The value at a time, or just before it. Before the first and after the last key it is theirs.
     Values at(double time, bool before) const {
-        const auto next = before ? std::lower_bound(times.begin(), times.end(), time) : std::upper_bound(times.begin(), times.end(), time);
+        const auto next = before ? std::lower_bound(times.begin(), times.end(), time)
+                                 : std::upper_bound(times.begin(), times.end(), time);
         const std::ptrdiff_t index = next - times.begin() - 1, last = static_cast<std::ptrdiff_t>(times.size()) - 1;
         const std::size_t key = static_cast<std::size_t>(std::max<std::ptrdiff_t>(index, 0));
         if (index < 0 || index == last || interpolation == Interpolation::step) return unitValue(valueAt(key));
@@ -60,8 +67,8 @@ public:
             const double squared = part * part, cubed = part * part * part;
             const Values after = tangentAt(key, 2), into = tangentAt(key + 1, 0);
             for (std::size_t i = 0; i < value.size(); ++i)
-                value[i] = (2 * cubed - 3 * squared + 1) * from[i] + (cubed - 2 * squared + part) * (span * after[i]) + (3 * squared - 2 * cubed) * to[i] +
-                           (cubed - squared) * (span * into[i]);
+                value[i] = (2 * cubed - 3 * squared + 1) * from[i] + (cubed - 2 * squared + part) * (span * after[i]) +
+                           (3 * squared - 2 * cubed) * to[i] + (cubed - squared) * (span * into[i]);
             return unitValue(value);
         }
         if (path == Path::rotation) return arc(unitValue(from), unitValue(to), part);
@@ -78,7 +85,9 @@ private:
     }
     Values valueAt(std::size_t key) const { return tangentAt(key, parts() / 2); }
 
-    static double product(const Values& a, const Values& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]; }
+    static double product(const Values& a, const Values& b) {
+        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+    }
 
     Values unitValue(Values value) const {
         if (path != Path::rotation) return value;
@@ -103,7 +112,8 @@ private:
             return value;
         }
         const double angle = fixed_order::arccos(cosine), sine = fixed_order::cosine(angle, 1);
-        const double before = fixed_order::cosine(angle * (1 - part), 1) / sine, after = fixed_order::cosine(angle * part, 1) / sine;
+        const double before = fixed_order::cosine(angle * (1 - part), 1) / sine,
+                     after = fixed_order::cosine(angle * part, 1) / sine;
         for (int i = 0; i < 4; ++i) value[i] = before * first[i] + after * last[i];
         return value;
     }
@@ -129,21 +139,21 @@ struct ClipPose {
 
 /// Shapes that are added to the vertices, each by its weight.
 struct Morphs {
-    std::vector<std::int64_t> nodes, slots;       ///< of each target, its node and its number among the node's weights
-    Values weights;                               ///< at rest
-    std::vector<std::int64_t> targets, vertices;  ///< of each change, by ascending vertex
-    std::vector<Vector> positions, normals;       ///< what is added
+    std::vector<std::int64_t> nodes, slots; ///< of each target, its node and its number among the node's weights
+    Values weights; ///< at rest
+    std::vector<std::int64_t> targets, vertices; ///< of each change, by ascending vertex
+    std::vector<Vector> positions, normals; ///< what is added
 };
 
 struct Clip {
     double duration = 0;
     Nodes nodes;
     std::vector<Track> tracks;
-    std::vector<std::int64_t> joints;                       ///< the node of each bone
-    std::vector<Matrix> inverses;                           ///< from where vertices are bound to their bone
-    std::vector<Vector> positions;                          ///< of vertices, where they are bound
+    std::vector<std::int64_t> joints; ///< the node of each bone
+    std::vector<Matrix> inverses; ///< from where vertices are bound to their bone
+    std::vector<Vector> positions; ///< of vertices, where they are bound
     std::vector<std::array<std::int64_t, influences>> bones;
-    std::vector<std::array<double, influences>> shares;     ///< of sum 1, the largest first
+    std::vector<std::array<double, influences>> shares; ///< of sum 1, the largest first
     Morphs morphs;
 
     ClipPose rest() const { return poseOf(nodes.matrices, morphs.weights); }
@@ -155,7 +165,8 @@ struct Clip {
             if (track.path != Path::weights) continue;
             const Values found = track.at(time, before);
             for (std::size_t target = 0; target < weights.size(); ++target)
-                if (morphs.nodes[target] == track.node) weights[target] = found[static_cast<std::size_t>(morphs.slots[target])];
+                if (morphs.nodes[target] == track.node)
+                    weights[target] = found[static_cast<std::size_t>(morphs.slots[target])];
         }
         return poseOf(matricesAt(time, before), weights);
     }
@@ -180,7 +191,8 @@ struct Clip {
                 const double share = shares[vertex][influence];
                 if (influence > 0 && share == 0) continue;
                 const BoneMatrix& bone = matrices[static_cast<std::size_t>(bones[vertex][influence])];
-                for (std::size_t i = 0; i < bone.size(); ++i) result[vertex][i] = influence > 0 ? result[vertex][i] + share * bone[i] : share * bone[i];
+                for (std::size_t i = 0; i < bone.size(); ++i)
+                    result[vertex][i] = influence > 0 ? result[vertex][i] + share * bone[i] : share * bone[i];
             }
         return result;
     }
@@ -194,7 +206,8 @@ struct Clip {
     }
 
 private:
-    static Matrix matrixOf(const Vector& translation, const Quaternion& rotation, const Vector& scale, const Matrix& bottom) {
+    static Matrix matrixOf(const Vector& translation, const Quaternion& rotation, const Vector& scale,
+                           const Matrix& bottom) {
         const auto [x, y, z, w] = rotation;
         const double rows[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
                                    {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
@@ -214,14 +227,16 @@ private:
             if (track.path == Path::weights) continue;
             const Values found = track.at(time, before);
             const auto node = static_cast<std::size_t>(track.node);
-            double* const to =
-                track.path == Path::rotation ? moving.rotations[node].data() : (track.path == Path::scale ? moving.scales : moving.translations)[node].data();
+            double* const to = track.path == Path::rotation
+                                   ? moving.rotations[node].data()
+                                   : (track.path == Path::scale ? moving.scales : moving.translations)[node].data();
             std::copy(found.begin(), found.end(), to);
         }
         for (const Track& track : tracks) {
             const auto node = static_cast<std::size_t>(track.node);
             if (track.path != Path::weights)
-                moving.matrices[node] = matrixOf(moving.translations[node], moving.rotations[node], moving.scales[node], nodes.matrices[node]);
+                moving.matrices[node] = matrixOf(moving.translations[node], moving.rotations[node], moving.scales[node],
+                                                 nodes.matrices[node]);
         }
         return moving.matrices;
     }
@@ -229,7 +244,8 @@ private:
     ClipPose poseOf(std::vector<Matrix> matrices, const Values& weights) const {
         for (const std::int64_t node : nodes.order)
             if (const std::int64_t parent = nodes.parents[static_cast<std::size_t>(node)]; parent >= 0)
-                matrices[static_cast<std::size_t>(node)] = product(matrices[static_cast<std::size_t>(parent)], matrices[static_cast<std::size_t>(node)]);
+                matrices[static_cast<std::size_t>(node)] =
+                    product(matrices[static_cast<std::size_t>(parent)], matrices[static_cast<std::size_t>(node)]);
         ClipPose pose{std::vector<BoneMatrix>(joints.size()), weights};
         for (std::size_t bone = 0; bone < joints.size(); ++bone) {
             const Matrix found = product(matrices[static_cast<std::size_t>(joints[bone])], inverses[bone]);
@@ -243,7 +259,7 @@ private:
 struct RestSurface {
     bool isFinite = true;
     std::vector<Vector> vertices;
-    std::vector<bool> isMirrored;  ///< of each face, whose corners go backwards
+    std::vector<bool> isMirrored; ///< of each face, whose corners go backwards
 };
 
 /// `normals`, at the corners of faces where these are bound, of any length, follow them; empty: there are none.
@@ -262,7 +278,9 @@ inline RestSurface restSurface(const Clip& clip, const std::vector<Face>& faces,
             if (normals.empty()) continue;
             const Vector normal = unit(normals[face][corner]);
             Vector rotated;
-            for (int axis = 0; axis < 3; ++axis) rotated[axis] = dot({columns[0][axis], columns[1][axis], columns[2][axis]}, normal) * (isMirrored ? -1.0 : 1.0);
+            for (int axis = 0; axis < 3; ++axis)
+                rotated[axis] =
+                    dot({columns[0][axis], columns[1][axis], columns[2][axis]}, normal) * (isMirrored ? -1.0 : 1.0);
             normals[face][corner] = unit(rotated);
         }
     return result;

@@ -88,8 +88,10 @@ private:
                 if (i == count) shares[count++] = {bone, 0};
                 shares[i].value += weight * clip_.shares[of][influence];
             }
-            const auto found = std::lower_bound(morphs.vertices.begin(), morphs.vertices.end(), point.corners[corner]) - morphs.vertices.begin();
-            for (auto change = static_cast<std::size_t>(found); change < firstChange && morphs.vertices[change] == point.corners[corner]; ++change) {
+            const auto found = std::lower_bound(morphs.vertices.begin(), morphs.vertices.end(), point.corners[corner]) -
+                               morphs.vertices.begin();
+            for (auto change = static_cast<std::size_t>(found);
+                 change < firstChange && morphs.vertices[change] == point.corners[corner]; ++change) {
                 std::size_t i = firstChange;
                 while (i < morphs.targets.size() && morphs.targets[i] != morphs.targets[change]) ++i;
                 if (i == morphs.targets.size()) {
@@ -110,7 +112,9 @@ private:
             // Of equal shares that of the first bone
             Share* largest = &shares[0];
             for (std::size_t i = 1; i < count; ++i)
-                if (shares[i].value > largest->value || (shares[i].value == largest->value && shares[i].of < largest->of)) largest = &shares[i];
+                if (shares[i].value > largest->value ||
+                    (shares[i].value == largest->value && shares[i].of < largest->of))
+                    largest = &shares[i];
             own = {largest->value > 0 ? largest->of : kept[0].of, largest->value};
             largest->value = 0;
             total += own.value;

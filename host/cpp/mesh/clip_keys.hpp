@@ -48,7 +48,8 @@ inline Box boxOf(const Clip& clip, const std::vector<ClipKey>& keys) {
         std::vector<Vector> crossed = clip.vertices(pose.matrices, next.weights);
         const std::vector<Vector> other = clip.vertices(next.matrices, pose.weights);
         for (std::size_t vertex = 0; vertex < crossed.size(); ++vertex)
-            for (int axis = 0; axis < 3; ++axis) crossed[vertex][axis] = (crossed[vertex][axis] + other[vertex][axis]) / 2;
+            for (int axis = 0; axis < 3; ++axis)
+                crossed[vertex][axis] = (crossed[vertex][axis] + other[vertex][axis]) / 2;
         box.widen(crossed);
     }
     return box;
@@ -57,7 +58,8 @@ inline Box boxOf(const Clip& clip, const std::vector<ClipKey>& keys) {
 /// Chooses keys with which no vertex is further than a tolerance from where the clip has it, at the keys of the file.
 class KeyChooser {
 public:
-    KeyChooser(const Clip& clip, double tolerance) : clip_(clip), tolerance_(tolerance), targets_(clip.morphs.weights.size()) {
+    KeyChooser(const Clip& clip, double tolerance)
+        : clip_(clip), tolerance_(tolerance), targets_(clip.morphs.weights.size()) {
         const Morphs& morphs = clip.morphs;
         std::vector<Vector> span(clip.positions.size());
         for (std::size_t change = 0; change < morphs.targets.size(); ++change)
@@ -106,16 +108,22 @@ private:
         for (std::size_t bone = 0; bone < boxes_.size(); ++bone) {
             BoneMatrix change;
             const BoneMatrix& own = key.pose.matrices[bone];
-            for (std::size_t i = 0; i < change.size(); ++i) change[i] = apart(first.pose.matrices[bone][i], last.pose.matrices[bone][i], own[i]);
+            for (std::size_t i = 0; i < change.size(); ++i)
+                change[i] = apart(first.pose.matrices[bone][i], last.pose.matrices[bone][i], own[i]);
             for (int octant = 0; octant < 8; ++octant) {
                 const Box& box = boxes_[bone];
-                const Vector corner{(octant & 4 ? box.high : box.low)[0], (octant & 2 ? box.high : box.low)[1], (octant & 1 ? box.high : box.low)[2]};
+                const Vector corner{(octant & 4 ? box.high : box.low)[0], (octant & 2 ? box.high : box.low)[1],
+                                    (octant & 1 ? box.high : box.low)[2]};
                 for (const double component : moved(change, corner)) most = std::max(most, std::fabs(component));
             }
-            for (std::size_t axis = 0; axis < 3; ++axis) scale = std::max(scale, std::fabs(own[4 * axis]) + std::fabs(own[4 * axis + 1]) + std::fabs(own[4 * axis + 2]));
+            for (std::size_t axis = 0; axis < 3; ++axis)
+                scale = std::max(
+                    scale, std::fabs(own[4 * axis]) + std::fabs(own[4 * axis + 1]) + std::fabs(own[4 * axis + 2]));
         }
         for (std::size_t target = 0; target < targets_.size(); ++target)
-            shapes += std::fabs(apart(first.pose.weights[target], last.pose.weights[target], key.pose.weights[target])) * targets_[target];
+            shapes +=
+                std::fabs(apart(first.pose.weights[target], last.pose.weights[target], key.pose.weights[target])) *
+                targets_[target];
         return most + scale * shapes;
     }
 
@@ -163,7 +171,8 @@ struct BakedClip {
 
     static BakedClip of(const Clip& clip) {
         const ClipPose rest = clip.rest();
-        BakedClip baked{KeyChooser(clip, clipTolerance * Box::of(clip.vertices(rest.matrices, rest.weights)).edge()).make(), {}};
+        BakedClip baked{
+            KeyChooser(clip, clipTolerance * Box::of(clip.vertices(rest.matrices, rest.weights)).edge()).make(), {}};
         baked.box = boxOf(clip, baked.keys);
         return baked;
     }

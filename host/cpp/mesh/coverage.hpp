@@ -26,9 +26,10 @@ static_assert(sizeof(Pane) == 4 * sizeof(double));
 /// Answers for the faces of one material.
 class Coverage {
 public:
-    /// `alpha` has one channel, and the size of `colours`; a picture that is not there has no pixels. `factor` of alpha,
-    /// which is shown from `cutoff` on.
-    Coverage(const Picture<std::uint8_t>& colours, const Picture<std::uint8_t>& alpha, const double* linear, double factor, double cutoff)
+    /// `alpha` has one channel, and the size of `colours`; a picture that is not there has no pixels. `factor` of
+    /// alpha, which is shown from `cutoff` on.
+    Coverage(const Picture<std::uint8_t>& colours, const Picture<std::uint8_t>& alpha, const double* linear,
+             double factor, double cutoff)
         : colours_(colours), alpha_(alpha), linear_(linear), factor_(factor), least_(cutoff / std::max(factor, 1e-6)),
           size_{static_cast<double>(alpha.width), static_cast<double>(alpha.height)} {
         if (!hasPicture()) return;
@@ -63,7 +64,8 @@ public:
     double texels(const Triangle& uvs) const {
         double longest = 0;
         for (int axis = 0; axis < 2 && hasPicture(); ++axis) {
-            const auto [low, high] = std::minmax({uvs[0][axis] * size_[axis], uvs[1][axis] * size_[axis], uvs[2][axis] * size_[axis]});
+            const auto [low, high] =
+                std::minmax({uvs[0][axis] * size_[axis], uvs[1][axis] * size_[axis], uvs[2][axis] * size_[axis]});
             longest = std::max(longest, high - low);
         }
         return longest;
@@ -72,7 +74,8 @@ public:
     /// Whether a face shows texels, or points between its corners, that are neither opaque nor invisible.
     bool isBlended(const CoveredFace& face) {
         if (!hasPicture() || face.alphas != Vector{1, 1, 1}) {
-            const auto [low, high] = std::minmax({face.alphas[0] * factor_, face.alphas[1] * factor_, face.alphas[2] * factor_});
+            const auto [low, high] =
+                std::minmax({face.alphas[0] * factor_, face.alphas[1] * factor_, face.alphas[2] * factor_});
             if (high > 0.01 && low < 0.99) return true;
         }
         if (!hasPicture()) return false;
@@ -94,22 +97,28 @@ public:
             pane.alpha += alpha;
             if (!colours_.pixels) continue;
             Vector colour;
-            colours_.sample(weighted(point, face.uvs).data(), [this](std::uint8_t code) { return linear_[code]; }, colour.data());
+            colours_.sample(
+                weighted(point, face.uvs).data(), [this](std::uint8_t code) { return linear_[code]; }, colour.data());
             for (int channel = 0; channel < 3; ++channel) sums[channel] += colour[channel] * alpha;
         }
         if (colours_.pixels)
-            for (int channel = 0; channel < 3; ++channel) pane.colour[channel] = sums[channel] / std::max(pane.alpha, 1e-12);
+            for (int channel = 0; channel < 3; ++channel)
+                pane.colour[channel] = sums[channel] / std::max(pane.alpha, 1e-12);
         pane.alpha /= static_cast<double>(points.size());
         return pane;
     }
 
     /// The texture with the nearest shown colour where it is hidden, so that filters find no other.
     std::vector<std::uint8_t> filled() const {
-        std::vector<std::uint8_t> pixels(colours_.pixels, colours_.pixels + 3 * colours_.width * colours_.height), missing;
-        for (std::int64_t i = 0; i < alpha_.width * alpha_.height; ++i) missing.push_back(!(alpha_.pixels[i] >= least_ * 255));
-        const std::vector<std::int32_t> nearest = environment::nearestKnown(missing.data(), alpha_.width, alpha_.height);
+        std::vector<std::uint8_t> pixels(colours_.pixels, colours_.pixels + 3 * colours_.width * colours_.height),
+            missing;
+        for (std::int64_t i = 0; i < alpha_.width * alpha_.height; ++i)
+            missing.push_back(!(alpha_.pixels[i] >= least_ * 255));
+        const std::vector<std::int32_t> nearest =
+            environment::nearestKnown(missing.data(), alpha_.width, alpha_.height);
         for (std::size_t i = 0; i < nearest.size(); ++i)
-            if (nearest[i] >= 0) std::copy_n(colours_.pixels + 3 * nearest[i], 3, pixels.begin() + 3 * static_cast<std::ptrdiff_t>(i));
+            if (nearest[i] >= 0)
+                std::copy_n(colours_.pixels + 3 * nearest[i], 3, pixels.begin() + 3 * static_cast<std::ptrdiff_t>(i));
         return pixels;
     }
 
@@ -119,14 +128,16 @@ private:
 
     bool hasPicture() const { return alpha_.pixels != nullptr; }
     double alphaAt(std::int64_t x, std::int64_t y) const {
-        return alpha_.pixels[wrapped(y, alpha_.height, alpha_.wrapV) * alpha_.width + wrapped(x, alpha_.width, alpha_.wrapU)];
+        return alpha_
+            .pixels[wrapped(y, alpha_.height, alpha_.wrapV) * alpha_.width + wrapped(x, alpha_.width, alpha_.wrapU)];
     }
     bool isOpaque(std::int64_t x, std::int64_t y) const { return alphaAt(x, y) >= least_ * 255; }
 
     /// Without the factor, at a point by the weights of a face's corners.
     double alphaAt(const CoveredFace& face, const Vector& point) const {
         double alpha = 1;
-        if (hasPicture()) alpha_.sample(weighted(point, face.uvs).data(), [](std::uint8_t code) { return code / 255.0; }, &alpha);
+        if (hasPicture())
+            alpha_.sample(weighted(point, face.uvs).data(), [](std::uint8_t code) { return code / 255.0; }, &alpha);
         return alpha * (point[0] * face.alphas[0] + point[1] * face.alphas[1] + point[2] * face.alphas[2]);
     }
 

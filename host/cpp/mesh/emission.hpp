@@ -20,7 +20,8 @@ using Rgb = std::array<double, 3>;
 /// @param uvs positions of the corners in the map, six for a face
 /// @param areas of the faces
 /// @param linear values of the map's codes
-inline std::vector<Rgb> emissionOf(const Picture<std::uint8_t>& map, const double* uvs, const double* areas, std::size_t count, const double* linear) {
+inline std::vector<Rgb> emissionOf(const Picture<std::uint8_t>& map, const double* uvs, const double* areas,
+                                   std::size_t count, const double* linear) {
     struct Group {
         double weight;
         Rgb sum;
@@ -29,7 +30,8 @@ inline std::vector<Rgb> emissionOf(const Picture<std::uint8_t>& map, const doubl
         double at(int channel) const { return weight > 0 ? sum[channel] / weight : 0; }
         double costOf(const Group& other) const {
             double apart = 0;
-            for (int channel = 0; channel < 3; ++channel) apart += (at(channel) - other.at(channel)) * (at(channel) - other.at(channel));
+            for (int channel = 0; channel < 3; ++channel)
+                apart += (at(channel) - other.at(channel)) * (at(channel) - other.at(channel));
             return weight * other.weight * apart / std::max(weight + other.weight, 1e-300);
         }
     };
@@ -71,16 +73,20 @@ inline std::vector<Rgb> emissionOf(const Picture<std::uint8_t>& map, const doubl
     return found;
 }
 
-/// Bisects the faces of a surface on which the emission by a map varies, at most so many more; vertices at the same place stay together.
+/// Bisects the faces of a surface on which the emission by a map varies, at most so many more; vertices at the same
+/// place stay together.
 /// @param factor of the map's values
 /// @param shows which faces show the map
 /// @param uvs positions of the corners in it, six for a face
 /// @return the pieces of all faces, in their order
-inline std::vector<Piece> emissionPieces(const Picture<std::uint8_t>& map, const Rgb& factor, const std::vector<Vector>& vertices, std::vector<Face> faces,
-                                         const std::uint8_t* shows, const double* uvs, std::int64_t budget, const double* linear) {
+inline std::vector<Piece> emissionPieces(const Picture<std::uint8_t>& map, const Rgb& factor,
+                                         const std::vector<Vector>& vertices, std::vector<Face> faces,
+                                         const std::uint8_t* shows, const double* uvs, std::int64_t budget,
+                                         const double* linear) {
     /// Sum of the variances of the channels on a piece that is not split: a channel differs by 1/16.
     constexpr double flat = 1.0 / 256;
-    const bool isFinite = std::all_of(vertices.begin(), vertices.end(), [](const Vector& at) { return std::isfinite(at[0] + at[1] + at[2]); });
+    const bool isFinite = std::all_of(vertices.begin(), vertices.end(),
+                                      [](const Vector& at) { return std::isfinite(at[0] + at[1] + at[2]); });
     // What is not finite is refused when the mesh is cleaned
     if (!isFinite || faces.empty()) return Pieces(vertices, faces).pieces;
     const MergedRows<double> merged = mergeRows(vertices.data(), vertices.size());
@@ -105,7 +111,8 @@ inline std::vector<Piece> emissionPieces(const Picture<std::uint8_t>& map, const
             }
         }
         const auto count = static_cast<double>(points.size());
-        const double variance = squares / count - (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]) / (count * count);
+        const double variance =
+            squares / count - (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]) / (count * count);
         return variance > flat ? variance * surface.area(piece) : 0.0;
     };
     bisectWorst(surface, surface.shortest(), budget, [&](std::size_t first) {
@@ -115,7 +122,8 @@ inline std::vector<Piece> emissionPieces(const Picture<std::uint8_t>& map, const
         while (steps > 4 && users * static_cast<std::size_t>(steps * (steps + 1) / 2) > 1u << 22) steps /= 2;
         const std::vector<Vector> points = trianglePoints(steps);
         std::vector<double> errors;
-        for (std::size_t i = first; i < surface.pieces.size(); ++i) errors.push_back(shows[surface.pieces[i].owner] ? errorOf(surface.pieces[i], points) : 0.0);
+        for (std::size_t i = first; i < surface.pieces.size(); ++i)
+            errors.push_back(shows[surface.pieces[i].owner] ? errorOf(surface.pieces[i], points) : 0.0);
         return errors;
     });
     surface.sort();

@@ -29,7 +29,8 @@ inline std::array<EdgeKey, 3> edgesOf(const Face& face) {
 class Pieces {
 public:
     Pieces(std::vector<Vector> points, const std::vector<Face>& faces) : vertices(std::move(points)) {
-        for (const Face& face : faces) pieces.push_back({face, static_cast<std::int64_t>(pieces.size()), {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}});
+        for (const Face& face : faces)
+            pieces.push_back({face, static_cast<std::int64_t>(pieces.size()), {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}});
     }
 
     std::array<Vector, 2> bounds() const {
@@ -87,17 +88,26 @@ public:
                 const Vector own = squares(piece);
                 int first = -1;
                 for (int corner = 0; corner < 3; ++corner)
-                    if ((first < 0 || own[corner] > own[first]) && std::binary_search(marked.begin(), marked.end(), edges[corner])) first = corner;
+                    if ((first < 0 || own[corner] > own[first]) &&
+                        std::binary_search(marked.begin(), marked.end(), edges[corner]))
+                        first = corner;
                 if (first < 0) {
                     done.push_back(piece);
                     continue;
                 }
                 const int second = (first + 1) % 3, third = (first + 2) % 3;
-                const auto middle = count + static_cast<std::int32_t>(std::lower_bound(marked.begin(), marked.end(), edges[first]) - marked.begin());
+                const auto middle =
+                    count + static_cast<std::int32_t>(std::lower_bound(marked.begin(), marked.end(), edges[first]) -
+                                                      marked.begin());
                 Vector half;
-                for (int axis = 0; axis < 3; ++axis) half[axis] = (piece.weights[first][axis] + piece.weights[second][axis]) / 2;
-                left.push_back({{piece.face[first], middle, piece.face[third]}, piece.owner, {piece.weights[first], half, piece.weights[third]}});
-                right.push_back({{middle, piece.face[second], piece.face[third]}, piece.owner, {half, piece.weights[second], piece.weights[third]}});
+                for (int axis = 0; axis < 3; ++axis)
+                    half[axis] = (piece.weights[first][axis] + piece.weights[second][axis]) / 2;
+                left.push_back({{piece.face[first], middle, piece.face[third]},
+                                piece.owner,
+                                {piece.weights[first], half, piece.weights[third]}});
+                right.push_back({{middle, piece.face[second], piece.face[third]},
+                                 piece.owner,
+                                 {half, piece.weights[second], piece.weights[third]}});
             }
             rest = std::move(left);
             rest.insert(rest.end(), right.begin(), right.end());
@@ -107,7 +117,8 @@ public:
 
     /// Orders the pieces by the faces that they are parts of.
     void sort() {
-        std::stable_sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.owner < b.owner; });
+        std::stable_sort(pieces.begin(), pieces.end(),
+                         [](const Piece& a, const Piece& b) { return a.owner < b.owner; });
     }
 
     std::vector<Vector> vertices;
@@ -121,7 +132,8 @@ public:
         std::vector<EdgeKey> all;
         for (const Piece& piece : from.pieces)
             for (const EdgeKey& edge : edgesOf(piece.face)) all.push_back(edge);
-        for (const std::int64_t i : sortedIndices(all.size(), [&](std::int64_t a, std::int64_t b) { return all[a] < all[b]; })) {
+        for (const std::int64_t i :
+             sortedIndices(all.size(), [&](std::int64_t a, std::int64_t b) { return all[a] < all[b]; })) {
             if (keys_.empty() || keys_.back() != all[i]) keys_.push_back(all[i]);
             numbers_[i / 3][i % 3] = keys_.size() - 1;
         }

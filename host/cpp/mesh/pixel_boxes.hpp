@@ -15,7 +15,8 @@ struct PixelBox {
     PixelBox(const Triangle& uvs, const Pair& size) {
         constexpr double near = 1e-4;  // positions so near to the border of a pixel do not show the pixel beyond
         for (int axis = 0; axis < 2; ++axis) {
-            const auto [low, high] = std::minmax({uvs[0][axis] * size[axis], uvs[1][axis] * size[axis], uvs[2][axis] * size[axis]});
+            const auto [low, high] =
+                std::minmax({uvs[0][axis] * size[axis], uvs[1][axis] * size[axis], uvs[2][axis] * size[axis]});
             first[axis] = static_cast<std::int64_t>(std::floor(low + near));
             last[axis] = std::max(first[axis], static_cast<std::int64_t>(std::ceil(high - near)) - 1);
         }
@@ -28,7 +29,8 @@ public:
     /// `isMarked` of the pixel (x, y) of the picture as it repeats without being mirrored, whose size `size()` is.
     template <class Pixel, class Marks> PixelCounts(const Picture<Pixel>& picture, Marks isMarked)
         : wraps_{picture.wrapU, picture.wrapV}, counts_{picture.width, picture.height},
-          size_{picture.width * (picture.wrapU == Wrap::mirror ? 2 : 1), picture.height * (picture.wrapV == Wrap::mirror ? 2 : 1)},
+          size_{picture.width * (picture.wrapU == Wrap::mirror ? 2 : 1),
+                picture.height * (picture.wrapV == Wrap::mirror ? 2 : 1)},
           sums_(static_cast<std::size_t>((size_[0] + 1) * (size_[1] + 1))) {
         for (std::int64_t y = 0; y < size_[1]; ++y) {
             std::int32_t row = 0;
@@ -54,13 +56,17 @@ public:
     }
 
 private:
-    std::int32_t at(std::int64_t x, std::int64_t y) const { return sums_[static_cast<std::size_t>(y * (size_[0] + 1) + x)]; }
+    std::int32_t at(std::int64_t x, std::int64_t y) const {
+        return sums_[static_cast<std::size_t>(y * (size_[0] + 1) + x)];
+    }
 
     /// Marked pixels from 0 to x and y of the repeated picture; signed.
     std::int64_t before(std::int64_t x, std::int64_t y) const {
         const auto [width, height] = size_;
-        const std::int64_t restX = (x % width + width) % width, restY = (y % height + height) % height, columns = (x - restX) / width, rows = (y - restY) / height;
-        return rows * columns * at(width, height) + rows * at(restX, height) + columns * at(width, restY) + at(restX, restY);
+        const std::int64_t restX = (x % width + width) % width, restY = (y % height + height) % height,
+                           columns = (x - restX) / width, rows = (y - restY) / height;
+        return rows * columns * at(width, height) + rows * at(restX, height) + columns * at(width, restY) +
+               at(restX, restY);
     }
 
     std::array<Wrap, 2> wraps_;

@@ -11,8 +11,8 @@ public:
     Pieces pieces;
 
     /// `normals` have unit length, or 0 for that of the face.
-    ReliefSurface(std::vector<Vector> vertices, const std::vector<Face>& faces, std::vector<Corners> normals, const std::vector<NormalMap>& maps,
-                  const std::vector<ReliefFace>& relief)
+    ReliefSurface(std::vector<Vector> vertices, const std::vector<Face>& faces, std::vector<Corners> normals,
+                  const std::vector<NormalMap>& maps, const std::vector<ReliefFace>& relief)
         : pieces(std::move(vertices), faces), maps_(maps), relief_(relief), normals_(std::move(normals)) {
         const std::vector<Vector> flat = faceNormals();
         for (std::size_t i = 0; i < normals_.size(); ++i)
@@ -29,7 +29,8 @@ public:
         for (const Piece& piece : pieces.pieces) {
             Corners scaled;
             for (int corner = 0; corner < 3; ++corner)
-                for (int axis = 0; axis < 3; ++axis) scaled[corner][axis] = pieces.vertices[piece.face[corner]][axis] / size;
+                for (int axis = 0; axis < 3; ++axis)
+                    scaled[corner][axis] = pieces.vertices[piece.face[corner]][axis] / size;
             normals.push_back(unit(cross(difference(scaled[1], scaled[0]), difference(scaled[2], scaled[0]))));
         }
         return normals;
@@ -40,9 +41,10 @@ public:
 
     bool hasMap(const Piece& piece) const { return relief_[piece.owner].map >= 0; }
 
-    /// Normals of a piece at points, by weights of its corners, at most of unit length. They are means over squares so wide;
-    /// without a width as wide as points that fill a triangle are apart.
-    std::vector<Vector> normalsAt(const Piece& piece, const std::vector<Vector>& points, std::optional<double> width = {}) const {
+    /// Normals of a piece at points, by weights of its corners, at most of unit length. They are means over squares so
+    /// wide; without a width as wide as points that fill a triangle are apart.
+    std::vector<Vector> normalsAt(const Piece& piece, const std::vector<Vector>& points,
+                                  std::optional<double> width = {}) const {
         const ReliefFace& own = relief_[piece.owner];
         const Frames frames = weighted(piece.weights, frames_[piece.owner]);
         Triangle uvs{};
@@ -55,7 +57,8 @@ public:
                 const auto [least, most] = std::minmax({uvs[0][axis] * size, uvs[1][axis] * size, uvs[2][axis] * size});
                 texels = std::max(texels, most - least);
             }
-            const double spacing = width ? texels * *width / std::sqrt(pieces.longest(piece)) : texels / std::sqrt(2.0 * static_cast<double>(points.size()));
+            const double spacing = width ? texels * *width / std::sqrt(pieces.longest(piece))
+                                         : texels / std::sqrt(2.0 * static_cast<double>(points.size()));
             int exponent;
             std::frexp(std::max(spacing, 1.0), &exponent);
             level = static_cast<std::size_t>(std::max(exponent - 1, 0));
@@ -65,7 +68,8 @@ public:
             const std::array<double, 9> axes = weighted(point, frames);
             const Vector tilt = own.map < 0 ? Vector{0, 0, 1} : maps_[own.map].normal(weighted(point, uvs), level);
             Vector normal;
-            for (int axis = 0; axis < 3; ++axis) normal[axis] = tilt[0] * axes[axis] + tilt[1] * axes[3 + axis] + tilt[2] * axes[6 + axis];
+            for (int axis = 0; axis < 3; ++axis)
+                normal[axis] = tilt[0] * axes[axis] + tilt[1] * axes[3 + axis] + tilt[2] * axes[6 + axis];
             normal = unit(normal);
             for (double& component : normal) component *= length(tilt);
             normals.push_back(normal);

@@ -21,18 +21,19 @@ inline FaceMetal metalOf(const Picture<std::uint8_t>& map, const double* uvs, co
     return {metallic * factors[0] >= 0.5, std::rint(steps * std::clamp(roughness * factors[1], 0.0, 1.0)) / steps};
 }
 
-/// Values in groups of one kind become means until so many groups are left: the two go first whose difference, squared, times
-/// their weight is least (Ward's clustering). Returns the value of each.
-inline std::vector<double> mergedValues(const std::vector<double>& values, const std::vector<double>& weights, const std::vector<std::int64_t>& kinds,
-                                        std::size_t count) {
+/// Values in groups of one kind become means until so many groups are left: the two go first whose difference, squared,
+/// times their weight is least (Ward's clustering). Returns the value of each.
+inline std::vector<double> mergedValues(const std::vector<double>& values, const std::vector<double>& weights,
+                                        const std::vector<std::int64_t>& kinds, std::size_t count) {
     struct Group {
         std::int64_t kind;
         double weight, value;
         std::vector<std::int64_t> members;
     };
     std::vector<Group> groups;
-    for (const std::int64_t i :
-         sortedIndices(values.size(), [&](std::int64_t a, std::int64_t b) { return std::pair{kinds[a], values[a]} < std::pair{kinds[b], values[b]}; }))
+    for (const std::int64_t i : sortedIndices(values.size(), [&](std::int64_t a, std::int64_t b) {
+             return std::pair{kinds[a], values[a]} < std::pair{kinds[b], values[b]};
+         }))
         groups.push_back({kinds[i], weights[i], values[i], {i}});
     while (groups.size() > count) {
         std::size_t best = 0;
@@ -40,7 +41,8 @@ inline std::vector<double> mergedValues(const std::vector<double>& values, const
         for (std::size_t i = 1; i < groups.size(); ++i) {
             const Group &one = groups[i - 1], &other = groups[i];
             if (one.kind != other.kind) continue;
-            const double apart = one.value - other.value, cost = one.weight * other.weight * apart * apart / std::max(one.weight + other.weight, 1e-300);
+            const double apart = one.value - other.value,
+                         cost = one.weight * other.weight * apart * apart / std::max(one.weight + other.weight, 1e-300);
             if (cost < least) {
                 least = cost;
                 best = i;
@@ -60,7 +62,8 @@ inline std::vector<double> mergedValues(const std::vector<double>& values, const
     }
     std::vector<double> found(values.size());
     for (const Group& group : groups)
-        for (const std::int64_t member : group.members) found[member] = group.members.size() > 1 ? group.value : values[member];
+        for (const std::int64_t member : group.members)
+            found[member] = group.members.size() > 1 ? group.value : values[member];
     return found;
 }
 

@@ -12,7 +12,9 @@ class Swatches {
 public:
     /// `linear`: values of the codes of a texture's pixels.
     Swatches(const Picture<std::uint8_t>& texture, const double* linear)
-        : texture_(texture), linear_(linear), size_{static_cast<double>(texture.width), static_cast<double>(texture.height)}, changes_{changes(1, 0), changes(0, 1)} {}
+        : texture_(texture), linear_(linear),
+          size_{static_cast<double>(texture.width), static_cast<double>(texture.height)},
+          changes_{changes(1, 0), changes(0, 1)} {}
 
     /// The linear colours at the corners of a face; nothing if it shows several.
     std::optional<Corners> colours(const Triangle& uvs) const {
@@ -37,7 +39,8 @@ public:
 
 private:
     const std::uint8_t* pixelAt(std::int64_t x, std::int64_t y) const {
-        return texture_.pixels + 3 * (wrapped(y, texture_.height, texture_.wrapV) * texture_.width + wrapped(x, texture_.width, texture_.wrapU));
+        return texture_.pixels + 3 * (wrapped(y, texture_.height, texture_.wrapV) * texture_.width +
+                                      wrapped(x, texture_.width, texture_.wrapU));
     }
     bool isEqual(std::int64_t x, std::int64_t y, std::int64_t otherX, std::int64_t otherY) const {
         const std::uint8_t *one = pixelAt(x, y), *other = pixelAt(otherX, otherY);

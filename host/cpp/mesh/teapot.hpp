@@ -1,8 +1,8 @@
 /// Newell's teapot of 1975, tessellated from its control points: 28 published Bézier patches and the later bottom.
 ///
-/// Body, lid and bottom are surfaces of revolution: a profile and Newell's cubic quarter circle (an approximation) give their control
-/// points. Handle and spout are mirrored halves. Adjacent patches share their edges bit for bit, so the mesh is closed without a merging
-/// tolerance.
+/// Body, lid and bottom are surfaces of revolution: a profile and Newell's cubic quarter circle (an approximation) give
+/// their control points. Handle and spout are mirrored halves. Adjacent patches share their edges bit for bit, so the
+/// mesh is closed without a merging tolerance.
 #pragma once
 
 #include "cleaning.hpp"
@@ -12,7 +12,8 @@ namespace colonnade::mesh {
 /// Rows of control points of a bicubic patch, y up, normals outward.
 using Patch = std::array<std::array<Vector, 4>, 4>;
 
-/// Profiles of the surfaces of revolution: rim, upper and lower body, knob of the lid, lid, bottom; radius and height, starting at the rim.
+/// Profiles of the surfaces of revolution: rim, upper and lower body, knob of the lid, lid, bottom; radius and height,
+/// starting at the rim.
 inline constexpr double profiles[6][4][2]{
     {{1.4, 2.4}, {1.3375, 2.53125}, {1.4375, 2.53125}, {1.5, 2.4}},
     {{1.5, 2.4}, {1.75, 1.875}, {2.0, 1.35}, {2.0, 0.9}},
@@ -22,7 +23,8 @@ inline constexpr double profiles[6][4][2]{
     {{1.5, 0.15}, {1.5, 0.075}, {1.425, 0.0}, {0.0, 0.0}},
 };
 
-/// Upper and lower handle, lower and upper spout: rows of x, half width and height, from symmetry plane to symmetry plane.
+/// Upper and lower handle, lower and upper spout: rows of x, half width and height, from symmetry plane to symmetry
+/// plane.
 inline constexpr double halves[4][4][4][3]{
     {{{-1.6, 0.0, 2.025}, {-1.6, 0.3, 2.025}, {-1.5, 0.3, 2.25}, {-1.5, 0.0, 2.25}},
      {{-2.3, 0.0, 2.025}, {-2.3, 0.3, 2.025}, {-2.5, 0.3, 2.25}, {-2.5, 0.0, 2.25}},
@@ -72,7 +74,8 @@ inline std::vector<Patch> teapotPatches() {
     return patches;
 }
 
-/// Each patch in level × level cells of two triangles, without the degenerate ones at the poles; vertices are not merged between patches.
+/// Each patch in level × level cells of two triangles, without the degenerate ones at the poles; vertices are not
+/// merged between patches.
 inline RawMesh teapot(int level) {
     std::vector<std::array<double, 4>> basis;
     for (int i = 0; i <= level; ++i) {
@@ -101,7 +104,8 @@ inline RawMesh teapot(int level) {
         for (int u = 0; u < level; ++u)
             for (int v = 0; v < level; ++v) {
                 const std::int32_t corner = first + u * side + v;
-                for (const Face& face : {Face{corner, corner + 1, corner + side + 1}, Face{corner, corner + side + 1, corner + side}}) {
+                for (const Face& face :
+                     {Face{corner, corner + 1, corner + side + 1}, Face{corner, corner + side + 1, corner + side}}) {
                     const Vector &a = mesh.vertices[face[0]], &b = mesh.vertices[face[1]], &c = mesh.vertices[face[2]];
                     if (a != b && b != c && c != a) mesh.faces.push_back(face);
                 }

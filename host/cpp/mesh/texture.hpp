@@ -60,7 +60,8 @@ template <class Pixel> struct Picture {
             for (int y = 0; y < (isNearest ? 1 : 2); ++y) {
                 const Pixel* pixel = pixels + (down.pixels[y] * width + across.pixels[x]) * channels;
                 const double weight = isNearest ? 1.0 : across.weights[x] * down.weights[y];
-                for (std::int64_t channel = 0; channel < channels; ++channel) out[channel] += weight * valueOf(pixel[channel]);
+                for (std::int64_t channel = 0; channel < channels; ++channel)
+                    out[channel] += weight * valueOf(pixel[channel]);
             }
     }
 

@@ -15,14 +15,19 @@ template <class T> using Row = std::array<T, 3>;
 using Vector = Row<double>;
 using Face = Row<std::int32_t>;
 
-template <class T> Row<T> difference(const Row<T>& a, const Row<T>& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-template <class T> Row<T> cross(const Row<T>& a, const Row<T>& b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+template <class T> Row<T> difference(const Row<T>& a, const Row<T>& b) {
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+template <class T> Row<T> cross(const Row<T>& a, const Row<T>& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
 inline double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 inline double length(const Vector& a) { return std::sqrt(dot(a, a)); }
 
 /// A vector of any finite length scaled to length 1; zero stays zero.
 inline Vector unit(const Vector& vector) {
-    const double largest = std::max({std::fabs(vector[0]), std::fabs(vector[1]), std::fabs(vector[2])}), scale = largest > 0 ? largest : 1;
+    const double largest = std::max({std::fabs(vector[0]), std::fabs(vector[1]), std::fabs(vector[2])}),
+                 scale = largest > 0 ? largest : 1;
     const Vector safe{vector[0] / scale, vector[1] / scale, vector[2] / scale};
     const double norm = length(safe), divisor = norm > 0 ? norm : 1;
     return {safe[0] / divisor, safe[1] / divisor, safe[2] / divisor};
@@ -45,7 +50,8 @@ template <class T> struct MergedRows {
 template <class T> MergedRows<T> mergeRows(const Row<T>* rows, std::size_t count) {
     MergedRows<T> merged;
     merged.index.resize(count);
-    for (const std::int64_t i : sortedIndices(count, [&](std::int64_t one, std::int64_t other) { return rows[one] < rows[other]; })) {
+    for (const std::int64_t i :
+         sortedIndices(count, [&](std::int64_t one, std::int64_t other) { return rows[one] < rows[other]; })) {
         if (merged.rows.empty() || merged.rows.back() != rows[i]) merged.rows.push_back(rows[i]);
         merged.index[i] = static_cast<std::int64_t>(merged.rows.size()) - 1;
     }
@@ -53,7 +59,9 @@ template <class T> MergedRows<T> mergeRows(const Row<T>* rows, std::size_t count
 }
 
 /// Indices of the faces to keep, ascending: with an area, and unless `keepsEqual` the first of each set of vertices.
-template <class T> std::vector<std::int64_t> dropFaces(const std::vector<Row<T>>& vertices, const std::vector<Row<std::int64_t>>& faces, bool keepsEqual = false) {
+template <class T> std::vector<std::int64_t> dropFaces(const std::vector<Row<T>>& vertices,
+                                                       const std::vector<Row<std::int64_t>>& faces,
+                                                       bool keepsEqual = false) {
     std::vector<std::int64_t> candidates;
     std::vector<Row<std::int64_t>> sets;
     for (std::size_t i = 0; i < faces.size(); ++i) {

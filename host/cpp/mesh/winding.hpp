@@ -38,7 +38,8 @@ public:
         number(parts);
         for (std::size_t i = 0; i < 2 * count; ++i) sideOf_[i] = sides.find(i);
 
-        std::vector<std::uint8_t> isClosed = closedParts(runs), isRepairable = isClosed, isMixed(first_.size()), isInward(first_.size());
+        std::vector<std::uint8_t> isClosed = closedParts(runs), isRepairable = isClosed, isMixed(first_.size()),
+                                  isInward(first_.size());
         for (std::size_t i = 0; i < count; ++i)
             if (sideOf_[i] == sideOf_[i + count]) isRepairable[partOf_[i]] = false;
         Winding result;
@@ -50,7 +51,8 @@ public:
         }
         const std::vector<double> volumes = partVolumes(result.reversed);
         for (std::size_t part = 0; part < first_.size(); ++part) {
-            isInward[part] = isRepairable[part] && volumes[part] < 0 && (isMixed[part] || !isCavity(part, isRepairable));
+            isInward[part] =
+                isRepairable[part] && volumes[part] < 0 && (isMixed[part] || !isCavity(part, isRepairable));
             result.mixed += isMixed[part];
             result.inverted += isInward[part] && !isMixed[part];
         }
@@ -75,7 +77,9 @@ private:
         };
         std::vector<Run> runs;
         std::array<std::int32_t, 2> edge{-1, -1};
-        for (const std::int64_t corner : sortedIndices(3 * faces_.size(), [&](std::int64_t one, std::int64_t other) { return edgeOf(one) < edgeOf(other); })) {
+        for (const std::int64_t corner : sortedIndices(3 * faces_.size(), [&](std::int64_t one, std::int64_t other) {
+                 return edgeOf(one) < edgeOf(other);
+             })) {
             if (edgeOf(corner) != edge) runs.emplace_back();
             edge = edgeOf(corner);
             runs.back().push_back(corner);
@@ -102,7 +106,9 @@ private:
         for (const Run& run : runs)
             for (const std::size_t corner : run) {
                 const std::size_t part = partOf_[corner / 3];
-                if (std::count_if(run.begin(), run.end(), [&](std::size_t other) { return partOf_[other / 3] == part; }) != 2) isClosed[part] = false;
+                if (std::count_if(run.begin(), run.end(),
+                                  [&](std::size_t other) { return partOf_[other / 3] == part; }) != 2)
+                    isClosed[part] = false;
             }
         return isClosed;
     }
@@ -120,7 +126,8 @@ private:
             for (double& component : centres[part]) component /= sizes[part];
         for (std::size_t i = 0; i < corners.size(); ++i) {
             const Vector& centre = centres[partOf_[i]];
-            const double volume = dot(difference(corners[i][0], centre), cross(difference(corners[i][1], centre), difference(corners[i][2], centre)));
+            const double volume = dot(difference(corners[i][0], centre),
+                                      cross(difference(corners[i][1], centre), difference(corners[i][2], centre)));
             volumes[partOf_[i]] += reversed[i] ? -volume : volume;
         }
         return volumes;
@@ -143,15 +150,19 @@ private:
         }
     }
 
-    /// Whether a part lies in an odd number of other closed parts: it is the wall of a cavity then. So are all of too many.
+    /// Whether a part lies in an odd number of other closed parts: it is the wall of a cavity then. So are all of too
+    /// many.
     bool isCavity(std::size_t inner, const std::vector<std::uint8_t>& isRepairable) {
-        if (static_cast<std::size_t>(std::count(isRepairable.begin(), isRepairable.end(), true)) > maxNested) return true;
+        if (static_cast<std::size_t>(std::count(isRepairable.begin(), isRepairable.end(), true)) > maxNested)
+            return true;
         findBoxes();
         const Vector& point = vertices_[faces_[first_[inner]][0]];
         int around = 0;
         for (std::size_t part = 0; part < first_.size(); ++part) {
             bool isEnclosing = part != inner && isRepairable[part];
-            for (int axis = 0; axis < 3; ++axis) isEnclosing = isEnclosing && low_[part][axis] <= low_[inner][axis] && high_[inner][axis] <= high_[part][axis];
+            for (int axis = 0; axis < 3; ++axis)
+                isEnclosing =
+                    isEnclosing && low_[part][axis] <= low_[inner][axis] && high_[inner][axis] <= high_[part][axis];
             if (isEnclosing) around += windingNumber(point, part);
         }
         return around % 2 != 0;
@@ -161,10 +172,12 @@ private:
     int windingNumber(const Vector& point, std::size_t part) const {
         double angle = 0;
         for (const std::size_t face : facesOf_[part]) {
-            const Vector a = difference(vertices_[faces_[face][0]], point), b = difference(vertices_[faces_[face][1]], point),
+            const Vector a = difference(vertices_[faces_[face][0]], point),
+                         b = difference(vertices_[faces_[face][1]], point),
                          c = difference(vertices_[faces_[face][2]], point);
             const double la = length(a), lb = length(b), lc = length(c);
-            angle += fixed_order::arctan2(dot(a, cross(b, c)), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
+            angle += fixed_order::arctan2(dot(a, cross(b, c)),
+                                          la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
         }
         return static_cast<int>(std::abs(std::lround(angle / (2 * 3.14159265358979324))));
     }
@@ -177,6 +190,8 @@ private:
 };
 
 /// The faces of closed parts to reverse, so that all point outward.
-inline Winding findWinding(const std::vector<Vector>& vertices, const std::vector<Face>& faces) { return WindingFinder(vertices, faces).find(); }
+inline Winding findWinding(const std::vector<Vector>& vertices, const std::vector<Face>& faces) {
+    return WindingFinder(vertices, faces).find();
+}
 
 } // namespace colonnade::mesh

@@ -11,7 +11,8 @@ using Wide = __int128;
 using UnsignedWide = unsigned __int128;
 
 /// The unsigned integer of a signed one's size.
-template <class Integer> using UnsignedOf = std::conditional_t<sizeof(Integer) == sizeof(Wide), UnsignedWide, std::uint64_t>;
+template <class Integer> using UnsignedOf =
+    std::conditional_t<sizeof(Integer) == sizeof(Wide), UnsignedWide, std::uint64_t>;
 
 /// Number of bits of x; 0 for 0.
 inline int bitLength(UnsignedWide x) {
@@ -19,11 +20,15 @@ inline int bitLength(UnsignedWide x) {
     return high ? 128 - __builtin_clzll(high) : low ? 64 - __builtin_clzll(low) : 0;
 }
 
-template <class Integer> UnsignedOf<Integer> magnitude(Integer x) { return x < 0 ? -static_cast<UnsignedOf<Integer>>(x) : static_cast<UnsignedOf<Integer>>(x); }
+template <class Integer> UnsignedOf<Integer> magnitude(Integer x) {
+    return x < 0 ? -static_cast<UnsignedOf<Integer>>(x) : static_cast<UnsignedOf<Integer>>(x);
+}
 
 /// x · 2^bits, modulo the integer's range.
 template <class Integer> Integer shiftLeft(Integer x, int bits) {
-    return bits >= static_cast<int>(8 * sizeof(Integer)) ? Integer(0) : static_cast<Integer>(static_cast<UnsignedOf<Integer>>(x) << bits);
+    return bits >= static_cast<int>(8 * sizeof(Integer))
+               ? Integer(0)
+               : static_cast<Integer>(static_cast<UnsignedOf<Integer>>(x) << bits);
 }
 
 /// The low `bits` bits of x as a signed number, as in a register of that width.
@@ -37,7 +42,8 @@ template <class Integer> Integer floorShift(Integer x, int bits) {
 
 /// floorShift(x, bits) for x within the bits of `all`, where the result fits 64 bits; faster if `all` fits 62.
 inline std::int64_t shiftToFit(Wide x, int bits, UnsignedWide all) {
-    return all >> 62 == 0 ? floorShift(static_cast<std::int64_t>(x), bits) : static_cast<std::int64_t>(floorShift(x, bits));
+    return all >> 62 == 0 ? floorShift(static_cast<std::int64_t>(x), bits)
+                          : static_cast<std::int64_t>(floorShift(x, bits));
 }
 
 /// x / 2^bits rounded to nearest, ties to even; a left shift for negative `bits`.
@@ -47,7 +53,9 @@ template <class Integer> Integer nearestEven(Integer x, int bits) {
     return quotient + (rest + (quotient & 1) > half);
 }
 
-template <class Integer> Integer clamp(Integer x, Integer low, Integer high) { return x < low ? low : x > high ? high : x; }
+template <class Integer> Integer clamp(Integer x, Integer low, Integer high) {
+    return x < low ? low : x > high ? high : x;
+}
 
 /// Largest value of a signed number of `bits` bits.
 inline Wide largest(int bits) { return (Wide(1) << (bits - 1)) - 1; }
@@ -74,7 +82,8 @@ inline std::uint64_t divide(std::uint64_t numerator, std::uint64_t denominator, 
 
 /// floor(sqrt(radicand)): by floating point, corrected.
 inline std::uint64_t squareRoot(std::uint64_t radicand) {
-    auto root = std::min<std::uint64_t>(0xffffffff, static_cast<std::uint64_t>(std::sqrt(static_cast<double>(radicand))));
+    auto root =
+        std::min<std::uint64_t>(0xffffffff, static_cast<std::uint64_t>(std::sqrt(static_cast<double>(radicand))));
     while (root * root > radicand) --root;
     while (root < 0xffffffff && (root + 1) * (root + 1) <= radicand) ++root;
     return root;

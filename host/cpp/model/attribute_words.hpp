@@ -72,7 +72,8 @@ public:
 
     void load(const std::uint8_t* words, std::size_t count, std::size_t stride) {
         if (stride < wordBytes) throw std::invalid_argument("heap words must have 16 bits");
-        for (std::size_t i = 0; i < std::min(count, words_.size()); ++i) words_[i] = static_cast<std::uint16_t>(words[i * stride] | words[i * stride + 1] << 8);
+        for (std::size_t i = 0; i < std::min(count, words_.size()); ++i)
+            words_[i] = static_cast<std::uint16_t>(words[i * stride] | words[i * stride + 1] << 8);
     }
     bool covers(int address) const { return static_cast<std::size_t>(address) < words_.size(); }
     int word(int address) const { return covers(address) ? words_[address] : 0; }
@@ -80,7 +81,9 @@ public:
     int high(int address) const { return word(address) >> 8; }
 
     /// Element `index` of a mask at `address` with elements of `bits` (1, 2 or 4) bits.
-    int select(int address, int index, int bits) const { return (word(wordOf(address, index, bits)) >> (index * bits % 16)) & ((1 << bits) - 1); }
+    int select(int address, int index, int bits) const {
+        return (word(wordOf(address, index, bits)) >> (index * bits % 16)) & ((1 << bits) - 1);
+    }
 
     /// Address of the word with that element.
     static int wordOf(int address, int index, int bits) { return address + index * bits / 16; }
@@ -95,17 +98,21 @@ public:
     AttributeWords(const Layout& layout, const std::uint8_t* words, std::size_t count, std::size_t stride)
         : layout_(layout), words_(words), count_(count), stride_(stride) {
         for (const auto& [name, field] : layout)
-            if (field.offset + field.width > static_cast<int>(8 * stride)) throw std::invalid_argument("words are too short for their field " + name);
+            if (field.offset + field.width > static_cast<int>(8 * stride))
+                throw std::invalid_argument("words are too short for their field " + name);
     }
     std::size_t count() const { return count_; }
-    std::int64_t field(std::size_t index, const std::string& name) const { return layout_.at(name).read(words_ + index * stride_); }
+    std::int64_t field(std::size_t index, const std::string& name) const {
+        return layout_.at(name).read(words_ + index * stride_);
+    }
     std::array<int, 3> components(std::size_t index, const std::string& prefix, const char* axes) const {
         std::array<int, 3> values;
         for (int i = 0; i < 3; ++i) values[i] = static_cast<int>(field(index, prefix + axes[i]));
         return values;
     }
     PlaneWord plane(std::size_t index, const std::string& prefix) const {
-        return {field(index, prefix + "a"), field(index, prefix + "b"), field(index, prefix + "c"), static_cast<int>(field(index, prefix + "exponent"))};
+        return {field(index, prefix + "a"), field(index, prefix + "b"), field(index, prefix + "c"),
+                static_cast<int>(field(index, prefix + "exponent"))};
     }
 
 private:

@@ -53,17 +53,20 @@ public:
     using Components = std::array<int, 3>;
 
     explicit ComponentMap(const AttributeSizes& sizes)
-        : sizes_(sizes), descriptors_(sizes.hasSlicMaps() ? 0 : sizes.tiles()), entries_(sizes.hasSlicMaps() ? sizes.tiles() : sizes.paletteSize),
+        : sizes_(sizes), descriptors_(sizes.hasSlicMaps() ? 0 : sizes.tiles()),
+          entries_(sizes.hasSlicMaps() ? sizes.tiles() : sizes.paletteSize),
           heap_(sizes.hasSlicMaps() ? sizes.labelWords : sizes.mapHeapWords) {}
 
     void loadDescriptors(const AttributeWords& words) {
         for (std::size_t i = 0; i < std::min(words.count(), descriptors_.size()); ++i)
-            descriptors_[i] = {static_cast<int>(words.field(i, "mode")),
-                               static_cast<int>(words.field(i, "pointer")),
-                               {static_cast<int>(words.field(i, "entries[0]")), static_cast<int>(words.field(i, "entries[1]"))}};
+            descriptors_[i] = {
+                static_cast<int>(words.field(i, "mode")),
+                static_cast<int>(words.field(i, "pointer")),
+                {static_cast<int>(words.field(i, "entries[0]")), static_cast<int>(words.field(i, "entries[1]"))}};
     }
     void loadEntries(const AttributeWords& words, const char* axes) {
-        for (std::size_t i = 0; i < std::min(words.count(), entries_.size()); ++i) entries_[i] = words.components(i, "", axes);
+        for (std::size_t i = 0; i < std::min(words.count(), entries_.size()); ++i)
+            entries_[i] = words.components(i, "", axes);
     }
     AttributeHeap& heap() { return heap_; }
     const AttributeHeap& heap() const { return heap_; }
@@ -71,7 +74,9 @@ public:
     const Components& components(const MapEntry& entry) const { return entries_[entry.index]; }
 
     /// The palette entry or the seed of a pixel.
-    MapEntry entryAt(int x, int y) const { return sizes_.hasSlicMaps() ? MapEntry{seedAt(x, y), false} : paletteEntryAt(x, y); }
+    MapEntry entryAt(int x, int y) const {
+        return sizes_.hasSlicMaps() ? MapEntry{seedAt(x, y), false} : paletteEntryAt(x, y);
+    }
 
 private:
     struct Descriptor {
@@ -88,7 +93,9 @@ private:
         const bool hasFour = tile.mode >= 4;
         const int mask = tile.pointer + hasFour, bits = hasFour ? 2 : 1;
         const int choice = heap_.select(mask, cell, bits);
-        const int entry = choice < 2 ? tile.entries[choice] : choice == 2 ? heap_.low(tile.pointer) : heap_.high(tile.pointer);
+        const int entry = choice < 2    ? tile.entries[choice]
+                          : choice == 2 ? heap_.low(tile.pointer)
+                                        : heap_.high(tile.pointer);
         return {entry & known, !heap_.covers(AttributeHeap::wordOf(mask, cell, bits))};
     }
 
@@ -113,19 +120,23 @@ public:
     /// @param sizes the manifest's `texture.sizes`
     /// @param layouts its `texture.layouts`
     TextureImage(const std::map<std::string, std::int64_t>& sizes, const std::map<std::string, Layout>& layouts)
-        : layouts_(layouts), fractionBits_(static_cast<int>(lookUp(sizes, "fractionBits"))), atlas_(AttributeSizes::ofTexture(sizes)) {}
+        : layouts_(layouts), fractionBits_(static_cast<int>(lookUp(sizes, "fractionBits"))),
+          atlas_(AttributeSizes::ofTexture(sizes)) {}
 
     /// Loads a memory as `AttributeImage::load`.
     void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
-        if (memory == "texture.descriptors") atlas_.loadDescriptors(AttributeWords(layouts_.at("mapDescriptor"), words, count, stride));
-        else if (memory == "texture.palette") atlas_.loadEntries(AttributeWords(layouts_.at("albedo"), words, count, stride), "rgb");
+        if (memory == "texture.descriptors")
+            atlas_.loadDescriptors(AttributeWords(layouts_.at("mapDescriptor"), words, count, stride));
+        else if (memory == "texture.palette")
+            atlas_.loadEntries(AttributeWords(layouts_.at("albedo"), words, count, stride), "rgb");
         else if (memory == "texture.heap") atlas_.heap().load(words, count, stride);
         else throw std::invalid_argument("there is no texture memory '" + memory + "'");
     }
 
     /// The texel at a position, which has fraction bits and lies in the atlas.
     Rgb12 texelAt(std::int64_t u, std::int64_t v) const {
-        const MapEntry entry = atlas_.entryAt(static_cast<int>(u >> fractionBits_), static_cast<int>(v >> fractionBits_));
+        const MapEntry entry =
+            atlas_.entryAt(static_cast<int>(u >> fractionBits_), static_cast<int>(v >> fractionBits_));
         const auto [r, g, b] = atlas_.components(entry);
         return {r, g, b, entry.isIllegal};
     }
@@ -139,7 +150,8 @@ private:
 /// The map from pixels to plane ids.
 class PlaneIds {
 public:
-    explicit PlaneIds(const AttributeSizes& sizes) : sizes_(sizes), descriptors_(sizes.tiles()), heap_(sizes.planeHeapWords) {}
+    explicit PlaneIds(const AttributeSizes& sizes)
+        : sizes_(sizes), descriptors_(sizes.tiles()), heap_(sizes.planeHeapWords) {}
 
     void loadDescriptors(const AttributeWords& words) {
         for (std::size_t i = 0; i < std::min(words.count(), descriptors_.size()); ++i)
@@ -153,14 +165,16 @@ public:
         const int count = tile.count(), known = sizes_.planes - 1;
         if (count == 1) return {sizes_.tileLog, 1, {tile.pointer & known, 0, 0, 0}, false};
         TileInfo info{cellLog(tile), count, {}, !heap_.covers(tile.pointer + count / 2 - 1)};
-        for (int i = 0; i < count; ++i) info.ids[i] = (i % 2 ? heap_.high(tile.pointer + i / 2) : heap_.low(tile.pointer + i / 2)) & known;
+        for (int i = 0; i < count; ++i)
+            info.ids[i] = (i % 2 ? heap_.high(tile.pointer + i / 2) : heap_.low(tile.pointer + i / 2)) & known;
         return info;
     }
 
     /// `info`: the planes of the pixel's tile.
     CellPlane planeAt(const TileInfo& info, int x, int y) const {
         if (info.count == 1) return {info.ids[0], false};
-        const int bits = info.count / 2, mask = descriptors_[sizes_.tileOf(x, y)].pointer + bits, cell = sizes_.cellOf(x, y, info.cellLog2);
+        const int bits = info.count / 2, mask = descriptors_[sizes_.tileOf(x, y)].pointer + bits,
+                  cell = sizes_.cellOf(x, y, info.cellLog2);
         return {info.ids[heap_.select(mask, cell, bits)], !heap_.covers(AttributeHeap::wordOf(mask, cell, bits))};
     }
 
@@ -184,14 +198,18 @@ class AttributeImage {
 public:
     /// @param layouts the manifest's `attributes.layouts`
     AttributeImage(const AttributeSizes& sizes, const std::map<std::string, Layout>& layouts)
-        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes), planes_(sizes.planes), boundingPlanes_(sizes.boundingPlanes) {}
+        : sizes_(sizes), layouts_(layouts), albedo_(sizes), normals_(sizes), ids_(sizes), planes_(sizes.planes),
+          boundingPlanes_(sizes.boundingPlanes) {}
 
-    /// Loads a memory, by its name in the manifest, from address 0 with words of `stride` bytes, low byte first. Words beyond its depth are dropped.
+    /// Loads a memory, by its name in the manifest, from address 0 with words of `stride` bytes, low byte first. Words
+    /// beyond its depth are dropped.
     void load(const std::string& memory, const std::uint8_t* words, std::size_t count, std::size_t stride) {
         const auto by = [&](const char* layout) { return AttributeWords(layouts_.at(layout), words, count, stride); };
-        const std::string entries = sizes_.hasSlicMaps() ? ".seeds" : ".palette", heap = sizes_.hasSlicMaps() ? ".labels" : ".heap";
+        const std::string entries = sizes_.hasSlicMaps() ? ".seeds" : ".palette",
+                          heap = sizes_.hasSlicMaps() ? ".labels" : ".heap";
         if (memory == "albedo.descriptors" && !sizes_.hasSlicMaps()) albedo_.loadDescriptors(by("mapDescriptor"));
-        else if (memory == "normals.descriptors" && !sizes_.hasSlicMaps()) normals_.loadDescriptors(by("mapDescriptor"));
+        else if (memory == "normals.descriptors" && !sizes_.hasSlicMaps())
+            normals_.loadDescriptors(by("mapDescriptor"));
         else if (memory == "albedo" + entries) albedo_.loadEntries(by("albedo"), "rgb");
         else if (memory == "normals" + entries) normals_.loadEntries(by("normal"), "xyz");
         else if (memory == "albedo" + heap) albedo_.heap().load(words, count, stride);

@@ -7,7 +7,8 @@
 
 namespace colonnade {
 
-/// Records are decoded as what the tree reads them for. Addresses outside the scene give null. Records that were never loaded are zero.
+/// Records are decoded as what the tree reads them for. Addresses outside the scene give null. Records that were never
+/// loaded are zero.
 class ColumnMemory {
 public:
     ColumnMemory(const std::map<std::string, Layout>& layouts, const Numbers& numbers)
@@ -20,7 +21,8 @@ public:
         isDecoded_ = false;
     }
 
-    /// Sets the number of records, and decodes what a ray can reach from the roots; without a tree the leaves, from record 0.
+    /// Sets the number of records, and decodes what a ray can reach from the roots; without a tree the leaves, from
+    /// record 0.
     void divide(std::size_t recordCount, const std::vector<std::size_t>& roots, bool bvh, std::size_t leafRecords) {
         const std::array<std::size_t, 3> given{recordCount, bvh, leafRecords};
         if (isDecoded_ && given == given_ && roots == roots_) return;
@@ -62,7 +64,10 @@ public:
     }
 
     /// The attributes of a hit triangle, without colours.
-    Face faceOf(std::uint64_t id) const { return colonnade::faceOf(leaves_[leafAt_[id / leafTriangles]], static_cast<int>(id % leafTriangles), normalFraction_); }
+    Face faceOf(std::uint64_t id) const {
+        return colonnade::faceOf(leaves_[leafAt_[id / leafTriangles]], static_cast<int>(id % leafTriangles),
+                                 normalFraction_);
+    }
 
     /// Reads the colours of a hit triangle; false if they are outside the scene.
     bool readColours(std::uint64_t id, Face& face) const {
@@ -88,7 +93,9 @@ private:
     };
     static_assert(sizeof(Slot) == 64);
 
-    const std::uint8_t* at(std::size_t address) const { return (address + 1) * recordBytes_ <= bytes_.size() ? bytes_.data() + address * recordBytes_ : zero_.data(); }
+    const std::uint8_t* at(std::size_t address) const {
+        return (address + 1) * recordBytes_ <= bytes_.size() ? bytes_.data() + address * recordBytes_ : zero_.data();
+    }
 
     void addLeaf(std::size_t address) {
         if (address >= recordCount_ || leafAt_[address] != none) return;
@@ -115,7 +122,8 @@ private:
             }
             if (!node.isLegal) continue;
             for (std::size_t i = 0; i < node.nodes; ++i) waiting.push_back(node.first + i);
-            for (std::size_t i = 0; i < node.leaves; ++i) addLeaf((node.first + node.nodes + i * leafRecords) & addressMask());
+            for (std::size_t i = 0; i < node.leaves; ++i)
+                addLeaf((node.first + node.nodes + i * leafRecords) & addressMask());
         }
     }
 

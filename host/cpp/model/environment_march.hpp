@@ -24,18 +24,22 @@ public:
         point.work.isFromCamera = true;
         const std::optional<Way> clipped = RayClip(f_, sizes_).clip(ray, view, point.work);
         if (!clipped) return point;
-        for (int a = 0; a < 3; ++a) ray.from[a] += static_cast<std::int64_t>(inMap(Wide(clipped->mantissa) * ray.dir[a], -clipped->exponent));
+        for (int a = 0; a < 3; ++a)
+            ray.from[a] += static_cast<std::int64_t>(inMap(Wide(clipped->mantissa) * ray.dir[a], -clipped->exponent));
         placeInMap(ray, view);
         if (!ray.isInFront || !marchTiles(ray, view, point)) return point;
         const int start = clipped->mantissa == 0 ? RayClip::none : clipped->exponent + ray.fromShift - ray.dirShift;
         const int longer = std::max(start, point.travelExponent) + 1;
-        point.travel = floorShift(clipped->mantissa, longer - start) + floorShift(point.travel, longer - point.travelExponent);
+        point.travel =
+            floorShift(clipped->mantissa, longer - start) + floorShift(point.travel, longer - point.travelExponent);
         point.travelExponent = longer;
         return point;
     }
 
-    /// The point visible to the maps' camera in pixel (x, y) of the frame; `direction` is the pixel's ray's, as in `findHit`.
-    EnvironmentPoint directView(std::int64_t x, std::int64_t y, const Vector& direction, const EnvironmentView& view) const {
+    /// The point visible to the maps' camera in pixel (x, y) of the frame; `direction` is the pixel's ray's, as in
+    /// `findHit`.
+    EnvironmentPoint directView(std::int64_t x, std::int64_t y, const Vector& direction,
+                                const EnvironmentView& view) const {
         EnvironmentPoint point{};
         Vector position{};
         const std::array<std::int64_t, 2> pixel = {x, y};
@@ -71,12 +75,15 @@ public:
     /// Albedo and normal of a point, the normal rotated to object space.
     EnvironmentTexel texelOf(const EnvironmentPoint& point, const EnvironmentView& view) const {
         const bool isBoundingPlane = point.kind == HitKind::boundingPlane;
-        const Rgb12 albedo = isBoundingPlane ? image_.boundingPlane(point.entry).albedo : image_.albedoAt(point.x, point.y);
-        const Normal12 normal = isBoundingPlane ? image_.boundingPlane(point.entry).normal : image_.normalAt(point.x, point.y);
+        const Rgb12 albedo =
+            isBoundingPlane ? image_.boundingPlane(point.entry).albedo : image_.albedoAt(point.x, point.y);
+        const Normal12 normal =
+            isBoundingPlane ? image_.boundingPlane(point.entry).normal : image_.normalAt(point.x, point.y);
         EnvironmentTexel texel{{albedo.r, albedo.g, albedo.b}, {}, albedo.isIllegal || normal.isIllegal};
         const std::int64_t one = std::int64_t(1) << n_.normalFraction;
         for (int a = 0; a < 3; ++a) {
-            const std::int64_t rotated = view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z;
+            const std::int64_t rotated =
+                view.rotation[a][0] * normal.x + view.rotation[a][1] * normal.y + view.rotation[a][2] * normal.z;
             texel.normal[a] = clamp<std::int64_t>(nearestEven(rotated, rotationFraction), -one, one - 1);
         }
         return texel;
@@ -91,9 +98,11 @@ public:
         return result;
     }
 
-    /// Whether a point of the map hides a hit of the object on the same ray, `distance` grid steps away along the dominant axis. A point that
-    /// is in contact with the hit, or with the start of a bounced ray, hides nothing; neither does one that the camera does not see.
-    bool hides(const EnvironmentPoint& point, const Vector& direction, Wide distance, bool isDirectView, const EnvironmentView& view) const {
+    /// Whether a point of the map hides a hit of the object on the same ray, `distance` grid steps away along the
+    /// dominant axis. A point that is in contact with the hit, or with the start of a bounced ray, hides nothing;
+    /// neither does one that the camera does not see.
+    bool hides(const EnvironmentPoint& point, const Vector& direction, Wide distance, bool isDirectView,
+               const EnvironmentView& view) const {
         if (point.kind != HitKind::map || point.isHidden) return false;
         Wide travelled = 0;
         for (const Wide way : wayTo(direction, point)) travelled = std::max(travelled, way < 0 ? ~way : way);
@@ -112,11 +121,13 @@ private:
         for (int i = 0; i < std::min(view.boundingPlanes, sizes_.boundingPlanes); ++i) {
             const PlaneWord& plane = image_.boundingPlane(i).plane;
             const std::int64_t distance = planeDistance(ray, plane, i).value;
-            const std::int64_t centreU = std::int64_t(sizes_.width) << (f_ - mapLog - 1), centreV = std::int64_t(sizes_.height) << (f_ - mapLog - 1);
+            const std::int64_t centreU = std::int64_t(sizes_.width) << (f_ - mapLog - 1),
+                               centreV = std::int64_t(sizes_.height) << (f_ - mapLog - 1);
             const auto fromCentre = [&](int axis, std::int64_t centre) {
                 return ray.dir[axis] - static_cast<std::int64_t>(floorShift<Wide>(Wide(centre) * ray.dir[2], f_));
             };
-            const Wide dir = Wide(plane.a) * fromCentre(0, centreU) + Wide(plane.b) * fromCentre(1, centreV) + Wide(plane.c) * ray.dir[2];
+            const Wide dir = Wide(plane.a) * fromCentre(0, centreU) + Wide(plane.b) * fromCentre(1, centreV) +
+                             Wide(plane.c) * ray.dir[2];
             ++point.work.boundingPlanes;
             if (distance <= 0 || dir <= 0) continue;
             ++point.work.approached;
@@ -125,7 +136,8 @@ private:
             const int exponent = rate.exponent - way.exponent;
             const Normalised normalised = normalise(quotient, f_ + 1);
             const int length = exponent + normalised.exponent;
-            if (bestQuotient == 0 || length > bestExponent || (length == bestExponent && normalised.mantissa > bestQuotient)) {
+            if (bestQuotient == 0 || length > bestExponent ||
+                (length == bestExponent && normalised.mantissa > bestQuotient)) {
                 bestQuotient = normalised.mantissa;
                 bestExponent = length;
                 point.entry = i;
@@ -146,7 +158,10 @@ private:
         WideVector way;
         for (int a = 0; a < 3; ++a) {
             const Wide step = Wide(point.travel) * direction[a];
-            const Wide whole = point.travelExponent > f_ ? (step < 0 ? -maximum - 1 : step > 0 ? maximum : 0) : floorShift<Wide>(step, -point.travelExponent);
+            const Wide whole = point.travelExponent > f_ ? (step < 0   ? -maximum - 1
+                                                            : step > 0 ? maximum
+                                                                       : 0)
+                                                         : floorShift<Wide>(step, -point.travelExponent);
             way[a] = clamp<Wide>(whole, -maximum - 1, maximum);
         }
         return way;

@@ -4,8 +4,9 @@
 
 namespace colonnade {
 
-/// The decoded frame registers of an environment. A position P in grid steps projects to p = matrix · P + (offset << offsetShift), in units of
-/// 2^-exponent. Its pixel in the map is 1024 · (p0, p1) / p2, and its inverse depth is w = 1 / p2.
+/// The decoded frame registers of an environment. A position P in grid steps projects to p = matrix · P + (offset <<
+/// offsetShift), in units of 2^-exponent. Its pixel in the map is 1024 · (p0, p1) / p2, and its inverse depth is w = 1
+/// / p2.
 struct EnvironmentView {
     std::array<Vector, 3> matrix, rotation;
     Vector offset;
@@ -17,13 +18,16 @@ struct EnvironmentView {
     std::array<std::int64_t, 2> step;
     /// Pixels that show the environment itself: x0, y0, x1, y1, the latter two exclusive.
     std::array<std::int64_t, 4> window;
-    /// The environment may hide the object; by how much its point must then be nearer, grid steps along the ray's dominant axis.
+    /// The environment may hide the object; by how much its point must then be nearer, grid steps along the ray's
+    /// dominant axis.
     bool occlusion;
     std::int64_t occlusionTolerance;
     /// The frame's camera took the maps; otherwise its rays march.
     bool isMapCamera;
 
-    bool shows(std::int64_t x, std::int64_t y) const { return x >= window[0] && x < window[2] && y >= window[1] && y < window[3]; }
+    bool shows(std::int64_t x, std::int64_t y) const {
+        return x >= window[0] && x < window[2] && y >= window[1] && y < window[3];
+    }
 };
 
 /// Albedo and normal of an environment point; the normal is in object space, 11 fraction bits.
@@ -37,8 +41,9 @@ struct EnvironmentTexel {
 /// What of the environment a ray hits.
 enum class HitKind { miss, map, boundingPlane };
 
-/// What a march has done, for the cycle model: tiles of one plane, tiles of several planes with the planes that are looked at there, tiles that are passed cell by cell, cells, planes
-/// that are none of the last four, squares passed behind the visible surfaces, bounding planes with approached ones; and planes that a camera's origin is outside of.
+/// What a march has done, for the cycle model: tiles of one plane, tiles of several planes with the planes that are
+/// looked at there, tiles that are passed cell by cell, cells, planes that are none of the last four, squares passed
+/// behind the visible surfaces, bounding planes with approached ones; and planes that a camera's origin is outside of.
 struct MarchWork {
     std::uint16_t flatTiles, tiles, planes, cellTiles, cells, fetches, behind, boundingPlanes, approached, outside;
     bool isFromCamera;
@@ -53,8 +58,9 @@ struct MarchWork {
     }
 };
 
-/// The point where a ray hits the environment, with the albedo and normal of pixel (x, y) or of a bounding plane's entry. Its distance from
-/// the origin is travel · 2^travelExponent ray directions. `isHidden`: the point is on the extension of an occluded surface.
+/// The point where a ray hits the environment, with the albedo and normal of pixel (x, y) or of a bounding plane's
+/// entry. Its distance from the origin is travel · 2^travelExponent ray directions. `isHidden`: the point is on the
+/// extension of an occluded surface.
 struct EnvironmentPoint {
     HitKind kind;
     int x, y, entry;
@@ -67,8 +73,9 @@ struct EnvironmentPoint {
     bool isIllegal;
 };
 
-/// A ray in map space, where it is straight: (u, v, w) with shadeBits fraction bits, u and v in units of 1024 pixels. `from` and `dir` are
-/// the projected origin and direction, shifted right by `fromShift` and `dirShift`. Without `isInFront` the origin is behind the camera.
+/// A ray in map space, where it is straight: (u, v, w) with shadeBits fraction bits, u and v in units of 1024 pixels.
+/// `from` and `dir` are the projected origin and direction, shifted right by `fromShift` and `dirShift`. Without
+/// `isInFront` the origin is behind the camera.
 struct MapRay {
     bool isInFront;
     Vector position, direction;
@@ -76,7 +83,8 @@ struct MapRay {
     int fromShift, dirShift, directionShift;
 };
 
-/// Scales a vector so that its components fit `bits` bits and a sign, as if one of them had at least `length` bits; returns the right shift.
+/// Scales a vector so that its components fit `bits` bits and a sign, as if one of them had at least `length` bits;
+/// returns the right shift.
 inline int blockScale(const WideVector& v, int bits, Vector& scaled, int length = 0) {
     UnsignedWide all = 0;
     for (const Wide component : v) all |= UnsignedWide(component ^ (component >> 127));

@@ -26,9 +26,11 @@ inline std::int64_t lookUp(const std::map<std::string, std::int64_t>& values, co
 
 /// The manifest's `numbers` (docs/numbers.md), and the configuration values that traversal depends on.
 struct Numbers {
-    int vertexBits, boxBits, gridBits, gridFraction, sceneBits, directionBits, mantissaBits, shearFraction, shearDigits, reciprocalFraction, reciprocalDigits,
-        entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits, shadeBits, radicandBits, cosineFraction, boxDistanceBits, boxPadLog, stepFraction,
-        stepReach, nodeBits, nearFraction, nearBits, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits, maxExponent;
+    int vertexBits, boxBits, gridBits, gridFraction, sceneBits, directionBits, mantissaBits, shearFraction, shearDigits,
+        reciprocalFraction, reciprocalDigits, entrySlackShift, entryBits, weightBits, distanceDigits, barycentricBits,
+        shadeBits, radicandBits, cosineFraction, boxDistanceBits, boxPadLog, stepFraction, stepReach, nodeBits,
+        nearFraction, nearBits, normalFraction, colourBits, lightBits, lightFraction, etaFraction, rootBits,
+        maxExponent;
     int stackDepth;
     bool bvh;
 
@@ -106,7 +108,8 @@ struct Field {
     void write(std::uint8_t* record, std::int64_t value) const {
         for (int bit = 0; bit < width;) {
             const int position = offset + bit, shift = position % 8, count = std::min(8 - shift, width - bit);
-            record[position / 8] |= static_cast<std::uint8_t>(((static_cast<std::uint64_t>(value) >> bit) & ((1u << count) - 1)) << shift);
+            record[position / 8] |=
+                static_cast<std::uint8_t>(((static_cast<std::uint64_t>(value) >> bit) & ((1u << count) - 1)) << shift);
             bit += count;
         }
     }
@@ -137,7 +140,8 @@ struct Face {
 /// Decodes nodes by the manifest's layouts. The fields are resolved once, for speed.
 class NodeDecoder {
 public:
-    NodeDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers) : maxExponent_(numbers.maxExponent) {
+    NodeDecoder(const std::map<std::string, Layout>& layouts, const Numbers& numbers)
+        : maxExponent_(numbers.maxExponent) {
         const Layout& node = layouts.at("node");
         corner_ = vectorOf(node, "corner");
         first_ = node.at("first");
@@ -160,7 +164,8 @@ public:
         bool isMarked = true;
         for (int axis = 0; axis < 3; ++axis) {
             // 2 · origin + 2^exponent: the lowest set bit is the exponent's
-            result.exponent[axis] = static_cast<std::uint8_t>(corner[axis] == 0 ? 0 : bitLength(static_cast<UnsignedWide>(corner[axis] & -corner[axis])) - 1);
+            result.exponent[axis] = static_cast<std::uint8_t>(
+                corner[axis] == 0 ? 0 : bitLength(static_cast<UnsignedWide>(corner[axis] & -corner[axis])) - 1);
             result.origin[axis] = static_cast<std::int32_t>((corner[axis] & (corner[axis] - 1)) >> 1);
             isMarked = isMarked && corner[axis] != 0 && result.exponent[axis] <= maxExponent_;
         }
@@ -174,7 +179,8 @@ public:
                 result.high[axis][child] = static_cast<std::uint8_t>(high[axis]);
             }
         }
-        const bool isBelow = result.first > at && result.first + static_cast<std::uint64_t>(result.children()) <= addressMask() + std::uint64_t{1};
+        const bool isBelow = result.first > at && result.first + static_cast<std::uint64_t>(result.children()) <=
+                                                      addressMask() + std::uint64_t{1};
         result.isLegal = result.children() == 0 || (result.children() <= nodeChildren && isMarked && isBelow);
         return result;
     }
@@ -182,9 +188,12 @@ public:
 private:
     using VectorFields = std::array<Field, 3>;
     static VectorFields vectorOf(const Layout& layout, const std::string& name, const char* components = "xyz") {
-        return {layout.at(name + "." + components[0]), layout.at(name + "." + components[1]), layout.at(name + "." + components[2])};
+        return {layout.at(name + "." + components[0]), layout.at(name + "." + components[1]),
+                layout.at(name + "." + components[2])};
     }
-    static Vector read(const VectorFields& fields, const std::uint8_t* record) { return {fields[0].read(record), fields[1].read(record), fields[2].read(record)}; }
+    static Vector read(const VectorFields& fields, const std::uint8_t* record) {
+        return {fields[0].read(record), fields[1].read(record), fields[2].read(record)};
+    }
 
     int maxExponent_;
     VectorFields corner_;

@@ -4,8 +4,9 @@
 
 namespace colonnade {
 
-/// One pixel of the stream. `triangle` (packed id), `instance` and `distance` (t from the camera, grid steps) are for object pixels. `ratio` is for
-/// pixels of the environment: light with the object over light without it, 12 fraction bits.
+/// One pixel of the stream. `triangle` (packed id), `instance` and `distance` (t from the camera, grid steps) are for
+/// object pixels. `ratio` is for pixels of the environment: light with the object over light without it, 12 fraction
+/// bits.
 struct Pixel {
     Colour colour, ratio;
     bool isObject = false;
@@ -14,8 +15,8 @@ struct Pixel {
     Wide distance = 0;
 };
 
-/// The closest hit of a ray: packed id and instance, -1 for a miss; distance along the dominant axis; where rays from there begin, grid steps;
-/// geometric normal against the ray.
+/// The closest hit of a ray: packed id and instance, -1 for a miss; distance along the dominant axis; where rays from
+/// there begin, grid steps; geometric normal against the ray.
 struct NearestHit {
     std::int64_t triangle = -1, instance = -1, distance = 0;
     WideVector start{};
@@ -25,10 +26,13 @@ struct NearestHit {
 class Device : public PathTracer {
 public:
     /// `limits`: the largest value of each register that the device accepts, by name.
-    Device(const Numbers& numbers, const std::map<std::string, Layout>& layouts, Registers limits = {}) : PathTracer(numbers, layouts), limits_(std::move(limits)) {}
+    Device(const Numbers& numbers, const std::map<std::string, Layout>& layouts, Registers limits = {})
+        : PathTracer(numbers, layouts), limits_(std::move(limits)) {}
 
     /// Loads the column memory: `count` records of `bytes` bytes.
-    void load(const std::uint8_t* records, std::size_t count, std::size_t bytes) { memory_->load(records, count, bytes); }
+    void load(const std::uint8_t* records, std::size_t count, std::size_t bytes) {
+        memory_->load(records, count, bytes);
+    }
 
     /// Uses the contents of the physical-attribute memory, which must outlive the device.
     void load(const AttributeImage& image) { march_.emplace(numbers_, image); }
@@ -43,7 +47,8 @@ public:
     void start(const Registers& registers) {
         Registers legal = registers;
         for (const auto& [name, limit] : limits_)
-            if (const auto found = legal.find(name); found != legal.end()) found->second = std::min(found->second, limit);
+            if (const auto found = legal.find(name); found != legal.end())
+                found->second = std::min(found->second, limit);
         frame_ = Frame(legal, numbers_);
         memory_->divide(frame_.recordCount, frame_.roots, numbers_.bvh, frame_.leafRecords());
         counters = {};
@@ -55,7 +60,8 @@ public:
     RayRequest primaryRay(std::int64_t x, std::int64_t y) const {
         RayRequest request{frame_.cameraPosition, {}, numbers_.unlimited()};
         for (int a = 0; a < 3; ++a)
-            request.direction[a] = floorShift<Wide>(frame_.cameraDirection[a], -frame_.stepShift) + Wide(x) * frame_.stepX[a] + Wide(y) * frame_.stepY[a];
+            request.direction[a] = floorShift<Wide>(frame_.cameraDirection[a], -frame_.stepShift) +
+                                   Wide(x) * frame_.stepX[a] + Wide(y) * frame_.stepY[a];
         return request;
     }
 
@@ -66,7 +72,8 @@ public:
         if (!hit.found) return {};
         const Surface surface = surfaceOf(ray, hit, faceAt(hit), numbers_);
         return {static_cast<std::int64_t>(hit.id), hit.instance, static_cast<std::int64_t>(distanceOf(ray, hit)),
-                offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_), surface.faceForwardNormal};
+                offSurface(surface.point, surface.faceForwardNormal, frame_.lighting.offset, numbers_),
+                surface.faceForwardNormal};
     }
 
     Pixel render(std::int64_t x, std::int64_t y) {
@@ -103,19 +110,23 @@ private:
     }
 
     /// Completes a pixel that shows the environment itself.
-    Pixel showDirectView(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray, const EnvironmentHit& found) {
+    Pixel showDirectView(Pixel pixel, std::int64_t x, std::int64_t y, const RayRequest& ray,
+                         const EnvironmentHit& found) {
         if (found.point.kind == HitKind::miss) return pixel;
         Incoming light = lightAt(ray, found, true, PathEnd::directView);
         // At the end `gathered` the light of the object replaces the ambient light
         if (const auto gathered = gatherFromObject(x, y, ray, found))
-            for (int channel = 0; channel < 3; ++channel) light.visible[channel] += (*gathered)[channel] - frame_.lighting.ambient[channel];
+            for (int channel = 0; channel < 3; ++channel)
+                light.visible[channel] += (*gathered)[channel] - frame_.lighting.ambient[channel];
         pixel.colour = reflectedBy(found.texel.albedo, light.visible);
-        for (int channel = 0; channel < 3; ++channel) pixel.ratio[channel] = ratioOf(light.visible[channel], light.unoccluded[channel]);
+        for (int channel = 0; channel < 3; ++channel)
+            pixel.ratio[channel] = ratioOf(light.visible[channel], light.unoccluded[channel]);
         return pixel;
     }
 
     /// The light of the ray that a point of the environment gathers, if it meets the object.
-    std::optional<Colour> gatherFromObject(std::int64_t x, std::int64_t y, const RayRequest& view, const EnvironmentHit& found) {
+    std::optional<Colour> gatherFromObject(std::int64_t x, std::int64_t y, const RayRequest& view,
+                                           const EnvironmentHit& found) {
         if (frame_.gather.bounces == 0) return std::nullopt;
         const std::int64_t one = std::int64_t(1) << numbers_.lightFraction;
         const Vector& normal = found.texel.normal;

@@ -8,24 +8,29 @@ namespace colonnade {
 struct SamplePoint {
     std::uint8_t u, v;
 
-    SamplePoint operator^(const SamplePoint& other) const { return {static_cast<std::uint8_t>(u ^ other.u), static_cast<std::uint8_t>(v ^ other.v)}; }
+    SamplePoint operator^(const SamplePoint& other) const {
+        return {static_cast<std::uint8_t>(u ^ other.u), static_cast<std::uint8_t>(v ^ other.v)};
+    }
 };
 
-/// Registers of gathered rays. `bounces`: gathered rays of a path, 0 for none; `points`: the frame's sample point of each of them; `parallax`: the
-/// distance of the light cube's surfaces is 2^(parallax - 1) edges of the object's cube, infinite if it is 0.
+/// Registers of gathered rays. `bounces`: gathered rays of a path, 0 for none; `points`: the frame's sample point of
+/// each of them; `parallax`: the distance of the light cube's surfaces is 2^(parallax - 1) edges of the object's cube,
+/// infinite if it is 0.
 struct Gather {
     int bounces, parallax;
     std::array<SamplePoint, 4> points;
 
     /// The point of a rough mirror or of rough glass, for a path that has gathered so many rays.
-    const SamplePoint& microfacetPoint(int gathered, bool backSide) const { return points[(static_cast<std::size_t>(gathered) ^ (backSide ? 2 : 3)) & 3]; }
+    const SamplePoint& microfacetPoint(int gathered, bool backSide) const {
+        return points[(static_cast<std::size_t>(gathered) ^ (backSide ? 2 : 3)) & 3];
+    }
 };
 
 /// Low bits of a pixel's coordinates that count.
 constexpr int coordinateBits = 10;
 
-/// What each bit of a pixel's Morton code (x in the even bits, low ones first) adds to its point: the third and the fourth dimension of Sobol's
-/// sequence (Joe and Kuo 2008).
+/// What each bit of a pixel's Morton code (x in the even bits, low ones first) adds to its point: the third and the
+/// fourth dimension of Sobol's sequence (Joe and Kuo 2008).
 inline const std::array<SamplePoint, 2 * coordinateBits>& pixelMatrix() {
     static const auto matrix = [] {
         std::array<SamplePoint, 2 * coordinateBits> columns{};
@@ -34,15 +39,18 @@ inline const std::array<SamplePoint, 2 * coordinateBits>& pixelMatrix() {
             std::array<std::uint64_t, 3> first;
             std::uint8_t SamplePoint::* byte;
         };
-        for (const auto& [degree, coefficients, first, byte] : {Dimension{2, 1, {1, 3, 0}, &SamplePoint::u}, Dimension{3, 1, {1, 3, 1}, &SamplePoint::v}}) {
+        for (const auto& [degree, coefficients, first, byte] :
+             {Dimension{2, 1, {1, 3, 0}, &SamplePoint::u}, Dimension{3, 1, {1, 3, 1}, &SamplePoint::v}}) {
             std::vector<std::uint64_t> m(first.begin(), first.begin() + degree);
             for (int k = degree; k < 2 * coordinateBits; ++k) {
                 std::uint64_t value = m[k - degree] ^ (m[k - degree] << degree);
-                for (int i = 1; i < degree; ++i) value ^= static_cast<std::uint64_t>(coefficients >> (degree - 1 - i) & 1) * (m[k - i] << i);
+                for (int i = 1; i < degree; ++i)
+                    value ^= static_cast<std::uint64_t>(coefficients >> (degree - 1 - i) & 1) * (m[k - i] << i);
                 m.push_back(value);
             }
             // m / 2^(k + 1) is a fraction: its highest eight bits
-            for (int k = 0; k < 2 * coordinateBits; ++k) columns[k].*byte = static_cast<std::uint8_t>((m[k] << 8) >> (k + 1));
+            for (int k = 0; k < 2 * coordinateBits; ++k)
+                columns[k].*byte = static_cast<std::uint8_t>((m[k] << 8) >> (k + 1));
         }
         return columns;
     }();
@@ -68,14 +76,16 @@ inline Vector spherePoint(const SamplePoint& point) {
     for (int axis = 0; axis < 2; ++axis) {
         const bool isBackwards = ((quarter & 1) != 0) != (axis == 1);
         const int index = isBackwards ? 63 - angle : angle;
-        const std::int64_t across = (radius * rounded(std::cos((index + 0.5) * 3.14159265358979323846 / 128)) + 128) >> 8;
+        const std::int64_t across =
+            (radius * rounded(std::cos((index + 0.5) * 3.14159265358979323846 / 128)) + 128) >> 8;
         const bool isMinus = axis == 0 ? quarter == 1 || quarter == 2 : quarter >= 2;
         result[axis] = isMinus ? -across : across;
     }
     return result;
 }
 
-/// The direction in which a smooth mirror would reflect a ray, the axis of a rough one's lobe; its largest component has `shadeBits` bits.
+/// The direction in which a smooth mirror would reflect a ray, the axis of a rough one's lobe; its largest component
+/// has `shadeBits` bits.
 inline WideVector lobeAxis(const WideVector& about, const Vector& dir, const Numbers& n) {
     Vector normal, ray, reflection;
     blockNormalise(about, n.shadeBits, normal);
@@ -85,14 +95,16 @@ inline WideVector lobeAxis(const WideVector& about, const Vector& dir, const Num
     }
     const Wide square = dot(normal, normal), against = std::max<Wide>(0, -dot(normal, ray));
     const int drop = bitLength(square) - 12;
-    const std::int64_t length = static_cast<std::int64_t>(floorShift(square, drop)), along = static_cast<std::int64_t>(floorShift(against, drop));
+    const std::int64_t length = static_cast<std::int64_t>(floorShift(square, drop)),
+                       along = static_cast<std::int64_t>(floorShift(against, drop));
     WideVector sum;
     for (int a = 0; a < 3; ++a) sum[a] = length * ray[a] + 2 * along * normal[a];
     blockNormalise(sum, n.shadeBits, reflection);
     return {reflection[0], reflection[1], reflection[2]};
 }
 
-/// An axis as scattered rays see it, with 11 bits, half its length, and a sample point's part along it, in units of the length.
+/// An axis as scattered rays see it, with 11 bits, half its length, and a sample point's part along it, in units of the
+/// length.
 struct ScatterAxis {
     Vector axis;
     std::int64_t length, lift;
@@ -101,7 +113,8 @@ struct ScatterAxis {
         Vector scaled;
         blockNormalise(about, n.shadeBits, scaled);
         for (int a = 0; a < 3; ++a) axis[a] = floorShift(scaled[a], n.shadeBits - 11);
-        length = static_cast<std::int64_t>(squareRoot(static_cast<std::uint64_t>(floorShift(dot(scaled, scaled), 2 * n.shadeBits + 2 - 22))));
+        length = static_cast<std::int64_t>(
+            squareRoot(static_cast<std::uint64_t>(floorShift(dot(scaled, scaled), 2 * n.shadeBits + 2 - 22))));
         lift = static_cast<std::int64_t>(floorShift(dot(sphere, axis) + 256, 9));
     }
 
@@ -116,8 +129,8 @@ struct ScatterAxis {
     }
 };
 
-/// The sum of two vectors without its low 11 bits. If it is not on the side of a third one it is negated, or else the difference replaces it. It is
-/// never zero.
+/// The sum of two vectors without its low 11 bits. If it is not on the side of a third one it is negated, or else the
+/// difference replaces it. It is never zero.
 inline Vector onSide(const Vector& along, const Vector& across, const Vector& side, bool isNegated) {
     Vector direction;
     Wide sum = 0;
@@ -131,13 +144,18 @@ inline Vector onSide(const Vector& along, const Vector& across, const Vector& si
     return direction;
 }
 
-/// The direction of the ray that gathers light at a surface, about an axis of any length: n + |n| · s at a diffuse one, about its normal; for a rough
-/// metal a ray of its lobe. One that points below the surface is negated, or lies on the other side of the lobe's axis. It is never zero.
-inline Vector gatherDirection(const WideVector& about, const Vector& faceForwardNormal, const SamplePoint& point, const Lobe* lobe, const Numbers& n) {
+/// The direction of the ray that gathers light at a surface, about an axis of any length: n + |n| · s at a diffuse one,
+/// about its normal; for a rough metal a ray of its lobe. One that points below the surface is negated, or lies on the
+/// other side of the lobe's axis. It is never zero.
+inline Vector gatherDirection(const WideVector& about, const Vector& faceForwardNormal, const SamplePoint& point,
+                              const Lobe* lobe, const Numbers& n) {
     const Vector sphere = spherePoint(point);
     const ScatterAxis frame(about, sphere, n);
     Vector along, across, side;
-    const std::int64_t lowered = lobe ? floorShift(lobe->alpha * floorShift(lobe->alpha * std::max<std::int64_t>(0, frame.length + frame.lift), 8), 8) : 0;
+    const std::int64_t lowered =
+        lobe ? floorShift(
+                   lobe->alpha * floorShift(lobe->alpha * std::max<std::int64_t>(0, frame.length + frame.lift), 8), 8)
+             : 0;
     if (lobe) across = frame.across(sphere, lobe->alpha);
     for (int a = 0; a < 3; ++a) {
         along[a] = lobe ? (frame.length - frame.lift - lowered) * frame.axis[a] : frame.axis[a] << 10;
@@ -147,9 +165,10 @@ inline Vector gatherDirection(const WideVector& about, const Vector& faceForward
     return onSide(along, across, side, !lobe);
 }
 
-/// The normal of a microfacet of a rough mirror or of rough glass, of any length. One that faces away from a ray in the direction `dir` lies on the
-/// other side of the normal. `alpha` has 10 fraction bits.
-inline WideVector microfacetNormal(const WideVector& normal, const Vector& dir, const SamplePoint& point, std::int64_t alpha, const Numbers& n) {
+/// The normal of a microfacet of a rough mirror or of rough glass, of any length. One that faces away from a ray in the
+/// direction `dir` lies on the other side of the normal. `alpha` has 10 fraction bits.
+inline WideVector microfacetNormal(const WideVector& normal, const Vector& dir, const SamplePoint& point,
+                                   std::int64_t alpha, const Numbers& n) {
     const Vector sphere = spherePoint(point);
     const ScatterAxis frame(normal, sphere, n);
     Vector along, across = frame.across(sphere, alpha), side;
@@ -162,8 +181,8 @@ inline WideVector microfacetNormal(const WideVector& normal, const Vector& dir, 
     return {found[0], found[1], found[2]};
 }
 
-/// The light cube: linear radiance by direction, 12 fraction bits, and where lights are; faces of 16 × 16 texels. The fields of a word are its
-/// mantissas of 7 bits, blue lowest, their exponent of 4 bits and whether there is a light.
+/// The light cube: linear radiance by direction, 12 fraction bits, and where lights are; faces of 16 × 16 texels. The
+/// fields of a word are its mantissas of 7 bits, blue lowest, their exponent of 4 bits and whether there is a light.
 class LightCube {
 public:
     static constexpr int faceLog = 4, texels = 6 << (2 * faceLog);
@@ -172,14 +191,18 @@ public:
     /// Loads texels from address 0; words of `wordBytes` bytes, low byte first.
     void load(const std::uint8_t* words, std::size_t count) {
         for (std::size_t i = 0; i < std::min(count, texels_.size()); ++i, words += wordBytes) {
-            const std::uint32_t word = words[0] | words[1] << 8 | words[2] << 16 | static_cast<std::uint32_t>(words[3]) << 24;
-            for (std::size_t channel = 0; channel < 3; ++channel) texels_[i][channel] = (word >> (14 - 7 * channel) & 127) << (word >> 21 & 15) & most;
+            const std::uint32_t word =
+                words[0] | words[1] << 8 | words[2] << 16 | static_cast<std::uint32_t>(words[3]) << 24;
+            for (std::size_t channel = 0; channel < 3; ++channel)
+                texels_[i][channel] = (word >> (14 - 7 * channel) & 127) << (word >> 21 & 15) & most;
             isLight_[i] = word >> 25 & 1;
         }
     }
 
-    /// What a ray meets that leaves the object, from an origin in grid steps; the lights are seen by paths that have gathered nothing.
-    Colour light(const WideVector& origin, const WideVector& direction, int parallax, bool seesLights, const Numbers& n) const {
+    /// What a ray meets that leaves the object, from an origin in grid steps; the lights are seen by paths that have
+    /// gathered nothing.
+    Colour light(const WideVector& origin, const WideVector& direction, int parallax, bool seesLights,
+                 const Numbers& n) const {
         const std::size_t address = addressOf(fromMiddle(origin, direction, parallax, n));
         return seesLights && isLight_[address] ? Colour{most, most, most} : texels_[address];
     }
@@ -194,8 +217,11 @@ private:
         std::int64_t major = 0;
         for (int a = 0; a < 3; ++a) major = std::max(major, (scaled[a] < 0 ? ~scaled[a] : scaled[a]) >> 5);
         for (int a = 0; a < 3; ++a) {
-            const auto offset = static_cast<std::int64_t>(floorShift<Wide>(origin[a] - (Wide(1) << (n.gridBits - 4)), n.gridBits - 9 + parallax));
-            scaled[a] = floorShift(2 * scaled[a] + 1 + (parallax == 0 ? 0 : (2 * std::clamp<std::int64_t>(offset, -32, 31) + 1) * major), 2);
+            const auto offset = static_cast<std::int64_t>(
+                floorShift<Wide>(origin[a] - (Wide(1) << (n.gridBits - 4)), n.gridBits - 9 + parallax));
+            scaled[a] = floorShift(
+                2 * scaled[a] + 1 + (parallax == 0 ? 0 : (2 * std::clamp<std::int64_t>(offset, -32, 31) + 1) * major),
+                2);
         }
         return scaled;
     }

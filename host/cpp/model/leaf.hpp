@@ -21,7 +21,9 @@ struct Leaf {
     int corners() const { return isPair() ? 4 : 3; }
 
     /// The vertex that is each corner of a triangle.
-    static constexpr std::array<int, 3> cornersOf(int triangle) { return triangle == 0 ? std::array<int, 3>{0, 1, 2} : std::array<int, 3>{1, 0, 3}; }
+    static constexpr std::array<int, 3> cornersOf(int triangle) {
+        return triangle == 0 ? std::array<int, 3>{0, 1, 2} : std::array<int, 3>{1, 0, 3};
+    }
 
     std::array<Vector, 3> verticesOf(int triangle) const {
         const std::array<int, 3> corners = cornersOf(triangle);
@@ -37,7 +39,8 @@ struct LeafTriangles {
     std::uint8_t count;
 
     explicit LeafTriangles(const Leaf& leaf)
-        : vertices{}, material(static_cast<std::uint8_t>(leaf.material)), isClear(leaf.isClear), count(static_cast<std::uint8_t>(leaf.triangles())) {
+        : vertices{}, material(static_cast<std::uint8_t>(leaf.material)), isClear(leaf.isClear),
+          count(static_cast<std::uint8_t>(leaf.triangles())) {
         for (int i = 0; i < leaf.corners(); ++i)
             for (int a = 0; a < 3; ++a) vertices[i][a] = static_cast<std::int32_t>(leaf.vertices[i][a]);
     }
@@ -59,7 +62,8 @@ public:
     using CodeFields = std::array<Field, 2>;
 
     explicit LeafFields(const std::map<std::string, Layout>& layouts) {
-        const Layout &nearPair = layouts.at("nearPair"), &farPair = layouts.at("farPair"), &flat = layouts.at("flatPair"), &triangle = layouts.at("triangle");
+        const Layout &nearPair = layouts.at("nearPair"), &farPair = layouts.at("farPair"),
+                     &flat = layouts.at("flatPair"), &triangle = layouts.at("triangle");
         format = nearPair.at("format");
         isClear = nearPair.at("isClear");
         material = nearPair.at("material");
@@ -74,7 +78,8 @@ public:
             lowNormals[i] = codeOf(nearPair, "body.lowBits", i);
         }
         const auto companion = layouts.find("colours");
-        for (int i = 0; companion != layouts.end() && i < 4; ++i) colours.push_back(vectorOf(companion->second, "colours", i, "rgb"));
+        for (int i = 0; companion != layouts.end() && i < 4; ++i)
+            colours.push_back(vectorOf(companion->second, "colours", i, "rgb"));
     }
 
     /// By vertex, from 0: absolute ones.
@@ -98,7 +103,8 @@ private:
     static std::string indexed(const std::string& name, int i) { return name + "[" + std::to_string(i) + "]."; }
     static VectorFields vectorOf(const Layout& layout, const std::string& name, int i, const char* components = "xyz") {
         const std::string prefix = indexed(name, i);
-        return {layout.at(prefix + components[0]), layout.at(prefix + components[1]), layout.at(prefix + components[2])};
+        return {layout.at(prefix + components[0]), layout.at(prefix + components[1]),
+                layout.at(prefix + components[2])};
     }
     static CodeFields codeOf(const Layout& layout, const std::string& name, int i) {
         const std::string prefix = indexed(name, i);
@@ -138,7 +144,8 @@ inline Leaf readLeaf(const LeafFields& fields, const std::uint8_t* record) {
 /// Reads the colours of a triangle's corners in the companion of its leaf.
 inline void readColours(const LeafFields& fields, const std::uint8_t* record, int triangle, Face& face) {
     for (int i = 0; i < 3; ++i)
-        for (int channel = 0; channel < 3; ++channel) face.colours[i][channel] = fields.colours[Leaf::cornersOf(triangle)[i]][channel].read(record);
+        for (int channel = 0; channel < 3; ++channel)
+            face.colours[i][channel] = fields.colours[Leaf::cornersOf(triangle)[i]][channel].read(record);
 }
 
 /// The attributes of a leaf's triangle, without colours.
@@ -147,7 +154,9 @@ inline Face faceOf(const Leaf& leaf, int triangle, int normalFraction) {
     face.material = leaf.material;
     face.geometricNormal = geometricNormal(leaf.verticesOf(triangle), normalFraction);
     for (int i = 0; i < 3; ++i)
-        face.normals[i] = leaf.format == LeafFormat::flatPair ? face.geometricNormal : directionOf(leaf.normals[Leaf::cornersOf(triangle)[i]], normalFraction);
+        face.normals[i] = leaf.format == LeafFormat::flatPair
+                              ? face.geometricNormal
+                              : directionOf(leaf.normals[Leaf::cornersOf(triangle)[i]], normalFraction);
     return face;
 }
 

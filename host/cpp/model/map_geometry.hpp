@@ -12,7 +12,8 @@ public:
     static constexpr int mapLog = 10;
 
 protected:
-    /// Signed distance in w between a ray and a plane: value + slope · s, in units of 2^(exponent − 22); positive in front of the plane.
+    /// Signed distance in w between a ray and a plane: value + slope · s, in units of 2^(exponent − 22); positive in
+    /// front of the plane.
     struct PlaneDistance {
         int id;
         std::int64_t value, slope;
@@ -20,7 +21,8 @@ protected:
     };
 
     static constexpr int planeFraction = 22;
-    MapGeometry(const Numbers& numbers, const AttributeSizes& sizes) : f_(numbers.shadeBits), sceneBits_(numbers.sceneBits), sizes_(sizes) {}
+    MapGeometry(const Numbers& numbers, const AttributeSizes& sizes)
+        : f_(numbers.shadeBits), sceneBits_(numbers.sceneBits), sizes_(sizes) {}
 
     /// The largest position, and the largest distance along a ray.
     std::int64_t maximum() const { return (std::int64_t(1) << (f_ + 3)) - 1; }
@@ -73,28 +75,39 @@ protected:
     /// value / 2^drop, saturated to the range of map positions. |value| must be below 2^64.
     std::int64_t inMap(Wide value, int drop) const {
         const Wide nearest = value < 0 ? -maximum() - 1 : maximum();
-        return static_cast<std::int64_t>(drop < -32 && value != 0 ? nearest : clamp<Wide>(floorShift<Wide>(value, drop), -maximum() - 1, maximum()));
+        return static_cast<std::int64_t>(
+            drop < -32 && value != 0 ? nearest : clamp<Wide>(floorShift<Wide>(value, drop), -maximum() - 1, maximum()));
     }
 
     /// 2^(2f - 1) / mantissa for a normalised mantissa of f bits; the result has f + 1 bits.
-    std::int64_t reciprocal(std::uint64_t mantissa) const { return static_cast<std::int64_t>(divide(std::uint64_t(1) << (f_ - 1), mantissa, f_)); }
+    std::int64_t reciprocal(std::uint64_t mantissa) const {
+        return static_cast<std::int64_t>(divide(std::uint64_t(1) << (f_ - 1), mantissa, f_));
+    }
 
     /// A component of the ray's position at s.
-    std::int64_t positionAt(const MapRay& ray, int axis, std::int64_t s) const { return ray.position[axis] + (ray.direction[axis] * s >> f_); }
+    std::int64_t positionAt(const MapRay& ray, int axis, std::int64_t s) const {
+        return ray.position[axis] + (ray.direction[axis] * s >> f_);
+    }
 
     PlaneDistance planeDistance(const MapRay& ray, const PlaneWord& plane, int id) const {
         const std::int64_t du = ray.position[0] - (std::int64_t(sizes_.width) << (f_ - mapLog - 1)),
                            dv = ray.position[1] - (std::int64_t(sizes_.height) << (f_ - mapLog - 1));
         const int up = planeFraction - f_ - plane.e;
         return {id, floorShift<std::int64_t>(ray.position[2], -up) - ((plane.a * du + plane.b * dv) >> f_) - plane.c,
-                floorShift<std::int64_t>(ray.direction[2], -up) - ((plane.a * ray.direction[0] + plane.b * ray.direction[1]) >> f_), plane.e};
+                floorShift<std::int64_t>(ray.direction[2], -up) -
+                    ((plane.a * ray.direction[0] + plane.b * ray.direction[1]) >> f_),
+                plane.e};
     }
 
     /// Distance of the ray from a plane at s.
-    std::int64_t distanceAt(const PlaneDistance& depth, std::int64_t s) const { return depth.value + (depth.slope * s >> f_); }
+    std::int64_t distanceAt(const PlaneDistance& depth, std::int64_t s) const {
+        return depth.value + (depth.slope * s >> f_);
+    }
 
     /// Converts a distance to w's units.
-    std::int64_t toW(std::int64_t value, const PlaneDistance& depth) const { return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent); }
+    std::int64_t toW(std::int64_t value, const PlaneDistance& depth) const {
+        return floorShift<std::int64_t>(value, planeFraction - f_ - depth.exponent);
+    }
 
     int f_, sceneBits_;
     const AttributeSizes& sizes_;

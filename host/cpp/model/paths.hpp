@@ -7,13 +7,13 @@
 
 namespace colonnade {
 
-/// What a path shows where its ray ends, as in the RTL: the background or light of the cube, without a surface; a surface in ambient light and in
-/// the lights; one of the environment that the camera sees, where a gathered ray may replace the ambient light; or one without ambient light, from
-/// which the path goes on with a gathered ray.
+/// What a path shows where its ray ends, as in the RTL: the background or light of the cube, without a surface; a
+/// surface in ambient light and in the lights; one of the environment that the camera sees, where a gathered ray may
+/// replace the ambient light; or one without ambient light, from which the path goes on with a gathered ray.
 enum class PathEnd { background, cube, lit, directView, gathered, gathers };
 
-/// State of a path: throughput (12 fraction bits per channel), accumulated radiance, number of traced reflections and refractions, whether its ray is
-/// inside glass, number of gathered rays, and its last ray.
+/// State of a path: throughput (12 fraction bits per channel), accumulated radiance, number of traced reflections and
+/// refractions, whether its ray is inside glass, number of gathered rays, and its last ray.
 struct Path {
     Colour throughput, radiance;
     int bounces;
@@ -39,7 +39,9 @@ protected:
         const Material& material;
         Colour albedo;
 
-        bool isSpecular() const { return material.kind == MaterialKind::mirror || material.kind == MaterialKind::glass; }
+        bool isSpecular() const {
+            return material.kind == MaterialKind::mirror || material.kind == MaterialKind::glass;
+        }
     };
 
     /// The colour that a path brings, from the first hit of the object on. `point`: the pixel's sample point.
@@ -79,14 +81,17 @@ protected:
     /// The attributes of a hit triangle in the world, without colours.
     Face faceAt(const Hit& hit) const {
         const Face face = memory_->faceOf(hit.id);
-        return frame_.instances.empty() ? face : instances::toWorld(face, frame_.instances[static_cast<std::size_t>(hit.instance)], numbers_);
+        return frame_.instances.empty()
+                   ? face
+                   : instances::toWorld(face, frame_.instances[static_cast<std::size_t>(hit.instance)], numbers_);
     }
 
     /// The object where a ray hits it; nothing if the colours of its leaf are outside the scene.
     std::optional<ObjectPoint> pointOf(const Ray& ray, const Hit& hit) {
         Face face = faceAt(hit);
         const Material& material = frame_.lighting.materialOf(face);
-        work.addSurface(hit.id / leafTriangles, workOf(material.kind), material.hasCornerColours || material.hasTexture);
+        work.addSurface(hit.id / leafTriangles, workOf(material.kind),
+                        material.hasCornerColours || material.hasTexture);
         if ((material.hasCornerColours || material.hasTexture) && !memory_->readColours(hit.id, face)) {
             errors.illegalRecord = true;
             return std::nullopt;
@@ -95,38 +100,52 @@ protected:
     }
 
     static PathStep::Material workOf(MaterialKind kind) {
-        return kind == MaterialKind::mirror ? PathStep::Material::mirror : kind == MaterialKind::glass ? PathStep::Material::glass : PathStep::Material::diffuse;
+        return kind == MaterialKind::mirror  ? PathStep::Material::mirror
+               : kind == MaterialKind::glass ? PathStep::Material::glass
+                                             : PathStep::Material::diffuse;
     }
 
     /// Adds the light of a surface to a path. The path ends there, or goes on with a ray that gathers light.
     std::optional<RayKind> lightAt(const ObjectPoint& at, const SamplePoint& point, Path& path) {
         const PathEnd end = path.gathered < frame_.gather.bounces ? PathEnd::gathers : PathEnd::lit;
-        const bool hasLobe = at.material.kind == MaterialKind::roughMetal && (end == PathEnd::gathers || frame_.gather.bounces == 0);
+        const bool hasLobe =
+            at.material.kind == MaterialKind::roughMetal && (end == PathEnd::gathers || frame_.gather.bounces == 0);
         const Lobe* const lobe = hasLobe ? &at.material.lobe : nullptr;
-        const WideVector normal = shadingNormal(at.surface, frame_.lighting.flat), axis = lobe ? lobeAxis(normal, at.surface.dir, numbers_) : normal;
-        const WideVector origin = offSurface(at.surface.point, at.surface.faceForwardNormal, frame_.lighting.offset, numbers_);
-        path.radiance = total(path, emitted(at.material, reflectedBy(at.albedo, incoming(origin, axis, true, end, lobe).visible)));
+        const WideVector normal = shadingNormal(at.surface, frame_.lighting.flat),
+                         axis = lobe ? lobeAxis(normal, at.surface.dir, numbers_) : normal;
+        const WideVector origin =
+            offSurface(at.surface.point, at.surface.faceForwardNormal, frame_.lighting.offset, numbers_);
+        path.radiance =
+            total(path, emitted(at.material, reflectedBy(at.albedo, incoming(origin, axis, true, end, lobe).visible)));
         if (end == PathEnd::lit) return std::nullopt;
-        for (int channel = 0; channel < 3; ++channel) path.throughput[channel] = (path.throughput[channel] * tintOf(at.albedo[channel])) >> numbers_.lightFraction;
+        for (int channel = 0; channel < 3; ++channel)
+            path.throughput[channel] =
+                (path.throughput[channel] * tintOf(at.albedo[channel])) >> numbers_.lightFraction;
         gatherFrom(origin, axis, at.surface.faceForwardNormal, lobe, path, point);
         return RayKind::gather;
     }
 
     /// Sends a path on with a ray that gathers light at a surface, from `origin` off it.
-    void gatherFrom(const WideVector& origin, const WideVector& axis, const Vector& faceForwardNormal, const Lobe* lobe, Path& path, const SamplePoint& point) {
-        const Vector direction = gatherDirection(axis, faceForwardNormal, frame_.gather.points[path.gathered] ^ point, lobe, numbers_);
+    void gatherFrom(const WideVector& origin, const WideVector& axis, const Vector& faceForwardNormal, const Lobe* lobe,
+                    Path& path, const SamplePoint& point) {
+        const Vector direction =
+            gatherDirection(axis, faceForwardNormal, frame_.gather.points[path.gathered] ^ point, lobe, numbers_);
         ++path.gathered;
         ++counters.raysGather;
         path.ray = {origin, {direction[0], direction[1], direction[2]}, numbers_.unlimited()};
     }
 
-    Wide distanceOf(const Ray& ray, const Hit& hit) const { return floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t; }
+    Wide distanceOf(const Ray& ray, const Hit& hit) const {
+        return floorShift<Wide>(ray.tEntry, -numbers_.gridFraction) + hit.t;
+    }
 
     /// The radiance of a path that ends in a colour.
     Colour total(const Path& path, const Colour& colour) const {
         Colour radiance;
         for (int channel = 0; channel < 3; ++channel)
-            radiance[channel] = std::min(white(), path.radiance[channel] + ((path.throughput[channel] * colour[channel]) >> numbers_.lightFraction));
+            radiance[channel] =
+                std::min(white(), path.radiance[channel] +
+                                      ((path.throughput[channel] * colour[channel]) >> numbers_.lightFraction));
         return radiance;
     }
 
@@ -149,12 +168,15 @@ protected:
     /// What a path's ray sees that meets no surface.
     Colour beyond(const Path& path, const RayRequest& ray) const {
         const PathEnd end = frame_.gather.bounces > 0 ? PathEnd::cube : PathEnd::background;
-        return end == PathEnd::cube ? cube_.light(ray.origin, ray.direction, frame_.gather.parallax, path.gathered == 0, numbers_) : frame_.lighting.background;
+        return end == PathEnd::cube
+                   ? cube_.light(ray.origin, ray.direction, frame_.gather.parallax, path.gathered == 0, numbers_)
+                   : frame_.lighting.background;
     }
 
     /// The colour that a path's ray sees as it leaves the object: of the environment, unless the path has gathered.
     Colour leavingRadiance(const Path& path, const RayRequest& ray, bool shadows = true) {
-        return hasEnvironment() && path.gathered == 0 ? radianceOf(path, ray, findHit(ray), shadows) : beyond(path, ray);
+        return hasEnvironment() && path.gathered == 0 ? radianceOf(path, ray, findHit(ray), shadows)
+                                                      : beyond(path, ray);
     }
 
     /// Incoming light at a surface whose shadow rays start at `origin`: without occlusion, and with it.
@@ -162,12 +184,14 @@ protected:
         Colour unoccluded, visible;
     };
 
-    Incoming incoming(const WideVector& origin, const WideVector& normal, bool shadows, PathEnd end, const Lobe* lobe = nullptr) {
+    Incoming incoming(const WideVector& origin, const WideVector& normal, bool shadows, PathEnd end,
+                      const Lobe* lobe = nullptr) {
         const Lighting& lighting = frame_.lighting;
         const Colour ambient = end == PathEnd::gathers ? Colour{} : lighting.ambient;
         Incoming result{ambient, ambient};
         for (const Light& source : lighting.lights) {
-            const Illumination illumination = illuminate(origin, normal, source, lighting.shadows && shadows, numbers_, lobe);
+            const Illumination illumination =
+                illuminate(origin, normal, source, lighting.shadows && shadows, numbers_, lobe);
             Occlusion occluder = Occlusion::none;
             if (illumination.needsShadowRay) {
                 ++counters.raysShadow;
@@ -178,7 +202,8 @@ protected:
                 const std::int64_t direct = illumination.direct[channel];
                 result.unoccluded[channel] += direct;
                 if (occluder == Occlusion::none) result.visible[channel] += direct;
-                if (occluder == Occlusion::transmissive) result.visible[channel] += (direct * lighting.shadowTransmittance) >> numbers_.lightFraction;
+                if (occluder == Occlusion::transmissive)
+                    result.visible[channel] += (direct * lighting.shadowTransmittance) >> numbers_.lightFraction;
             }
         }
         return result;
@@ -186,13 +211,15 @@ protected:
 
     Colour reflectedBy(const Colour& albedo, const Colour& light) const {
         Colour colour;
-        for (int channel = 0; channel < 3; ++channel) colour[channel] = reflected(albedo[channel], light[channel], numbers_);
+        for (int channel = 0; channel < 3; ++channel)
+            colour[channel] = reflected(albedo[channel], light[channel], numbers_);
         return colour;
     }
 
     /// The reflected light of a diffuse surface and what it emits.
     Colour emitted(const Material& material, Colour colour) const {
-        for (int channel = 0; channel < 3; ++channel) colour[channel] = std::min(white(), colour[channel] + material.emission[channel]);
+        for (int channel = 0; channel < 3; ++channel)
+            colour[channel] = std::min(white(), colour[channel] + material.emission[channel]);
         return colour;
     }
 
@@ -225,24 +252,32 @@ protected:
         Vector direction;
         blockScale(ray.direction, numbers_.shadeBits, direction);
         const EnvironmentView& view = frame_.environment;
-        return lookedUp(direction, view.isMapCamera ? march_->directView(x, y, direction, view) : march_->cameraView(ray.origin, direction, view), view.isMapCamera);
+        return lookedUp(direction,
+                        view.isMapCamera ? march_->directView(x, y, direction, view)
+                                         : march_->cameraView(ray.origin, direction, view),
+                        view.isMapCamera);
     }
 
     bool hasEnvironment() const { return frame_.hasEnvironment && march_.has_value(); }
 
-    /// Whether the environment may hide the hit of a path's ray: there is none of it inside glass, and none for a path that has gathered.
-    bool mayBeHidden(const Path& path) const { return hasEnvironment() && frame_.environment.occlusion && !path.isInside && path.gathered == 0; }
+    /// Whether the environment may hide the hit of a path's ray: there is none of it inside glass, and none for a path
+    /// that has gathered.
+    bool mayBeHidden(const Path& path) const {
+        return hasEnvironment() && frame_.environment.occlusion && !path.isInside && path.gathered == 0;
+    }
 
     /// Whether a point of the environment hides the hit of a ray, which is from the camera or not.
     bool hides(const EnvironmentHit& found, const Ray& ray, const Hit& hit, bool isFromCamera) const {
-        const bool isHidden = march_->hides(found.point, found.direction, distanceOf(ray, hit), isFromCamera, frame_.environment);
+        const bool isHidden =
+            march_->hides(found.point, found.direction, distanceOf(ray, hit), isFromCamera, frame_.environment);
         work.testsHit(isHidden);
         return isHidden;
     }
 
     /// Where the rays of a point of the environment begin.
     WideVector originAt(const RayRequest& ray, const EnvironmentHit& found) const {
-        return offSurface(march_->hitPosition(ray.origin, found.direction, found.point), found.texel.normal, frame_.lighting.offset, numbers_);
+        return offSurface(march_->hitPosition(ray.origin, found.direction, found.point), found.texel.normal,
+                          frame_.lighting.offset, numbers_);
     }
 
     /// Incoming light at a point of the environment; its normal has 11 fraction bits.
@@ -263,7 +298,9 @@ protected:
         work.addBounce(next.isRefraction, at.surface.backSide);
         const bool isTinted = !at.surface.backSide || at.material.kind == MaterialKind::mirror;
         if (isTinted)
-            for (int channel = 0; channel < 3; ++channel) path.throughput[channel] = (path.throughput[channel] * tintOf(at.albedo[channel])) >> numbers_.lightFraction;
+            for (int channel = 0; channel < 3; ++channel)
+                path.throughput[channel] =
+                    (path.throughput[channel] * tintOf(at.albedo[channel])) >> numbers_.lightFraction;
         if (path.gathered == 0 && next.fresnelWeight != 0) addReflection(at.surface, next, path);
         path.isInside = next.isRefraction == isTinted;
         path.ray = next.ray;
@@ -277,8 +314,12 @@ protected:
     Bounce bounceOf(const ObjectPoint& at, const SamplePoint& point, const Path& path) const {
         WideVector normal = shadingNormal(at.surface, frame_.lighting.flat);
         const std::int64_t alpha = frame_.gather.bounces > 0 ? at.material.lobe.alpha : 0;
-        if (alpha != 0) normal = microfacetNormal(normal, at.surface.dir, frame_.gather.microfacetPoint(path.gathered, at.surface.backSide) ^ point, alpha, numbers_);
-        return bounce(at.surface, at.material, frame_.lighting.flat, frame_.lighting.offset, numbers_, alpha != 0 ? &normal : nullptr);
+        if (alpha != 0)
+            normal = microfacetNormal(normal, at.surface.dir,
+                                      frame_.gather.microfacetPoint(path.gathered, at.surface.backSide) ^ point, alpha,
+                                      numbers_);
+        return bounce(at.surface, at.material, frame_.lighting.flat, frame_.lighting.offset, numbers_,
+                      alpha != 0 ? &normal : nullptr);
     }
 
     /// Adds the Fresnel reflection at the front of glass to a tinted path, and takes its weight from the throughput.
@@ -295,7 +336,8 @@ protected:
         }
         for (int channel = 0; channel < 3; ++channel) {
             const std::int64_t reflected = (path.throughput[channel] * next.fresnelWeight) >> numbers_.lightFraction;
-            path.radiance[channel] = std::min(white(), path.radiance[channel] + ((reflected * seen[channel]) >> numbers_.lightFraction));
+            path.radiance[channel] =
+                std::min(white(), path.radiance[channel] + ((reflected * seen[channel]) >> numbers_.lightFraction));
             path.throughput[channel] -= reflected;
         }
     }

@@ -24,16 +24,18 @@ public:
     /// The least exponent of a block that also holds the depth of the near plane.
     static int leastExponent(const EnvironmentView& view) { return clamp(view.exponent + 1, 0, 255); }
 
-    /// The way from the origin, in ray.dir, to the last plane that the ray enters through; 0 · 2^none if the origin is inside, nothing if the ray
-    /// stays outside a plane.
-    /// `work` counts the planes that the origin is outside of.
+    /// The way from the origin, in ray.dir, to the last plane that the ray enters through; 0 · 2^none if the origin is
+    /// inside, nothing if the ray stays outside a plane. `work` counts the planes that the origin is outside of.
     std::optional<Way> clip(const MapRay& ray, const EnvironmentView& view, MarchWork& work) const {
         const std::int64_t near = floorShift(std::int64_t(1) << f_, ray.fromShift + f_ - view.exponent);
         Way best{0, none};
         for (int i = 0; i < 5; ++i) {
             const int axis = i == 0 ? 2 : (i - 1) / 2, size = axis == 0 ? sizes_.width : sizes_.height;
             const bool isHigh = i == 2 || i == 4;
-            const std::int64_t limit = i == 0 ? 0 : isHigh ? (std::int64_t(size) << insetLog) - 1 : 1, from = ray.from[axis] - (i == 0 ? near : 0);
+            const std::int64_t limit = i == 0   ? 0
+                                       : isHigh ? (std::int64_t(size) << insetLog) - 1
+                                                : 1,
+                               from = ray.from[axis] - (i == 0 ? near : 0);
             const std::int64_t outside = distance(from, ray.from[2] * limit, isHigh);
             if (outside <= 0) continue;
             ++work.outside;
@@ -43,7 +45,8 @@ public:
             const Normalised quotient = normalise(divide(way.mantissa, speed.mantissa, f_), f_ + 1);
             const int exponent = way.exponent - speed.exponent + quotient.exponent - 2 * f_ - 1;
             const auto mantissa = static_cast<std::int64_t>(quotient.mantissa);
-            if (exponent > best.exponent || (exponent == best.exponent && mantissa > best.mantissa)) best = {mantissa, exponent};
+            if (exponent > best.exponent || (exponent == best.exponent && mantissa > best.mantissa))
+                best = {mantissa, exponent};
         }
         return best;
     }

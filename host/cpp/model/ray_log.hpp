@@ -13,7 +13,8 @@ enum class RayKind { primary, shadow, reflection, refraction, gather };
 struct RayStep {
     enum class Kind { ray, node, child, record, triangle, hit };
     Kind kind;
-    /// `ray`: its kind. `node`, `record`: the address that is read. `child`: the address of the child. `triangle`, `hit`: the packed id.
+    /// `ray`: its kind. `node`, `record`: the address that is read. `child`: the address of the child. `triangle`,
+    /// `hit`: the packed id.
     std::int32_t value;
     /// `child`: whether the ray enters it. `triangle`: whether it is the closest hit so far.
     bool isHit;
@@ -34,7 +35,8 @@ public:
     void addRay(RayKind kind, const RayRequest& request, const Numbers& n) const {
         if (!isOn()) return;
         RayStep step{RayStep::Kind::ray, static_cast<std::int32_t>(kind), false, false, {}};
-        const double unit = static_cast<double>(std::int64_t(1) << std::max(0, n.gridFraction)) / static_cast<double>(std::int64_t(1) << std::max(0, -n.gridFraction));
+        const double unit = static_cast<double>(std::int64_t(1) << std::max(0, n.gridFraction)) /
+                            static_cast<double>(std::int64_t(1) << std::max(0, -n.gridFraction));
         for (int axis = 0; axis < 3; ++axis) {
             step.values[axis] = static_cast<double>(request.origin[axis]) / unit;
             step.values[3 + axis] = static_cast<double>(request.direction[axis]);
@@ -49,8 +51,10 @@ public:
     void addChild(const Node& node, int slot, std::uint32_t address, bool isHit) const {
         RayStep step{RayStep::Kind::child, static_cast<std::int32_t>(address), isHit, slot >= node.nodes, {}};
         for (int axis = 0; axis < 3; ++axis) {
-            step.values[axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.low[axis][slot]) << node.exponent[axis]));
-            step.values[3 + axis] = static_cast<double>(node.origin[axis] + (std::int64_t(node.high[axis][slot]) << node.exponent[axis]));
+            step.values[axis] =
+                static_cast<double>(node.origin[axis] + (std::int64_t(node.low[axis][slot]) << node.exponent[axis]));
+            step.values[3 + axis] =
+                static_cast<double>(node.origin[axis] + (std::int64_t(node.high[axis][slot]) << node.exponent[axis]));
         }
         add(step);
     }

@@ -9,13 +9,15 @@ namespace colonnade {
 
 using WideVector = std::array<Wide, 3>;
 
-/// A requested ray. The origin is a scene position in grid steps, the direction has any scale, tMin and tMax are along the dominant axis in grid steps.
+/// A requested ray. The origin is a scene position in grid steps, the direction has any scale, tMin and tMax are along
+/// the dominant axis in grid steps.
 struct RayRequest {
     WideVector origin, direction;
     Wide tMax, tMin = 0;
 };
 
-/// A prepared ray in its permuted frame (x', y', then the dominant axis z'). docs/numbers.md, section 2, defines the fields.
+/// A prepared ray in its permuted frame (x', y', then the dominant axis z'). docs/numbers.md, section 2, defines the
+/// fields.
 struct Ray {
     bool enters;
     int axis;
@@ -40,8 +42,10 @@ template <class Integer> struct Crossing {
 };
 
 /// Intersects the slab low..high on one axis; `pad` widens it on both sides.
-template <class Integer> Crossing<Integer> crossSlab(Integer low, Integer high, Integer origin, bool negative, Integer pad) {
-    return negative ? Crossing<Integer>{origin - high - pad, origin - low + pad} : Crossing<Integer>{low - origin - pad, high - origin + pad};
+template <class Integer>
+Crossing<Integer> crossSlab(Integer low, Integer high, Integer origin, bool negative, Integer pad) {
+    return negative ? Crossing<Integer>{origin - high - pad, origin - low + pad}
+                    : Crossing<Integer>{low - origin - pad, high - origin + pad};
 }
 
 /// The object's bounding box, vertex units.
@@ -49,7 +53,9 @@ struct Bounds {
     Vector low, high;
 };
 
-template <class Integer> std::int64_t boxOrigin(Integer origin, const Numbers& n) { return static_cast<std::int64_t>(nearestEven(origin, n.gridFraction)); }
+template <class Integer> std::int64_t boxOrigin(Integer origin, const Numbers& n) {
+    return static_cast<std::int64_t>(nearestEven(origin, n.gridFraction));
+}
 
 /// The axis of largest magnitude; ties go to the lowest axis.
 inline int dominantAxis(const WideVector& direction) {
@@ -59,7 +65,8 @@ inline int dominantAxis(const WideVector& direction) {
     return axis;
 }
 
-/// Intersects a ray of known direction with the object's box and advances it to its entry. `Integer` holds the products of positions.
+/// Intersects a ray of known direction with the object's box and advances it to its entry. `Integer` holds the products
+/// of positions.
 template <class Integer> void enterBox(Ray& ray, const RayRequest& request, const Bounds& bounds, const Numbers& n) {
     std::array<Integer, 3> origin;
     for (int a = 0; a < 3; ++a) origin[a] = static_cast<Integer>(request.origin[ray.objectAxis(a)]);
@@ -93,7 +100,8 @@ template <class Integer> void enterBox(Ray& ray, const RayRequest& request, cons
         const Integer half = floorShift<Integer>(Integer(1) << (n.vertexBits - 1), -n.gridFraction);
         return static_cast<std::int64_t>(clamp<Integer>(position, -half, 3 * half));
     };
-    for (int a = 0; a < 2; ++a) ray.origin[a] = inReach(origin[a] + nearestEven<Integer>(ray.shear[a] * tNear, n.vertexBits + 1));
+    for (int a = 0; a < 2; ++a)
+        ray.origin[a] = inReach(origin[a] + nearestEven<Integer>(ray.shear[a] * tNear, n.vertexBits + 1));
     ray.origin[2] = inReach(ray.negative[2] ? origin[2] - entrySteps : origin[2] + entrySteps);
     for (int a = 0; a < 3; ++a) ray.boxOrigin[a] = boxOrigin(ray.origin[a], n);
     ray.tMax = static_cast<std::int64_t>(clamp<Integer>(static_cast<Integer>(request.tMax) - entrySteps, 0, n.maxT()));
@@ -105,8 +113,9 @@ inline bool isNarrow(const RayRequest& request, const Numbers& n) {
     UnsignedWide all = 0;
     for (const Wide position : request.origin) all |= magnitude(position);
     const int bits = bitLength(all), unitBits = std::max(bits - n.gridFraction, n.vertexBits) + 3;
-    return std::max({bits, bitLength(magnitude(request.tMax)), bitLength(magnitude(request.tMin)), unitBits + n.reciprocalFraction, n.shearFraction + n.entryBits,
-                     n.gridFraction + n.entryBits, n.gridBits}) < 60;
+    return std::max({bits, bitLength(magnitude(request.tMax)), bitLength(magnitude(request.tMin)),
+                     unitBits + n.reciprocalFraction, n.shearFraction + n.entryBits, n.gridFraction + n.entryBits,
+                     n.gridBits}) < 60;
 }
 
 /// Writes the fields of a ray that the request sets; one that does not enter has others as they were.
@@ -125,14 +134,16 @@ inline void prepareRay(const RayRequest& request, const Bounds& bounds, const Nu
         ray.shear[a] = 0;
         if (component != 0) {
             const std::uint64_t quotient = divide(minor.mantissa, dominant.mantissa, n.shearDigits);
-            const auto shear = static_cast<std::int64_t>(floorShift<Wide>(Wide(quotient) << (n.shearFraction - n.shearDigits), exponent));
+            const auto shear = static_cast<std::int64_t>(
+                floorShift<Wide>(Wide(quotient) << (n.shearFraction - n.shearDigits), exponent));
             ray.shear[a] = component < 0 ? -shear : shear;
         }
         if (component == 0 || exponent > n.reciprocalFraction) {
             ray.reciprocal[a] = std::int64_t(1) << n.reciprocalFraction;
             ray.exponent[a] = n.reciprocalFraction;
         } else {
-            ray.reciprocal[a] = static_cast<std::int64_t>(divide(dominant.mantissa, minor.mantissa, n.reciprocalDigits) << (n.reciprocalFraction - n.reciprocalDigits));
+            ray.reciprocal[a] = static_cast<std::int64_t>(divide(dominant.mantissa, minor.mantissa, n.reciprocalDigits)
+                                                          << (n.reciprocalFraction - n.reciprocalDigits));
             ray.exponent[a] = exponent;
         }
     }

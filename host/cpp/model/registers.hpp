@@ -53,7 +53,8 @@ struct Frame {
         };
         width = take("frame.width");
         height = take("frame.height");
-        objectRectangle = {take("frame.objectRect.x0"), take("frame.objectRect.y0"), take("frame.objectRect.x1"), take("frame.objectRect.y1")};
+        objectRectangle = {take("frame.objectRect.x0"), take("frame.objectRect.y0"), take("frame.objectRect.x1"),
+                           take("frame.objectRect.y1")};
         for (int i = 0; registers.count(entry("frame.objectOutline", i) + "x"); ++i) {
             const std::string edge = entry("frame.objectOutline", i);
             objectOutline.push_back({take(edge + "x"), take(edge + "y"), take(edge + "offset")});
@@ -66,8 +67,8 @@ struct Frame {
         bounds = {vector("bounds.low"), vector("bounds.high")};
         for (int i = 0; registers.count(entry("lights", i) + "colour.r"); ++i) {
             const std::string name = entry("lights", i);
-            lighting.lights.push_back(
-                {position(name + "position"), vector(name + "colour", "rgb"), take(name + "reachMantissa"), static_cast<int>(take(name + "reachExponent"))});
+            lighting.lights.push_back({position(name + "position"), vector(name + "colour", "rgb"),
+                                       take(name + "reachMantissa"), static_cast<int>(take(name + "reachExponent"))});
         }
         lighting.lights.resize(std::min(lighting.lights.size(), static_cast<std::size_t>(take("shading.lights"))));
         lighting.ambient = vector("ambient", "rgb");
@@ -80,14 +81,16 @@ struct Frame {
         lighting.bounces = static_cast<int>(takeIfThere("shading.bounces"));
         for (int i = 0; registers.count(entry("materials", i) + "albedo.r"); ++i) {
             const std::string name = entry("materials", i);
-            lighting.materials.push_back({vector(name + "albedo", "rgb"),
-                                          takeIfThere(name + "hasCornerColours") != 0,
-                                          takeIfThere(name + "hasTexture") != 0,
-                                          registers.count(name + "emission.r") ? vector(name + "emission", "rgb") : Vector{},
-                                          static_cast<MaterialKind>(takeIfThere(name + "kind")),
-                                          {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")},
-                                          takeIfThere(name + "reflectance"),
-                                          {takeIfThere(name + "lobe.alpha"), takeIfThere(name + "lobe.slope"), takeIfThere(name + "lobe.peak")}});
+            lighting.materials.push_back(
+                {vector(name + "albedo", "rgb"),
+                 takeIfThere(name + "hasCornerColours") != 0,
+                 takeIfThere(name + "hasTexture") != 0,
+                 registers.count(name + "emission.r") ? vector(name + "emission", "rgb") : Vector{},
+                 static_cast<MaterialKind>(takeIfThere(name + "kind")),
+                 {takeIfThere(name + "etaFront"), takeIfThere(name + "etaBack")},
+                 takeIfThere(name + "reflectance"),
+                 {takeIfThere(name + "lobe.alpha"), takeIfThere(name + "lobe.slope"),
+                  takeIfThere(name + "lobe.peak")}});
         }
         recordCount = static_cast<std::size_t>(take("scene.recordCount"));
         roots = {static_cast<std::size_t>(take("scene.root"))};
@@ -113,7 +116,8 @@ struct Frame {
         gather.parallax = static_cast<int>(takeIfThere("gather.parallax"));
         for (std::size_t i = 0; i < gather.points.size(); ++i) {
             const std::string name = entry("gather.points", static_cast<int>(i));
-            gather.points[i] = {static_cast<std::uint8_t>(takeIfThere(name + "u")), static_cast<std::uint8_t>(takeIfThere(name + "v"))};
+            gather.points[i] = {static_cast<std::uint8_t>(takeIfThere(name + "u")),
+                                static_cast<std::uint8_t>(takeIfThere(name + "v"))};
         }
         hasEnvironment = takeIfThere("environment.enabled") != 0;
         if (!hasEnvironment) return;
@@ -126,7 +130,8 @@ struct Frame {
         environment.exponent = static_cast<int>(take("environment.exponent"));
         environment.boundingPlanes = static_cast<int>(take("environment.boundingPlanes"));
         environment.step = {take("environment.stepX"), take("environment.stepY")};
-        environment.window = {take("environment.window.x0"), take("environment.window.y0"), take("environment.window.x1"), take("environment.window.y1")};
+        environment.window = {take("environment.window.x0"), take("environment.window.y0"),
+                              take("environment.window.x1"), take("environment.window.y1")};
         environment.occlusion = take("environment.occlusion") != 0;
         environment.occlusionTolerance = take("environment.occlusionTolerance");
         environment.isMapCamera = take("environment.isMapCamera") != 0;
@@ -141,7 +146,8 @@ struct Frame {
     bool maySeeObject(std::int64_t px, std::int64_t py) const {
         const auto& rectangle = objectRectangle;
         if (px < rectangle[0] || px >= rectangle[2] || py < rectangle[1] || py >= rectangle[3]) return false;
-        return std::all_of(objectOutline.begin(), objectOutline.end(), [&](const HalfPlane& edge) { return edge.x * px + edge.y * py + edge.offset >= 0; });
+        return std::all_of(objectOutline.begin(), objectOutline.end(),
+                           [&](const HalfPlane& edge) { return edge.x * px + edge.y * py + edge.offset >= 0; });
     }
 };
 

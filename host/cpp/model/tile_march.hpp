@@ -11,15 +11,18 @@ public:
     static constexpr int maxSteps = 512;
 
     /// Decodes the tiles: an image that is loaded again needs another march.
-    TileMarch(const Numbers& numbers, const AttributeImage& image) : MapGeometry(numbers, image.sizes()), image_(image) {
+    TileMarch(const Numbers& numbers, const AttributeImage& image)
+        : MapGeometry(numbers, image.sizes()), image_(image) {
         for (int y = 0; y < sizes_.tileRows; ++y)
-            for (int x = 0; x < sizes_.tileColumns; ++x) tiles_.push_back(image.tileAt(x << sizes_.tileLog, y << sizes_.tileLog));
+            for (int x = 0; x < sizes_.tileColumns; ++x)
+                tiles_.push_back(image.tileAt(x << sizes_.tileLog, y << sizes_.tileLog));
     }
 
     /// Marches a ray that starts in front of the camera; true if it hits a plane, and then completes `point`.
     bool marchTiles(const MapRay& ray, const EnvironmentView& view, EnvironmentPoint& point) const {
         const int toPixel = f_ - mapLog;
-        std::array<int, 2> pixel = {static_cast<int>(ray.position[0] >> toPixel), static_cast<int>(ray.position[1] >> toPixel)};
+        std::array<int, 2> pixel = {static_cast<int>(ray.position[0] >> toPixel),
+                                    static_cast<int>(ray.position[1] >> toPixel)};
         if (!sizes_.covers(pixel[0], pixel[1])) return false;
         std::array<AxisSteps, 2> axes = {axisSteps(ray, 0, pixel[0]), axisSteps(ray, 1, pixel[1])};
         std::array<int, 2> tile = {pixel[0] >> sizes_.tileLog, pixel[1] >> sizes_.tileLog};
@@ -31,7 +34,8 @@ public:
             const TileInfo& info = tiles_[tile[1] * sizes_.tileColumns + tile[0]];
             point.isIllegal = point.isIllegal || info.isIllegal;
             std::array<PlaneDistance, 4> depths;
-            for (int i = 0; i < info.count; ++i) depths[i] = planeDistance(ray, image_.planeOf(info.ids[i]), info.ids[i]);
+            for (int i = 0; i < info.count; ++i)
+                depths[i] = planeDistance(ray, image_.planeOf(info.ids[i]), info.ids[i]);
 
             // If the ray is in front of all planes of a tile, one step passes the whole tile
             int nearest = 0;
@@ -54,11 +58,14 @@ public:
             if (info.count == 1 || isInFrontOfAll) {
                 ++point.steps;
                 point.work.behind += state.isBehind;
-                if (testPlane(ray, depths[nearest], s0, s1, {tile, sizes_.tileLog, info.count == 1 ? s0 : s1}, state)) return reportHit(ray, view, state, point);
+                if (testPlane(ray, depths[nearest], s0, s1, {tile, sizes_.tileLog, info.count == 1 ? s0 : s1}, state))
+                    return reportHit(ray, view, state, point);
             } else if (marchCells(ray, info, depths, tile, axes, tEnter, tExit, state, point)) {
                 return reportHit(ray, view, state, point);
             }
-            if (point.steps >= maxSteps || tExit >= maxGuardedS() || positionAt(ray, 2, s1) <= 0 || positionAt(ray, 2, s1) >= maximum()) return false;
+            if (point.steps >= maxSteps || tExit >= maxGuardedS() || positionAt(ray, 2, s1) <= 0 ||
+                positionAt(ray, 2, s1) >= maximum())
+                return false;
             tEnter = tExit;
             const int axis = axes[0].next <= axes[1].next ? 0 : 1;
             tile[axis] += axes[axis].isNegative ? -1 : 1;
@@ -96,12 +103,15 @@ private:
         std::int64_t hitS;
     };
 
-    /// Tests the ray from s0 to s1 against a plane, whose first pixel is `first`; true if it hits this plane, or the last plane in front.
-    bool testPlane(const MapRay& ray, const PlaneDistance& depth, std::int64_t s0, std::int64_t s1, const SquarePoint& first, MarchState& state) const {
+    /// Tests the ray from s0 to s1 against a plane, whose first pixel is `first`; true if it hits this plane, or the
+    /// last plane in front.
+    bool testPlane(const MapRay& ray, const PlaneDistance& depth, std::int64_t s0, std::int64_t s1,
+                   const SquarePoint& first, MarchState& state) const {
         const std::int64_t atEntry = distanceAt(depth, s0), atExit = distanceAt(depth, s1);
         if (!state.isBehind && (atEntry < 0 || atExit < 0)) {
             // A plane entered slightly behind it is a hit too: an edge between planes, or a start on the surface
-            const bool isNear = -toW(atEntry, depth) < positionAt(ray, 2, s0) >> surfaceToleranceLog, isSame = state.hasPlane && state.plane.id == depth.id;
+            const bool isNear = -toW(atEntry, depth) < positionAt(ray, 2, s0) >> surfaceToleranceLog,
+                       isSame = state.hasPlane && state.plane.id == depth.id;
             if (atEntry >= 0 || isNear || isSame) {
                 state.hitS = atEntry < 0 ? s0 : crossing(depth, s0, s1);
                 return true;
@@ -140,10 +150,13 @@ private:
         AxisSteps result{ray.direction[axis] != 0, ray.direction[axis] < 0, maxGuardedS(), maxGuardedS()};
         if (!result.moves) return result;
         const Normalised rate = normalise(magnitude(ray.direction[axis]), f_);
-        const std::int64_t inverse = reciprocal(rate.mantissa), low = (std::int64_t(pixel) >> sizes_.tileLog << sizes_.tileLog) << (f_ - mapLog);
+        const std::int64_t inverse = reciprocal(rate.mantissa),
+                           low = (std::int64_t(pixel) >> sizes_.tileLog << sizes_.tileLog) << (f_ - mapLog);
         const std::int64_t width = std::int64_t(1) << (f_ - mapLog + sizes_.tileLog);
         const std::int64_t way = result.isNegative ? ray.position[axis] - low : low + width - ray.position[axis];
-        const auto guardedS = [&](std::int64_t length) { return std::min(maxGuardedS(), floorShift((length * inverse) << guardBits, rate.exponent - 1)); };
+        const auto guardedS = [&](std::int64_t length) {
+            return std::min(maxGuardedS(), floorShift((length * inverse) << guardBits, rate.exponent - 1));
+        };
         result.next = guardedS(way);
         result.tile = guardedS(width);
         return result;
@@ -156,14 +169,16 @@ private:
         std::array<int, 2> pixel;
         const std::array<int, 2> size = {sizes_.width, sizes_.height};
         for (int a = 0; a < 2; ++a) {
-            const int low = std::min(size[a] - 1, point.square[a] << point.log), high = std::min(size[a], low + (1 << point.log)) - 1;
+            const int low = std::min(size[a] - 1, point.square[a] << point.log),
+                      high = std::min(size[a], low + (1 << point.log)) - 1;
             pixel[a] = static_cast<int>(clamp<std::int64_t>(positionAt(ray, a, point.s) >> (f_ - mapLog), low, high));
         }
         return pixel;
     }
 
-    bool marchCells(const MapRay& ray, const TileInfo& info, const std::array<PlaneDistance, 4>& depths, const std::array<int, 2>& tile,
-                    const std::array<AxisSteps, 2>& axes, std::int64_t tEnter, std::int64_t tExit, MarchState& state, EnvironmentPoint& point) const {
+    bool marchCells(const MapRay& ray, const TileInfo& info, const std::array<PlaneDistance, 4>& depths,
+                    const std::array<int, 2>& tile, const std::array<AxisSteps, 2>& axes, std::int64_t tEnter,
+                    std::int64_t tExit, MarchState& state, EnvironmentPoint& point) const {
         ++point.work.cellTiles;
         const int cellLog = info.cellLog2, perTile = 1 << (sizes_.tileLog - cellLog);
         const auto start = pixelOf(ray, {tile, sizes_.tileLog, tEnter >> guardBits});
@@ -191,7 +206,9 @@ private:
             ++point.work.cells;
             point.work.behind += state.isBehind;
             point.work.lookUp(plane.id);
-            if (testPlane(ray, depths[slot], tEnter >> guardBits, cellExit >> guardBits, {square, cellLog, tEnter >> guardBits}, state)) return true;
+            if (testPlane(ray, depths[slot], tEnter >> guardBits, cellExit >> guardBits,
+                          {square, cellLog, tEnter >> guardBits}, state))
+                return true;
             if (cellExit >= tExit || point.steps >= maxSteps) return false;
             tEnter = cellExit;
             const int axis = next[0] <= next[1] ? 0 : 1;
@@ -202,12 +219,15 @@ private:
     }
 
     /// Completes the point of a hit.
-    bool reportHit(const MapRay& ray, const EnvironmentView& view, const MarchState& state, EnvironmentPoint& point) const {
+    bool reportHit(const MapRay& ray, const EnvironmentView& view, const MarchState& state,
+                   EnvironmentPoint& point) const {
         point.kind = HitKind::map;
         point.isHidden = state.isBehind;
         // A hidden hit takes the last visible pixel of its plane
-        const std::array<int, 2> pixel =
-            state.isBehind ? pixelOf(ray, state.first) : std::array<int, 2>{pixelOf(ray, 0, state.hitS, sizes_.width), pixelOf(ray, 1, state.hitS, sizes_.height)};
+        const std::array<int, 2> pixel = state.isBehind
+                                             ? pixelOf(ray, state.first)
+                                             : std::array<int, 2>{pixelOf(ray, 0, state.hitS, sizes_.width),
+                                                                  pixelOf(ray, 1, state.hitS, sizes_.height)};
         point.x = pixel[0];
         point.y = pixel[1];
         const std::int64_t w = std::max<std::int64_t>(1, positionAt(ray, 2, state.hitS));

@@ -11,7 +11,8 @@ namespace colonnade {
 
 /// Timing-independent counters, named as in the register map.
 struct Counters {
-    std::uint64_t raysPrimary, raysShadow, raysReflection, raysRefraction, raysInBox, nodeReads, boxTests, triangleTests, hits, deepestStack;
+    std::uint64_t raysPrimary, raysShadow, raysReflection, raysRefraction, raysInBox, nodeReads, boxTests,
+        triangleTests, hits, deepestStack;
     /// Environment lookups, march steps (tiles and cells), and hits in the maps.
     std::uint64_t raysEnvironment, marchSteps, albedoReads;
     std::uint64_t raysGather;
@@ -30,7 +31,8 @@ struct RayFilter {
     int mask; ///< of leaves, in place of their material
 
     bool accepts(const Hit& hit, const LeafTriangles& leaf) const {
-        return !(hit.backSide ? cullsBack : cullsFront) && !(refusesClear && hit.isClear) && (leaf.material & mask) != 0;
+        return !(hit.backSide ? cullsBack : cullsFront) && !(refusesClear && hit.isClear) &&
+               (leaf.material & mask) != 0;
     }
 };
 
@@ -58,10 +60,12 @@ struct FaceTable {
     }
 };
 
-/// Finds the hits of prepared rays in a scene that does not change, and notes what it did. It only refers to its arguments.
+/// Finds the hits of prepared rays in a scene that does not change, and notes what it did. It only refers to its
+/// arguments.
 class SceneSearch {
 public:
-    SceneSearch(const Numbers& numbers, const ColumnMemory& memory, const Frame& frame, TraceRecord& record, FaceTable faces = {})
+    SceneSearch(const Numbers& numbers, const ColumnMemory& memory, const Frame& frame, TraceRecord& record,
+                FaceTable faces = {})
         : numbers_(numbers), memory_(memory), frame_(frame), record_(record), faces_(faces) {}
 
     /// The closest hit of a prepared ray.
@@ -79,21 +83,25 @@ public:
     /// The occluders of a prepared shadow ray; the first opaque triangle ends the search.
     Occlusion occlusion(const Ray& ray, const RayFilter* filter = nullptr) const {
         if (!ray.enters) return Occlusion::none;
-        const Occlusion found = frame_.instances.empty() ? search(ray, filter, true).occlusion : occlusionByInstances(ray);
+        const Occlusion found =
+            frame_.instances.empty() ? search(ray, filter, true).occlusion : occlusionByInstances(ray);
         if (found != Occlusion::none) record_.work.addDimmed();
         if (found == Occlusion::opaque) record_.work.addHit();
         return found;
     }
 
     /// The first triangle that a traversal meets, not the closest one.
-    Hit anyHit(const Ray& ray, const RayFilter& filter) const { return ray.enters ? search(ray, &filter, true).occluder : Hit::none(ray.tMax); }
+    Hit anyHit(const Ray& ray, const RayFilter& filter) const {
+        return ray.enters ? search(ray, &filter, true).occluder : Hit::none(ray.tMax);
+    }
 
     /// All triangles that a prepared ray hits before its tMax, in the order of (t, id).
     std::vector<Hit> allHits(const Ray& ray, const RayFilter& filter) const {
         std::vector<Hit> hits;
         if (!ray.enters) return hits;
         search(ray, &filter, false, 0, &hits);
-        std::sort(hits.begin(), hits.end(), [](const Hit& one, const Hit& other) { return other.isReplacedBy(one.t, one.id); });
+        std::sort(hits.begin(), hits.end(),
+                  [](const Hit& one, const Hit& other) { return other.isReplacedBy(one.t, one.id); });
         return hits;
     }
 
@@ -119,10 +127,12 @@ private:
     };
 
     /// Traces a prepared ray from a root, by default the scene's.
-    TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0, std::vector<Hit>* hits = nullptr) const {
+    TraceState search(const Ray& ray, const RayFilter* filter, bool isShadow, std::size_t instance = 0,
+                      std::vector<Hit>* hits = nullptr) const {
         ++record_.counters.raysInBox;
         record_.work.enterBox();
-        TraceState state{ray, frame_.roots[instance], Hit::none(ray.tMax), isShadow, filter, Occlusion::none, Hit::none(ray.tMax), hits};
+        TraceState state{ray,    frame_.roots[instance], Hit::none(ray.tMax), isShadow,
+                         filter, Occlusion::none,        Hit::none(ray.tMax), hits};
         run(state);
         return state;
     }
@@ -158,7 +168,8 @@ private:
     void run(TraceState& state) const {
         if (numbers_.bvh) hasNarrowBoxes(numbers_) ? traverse<std::int32_t>(state) : traverse<std::int64_t>(state);
         else
-            for (std::size_t i = 0; (i == 0 || i < frame_.recordCount) && !state.isOver(); i += frame_.leafRecords()) testRecord(state, i);
+            for (std::size_t i = 0; (i == 0 || i < frame_.recordCount) && !state.isOver(); i += frame_.leafRecords())
+                testRecord(state, i);
     }
 
     void testRecord(TraceState& state, std::size_t address) const {
@@ -179,7 +190,8 @@ private:
             const std::uint64_t id = leafTriangles * address + static_cast<std::uint64_t>(i);
             const std::array<Vector, 3> vertices = leaf.verticesOf(i);
             bool crossesTriangle = false;
-            const bool isHit = testTriangle(state.ray, vertices, id, numbers_, hit, record_.work.isOn() ? &crossesTriangle : nullptr);
+            const bool isHit =
+                testTriangle(state.ray, vertices, id, numbers_, hit, record_.work.isOn() ? &crossesTriangle : nullptr);
             if (crossesTriangle) record_.work.addCrossed(i);
             record_.log.addTriangle(vertices, id, isHit);
             hit.isClear = leaf.isClear;
@@ -194,7 +206,9 @@ private:
                 continue;
             }
             if (!state.isOver()) state.occluder = hit;
-            state.occlusion = std::max(state.occlusion, hit.isClear && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
+            state.occlusion =
+                std::max(state.occlusion,
+                         hit.isClear && frame_.lighting.hasTransmittance ? Occlusion::transmissive : Occlusion::opaque);
         }
     }
 
@@ -250,10 +264,12 @@ private:
         }
     }
 
-    void logNode(std::uint32_t address, const Node& node, const std::array<Entered, nodeChildren>& entered, int count) const {
+    void logNode(std::uint32_t address, const Node& node, const std::array<Entered, nodeChildren>& entered,
+                 int count) const {
         record_.log.addRead(RayStep::Kind::node, address);
         for (int slot = 0; node.isLegal && slot < node.children(); ++slot) {
-            const bool isHit = std::any_of(entered.begin(), entered.begin() + count, [slot](const Entered& child) { return child.slot == slot; });
+            const bool isHit = std::any_of(entered.begin(), entered.begin() + count,
+                                           [slot](const Entered& child) { return child.slot == slot; });
             record_.log.addChild(node, slot, entryOf(node, {slot, 0}).address, isHit);
         }
     }
@@ -261,7 +277,8 @@ private:
     StackEntry entryOf(const Node& node, const Entered& child) const {
         const auto slot = static_cast<std::uint32_t>(child.slot), nodes = std::uint32_t{node.nodes};
         const bool isLeaf = slot >= nodes;
-        const std::uint32_t offset = isLeaf ? nodes + (slot - nodes) * static_cast<std::uint32_t>(frame_.leafRecords()) : slot;
+        const std::uint32_t offset =
+            isLeaf ? nodes + (slot - nodes) * static_cast<std::uint32_t>(frame_.leafRecords()) : slot;
         return {isLeaf, (node.first + offset) & memory_.addressMask(), child.tNear};
     }
 
@@ -280,7 +297,8 @@ public:
     Occlusion occlusion(const Ray& ray) { return search().occlusion(ray); }
 
 protected:
-    Tracer(const Numbers& numbers, const std::map<std::string, Layout>& layouts) : numbers_(numbers), memory_(std::make_shared<ColumnMemory>(layouts, numbers)) {}
+    Tracer(const Numbers& numbers, const std::map<std::string, Layout>& layouts)
+        : numbers_(numbers), memory_(std::make_shared<ColumnMemory>(layouts, numbers)) {}
 
     Numbers numbers_;
     std::shared_ptr<ColumnMemory> memory_;

@@ -1,4 +1,5 @@
-// What a frame asks of the device's units, pixel by pixel in the order of each path: the input of the cycle model (cpp/cycles).
+// What a frame asks of the device's units, pixel by pixel in the order of each path: the input of the cycle model
+// (cpp/cycles).
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -7,8 +8,9 @@
 
 namespace colonnade {
 
-/// A record that a ray visits. `dropped`: stack entries beyond its tMax that it pops behind the record. Of a node `children` are entered, `triangles` is 0. Of a leaf `crossed` has
-/// a bit for each of its `triangles` that the ray's line crosses.
+/// A record that a ray visits. `dropped`: stack entries beyond its tMax that it pops behind the record. Of a node
+/// `children` are entered, `triangles` is 0. Of a leaf `crossed` has a bit for each of its `triangles` that the ray's
+/// line crosses.
 struct RecordVisit {
     std::uint32_t address;
     std::uint8_t children, dropped, triangles, crossed;
@@ -16,22 +18,25 @@ struct RecordVisit {
 
 /// A step of a path.
 ///
-/// `ray`: it visits `count` records, the first of which is `first`; `isInBox`: it enters the object's box; `isHit`: of a shadow ray, something opaque ends it; `isDimmed`: of a shadow ray, it meets anything.
-/// `surface`: the leaf `first` is fetched, with its companion if `hasColours`, and its hit is shaded; `material`; of mirrors and glass `isRefraction`, and whether the hit `isBehind`.
-/// `lookup`: `first` is its march's; `isDirect`: by the pipeline of directly seen pixels, in a tile of one plane if `isFlat`; `isHit`: a point is found and shaded; `isTest`: it may hide a hit, and
-/// `isHit` tells that it does; `isReflection`: of a Fresnel reflection, whose bounce waits.
+/// `ray`: it visits `count` records, the first of which is `first`; `isInBox`: it enters the object's box; `isHit`: of
+/// a shadow ray, something opaque ends it; `isDimmed`: of a shadow ray, it meets anything. `surface`: the leaf `first`
+/// is fetched, with its companion if `hasColours`, and its hit is shaded; `material`; of mirrors and glass
+/// `isRefraction`, and whether the hit `isBehind`. `lookup`: `first` is its march's; `isDirect`: by the pipeline of
+/// directly seen pixels, in a tile of one plane if `isFlat`; `isHit`: a point is found and shaded; `isTest`: it may
+/// hide a hit, and `isHit` tells that it does; `isReflection`: of a Fresnel reflection, whose bounce waits.
 struct PathStep {
     enum class Kind : std::uint8_t { ray, surface, lookup };
     enum class Material : std::uint8_t { diffuse, mirror, glass };
     Kind kind;
     Material material = Material::diffuse;
-    bool isShadow : 1, isGathered : 1, isInBox : 1, isHit : 1, hasColours : 1, isDirect : 1, isTest : 1, isReflection : 1, isDimmed : 1, isRefraction : 1, isBehind : 1,
-        isFlat : 1;
+    bool isShadow : 1, isGathered : 1, isInBox : 1, isHit : 1, hasColours : 1, isDirect : 1, isTest : 1,
+        isReflection : 1, isDimmed : 1, isRefraction : 1, isBehind : 1, isFlat : 1;
     std::uint32_t first = 0, count = 0;
 
     explicit PathStep(Kind kind)
-        : kind(kind), isShadow(false), isGathered(false), isInBox(false), isHit(false), hasColours(false), isDirect(false), isTest(false), isReflection(false),
-          isDimmed(false), isRefraction(false), isBehind(false), isFlat(false) {}
+        : kind(kind), isShadow(false), isGathered(false), isInBox(false), isHit(false), hasColours(false),
+          isDirect(false), isTest(false), isReflection(false), isDimmed(false), isRefraction(false), isBehind(false),
+          isFlat(false) {}
 };
 
 /// The work of a frame: the steps of pixel i are those from `pixels[i]` on to `pixels[i + 1]`.

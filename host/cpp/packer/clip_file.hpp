@@ -20,14 +20,18 @@ struct ClipTree {
 /// The lowest bit of each field that a target writes, in the order of a clip file.
 inline std::vector<std::uint8_t> fieldLows(const std::map<std::string, Layout>& layouts) {
     std::vector<std::uint8_t> lows;
-    const auto add = [&](const std::string& layout, const std::string& name) { lows.push_back(static_cast<std::uint8_t>(layouts.at(layout).at(name).offset)); };
-    const auto addEach = [&](const std::string& layout, const std::string& list, int count, const std::string& components) {
+    const auto add = [&](const std::string& layout, const std::string& name) {
+        lows.push_back(static_cast<std::uint8_t>(layouts.at(layout).at(name).offset));
+    };
+    const auto addEach = [&](const std::string& layout, const std::string& list, int count,
+                             const std::string& components) {
         for (int i = 0; i < count; ++i)
             for (const char component : components) add(layout, list + "[" + std::to_string(i) + "]." + component);
     };
     for (int child = 0; child < nodeChildren; ++child)
         for (const char* plane : {"low", "high"})
-            for (const char axis : std::string("xyz")) add("node", "children[" + std::to_string(child) + "]." + plane + "." + axis);
+            for (const char axis : std::string("xyz"))
+                add("node", "children[" + std::to_string(child) + "]." + plane + "." + axis);
     for (const char* name : {"corner.x", "corner.y", "corner.z", "first", "leaves", "nodes"}) add("node", name);
     addEach("flatPair", "body.vertices", 4, "xyz");
     addEach("nearPair", "body.deltas", 3, "xyz");
@@ -52,9 +56,11 @@ inline void orderByUse(GridClip& clip, std::vector<ClipLeaf>& leaves) {
             if (isUsed(vertex)) number(vertex);
     for (std::size_t vertex = 0; vertex < numbers.size(); ++vertex) number(static_cast<std::int64_t>(vertex));
     const std::vector<std::array<std::int64_t, 13>> vertices = clip.vertices;
-    for (std::size_t vertex = 0; vertex < vertices.size(); ++vertex) clip.vertices[static_cast<std::size_t>(numbers[vertex])] = vertices[vertex];
+    for (std::size_t vertex = 0; vertex < vertices.size(); ++vertex)
+        clip.vertices[static_cast<std::size_t>(numbers[vertex])] = vertices[vertex];
     for (auto& change : clip.changes) change[0] = numbers[static_cast<std::size_t>(change[0])];
-    std::stable_sort(clip.changes.begin(), clip.changes.end(), [](const auto& one, const auto& other) { return one[0] < other[0]; });
+    std::stable_sort(clip.changes.begin(), clip.changes.end(),
+                     [](const auto& one, const auto& other) { return one[0] < other[0]; });
     for (mesh::Face& face : clip.corners)
         for (std::int32_t& corner : face) corner = static_cast<std::int32_t>(numbers[static_cast<std::size_t>(corner)]);
     for (ClipLeaf& leaf : leaves)
@@ -63,7 +69,8 @@ inline void orderByUse(GridClip& clip, std::vector<ClipLeaf>& leaves) {
 }
 
 /// The bytes of a clip file, for a design of these layouts and this hash of its formats.
-inline std::vector<std::uint8_t> clipFile(const GridClip& clip, const ClipTree& tree, const std::map<std::string, Layout>& layouts,
+inline std::vector<std::uint8_t> clipFile(const GridClip& clip, const ClipTree& tree,
+                                          const std::map<std::string, Layout>& layouts,
                                           const std::array<std::uint32_t, 8>& hash) {
     std::vector<std::uint8_t> bytes;
     const auto addWord = [&](std::int64_t value) {
@@ -78,10 +85,12 @@ inline std::vector<std::uint8_t> clipFile(const GridClip& clip, const ClipTree& 
     for (const char letter : std::string("CLNDCLIP")) bytes.push_back(static_cast<std::uint8_t>(letter));
     addWords(std::array<std::int64_t, 2>{1, 0}, 2); // version; the size follows
     addWords(hash, hash.size());
-    addWords(std::array<std::int64_t, 5>{tree.vertexBits, tree.deltaBits, tree.boxBits, tree.addressBits, tree.leafRecords}, 5);
     addWords(
-        std::array<std::size_t, 8>{tree.records, tree.depth, clip.vertices.size(), tree.leaves.size(), clip.bones, clip.targets, clip.changes.size(), clip.times.size()},
-        8);
+        std::array<std::int64_t, 5>{tree.vertexBits, tree.deltaBits, tree.boxBits, tree.addressBits, tree.leafRecords},
+        5);
+    addWords(std::array<std::size_t, 8>{tree.records, tree.depth, clip.vertices.size(), tree.leaves.size(), clip.bones,
+                                        clip.targets, clip.changes.size(), clip.times.size()},
+             8);
     addWords(std::array<std::int64_t, 3>{clip.times.back(), clip.linearShift, clip.shift}, 3);
     const std::vector<std::uint8_t> lows = fieldLows(layouts);
     bytes.insert(bytes.end(), lows.begin(), lows.end());
@@ -99,7 +108,8 @@ inline std::vector<std::uint8_t> clipFile(const GridClip& clip, const ClipTree& 
         addWord(clip.times[key]);
         addWords(clip.poses[key], clip.poses[key].size());
     }
-    for (int byte = 0; byte < 4; ++byte) bytes[12 + static_cast<std::size_t>(byte)] = static_cast<std::uint8_t>(bytes.size() >> (8 * byte));
+    for (int byte = 0; byte < 4; ++byte)
+        bytes[12 + static_cast<std::size_t>(byte)] = static_cast<std::uint8_t>(bytes.size() >> (8 * byte));
     return bytes;
 }
 

@@ -11,7 +11,9 @@ namespace colonnade::packer {
 /// The code nearest to a direction of any length but 0.
 inline Octahedral octahedralOf(const mesh::Vector& normal) {
     const double sum = std::abs(normal[0]) + std::abs(normal[1]) + std::abs(normal[2]);
-    const auto scaled = [&](int axis) { return static_cast<std::int64_t>(std::rint(octahedralOne * normal[axis] / sum)); };
+    const auto scaled = [&](int axis) {
+        return static_cast<std::int64_t>(std::rint(octahedralOne * normal[axis] / sum));
+    };
     const std::int64_t u = scaled(0), v = scaled(1);
     if (normal[2] >= 0) return {u, v};
     const std::int64_t across = octahedralOne - std::abs(v), up = octahedralOne - std::abs(u);
@@ -21,15 +23,18 @@ inline Octahedral octahedralOf(const mesh::Vector& normal) {
 /// The code of a triangle's geometric normal. The triangle has an area.
 inline Octahedral flatCode(const Leaf& leaf, int triangle, int normalFraction) {
     const Vector normal = geometricNormal(leaf.verticesOf(triangle), normalFraction);
-    return octahedralOf({static_cast<double>(normal[0]), static_cast<double>(normal[1]), static_cast<double>(normal[2])});
+    return octahedralOf(
+        {static_cast<double>(normal[0]), static_cast<double>(normal[1]), static_cast<double>(normal[2])});
 }
 
-/// The format of a pair: flat where all normals are its triangles', else near or far; none if its vertices are too far apart. A pair
-/// that bends is near, so that it may become twice as long before it loses its normals.
-inline std::optional<LeafFormat> formatOf(const LeafFields& fields, const Leaf& pair, int normalFraction, bool bends = false) {
+/// The format of a pair: flat where all normals are its triangles', else near or far; none if its vertices are too far
+/// apart. A pair that bends is near, so that it may become twice as long before it loses its normals.
+inline std::optional<LeafFormat> formatOf(const LeafFields& fields, const Leaf& pair, int normalFraction,
+                                          bool bends = false) {
     bool isFlat = !bends;
     for (int triangle = 0; isFlat && triangle < 2; ++triangle)
-        for (const int corner : Leaf::cornersOf(triangle)) isFlat = isFlat && pair.normals[corner] == flatCode(pair, triangle, normalFraction);
+        for (const int corner : Leaf::cornersOf(triangle))
+            isFlat = isFlat && pair.normals[corner] == flatCode(pair, triangle, normalFraction);
     if (isFlat) return LeafFormat::flatPair;
     std::int64_t reach = 0; // the most bits of a delta, without its sign
     for (int i = 1; i < 4; ++i)

@@ -31,13 +31,13 @@ struct FaceAttributes {
     std::size_t leafRecords() const { return colours ? 2 : 1; }
 };
 
-/// Recognises pairs: two triangles that share an edge in opposite directions, with one material, whose codes of normals and colours
-/// are equal at its ends, and whose vertices a leaf can hold.
+/// Recognises pairs: two triangles that share an edge in opposite directions, with one material, whose codes of normals
+/// and colours are equal at its ends, and whose vertices a leaf can hold.
 class Pairing {
 public:
     Pairing(const QuantisedMesh& quantised, const FaceAttributes& attributes, const RecordFormat& format)
-        : quantised_(quantised), attributes_(attributes), fields_(format.layouts), normalFraction_(format.normalFraction), bends_(format.bends),
-          codes_(quantised.faces.size()) {
+        : quantised_(quantised), attributes_(attributes), fields_(format.layouts),
+          normalFraction_(format.normalFraction), bends_(format.bends), codes_(quantised.faces.size()) {
         for (std::size_t face = 0; face < codes_.size(); ++face)
             for (int i = 0; i < 3; ++i) {
                 const mesh::Vector& normal = attributes_.cornerNormals[meshFace(face)][i];
@@ -49,14 +49,19 @@ public:
 
     /// A face alone.
     Leaf triangle(std::uint32_t face) const {
-        Leaf leaf{LeafFormat::triangle, attributes_.isClear[meshFace(face)] != 0, attributes_.materials[meshFace(face)], {}, {}};
+        Leaf leaf{LeafFormat::triangle,
+                  attributes_.isClear[meshFace(face)] != 0,
+                  attributes_.materials[meshFace(face)],
+                  {},
+                  {}};
         for (int i = 0; i < 3; ++i) take(leaf, i, face, i);
         return leaf;
     }
 
     /// Two faces; none if they are no pair. `begins` are the corners at which each begins their common edge.
     std::optional<Leaf> pair(std::uint32_t one, std::uint32_t other, std::array<int, 2>& begins) const {
-        if (attributes_.materials[meshFace(one)] != attributes_.materials[meshFace(other)] || attributes_.isClear[meshFace(one)] != attributes_.isClear[meshFace(other)])
+        if (attributes_.materials[meshFace(one)] != attributes_.materials[meshFace(other)] ||
+            attributes_.isClear[meshFace(one)] != attributes_.isClear[meshFace(other)])
             return {};
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) {
@@ -95,7 +100,8 @@ private:
     bool isSame(std::uint32_t one, int i, std::uint32_t other, int j) const {
         return quantised_.corner(one, i) == quantised_.corner(other, j) && codes_[one][i] == codes_[other][j] &&
                (!bends_ || quantised_.faces[one][i] == quantised_.faces[other][j]) &&
-               (!attributes_.colours || attributes_.colours[meshFace(one)][i] == attributes_.colours[meshFace(other)][j]);
+               (!attributes_.colours ||
+                attributes_.colours[meshFace(one)][i] == attributes_.colours[meshFace(other)][j]);
     }
 
     const QuantisedMesh& quantised_;
@@ -106,12 +112,13 @@ private:
     std::vector<std::array<Octahedral, 3>> codes_;
 };
 
-/// Divides triangles among leaves, two to each if they are a pair. A pair costs the area of its box, in proportion to the boxes of
-/// its triangles. The cheapest ones are joined first. Then a triangle that is left takes a neighbour from its pair, if the other one
-/// of that pair also has a neighbour that is left.
+/// Divides triangles among leaves, two to each if they are a pair. A pair costs the area of its box, in proportion to
+/// the boxes of its triangles. The cheapest ones are joined first. Then a triangle that is left takes a neighbour from
+/// its pair, if the other one of that pair also has a neighbour that is left.
 class Matching {
 public:
-    Matching(const QuantisedMesh& quantised, const std::vector<bvh::Box>& boxes, const Pairing& pairing) : boxes_(boxes), pairOf_(boxes.size(), none) {
+    Matching(const QuantisedMesh& quantised, const std::vector<bvh::Box>& boxes, const Pairing& pairing)
+        : boxes_(boxes), pairOf_(boxes.size(), none) {
         findPairs(quantised, pairing);
         for (std::uint32_t pair = 0; pair < pairs_.size(); ++pair)
             if (isAlone(pairs_[pair].faces[0]) && isAlone(pairs_[pair].faces[1])) join(pair);
@@ -152,7 +159,8 @@ private:
     };
 
     void findPairs(const QuantisedMesh& quantised, const Pairing& pairing) {
-        const std::vector<std::int64_t> position = mesh::mergeRows(quantised.vertices.data(), quantised.vertices.size()).index;
+        const std::vector<std::int64_t> position =
+            mesh::mergeRows(quantised.vertices.data(), quantised.vertices.size()).index;
         std::vector<Side> sides;
         for (std::uint32_t face = 0; face < boxes_.size(); ++face)
             for (int i = 0; i < 3; ++i) {
@@ -160,13 +168,17 @@ private:
                            other = static_cast<std::uint64_t>(position[quantised.faces[face][(i + 1) % 3]]);
                 sides.push_back({std::min(one, other) << 32 | std::max(one, other), face});
             }
-        std::stable_sort(sides.begin(), sides.end(), [](const Side& one, const Side& other) { return one.ends < other.ends; });
+        std::stable_sort(sides.begin(), sides.end(),
+                         [](const Side& one, const Side& other) { return one.ends < other.ends; });
         std::array<int, 2> begins;
         for (std::size_t one = 0; one < sides.size(); ++one)
-            for (std::size_t other = one + 1; other < std::min(sides.size(), one + window) && sides[other].ends == sides[one].ends; ++other)
+            for (std::size_t other = one + 1;
+                 other < std::min(sides.size(), one + window) && sides[other].ends == sides[one].ends; ++other)
                 if (pairing.pair(sides[one].face, sides[other].face, begins))
-                    pairs_.push_back({costOf(sides[one].face, sides[other].face), {sides[one].face, sides[other].face}});
-        std::stable_sort(pairs_.begin(), pairs_.end(), [](const Pair& one, const Pair& other) { return one.cost < other.cost; });
+                    pairs_.push_back(
+                        {costOf(sides[one].face, sides[other].face), {sides[one].face, sides[other].face}});
+        std::stable_sort(pairs_.begin(), pairs_.end(),
+                         [](const Pair& one, const Pair& other) { return one.cost < other.cost; });
 
         // The pairs of each face
         starts_.assign(boxes_.size() + 1, 0);
@@ -192,7 +204,8 @@ private:
         for (const std::uint32_t face : pairs_[pair].faces) pairOf_[face] = pair;
     }
 
-    /// Replaces a pair by one with `face` and one with another triangle that is left, at the least cost, if there is one.
+    /// Replaces a pair by one with `face` and one with another triangle that is left, at the least cost, if there is
+    /// one.
     bool exchange(std::uint32_t face) {
         Cost least = 0;
         std::array<std::uint32_t, 2> best{none, none};

@@ -22,11 +22,11 @@ struct QuantiseOptions {
     bool keepsEqual = false;  ///< faces equal to an earlier one
 };
 
-/// Scales a mesh uniformly into the centre of the cube [0, 2^vertexBits − 1]³ and rounds to nearest. The low planes of its box
-/// are integers, so that a flat side stays flat. Faces that become degenerate, or equal to an earlier one, are dropped: all
-/// of them, if the mesh is too thin for its vertex units.
-inline QuantisedMesh quantise(const mesh::Vector* vertices, std::size_t vertexCount, const mesh::Face* faces, std::size_t faceCount, int vertexBits,
-                              const QuantiseOptions& options = {}) {
+/// Scales a mesh uniformly into the centre of the cube [0, 2^vertexBits − 1]³ and rounds to nearest. The low planes of
+/// its box are integers, so that a flat side stays flat. Faces that become degenerate, or equal to an earlier one, are
+/// dropped: all of them, if the mesh is too thin for its vertex units.
+inline QuantisedMesh quantise(const mesh::Vector* vertices, std::size_t vertexCount, const mesh::Face* faces,
+                              std::size_t faceCount, int vertexBits, const QuantiseOptions& options = {}) {
     const double maximum = static_cast<double>((std::int64_t{1} << vertexBits) - 1);
     mesh::Vector low = vertices[0], high = vertices[0];
     for (std::size_t i = 0; i < vertexCount; ++i)
@@ -36,7 +36,8 @@ inline QuantisedMesh quantise(const mesh::Vector* vertices, std::size_t vertexCo
         }
     QuantisedMesh result;
     int exponent;
-    const double mantissa = std::frexp(maximum / std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}), &exponent);
+    const double mantissa =
+        std::frexp(maximum / std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}), &exponent);
     result.scale = std::ldexp(std::floor(std::ldexp(mantissa, options.scaleBits)), exponent - options.scaleBits);
     mesh::Vector start;
     for (int axis = 0; axis < 3; ++axis) {

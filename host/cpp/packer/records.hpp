@@ -1,5 +1,5 @@
-/// The records of the column memory by the manifest's layouts: the tree from record 0, without one its leaves alone in the same order,
-/// and behind each leaf its companion if the mesh has colours. Addresses in nodes are absolute.
+/// The records of the column memory by the manifest's layouts: the tree from record 0, without one its leaves alone in
+/// the same order, and behind each leaf its companion if the mesh has colours. Addresses in nodes are absolute.
 #pragma once
 
 #include "tree.hpp"
@@ -16,9 +16,10 @@ struct Sections {
 /// Writes the records of a tree.
 class RecordPacker {
 public:
-    RecordPacker(const QuantisedMesh& quantised, const FaceAttributes& attributes, const bvh::Bvh& tree, const RecordFormat& format)
-        : quantised_(quantised), attributes_(attributes), pairing_(quantised, attributes, format), tree_(tree), format_(format), leafFirst_(tree.tree.leafFirst),
-          leafCount_(tree.tree.leafTriangleCount) {
+    RecordPacker(const QuantisedMesh& quantised, const FaceAttributes& attributes, const bvh::Bvh& tree,
+                 const RecordFormat& format)
+        : quantised_(quantised), attributes_(attributes), pairing_(quantised, attributes, format), tree_(tree),
+          format_(format), leafFirst_(tree.tree.leafFirst), leafCount_(tree.tree.leafTriangleCount) {
         sections_.nodes = format.bvh ? tree.tree.nodes() : 0;
         sections_.leaves = tree.tree.leaves();
         sections_.recordCount = sections_.nodes + sections_.leaves * attributes.leafRecords();
@@ -31,7 +32,8 @@ public:
     std::vector<std::int64_t> indices() const {
         std::vector<std::int64_t> indices(leafTriangles * sections_.recordCount, -1);
         for (std::size_t leaf = 0; leaf < sections_.leaves; ++leaf)
-            for (std::uint32_t k = 0; k < leafCount_[leaf]; ++k) indices[leafTriangles * addressOf(leaf) + k] = leafFirst_[leaf] + k;
+            for (std::uint32_t k = 0; k < leafCount_[leaf]; ++k)
+                indices[leafTriangles * addressOf(leaf) + k] = leafFirst_[leaf] + k;
         return indices;
     }
 
@@ -43,13 +45,14 @@ public:
             std::array<int, 2> begins{};
             const std::uint32_t first = leafFirst_[leaf];
             pairing_.pair(tree_.order[first], tree_.order[first + 1], begins);
-            for (int k = 0; k < leafTriangles; ++k) rotations[first + static_cast<std::uint32_t>(k)] = static_cast<std::uint8_t>(begins[k]);
+            for (int k = 0; k < leafTriangles; ++k)
+                rotations[first + static_cast<std::uint32_t>(k)] = static_cast<std::uint8_t>(begins[k]);
         }
         return rotations;
     }
 
-    /// The corner of a quantised face that is each of the four vertices of a leaf, in the order of leaves: 3 · face + corner; −1 for the
-    /// fourth of a triangle.
+    /// The corner of a quantised face that is each of the four vertices of a leaf, in the order of leaves: 3 · face +
+    /// corner; −1 for the fourth of a triangle.
     std::vector<std::int64_t> leafCorners() const {
         std::vector<std::int64_t> corners;
         for (std::size_t leaf = 0; leaf < sections_.leaves; ++leaf) {
@@ -82,14 +85,18 @@ public:
 private:
     using Vector = std::array<const Field*, 3>;
 
-    const Field& field(const char* record, const std::string& name) const { return format_.layouts.at(record).at(name); }
+    const Field& field(const char* record, const std::string& name) const {
+        return format_.layouts.at(record).at(name);
+    }
 
     Vector vectorOf(const char* record, const std::string& name, const char* components = "xyz") const {
-        return {&field(record, name + "." + components[0]), &field(record, name + "." + components[1]), &field(record, name + "." + components[2])};
+        return {&field(record, name + "." + components[0]), &field(record, name + "." + components[1]),
+                &field(record, name + "." + components[2])};
     }
 
     static void write(const Field& field, std::uint8_t* record, std::int64_t value) {
-        if (!field.holds(value)) throw std::invalid_argument("a value does not fit " + std::to_string(field.width) + " bits of a record");
+        if (!field.holds(value))
+            throw std::invalid_argument("a value does not fit " + std::to_string(field.width) + " bits of a record");
         field.write(record, value);
     }
 
@@ -105,16 +112,21 @@ private:
                 const Units at = quantised_.corner(tree_.order[packed], i);
                 box.add({at, at});
             }
-            for (int axis = 0; axis < 3; ++axis) sections_.largestTriangle = std::max(sections_.largestTriangle, box.high[axis] - box.low[axis]);
+            for (int axis = 0; axis < 3; ++axis)
+                sections_.largestTriangle = std::max(sections_.largestTriangle, box.high[axis] - box.low[axis]);
             bounds.add(box);
         }
         sections_.boundsLow = bounds.low;
         sections_.boundsHigh = bounds.high;
     }
 
-    std::size_t addressOf(std::size_t leaf) const { return format_.bvh ? tree_.tree.leafAddress[leaf] : leaf * attributes_.leafRecords(); }
+    std::size_t addressOf(std::size_t leaf) const {
+        return format_.bvh ? tree_.tree.leafAddress[leaf] : leaf * attributes_.leafRecords();
+    }
 
-    std::uint8_t* recordAt(std::uint8_t* records, std::size_t address) const { return records + address * format_.recordBytes(); }
+    std::uint8_t* recordAt(std::uint8_t* records, std::size_t address) const {
+        return records + address * format_.recordBytes();
+    }
 
     void writeNodes(std::uint8_t* records) const {
         const bvh::WideTree& tree = tree_.tree;
@@ -134,7 +146,9 @@ private:
                 write(high[slot], record, &tree.high[3 * child]);
             }
             for (int axis = 0; axis < 3; ++axis)
-                write(*corner[axis], record, std::int64_t{2} * tree.origin[3 * node + axis] + (std::int64_t{1} << tree.exponent[3 * node + axis]));
+                write(*corner[axis], record,
+                      std::int64_t{2} * tree.origin[3 * node + axis] +
+                          (std::int64_t{1} << tree.exponent[3 * node + axis]));
             write(first, record, tree.first[node]);
             write(nodes, record, tree.nodeCount[node]);
             write(leaves, record, tree.leafCount[node]);
@@ -145,7 +159,8 @@ private:
         for (std::size_t leaf = 0; leaf < sections_.leaves; ++leaf) {
             const std::uint32_t* const faces = &tree_.order[leafFirst_[leaf]];
             std::array<int, 2> begins{};
-            const Leaf written = leafCount_[leaf] == 1 ? pairing_.triangle(faces[0]) : pairing_.pair(faces[0], faces[1], begins).value();
+            const Leaf written =
+                leafCount_[leaf] == 1 ? pairing_.triangle(faces[0]) : pairing_.pair(faces[0], faces[1], begins).value();
             writeLeaf(pairing_.fields(), written, recordAt(records, addressOf(leaf)));
             if (!attributes_.colours) continue;
             std::uint8_t* const companion = recordAt(records, addressOf(leaf) + 1);
@@ -153,7 +168,8 @@ private:
                 const std::uint32_t face = faces[i / 3];
                 const int corner = i < 3 ? (begins[0] + i) % 3 : (begins[1] + 2) % 3;
                 for (int channel = 0; channel < 3; ++channel)
-                    write(pairing_.fields().colours[i][channel], companion, attributes_.colours[quantised_.meshFaces[face]][corner][channel]);
+                    write(pairing_.fields().colours[i][channel], companion,
+                          attributes_.colours[quantised_.meshFaces[face]][corner][channel]);
             }
         }
     }

@@ -10,9 +10,11 @@ struct OffsetFormat {
     int gridFraction, weightBits, mantissaBits, distanceDigits;
 };
 
-/// Bound of the error of a hit's t, grid steps. `largestTriangle`: greatest extent of a triangle along an axis, vertex units.
+/// Bound of the error of a hit's t, grid steps. `largestTriangle`: greatest extent of a triangle along an axis, vertex
+/// units.
 inline double distanceError(const OffsetFormat& n, int largestTriangle) {
-    const double weights = 4 / (std::ldexp(1, n.weightBits) - 6), quotient = std::ldexp(1, 1 - n.mantissaBits) + std::ldexp(1, 1 - n.distanceDigits);
+    const double weights = 4 / (std::ldexp(1, n.weightBits) - 6),
+                 quotient = std::ldexp(1, 1 - n.mantissaBits) + std::ldexp(1, 1 - n.distanceDigits);
     return 1 + std::ldexp(largestTriangle, n.gridFraction) * (weights + quotient);
 }
 

@@ -6,7 +6,8 @@
 namespace colonnade::packer {
 
 /// The tree over quantised triangles.
-inline bvh::Bvh buildTree(const QuantisedMesh& quantised, const FaceAttributes& attributes, const RecordFormat& format) {
+inline bvh::Bvh buildTree(const QuantisedMesh& quantised, const FaceAttributes& attributes,
+                          const RecordFormat& format) {
     std::vector<bvh::Box> boxes(quantised.faces.size());
     for (std::size_t i = 0; i < boxes.size(); ++i)
         for (int corner = 0; corner < 3; ++corner) {
@@ -15,8 +16,8 @@ inline bvh::Bvh buildTree(const QuantisedMesh& quantised, const FaceAttributes& 
         }
     const Pairing pairing(quantised, attributes, format);
     const std::vector<bvh::LeafTriangles> leaves = Matching(quantised, boxes, pairing).leaves();
-    return bvh::build(boxes, leaves, static_cast<unsigned>(format.children), static_cast<unsigned>(format.boxBits), static_cast<unsigned>(format.stackDepth),
-                      static_cast<unsigned>(attributes.leafRecords()));
+    return bvh::build(boxes, leaves, static_cast<unsigned>(format.children), static_cast<unsigned>(format.boxBits),
+                      static_cast<unsigned>(format.stackDepth), static_cast<unsigned>(attributes.leafRecords()));
 }
 
 } // namespace colonnade::packer

@@ -16,7 +16,9 @@ inline std::size_t rayBytes(const colonnade_rays_batch& batch) {
 inline std::size_t responseBytes(const colonnade_rays_batch& batch) {
     const std::size_t count = batch.count;
     const std::uint32_t response = batch.mode & COLONNADE_RAYS_RESPONSE;
-    return response == COLONNADE_RAYS_HITS ? 16 * count : response == COLONNADE_RAYS_RANGES ? 8 * count : (count + 63) / 64 * 8;
+    return response == COLONNADE_RAYS_HITS     ? 16 * count
+           : response == COLONNADE_RAYS_RANGES ? 8 * count
+                                               : (count + 63) / 64 * 8;
 }
 
 } // namespace colonnade::rays

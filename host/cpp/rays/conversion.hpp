@@ -39,13 +39,15 @@ inline float nearestFloat(std::uint64_t numerator, std::uint64_t denominator, in
         const std::uint64_t dividend = numerator << shift;
         digits = static_cast<std::int64_t>(dividend / denominator << 1 | (dividend % denominator != 0));
     } else {
-        const UnsignedWide dividend = shift >= 0 ? UnsignedWide(numerator) << shift : numerator, divisor = shift >= 0 ? denominator : UnsignedWide(denominator) << -shift;
+        const UnsignedWide dividend = shift >= 0 ? UnsignedWide(numerator) << shift : numerator,
+                           divisor = shift >= 0 ? denominator : UnsignedWide(denominator) << -shift;
         digits = static_cast<std::int64_t>(dividend / divisor << 1 | (dividend % divisor != 0));
     }
     const int drop = bitLength(digits) - 24;
     const double nearest = std::ldexp(static_cast<double>(nearestEven(digits, drop)), drop - 1 - shift + exponent);
     if (nearest < std::numeric_limits<float>::min()) return 0;
-    return nearest > std::numeric_limits<float>::max() ? std::numeric_limits<float>::infinity() : static_cast<float>(nearest);
+    return nearest > std::numeric_limits<float>::max() ? std::numeric_limits<float>::infinity()
+                                                       : static_cast<float>(nearest);
 }
 
 /// Where a scene lies among the rays: registers of the device.
@@ -72,7 +74,8 @@ struct ConvertedRay {
 
 class RayConverter {
 public:
-    RayConverter(const Numbers& numbers, int directionBits, const Placement& placement) : n_(numbers), directionBits_(directionBits), placement_(placement) {}
+    RayConverter(const Numbers& numbers, int directionBits, const Placement& placement)
+        : n_(numbers), directionBits_(directionBits), placement_(placement) {}
 
     /// `isLocal`: the origin is relative to the position (0, 0, 0) of the device.
     ConvertedRay convert(const colonnade_rays_record& ray, bool isLocal) const {
@@ -99,15 +102,18 @@ public:
         for (int a = 0; a < 3; ++a) {
             // At most directionBits, 64
             const auto mantissa = static_cast<std::int64_t>(result.request.direction[a]);
-            if (mantissa != 0 && exponents[a] == largest) dominant = std::max(dominant, static_cast<int>(magnitude(mantissa)));
-            result.request.direction[a] = nearestEven(mantissa, std::min(largest - exponents[a] - (directionBits_ - 2 - 24), 62));
+            if (mantissa != 0 && exponents[a] == largest)
+                dominant = std::max(dominant, static_cast<int>(magnitude(mantissa)));
+            result.request.direction[a] =
+                nearestEven(mantissa, std::min(largest - exponents[a] - (directionBits_ - 2 - 24), 62));
         }
         setStep(result, dominant, largest);
         result.request.tMin = near.mantissa > 0 ? std::min<Wide>(steps(near, result, true), n_.unlimited()) : 0;
         result.request.tMax = std::min<Wide>(steps(far, result, false) + 1, n_.unlimited());
         result.kind = ConvertedRay::Kind::legal;
         for (int a = 0; a < 3; ++a)
-            if (!toGrid(ray.origin[a], isLocal ? 0 : placement_.base[a], result.request.origin[a])) result.kind = ConvertedRay::Kind::outOfRange;
+            if (!toGrid(ray.origin[a], isLocal ? 0 : placement_.base[a], result.request.origin[a]))
+                result.kind = ConvertedRay::Kind::outOfRange;
     }
 
     /// Sets a step of t, from the direction's largest component.
@@ -118,14 +124,16 @@ public:
 
     /// The id of a hit, with its bits.
     static std::uint32_t idOf(const Hit& hit) {
-        return static_cast<std::uint32_t>(hit.id) | (hit.backSide ? COLONNADE_RAYS_BACK_SIDE : 0) | (hit.isClear ? COLONNADE_RAYS_NON_OPAQUE : 0);
+        return static_cast<std::uint32_t>(hit.id) | (hit.backSide ? COLONNADE_RAYS_BACK_SIDE : 0) |
+               (hit.isClear ? COLONNADE_RAYS_NON_OPAQUE : 0);
     }
 
     /// A hit in the application's numbers.
     colonnade_rays_response hitOf(const ConvertedRay& converted, const Ray& ray, const Hit& hit) const {
         const auto steps = static_cast<std::uint64_t>(floorShift<Wide>(ray.tEntry, -n_.gridFraction) + hit.t);
         const auto sum = static_cast<std::uint64_t>(hit.weights[0] + hit.weights[1] + hit.weights[2]);
-        return {nearestFloat(steps, converted.product, converted.exponent), idOf(hit), nearestFloat(static_cast<std::uint64_t>(hit.weights[1]), sum, 0),
+        return {nearestFloat(steps, converted.product, converted.exponent), idOf(hit),
+                nearestFloat(static_cast<std::uint64_t>(hit.weights[1]), sum, 0),
                 nearestFloat(static_cast<std::uint64_t>(hit.weights[2]), sum, 0)};
     }
 
@@ -148,7 +156,8 @@ private:
         constexpr int shift = Placement::scaleBits + Placement::fractionBits;
         const std::int64_t fixed = nearestEven<std::int64_t>(value.mantissa, std::min(-left, 62));
         const Wide distance = Wide(fixed) - base;
-        if (magnitude(distance) >> (62 - Placement::scaleBits) == 0) position = nearestEven(static_cast<std::int64_t>(distance) * placement_.mantissa, shift);
+        if (magnitude(distance) >> (62 - Placement::scaleBits) == 0)
+            position = nearestEven(static_cast<std::int64_t>(distance) * placement_.mantissa, shift);
         else position = nearestEven(distance * placement_.mantissa, shift);
         return magnitude(position) >> (n_.gridBits + 1) == 0;
     }

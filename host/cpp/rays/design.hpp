@@ -29,7 +29,8 @@ struct Design {
             if (!lines) throw std::invalid_argument("the design has a line that is not complete: " + kind + " " + name);
         }
         for (const char* each : records)
-            if (!format.layouts.count(each)) throw std::invalid_argument("the design has no layout of '" + std::string(each) + "'");
+            if (!format.layouts.count(each))
+                throw std::invalid_argument("the design has no layout of '" + std::string(each) + "'");
         format.recordBits = ranged("recordBits", 64, maxBits);
         format.vertexBits = ranged("vertexBits", 10, 24);
         format.boxBits = ranged("boxBits", 4, 7);
@@ -39,7 +40,9 @@ struct Design {
         ranged("directionBits", 26, 64);
         ranged("depth", 1, 1 << 22);
         for (const auto& [name, value] : numbers)
-            if (value < -maxBits || value > 1 << 22) throw std::invalid_argument("the design's " + name + " is " + std::to_string(value) + ", which no device has");
+            if (value < -maxBits || value > 1 << 22)
+                throw std::invalid_argument("the design's " + name + " is " + std::to_string(value) +
+                                            ", which no device has");
         for (const auto& [name, layout] : format.layouts)
             for (const auto& [field, at] : layout)
                 if (isOfRecords(name) && (at.width > 64 || at.offset + at.width > format.recordBits))
@@ -53,13 +56,15 @@ private:
     static constexpr int maxBits = 4096;
     static constexpr const char* records[] = {"node", "nearPair", "triangle", "flatPair", "farPair"};
 
-    static bool isOfRecords(const std::string& name) { return std::find(std::begin(records), std::end(records), name) != std::end(records); }
+    static bool isOfRecords(const std::string& name) {
+        return std::find(std::begin(records), std::end(records), name) != std::end(records);
+    }
 
     int ranged(const char* name, int low, int high) const {
         const std::int64_t value = lookUp(numbers, name);
         if (value < low || value > high)
-            throw std::invalid_argument("the design's " + std::string(name) + " is " + std::to_string(value) + ": a device has " + std::to_string(low) + " to " +
-                                        std::to_string(high));
+            throw std::invalid_argument("the design's " + std::string(name) + " is " + std::to_string(value) +
+                                        ": a device has " + std::to_string(low) + " to " + std::to_string(high));
         return static_cast<int>(value);
     }
 };

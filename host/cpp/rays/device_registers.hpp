@@ -16,8 +16,9 @@ using RegisterValues = std::map<std::string, std::int64_t>;
 
 /// The registers that a scene sets.
 inline RegisterValues registersOf(const colonnade_rays_image& image) {
-    RegisterValues values{
-        {"placement.mantissa", image.scale_mantissa}, {"placement.exponent", image.scale_exponent}, {"scene.recordCount", static_cast<std::int64_t>(image.record_count)}};
+    RegisterValues values{{"placement.mantissa", image.scale_mantissa},
+                          {"placement.exponent", image.scale_exponent},
+                          {"scene.recordCount", static_cast<std::int64_t>(image.record_count)}};
     for (int a = 0; a < 3; ++a) {
         const std::string axis = std::string(".") + "xyz"[a];
         values["bounds.low" + axis] = image.bounds_low[a];
@@ -30,7 +31,8 @@ inline RegisterValues registersOf(const colonnade_rays_image& image) {
 /// The library's sums of a device's counters.
 inline colonnade_rays_sums sumsOf(const RegisterValues& counters) {
     const auto of = [&](const char* name) { return static_cast<std::uint64_t>(counters.at(name)); };
-    return {of("rays"), of("raysRefused"), of("raysInBox"), of("nodeReads"), of("boxTests"), of("triangleTests"), of("deepestStack")};
+    return {of("rays"),     of("raysRefused"),   of("raysInBox"),   of("nodeReads"),
+            of("boxTests"), of("triangleTests"), of("deepestStack")};
 }
 
 class DeviceRegisters {
@@ -60,7 +62,8 @@ public:
         for (const auto& [name, value] : values) addressOf(name);
         for (const auto& [name, one] : registers_) {
             const auto found = values.find(name);
-            if (one.access == "rw" || found != values.end()) append(writes, name, one, found == values.end() ? 0 : found->second);
+            if (one.access == "rw" || found != values.end())
+                append(writes, name, one, found == values.end() ? 0 : found->second);
         }
         for (const char* const command : {"control.invalidate", "control.start"})
             if (registers_.count(command)) append(writes, command, registers_.at(command), 1);
@@ -73,10 +76,12 @@ public:
         for (const auto& [name, one] : registers_) {
             if (name.rfind(prefix, 0) != 0) continue;
             std::uint64_t value = 0;
-            for (unsigned word = 0; word < wordsOf(one); ++word) value |= static_cast<std::uint64_t>(read(one.address + word)) << 32 * word;
+            for (unsigned word = 0; word < wordsOf(one); ++word)
+                value |= static_cast<std::uint64_t>(read(one.address + word)) << 32 * word;
             const std::string counter = name.substr(prefix.size());
             const auto found = before_.find(counter);
-            const std::int64_t before = found == before_.end() ? 0 : found->second, now = static_cast<std::int64_t>(value);
+            const std::int64_t before = found == before_.end() ? 0 : found->second,
+                               now = static_cast<std::int64_t>(value);
             sums[counter] = counter == "deepestStack" ? std::max(before, now) : before + now;
         }
         return sums;
@@ -96,13 +101,19 @@ private:
 
     static unsigned wordsOf(const Register& one) { return (one.bits + 31) / 32; }
 
-    static void append(std::vector<std::pair<std::uint32_t, std::uint32_t>>& writes, const std::string& name, const Register& one, std::int64_t value) {
+    static void append(std::vector<std::pair<std::uint32_t, std::uint32_t>>& writes, const std::string& name,
+                       const Register& one, std::int64_t value) {
         const unsigned magnitude = one.bits - one.isSigned;
-        const bool fits =
-            one.isSigned ? magnitude >= 63 || (value >> magnitude == 0 || value >> magnitude == -1) : value >= 0 && (magnitude >= 63 || value >> magnitude == 0);
-        if (!fits) throw std::invalid_argument("register " + name + ": " + std::to_string(value) + " does not fit " + std::to_string(one.bits) + " bits");
-        const std::uint64_t raw = one.bits >= 64 ? static_cast<std::uint64_t>(value) : static_cast<std::uint64_t>(value) & ((std::uint64_t{1} << one.bits) - 1);
-        for (unsigned word = 0; word < wordsOf(one); ++word) writes.emplace_back(one.address + word, static_cast<std::uint32_t>(raw >> 32 * word));
+        const bool fits = one.isSigned ? magnitude >= 63 || (value >> magnitude == 0 || value >> magnitude == -1)
+                                       : value >= 0 && (magnitude >= 63 || value >> magnitude == 0);
+        if (!fits)
+            throw std::invalid_argument("register " + name + ": " + std::to_string(value) + " does not fit " +
+                                        std::to_string(one.bits) + " bits");
+        const std::uint64_t raw = one.bits >= 64
+                                      ? static_cast<std::uint64_t>(value)
+                                      : static_cast<std::uint64_t>(value) & ((std::uint64_t{1} << one.bits) - 1);
+        for (unsigned word = 0; word < wordsOf(one); ++word)
+            writes.emplace_back(one.address + word, static_cast<std::uint32_t>(raw >> 32 * word));
     }
 
     std::map<std::string, Register> registers_;

@@ -1,5 +1,5 @@
-// The calls of Embree 4 for triangles: a shared library in place of libembree4, on the device that the environment names. All of its calls
-// are here; those for other geometries, instances and motion set an error, and do nothing.
+// The calls of Embree 4 for triangles: a shared library in place of libembree4, on the device that the environment
+// names. All of its calls are here; those for other geometries, instances and motion set an error, and do nothing.
 #include "embree.hpp"
 
 using namespace colonnade::rays::embree;
@@ -7,7 +7,19 @@ using namespace colonnade::rays::embree;
 namespace {
 
 /// Words of a ray and its hit, 4 bytes each.
-enum Word { origin = 0, nearEnd = 3, direction = 4, farEnd = 8, rayMask = 9, hitNormal = 12, hitU = 15, hitV, hitPrimitive, hitGeometry, hitInstance };
+enum Word {
+    origin = 0,
+    nearEnd = 3,
+    direction = 4,
+    farEnd = 8,
+    rayMask = 9,
+    hitNormal = 12,
+    hitU = 15,
+    hitV,
+    hitPrimitive,
+    hitGeometry,
+    hitInstance
+};
 constexpr int rayWords = 12;
 constexpr float occludedEnd = -std::numeric_limits<float>::infinity();
 
@@ -20,13 +32,18 @@ template <int width> struct Packet {
         std::memcpy(&value, bytes + 4 * (word * width + lane), 4);
         return value;
     }
-    template <class T> void set(int word, int lane, T value) const { std::memcpy(bytes + 4 * (word * width + lane), &value, 4); }
+    template <class T> void set(int word, int lane, T value) const {
+        std::memcpy(bytes + 4 * (word * width + lane), &value, 4);
+    }
 
     /// A ray without an interval is not active, and keeps its bytes.
     bool isActive(int lane) const { return get(nearEnd, lane) <= get(farEnd, lane) && get(farEnd, lane) >= 0; }
     colonnade_rays_ray ray(int lane) const {
         const auto at = [&](int word) { return double{get(word, lane)}; };
-        return {{at(origin), at(origin + 1), at(origin + 2)}, at(nearEnd), {at(direction), at(direction + 1), at(direction + 2)}, at(farEnd)};
+        return {{at(origin), at(origin + 1), at(origin + 2)},
+                at(nearEnd),
+                {at(direction), at(direction + 1), at(direction + 2)},
+                at(farEnd)};
     }
     /// Writes a hit, whose words begin at `first`.
     void take(const Part& part, const colonnade_rays_hit& hit, int lane, int first) const {
@@ -45,26 +62,30 @@ bool isAccepted(const Geometry& geometry, bool isOcclusion, const QueryArguments
     const bool takesArgument = arguments && (geometry.takesArgumentFilter || (arguments->flags & invokeArgumentFilter));
     int valid = -1;
     unsigned noInstances[2] = {noId, noId};
-    const FilterArguments call{&valid, geometry.user, arguments && arguments->context ? arguments->context : noInstances, ray, hit, 1};
+    const FilterArguments call{
+        &valid, geometry.user, arguments && arguments->context ? arguments->context : noInstances, ray, hit, 1};
     for (const Filter filter : {geometry.filters[isOcclusion], takesArgument ? arguments->filter : nullptr})
         if (filter && valid) filter(&call);
     return valid != 0;
 }
 
 /// Takes the first hit that filters accept, from near to far.
-template <int width> void traceFiltered(Scene& scene, const Packet<width>& packet, int lane, bool isOcclusion, const QueryArguments* arguments) {
+template <int width> void traceFiltered(Scene& scene, const Packet<width>& packet, int lane, bool isOcclusion,
+                                        const QueryArguments* arguments) {
     const colonnade_rays_ray ray = packet.ray(lane);
     const float end = packet.get(farEnd, lane);
     // Filters see the caller's own single ray, which may be a part of something larger
     char copy[4 * rayWords], *seen = packet.bytes;
     if (width != 1) {
-        for (int word = 0; word < rayWords; ++word) std::memcpy(copy + 4 * word, packet.bytes + 4 * (word * width + lane), 4);
+        for (int word = 0; word < rayWords; ++word)
+            std::memcpy(copy + 4 * word, packet.bytes + 4 * (word * width + lane), 4);
         seen = copy;
     }
     std::vector<colonnade_rays_hit> hits(16);
     for (std::size_t count = 0;; hits.resize(count)) {
-        scene.device->check(
-            colonnade_rays_all(scene.committed.rays, &ray, 1, 0, packet.template get<unsigned>(rayMask, lane), SIZE_MAX, hits.data(), hits.size(), &count));
+        scene.device->check(colonnade_rays_all(scene.committed.rays, &ray, 1, 0,
+                                               packet.template get<unsigned>(rayMask, lane), SIZE_MAX, hits.data(),
+                                               hits.size(), &count));
         if (count > hits.size()) continue;
         hits.resize(count);
         break;
@@ -78,18 +99,21 @@ template <int width> void traceFiltered(Scene& scene, const Packet<width>& packe
         Packet<1>{seen}.set(farEnd, 0, static_cast<float>(hit.t));
         if (!isAccepted(*part.geometry.get(), isOcclusion, arguments, seen, bytes)) continue;
         packet.set(farEnd, lane, isOcclusion ? occludedEnd : Packet<1>{seen}.get(farEnd, 0));
-        for (int word = hitNormal; !isOcclusion && word <= hitInstance; ++word) packet.set(word, lane, found.get(word - hitNormal, 0));
+        for (int word = hitNormal; !isOcclusion && word <= hitInstance; ++word)
+            packet.set(word, lane, found.get(word - hitNormal, 0));
         return;
     }
     packet.set(farEnd, lane, end);
 }
 
 /// Traces the active rays of a packet. Consecutive rays with one mask are a batch.
-template <int width, bool isOcclusion> void trace(const int* valid, Scene* scene, char* bytes, const QueryArguments* arguments) noexcept {
+template <int width, bool isOcclusion>
+void trace(const int* valid, Scene* scene, char* bytes, const QueryArguments* arguments) noexcept {
     called(scene, [&] {
         const Packet<width> packet{static_cast<char*>(needed(bytes))};
         const Committed& committed = scene->committed;
-        const bool hasFilters = committed.hasFilters || (arguments && arguments->filter && (arguments->flags & invokeArgumentFilter));
+        const bool hasFilters =
+            committed.hasFilters || (arguments && arguments->filter && (arguments->flags & invokeArgumentFilter));
         for (int lane = 0; lane < width;) {
             colonnade_rays_ray rays[width];
             int lanes[width];
@@ -164,8 +188,9 @@ Device* rtcNewDevice(const char*) {
 int rtcGetDeviceError(Device* device) { return std::exchange(Device::error(device).code, none); }
 const char* rtcGetDeviceLastErrorMessage(Device* device) { return Device::error(device).text.c_str(); }
 const char* rtcGetErrorString(int error) {
-    constexpr const char* texts[] = {"No Error",      "Unknown error",   "Invalid argument", "Invalid operation",
-                                     "Out of Memory", "Unsupported CPU", "Build cancelled",  "Level Zero raytracing support missing"};
+    constexpr const char* texts[] = {
+        "No Error",      "Unknown error",   "Invalid argument", "Invalid operation",
+        "Out of Memory", "Unsupported CPU", "Build cancelled",  "Level Zero raytracing support missing"};
     return error >= 0 && error < static_cast<int>(std::size(texts)) ? texts[error] : "Invalid error code";
 }
 void rtcSetDeviceErrorFunction(Device* device, void (*report)(void*, int, const char*), void* user) {
@@ -189,7 +214,8 @@ ssize_t rtcGetDeviceProperty(Device* device, int property) {
         case 140: return 1;
         }
         const auto isBetween = [&](int first, int last) { return first <= property && property <= last; };
-        if (property != 3 && !isBetween(32, 34) && !isBetween(62, 68) && !isBetween(96, 101) && property != 128 && property != 141)
+        if (property != 3 && !isBetween(32, 34) && !isBetween(62, 68) && !isBetween(96, 101) && property != 128 &&
+            property != 141)
             throw Error(invalidArgument, "unknown readable property");
         return 0;
     });
@@ -203,7 +229,9 @@ Buffer* rtcNewSharedBuffer(Device* device, char* data, std::size_t bytes) {
     return called(device, [&] { return new Buffer(device, data, bytes); });
 }
 Buffer* rtcNewBuffer(Device* device, std::size_t bytes) { return rtcNewSharedBuffer(device, nullptr, bytes); }
-Buffer* rtcNewSharedBufferHostDevice(Device* device, char* data, std::size_t bytes) { return rtcNewSharedBuffer(device, data, bytes); }
+Buffer* rtcNewSharedBufferHostDevice(Device* device, char* data, std::size_t bytes) {
+    return rtcNewSharedBuffer(device, data, bytes);
+}
 Buffer* rtcNewBufferHostDevice(Device* device, std::size_t bytes) { return rtcNewBuffer(device, bytes); }
 void* rtcGetBufferData(Buffer* buffer) {
     return called(buffer, [&] { return static_cast<void*>(buffer->data); });
@@ -226,35 +254,46 @@ void rtcCommitGeometry(Geometry* geometry) {
         geometry->isCommitted = true;
     });
 }
-void rtcSetGeometryBuffer(Geometry* geometry, int type, unsigned slot, int format, Buffer* buffer, std::size_t offset, std::size_t stride, std::size_t count) {
+void rtcSetGeometryBuffer(Geometry* geometry, int type, unsigned slot, int format, Buffer* buffer, std::size_t offset,
+                          std::size_t stride, std::size_t count) {
     called(geometry, [&] {
         needed(buffer);
         if (buffer->device != geometry->device) throw Error(invalidArgument, "the buffer is another device's");
-        geometry->set(type, slot, format, offset, stride, count, [&](std::size_t) { return Reference<Buffer>(buffer); });
+        geometry->set(type, slot, format, offset, stride, count,
+                      [&](std::size_t) { return Reference<Buffer>(buffer); });
     });
 }
-void rtcSetSharedGeometryBuffer(Geometry* geometry, int type, unsigned slot, int format, char* data, std::size_t offset, std::size_t stride, std::size_t count) {
+void rtcSetSharedGeometryBuffer(Geometry* geometry, int type, unsigned slot, int format, char* data, std::size_t offset,
+                                std::size_t stride, std::size_t count) {
     called(geometry, [&] {
         char* const from = data ? data + offset : nullptr;
-        geometry->set(type, slot, format, 0, stride, count, [&](std::size_t bytes) { return Reference<Buffer>::of(new Buffer(geometry->device, from, bytes)); });
+        geometry->set(type, slot, format, 0, stride, count, [&](std::size_t bytes) {
+            return Reference<Buffer>::of(new Buffer(geometry->device, from, bytes));
+        });
     });
 }
-void rtcSetSharedGeometryBufferHostDevice(Geometry* geometry, int type, unsigned slot, int format, char* data, const void* onDevice, std::size_t offset,
-                                          std::size_t stride, std::size_t count) {
+void rtcSetSharedGeometryBufferHostDevice(Geometry* geometry, int type, unsigned slot, int format, char* data,
+                                          const void* onDevice, std::size_t offset, std::size_t stride,
+                                          std::size_t count) {
     called(geometry, [&] {
         if (onDevice) throw Error(invalidArgument, "the device's memory is the host's: pass NULL");
     });
     if (!onDevice) rtcSetSharedGeometryBuffer(geometry, type, slot, format, data, offset, stride, count);
 }
-void* rtcSetNewGeometryBuffer(Geometry* geometry, int type, unsigned slot, int format, std::size_t stride, std::size_t count) {
+void* rtcSetNewGeometryBuffer(Geometry* geometry, int type, unsigned slot, int format, std::size_t stride,
+                              std::size_t count) {
     return called(geometry, [&]() -> void* {
         // Room for reads of 16 bytes
         return geometry
-            ->set(type, slot, format, 0, stride, count, [&](std::size_t bytes) { return Reference<Buffer>::of(new Buffer(geometry->device, nullptr, bytes + 16)); })
+            ->set(type, slot, format, 0, stride, count,
+                  [&](std::size_t bytes) {
+                      return Reference<Buffer>::of(new Buffer(geometry->device, nullptr, bytes + 16));
+                  })
             .data;
     });
 }
-void rtcSetNewGeometryBufferHostDevice(Geometry* geometry, int type, unsigned slot, int format, std::size_t stride, std::size_t count, void** data, void** onDevice) {
+void rtcSetNewGeometryBufferHostDevice(Geometry* geometry, int type, unsigned slot, int format, std::size_t stride,
+                                       std::size_t count, void** data, void** onDevice) {
     void* const made = rtcSetNewGeometryBuffer(geometry, type, slot, format, stride, count);
     for (void** const to : {data, onDevice})
         if (to) *to = made;
@@ -262,7 +301,9 @@ void rtcSetNewGeometryBufferHostDevice(Geometry* geometry, int type, unsigned sl
 void* rtcGetGeometryBufferData(Geometry* geometry, int type, unsigned slot) {
     return called(geometry, [&]() -> void* { return geometry->view(type, slot).data; });
 }
-void* rtcGetGeometryBufferDataDevice(Geometry* geometry, int type, unsigned slot) { return rtcGetGeometryBufferData(geometry, type, slot); }
+void* rtcGetGeometryBufferDataDevice(Geometry* geometry, int type, unsigned slot) {
+    return rtcGetGeometryBufferData(geometry, type, slot);
+}
 void rtcUpdateGeometryBuffer(Geometry* geometry, int type, unsigned slot) {
     called(geometry, [&] {
         geometry->view(type, slot);
@@ -349,7 +390,9 @@ void* rtcGetGeometryUserDataFromScene(Scene* scene, unsigned id) {
         return found ? found->user : nullptr;
     });
 }
-void* rtcGetGeometryUserDataFromTraversable(Scene* scene, unsigned id) { return rtcGetGeometryUserDataFromScene(scene, id); }
+void* rtcGetGeometryUserDataFromTraversable(Scene* scene, unsigned id) {
+    return rtcGetGeometryUserDataFromScene(scene, id);
+}
 void rtcCommitScene(Scene* scene) {
     called(scene, [&] { scene->commit(); });
 }
@@ -394,18 +437,25 @@ void rtcGetSceneLinearBounds(Scene* scene, float* bounds) {
 
 // Rays
 #define SINGLE(PREFIX) \
-    void PREFIX##Intersect1(Scene* scene, char* ray, const QueryArguments* arguments) { trace<1, false>(nullptr, scene, ray, arguments); } \
-    void PREFIX##Occluded1(Scene* scene, char* ray, const QueryArguments* arguments) { trace<1, true>(nullptr, scene, ray, arguments); }
+    void PREFIX##Intersect1(Scene* scene, char* ray, const QueryArguments* arguments) { \
+        trace<1, false>(nullptr, scene, ray, arguments); \
+    } \
+    void PREFIX##Occluded1(Scene* scene, char* ray, const QueryArguments* arguments) { \
+        trace<1, true>(nullptr, scene, ray, arguments); \
+    }
 #define PACKET(PREFIX, WIDTH) \
     void PREFIX##Intersect##WIDTH(const int* valid, Scene* scene, char* packet, const QueryArguments* arguments) { \
         trace<WIDTH, false>(valid, scene, packet, arguments); \
     } \
-    void PREFIX##Occluded##WIDTH(const int* valid, Scene* scene, char* packet, const QueryArguments* arguments) { trace<WIDTH, true>(valid, scene, packet, arguments); }
+    void PREFIX##Occluded##WIDTH(const int* valid, Scene* scene, char* packet, const QueryArguments* arguments) { \
+        trace<WIDTH, true>(valid, scene, packet, arguments); \
+    }
 #define RAYS(PREFIX) SINGLE(PREFIX) PACKET(PREFIX, 4) PACKET(PREFIX, 8) PACKET(PREFIX, 16)
 RAYS(rtc)
 RAYS(rtcTraversable)
 
-// What is refused, by the argument that is the handle: `first`, `second` or `third`, or null for none. Arguments behind it are not read.
+// What is refused, by the argument that is the handle: `first`, `second` or `third`, or null for none. Arguments behind
+// it are not read.
 #define REFUSED(HANDLE, RESULT, NAME) \
     ssize_t NAME([[maybe_unused]] Object* first, [[maybe_unused]] Object* second, [[maybe_unused]] Object* third) { \
         refuse(HANDLE, #NAME REFUSAL); \

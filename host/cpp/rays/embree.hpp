@@ -1,5 +1,5 @@
-// Embree's devices, buffers, geometries and scenes for triangles, on colonnade_rays.h. Structures are as in Embree 4's documented binary
-// interface, errors as of its calls.
+// Embree's devices, buffers, geometries and scenes for triangles, on colonnade_rays.h. Structures are as in Embree 4's
+// documented binary interface, errors as of its calls.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -89,7 +89,8 @@ struct LastError {
 struct Device final : Object {
     Device() : Object(this) {
         if (const int status = colonnade_rays_open_environment(&rays))
-            throw Error(status == COLONNADE_RAYS_NO_MEMORY ? outOfMemory : unknown, "the design or the device does not open");
+            throw Error(status == COLONNADE_RAYS_NO_MEMORY ? outOfMemory : unknown,
+                        "the design or the device does not open");
     }
     ~Device() override { colonnade_rays_close(rays); }
 
@@ -109,7 +110,10 @@ struct Device final : Object {
     void check(int status) {
         if (status == COLONNADE_RAYS_OK) return;
         const bool isHardware = status == COLONNADE_RAYS_DEVICE;
-        throw Error(status == COLONNADE_RAYS_NO_MEMORY ? outOfMemory : isHardware ? unknown : invalidOperation, colonnade_rays_error(rays));
+        throw Error(status == COLONNADE_RAYS_NO_MEMORY ? outOfMemory
+                    : isHardware                       ? unknown
+                                                       : invalidOperation,
+                    colonnade_rays_error(rays));
     }
 
     void (*report)(void*, int, const char*) = nullptr;
@@ -146,7 +150,9 @@ template <class Call> auto called(Object* handle, const Call& call) noexcept -> 
 
 struct Buffer final : Child {
     /// Memory of its own, if `shared` is null.
-    Buffer(Device* of, char* shared, std::size_t size) : Child(of), bytes(size), data(shared ? shared : static_cast<char*>(std::calloc(size + 1, 1))), isOwned_(!shared) {
+    Buffer(Device* of, char* shared, std::size_t size)
+        : Child(of), bytes(size), data(shared ? shared : static_cast<char*>(std::calloc(size + 1, 1))),
+          isOwned_(!shared) {
         if (!data) throw std::bad_alloc();
     }
     ~Buffer() override {
@@ -173,7 +179,8 @@ struct View {
     }
 };
 
-/// What a filter gets. It clears `*valid` to refuse the hit. `ray` has the t of its hit; of a single ray it is the caller's.
+/// What a filter gets. It clears `*valid` to refuse the hit. `ray` has the t of its hit; of a single ray it is the
+/// caller's.
 struct FilterArguments {
     int* valid;
     void *user, *context, *ray, *hit;
@@ -192,18 +199,23 @@ struct Geometry final : Child {
     View& view(int type, unsigned slot) {
         if (type == attributeBuffer && slot < attributes.size()) return attributes[slot];
         if ((type == indexBuffer || type == vertexBuffer) && slot == 0) return views[type];
-        throw Error(type == attributeBuffer ? invalidOperation : invalidArgument, "there is no buffer of this type and slot");
+        throw Error(type == attributeBuffer ? invalidOperation : invalidArgument,
+                    "there is no buffer of this type and slot");
     }
 
     /// `made`: a function of the bytes that makes the buffer.
-    template <class Make> View& set(int type, unsigned slot, int format, std::size_t offset, std::size_t stride, std::size_t count, const Make& make) {
+    template <class Make> View& set(int type, unsigned slot, int format, std::size_t offset, std::size_t stride,
+                                    std::size_t count, const Make& make) {
         if (count > UINT32_MAX || stride > UINT32_MAX) throw Error(invalidArgument, "the buffer is too large");
         View& to = view(type, slot);
-        if (type == attributeBuffer ? format < float1 || format > float16 : format != (type == indexBuffer ? uint3 : float3))
+        if (type == attributeBuffer ? format < float1 || format > float16
+                                    : format != (type == indexBuffer ? uint3 : float3))
             throw Error(invalidOperation, "the buffer has another format");
         const Reference<Buffer> buffer = make(stride * count);
-        if (((reinterpret_cast<std::uintptr_t>(buffer->data) + offset) | stride) % 4 != 0) throw Error(invalidOperation, "data are not aligned to 4 bytes");
-        if (offset > buffer->bytes || stride * count > buffer->bytes - offset) throw Error(invalidArgument, "the buffer is too small");
+        if (((reinterpret_cast<std::uintptr_t>(buffer->data) + offset) | stride) % 4 != 0)
+            throw Error(invalidOperation, "data are not aligned to 4 bytes");
+        if (offset > buffer->bytes || stride * count > buffer->bytes - offset)
+            throw Error(invalidArgument, "the buffer is too small");
         if (type == indexBuffer && count != to.count) change();
         to = {buffer, buffer->data + offset, stride, count};
         return to;
@@ -238,7 +250,8 @@ struct Part {
 /// What rays meet: the scene at its last commit.
 struct Committed {
     explicit Committed(Device& device) { device.check(colonnade_rays_scene_new(device.rays, &rays)); }
-    Committed(Committed&& other) noexcept : rays(std::exchange(other.rays, nullptr)), parts(std::move(other.parts)), hasFilters(other.hasFilters) {}
+    Committed(Committed&& other) noexcept
+        : rays(std::exchange(other.rays, nullptr)), parts(std::move(other.parts)), hasFilters(other.hasFilters) {}
     Committed& operator=(Committed&& other) noexcept {
         std::swap(rays, other.rays);
         parts.swap(other.parts);
@@ -247,7 +260,8 @@ struct Committed {
     }
     ~Committed() { colonnade_rays_scene_free(rays); }
 
-    /// Adds a geometry. Triangles with an index or a vertex that is none, or a vertex too far away, become points, and keep their place.
+    /// Adds a geometry. Triangles with an index or a vertex that is none, or a vertex too far away, become points, and
+    /// keep their place.
     void add(Device& device, unsigned id, Geometry& geometry) {
         const View &corners = geometry.views[vertexBuffer], &triangles = geometry.views[indexBuffer];
         const std::uint32_t vertexCount = static_cast<std::uint32_t>(corners.count);
@@ -271,7 +285,8 @@ struct Committed {
         if (some == vertexCount) return;
         std::replace(faces.begin(), faces.end(), vertexCount, some);
         std::uint32_t mesh;
-        const int status = colonnade_rays_mesh_add(rays, vertices.data(), vertexCount, faces.data(), triangles.count, &mesh);
+        const int status =
+            colonnade_rays_mesh_add(rays, vertices.data(), vertexCount, faces.data(), triangles.count, &mesh);
         if (status == COLONNADE_RAYS_BAD_MESH) return; // No face has an area
         device.check(status);
         device.check(colonnade_rays_mesh_mask(rays, mesh, geometry.mask));
@@ -280,7 +295,9 @@ struct Committed {
         for (std::size_t i = 0; i < triangles.count; ++i) {
             const double *at[3], *&a = at[0], *&b = at[1], *&c = at[2];
             for (int corner = 0; corner < 3; ++corner) at[corner] = &vertices[3 * std::size_t{faces[3 * i + corner]}];
-            const auto component = [&](int x, int y) { return static_cast<float>((b[x] - a[x]) * (c[y] - a[y]) - (b[y] - a[y]) * (c[x] - a[x])); };
+            const auto component = [&](int x, int y) {
+                return static_cast<float>((b[x] - a[x]) * (c[y] - a[y]) - (b[y] - a[y]) * (c[x] - a[x]));
+            };
             part.normals.push_back({component(1, 2), component(2, 0), component(0, 1)});
         }
         parts.push_back(std::move(part));
@@ -305,7 +322,8 @@ struct Scene final : Child {
             while (geometries_.count(firstFree_)) ++firstFree_;
             id = firstFree_;
         }
-        if (!geometries_.emplace(id, geometry).second) throw Error(invalidOperation, "the scene has a geometry of this number");
+        if (!geometries_.emplace(id, geometry).second)
+            throw Error(invalidOperation, "the scene has a geometry of this number");
         isModified = isModified || geometry->isEnabled;
         return id;
     }
@@ -331,7 +349,9 @@ struct Scene final : Child {
             const std::lock_guard tableLock(table_);
             for (const auto& [id, each] : geometries_) now.push_back({id, each, each->changes});
         }
-        const auto isSame = [](const Seen& a, const Seen& b) { return a.id == b.id && a.geometry.get() == b.geometry.get() && a.changes == b.changes; };
+        const auto isSame = [](const Seen& a, const Seen& b) {
+            return a.id == b.id && a.geometry.get() == b.geometry.get() && a.changes == b.changes;
+        };
         if (!isModified && std::equal(now.begin(), now.end(), seen_.begin(), seen_.end(), isSame)) return;
         isModified = true;
         Committed empty(*device), next(*device); // The scene is empty if this fails

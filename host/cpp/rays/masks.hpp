@@ -6,8 +6,9 @@
 
 namespace colonnade::rays {
 
-/// A bit stands for the meshes that have it. The device keeps its own 8 bits if each other one stands for the same meshes as one of
-/// them, or for none. Else it has a bit for each set of meshes; of more than 8 sets, all meshes of a mask have all bits.
+/// A bit stands for the meshes that have it. The device keeps its own 8 bits if each other one stands for the same
+/// meshes as one of them, or for none. Else it has a bit for each set of meshes; of more than 8 sets, all meshes of a
+/// mask have all bits.
 class MaskMap {
 public:
     MaskMap() : MaskMap(std::vector<std::uint32_t>()) {}

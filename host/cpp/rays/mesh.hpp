@@ -45,7 +45,8 @@ public:
             const mesh::Vector edge = mesh::difference(corners[(i + 1) % 3], corners[i]);
             longest = std::max(longest, std::sqrt(dot(edge, edge)));
         }
-        const mesh::Vector area = mesh::cross(mesh::difference(corners[1], corners[0]), mesh::difference(corners[2], corners[0]));
+        const mesh::Vector area =
+            mesh::cross(mesh::difference(corners[1], corners[0]), mesh::difference(corners[2], corners[0]));
         return longest > 0 ? std::sqrt(dot(area, area)) / longest : 0;
     }
 
@@ -54,7 +55,8 @@ public:
         const std::array<mesh::Vector, 3>& corners = records_[index].corners;
         const mesh::Vector &corner = corners[0], d{direction[0], direction[1], direction[2]};
         const mesh::Vector e1 = mesh::difference(corners[1], corner), e2 = mesh::difference(corners[2], corner);
-        const mesh::Vector s = mesh::difference({origin[0], origin[1], origin[2]}, corner), p = mesh::cross(d, e2), q = mesh::cross(s, e1);
+        const mesh::Vector s = mesh::difference({origin[0], origin[1], origin[2]}, corner), p = mesh::cross(d, e2),
+                           q = mesh::cross(s, e1);
         const double determinant = dot(e1, p);
         if (determinant == 0 || !std::isfinite(determinant)) return std::nullopt;
         const double u = dot(s, p) / determinant, v = dot(d, q) / determinant;
@@ -62,7 +64,8 @@ public:
         return std::isfinite(hit.t) && std::isfinite(hit.u) && std::isfinite(hit.v) ? std::optional(hit) : std::nullopt;
     }
 
-    /// The faces with a corner at the place of one of this face's, itself among them. `function` is called once or more for each.
+    /// The faces with a corner at the place of one of this face's, itself among them. `function` is called once or more
+    /// for each.
     template <class Function> void around(std::size_t index, const Function& function) const {
         const Neighbours& near = neighbours();
         for (int corner = 0; corner < 3; ++corner) {

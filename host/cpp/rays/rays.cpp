@@ -55,25 +55,30 @@ template <class Call> int guarded(const Call& call) {
 }
 
 MeshPart& meshOf(colonnade_rays_scene& scene, std::uint32_t mesh) {
-    if (mesh >= scene.meshes.size() || !scene.meshes[mesh]) throw Failure(COLONNADE_RAYS_NO_MESH, "the scene has no mesh " + std::to_string(mesh));
+    if (mesh >= scene.meshes.size() || !scene.meshes[mesh])
+        throw Failure(COLONNADE_RAYS_NO_MESH, "the scene has no mesh " + std::to_string(mesh));
     return *scene.meshes[mesh];
 }
 
 std::vector<mesh::Vector> verticesOf(const double* vertices, std::size_t count) {
     for (std::size_t i = 0; i < 3 * count; ++i)
-        if (!std::isfinite(vertices[i])) throw Failure(COLONNADE_RAYS_BAD_MESH, "vertex " + std::to_string(i / 3) + " is not finite");
+        if (!std::isfinite(vertices[i]))
+            throw Failure(COLONNADE_RAYS_BAD_MESH, "vertex " + std::to_string(i / 3) + " is not finite");
     std::vector<mesh::Vector> result(count);
     if (count != 0) std::memcpy(result.data(), vertices, count * sizeof(mesh::Vector));
     return result;
 }
 
 void checkCount(const char* what, std::size_t given, std::size_t has) {
-    if (given != has) throw Failure(COLONNADE_RAYS_BAD_MESH, "the mesh has " + std::to_string(has) + " " + what + ", " + std::to_string(given) + " are given");
+    if (given != has)
+        throw Failure(COLONNADE_RAYS_BAD_MESH,
+                      "the mesh has " + std::to_string(has) + " " + what + ", " + std::to_string(given) + " are given");
 }
 
 void checkMode(std::uint32_t mode) {
     if (mode & ~(COLONNADE_RAYS_CULL_FRONT | COLONNADE_RAYS_CULL_BACK | COLONNADE_RAYS_OPAQUE_ONLY))
-        throw Failure(COLONNADE_RAYS_BAD_BATCH, "a mode has other bits than those of CULL_FRONT, CULL_BACK and OPAQUE_ONLY");
+        throw Failure(COLONNADE_RAYS_BAD_BATCH,
+                      "a mode has other bits than those of CULL_FRONT, CULL_BACK and OPAQUE_ONLY");
 }
 
 /// A change of a scene, which takes effect at the next commit.
@@ -88,7 +93,8 @@ template <class Change> int changed(colonnade_rays_scene* scene, const Change& c
 void load(const colonnade_rays_scene& scene) {
     colonnade_rays_device& device = *scene.device;
     if (device.loaded == &scene) return;
-    if (const int status = device.backend->load(device.backend->context, &scene.packed->image())) throw Failure(status, "the device did not load the scene");
+    if (const int status = device.backend->load(device.backend->context, &scene.packed->image()))
+        throw Failure(status, "the device did not load the scene");
     device.loaded = &scene;
 }
 
@@ -102,7 +108,8 @@ void checkCommitted(const colonnade_rays_scene& scene) {
     if (!scene.isCommitted) throw Failure(COLONNADE_RAYS_NOT_COMMITTED, "the scene has changed: commit it");
 }
 
-/// Calls `call` with the rays of a scene; not without faces. On a device, whose memory has the scene then, one thread's at a time.
+/// Calls `call` with the rays of a scene; not without faces. On a device, whose memory has the scene then, one thread's
+/// at a time.
 template <class Call> void withBatches(colonnade_rays_scene& scene, const Call& call) {
     checkCommitted(scene);
     if (scene.packed->isEmpty()) return;
@@ -115,7 +122,8 @@ template <class Call> void withBatches(colonnade_rays_scene& scene, const Call& 
 
 /// The box of the vertices.
 void boxOf(const colonnade_rays_scene& scene, mesh::Vector& low, mesh::Vector& high) {
-    if (!scene.isCommitted || scene.packed->isEmpty()) throw Failure(COLONNADE_RAYS_NOT_COMMITTED, "the scene has no box: commit it with a face");
+    if (!scene.isCommitted || scene.packed->isEmpty())
+        throw Failure(COLONNADE_RAYS_NOT_COMMITTED, "the scene has no box: commit it with a face");
     low = high = scene.packed->faces().vertices().front();
     for (const mesh::Vector& vertex : scene.packed->faces().vertices())
         for (int a = 0; a < 3; ++a) {
@@ -126,12 +134,15 @@ void boxOf(const colonnade_rays_scene& scene, mesh::Vector& low, mesh::Vector& h
 
 } // namespace
 
-std::vector<std::vector<std::uint32_t>> colonnade::rays::readsOf(const colonnade_rays_scene& scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t mode,
-                                                                 std::uint32_t mask, bool isOcclusion) {
+std::vector<std::vector<std::uint32_t>> colonnade::rays::readsOf(const colonnade_rays_scene& scene,
+                                                                 const colonnade_rays_ray* rays, std::size_t count,
+                                                                 std::uint32_t mode, std::uint32_t mask,
+                                                                 bool isOcclusion) {
     checkCommitted(scene);
     if (scene.device->backend) throw std::invalid_argument("the traffic is that of the model");
     if (scene.packed->isEmpty()) return std::vector<std::vector<std::uint32_t>>(count);
-    return Batches(*scene.packed, nullptr, scene.device->sums, scene.isRefined).reads(rays, count, mode, mask, isOcclusion);
+    return Batches(*scene.packed, nullptr, scene.device->sums, scene.isRefined)
+        .reads(rays, count, mode, mask, isOcclusion);
 }
 
 int colonnade_rays_open(const char* design, const colonnade_rays_backend* backend, colonnade_rays_device** device) {
@@ -176,8 +187,8 @@ void colonnade_rays_scene_free(colonnade_rays_scene* scene) {
     delete scene;
 }
 
-int colonnade_rays_mesh_add(colonnade_rays_scene* scene, const double* vertices, std::size_t vertexCount, const std::uint32_t* faces, std::size_t faceCount,
-                            std::uint32_t* mesh) {
+int colonnade_rays_mesh_add(colonnade_rays_scene* scene, const double* vertices, std::size_t vertexCount,
+                            const std::uint32_t* faces, std::size_t faceCount, std::uint32_t* mesh) {
     return changed(scene, [&] {
         auto part = std::make_unique<MeshPart>();
         part->vertices = verticesOf(vertices, vertexCount);
@@ -186,12 +197,14 @@ int colonnade_rays_mesh_add(colonnade_rays_scene* scene, const double* vertices,
             mesh::Face face;
             for (int corner = 0; corner < 3; ++corner) {
                 if (faces[3 * i + corner] >= vertexCount)
-                    throw Failure(COLONNADE_RAYS_BAD_MESH,
-                                  "face " + std::to_string(i) + " names vertex " + std::to_string(faces[3 * i + corner]) + " of " + std::to_string(vertexCount));
+                    throw Failure(COLONNADE_RAYS_BAD_MESH, "face " + std::to_string(i) + " names vertex " +
+                                                               std::to_string(faces[3 * i + corner]) + " of " +
+                                                               std::to_string(vertexCount));
                 face[corner] = static_cast<std::int32_t>(faces[3 * i + corner]);
             }
             const mesh::Vector& at = part->vertices[face[0]];
-            const mesh::Vector area = mesh::cross(mesh::difference(part->vertices[face[1]], at), mesh::difference(part->vertices[face[2]], at));
+            const mesh::Vector area = mesh::cross(mesh::difference(part->vertices[face[1]], at),
+                                                  mesh::difference(part->vertices[face[2]], at));
             hasArea = hasArea || area[0] != 0 || area[1] != 0 || area[2] != 0;
             part->faces.push_back(face);
         }
@@ -201,7 +214,8 @@ int colonnade_rays_mesh_add(colonnade_rays_scene* scene, const double* vertices,
     });
 }
 
-int colonnade_rays_mesh_update(colonnade_rays_scene* scene, std::uint32_t mesh, const double* vertices, std::size_t vertexCount) {
+int colonnade_rays_mesh_update(colonnade_rays_scene* scene, std::uint32_t mesh, const double* vertices,
+                               std::size_t vertexCount) {
     return changed(scene, [&] {
         MeshPart& part = meshOf(*scene, mesh);
         checkCount("vertices", vertexCount, part.vertices.size());
@@ -224,7 +238,8 @@ int colonnade_rays_mesh_mask(colonnade_rays_scene* scene, std::uint32_t mesh, st
     return changed(scene, [&] { meshOf(*scene, mesh).mask = mask; });
 }
 
-int colonnade_rays_mesh_opacity(colonnade_rays_scene* scene, std::uint32_t mesh, const std::uint8_t* isOpaque, std::size_t faceCount) {
+int colonnade_rays_mesh_opacity(colonnade_rays_scene* scene, std::uint32_t mesh, const std::uint8_t* isOpaque,
+                                std::size_t faceCount) {
     return changed(scene, [&] {
         MeshPart& part = meshOf(*scene, mesh);
         if (isOpaque) checkCount("faces", faceCount, part.faces.size());
@@ -278,8 +293,8 @@ int colonnade_rays_grid(const colonnade_rays_scene* scene, double* unit, double 
     });
 }
 
-int colonnade_rays_closest(colonnade_rays_scene* scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t mode, std::uint32_t mask,
-                           colonnade_rays_hit* hits) {
+int colonnade_rays_closest(colonnade_rays_scene* scene, const colonnade_rays_ray* rays, std::size_t count,
+                           std::uint32_t mode, std::uint32_t mask, colonnade_rays_hit* hits) {
     return guarded([&] {
         checkMode(mode);
         bool isEmpty = true;
@@ -291,8 +306,8 @@ int colonnade_rays_closest(colonnade_rays_scene* scene, const colonnade_rays_ray
     });
 }
 
-int colonnade_rays_occluded(colonnade_rays_scene* scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t mode, std::uint32_t mask,
-                            std::uint8_t* isOccluded) {
+int colonnade_rays_occluded(colonnade_rays_scene* scene, const colonnade_rays_ray* rays, std::size_t count,
+                            std::uint32_t mode, std::uint32_t mask, std::uint8_t* isOccluded) {
     return guarded([&] {
         checkMode(mode);
         std::fill(isOccluded, isOccluded + count, 0);
@@ -300,8 +315,9 @@ int colonnade_rays_occluded(colonnade_rays_scene* scene, const colonnade_rays_ra
     });
 }
 
-int colonnade_rays_all(colonnade_rays_scene* scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t mode, std::uint32_t mask, std::size_t most,
-                       colonnade_rays_hit* hits, std::size_t capacity, std::size_t* found) {
+int colonnade_rays_all(colonnade_rays_scene* scene, const colonnade_rays_ray* rays, std::size_t count,
+                       std::uint32_t mode, std::uint32_t mask, std::size_t most, colonnade_rays_hit* hits,
+                       std::size_t capacity, std::size_t* found) {
     return guarded([&] {
         checkMode(mode);
         std::vector<AppHit> all;
@@ -313,7 +329,8 @@ int colonnade_rays_all(colonnade_rays_scene* scene, const colonnade_rays_ray* ra
 
 void colonnade_rays_refine(colonnade_rays_scene* scene, int isRefined) { scene->isRefined = isRefined != 0; }
 
-int colonnade_rays_order(const colonnade_rays_scene* scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t* order) {
+int colonnade_rays_order(const colonnade_rays_scene* scene, const colonnade_rays_ray* rays, std::size_t count,
+                         std::uint32_t* order) {
     return guarded([&] {
         mesh::Vector low, high;
         boxOf(*scene, low, high);
@@ -328,10 +345,12 @@ int colonnade_rays_submit(colonnade_rays_scene* scene, const colonnade_rays_batc
         colonnade_rays_device& device = *scene->device;
         const std::lock_guard<std::mutex> lock(device.calls);
         if (device.backend) load(*scene);
-        const int status = device.backend ? device.backend->submit(device.backend->context, batch) : scene->packed->model()->run(*batch, device.sums);
+        const int status = device.backend ? device.backend->submit(device.backend->context, batch)
+                                          : scene->packed->model()->run(*batch, device.sums);
         // Of the model a batch ends before the call
         if (!device.backend && status == COLONNADE_RAYS_DEVICE) device.hasFailed = true;
-        else if (status != COLONNADE_RAYS_OK) throw Failure(status, "the batch is misaligned, empty, too long, or of an unknown mode");
+        else if (status != COLONNADE_RAYS_OK)
+            throw Failure(status, "the batch is misaligned, empty, too long, or of an unknown mode");
     });
 }
 
@@ -340,14 +359,19 @@ int colonnade_rays_wait(colonnade_rays_scene* scene) {
         colonnade_rays_device& device = *scene->device;
         const std::lock_guard<std::mutex> lock(device.calls);
         const bool hasFailed = std::exchange(device.hasFailed, false);
-        const int status = device.backend ? device.backend->wait(device.backend->context) : hasFailed ? COLONNADE_RAYS_DEVICE : COLONNADE_RAYS_OK;
-        if (status != COLONNADE_RAYS_OK) throw Failure(status, "the device met an illegal record, or its stack overflowed: the hits are not valid");
+        const int status = device.backend ? device.backend->wait(device.backend->context)
+                           : hasFailed    ? COLONNADE_RAYS_DEVICE
+                                          : COLONNADE_RAYS_OK;
+        if (status != COLONNADE_RAYS_OK)
+            throw Failure(status, "the device met an illegal record, or its stack overflowed: the hits are not valid");
     });
 }
 
 int colonnade_rays_face(const colonnade_rays_scene* scene, std::uint32_t id, std::uint32_t* mesh, std::uint32_t* face) {
     return guarded([&] {
-        const std::size_t at = scene->isCommitted ? scene->packed->faceOfId(id & ~(COLONNADE_RAYS_BACK_SIDE | COLONNADE_RAYS_NON_OPAQUE)) : ~std::size_t{0};
+        const std::size_t at =
+            scene->isCommitted ? scene->packed->faceOfId(id & ~(COLONNADE_RAYS_BACK_SIDE | COLONNADE_RAYS_NON_OPAQUE))
+                               : ~std::size_t{0};
         if (at == ~std::size_t{0}) throw Failure(COLONNADE_RAYS_NO_MESH, "this id is that of no triangle");
         *mesh = scene->packed->meshOf(at);
         *face = scene->packed->faceOf(at);

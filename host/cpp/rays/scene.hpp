@@ -24,8 +24,8 @@ struct MeshPart {
     bool isEnabled = true;
 };
 
-/// What a committed scene is to the device and to the library. After `pack` it does not change, but for the neighbours of faces,
-/// which the first thread that needs them finds.
+/// What a committed scene is to the device and to the library. After `pack` it does not change, but for the neighbours
+/// of faces, which the first thread that needs them finds.
 class PackedScene {
 public:
     /// Rounds the faces of the enabled meshes, joined, to the grid of a design.
@@ -33,16 +33,18 @@ public:
         join(meshes);
         if (isEmpty()) return;
         const packer::QuantiseOptions options{Placement::scaleBits, true};
-        quantised_ =
-            packer::quantise(faces_.vertices().data(), faces_.vertices().size(), faces_.faces().data(), faces_.faces().size(), design.format.vertexBits, options);
+        quantised_ = packer::quantise(faces_.vertices().data(), faces_.vertices().size(), faces_.faces().data(),
+                                      faces_.faces().size(), design.format.vertexBits, options);
         unit_ = 1 / quantised_.scale;
         edge_ = std::ldexp(unit_, design.format.vertexBits);
         std::size_t whole = 0;
-        for (std::size_t i = 0; i < faces_.faces().size(); ++i) whole += faces_.altitude(i) > std::ldexp(edge_, thinLog);
+        for (std::size_t i = 0; i < faces_.faces().size(); ++i)
+            whole += faces_.altitude(i) > std::ldexp(edge_, thinLog);
         dropped_ = whole - std::min(whole, quantised_.faces.size());
     }
 
-    /// Faces that the grid drops, as their corners become one line; not faces so thin that rounding to double makes them lines.
+    /// Faces that the grid drops, as their corners become one line; not faces so thin that rounding to double makes
+    /// them lines.
     std::size_t dropped() const { return dropped_; }
 
     /// Why the grid is too coarse; nothing if it is not.
@@ -50,8 +52,10 @@ public:
         const std::size_t count = faces_.faces().size();
         const bool isLost = count != 0 && quantised_.faces.empty();
         if (!isLost && dropped_ <= count / droppedShare) return {};
-        return (isLost ? "no face keeps an area at " : std::to_string(dropped_) + " of " + std::to_string(count) + " faces vanish at ") +
-               std::to_string(design_.format.vertexBits) + " bits a coordinate: " + (design_.format.vertexBits < maxBits ? "use a design with more, or " : "") +
+        return (isLost ? "no face keeps an area at "
+                       : std::to_string(dropped_) + " of " + std::to_string(count) + " faces vanish at ") +
+               std::to_string(design_.format.vertexBits) +
+               " bits a coordinate: " + (design_.format.vertexBits < maxBits ? "use a design with more, or " : "") +
                "leave out what widens the box";
     }
 
@@ -70,13 +74,16 @@ public:
         rotationOfId_.assign(indices.size(), 0);
         for (std::size_t id = 0; id < indices.size(); ++id) {
             if (indices[id] < 0) continue;
-            faceOfId_[id] = static_cast<std::uint32_t>(quantised_.meshFaces[tree_.order[static_cast<std::size_t>(indices[id])]]);
+            faceOfId_[id] =
+                static_cast<std::uint32_t>(quantised_.meshFaces[tree_.order[static_cast<std::size_t>(indices[id])]]);
             rotationOfId_[id] = rotations[static_cast<std::size_t>(indices[id])];
         }
         records_ = packer.records();
         describe(packer.sections());
         const FaceTable table{faceOfId_.data(), reinterpret_cast<const std::uint8_t*>(&faces_[0]), sizeof(FaceRecord)};
-        if (hasModel) model_ = std::make_unique<RayModel>(Numbers(design_.numbers), design_.number("directionBits"), design_.format.layouts, image_, table);
+        if (hasModel)
+            model_ = std::make_unique<RayModel>(Numbers(design_.numbers), design_.number("directionBits"),
+                                                design_.format.layouts, image_, table);
     }
 
     bool isEmpty() const { return faces_.faces().empty(); }
@@ -97,7 +104,9 @@ public:
     bool isOpaque(std::size_t face) const { return !faces_[face].isClear; }
 
     /// The face of a packed id; all ones for an id of none.
-    std::size_t faceOfId(std::uint32_t id) const { return id < faceOfId_.size() && faceOfId_[id] != noFace ? faceOfId_[id] : ~std::size_t{0}; }
+    std::size_t faceOfId(std::uint32_t id) const {
+        return id < faceOfId_.size() && faceOfId_[id] != noFace ? faceOfId_[id] : ~std::size_t{0};
+    }
 
     /// u, v of a response by the corners of the face.
     std::array<double, 2> weightsOf(const colonnade_rays_response& response) const {
@@ -152,11 +161,13 @@ private:
     void checkFit(const packer::Sections& sections) const {
         const auto refuse = [](const char* what, std::size_t needs, std::size_t has) {
             if (needs > has)
-                throw Failure(COLONNADE_RAYS_DOES_NOT_FIT, "the scene needs " + std::to_string(needs) + " " + what + ", the design has " + std::to_string(has) +
+                throw Failure(COLONNADE_RAYS_DOES_NOT_FIT, "the scene needs " + std::to_string(needs) + " " + what +
+                                                               ", the design has " + std::to_string(has) +
                                                                ": use one with more, or fewer faces");
         };
         refuse("records", sections.recordCount, static_cast<std::size_t>(design_.number("depth")));
-        if (design_.format.bvh) refuse("stack entries", tree_.tree.stackBound, static_cast<std::size_t>(design_.format.stackDepth));
+        if (design_.format.bvh)
+            refuse("stack entries", tree_.tree.stackBound, static_cast<std::size_t>(design_.format.stackDepth));
     }
 
     void describe(const packer::Sections& s) {
@@ -169,7 +180,9 @@ private:
             image_.bounds_high[a] = s.boundsHigh[a];
             const double base = std::rint(std::ldexp(quantised_.offset[a], fraction));
             if (!(std::abs(base) < std::ldexp(1.0, 62)) || std::abs(image_.scale_exponent) > 120)
-                throw Failure(COLONNADE_RAYS_BAD_MESH, "the scene is too small, too large, or too far from the origin for its size: move it, or change its unit");
+                throw Failure(COLONNADE_RAYS_BAD_MESH,
+                              "the scene is too small, too large, or too far from the origin for its size: move it, or "
+                              "change its unit");
             image_.base[a] = static_cast<std::int64_t>(base);
             corner_[a] = std::ldexp(base, -fraction);
         }

@@ -1,4 +1,5 @@
-// The device that the environment names: the model, or a simulated one, whose program this starts. Compiled with rays.cpp.
+// The device that the environment names: the model, or a simulated one, whose program this starts. Compiled with
+// rays.cpp.
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -30,7 +31,9 @@ std::string contentOf(const char* variable) {
 }
 
 /// Prints the one line of a failure of what a variable names.
-void report(const char* variable, const char* text) { std::fprintf(stderr, "colonnade: error: %s: %s\n", variable, text); }
+void report(const char* variable, const char* text) {
+    std::fprintf(stderr, "colonnade: error: %s: %s\n", variable, text);
+}
 
 /// A program with pipes for its standard streams. It ends with its input.
 class Program {
@@ -98,14 +101,24 @@ struct Description {
 /// The simulated device as a backend.
 class SimulatedDevice {
 public:
-    explicit SimulatedDevice(const Description& description) : program_(description.words), simulation_(description.registers, program_.streams()) {}
+    explicit SimulatedDevice(const Description& description)
+        : program_(description.words), simulation_(description.registers, program_.streams()) {}
 
     colonnade_rays_backend backend() {
         return {this,
-                [](void* self, const colonnade_rays_image* image) { return call(self, [&](SimulatedDevice& device) { device.load(*image); }); },
-                [](void* self, const colonnade_rays_batch* batch) { return call(self, [&](SimulatedDevice& device) { device.submit(*batch); }); },
-                [](void* self) { return std::exchange(static_cast<SimulatedDevice*>(self)->status_, static_cast<int>(COLONNADE_RAYS_OK)); },
-                [](void* self, colonnade_rays_sums* sums) { call(self, [&](SimulatedDevice& device) { *sums = sumsOf(device.simulation_.counters()); }); },
+                [](void* self, const colonnade_rays_image* image) {
+                    return call(self, [&](SimulatedDevice& device) { device.load(*image); });
+                },
+                [](void* self, const colonnade_rays_batch* batch) {
+                    return call(self, [&](SimulatedDevice& device) { device.submit(*batch); });
+                },
+                [](void* self) {
+                    return std::exchange(static_cast<SimulatedDevice*>(self)->status_,
+                                         static_cast<int>(COLONNADE_RAYS_OK));
+                },
+                [](void* self, colonnade_rays_sums* sums) {
+                    call(self, [&](SimulatedDevice& device) { *sums = sumsOf(device.simulation_.counters()); });
+                },
                 [](void* self) { delete static_cast<SimulatedDevice*>(self); }};
     }
 
@@ -122,11 +135,13 @@ private:
         }
     }
 
-    void load(const colonnade_rays_image& image) { simulation_.load(registersOf(image), image.records, image.record_count, image.record_bytes); }
+    void load(const colonnade_rays_image& image) {
+        simulation_.load(registersOf(image), image.records, image.record_count, image.record_bytes);
+    }
 
     void submit(const colonnade_rays_batch& batch) {
-        const std::uint32_t tag =
-            simulation_.submit(batch, reinterpret_cast<const void*>(batch.rays), rayBytes(batch), reinterpret_cast<void*>(batch.hits), responseBytes(batch));
+        const std::uint32_t tag = simulation_.submit(batch, reinterpret_cast<const void*>(batch.rays), rayBytes(batch),
+                                                     reinterpret_cast<void*>(batch.hits), responseBytes(batch));
         if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = tag;
         if (tag >> 31) status_ = COLONNADE_RAYS_DEVICE;
     }
@@ -153,7 +168,8 @@ int colonnade_rays_open_environment(colonnade_rays_device** device) {
             simulated = std::make_unique<SimulatedDevice>(Description(contentOf(variable)));
             backend = simulated->backend();
         }
-        const int status = colonnade_rays_open(hasDesign ? design.c_str() : nullptr, simulated ? &backend : nullptr, device);
+        const int status =
+            colonnade_rays_open(hasDesign ? design.c_str() : nullptr, simulated ? &backend : nullptr, device);
         if (status == COLONNADE_RAYS_OK) {
             simulated.release(); // The library closes it
             return status;

@@ -1,4 +1,5 @@
-// The simulated device for rays, by the commands of its program (host/colonnade/device/harness/rays.cpp) over its standard streams.
+// The simulated device for rays, by the commands of its program (host/colonnade/device/harness/rays.cpp) over its
+// standard streams.
 #pragma once
 #include <unistd.h>
 
@@ -26,16 +27,19 @@ public:
         registers_.keepSums([this](std::uint32_t address) { return read(address); });
         std::string commands = "load " + std::to_string(count) + ' ' + std::to_string(recordBytes) + '\n';
         commands.append(reinterpret_cast<const char*>(records), count * recordBytes);
-        for (const auto& [address, word] : writes) commands += "write " + std::to_string(address) + ' ' + std::to_string(word) + '\n';
+        for (const auto& [address, word] : writes)
+            commands += "write " + std::to_string(address) + ' ' + std::to_string(word) + '\n';
         send(commands);
     }
 
-    /// Runs a batch of `in` bytes of rays, with the addresses of the simulator; writes `out` bytes of hits, and returns the tag.
+    /// Runs a batch of `in` bytes of rays, with the addresses of the simulator; writes `out` bytes of hits, and returns
+    /// the tag.
     std::uint32_t submit(colonnade_rays_batch batch, const void* rays, std::size_t in, void* hits, std::size_t out) {
         batch.rays = raysAddress;
         batch.hits = hitsAddress;
         batch.done = doneAddress;
-        std::string commands = "batch " + std::to_string(registers_.addressOf("rays.tail")) + ' ' + std::to_string(in) + ' ' + std::to_string(out) + '\n';
+        std::string commands = "batch " + std::to_string(registers_.addressOf("rays.tail")) + ' ' + std::to_string(in) +
+                               ' ' + std::to_string(out) + '\n';
         commands.append(reinterpret_cast<const char*>(&batch), sizeof batch);
         commands.append(static_cast<const char*>(rays), in);
         send(commands);
@@ -50,7 +54,8 @@ public:
     }
 
 private:
-    static constexpr std::uint64_t raysAddress = std::uint64_t{1} << 32, hitsAddress = std::uint64_t{2} << 32, doneAddress = 64;
+    static constexpr std::uint64_t raysAddress = std::uint64_t{1} << 32, hitsAddress = std::uint64_t{2} << 32,
+                                   doneAddress = 64;
 
     /// Blocks SIGPIPE in this thread: a program that has ended is an error of the call, not the end of this process.
     class WithoutPipeSignal {
@@ -127,7 +132,8 @@ private:
     [[noreturn]] void fail() {
         if (failure_.empty()) {
             std::string text;
-            for (ssize_t count; (count = readSome(streams_.errors)) > 0;) text.append(buffer_, static_cast<std::size_t>(count));
+            for (ssize_t count; (count = readSome(streams_.errors)) > 0;)
+                text.append(buffer_, static_cast<std::size_t>(count));
             while (!text.empty() && text.back() == '\n') text.pop_back();
             std::replace(text.begin(), text.end(), '\n', ' ');
             failure_ = "the simulated hardware failed: " + (text.empty() ? "its program has ended" : text);

@@ -13,7 +13,8 @@
 
 namespace colonnade::rays {
 
-static_assert(sizeof(colonnade_rays_batch) == 64 && sizeof(colonnade_rays_record) == 32 && sizeof(colonnade_rays_sensor) == 64 && sizeof(colonnade_rays_response) == 16,
+static_assert(sizeof(colonnade_rays_batch) == 64 && sizeof(colonnade_rays_record) == 32 &&
+                  sizeof(colonnade_rays_sensor) == 64 && sizeof(colonnade_rays_response) == 16,
               "formats in memory");
 
 /// Sums of what rays did. A thread adds to its own ones, so that it needs no lock and shares no line of a cache.
@@ -24,8 +25,10 @@ public:
         if (last.first != number_) last = {number_, &partOfThread()};
         const std::uint64_t values[] = {rays, refused, c.raysInBox, c.nodeReads, c.boxTests, c.triangleTests};
         Part& part = *last.second;
-        for (std::size_t i = 0; i < part.sums.size(); ++i) part.sums[i].store(part.sums[i].load(std::memory_order_relaxed) + values[i], std::memory_order_relaxed);
-        if (c.deepestStack > part.deepest.load(std::memory_order_relaxed)) part.deepest.store(c.deepestStack, std::memory_order_relaxed);
+        for (std::size_t i = 0; i < part.sums.size(); ++i)
+            part.sums[i].store(part.sums[i].load(std::memory_order_relaxed) + values[i], std::memory_order_relaxed);
+        if (c.deepestStack > part.deepest.load(std::memory_order_relaxed))
+            part.deepest.store(c.deepestStack, std::memory_order_relaxed);
     }
 
     colonnade_rays_sums total() const {
@@ -58,7 +61,8 @@ private:
 
     const std::uint64_t number_ = newNumber();
     mutable std::mutex adding_;
-    std::map<decltype(std::this_thread::get_id()), Part> parts_; ///< a thread that has ended leaves its own to one of the same id
+    std::map<decltype(std::this_thread::get_id()), Part>
+        parts_; ///< a thread that has ended leaves its own to one of the same id
 };
 
 /// What the rays of a thread do until their sums are added.
@@ -69,9 +73,12 @@ struct RayRecord : TraceRecord {
 /// A loaded scene. It does not change: any number of threads may trace at the same time.
 class RayModel {
 public:
-    RayModel(const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts, const colonnade_rays_image& image, FaceTable faces = {})
+    RayModel(const Numbers& numbers, int directionBits, const std::map<std::string, Layout>& layouts,
+             const colonnade_rays_image& image, FaceTable faces = {})
         : numbers_(whole(numbers)), memory_(layouts, numbers_),
-          converter_(numbers_, directionBits, {image.scale_mantissa, image.scale_exponent, {image.base[0], image.base[1], image.base[2]}}), faces_(faces) {
+          converter_(numbers_, directionBits,
+                     {image.scale_mantissa, image.scale_exponent, {image.base[0], image.base[1], image.base[2]}}),
+          faces_(faces) {
         memory_.load(image.records, image.record_count, image.record_bytes);
         frame_ = {};
         frame_.recordCount = image.record_count;
@@ -104,7 +111,8 @@ public:
     }
 
     /// The responses to all triangles that a ray of the mode HITS hits, in the order of (t, id).
-    std::vector<colonnade_rays_response> traceAll(const colonnade_rays_record& ray, std::uint32_t mode, RayRecord& record) const {
+    std::vector<colonnade_rays_response> traceAll(const colonnade_rays_record& ray, std::uint32_t mode,
+                                                  RayRecord& record) const {
         Result result;
         std::vector<colonnade_rays_response> responses;
         if (!prepare(ray, mode, record, result)) return responses;
@@ -123,13 +131,14 @@ public:
     int run(const colonnade_rays_batch& batch, Sums& sums) const {
         if (!isLegal(batch)) return COLONNADE_RAYS_BAD_BATCH;
         // Runs of whole words of occluded rays
-        const bool isValid = inThreads(batch.count, 64, [&](std::size_t first, std::size_t last) { return runPart(batch, first, last, sums); });
+        const bool isValid = inThreads(
+            batch.count, 64, [&](std::size_t first, std::size_t last) { return runPart(batch, first, last, sums); });
         if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = batch.tag;
         return isValid ? COLONNADE_RAYS_OK : COLONNADE_RAYS_DEVICE;
     }
 
-    /// Calls `part` with parts of a range, multiples of `multiple` but for the last, in several threads if it is long; whether all return true.
-    /// A part whose thread does not start is run by the caller.
+    /// Calls `part` with parts of a range, multiples of `multiple` but for the last, in several threads if it is long;
+    /// whether all return true. A part whose thread does not start is run by the caller.
     template <class Part> static bool inThreads(std::size_t count, std::size_t multiple, const Part& part) {
         static const std::size_t processors = std::max(1u, std::thread::hardware_concurrency());
         const std::size_t most = std::min(processors, count / raysOfAThread);
@@ -165,8 +174,8 @@ private:
     }
 
     static RayFilter filterOf(std::uint32_t mode) {
-        return {(mode & COLONNADE_RAYS_CULL_FRONT) != 0, (mode & COLONNADE_RAYS_CULL_BACK) != 0, (mode & COLONNADE_RAYS_OPAQUE_ONLY) != 0,
-                static_cast<int>(mode >> COLONNADE_RAYS_MASK_SHIFT)};
+        return {(mode & COLONNADE_RAYS_CULL_FRONT) != 0, (mode & COLONNADE_RAYS_CULL_BACK) != 0,
+                (mode & COLONNADE_RAYS_OPAQUE_ONLY) != 0, static_cast<int>(mode >> COLONNADE_RAYS_MASK_SHIFT)};
     }
 
     static constexpr std::size_t raysOfAThread = 512;
@@ -191,10 +200,12 @@ private:
     }
 
     static bool isLegal(const colonnade_rays_batch& batch) {
-        constexpr std::uint32_t known = COLONNADE_RAYS_RESPONSE | forms | COLONNADE_RAYS_CULL_FRONT | COLONNADE_RAYS_CULL_BACK | COLONNADE_RAYS_OPAQUE_ONLY |
-                                        COLONNADE_RAYS_LOCAL | 0xffu << COLONNADE_RAYS_MASK_SHIFT;
-        if ((batch.rays | batch.hits) % 64 != 0 || batch.done % 4 != 0 || batch.count == 0 || batch.count > 1u << 24 || (batch.mode & ~known) != 0 ||
-            (batch.mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_RESPONSE || (batch.mode & forms) == forms)
+        constexpr std::uint32_t known = COLONNADE_RAYS_RESPONSE | forms | COLONNADE_RAYS_CULL_FRONT |
+                                        COLONNADE_RAYS_CULL_BACK | COLONNADE_RAYS_OPAQUE_ONLY | COLONNADE_RAYS_LOCAL |
+                                        0xffu << COLONNADE_RAYS_MASK_SHIFT;
+        if ((batch.rays | batch.hits) % 64 != 0 || batch.done % 4 != 0 || batch.count == 0 || batch.count > 1u << 24 ||
+            (batch.mode & ~known) != 0 || (batch.mode & COLONNADE_RAYS_RESPONSE) == COLONNADE_RAYS_RESPONSE ||
+            (batch.mode & forms) == forms)
             return false;
         if (!(batch.mode & COLONNADE_RAYS_SENSOR)) return true;
         const std::uint32_t width = reinterpret_cast<const colonnade_rays_sensor*>(batch.rays)->width;
@@ -213,7 +224,9 @@ private:
                 std::memcpy(ray.origin, batch.origin, sizeof ray.origin);
                 ray.tnear = batch.tnear;
                 if (batch.mode & COLONNADE_RAYS_FAN) std::memcpy(ray.direction, rays + 16 * i, 16);
-                else setSensorRay(ray, *reinterpret_cast<const colonnade_rays_sensor*>(rays), static_cast<std::uint32_t>(i), batch.tfar);
+                else
+                    setSensorRay(ray, *reinterpret_cast<const colonnade_rays_sensor*>(rays),
+                                 static_cast<std::uint32_t>(i), batch.tfar);
             } else std::memcpy(&ray, rays + sizeof ray * i, sizeof ray);
             const Result found = trace(ray, batch.mode, record);
             if (form == COLONNADE_RAYS_OCCLUDED) {
@@ -231,9 +244,11 @@ private:
         return !record.errors.stackOverflow && !record.errors.illegalRecord;
     }
 
-    static void setSensorRay(colonnade_rays_record& ray, const colonnade_rays_sensor& sensor, std::uint32_t i, float tfar) {
+    static void setSensorRay(colonnade_rays_record& ray, const colonnade_rays_sensor& sensor, std::uint32_t i,
+                             float tfar) {
         for (int a = 0; a < 3; ++a) {
-            const std::uint32_t sum = sensor.corner[a] + i % sensor.width * sensor.right[a] + i / sensor.width * sensor.down[a];
+            const std::uint32_t sum =
+                sensor.corner[a] + i % sensor.width * sensor.right[a] + i / sensor.width * sensor.down[a];
             ray.direction[a] = std::ldexp(static_cast<float>(static_cast<std::int32_t>(sum)), -30);
         }
         ray.tfar = tfar;

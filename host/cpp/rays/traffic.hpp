@@ -19,8 +19,9 @@ struct Traffic {
 };
 
 /// The records that each ray reads in the model of a committed scene, in their order. Throws Failure.
-std::vector<std::vector<std::uint32_t>> readsOf(const colonnade_rays_scene& scene, const colonnade_rays_ray* rays, std::size_t count, std::uint32_t mode,
-                                                std::uint32_t mask, bool isOcclusion);
+std::vector<std::vector<std::uint32_t>> readsOf(const colonnade_rays_scene& scene, const colonnade_rays_ray* rays,
+                                                std::size_t count, std::uint32_t mode, std::uint32_t mask,
+                                                bool isOcclusion);
 
 /// Tags of a cache whose sets replace the line that was least recently used.
 class LineCache {
@@ -43,7 +44,8 @@ private:
     std::vector<std::vector<std::size_t>> sets_;
 };
 
-/// What columns read that take the rays in runs of a tile, and of whose rays in flight each reads its next record in turn.
+/// What columns read that take the rays in runs of a tile, and of whose rays in flight each reads its next record in
+/// turn.
 inline Traffic trafficOf(const std::vector<std::vector<std::uint32_t>>& reads, const CacheShape& shape) {
     constexpr std::size_t run = 64;
     struct Cursor {
@@ -55,13 +57,15 @@ inline Traffic trafficOf(const std::vector<std::vector<std::uint32_t>>& reads, c
         std::size_t next;
     };
     std::vector<ColumnState> columns;
-    for (std::size_t c = 0; c < shape.columns; ++c) columns.push_back({LineCache(shape.lines, shape.ways), {}, c * run});
+    for (std::size_t c = 0; c < shape.columns; ++c)
+        columns.push_back({LineCache(shape.lines, shape.ways), {}, c * run});
     LineCache shared(shape.sharedLines, shape.sharedWays);
     Traffic traffic;
     for (bool isBusy = true; isBusy;) {
         isBusy = false;
         for (ColumnState& column : columns) {
-            for (; column.flight.size() < shape.flight && column.next < reads.size(); column.next += (column.next + 1) % run != 0 ? 1 : run * (shape.columns - 1) + 1)
+            for (; column.flight.size() < shape.flight && column.next < reads.size();
+                 column.next += (column.next + 1) % run != 0 ? 1 : run * (shape.columns - 1) + 1)
                 if (!reads[column.next].empty()) column.flight.push_back({column.next, 0});
             std::vector<std::uint32_t> addresses;
             for (Cursor& cursor : column.flight) addresses.push_back(reads[cursor.ray][cursor.read++]);
@@ -73,7 +77,8 @@ inline Traffic trafficOf(const std::vector<std::vector<std::uint32_t>>& reads, c
                 if (!column.cache.holds(line) && (shape.sharedLines == 0 || !shared.holds(line))) ++traffic.lines;
             }
             const auto isDone = [&](const Cursor& cursor) { return cursor.read == reads[cursor.ray].size(); };
-            column.flight.erase(std::remove_if(column.flight.begin(), column.flight.end(), isDone), column.flight.end());
+            column.flight.erase(std::remove_if(column.flight.begin(), column.flight.end(), isDone),
+                                column.flight.end());
             isBusy = isBusy || !column.flight.empty() || column.next < reads.size();
         }
     }

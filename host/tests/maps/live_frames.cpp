@@ -1,5 +1,5 @@
-// Encodes the frames of standard input with the live encoder, and writes all that it returns to standard output. Input: the sizes as
-// int32, then for each frame its maps, and lens, pose and tolerance as float64.
+// Encodes the frames of standard input with the live encoder, and writes all that it returns to standard output. Input:
+// the sizes as int32, then for each frame its maps, and lens, pose and tolerance as float64.
 #include <cstdint>
 #include <cstdio>
 #include <vector>
@@ -8,8 +8,12 @@
 
 namespace {
 
-template <class T> bool get(std::vector<T>& values) { return std::fread(values.data(), sizeof(T), values.size(), stdin) == values.size(); }
-template <class T> void put(const std::vector<T>& values) { std::fwrite(values.data(), sizeof(T), values.size(), stdout); }
+template <class T> bool get(std::vector<T>& values) {
+    return std::fread(values.data(), sizeof(T), values.size(), stdin) == values.size();
+}
+template <class T> void put(const std::vector<T>& values) {
+    std::fwrite(values.data(), sizeof(T), values.size(), stdout);
+}
 
 } // namespace
 
@@ -24,9 +28,11 @@ int main() {
     std::vector<std::uint32_t> depth(pixels);
     std::vector<double> camera(4 + 12 + 1);
     while (get(albedo) && get(normals) && get(depth) && get(camera)) {
-        colonnade_live_frame frame{albedo.data(), normals.data(), depth.data(), camera[0], camera[1], camera[2], camera[3], {}, camera[16]};
+        colonnade_live_frame frame{albedo.data(), normals.data(), depth.data(), camera[0], camera[1],
+                                   camera[2],     camera[3],      {},           camera[16]};
         for (int i = 0; i < 12; ++i) frame.to_world[i] = camera[4 + i];
-        std::vector<std::uint32_t> descriptors[2] = {std::vector<std::uint32_t>(tiles), std::vector<std::uint32_t>(tiles)};
+        std::vector<std::uint32_t> descriptors[2] = {std::vector<std::uint32_t>(tiles),
+                                                     std::vector<std::uint32_t>(tiles)};
         std::vector<std::uint64_t> palettes[2] = {std::vector<std::uint64_t>(s[2]), std::vector<std::uint64_t>(s[2])};
         std::vector<std::uint16_t> heaps[2] = {std::vector<std::uint16_t>(s[3]), std::vector<std::uint16_t>(s[3])};
         std::vector<std::uint16_t> planeDescriptors(tiles), planeHeap(s[5]);

@@ -1,5 +1,5 @@
-// Reads any bytes as a mesh file: the first chooses the format, the rest is the file, and for OBJ with a zero byte then its materials. A
-// surface that is read is whole. tools/reader-fuzz runs it.
+// Reads any bytes as a mesh file: the first chooses the format, the rest is the file, and for OBJ with a zero byte then
+// its materials. A surface that is read is whole. tools/reader-fuzz runs it.
 
 #include <cstdio>
 #include <cstdlib>
@@ -20,10 +20,12 @@ bool read(MeshReader& reader, Text file, Text materials) {
     if (!reader.begin(file)) return false;
     std::string name;
     for (bool isFirst = true; reader.nextLibrary(name); isFirst = false)
-        if (!reader.giveLibrary(isFirst && !materials.empty() ? std::optional(materials) : std::nullopt, name)) return false;
+        if (!reader.giveLibrary(isFirst && !materials.empty() ? std::optional(materials) : std::nullopt, name))
+            return false;
     if (!reader.needPictures()) return false;
     std::vector<std::int32_t> numbers;
-    for (const auto& picture : reader.pictures) numbers.push_back(picture.name.size() % 3 == 0 ? -1 : static_cast<std::int32_t>(numbers.size()));
+    for (const auto& picture : reader.pictures)
+        numbers.push_back(picture.name.size() % 3 == 0 ? -1 : static_cast<std::int32_t>(numbers.size()));
     return reader.finish(numbers);
 }
 
@@ -31,17 +33,22 @@ void check(const FileSurface& surface) {
     const std::size_t count = surface.faces.size();
     for (const Face& face : surface.faces)
         for (const std::int32_t vertex : face)
-            require(vertex >= 0 && static_cast<std::size_t>(vertex) < surface.vertices.size(), "a face names a vertex that does not exist");
+            require(vertex >= 0 && static_cast<std::size_t>(vertex) < surface.vertices.size(),
+                    "a face names a vertex that does not exist");
     require(surface.normals.empty() || surface.normals.size() == count, "faces have no normals");
     require(surface.colours.empty() || surface.colours.size() == count, "faces have no colours");
     require(surface.uvs.empty() || surface.uvs.size() == count, "faces have no positions");
     for (const Triangle& face : surface.uvs)
-        for (const Pair& uv : face) require(std::fabs(uv[0]) <= maxUv + 1 && std::fabs(uv[1]) <= maxUv + 1, "a position is beyond all pictures");
+        for (const Pair& uv : face)
+            require(std::fabs(uv[0]) <= maxUv + 1 && std::fabs(uv[1]) <= maxUv + 1,
+                    "a position is beyond all pictures");
     require(surface.faceMaterials.empty() || surface.faceMaterials.size() == count, "faces have no materials");
     for (const std::int32_t number : surface.faceMaterials)
-        require(number >= 0 && static_cast<std::size_t>(number) < surface.materials.size(), "a face has no such material");
+        require(number >= 0 && static_cast<std::size_t>(number) < surface.materials.size(),
+                "a face has no such material");
     for (const FileMaterial& material : surface.materials) {
-        require(material.texture < static_cast<std::int32_t>(surface.textures.size()), "a material has no such texture");
+        require(material.texture < static_cast<std::int32_t>(surface.textures.size()),
+                "a material has no such texture");
         for (const double value : material.albedo) require(value >= 0 && value <= 1, "an albedo is none");
         for (const double value : material.emission) require(value >= 0 && value <= 1, "an emission is none");
     }
@@ -59,6 +66,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(isRead == reader->refusal.empty(), "a refusal says nothing, or what is read has one");
     require(reader->refusal.find('\n') == std::string::npos, "a refusal has several lines");
     if (isRead) check(reader->surface);
-    for (const std::string& line : reader->losses.lines()) require(!line.empty() && line.find('\n') == std::string::npos, "a note is no line");
+    for (const std::string& line : reader->losses.lines())
+        require(!line.empty() && line.find('\n') == std::string::npos, "a note is no line");
     return 0;
 }

@@ -33,24 +33,35 @@ struct QueryArguments {
     void *callback;
 };
 
-Handle rtcNewDevice(const char *), rtcNewScene(Handle), rtcNewGeometry(Handle, int), rtcNewBuffer(Handle, size_t), rtcNewSharedBuffer(Handle, void *, size_t);
-Handle rtcGetSceneDevice(Handle), rtcGetSceneTraversable(Handle), rtcGetGeometryThreadSafe(Handle, unsigned), rtcGetGeometry(Handle, unsigned);
+Handle rtcNewDevice(const char *), rtcNewScene(Handle), rtcNewGeometry(Handle, int), rtcNewBuffer(Handle, size_t),
+    rtcNewSharedBuffer(Handle, void *, size_t);
+Handle rtcGetSceneDevice(Handle), rtcGetSceneTraversable(Handle), rtcGetGeometryThreadSafe(Handle, unsigned),
+    rtcGetGeometry(Handle, unsigned);
 int rtcGetDeviceError(Handle);
 ssize_t rtcGetDeviceProperty(Handle, int);
 unsigned rtcAttachGeometry(Handle, Handle);
 const char *rtcGetDeviceLastErrorMessage(Handle), *rtcGetErrorString(int);
-void *rtcSetNewGeometryBuffer(Handle, int, unsigned, int, size_t, size_t), *rtcGetBufferData(Handle), *rtcGetGeometryBufferData(Handle, int, unsigned);
-void rtcReleaseDevice(Handle), rtcReleaseScene(Handle), rtcReleaseGeometry(Handle), rtcReleaseBuffer(Handle), rtcRetainDevice(Handle);
-void rtcCommitGeometry(Handle), rtcCommitScene(Handle), rtcJoinCommitScene(Handle), rtcAttachGeometryByID(Handle, Handle, unsigned), rtcDetachGeometry(Handle, unsigned);
+void *rtcSetNewGeometryBuffer(Handle, int, unsigned, int, size_t, size_t), *rtcGetBufferData(Handle),
+    *rtcGetGeometryBufferData(Handle, int, unsigned);
+void rtcReleaseDevice(Handle), rtcReleaseScene(Handle), rtcReleaseGeometry(Handle), rtcReleaseBuffer(Handle),
+    rtcRetainDevice(Handle);
+void rtcCommitGeometry(Handle), rtcCommitScene(Handle), rtcJoinCommitScene(Handle),
+    rtcAttachGeometryByID(Handle, Handle, unsigned), rtcDetachGeometry(Handle, unsigned);
 void rtcSetSharedGeometryBuffer(Handle, int, unsigned, int, const void *, size_t, size_t, size_t);
 void rtcSetGeometryBuffer(Handle, int, unsigned, int, Handle, size_t, size_t, size_t);
-void rtcSetGeometryMask(Handle, unsigned), rtcSetGeometryVertexAttributeCount(Handle, unsigned), rtcSetGeometryTimeStepCount(Handle, unsigned);
-void rtcSetGeometryIntersectFilterFunction(Handle, Filter), rtcSetGeometryOccludedFilterFunction(Handle, Filter), rtcSetGeometryUserData(Handle, void *);
-void rtcSetGeometryEnableFilterFunctionFromArguments(Handle, bool), rtcSetSceneFlags(Handle, int), rtcSetGeometryBuildQuality(Handle, int);
-void rtcSetSceneProgressMonitorFunction(Handle, bool (*)(void *, double), void *), rtcSetDeviceErrorFunction(Handle, void (*)(void *, int, const char *), void *);
-void rtcGetSceneBounds(Handle, float *), rtcDisableGeometry(Handle), rtcEnableGeometry(Handle), rtcSetGeometryTransform(Handle, unsigned, int, const void *);
+void rtcSetGeometryMask(Handle, unsigned), rtcSetGeometryVertexAttributeCount(Handle, unsigned),
+    rtcSetGeometryTimeStepCount(Handle, unsigned);
+void rtcSetGeometryIntersectFilterFunction(Handle, Filter), rtcSetGeometryOccludedFilterFunction(Handle, Filter),
+    rtcSetGeometryUserData(Handle, void *);
+void rtcSetGeometryEnableFilterFunctionFromArguments(Handle, bool), rtcSetSceneFlags(Handle, int),
+    rtcSetGeometryBuildQuality(Handle, int);
+void rtcSetSceneProgressMonitorFunction(Handle, bool (*)(void *, double), void *),
+    rtcSetDeviceErrorFunction(Handle, void (*)(void *, int, const char *), void *);
+void rtcGetSceneBounds(Handle, float *), rtcDisableGeometry(Handle), rtcEnableGeometry(Handle),
+    rtcSetGeometryTransform(Handle, unsigned, int, const void *);
 void rtcUpdateGeometryBuffer(Handle, int, unsigned), rtcSetDeviceProperty(Handle, int, ssize_t);
-void rtcIntersect1(Handle, struct RayHit *, void *), rtcOccluded1(Handle, struct Ray *, void *), rtcTraversableIntersect1(Handle, struct RayHit *, void *);
+void rtcIntersect1(Handle, struct RayHit *, void *), rtcOccluded1(Handle, struct Ray *, void *),
+    rtcTraversableIntersect1(Handle, struct RayHit *, void *);
 void rtcTraversableOccluded1(Handle, struct Ray *, void *);
 
 enum { indices, vertices, attributes };
@@ -86,7 +97,8 @@ static void shoot(unsigned mask) {
     struct Ray ray = query.ray;
     rtcIntersect1(scene, &query, NULL);
     rtcOccluded1(scene, &ray, NULL);
-    printf("%d %d t %g occluded %d error %d\n", (int)query.geometry, (int)query.primitive, query.ray.tfar, ray.tfar < 0, rtcGetDeviceError(device));
+    printf("%d %d t %g occluded %d error %d\n", (int)query.geometry, (int)query.primitive, query.ray.tfar, ray.tfar < 0,
+           rtcGetDeviceError(device));
 }
 
 static void error(const char *what) { printf("%s: error %d\n", what, rtcGetDeviceError(device)); }
@@ -97,7 +109,8 @@ static void refuse(const struct FilterArguments *call) {
 }
 static void accept(const struct FilterArguments *call) {
     calls += call->ray->id;
-    printf("filter: user %d t %g geometry %d\n", call->user ? *(int *)call->user : 0, call->ray->tfar, (int)((unsigned *)call->hit)[6]);
+    printf("filter: user %d t %g geometry %d\n", call->user ? *(int *)call->user : 0, call->ray->tfar,
+           (int)((unsigned *)call->hit)[6]);
 }
 
 static void attach_by_id(void) {
@@ -114,7 +127,8 @@ static void attach_by_id(void) {
     shoot(~0u);
 }
 static void masks(void) {
-    static const unsigned of_meshes[] = {1, ~0u, 0x100, 0x80000000}, of_rays[] = {1, 2, 0x100, 0xff00, 0x80000000, ~0u, 0};
+    static const unsigned of_meshes[] = {1, ~0u, 0x100, 0x80000000},
+                          of_rays[] = {1, 2, 0x100, 0xff00, 0x80000000, ~0u, 0};
     for (int i = -1; i < 4; ++i) {
         Handle geometry = square(0, 1);
         if (i >= 0) rtcSetGeometryMask(geometry, of_meshes[i]);
@@ -258,8 +272,8 @@ static void filter_ray(void) {
     rtcCommitScene(scene);
     larger.query.ray.id = 3;
     rtcIntersect1(scene, &larger.query, NULL);
-    printf("calls %d geometry %d t %g normal %g %g %g\n", calls, (int)larger.query.geometry, larger.query.ray.tfar, larger.query.normal[0] + 0,
-           larger.query.normal[1] + 0, larger.query.normal[2]);
+    printf("calls %d geometry %d t %g normal %g %g %g\n", calls, (int)larger.query.geometry, larger.query.ray.tfar,
+           larger.query.normal[0] + 0, larger.query.normal[1] + 0, larger.query.normal[2]);
     struct Ray ray = down(~0u).ray;
     rtcOccluded1(scene, &ray, NULL);
     printf("%g\n", ray.tfar);
@@ -346,7 +360,8 @@ static void *build(void *of) {
             at[3 * i + 2] = z;
         }
         for (int i = 0; i < 400; ++i) {
-            const unsigned corner = i / 20 * 21 + i % 20, face[6] = {corner, corner + 21, corner + 22, corner, corner + 22, corner + 1};
+            const unsigned corner = i / 20 * 21 + i % 20,
+                           face[6] = {corner, corner + 21, corner + 22, corner, corner + 22, corner + 1};
             memcpy(faces + 6 * i, face, sizeof face);
         }
         if (*(int *)of == 3) {
@@ -472,7 +487,8 @@ static void handles(void) {
     Handle geometry = square(0, 1);
     add(scene, geometry);
     rtcCommitScene(scene);
-    printf("%d %d %d\n", rtcGetGeometryThreadSafe(scene, 0) == geometry, rtcGetGeometry(scene, 0) == geometry, rtcGetSceneDevice(scene) == device);
+    printf("%d %d %d\n", rtcGetGeometryThreadSafe(scene, 0) == geometry, rtcGetGeometry(scene, 0) == geometry,
+           rtcGetSceneDevice(scene) == device);
     rtcReleaseDevice(device);
     rtcReleaseDevice(device);
     shoot(~0u);
@@ -585,12 +601,19 @@ static const struct {
     const char *name;
     void (*run)(void);
 } cases[] = {
-    CASE(attach_by_id),   CASE(bad_index),         CASE(bad_vertices),   CASE(bounds),       CASE(buffers),         CASE(commits),     CASE(detached),
-    CASE(error_function), CASE(errors_of_threads), CASE(filter_address), CASE(filter_apart), CASE(filter_coplanar), CASE(filter_near), CASE(filter_of_call),
-    CASE(filter_ray),     CASE(first_error),       CASE(handles),        CASE(huge_buffers), CASE(lengths),         CASE(many_masks),  CASE(masks),
-    CASE(no_error),       CASE(no_triangle),       CASE(null_data),      CASE(null_handles), CASE(outlier),         CASE(progress),    CASE(properties),
-    CASE(refused),        CASE(threads_build),     CASE(threads_filter), CASE(threads_join), CASE(threads_trace),   CASE(traversable), CASE(vertex_attributes),
-    CASE(small_buffers),  CASE(wrong_buffers),
+    CASE(attach_by_id),   CASE(bad_index),         CASE(bad_vertices),
+    CASE(bounds),         CASE(buffers),           CASE(commits),
+    CASE(detached),       CASE(error_function),    CASE(errors_of_threads),
+    CASE(filter_address), CASE(filter_apart),      CASE(filter_coplanar),
+    CASE(filter_near),    CASE(filter_of_call),    CASE(filter_ray),
+    CASE(first_error),    CASE(handles),           CASE(huge_buffers),
+    CASE(lengths),        CASE(many_masks),        CASE(masks),
+    CASE(no_error),       CASE(no_triangle),       CASE(null_data),
+    CASE(null_handles),   CASE(outlier),           CASE(progress),
+    CASE(properties),     CASE(refused),           CASE(threads_build),
+    CASE(threads_filter), CASE(threads_join),      CASE(threads_trace),
+    CASE(traversable),    CASE(vertex_attributes), CASE(small_buffers),
+    CASE(wrong_buffers),
 };
 
 int main(int count, char **words) {

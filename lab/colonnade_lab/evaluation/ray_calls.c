@@ -1,5 +1,6 @@
-// A program for Embree 4 that measures the calls of single rays and packets of 16 on one mesh: CPU nanoseconds a ray, and rays that hit.
-// Usage: ray_calls FILE VERTICES FACES RAYS closest|occluded; FILE has vertices float[3], faces uint32[3], rays float[8]: origin, tnear, direction, tfar
+// A program for Embree 4 that measures the calls of single rays and packets of 16 on one mesh: CPU nanoseconds a ray,
+// and rays that hit. Usage: ray_calls FILE VERTICES FACES RAYS closest|occluded; FILE has vertices float[3], faces
+// uint32[3], rays float[8]: origin, tnear, direction, tfar
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -17,7 +18,8 @@ void rtcIntersect16(const int *, Handle, void *, void *), rtcOccluded16(const in
 
 enum { tfar = 8, mask = 9, geometry_id = 18, words = 24, lanes = 16, repeats = 3 };
 static float packet[words * lanes] __attribute__((aligned(64)));
-static const int all[lanes] __attribute__((aligned(64))) = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
+static const int all[lanes]
+    __attribute__((aligned(64))) = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
 
 static void *bytes_of(FILE *file, size_t size) {
     void *const result = malloc(size + 16);
@@ -43,7 +45,8 @@ static void set(const float *ray, int width, int lane) {
 
 int main(int count, char **argument) {
     if (count != 6) return 2;
-    const size_t vertices = strtoul(argument[2], NULL, 10), faces = strtoul(argument[3], NULL, 10), rays = strtoul(argument[4], NULL, 10);
+    const size_t vertices = strtoul(argument[2], NULL, 10), faces = strtoul(argument[3], NULL, 10),
+                 rays = strtoul(argument[4], NULL, 10);
     const int is_occlusion = strcmp(argument[5], "occluded") == 0;
     FILE *const file = fopen(argument[1], "rb");
     if (!file) return 1;

@@ -1,5 +1,5 @@
-/* Renders an orbit around the object by the driver, with interrupts, and ends the simulation. The processor computes the
- * registers of each view while the frame before it runs. The build puts the files into memory and their places into
+/* Renders an orbit around the object by the driver, with interrupts, and ends the simulation. The processor computes
+ * the registers of each view while the frame before it runs. The build puts the files into memory and their places into
  * layout.h. */
 #include <libbase/crc.h>
 #include <stdio.h>
@@ -66,7 +66,8 @@ static uint32_t compute_view(struct record *record, struct colonnade_frame *fram
 
 static void load_image(void) {
     const uint8_t *data = (const uint8_t *)IMAGE;
-    printf("colonnade: an image without its end: %s\n", colonnade_error_name(colonnade_check_image(&colonnade_design, data, IMAGE_BYTES - 128)));
+    printf("colonnade: an image without its end: %s\n",
+           colonnade_error_name(colonnade_check_image(&colonnade_design, data, IMAGE_BYTES - 128)));
     const struct colonnade_image image = {data, IMAGE_BYTES, IMAGE, {IMAGE, IMAGE + IMAGE_BYTES}};
     uint32_t start = soc_now();
     soc_check("load", colonnade_load(&device, &image, ATTEMPTS));
@@ -78,7 +79,8 @@ static void load_image(void) {
 
 int main(void) {
     soc_begin(&device);
-    printf("colonnade: found, frames of up to %ux%u, capabilities %03x\n", (unsigned)device.max_width, (unsigned)device.max_height, (unsigned)device.capabilities);
+    printf("colonnade: found, frames of up to %ux%u, capabilities %03x\n", (unsigned)device.max_width,
+           (unsigned)device.max_height, (unsigned)device.capabilities);
     load_image();
 
     struct record *records = (struct record *)RECORDS;
@@ -95,7 +97,8 @@ int main(void) {
         colonnade_view_accept(&view);
         soc_check("start", colonnade_start(&device, &framebuffer));
         uint32_t started = soc_now();
-        printf("colonnade: view %u: %u words in %u cycles, set and started in %u\n", (unsigned)i, (unsigned)frame.count, (unsigned)computed, (unsigned)(started - start));
+        printf("colonnade: view %u: %u words in %u cycles, set and started in %u\n", (unsigned)i, (unsigned)frame.count,
+               (unsigned)computed, (unsigned)(started - start));
 
         if (i + 1 < FRAMES) {
             records[i + 1].camera = records[i].camera;
@@ -108,8 +111,10 @@ int main(void) {
         soc_check("frame", colonnade_result(&device));
         /* The processor's own view of the frame */
         flush_cpu_dcache();
-        printf("colonnade: frame %u: crc32 %08x, hits %u, %u cycles of the array\n", (unsigned)i, (unsigned)crc32((const unsigned char *)base, FRAME_BYTES),
-               (unsigned)colonnade_counter(&device, COLONNADE_COUNTER_HITS), (unsigned)colonnade_counter(&device, COLONNADE_COUNTER_CYCLES));
+        printf("colonnade: frame %u: crc32 %08x, hits %u, %u cycles of the array\n", (unsigned)i,
+               (unsigned)crc32((const unsigned char *)base, FRAME_BYTES),
+               (unsigned)colonnade_counter(&device, COLONNADE_COUNTER_HITS),
+               (unsigned)colonnade_counter(&device, COLONNADE_COUNTER_CYCLES));
     }
     soc_end("end", COLONNADE_OK);
 }

@@ -1,6 +1,6 @@
-/* Hands batches of rays to the device by the driver, with interrupts, and ends the simulation. Up to three batches are in the
-* ring, where others wait behind the running one. The build puts the files of examples/rays/batches.py into memory, and
- * their addresses into layout.h. */
+/* Hands batches of rays to the device by the driver, with interrupts, and ends the simulation. Up to three batches are
+ * in the ring, where others wait behind the running one. The build puts the files of examples/rays/batches.py into
+ * memory, and their addresses into layout.h. */
 #include <libbase/crc.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,7 +16,9 @@ static struct colonnade_ring ring;
 static uint32_t submitted, ended;
 static uint32_t starts[BATCH_COUNT], ends[BATCH_COUNT];
 
-static uint32_t tag_of(uint32_t batch) { return *(const volatile uint32_t *)(uintptr_t)(RESULTS + (uint32_t)file->batches[batch].done); }
+static uint32_t tag_of(uint32_t batch) {
+    return *(const volatile uint32_t *)(uintptr_t)(RESULTS + (uint32_t)file->batches[batch].done);
+}
 
 /* Acknowledges the event, and takes the time of batches whose tags have come. */
 static void take_ends(void) {
@@ -53,8 +55,9 @@ int main(void) {
     for (uint32_t i = 0; i < BATCH_COUNT; ++i) {
         /* A batch that was queued begins at the end of the one before */
         const bool is_queued = i > 0 && (int32_t)(ends[i - 1] - starts[i]) > 0;
-        printf("colonnade: batch %u: %u rays, mode %08x, tag %08x, %u cycles%s\n", (unsigned)i, (unsigned)file->batches[i].count, (unsigned)file->batches[i].mode,
-               (unsigned)tag_of(i), (unsigned)(ends[i] - (is_queued ? ends[i - 1] : starts[i])), is_queued ? ", queued" : "");
+        printf("colonnade: batch %u: %u rays, mode %08x, tag %08x, %u cycles%s\n", (unsigned)i,
+               (unsigned)file->batches[i].count, (unsigned)file->batches[i].mode, (unsigned)tag_of(i),
+               (unsigned)(ends[i] - (is_queued ? ends[i - 1] : starts[i])), is_queued ? ", queued" : "");
     }
     printf("colonnade: results: crc32 %08x\n", (unsigned)crc32((const unsigned char *)RESULTS, RESULTS_BYTES));
     soc_end("end", COLONNADE_OK);

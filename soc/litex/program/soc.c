@@ -15,7 +15,8 @@ enum { SPINS = 1000000 };
 static struct colonnade *interrupting;
 static volatile bool interrupt_came;
 
-/* The level goes with the device's own mask, which the driver sets before each wait; the event stays in interrupt.status. */
+/* The level goes with the device's own mask, which the driver sets before each wait; the event stays in
+ * interrupt.status. */
 static void on_interrupt(void) {
     colonnade_enable_interrupts(interrupting, 0);
     interrupt_came = true;
@@ -45,7 +46,8 @@ void soc_check(const char *what, enum colonnade_error error) {
 }
 
 void soc_begin(struct colonnade *device) {
-    static const struct colonnade_bus bus = {colonnade_mmio_read, colonnade_mmio_write, wait_for_interrupt, (void *)COLONNADE_BASE};
+    static const struct colonnade_bus bus = {colonnade_mmio_read, colonnade_mmio_write, wait_for_interrupt,
+                                             (void *)COLONNADE_BASE};
     interrupting = device;
     irq_setmask(0);
     irq_setie(1);

@@ -27,7 +27,9 @@
 #define DIFFERS(port) | differs(*variables.port, inner.port)
 #define ANY_DIFFERS(ports) (false ports(DIFFERS))
 
-template <class Value> bool differs(const Value& outer, const Value& inner) { return std::memcmp(&outer, &inner, sizeof outer) != 0; }
+template <class Value> bool differs(const Value& outer, const Value& inner) {
+    return std::memcmp(&outer, &inner, sizeof outer) != 0;
+}
 
 template <class Value> void requireEqual(const Value& outer, const Value& inner, const char* port) {
     if (differs(outer, inner)) throw std::runtime_error(std::string("the simulator's models disagree on port ") + port);
@@ -50,7 +52,9 @@ inline void flip(CData& event) { event = !event; }
         } \
         bool take(bool isDeaf) { \
             V##name##Model& inner = *model; \
-            if (!(ANY_DIFFERS(name##_INPUTS) | ANY_DIFFERS(name##_DIRECT) | ANY_DIFFERS(name##_REGISTERS)) || (isDeaf && model.isStill())) return false; \
+            if (!(ANY_DIFFERS(name##_INPUTS) | ANY_DIFFERS(name##_DIRECT) | ANY_DIFFERS(name##_REGISTERS)) || \
+                (isDeaf && model.isStill())) \
+                return false; \
             model.wake(); \
             name##_INPUTS(INWARD) name##_DIRECT(INWARD) name##_REGISTERS(INWARD) flip(inner.take); \
             inner.eval(); \
@@ -62,7 +66,8 @@ inline void flip(CData& event) { event = !event; }
                 flip(inner.take); \
                 inner.eval(); \
             } \
-            name##_INPUTS(REQUIRE_EQUAL) name##_DIRECT(REQUIRE_EQUAL) name##_REGISTERS(REQUIRE_EQUAL) name##_OUTPUTS(REQUIRE_EQUAL) model.check(#name); \
+            name##_INPUTS(REQUIRE_EQUAL) name##_DIRECT(REQUIRE_EQUAL) name##_REGISTERS(REQUIRE_EQUAL) \
+                name##_OUTPUTS(REQUIRE_EQUAL) model.check(#name); \
         } \
     };
 EACH_PART(PART)
@@ -294,7 +299,8 @@ private:
         model.eval();
     }
 
-    template <class Memory> static void storeInBank(Memory& memory, unsigned bank, std::uint64_t address, const void* record, std::size_t bytes) {
+    template <class Memory> static void storeInBank(Memory& memory, unsigned bank, std::uint64_t address,
+                                                    const void* record, std::size_t bytes) {
         if (address % banksOfColumn != bank) return;
         const std::uint64_t row = address / banksOfColumn;
         if (row < sizeof memory / sizeof memory[0]) std::memcpy(&memory[row], record, bytes);

@@ -96,7 +96,9 @@ public:
         return read_.last;
     }
 
-    void beginWrite(unsigned address, std::uint32_t data, unsigned strobes = 15) { write_.begin({address, strobes, data, delay(), delay(), delay(), 0}); }
+    void beginWrite(unsigned address, std::uint32_t data, unsigned strobes = 15) {
+        write_.begin({address, strobes, data, delay(), delay(), delay(), 0});
+    }
     void beginRead(unsigned address) { read_.begin({address, 15, 0, delay(), 0, delay(), 0}); }
 
     /// Waits for the answers of what has begun; the answers of the writes, in order.
@@ -174,15 +176,18 @@ private:
     }
 
     std::array<bool, 6> valids() const {
-        return {top_.m_axi_awvalid != 0, top_.m_axi_wvalid != 0, top_.m_axi_arvalid != 0, sceneIsOffered(), top_.s_axil_bvalid != 0, top_.s_axil_rvalid != 0};
+        return {top_.m_axi_awvalid != 0, top_.m_axi_wvalid != 0,  top_.m_axi_arvalid != 0,
+                sceneIsOffered(),        top_.s_axil_bvalid != 0, top_.s_axil_rvalid != 0};
     }
 
     void sample() {
         Report& report = slaves.report;
         if (resets_ == 0) requireSilence("the first cycle after reset");
         resets_ = 1;
-        const Address aw{top_.m_axi_awaddr, top_.m_axi_awlen, top_.m_axi_awsize, top_.m_axi_awburst, top_.m_axi_awid, top_.m_axi_awprot};
-        const Address ar{top_.m_axi_araddr, top_.m_axi_arlen, top_.m_axi_arsize, top_.m_axi_arburst, top_.m_axi_arid, top_.m_axi_arprot};
+        const Address aw{top_.m_axi_awaddr,  top_.m_axi_awlen, top_.m_axi_awsize,
+                         top_.m_axi_awburst, top_.m_axi_awid,  top_.m_axi_awprot};
+        const Address ar{top_.m_axi_araddr,  top_.m_axi_arlen, top_.m_axi_arsize,
+                         top_.m_axi_arburst, top_.m_axi_arid,  top_.m_axi_arprot};
         WriteBeat beat;
         if (top_.m_axi_wvalid) {
             std::memcpy(beat.data.data(), &top_.m_axi_wdata, bus_);
@@ -201,11 +206,15 @@ private:
         // The registers
         report.require(!top_.s_axil_bvalid || write_.mayBeAnswered(), "s_axil B", "an answer comes before its request");
         report.require(!top_.s_axil_rvalid || read_.mayBeAnswered(), "s_axil R", "an answer comes before its request");
-        report.require(!top_.s_axil_bvalid || top_.s_axil_bresp == 0 || top_.s_axil_bresp == 2, "s_axil B", "an answer is neither OKAY nor SLVERR");
-        report.require(!top_.s_axil_rvalid || top_.s_axil_rresp == 0 || top_.s_axil_rresp == 2, "s_axil R", "an answer is neither OKAY nor SLVERR");
-        if (b_.transfers(top_.s_axil_bvalid, top_.s_axil_bready, top_.s_axil_bresp) && write_.mayBeAnswered()) write_.answer(top_.s_axil_bresp, 0);
+        report.require(!top_.s_axil_bvalid || top_.s_axil_bresp == 0 || top_.s_axil_bresp == 2, "s_axil B",
+                       "an answer is neither OKAY nor SLVERR");
+        report.require(!top_.s_axil_rvalid || top_.s_axil_rresp == 0 || top_.s_axil_rresp == 2, "s_axil R",
+                       "an answer is neither OKAY nor SLVERR");
+        if (b_.transfers(top_.s_axil_bvalid, top_.s_axil_bready, top_.s_axil_bresp) && write_.mayBeAnswered())
+            write_.answer(top_.s_axil_bresp, 0);
         const std::uint64_t answer = std::uint64_t{top_.s_axil_rresp} << 32 | top_.s_axil_rdata;
-        if (r_.transfers(top_.s_axil_rvalid, top_.s_axil_rready, answer) && read_.mayBeAnswered()) read_.answer(top_.s_axil_rresp, top_.s_axil_rdata);
+        if (r_.transfers(top_.s_axil_rvalid, top_.s_axil_rready, answer) && read_.mayBeAnswered())
+            read_.answer(top_.s_axil_rresp, top_.s_axil_rdata);
         if (top_.s_axil_awvalid && top_.s_axil_awready) write_.takeAddress();
         if (top_.s_axil_wvalid && top_.s_axil_wready) write_.takeData();
         if (top_.s_axil_arvalid && top_.s_axil_arready) read_.takeAddress();
@@ -226,7 +235,8 @@ private:
     }
 
     void requireSilence(const char* when) {
-        if (top_.m_axi_awvalid || top_.m_axi_wvalid || top_.m_axi_arvalid || top_.s_axil_bvalid || top_.s_axil_rvalid || sceneIsOffered())
+        if (top_.m_axi_awvalid || top_.m_axi_wvalid || top_.m_axi_arvalid || top_.s_axil_bvalid || top_.s_axil_rvalid ||
+            sceneIsOffered())
             slaves.report.broken(std::string("a VALID is high in ") + when);
     }
 

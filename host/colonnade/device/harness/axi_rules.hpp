@@ -23,7 +23,8 @@ public:
     }
 
     void print() const {
-        for (const auto& [rule, entry] : breaks_) std::cout << "broken " << rule << " (" << entry.count << " times, first in " << entry.first << ")\n";
+        for (const auto& [rule, entry] : breaks_)
+            std::cout << "broken " << rule << " (" << entry.count << " times, first in " << entry.first << ")\n";
     }
 
     std::string place;
@@ -43,7 +44,8 @@ struct Address {
     unsigned length = 0, size = 0, burst = 0, id = 0, protection = 0;
 
     bool operator==(const Address& o) const {
-        return std::tie(address, length, size, burst, id, protection) == std::tie(o.address, o.length, o.size, o.burst, o.id, o.protection);
+        return std::tie(address, length, size, burst, id, protection) ==
+               std::tie(o.address, o.length, o.size, o.burst, o.id, o.protection);
     }
     unsigned beats() const { return length + 1; }
     /// Of the bytes of all beats: only the first beat of a burst may begin within a word of the bus.

@@ -20,8 +20,9 @@ enum class Order {
     mixed               ///< each burst in another order
 };
 constexpr unsigned orders = 10;
-constexpr const char* orderNames[orders] = {"any",          "dataValidFirst", "firstBeatFirst", "wholeBurstFirst", "addressValidFirst",
-                                            "addressFirst", "together",       "lateAddress",    "lateData",        "mixed"};
+constexpr const char* orderNames[orders] = {
+    "any",          "dataValidFirst", "firstBeatFirst", "wholeBurstFirst", "addressValidFirst",
+    "addressFirst", "together",       "lateAddress",    "lateData",        "mixed"};
 
 enum class Silent { none, aw, w, b, ar, r, sceneAr, sceneR };
 constexpr unsigned silentChannels = 7;
@@ -64,7 +65,9 @@ public:
 
     /// Chooses the answer that is offered in this cycle.
     void offer() {
-        if (!offersAnswer && !answers_.empty() && answers_.front().due <= slaves_.report.cycle && slaves_.moves(Silent::b)) offersAnswer = true;
+        if (!offersAnswer && !answers_.empty() && answers_.front().due <= slaves_.report.cycle &&
+            slaves_.moves(Silent::b))
+            offersAnswer = true;
     }
     unsigned response() { return offersAnswer ? answers_.front().response : slaves_.below(4); }
     unsigned id() { return offersAnswer ? answers_.front().id : slaves_.below(2); }
@@ -142,7 +145,8 @@ private:
             const std::uint64_t first = burst.first() + std::uint64_t{beat_} * bus_;
             for (unsigned i = 0; i < bus_; ++i) {
                 if (!beat.writes(i)) continue;
-                slaves_.report.require(isInside(slaves_.writable, first + i, first + i + 1), "m_axi W", "a byte is written outside the window");
+                slaves_.report.require(isInside(slaves_.writable, first + i, first + i + 1), "m_axi W",
+                                       "a byte is written outside the window");
                 if (first + i < slaves_.memory.size()) slaves_.memory[first + i] = beat.data[i];
             }
             const bool isLast = ++beat_ == burst.beats();
@@ -187,7 +191,8 @@ public:
         id = read.burst.id;
         response = slaves_.responseUpTo(at + bus_);
         isLast = read.done + 1 == read.burst.beats();
-        for (unsigned i = 0; i < bus_; ++i) data[i] = response == 0 ? slaves_.memory[at + i] : static_cast<std::uint8_t>(slaves_.random());
+        for (unsigned i = 0; i < bus_; ++i)
+            data[i] = response == 0 ? slaves_.memory[at + i] : static_cast<std::uint8_t>(slaves_.random());
         offersBeat = true;
     }
 
@@ -195,14 +200,16 @@ public:
 
     void takeAddress(const Address& address) {
         requireLegal(slaves_.report, port_, address, bus_);
-        slaves_.report.require(isInside(slaves_.readable, address.first(), address.end()), port_, "a read leaves its window");
+        slaves_.report.require(isInside(slaves_.readable, address.first(), address.end()), port_,
+                               "a read leaves its window");
         reads_.push_back({address, slaves_.due(), 0});
         ++slaves_.bursts;
     }
 
     void takeBeat() {
         offersBeat = false;
-        if (++reads_[chosen_].done == reads_[chosen_].burst.beats()) reads_.erase(reads_.begin() + static_cast<std::ptrdiff_t>(chosen_));
+        if (++reads_[chosen_].done == reads_[chosen_].burst.beats())
+            reads_.erase(reads_.begin() + static_cast<std::ptrdiff_t>(chosen_));
     }
 
     bool isIdle() const { return reads_.empty(); }

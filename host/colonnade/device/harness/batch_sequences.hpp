@@ -1,10 +1,12 @@
-// Sequences of a shell for rays: batches of which many are wrong, one after the other from a ring. The legal work is a batch.
+// Sequences of a shell for rays: batches of which many are wrong, one after the other from a ring. The legal work is a
+// batch.
 #pragma once
 #include "sequences.hpp"
 
 class BatchSequences final : public Sequences {
 public:
-    BatchSequences(const SequenceJob& job, unsigned busBytes, std::size_t memoryBytes) : Sequences(job, busBytes, memoryBytes) {
+    BatchSequences(const SequenceJob& job, unsigned busBytes, std::size_t memoryBytes)
+        : Sequences(job, busBytes, memoryBytes) {
         kinds_ = {{"hostile batches", [this] { hostileBatches(); }},
                   {"soft resets", [this] { softResets(); }},
                   {"hard resets", [this] { hardResets(); }},
@@ -13,9 +15,10 @@ public:
     }
 
 private:
-    // Behind 4 KB of the window that wrong batches may name come the ring, tags, and memory of the rays and the hits of each batch. Further
-    // 4 KB follow.
-    static constexpr std::uint64_t ring_ = 0x1000, tags_ = 0x1800, scratch_ = 0x400, rays_ = 0x2000, rayBytes_ = 0x1000, hits_ = 0x22000, hitBytes_ = 0x800;
+    // Behind 4 KB of the window that wrong batches may name come the ring, tags, and memory of the rays and the hits of
+    // each batch. Further 4 KB follow.
+    static constexpr std::uint64_t ring_ = 0x1000, tags_ = 0x1800, scratch_ = 0x400, rays_ = 0x2000, rayBytes_ = 0x1000,
+                                   hits_ = 0x22000, hitBytes_ = 0x800;
     static constexpr unsigned ringLog_ = 5, slots_ = 1u << ringLog_, rounds_ = 30;
     static constexpr std::uint32_t errorBit_ = 1u << 31, maxCount_ = 1u << 24;
 
@@ -71,7 +74,9 @@ private:
         if (wrong & 1) rays = anyAddress();
         if (wrong & 2) hits = anyAddress();
         if (wrong & 4) done = anyAddress();
-        if (wrong & 8) count = std::array<std::uint32_t, 5>{0, maxCount_ + 1, 1u << 31, 1, static_cast<std::uint32_t>(1 + pick(60))}[pick(5)];
+        if (wrong & 8)
+            count = std::array<std::uint32_t, 5>{0, maxCount_ + 1, 1u << 31, 1,
+                                                 static_cast<std::uint32_t>(1 + pick(60))}[pick(5)];
         if (wrong & 16) mode ^= 1u << pick(32);
         if (wrong & 32)
             for (unsigned i = 24; i < 44; ++i) words[i] = static_cast<std::uint8_t>(slaves_.random());
@@ -83,21 +88,26 @@ private:
         std::memcpy(&words[44], &tag, 4);
         std::memcpy(&words[48], &done, 8);
         store(own, batch.rays);
-        std::copy(words.begin(), words.end(), slaves_.memory.begin() + static_cast<std::ptrdiff_t>(at(ring_ + 64 * slot)));
+        std::copy(words.begin(), words.end(),
+                  slaves_.memory.begin() + static_cast<std::ptrdiff_t>(at(ring_ + 64 * slot)));
         return expected(batch, wrong, rays, hits, done, count, mode, tag);
     }
 
     /// What docs/rays.md says of a batch.
-    Expected expected(const SequenceJob::Batch& batch, unsigned wrong, std::uint64_t rays, std::uint64_t hits, std::uint64_t done, std::uint32_t count,
-                      std::uint32_t mode, std::uint32_t tag) const {
+    Expected expected(const SequenceJob::Batch& batch, unsigned wrong, std::uint64_t rays, std::uint64_t hits,
+                      std::uint64_t done, std::uint32_t count, std::uint32_t mode, std::uint32_t tag) const {
         constexpr std::uint64_t reach = std::uint64_t{1} << 40;
-        const auto fits = [this](std::uint64_t first, std::uint64_t bytes) { return first >= job_.windowBegin && first + (bytes + 63) / 64 * 64 <= job_.windowEnd; };
+        const auto fits = [this](std::uint64_t first, std::uint64_t bytes) {
+            return first >= job_.windowBegin && first + (bytes + 63) / 64 * 64 <= job_.windowEnd;
+        };
         const bool isSensor = mode >> 5 & 1, isFan = mode >> 4 & 1;
         const unsigned response = mode & 3;
         const bool hasPlace = rays % 64 == 0 && hits % 64 == 0 && done % 4 == 0 && (rays | hits | done) < reach;
-        const bool isLegal = hasPlace && response != 3 && !(isSensor && isFan) && (mode & ~0xff000f33u) == 0 && count != 0 && count <= maxCount_;
+        const bool isLegal = hasPlace && response != 3 && !(isSensor && isFan) && (mode & ~0xff000f33u) == 0 &&
+                             count != 0 && count <= maxCount_;
         const std::uint64_t taken = isSensor ? 64 : std::uint64_t{count} * (isFan ? 16 : 32);
-        const std::uint64_t answers = response == 2 ? (std::uint64_t{count} + 63) / 64 * 8 : std::uint64_t{count} * (response == 1 ? 8 : 16);
+        const std::uint64_t answers =
+            response == 2 ? (std::uint64_t{count} + 63) / 64 * 8 : std::uint64_t{count} * (response == 1 ? 8 : 16);
         Expected found;
         found.tag = tag;
         found.hasTag = done != 0 && done % 4 == 0 && done < reach && fits(done / 64 * 64, 4);
@@ -112,7 +122,8 @@ private:
         return found;
     }
 
-    /// Hands over `count` batches that are in the ring from `tail_` on; the device takes them, in several writes of the tail.
+    /// Hands over `count` batches that are in the ring from `tail_` on; the device takes them, in several writes of the
+    /// tail.
     void submit(unsigned count) {
         while (count != 0) {
             const unsigned some = 1 + static_cast<unsigned>(pick(count));
@@ -125,7 +136,8 @@ private:
     /// As many batches as the ring takes, one of `hostility` of which is right.
     std::vector<Expected> fill(unsigned hostility) {
         std::vector<Expected> found;
-        for (unsigned i = 0; i + 1 < slots_; ++i) found.push_back(put(job_.batches[pick(job_.batches.size())], (tail_ + i) % slots_, pick(hostility) != 0));
+        for (unsigned i = 0; i + 1 < slots_; ++i)
+            found.push_back(put(job_.batches[pick(job_.batches.size())], (tail_ + i) % slots_, pick(hostility) != 0));
         return found;
     }
 
@@ -145,7 +157,8 @@ private:
             check(each, hasErrors, after, isOpen);
         }
         for (std::size_t i = 0; i < after.size(); ++i)
-            if (!isOpen[i] && after[i] != slaves_.memory[i]) return report_.broken("a byte that belongs to no batch has changed");
+            if (!isOpen[i] && after[i] != slaves_.memory[i])
+                return report_.broken("a byte that belongs to no batch has changed");
         const std::uint32_t errors = read(job_.batchErrors);
         expect(!fails || errors != 0, "a wrong batch raises no error");
         expect(mayFail || errors == 0, "an error without a wrong batch");
@@ -164,8 +177,11 @@ private:
             expect(isMissing || hasErrors || each.mayFail || tag == each.tag, "the tag of a right batch has an error");
             std::fill_n(isOpen.begin() + static_cast<std::ptrdiff_t>(each.tagAt), 4, true);
         }
-        if (each.bytes && tag == each.tag) std::copy(each.bytes->begin(), each.bytes->end(), after.begin() + static_cast<std::ptrdiff_t>(each.hits));
-        else std::fill(isOpen.begin() + static_cast<std::ptrdiff_t>(each.hits), isOpen.begin() + static_cast<std::ptrdiff_t>(each.hitEnd), true);
+        if (each.bytes && tag == each.tag)
+            std::copy(each.bytes->begin(), each.bytes->end(), after.begin() + static_cast<std::ptrdiff_t>(each.hits));
+        else
+            std::fill(isOpen.begin() + static_cast<std::ptrdiff_t>(each.hits),
+                      isOpen.begin() + static_cast<std::ptrdiff_t>(each.hitEnd), true);
     }
 
     /// Other wrong batches may also write there.
@@ -186,7 +202,8 @@ private:
         for (const unsigned error : job_.errors) errors |= read(error);
         expect(errors == 0, "a right batch has an error bit");
         expect(wordAt(each.tagAt) == each.tag, "a right batch has another tag");
-        const bool isSame = std::equal(batch.hits.begin(), batch.hits.end(), slaves_.memory.begin() + static_cast<std::ptrdiff_t>(each.hits));
+        const bool isSame = std::equal(batch.hits.begin(), batch.hits.end(),
+                                       slaves_.memory.begin() + static_cast<std::ptrdiff_t>(each.hits));
         expect(isSame, "hits differ from the model's");
         return isSame && errors == 0;
     }

@@ -30,7 +30,8 @@ public:
     std::uint8_t& operator[](std::uint64_t address) { return begin_[address]; }
 
     std::uint8_t* range(std::uint64_t address, std::uint64_t size) {
-        if (address < base_ || address > end_ || size > end_ - address) throw std::runtime_error("an access beyond the memory");
+        if (address < base_ || address > end_ || size > end_ - address)
+            throw std::runtime_error("an access beyond the memory");
         return begin_ + address;
     }
 
@@ -45,7 +46,8 @@ private:
         const int file = open(name.c_str(), O_RDWR);
         struct stat status = {};
         if (file < 0 || fstat(file, &status) != 0) throw std::runtime_error("no file " + name);
-        if (static_cast<std::uint64_t>(status.st_size) < size) throw std::runtime_error(name + " is smaller than the memory");
+        if (static_cast<std::uint64_t>(status.st_size) < size)
+            throw std::runtime_error(name + " is smaller than the memory");
         map(begin_ + base_, size, MAP_SHARED | MAP_FIXED, file);
         close(file);
     }

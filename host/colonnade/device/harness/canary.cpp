@@ -1,5 +1,5 @@
-// Tests the compiler with a population count as Verilator writes it: a byte sum of byte comparisons. Exit status 0 if all
-// sums are right. g++ 12.2 vectorises such code wrongly at -O2: each true comparison counts -1.
+// Tests the compiler with a population count as Verilator writes it: a byte sum of byte comparisons. Exit status 0 if
+// all sums are right. g++ 12.2 vectorises such code wrongly at -O2: each true comparison counts -1.
 #include <cstdint>
 
 namespace {
@@ -10,7 +10,9 @@ struct Variables {
 
 #define HAS_STATE(i) (1U == static_cast<std::uint32_t>(variables->state[i]))
 
-__attribute__((noinline)) void countOf4(Variables* variables) { variables->count = 7U & ((3U & (HAS_STATE(0) + HAS_STATE(1))) + (3U & (HAS_STATE(2) + HAS_STATE(3)))); }
+__attribute__((noinline)) void countOf4(Variables* variables) {
+    variables->count = 7U & ((3U & (HAS_STATE(0) + HAS_STATE(1))) + (3U & (HAS_STATE(2) + HAS_STATE(3))));
+}
 
 __attribute__((noinline)) void countOf8(Variables* variables) {
     variables->count = 0xfU & ((7U & ((3U & (HAS_STATE(0) + HAS_STATE(1))) + (3U & (HAS_STATE(2) + HAS_STATE(3))))) +

@@ -1,9 +1,10 @@
 // A model of DRAM behind the device's AXI4 read port, for designs with a cache (DRAM_BUS_BYTES).
 //
 // Reads take `latency` cycles, with `banks` also rows and refresh (dram_timing.hpp), then deliver a beat per cycle,
-// or every `interval` cycles, in the order of the reads. With `randomPercent`, addresses and beats are refused or withheld in that share of the cycles, and reads of different ids
-// overtake each other. A read beyond the scene is answered with DECERR. Two failures end with the first frame: with
-// `errorsPer1024`, so many of 1024 beats are answered with SLVERR; with `silentAfter`, reads are answered no more after so many.
+// or every `interval` cycles, in the order of the reads. With `randomPercent`, addresses and beats are refused or
+// withheld in that share of the cycles, and reads of different ids overtake each other. A read beyond the scene is
+// answered with DECERR. Two failures end with the first frame: with `errorsPer1024`, so many of 1024 beats are answered
+// with SLVERR; with `silentAfter`, reads are answered no more after so many.
 #pragma once
 #include <cstdint>
 #include <cstring>
@@ -26,12 +27,14 @@ public:
 
     /// A DRAM whose content is `memory`, which others may change.
     Dram(Top& top, const DramOptions& options, Bytes& memory)
-        : top_(top), options_(options), timing_(dramTiming(options.banks, options.latency)), random_(options.seed), memory_(memory) {}
+        : top_(top), options_(options), timing_(dramTiming(options.banks, options.latency)), random_(options.seed),
+          memory_(memory) {}
 
     /// Writes a record, as the host would.
     void store(std::uint64_t address, const void* record, std::size_t bytes) {
         const std::uint64_t at = address / DRAM_LINE_RECORDS * DRAM_LINE_PITCH + address % DRAM_LINE_RECORDS * bytes;
-        if (memory_.size() < at + DRAM_LINE_PITCH) memory_.resize((at / (2 * DRAM_LINE_PITCH) + 2) * 2 * DRAM_LINE_PITCH); // whole pairs of lines
+        if (memory_.size() < at + DRAM_LINE_PITCH)
+            memory_.resize((at / (2 * DRAM_LINE_PITCH) + 2) * 2 * DRAM_LINE_PITCH); // whole pairs of lines
         std::memcpy(&memory_[at], record, bytes);
     }
 
@@ -68,7 +71,8 @@ public:
         const std::uint64_t address = top_.io_memory_ar_bits_addr;
         const unsigned length = (top_.io_memory_ar_bits_len + 1u) << top_.io_memory_ar_bits_size;
         if (address / 4096 != (address + length - 1) / 4096) throw std::runtime_error("a burst crosses a page of 4 KB");
-        reads_.push_back({address, timing_->due(now_, address, length), top_.io_memory_ar_bits_len + 1u, 0, static_cast<unsigned>(top_.io_memory_ar_bits_id)});
+        reads_.push_back({address, timing_->due(now_, address, length), top_.io_memory_ar_bits_len + 1u, 0,
+                          static_cast<unsigned>(top_.io_memory_ar_bits_id)});
     }
 
     /// Beats that the port has moved.

@@ -9,7 +9,8 @@ class DramTiming {
 public:
     virtual ~DramTiming() = default;
 
-    /// The cycle from which the data of a read of so many bytes, accepted in cycle `now`, may leave; calls are in the order of the reads.
+    /// The cycle from which the data of a read of so many bytes, accepted in cycle `now`, may leave; calls are in the
+    /// order of the reads.
     virtual std::uint64_t due(std::uint64_t now, std::uint64_t address, unsigned bytes) = 0;
 };
 
@@ -24,8 +25,9 @@ private:
 
 /// DDR3-1600 with 64 data pins behind a controller of 200 MHz, in its cycles of 5 ns (JESD79-3, devices of 4 Gbit).
 ///
-/// A cycle moves one burst of 64 bytes, in the order of the reads. Addresses are row, bank, column. Each bank opens the row of its next read
-/// while others deliver. A read of an open row takes `latency` cycles, without one also an activation, of another row also a precharge.
+/// A cycle moves one burst of 64 bytes, in the order of the reads. Addresses are row, bank, column. Each bank opens the
+/// row of its next read while others deliver. A read of an open row takes `latency` cycles, without one also an
+/// activation, of another row also a precharge.
 class BankedDram final : public DramTiming {
 public:
     static constexpr std::uint64_t rowBytes = 8192, burstBytes = 64;

@@ -4,7 +4,8 @@
 
 class FrameSequences final : public Sequences {
 public:
-    FrameSequences(const SequenceJob& job, unsigned busBytes, std::size_t memoryBytes) : Sequences(job, busBytes, memoryBytes) {
+    FrameSequences(const SequenceJob& job, unsigned busBytes, std::size_t memoryBytes)
+        : Sequences(job, busBytes, memoryBytes) {
         kinds_ = {{"errors of the memory", [this] { errorsOfTheMemory(); }},
                   {"a silent channel", [this] { silentChannel(); }},
                   {"soft resets", [this] { softResets(); }},
@@ -44,7 +45,8 @@ private:
     }
 
     bool framebufferIsRight() const {
-        return std::equal(job_.framebuffer.bytes.begin(), job_.framebuffer.bytes.end(), slaves_.memory.begin() + static_cast<std::ptrdiff_t>(job_.framebuffer.address));
+        return std::equal(job_.framebuffer.bytes.begin(), job_.framebuffer.bytes.end(),
+                          slaves_.memory.begin() + static_cast<std::ptrdiff_t>(job_.framebuffer.address));
     }
 
     /// Renders a frame that must be the model's, and its interrupt.
@@ -93,9 +95,12 @@ private:
         silence(Silent::r);
         write("control", load_);
         bench_->cycles(pick(50));
-        const std::array<std::pair<unsigned, std::uint32_t>, 4> writes{
-            {{address("control"), start_}, {address("control"), load_}, {address("image.base"), 0}, {address("image.bytes"), 1}}};
-        for (const auto& [at, value] : writes) expect(bench_->write(at, value) == refused_, "a write during a load is accepted");
+        const std::array<std::pair<unsigned, std::uint32_t>, 4> writes{{{address("control"), start_},
+                                                                        {address("control"), load_},
+                                                                        {address("image.base"), 0},
+                                                                        {address("image.bytes"), 1}}};
+        for (const auto& [at, value] : writes)
+            expect(bench_->write(at, value) == refused_, "a write during a load is accepted");
         expect(read("status") == loading_, "a refused command has an effect");
         slaves_.behaviour.silent = Silent::none;
         awaitIdle("a load does not end");
@@ -110,8 +115,11 @@ private:
         setDevice();
         write("control", start_);
         const std::array<std::pair<unsigned, std::uint32_t>, 3> writes{
-            {{address("control"), start_}, {address("framebuffer.stride"), job_.stride}, {job_.frame.front().address, job_.frame.front().value}}};
-        for (const auto& [at, value] : writes) expect(bench_->write(at, value) == refused_, "a write while a frame is queued is accepted");
+            {{address("control"), start_},
+             {address("framebuffer.stride"), job_.stride},
+             {job_.frame.front().address, job_.frame.front().value}}};
+        for (const auto& [at, value] : writes)
+            expect(bench_->write(at, value) == refused_, "a write while a frame is queued is accepted");
         expect(read("status") == (running_ | queued_), "a refused command has an effect");
         slaves_.behaviour.silent = Silent::none;
         awaitIdle("queued frames do not end");
@@ -122,7 +130,8 @@ private:
     void illegalCommands() {
         for (std::uint32_t value = 0; value < 16; ++value)
             if (value != start_ && value != load_ && value != reset_)
-                expect(bench_->write(address("control"), value | static_cast<std::uint32_t>(pick(2)) << 20) == refused_, "an illegal command is accepted");
+                expect(bench_->write(address("control"), value | static_cast<std::uint32_t>(pick(2)) << 20) == refused_,
+                       "an illegal command is accepted");
         expect(bench_->write(job_.deviceStart, 1) == refused_, "control.start of the device is accepted");
         expect(bench_->read(address("control")).response == refused_, "control is read");
     }
@@ -131,13 +140,19 @@ private:
     void illegalAccesses() {
         const std::uint32_t before = read("framebuffer.stride");
         for (int i = 0; i < 20; ++i) {
-            expect(bench_->write(address("framebuffer.stride"), 64, static_cast<unsigned>(pick(15))) == refused_, "a part of a word is written");
-            expect(bench_->write(address("framebuffer.stride"), 1u << 24) == refused_, "a value that does not fit is accepted");
-            const unsigned missing = pick(2) != 0 ? 0x108 + 4 * static_cast<unsigned>(pick(1000)) : job_.deviceEnd + 4 * static_cast<unsigned>(pick(1000));
-            expect(bench_->write(missing, 0) == refused_ && bench_->read(missing).response == refused_, "a missing register is accessed");
+            expect(bench_->write(address("framebuffer.stride"), 64, static_cast<unsigned>(pick(15))) == refused_,
+                   "a part of a word is written");
+            expect(bench_->write(address("framebuffer.stride"), 1u << 24) == refused_,
+                   "a value that does not fit is accepted");
+            const unsigned missing = pick(2) != 0 ? 0x108 + 4 * static_cast<unsigned>(pick(1000))
+                                                  : job_.deviceEnd + 4 * static_cast<unsigned>(pick(1000));
+            expect(bench_->write(missing, 0) == refused_ && bench_->read(missing).response == refused_,
+                   "a missing register is accessed");
             auto entry = std::next(job_.registers.begin(), static_cast<std::ptrdiff_t>(pick(job_.registers.size())));
-            if (entry->second.access == "ro") expect(bench_->write(entry->second.address, 0) == refused_, "a read-only register is written");
-            if (entry->second.access == "wo") expect(bench_->read(entry->second.address).response == refused_, "a write-only register is read");
+            if (entry->second.access == "ro")
+                expect(bench_->write(entry->second.address, 0) == refused_, "a read-only register is written");
+            if (entry->second.access == "wo")
+                expect(bench_->read(entry->second.address).response == refused_, "a write-only register is read");
         }
         expect(read("framebuffer.stride") == before, "a refused write has an effect");
     }
@@ -145,7 +160,8 @@ private:
     /// Any accesses, reads and writes at the same time; then a soft reset.
     void anyAccesses() {
         for (int i = 0; i < 60; ++i) {
-            const unsigned at = static_cast<unsigned>(pick(3) != 0 ? pick(0x110) : pick(0x10000)), other = static_cast<unsigned>(pick(0x10000));
+            const unsigned at = static_cast<unsigned>(pick(3) != 0 ? pick(0x110) : pick(0x10000)),
+                           other = static_cast<unsigned>(pick(0x10000));
             if (at / 4 == address("control") / 4) continue; // a command: the other kinds give them
             if (at / 4 == job_.deviceStart / 4) continue;
             const auto value = static_cast<std::uint32_t>(pick(3) != 0 ? slaves_.random() : pick(8));
@@ -209,7 +225,8 @@ private:
     void damagedImage() {
         for (std::uint64_t i = 0, damages = 1 + pick(4); i < damages; ++i) {
             const auto& damaged = pick(2) != 0 && !job_.scene.bytes.empty() ? job_.scene : job_.image;
-            const std::uint64_t at = pick(2) != 0 ? pick(std::min<std::uint64_t>(192, damaged.bytes.size())) : pick(damaged.bytes.size());
+            const std::uint64_t at =
+                pick(2) != 0 ? pick(std::min<std::uint64_t>(192, damaged.bytes.size())) : pick(damaged.bytes.size());
             slaves_.memory[damaged.address + at] ^= static_cast<std::uint8_t>(1u << pick(8));
         }
         setImage();
@@ -228,7 +245,9 @@ private:
     void noisyRegisters() {
         prepare();
         for (const auto& word : job_.frame)
-            if (word.isNoisy && pick(3) == 0) bench_->write(word.address, pick(2) != 0 ? static_cast<std::uint32_t>(slaves_.random()) : word.value ^ 1u << pick(32));
+            if (word.isNoisy && pick(3) == 0)
+                bench_->write(word.address, pick(2) != 0 ? static_cast<std::uint32_t>(slaves_.random())
+                                                         : word.value ^ 1u << pick(32));
         slaves_.readable = {{0, ~std::uint64_t{0}}};
         write("control", start_);
         awaitIdle("a frame does not end, in spite of the watchdog");

@@ -4,14 +4,16 @@
 //                            directly into the column memories
 //   stream FILE BYTES TARGET loads words through the load port, one per cycle
 //   write ADDRESS VALUE      writes one register word
-//   frame FILE WIDTH HEIGHT START WATCHDOG  starts a frame by a write to register START, waits for its end, and writes
-//                            its pixels (struct PixelBytes, row by row); WATCHDOG is in cycles, 0 for none;
-//                            prints "simulated CYCLES SECONDS", and for designs with a cache "value dram.beats N", the beats of its DRAM port
+//   frame FILE WIDTH HEIGHT START WATCHDOG  starts a frame by a write to register START, waits for its end, and
+//                            writes its pixels (struct PixelBytes, row by row); WATCHDOG is in cycles, 0 for none;
+//                            prints "simulated CYCLES SECONDS", and for designs with a cache "value dram.beats N",
+//                            the beats of its DRAM port
 //   read NAME ADDRESS WORDS  prints "value NAME VALUE"
 //
 // Options: --stall PERCENT of cycles in which the pixel sink is not ready; --seed N; for designs with memory stalls:
 // --memory PERCENT of cycles in which each bank is stalled, --burst N, the longest stall in cycles;
-// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-interval N, --dram-banks N, --dram-random PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
+// for designs with a cache: --dram N, the latency of DRAM in cycles, --dram-interval N, --dram-banks N, --dram-random
+// PERCENT, --dram-errors N, --dram-silent N (dram.hpp);
 // --check N: checks the coupling of the models (array.hpp) in every Nth cycle.
 // --deaf 1: a fault for tests: models that are not evaluated since they stand still do not hear their inputs.
 // With WAVEFORM defined, --waveform FILE writes the signals of the frames as VCD; the time unit is a cycle.
@@ -54,8 +56,8 @@ template <class Port> double numberOf(const Port& port) {
     return static_cast<double>(value);
 }
 
-/// Maximum cycles from the watchdog's last expiry to the end of the frame, and expiries: an abort, and the end of waiting
-/// for a DRAM that is silent.
+/// Maximum cycles from the watchdog's last expiry to the end of the frame, and expiries: an abort, and the end of
+/// waiting for a DRAM that is silent.
 constexpr std::uint64_t watchdogMargin = 100'000, watchdogs = 2;
 
 /// A common multiple of the periods of all free-running counters, such as the beats of shared arithmetic units.
@@ -71,7 +73,8 @@ struct Options {
 /// Stalls each bank independently, in bursts of random length, in `percent` of all cycles.
 class BankStalls {
 public:
-    explicit BankStalls(const Options& options) : random_(options.seed), percent_(options.memoryPercent), burst_(1, options.memoryBurst) {
+    explicit BankStalls(const Options& options)
+        : random_(options.seed), percent_(options.memoryPercent), burst_(1, options.memoryBurst) {
         const double stalled = percent_ / 100.0, length = (1.0 + options.memoryBurst) / 2.0;
         starts_ = std::bernoulli_distribution(percent_ == 0 ? 0.0 : 1.0 / (1.0 + length * (1.0 - stalled) / stalled));
     }
@@ -102,7 +105,8 @@ private:
 class Harness {
 public:
     explicit Harness(const Options& options)
-        : array_(options.deaf != 0), random_(options.seed), stallPercent_(options.stallPercent), checkInterval_(std::max(1u, options.checkInterval))
+        : array_(options.deaf != 0), random_(options.seed), stallPercent_(options.stallPercent),
+          checkInterval_(std::max(1u, options.checkInterval))
 #ifdef MEMORY_BANKS
           ,
           stalls_(options)
@@ -138,7 +142,8 @@ public:
     /// columns. Extra cycles then bring free-running counters to the same state as a load through the port.
     void load(const std::string& file, std::size_t bytes, std::uint64_t target, bool throughPort) {
         const std::size_t port = sizeof top_.io_load_bits_record;
-        if (target == 0 ? bytes != port : bytes > port) throw std::runtime_error("the words do not have the width of the load port");
+        if (target == 0 ? bytes != port : bytes > port)
+            throw std::runtime_error("the words do not have the width of the load port");
         if (!top_.io_load_ready) throw std::runtime_error("the load port is not ready");
         std::ifstream stream(file, std::ios::binary);
         if (!stream) throw std::runtime_error("no file " + file);
@@ -191,7 +196,8 @@ public:
         return value;
     }
 
-    void frame(const std::string& file, std::size_t width, std::size_t height, std::uint64_t startAddress, std::uint64_t watchdog) {
+    void frame(const std::string& file, std::size_t width, std::size_t height, std::uint64_t startAddress,
+               std::uint64_t watchdog) {
         pixels_.assign(width * height, {});
         width_ = width;
         received_ = 0;
@@ -210,10 +216,13 @@ public:
             stalls_.next(top_.io_memoryHolds);
 #endif
             cycle();
-            if (watchdog != 0 && quiet_ > watchdogs * watchdog + watchdogMargin) throw std::runtime_error("the watchdog did not abort the frame in time");
-            if ((cycles_ & 0xff) == 0 && std::chrono::steady_clock::now() - lastReport > std::chrono::milliseconds(250)) {
+            if (watchdog != 0 && quiet_ > watchdogs * watchdog + watchdogMargin)
+                throw std::runtime_error("the watchdog did not abort the frame in time");
+            if ((cycles_ & 0xff) == 0 &&
+                std::chrono::steady_clock::now() - lastReport > std::chrono::milliseconds(250)) {
                 lastReport = std::chrono::steady_clock::now();
-                std::cerr << "progress " << static_cast<double>(received_) / static_cast<double>(pixels_.size()) << std::endl;
+                std::cerr << "progress " << static_cast<double>(received_) / static_cast<double>(pixels_.size())
+                          << std::endl;
             }
         }
 #ifdef MEMORY_BANKS
@@ -227,7 +236,9 @@ public:
         if (traces()) cycle();
         isTraced_ = false;
         const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
-        std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(pixels_.data()), static_cast<std::streamsize>(pixels_.size() * sizeof(PixelBytes)));
+        std::ofstream(file, std::ios::binary)
+            .write(reinterpret_cast<const char*>(pixels_.data()),
+                   static_cast<std::streamsize>(pixels_.size() * sizeof(PixelBytes)));
         std::cout << "simulated " << cycles_ - first << ' ' << seconds.count() << '\n';
 #ifdef DRAM_BUS_BYTES
         std::cout << "value dram.beats " << dram_.beats() - firstBeat << '\n';
@@ -348,10 +359,12 @@ void run(const std::string& job, const Options& options) {
         std::string command, name;
         std::uint64_t a = 0, b = 0, c = 0, d = 0;
         words >> command;
-        if ((command == "load" || command == "stream") && words >> name >> a >> b) harness.load(name, a, b, command == "stream");
+        if ((command == "load" || command == "stream") && words >> name >> a >> b)
+            harness.load(name, a, b, command == "stream");
         else if (command == "write" && words >> a >> b) harness.write(a, static_cast<std::uint32_t>(b));
         else if (command == "frame" && words >> name >> a >> b >> c >> d) harness.frame(name, a, b, c, d);
-        else if (command == "read" && words >> name >> a >> b) std::cout << "value " << name << ' ' << decimal(harness.read(a, static_cast<unsigned>(b))) << '\n';
+        else if (command == "read" && words >> name >> a >> b)
+            std::cout << "value " << name << ' ' << decimal(harness.read(a, static_cast<unsigned>(b))) << '\n';
         else throw std::runtime_error("unknown command: " + line);
     }
 }
@@ -375,7 +388,8 @@ int main(int argc, char** argv) try {
                                                        {"--dram-silent", &options.dram.silentAfter}};
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
-        const auto option = std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });
+        const auto option =
+            std::find_if(std::begin(named), std::end(named), [&](const auto& one) { return argument == one.first; });
         if (argument == "--waveform" && i + 1 < argc) options.waveform = argv[++i];
         else if (option == std::end(named)) job = argument;
         else if (++i < argc) *option->second = static_cast<unsigned>(std::stoul(argv[i]));

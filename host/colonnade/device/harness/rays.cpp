@@ -3,11 +3,13 @@
 //   load COUNT BYTES         then COUNT records of BYTES bytes: loads them, from address 0
 //   write ADDRESS VALUE      writes one register word
 //   read ADDRESS             prints a register word
-//   batch TAIL IN OUT        then a batch and IN bytes of its rays: puts it into the only place of the ring, writes 1 to the register TAIL more
+//   batch TAIL IN OUT        then a batch and IN bytes of its rays: puts it into the only place of the ring, writes 1
+//                            to the register TAIL more
 //                            than the last one, waits for its end, and prints its tag and OUT bytes of hits
 //
-// A batch has its rays at 1 << 32, its hits at 2 << 32 and its tag at 64; the ring is at 0. Options: --dram N, the latency of both memories
-// in cycles, --random PERCENT of cycles in which nothing moves, --seed N. Exit status 0, or 3 on an error.
+// A batch has its rays at 1 << 32, its hits at 2 << 32 and its tag at 64; the ring is at 0. Options: --dram N, the
+// latency of both memories in cycles, --random PERCENT of cycles in which nothing moves, --seed N. Exit status 0, or 3
+// on an error.
 #include <deque>
 #include <iostream>
 #include <random>
@@ -26,7 +28,9 @@ constexpr std::uint64_t patience = 1'000'000, doneAddress = 64;
 /// The memory of batches, rays and hits: 4 GB each from a region's begin, of which only what is in use exists.
 class RayMemory {
 public:
-    RayMemory(VColonnade& top, const DramOptions& options) : top_(top), options_(options), random_(options.seed) { regions_[0].resize(2 * beatBytes); }
+    RayMemory(VColonnade& top, const DramOptions& options) : top_(top), options_(options), random_(options.seed) {
+        regions_[0].resize(2 * beatBytes);
+    }
 
     std::vector<unsigned char>& region(unsigned number) { return regions_[number]; }
     bool isIdle() const { return reads_.empty() && answers_.empty() && writeBeats_ == 0; }
@@ -59,7 +63,8 @@ public:
             answers_.pop_front();
         }
         if (top_.io_read_ar_valid && top_.io_read_ar_ready)
-            reads_.push_back({top_.io_read_ar_bits_addr, top_.io_read_ar_bits_len + 1u, static_cast<unsigned>(top_.io_read_ar_bits_id), now_ + options_.latency});
+            reads_.push_back({top_.io_read_ar_bits_addr, top_.io_read_ar_bits_len + 1u,
+                              static_cast<unsigned>(top_.io_read_ar_bits_id), now_ + options_.latency});
         if (top_.io_write_w_valid && top_.io_write_w_ready) store();
         if (top_.io_write_aw_valid && top_.io_write_aw_ready) {
             write_ = {top_.io_write_aw_bits_addr, 0, static_cast<unsigned>(top_.io_write_aw_bits_id), 0};
@@ -132,7 +137,8 @@ public:
 
     void load(std::size_t count, std::size_t bytes) {
         const std::vector<char> records = input(count * bytes);
-        if (bytes != sizeof top_.io_load_bits_record) throw std::runtime_error("the records do not have the width of the load port");
+        if (bytes != sizeof top_.io_load_bits_record)
+            throw std::runtime_error("the records do not have the width of the load port");
         for (std::size_t address = 0; address < count; ++address) {
 #ifdef DRAM_BUS_BYTES
             dram_.store(address, &records[address * bytes], bytes);
@@ -192,7 +198,8 @@ private:
 
     static std::vector<char> input(std::size_t bytes) {
         std::vector<char> result(bytes);
-        if (!std::cin.read(result.data(), static_cast<std::streamsize>(bytes))) throw std::runtime_error("the input ends");
+        if (!std::cin.read(result.data(), static_cast<std::streamsize>(bytes)))
+            throw std::runtime_error("the input ends");
         return result;
     }
 
@@ -226,7 +233,9 @@ int main(int argc, char** argv) try {
     DramOptions options;
     for (int i = 1; i + 1 < argc; i += 2) {
         const std::string name = argv[i];
-        unsigned& value = name == "--dram" ? options.latency : name == "--random" ? options.randomPercent : options.seed;
+        unsigned& value = name == "--dram"     ? options.latency
+                          : name == "--random" ? options.randomPercent
+                                               : options.seed;
         value = static_cast<unsigned>(std::stoul(argv[i + 1]));
     }
     run(options);

@@ -8,7 +8,8 @@
 //   invalidate ADDRESS                     of control.invalidate, if there are caches: the scene may have changed
 //   error ADDRESS                          an error register of the device, 0 after a legal frame
 //   image ADDRESS FILE, scene ADDRESS FILE, framebuffer ADDRESS FILE STRIDE
-//   rays TAIL HEAD ERRORS FIRST END        of a device for rays: addresses of rays.tail, rays.head and errors.batch; its window
+//   rays TAIL HEAD ERRORS FIRST END        of a device for rays: addresses of rays.tail, rays.head and errors.batch;
+//                                          its window
 //   batch DESCRIPTOR RAYS HITS             files of a batch, whose descriptor has no address
 #pragma once
 #include <algorithm>
@@ -63,7 +64,8 @@ struct SequenceJob {
             } else if (kind == "rays") lines >> tail >> head >> batchErrors >> windowBegin >> windowEnd;
             else if (kind == "batch") {
                 batches.emplace_back();
-                for (auto* part : {&batches.back().descriptor, &batches.back().rays, &batches.back().hits}) *part = file(lines);
+                for (auto* part : {&batches.back().descriptor, &batches.back().rays, &batches.back().hits})
+                    *part = file(lines);
             } else throw std::runtime_error("cannot parse: " + kind);
             if (!lines) throw std::runtime_error("cannot parse a line of " + kind);
         }
@@ -97,9 +99,11 @@ struct SequenceJob {
 class Sequences {
 public:
     virtual ~Sequences() = default;
-    Sequences(const SequenceJob& job, unsigned busBytes, std::size_t memoryBytes) : job_(job), busBytes_(busBytes), clean_(memoryBytes, 0xA5) {
+    Sequences(const SequenceJob& job, unsigned busBytes, std::size_t memoryBytes)
+        : job_(job), busBytes_(busBytes), clean_(memoryBytes, 0xA5) {
         for (const auto* stored : {&job.image, &job.scene})
-            std::copy(stored->bytes.begin(), stored->bytes.end(), clean_.begin() + static_cast<std::ptrdiff_t>(stored->address));
+            std::copy(stored->bytes.begin(), stored->bytes.end(),
+                      clean_.begin() + static_cast<std::ptrdiff_t>(stored->address));
     }
 
     /// Runs a sequence on a shell of its own, whose power-up state is also the seed's: the seed repeats it.
@@ -112,7 +116,8 @@ public:
         behaviour.order = static_cast<Order>(seed / kinds_.size() % orders);
         behaviour.stall = std::array<unsigned, 5>{0, 10, 30, 60, 85}[pick(5)];
         behaviour.latency = std::array<unsigned, 8>{0, 0, 5, 5, 5, 40, 40, 200}[pick(8)];
-        report_.place = "sequence " + std::to_string(seed) + " (" + name + ", " + orderNames[seed / kinds_.size() % orders] + ")";
+        report_.place =
+            "sequence " + std::to_string(seed) + " (" + name + ", " + orderNames[seed / kinds_.size() % orders] + ")";
         const std::uint64_t before = report_.count;
         try {
             restore();
@@ -134,8 +139,9 @@ public:
 
     void print() const {
         report_.print();
-        std::cout << "sequences " << done_ << " ended " << ended_ << " exact " << exact_ << " violations " << report_.count << " failed " << failed_ << " cycles "
-                  << report_.cycle << " bursts " << slaves_.bursts << " accesses " << slaves_.accesses << " batches " << batches_ << '\n';
+        std::cout << "sequences " << done_ << " ended " << ended_ << " exact " << exact_ << " violations "
+                  << report_.count << " failed " << failed_ << " cycles " << report_.cycle << " bursts "
+                  << slaves_.bursts << " accesses " << slaves_.accesses << " batches " << batches_ << '\n';
     }
 
 protected:
@@ -159,11 +165,14 @@ protected:
         if (!holds) report_.broken(rule);
     }
 
-    void write(unsigned at, std::uint32_t value) { expect(bench_->write(at, value) == okay_, "a legal write is refused"); }
+    void write(unsigned at, std::uint32_t value) {
+        expect(bench_->write(at, value) == okay_, "a legal write is refused");
+    }
 
     void write(const std::string& name, std::uint64_t value) {
         const auto& entry = job_.registers.at(name);
-        for (unsigned word = 0; 32 * word < entry.width; ++word) write(entry.address + 4 * word, static_cast<std::uint32_t>(value >> 32 * word));
+        for (unsigned word = 0; 32 * word < entry.width; ++word)
+            write(entry.address + 4 * word, static_cast<std::uint32_t>(value >> 32 * word));
     }
 
     std::uint32_t read(unsigned at) {
@@ -189,7 +198,9 @@ protected:
     /// The memory and the windows of legal work.
     void restore() {
         slaves_.memory = clean_;
-        slaves_.readable = {{job_.image.address, job_.image.end()}, {job_.scene.address, job_.scene.end()}, {job_.windowBegin, job_.windowEnd}};
+        slaves_.readable = {{job_.image.address, job_.image.end()},
+                            {job_.scene.address, job_.scene.end()},
+                            {job_.windowBegin, job_.windowEnd}};
         slaves_.writable = {{job_.framebuffer.address, job_.framebuffer.end()}, {job_.windowBegin, job_.windowEnd}};
     }
 
@@ -207,7 +218,8 @@ protected:
         write("control", reset_);
         const std::uint64_t before = slaves_.writtenBeats;
         awaitIdle("a soft reset does not end");
-        expect(slaves_.writtenBeats - before <= 2, "bytes are written after a soft reset"); // two beats may have been offered
+        expect(slaves_.writtenBeats - before <= 2,
+               "bytes are written after a soft reset"); // two beats may have been offered
         expect(bench_->isQuiet(), "a burst is under way after a soft reset");
         for (const auto& word : job_.frame)
             if (read(word.address) != 0) return report_.broken("a register of the device is not 0 after a soft reset");

@@ -1,5 +1,6 @@
-// Testbench of the AXI4 shell: executes the commands of a job on the Verilated ColonnadeAxi, one command per line. The job
-// is a file, or "-" for the standard input: then a driver in another process can send commands and read what they print.
+// Testbench of the AXI4 shell: executes the commands of a job on the Verilated ColonnadeAxi, one command per line. The
+// job is a file, or "-" for the standard input: then a driver in another process can send commands and read what they
+// print.
 //
 //   store FILE ADDRESS         writes a file into the memory
 //   write ADDRESS VALUE        writes a register word by AXI4-Lite
@@ -8,13 +9,14 @@
 //   run CYCLES                 goes on for so many cycles, or until the interrupt; prints "ran CYCLES"
 //   dump FILE ADDRESS BYTES    writes a range of the memory to a file; bytes that were never written are 0xA5
 //   fail BEATS                 so many of 1024 beats of the scene's reads are answered with an error from now on
-//   bus LATENCY STALL ORDER ERRORS SEED    the memory of the masters, not of the scene, from now on: as the options, and so many of
-//                              1024 of its answers are errors
+//   bus LATENCY STALL ORDER ERRORS SEED    the memory of the masters, not of the scene, from now on: as the options,
+//                              and so many of 1024 of its answers are errors
 //
-// Options: --bus BYTES of the data bus; --memory BYTES of memory, from address --base N (0); --shared FILE, which is the
-// memory, and which other programs may also map; --latency CYCLES of an answer; --stall
-// PERCENT of cycles in which a channel does not move; --order N of a write's address and data (WriteOrder); --seed N of stalls and of the state at power-up. An access beyond the memory, an answer with an error, or a
-// broken rule of AXI ends the run. Exit status 0, or 3 on an error.
+// Options: --bus BYTES of the data bus; --memory BYTES of memory, from address --base N (0); --shared FILE, which is
+// the memory, and which other programs may also map; --latency CYCLES of an answer; --stall PERCENT of cycles in which
+// a channel does not move; --order N of a write's address and data (WriteOrder); --seed N of stalls and of the state at
+// power-up. An access beyond the memory, an answer with an error, or a broken rule of AXI ends the run. Exit status 0,
+// or 3 on an error.
 #include <cstdint>
 #include <fstream>
 #include <iostream>
@@ -56,7 +58,8 @@ public:
     }
 
     void dump(const std::string& file, std::uint64_t address, std::uint64_t size) {
-        std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(memory_.range(address, size)), static_cast<std::streamsize>(size));
+        std::ofstream(file, std::ios::binary)
+            .write(reinterpret_cast<const char*>(memory_.range(address, size)), static_cast<std::streamsize>(size));
     }
 
     void write(unsigned address, std::uint32_t value) {
@@ -139,7 +142,8 @@ void run(const std::string& job, std::map<std::string, unsigned>& options, const
         words >> command;
         if (command == "bus") {
             MasterTiming timing;
-            if (!(words >> timing.latency >> timing.stall >> timing.order >> timing.errorsPer1024 >> timing.seed)) throw std::runtime_error("cannot parse: " + line);
+            if (!(words >> timing.latency >> timing.stall >> timing.order >> timing.errorsPer1024 >> timing.seed))
+                throw std::runtime_error("cannot parse: " + line);
             harness.setBus(timing);
             continue;
         }
@@ -156,19 +160,24 @@ void run(const std::string& job, std::map<std::string, unsigned>& options, const
         else if (command == "run") std::cout << "ran " << harness.run(first) << '\n';
         else if (command == "read") {
             std::uint64_t value = 0;
-            for (unsigned word = 0; word < second; ++word) value |= static_cast<std::uint64_t>(harness.read(static_cast<unsigned>(first) + 4 * word)) << (32 * word);
+            for (unsigned word = 0; word < second; ++word)
+                value |= static_cast<std::uint64_t>(harness.read(static_cast<unsigned>(first) + 4 * word))
+                         << (32 * word);
             std::cout << "value " << name << ' ' << value << '\n';
         } else throw std::runtime_error("unknown command: " + line);
     }
 }
 
-/// Runs sequences of consecutive seeds; prints what was broken, and counts. Ends after ten that broke a rule: hangs take long.
+/// Runs sequences of consecutive seeds; prints what was broken, and counts. Ends after ten that broke a rule: hangs
+/// take long.
 int runSequences(const std::string& job, std::map<std::string, unsigned>& options) {
     const SequenceJob parsed(job);
     std::unique_ptr<Sequences> sequences;
-    if (parsed.batches.empty()) sequences = std::make_unique<FrameSequences>(parsed, options["--bus"], options["--memory"]);
+    if (parsed.batches.empty())
+        sequences = std::make_unique<FrameSequences>(parsed, options["--bus"], options["--memory"]);
     else sequences = std::make_unique<BatchSequences>(parsed, options["--bus"], options["--memory"]);
-    for (unsigned i = 0; i < options["--sequences"] && sequences->failed() < 10; ++i) sequences->run(options["--seed"] + i);
+    for (unsigned i = 0; i < options["--sequences"] && sequences->failed() < 10; ++i)
+        sequences->run(options["--seed"] + i);
     sequences->print();
     return 0;
 }

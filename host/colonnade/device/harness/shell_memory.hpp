@@ -18,14 +18,17 @@
 /// The pins of m_axi_scene, under the names that the core's read port has.
 struct ScenePins {
     explicit ScenePins(VColonnadeAxi& top)
-        : io_memory_ar_valid(top.m_axi_scene_arvalid), io_memory_ar_ready(top.m_axi_scene_arready), io_memory_ar_bits_addr(top.m_axi_scene_araddr),
-          io_memory_ar_bits_len(top.m_axi_scene_arlen), io_memory_ar_bits_size(top.m_axi_scene_arsize), io_memory_ar_bits_id(top.m_axi_scene_arid),
-          io_memory_r_valid(top.m_axi_scene_rvalid), io_memory_r_ready(top.m_axi_scene_rready), io_memory_r_bits_data(top.m_axi_scene_rdata),
-          io_memory_r_bits_id(top.m_axi_scene_rid), io_memory_r_bits_last(top.m_axi_scene_rlast), io_memory_r_bits_resp(top.m_axi_scene_rresp) {}
+        : io_memory_ar_valid(top.m_axi_scene_arvalid), io_memory_ar_ready(top.m_axi_scene_arready),
+          io_memory_ar_bits_addr(top.m_axi_scene_araddr), io_memory_ar_bits_len(top.m_axi_scene_arlen),
+          io_memory_ar_bits_size(top.m_axi_scene_arsize), io_memory_ar_bits_id(top.m_axi_scene_arid),
+          io_memory_r_valid(top.m_axi_scene_rvalid), io_memory_r_ready(top.m_axi_scene_rready),
+          io_memory_r_bits_data(top.m_axi_scene_rdata), io_memory_r_bits_id(top.m_axi_scene_rid),
+          io_memory_r_bits_last(top.m_axi_scene_rlast), io_memory_r_bits_resp(top.m_axi_scene_rresp) {}
 
     CData &io_memory_ar_valid, &io_memory_ar_ready;
     QData& io_memory_ar_bits_addr;
-    CData &io_memory_ar_bits_len, &io_memory_ar_bits_size, &io_memory_ar_bits_id, &io_memory_r_valid, &io_memory_r_ready;
+    CData &io_memory_ar_bits_len, &io_memory_ar_bits_size, &io_memory_ar_bits_id, &io_memory_r_valid,
+        &io_memory_r_ready;
     decltype(VColonnadeAxi::m_axi_scene_rdata) io_memory_r_bits_data; // a reference, whose type depends on the width
     CData &io_memory_r_bits_id, &io_memory_r_bits_last, &io_memory_r_bits_resp;
 };
@@ -53,7 +56,14 @@ struct Scene {
 #endif
 
 /// When a memory takes the address and the data of a write; AXI4 allows all of these.
-enum class WriteOrder : unsigned { any, addressAfterDataValid, dataAfterAddress, together, addressAfterLastBeat, count };
+enum class WriteOrder : unsigned {
+    any,
+    addressAfterDataValid,
+    dataAfterAddress,
+    together,
+    addressAfterLastBeat,
+    count
+};
 
 /// How the memory behind a master behaves.
 struct MasterTiming {
@@ -86,7 +96,8 @@ MASTER(RefitPins, m_axi_refit)
 /// The memory behind a master, whose answers come in order.
 template <class Pins> class MemoryPort {
 public:
-    MemoryPort(VColonnadeAxi& top, unsigned busBytes, const MasterTiming& timing, BusBytes& bytes) : pins_(top), bus_(busBytes), bytes_(bytes) {
+    MemoryPort(VColonnadeAxi& top, unsigned busBytes, const MasterTiming& timing, BusBytes& bytes)
+        : pins_(top), bus_(busBytes), bytes_(bytes) {
         set(timing);
         pins_.bvalid = pins_.rvalid = pins_.bresp = pins_.rresp = pins_.bid = pins_.rid = 0;
     }
@@ -149,7 +160,9 @@ private:
     bool moves() { return timing_.stall == 0 || random_() % 100 >= timing_.stall; }
 
     /// SLVERR or DECERR for some answers.
-    CData response() { return timing_.errorsPer1024 != 0 && random_() % 1024 < timing_.errorsPer1024 ? 2 + random_() % 2 : 0; }
+    CData response() {
+        return timing_.errorsPer1024 != 0 && random_() % 1024 < timing_.errorsPer1024 ? 2 + random_() % 2 : 0;
+    }
 
     /// Offers the next beat of a read, whose data are other ones if it fails.
     void offerBeat(const Burst& read) {
@@ -215,7 +228,8 @@ private:
         for (unsigned i = 0; i < bus_; ++i)
             if (beat.strobes[i / 8] >> i % 8 & 1) to[i] = beat.data[i];
         ++burst.done;
-        if (beat.isLast != (burst.done == burst.beats)) throw std::runtime_error("a burst does not end with its last beat");
+        if (beat.isLast != (burst.done == burst.beats))
+            throw std::runtime_error("a burst does not end with its last beat");
         if (burst.done < burst.beats) return;
         answers_.push_back(burst);
         answers_.back().due = now_ + timing_.latency;
@@ -239,7 +253,8 @@ private:
 class Memory {
 public:
     Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options, const std::string& shared)
-        : Memory(top, options, {options["--latency"], options["--stall"], options["--order"], 0, options["--seed"]}, shared) {}
+        : Memory(top, options, {options["--latency"], options["--stall"], options["--order"], 0, options["--seed"]},
+                 shared) {}
 
     std::uint8_t* range(std::uint64_t address, std::uint64_t size) { return bytes_.range(address, size); }
 
@@ -274,9 +289,11 @@ public:
     }
 
 private:
-    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options, const MasterTiming& timing, const std::string& shared)
-        : top_(top), bytes_(options["--base"], options["--memory"], shared), master_(top, options["--bus"], timing, bytes_),
-          refit_(top, options["--bus"], timing, bytes_), scene_(top, {timing.latency, timing.stall, 0, 0, timing.seed}, bytes_) {}
+    Memory(VColonnadeAxi& top, std::map<std::string, unsigned>& options, const MasterTiming& timing,
+           const std::string& shared)
+        : top_(top), bytes_(options["--base"], options["--memory"], shared),
+          master_(top, options["--bus"], timing, bytes_), refit_(top, options["--bus"], timing, bytes_),
+          scene_(top, {timing.latency, timing.stall, 0, 0, timing.seed}, bytes_) {}
 
     VColonnadeAxi& top_;
     BusBytes bytes_;

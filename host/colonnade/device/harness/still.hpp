@@ -58,7 +58,8 @@ public:
     void check(const char* name) {
         if (!isStill_) return;
         flip(period_); // from the begin of a period: the missing ones are still to be done
-        if (!isSaved()) throw std::runtime_error(std::string("the simulator let ") + name + " sleep, which does not stand still");
+        if (!isSaved())
+            throw std::runtime_error(std::string("the simulator let ") + name + " sleep, which does not stand still");
     }
 
 private:

@@ -17,13 +17,16 @@ inline std::unique_ptr<MeshReader> readerOf(Text format, const std::string& wher
     return nullptr;
 }
 
-/// The alpha of a texture of so many pixels: that of another picture at the nearest pixels, or its brightness if it has none.
-inline std::vector<std::uint8_t> maskOf(const Picture<std::uint8_t>& picture, const std::uint8_t* alpha, std::int64_t height, std::int64_t width) {
+/// The alpha of a texture of so many pixels: that of another picture at the nearest pixels, or its brightness if it has
+/// none.
+inline std::vector<std::uint8_t> maskOf(const Picture<std::uint8_t>& picture, const std::uint8_t* alpha,
+                                        std::int64_t height, std::int64_t width) {
     std::vector<std::uint8_t> found;
     for (std::int64_t row = 0; row < height; ++row)
         for (std::int64_t column = 0; column < width; ++column) {
             const std::int64_t at = row * picture.height / height * picture.width + column * picture.width / width;
-            found.push_back(alpha ? alpha[at] : *std::max_element(picture.pixels + 3 * at, picture.pixels + 3 * at + 3));
+            found.push_back(alpha ? alpha[at]
+                                  : *std::max_element(picture.pixels + 3 * at, picture.pixels + 3 * at + 3));
         }
     return found;
 }

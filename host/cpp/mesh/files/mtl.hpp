@@ -1,8 +1,9 @@
 /// MTL files: materials by name, and the textures `map_Kd` and `map_d` with the options `-s`, `-o` and `-clamp`.
 ///
 /// The format leaves the space of its colours open. Viewers take them as sRGB: three.js' MTLLoader and F3D decode them,
-/// Babylon.js, Godot and those of OpenGL's fixed colours show them as they are. Blender reads and writes linear ones, so those of a
-/// file that begins with its name are linear. host/colonnade/mesh/materials/materials.py has a table of what becomes of a material.
+/// Babylon.js, Godot and those of OpenGL's fixed colours show them as they are. Blender reads and writes linear ones,
+/// so those of a file that begins with its name are linear. host/colonnade/mesh/materials/materials.py has a table of
+/// what becomes of a material.
 #pragma once
 
 #include <map>
@@ -18,7 +19,10 @@ struct TextureMap {
     Pair scale{1, 1}, offset{0, 0};
     bool isClamped = false;
 
-    bool operator<(const TextureMap& other) const { return std::tie(name, scale, offset, isClamped) < std::tie(other.name, other.scale, other.offset, other.isClamped); }
+    bool operator<(const TextureMap& other) const {
+        return std::tie(name, scale, offset, isClamped) <
+               std::tie(other.name, other.scale, other.offset, other.isClamped);
+    }
 };
 
 /// A statement of OBJ or MTL without its comment: the keyword, lower case in MTL, and its words.
@@ -31,10 +35,12 @@ struct Statement {
         keyword = lowered(from.next());
         // Names may have a #
         static constexpr Text names[]{"newmtl", "bump", "disp", "decal", "refl", "norm"};
-        const bool isName = startsWith(keyword, "map_") || std::find(std::begin(names), std::end(names), keyword) != std::end(names);
+        const bool isName =
+            startsWith(keyword, "map_") || std::find(std::begin(names), std::end(names), keyword) != std::end(names);
         if (!isName && keyword[0] == '#') keyword.clear();
         if (keyword.empty()) return;
-        for (Text word = from.next(); !word.empty() && (isName || word[0] != '#'); word = from.next()) words.emplace_back(word);
+        for (Text word = from.next(); !word.empty() && (isName || word[0] != '#'); word = from.next())
+            words.emplace_back(word);
     }
 };
 
@@ -61,7 +67,8 @@ public:
         if (first("pm", 0) >= 0.5 || model == 3 || model == 5) {
             found.kind = Kind::mirror;
             found.roughness = share(first("pr", 0));
-        } else if (const double rough = first("pr", 1); rough < glossy) found.roughness = std::max(share(rough), sharpRoughness);
+        } else if (const double rough = first("pr", 1); rough < glossy)
+            found.roughness = std::max(share(rough), sharpRoughness);
         if (isLit(found)) {
             const Vector emitted = emission();
             const double most = std::max({1.0, emitted[0], emitted[1], emitted[2]});
@@ -75,15 +82,17 @@ public:
         const FileMaterial found = material();
         std::size_t maps = 0;
         for (const auto& [keyword, values] : words)
-            maps += (startsWith(keyword, "map_") && keyword != "map_kd" && keyword != "map_d") || keyword == "bump" || keyword == "disp" || keyword == "decal" ||
-                    keyword == "refl" || keyword == "norm";
+            maps += (startsWith(keyword, "map_") && keyword != "map_kd" && keyword != "map_d") || keyword == "bump" ||
+                    keyword == "disp" || keyword == "decal" || keyword == "refl" || keyword == "norm";
         losses.add(lost::otherMaps, maps);
         const Vector emitted = emission();
         const double most = std::max({emitted[0], emitted[1], emitted[2]});
         if (most > 0 && !isLit(found)) losses.add(lost::emission);
         else if (most > 1) losses.add(lost::bright);
-        if (opacity() > 0 && opacity() < 1 && !words.count("tf")) losses.add(found.kind == Kind::glass ? lost::partlyGlass : lost::blended);
-        if (found.kind == Kind::diffuse && first("illum", 2) >= 2 && colour("ks", {}, 1) != Vector{}) losses.add(lost::highlights);
+        if (opacity() > 0 && opacity() < 1 && !words.count("tf"))
+            losses.add(found.kind == Kind::glass ? lost::partlyGlass : lost::blended);
+        if (found.kind == Kind::diffuse && first("illum", 2) >= 2 && colour("ks", {}, 1) != Vector{})
+            losses.add(lost::highlights);
         static constexpr struct {
             const char *keyword, *lower;
             std::size_t count;
@@ -93,11 +102,15 @@ public:
             const std::vector<std::string>* given = get(one.lower);
             if (!given) continue;
             bool isRead = given->size() >= one.count;
-            for (std::size_t i = 0; isRead && i < one.count; ++i) isRead = std::isfinite(numberOf((*given)[i]).value_or(HUGE_VAL));
-            if (!isRead) losses.add(lost::noValues, 1, std::string(one.keyword) + (given->empty() ? "" : " ") + joined(*given));
+            for (std::size_t i = 0; isRead && i < one.count; ++i)
+                isRead = std::isfinite(numberOf((*given)[i]).value_or(HUGE_VAL));
+            if (!isRead)
+                losses.add(lost::noValues, 1, std::string(one.keyword) + (given->empty() ? "" : " ") + joined(*given));
         }
         const std::vector<std::string>* shininess = get("ns");
-        losses.add(lost::negativeShininess, shininess && std::any_of(shininess->begin(), shininess->end(), [](const std::string& word) { return word[0] == '-'; }));
+        losses.add(lost::negativeShininess,
+                   shininess && std::any_of(shininess->begin(), shininess->end(),
+                                            [](const std::string& word) { return word[0] == '-'; }));
     }
 
     /// A texture map; nothing without one. Options that are not used are counted.
@@ -114,10 +127,13 @@ public:
         const std::size_t last = given->size() - 1;
         while (at < last) {
             const std::string name = lowered((*given)[at]);
-            const auto* option = std::find_if(std::begin(options), std::end(options), [&](const auto& one) { return one.name == name; });
+            const auto* option =
+                std::find_if(std::begin(options), std::end(options), [&](const auto& one) { return one.name == name; });
             if (option == std::end(options)) break;
             const std::size_t begin = ++at;
-            const auto isNumber = [&](const std::string& word) { return std::isfinite(numberOf(word).value_or(HUGE_VAL)); };
+            const auto isNumber = [&](const std::string& word) {
+                return std::isfinite(numberOf(word).value_or(HUGE_VAL));
+            };
             while (at < last && at < begin + option->values && (option->values == 1 || isNumber((*given)[at]))) ++at;
             if (name == "-clamp") found.isClamped = at > begin && (*given)[begin] == "on";
             else if ((name == "-s" || name == "-o") && at > begin) {
@@ -137,7 +153,9 @@ private:
 
     static double share(double value) { return std::clamp(value, 0.0, 1.0); }
     /// Whether the lights are seen on a surface, and its emission with them.
-    static bool isLit(const FileMaterial& found) { return found.kind == Kind::diffuse || found.roughness > mirrorRoughness; }
+    static bool isLit(const FileMaterial& found) {
+        return found.kind == Kind::diffuse || found.roughness > mirrorRoughness;
+    }
 
     const std::vector<std::string>* get(const char* keyword) const {
         const auto found = words.find(keyword);
@@ -158,7 +176,8 @@ private:
         Vector found;
         bool isColour = !isLinear && (keyword[1] == 'd' || keyword[1] == 'e'); // Kd or Ke: others are shares of light
         for (int channel = 0; channel < 3; ++channel) {
-            isColour = isColour && std::isfinite(numberOf((*given)[static_cast<std::size_t>(channel)]).value_or(HUGE_VAL));
+            isColour =
+                isColour && std::isfinite(numberOf((*given)[static_cast<std::size_t>(channel)]).value_or(HUGE_VAL));
             found[channel] = numberOr((*given)[static_cast<std::size_t>(channel)], otherwise[channel]);
         }
         for (double& value : found) {
@@ -184,7 +203,8 @@ inline bool isChecked(const std::string& keyword) {
            (keyword.size() > 1 && keyword[0] == 'p' && Text("rmsc").find(keyword[1]) != Text::npos);
 }
 
-/// Adds the materials of an MTL file, which replace those of equal names; a refusal, or none. `where`: the file, in messages.
+/// Adds the materials of an MTL file, which replace those of equal names; a refusal, or none. `where`: the file, in
+/// messages.
 inline std::string addMaterials(Text bytes, const std::string& where, MtlMaterials& to) {
     std::string buffer;
     const Text text = textOf(bytes, buffer);
@@ -206,7 +226,8 @@ inline std::string addMaterials(Text bytes, const std::string& where, MtlMateria
                 const std::optional<double> number = numberOf(word);
                 if (!number) break;
                 if (!std::isfinite(*number) || (*number < 0 && statement.keyword != "ns"))
-                    return where + ", line " + std::to_string(row) + ": " + std::string(trimmed(line)) + ": a material's numbers must be finite and not negative";
+                    return where + ", line " + std::to_string(row) + ": " + std::string(trimmed(line)) +
+                           ": a material's numbers must be finite and not negative";
             }
         if (statement.keyword == "newmtl") {
             current = &own[joined(statement.words)];

@@ -26,7 +26,8 @@ public:
             else if (keyword == "vn") readRow(words, normals_, badNormal_);
             else if (keyword == "vt") readRow(words, uvs_, badUv_);
             else if (keyword == "usemtl") {
-                material_ = static_cast<std::int32_t>(names_.emplace(joined(wordsOf(words.rest())), names_.size()).first->second);
+                material_ = static_cast<std::int32_t>(
+                    names_.emplace(joined(wordsOf(words.rest())), names_.size()).first->second);
             } else if (keyword == "mtllib") addLibrary(words.rest());
             else if (keyword == "s") {
                 const std::string group(words.next());
@@ -61,7 +62,8 @@ public:
                 continue;
             }
             use.entries = &found->second;
-            const std::optional<TextureMap> colour = use.entries->map("map_kd", losses), alpha = use.entries->map("map_d", losses);
+            const std::optional<TextureMap> colour = use.entries->map("map_kd", losses),
+                                            alpha = use.entries->map("map_d", losses);
             if (!colour && !alpha) continue;
             use.map = colour ? colour : alpha; // one position of a corner serves both
             use.isColoured = colour.has_value();
@@ -77,7 +79,9 @@ public:
         surface.materials.resize(names_.size());
         std::vector<std::int32_t> numbers; // of the textures that are needed, in the surface
         for (const auto& [colour, alpha] : needed_) {
-            const auto read = [&](std::int32_t picture) { return picture < 0 ? -1 : pictures[static_cast<std::size_t>(picture)]; };
+            const auto read = [&](std::int32_t picture) {
+                return picture < 0 ? -1 : pictures[static_cast<std::size_t>(picture)];
+            };
             const std::int32_t base = read(colour), mask = read(alpha);
             numbers.push_back(base < 0 && mask < 0 ? -1 : static_cast<std::int32_t>(surface.textures.size()));
             if (numbers.back() >= 0) surface.textures.push_back({base < 0 ? mask : base, mask, base < 0});
@@ -97,7 +101,8 @@ public:
         // Of equal materials the first
         std::map<FileMaterial, std::int32_t> firsts;
         std::vector<std::int32_t> first;
-        for (const FileMaterial& material : surface.materials) first.push_back(firsts.emplace(material, static_cast<std::int32_t>(first.size())).first->second);
+        for (const FileMaterial& material : surface.materials)
+            first.push_back(firsts.emplace(material, static_cast<std::int32_t>(first.size())).first->second);
         for (std::int32_t& material : polygons_.materials) material = first[static_cast<std::size_t>(material)];
         return addTo(polygons_);
     }
@@ -142,7 +147,8 @@ private:
     template <class Values> void readRow(Words& words, std::vector<Values>& rows, Bad& bad) {
         Values row{};
         std::size_t count = 0;
-        for (Text word = words.next(); count < row.size() && !word.empty() && word[0] != '#'; word = words.next(), ++count) {
+        for (Text word = words.next(); count < row.size() && !word.empty() && word[0] != '#';
+             word = words.next(), ++count) {
             const std::optional<double> number = numberOf(word);
             if (!number && bad.word.empty()) bad.word = word;
             row[count] = number.value_or(0);
@@ -187,8 +193,10 @@ private:
     }
 
     bool finishVertices() {
-        if (!surface.vertices.empty() && (columns_ < 3 || badVertex_.column < 3)) return refuseRow(badVertex_.column < 3 ? badVertex_.word : "");
-        if (badNormal_.column == 0 || !badNormal_.word.empty()) return refuseRow(badNormal_.column == 0 ? "" : badNormal_.word);
+        if (!surface.vertices.empty() && (columns_ < 3 || badVertex_.column < 3))
+            return refuseRow(badVertex_.column < 3 ? badVertex_.word : "");
+        if (badNormal_.column == 0 || !badNormal_.word.empty())
+            return refuseRow(badNormal_.column == 0 ? "" : badNormal_.word);
         if (columns_ < 6 || surface.vertices.empty()) {
             losses.add(lost::someColours, surface.vertices.empty() ? 0 : coloured_);
             polygons_.vertexColours.clear();
@@ -200,7 +208,9 @@ private:
         return true;
     }
 
-    bool refuseRow(const std::string& word) { return refuseValue(word.empty() ? "a vertex or normal has fewer than 3 numbers" : noNumber(word)); }
+    bool refuseRow(const std::string& word) {
+        return refuseValue(word.empty() ? "a vertex or normal has fewer than 3 numbers" : noNumber(word));
+    }
 
     bool finishCorners() {
         if (hasOddIndex_) return refuse("a vertex index of a face is not an integer");
@@ -208,7 +218,8 @@ private:
             losses.add(lost::missing, namedNormals_);
             normalIndices_ = {};
         }
-        if (!vertexIndices_.check(*this, "vertex", "vertices", surface.vertices.size()) || !normalIndices_.check(*this, "normal", "normals", normals_.size()))
+        if (!vertexIndices_.check(*this, "vertex", "vertices", surface.vertices.size()) ||
+            !normalIndices_.check(*this, "normal", "normals", normals_.size()))
             return false;
         if (isBefore_) return refuse("a relative index of a face names a vertex before the first");
         for (std::int32_t& uv : cornerUvs_)
@@ -218,10 +229,12 @@ private:
         for (const std::int32_t corner : polygons_.corners)
             for (const double value : surface.vertices[static_cast<std::size_t>(corner)])
                 if (!std::isfinite(value)) odd = std::min(odd, corner);
-        return odd == INT32_MAX || refuse("vertex " + std::to_string(odd + 1) + " is not a finite number: repair the file");
+        return odd == INT32_MAX ||
+               refuse("vertex " + std::to_string(odd + 1) + " is not a finite number: repair the file");
     }
 
-    /// Gives corners their positions. A polygon with a corner without one, or with one beyond `maxUv`, shows no texture.
+    /// Gives corners their positions. A polygon with a corner without one, or with one beyond `maxUv`, shows no
+    /// texture.
     bool placeTextures() {
         if (badUv_.column == 0 || !badUv_.word.empty()) return refuseRow(badUv_.column == 0 ? "" : badUv_.word);
         const auto count = static_cast<std::int32_t>(surface.materials.size());
@@ -233,12 +246,14 @@ private:
         for (std::size_t polygon = 0; polygon < polygons_.sizes.size(); ++polygon) {
             std::int32_t& material = polygons_.materials[polygon];
             const std::optional<TextureMap>& map = uses_[static_cast<std::size_t>(material)].map;
-            const TextureMap transform = map && surface.materials[static_cast<std::size_t>(material)].texture >= 0 ? *map : TextureMap();
+            const TextureMap transform =
+                map && surface.materials[static_cast<std::size_t>(material)].texture >= 0 ? *map : TextureMap();
             bool lacks = false;
             for (std::int64_t i = 0; i < polygons_.sizes[polygon]; ++i, ++corner) {
                 const std::int32_t own = cornerUvs_[corner];
                 const Pair at = own < 0 ? Pair{} : uvs_[static_cast<std::size_t>(own)];
-                const Pair uv{at[0] * transform.scale[0] + transform.offset[0], 1 - (at[1] * transform.scale[1] + transform.offset[1])};
+                const Pair uv{at[0] * transform.scale[0] + transform.offset[0],
+                              1 - (at[1] * transform.scale[1] + transform.offset[1])};
                 const bool isKnown = own >= 0 && std::fabs(uv[0]) <= maxUv && std::fabs(uv[1]) <= maxUv;
                 polygons_.uvs.push_back(isKnown ? uv : Pair{});
                 lacks |= !isKnown;
@@ -267,7 +282,8 @@ private:
             if (hasZero) return reader.refuse("a face names " + one + " 0; OBJ files number " + several + " from 1");
             for (const std::int64_t worst : {least, largest})
                 if (std::abs(worst) > static_cast<std::int64_t>(count))
-                    return reader.refuse("a face names " + one + " " + std::to_string(worst) + ", but the file has " + grouped(count) + " " + several);
+                    return reader.refuse("a face names " + one + " " + std::to_string(worst) + ", but the file has " +
+                                         grouped(count) + " " + several);
             return true;
         }
     };
@@ -285,7 +301,8 @@ private:
     MtlMaterials defined_;
     std::vector<Use> uses_;
     std::map<std::pair<std::optional<TextureMap>, std::optional<TextureMap>>, std::size_t> textures_;
-    std::vector<std::pair<std::int32_t, std::int32_t>> needed_; ///< of each texture the pictures of its colours and its alpha
+    std::vector<std::pair<std::int32_t, std::int32_t>>
+        needed_; ///< of each texture the pictures of its colours and its alpha
 };
 
 } // namespace colonnade::mesh

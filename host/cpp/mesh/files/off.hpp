@@ -13,13 +13,17 @@ public:
         std::string buffer;
         Lines lines(textOf(bytes, buffer));
         Row words;
-        if (!next(lines, words) || !readKeyword(words[0]) || std::find(words.begin(), words.end(), "BINARY") != words.end())
+        if (!next(lines, words) || !readKeyword(words[0]) ||
+            std::find(words.begin(), words.end(), "BINARY") != words.end())
             return refuseFormat("it is no text that starts with OFF, COFF or NOFF");
         words.erase(words.begin());
         // Some programs write the counts right after the keyword, as those of ModelNet40
         if (!counts_.empty()) words.insert(words.begin(), counts_);
         if (words.empty()) next(lines, words);
-        const auto countOf = [&](std::size_t at) { return words.size() > at && words[at].size() <= 18 && isDigit(words[at][0]) ? wholeOf(words[at]) : std::nullopt; };
+        const auto countOf = [&](std::size_t at) {
+            return words.size() > at && words[at].size() <= 18 && isDigit(words[at][0]) ? wholeOf(words[at])
+                                                                                        : std::nullopt;
+        };
         const std::optional<std::int64_t> vertices = countOf(0), faces = countOf(1);
         if (!vertices || !faces) return refuseFormat("its OFF header has no numbers of vertices and faces");
         return readVertices(lines, *vertices, *faces) && readFaces(lines, *vertices, *faces);
@@ -38,7 +42,8 @@ private:
     }
 
     bool readKeyword(Text word) {
-        const std::size_t letters = std::min(word.size(), static_cast<std::size_t>(std::find_if(word.begin(), word.end(), isDigit) - word.begin()));
+        const std::size_t letters = std::min(
+            word.size(), static_cast<std::size_t>(std::find_if(word.begin(), word.end(), isDigit) - word.begin()));
         counts_ = word.substr(letters);
         word = word.substr(0, letters);
         if (startsWith(word, "ST")) word.remove_prefix(2);
@@ -50,8 +55,8 @@ private:
     }
 
     bool refuseShort(std::int64_t vertices, std::int64_t faces) {
-        return refuseTruncated("its header states " + grouped(static_cast<std::uint64_t>(vertices)) + " vertices and " + grouped(static_cast<std::uint64_t>(faces)) +
-                               " faces");
+        return refuseTruncated("its header states " + grouped(static_cast<std::uint64_t>(vertices)) + " vertices and " +
+                               grouped(static_cast<std::uint64_t>(faces)) + " faces");
     }
 
     bool readVertices(Lines& lines, std::int64_t count, std::int64_t faces) {
@@ -106,7 +111,8 @@ private:
             if (!next(lines, words)) return refuseShort(vertices, count);
             const std::optional<std::int64_t> size = wholeOf(words[0]);
             if (!size) return refuseValue(noNumber(words[0]));
-            if (*size < 0 || *size >= static_cast<std::int64_t>(words.size())) return refuse("a face has fewer corners than it states");
+            if (*size < 0 || *size >= static_cast<std::int64_t>(words.size()))
+                return refuse("a face has fewer corners than it states");
             for (std::size_t i = 1; i <= static_cast<std::size_t>(*size); ++i) {
                 const std::optional<std::int64_t> index = wholeOf(words[i]);
                 if (!index) return refuseValue(noNumber(words[i]));
@@ -123,8 +129,8 @@ private:
             colours.push_back(colour);
         }
         if (least < 0 || largest >= vertices)
-            return refuse("a face names vertex " + std::to_string(least < 0 ? least : largest) + ", but the file has " + grouped(static_cast<std::uint64_t>(vertices)) +
-                          " vertices");
+            return refuse("a face names vertex " + std::to_string(least < 0 ? least : largest) + ", but the file has " +
+                          grouped(static_cast<std::uint64_t>(vertices)) + " vertices");
         losses.add(lost::alpha, transparent_);
         losses.add(lost::faceAlpha, clear);
         if (hasColours_) makeLinear(polygons_.vertexColours, {}, losses);
@@ -142,7 +148,12 @@ private:
             if (!number) return refuseValue(noNumber(words[i]));
             const double value = std::isnan(*number) ? 0 : *number;
             if (i < 3) colour[i] = linearFromSrgb(std::clamp(value / white, 0.0, 1.0));
-            else clear += value < (std::any_of(words.begin(), words.begin() + 3, [](Text word) { return word.find('.') != Text::npos; }) ? 1.0 : 255.0);
+            else
+                clear += value <
+                         (std::any_of(
+                              words.begin(), words.begin() + 3, [](Text word) { return word.find('.') != Text::npos; })
+                              ? 1.0
+                              : 255.0);
         }
         return true;
     }

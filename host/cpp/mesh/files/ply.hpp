@@ -1,9 +1,9 @@
 /// PLY files: polygons and triangle strips with normals, colours and textures.
 ///
-/// The format names no properties; those that are read are the ones that MeshLab, Blender, Assimp, trimesh and scanners write. Colours are
-/// sRGB, as bytes or from 0 to 1. `comment TextureFile NAME` names a picture, in the forms of MeshLab and Blender: a vertex has its position
-/// as `s t`, `u v`, `texture_u texture_v` or `tx ty`, or a face has those of its corners as the list `texcoord`, and the number of its picture
-/// as `texnumber`.
+/// The format names no properties; those that are read are the ones that MeshLab, Blender, Assimp, trimesh and scanners
+/// write. Colours are sRGB, as bytes or from 0 to 1. `comment TextureFile NAME` names a picture, in the forms of
+/// MeshLab and Blender: a vertex has its position as `s t`, `u v`, `texture_u texture_v` or `tx ty`, or a face has
+/// those of its corners as the list `texcoord`, and the number of its picture as `texnumber`.
 #pragma once
 
 #include <cstring>
@@ -30,11 +30,14 @@ struct PlyProperty {
 
     bool isList() const { return countType != none; }
     /// The largest value of a colour; nothing for real numbers.
-    std::optional<double> white() const { return type == f4 || type == f8 ? std::nullopt : std::optional(type == u2 ? 65535.0 : 255.0); }
+    std::optional<double> white() const {
+        return type == f4 || type == f8 ? std::nullopt : std::optional(type == u2 ? 65535.0 : 255.0);
+    }
 
     static Type typeOf(Text name) {
-        static constexpr Text names[][2]{{"char", "int8"}, {"uchar", "uint8"}, {"short", "int16"},   {"ushort", "uint16"},
-                                         {"int", "int32"}, {"uint", "uint32"}, {"float", "float32"}, {"double", "float64"}};
+        static constexpr Text names[][2]{{"char", "int8"},     {"uchar", "uint8"},   {"short", "int16"},
+                                         {"ushort", "uint16"}, {"int", "int32"},     {"uint", "uint32"},
+                                         {"float", "float32"}, {"double", "float64"}};
         for (int type = 0; type < none; ++type)
             if (name == names[type][0] || name == names[type][1]) return static_cast<Type>(type);
         return none;
@@ -67,7 +70,8 @@ public:
         if (stack(vertex, {"nx", "ny", "nz"}, normals)) polygons_.normals = std::move(normals);
         const PlyElement* face = find("face");
         if (face) {
-            const PlyProperty *plural = face->find("vertex_indices", true), *own = plural ? plural : face->find("vertex_index", true);
+            const PlyProperty *plural = face->find("vertex_indices", true),
+                              *own = plural ? plural : face->find("vertex_index", true);
             if (own) {
                 polygons_.sizes = own->column.sizes;
                 for (const double value : own->column.values) addCorner(value);
@@ -77,8 +81,9 @@ public:
         const PlyElement* strips = find("tristrips");
         if (const PlyProperty* own = strips ? strips->find("vertex_indices", true) : nullptr) unroll(own->column);
         if (least_ < 0 || largest_ >= static_cast<std::int64_t>(surface.vertices.size()))
-            return refuse("a face names vertex " + std::to_string(least_ < 0 ? least_ : largest_) + ", which does not exist: the file has " +
-                          grouped(surface.vertices.size()) + " vertices, numbered from 0");
+            return refuse("a face names vertex " + std::to_string(least_ < 0 ? least_ : largest_) +
+                          ", which does not exist: the file has " + grouped(surface.vertices.size()) +
+                          " vertices, numbered from 0");
         const PlyElement* edges = find("edge");
         losses.add(lost::lines, edges ? edges->rows : 0);
         losses.add(lost::alpha, transparent(*vertex));
@@ -93,7 +98,8 @@ public:
         if (const PlyProperty* own = face ? face->find("texnumber") : nullptr)
             for (std::size_t i = 0; i < std::min(numbers_.size(), own->column.values.size()); ++i) {
                 const double value = own->column.values[i];
-                numbers_[i] = value >= 0 && value < static_cast<double>(names_.size()) ? static_cast<std::int32_t>(value) : -1;
+                numbers_[i] =
+                    value >= 0 && value < static_cast<double>(names_.size()) ? static_cast<std::int32_t>(value) : -1;
             }
         for (const std::int32_t number : std::set<std::int32_t>(numbers_.begin(), numbers_.end())) {
             if (number < 0) continue;
@@ -104,7 +110,8 @@ public:
     }
 
     bool finish(const std::vector<std::int32_t>& read) override {
-        std::vector<std::string> known{"x", "y", "z", "nx", "ny", "nz", "vertex_indices", "vertex_index", "confidence", "intensity", "quality"};
+        std::vector<std::string> known{
+            "x", "y", "z", "nx", "ny", "nz", "vertex_indices", "vertex_index", "confidence", "intensity", "quality"};
         if (!names_.empty()) addTextures(read, known);
         noteUnread(known);
         readColours(*find("vertex"), polygons_.vertexColours);
@@ -116,7 +123,8 @@ private:
     static constexpr std::size_t maxNamed = 8;
 
     bool refuseShort(const PlyElement& element) {
-        return refuseTruncated("its header states " + grouped(element.rows) + " rows of " + element.name + ", the file ends before");
+        return refuseTruncated("its header states " + grouped(element.rows) + " rows of " + element.name +
+                               ", the file ends before");
     }
 
     const PlyElement* find(Text name) const {
@@ -133,22 +141,28 @@ private:
             while (!hasEnd && lines.next(line)) {
                 const std::vector<Text> words = wordsOf(line);
                 if (words.empty()) continue;
-                hasEnd = words[0] == "end_header" && line[0] == 'e' && words.size() == 1 && (!lines.rest().empty() || isEnd(bytes.back()));
+                hasEnd = words[0] == "end_header" && line[0] == 'e' && words.size() == 1 &&
+                         (!lines.rest().empty() || isEnd(bytes.back()));
                 if (words[0] == "format" && words.size() > 1) encoding_ = words[1];
                 else if (words[0] == "comment" && words.size() > 2 && words[1] == "TextureFile") {
                     names_.emplace_back(trimmed(line.substr(static_cast<std::size_t>(words[2].data() - line.data()))));
                 } else if (words[0] == "element") {
-                    const std::optional<std::int64_t> rows = words.size() == 3 && words[2].size() <= 18 && isDigit(words[2][0]) ? wholeOf(words[2]) : std::nullopt;
-                    if (!rows) return refuse("the number of an element of its header is not valid: " + std::string(line));
+                    const std::optional<std::int64_t> rows =
+                        words.size() == 3 && words[2].size() <= 18 && isDigit(words[2][0]) ? wholeOf(words[2])
+                                                                                           : std::nullopt;
+                    if (!rows)
+                        return refuse("the number of an element of its header is not valid: " + std::string(line));
                     elements_.push_back({std::string(words[1]), static_cast<std::uint64_t>(*rows), {}});
-                } else if (words[0] == "property" && !addProperty(words)) return refuse("a property of its header is not valid: " + std::string(line));
+                } else if (words[0] == "property" && !addProperty(words))
+                    return refuse("a property of its header is not valid: " + std::string(line));
             }
         if (!hasEnd) return refuseFormat("its PLY header has no end");
         if (encoding_ != "ascii" && encoding_ != "binary_little_endian" && encoding_ != "binary_big_endian")
             return refuseFormat("its PLY format is " + (encoding_.empty() ? "missing" : encoding_));
         body_ = lines.rest();
         // Of other properties the values are passed over
-        static constexpr Text read[]{"x", "y", "z", "nx", "ny", "nz", "vertex_indices", "vertex_index", "texcoord", "texnumber"};
+        static constexpr Text read[]{"x",        "y",        "z", "nx", "ny", "nz", "vertex_indices", "vertex_index",
+                                     "texcoord", "texnumber"};
         for (PlyElement& element : elements_)
             for (PlyProperty& property : element.properties) {
                 property.isRead = std::find(std::begin(read), std::end(read), property.name) != std::end(read);
@@ -172,8 +186,8 @@ private:
         return true;
     }
 
-    /// Rows may go over several lines. Where the words are not those of the header, each line is a row, of which the values beyond those of the
-    /// header are left out.
+    /// Rows may go over several lines. Where the words are not those of the header, each line is a row, of which the
+    /// values beyond those of the header are left out.
     bool readAscii() {
         const std::vector<PlyElement> header = elements_;
         std::size_t used = 0, ofLines = 0;
@@ -201,7 +215,8 @@ private:
         return count;
     }
 
-    /// Reads the words of all elements, of which `used` is the number; with `byLines` those of a row from a line of its own.
+    /// Reads the words of all elements, of which `used` is the number; with `byLines` those of a row from a line of its
+    /// own.
     bool readWords(bool byLines, std::size_t& used) {
         Lines lines(body_);
         const char *at = body_.data(), *end = at + body_.size();
@@ -231,8 +246,9 @@ private:
                         if (word.empty()) return refuseShort(element);
                         const std::optional<std::int64_t> given = isDigit(word[0]) ? wholeOf(word) : std::nullopt;
                         if (!given)
-                            return refuse("a list of " + element.name + " begins with " + std::string(word.substr(0, 40)) +
-                                          ", not with its number of values: rows may have more values than the header states");
+                            return refuse(
+                                "a list of " + element.name + " begins with " + std::string(word.substr(0, 40)) +
+                                ", not with its number of values: rows may have more values than the header states");
                         size = *given;
                         if (size > end - at) return refuseShort(element);
                         if (property.isRead) property.column.sizes.push_back(size);
@@ -292,7 +308,8 @@ private:
                     if (left() / bytes[property.type] < size) return refuseShort(element);
                     if (!property.isRead) at += size * bytes[property.type];
                     else
-                        for (std::size_t i = 0; i < size; ++i, at += bytes[property.type]) property.column.values.push_back(numberAt(property.type, at, isBig));
+                        for (std::size_t i = 0; i < size; ++i, at += bytes[property.type])
+                            property.column.values.push_back(numberAt(property.type, at, isBig));
                 }
         }
         return true;
@@ -353,7 +370,8 @@ private:
         const PlyProperty* alpha = names ? element.find(names[3]) : nullptr;
         if (!alpha) return 0;
         const double white = alpha->white().value_or(1.0);
-        return static_cast<std::size_t>(std::count_if(alpha->column.values.begin(), alpha->column.values.end(), [&](double value) { return value < white; }));
+        return static_cast<std::size_t>(std::count_if(alpha->column.values.begin(), alpha->column.values.end(),
+                                                      [&](double value) { return value < white; }));
     }
 
     /// Gives polygons the textures that are read, and their positions; `known` gets the properties that it reads.
@@ -389,16 +407,19 @@ private:
         polygons_.materials.resize(polygons_.sizes.size());
         std::size_t corner = 0, lacking = 0;
         for (std::size_t polygon = 0; polygon < polygons_.sizes.size(); ++polygon) {
-            const std::int64_t size = polygons_.sizes[polygon], coordinates = own && polygon < own->column.sizes.size() ? own->column.sizes[polygon] : 0;
+            const std::int64_t size = polygons_.sizes[polygon],
+                               coordinates = own && polygon < own->column.sizes.size() ? own->column.sizes[polygon] : 0;
             bool lacks = false;
             for (std::int64_t i = 0; i < size; ++i, ++corner) {
-                if (coordinates == 2 * size) uvs[corner] = {given[2 * i], given[2 * i + 1]}; // a list that does not fit is none
+                if (coordinates == 2 * size)
+                    uvs[corner] = {given[2 * i], given[2 * i + 1]}; // a list that does not fit is none
                 const bool isKnown = std::fabs(uvs[corner][0]) <= maxUv && std::fabs(uvs[corner][1]) <= maxUv;
                 uvs[corner] = isKnown ? Pair{uvs[corner][0], 1 - uvs[corner][1]} : Pair{};
                 lacks |= !isKnown;
             }
             given += coordinates;
-            const std::int32_t number = numbers_[polygon], material = number < 0 ? 0 : materials[static_cast<std::size_t>(number)];
+            const std::int32_t number = numbers_[polygon],
+                               material = number < 0 ? 0 : materials[static_cast<std::size_t>(number)];
             lacking += lacks && material > 0;
             polygons_.materials[polygon] = lacks ? 0 : material;
         }
@@ -421,7 +442,8 @@ private:
             }
         }
         static constexpr Loss loss{"property is not read", "properties are not read", ""};
-        if (!polygons_.sizes.empty()) losses.add(loss, count, "", joined(unread, ", ") + (count > maxNamed ? " \u2026" : ""));
+        if (!polygons_.sizes.empty())
+            losses.add(loss, count, "", joined(unread, ", ") + (count > maxNamed ? " \u2026" : ""));
     }
 
     static constexpr const char* colourNames[][4]{{"red", "green", "blue", "alpha"},
@@ -436,7 +458,7 @@ private:
     Text body_;
     Polygons polygons_;
     std::vector<std::int32_t> numbers_; ///< of the polygons' pictures, -1 for none
-    std::vector<std::int32_t> needed_;  ///< numbers of the pictures that are needed
+    std::vector<std::int32_t> needed_; ///< numbers of the pictures that are needed
     std::int64_t least_ = 0, largest_ = -1; ///< of the vertices that corners name
 };
 

@@ -58,19 +58,22 @@ private:
     enum : std::int64_t { ear = -1, unknown = -2, notConvex = -3 };
 
     void emit(std::size_t a, std::size_t b, std::size_t c) {
-        to_.corners.push_back({start_ + static_cast<std::int64_t>(a), start_ + static_cast<std::int64_t>(b), start_ + static_cast<std::int64_t>(c)});
+        to_.corners.push_back({start_ + static_cast<std::int64_t>(a), start_ + static_cast<std::int64_t>(b),
+                               start_ + static_cast<std::int64_t>(c)});
         to_.polygons.push_back(polygon_);
     }
 
-    /// Whether a polygon has a corner that is not convex, and whether it crosses itself: the angles of all others sum to a circle. Returns the corner from
-    /// which it is a fan: of a quadrilateral that is not convex the one of the least angle.
+    /// Whether a polygon has a corner that is not convex, and whether it crosses itself: the angles of all others sum
+    /// to a circle. Returns the corner from which it is a fan: of a quadrilateral that is not convex the one of the
+    /// least angle.
     static std::size_t findBends(const std::vector<Vector>& points, bool& isBent, bool& crosses) {
         const std::size_t size = points.size();
         Vector normal{};
         for (std::size_t i = 0; i < size; ++i) {
             for (const double value : points[i])
                 if (!std::isfinite(value)) return 0;
-            const Vector across = cross(difference(points[i], points[0]), difference(points[(i + 1) % size], points[0]));
+            const Vector across =
+                cross(difference(points[i], points[0]), difference(points[(i + 1) % size], points[0]));
             for (int axis = 0; axis < 3; ++axis) normal[axis] += across[axis];
         }
         const double norm = length(normal), divisor = norm > 0 ? norm : 1;
@@ -78,7 +81,8 @@ private:
         double total = 0, least = HUGE_VAL;
         std::size_t first = 0;
         for (std::size_t i = 0; i < size; ++i) {
-            const Vector before = difference(points[i], points[(i + size - 1) % size]), after = difference(points[(i + 1) % size], points[i]);
+            const Vector before = difference(points[i], points[(i + size - 1) % size]),
+                         after = difference(points[(i + 1) % size], points[i]);
             const double angle = fixed_order::arctan2(dot(cross(before, after), normal), dot(before, after));
             total += angle;
             isBent |= angle <= straight;
@@ -92,7 +96,9 @@ private:
     }
 
     /// Twice the signed area of a triangle.
-    static double area(const Pair& a, const Pair& b, const Pair& c) { return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]); }
+    static double area(const Pair& a, const Pair& b, const Pair& c) {
+        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    }
 
     /// Puts the corners into the polygon's plane, counter-clockwise; exact for integers of up to 25 bits.
     void flatten(const std::vector<Vector>& points) {
@@ -116,11 +122,14 @@ private:
         for (int other = 1; other < 3; ++other)
             if (std::fabs(normal[other]) > std::fabs(normal[axis])) axis = other;
         flat_.clear();
-        for (const Vector& point : relative) flat_.push_back({normal[axis] >= 0 ? point[(axis + 1) % 3] : -point[(axis + 1) % 3], point[(axis + 2) % 3]});
+        for (const Vector& point : relative)
+            flat_.push_back(
+                {normal[axis] >= 0 ? point[(axis + 1) % 3] : -point[(axis + 1) % 3], point[(axis + 2) % 3]});
     }
 
-    /// `ear` if a corner is convex, and its triangle holds no other corner, not even on the cut. Else `notConvex`, or the corner in the
-    /// triangle that is farthest from the cut: it is concave in a simple polygon, so that it remains for long.
+    /// `ear` if a corner is convex, and its triangle holds no other corner, not even on the cut. Else `notConvex`, or
+    /// the corner in the triangle that is farthest from the cut: it is concave in a simple polygon, so that it remains
+    /// for long.
     std::int64_t obstacleOf(std::size_t at) {
         ++to_.tests;
         const Pair &a = flat_[before_[at]], &b = flat_[at], &c = flat_[after_[at]];
@@ -156,13 +165,15 @@ private:
         return std::fabs(sum) > straight * (largest * largest);
     }
 
-    /// Cuts off ears: convex corners whose triangle contains no other corner, until a triangle remains. A corner is tested again only when a
-    /// neighbour or the corner in its way has gone, so a simple polygon takes some tests for each corner. An outline that crosses itself may
-    /// have no ear, then any corner is cut off; after too many tests the rest becomes a fan.
+    /// Cuts off ears: convex corners whose triangle contains no other corner, until a triangle remains. A corner is
+    /// tested again only when a neighbour or the corner in its way has gone, so a simple polygon takes some tests for
+    /// each corner. An outline that crosses itself may have no ear, then any corner is cut off; after too many tests
+    /// the rest becomes a fan.
     bool clipEars(const std::vector<Vector>& points, bool& crosses) {
         const std::size_t size = points.size();
         if (size > maxPolygon) {
-            to_.error = "a concave polygon has " + grouped(size) + " corners: split it, " + grouped(maxPolygon) + " are supported";
+            to_.error = "a concave polygon has " + grouped(size) + " corners: split it, " + grouped(maxPolygon) +
+                        " are supported";
             return false;
         }
         flatten(points);
@@ -180,7 +191,8 @@ private:
             std::size_t tries = 0;
             for (; tries < count; ++tries) {
                 std::int64_t& obstacle = obstacles[at];
-                if (obstacle == unknown || (obstacle >= 0 && !remains_[static_cast<std::size_t>(obstacle)])) obstacle = obstacleOf(at);
+                if (obstacle == unknown || (obstacle >= 0 && !remains_[static_cast<std::size_t>(obstacle)]))
+                    obstacle = obstacleOf(at);
                 if (obstacle == ear) break;
                 at = after_[at];
             }

@@ -1,9 +1,10 @@
 /// What the readers of mesh files share.
 ///
-/// A reader takes the bytes of a file in four steps, so that its caller may read and decode other files as it does, also later:
-/// `begin`; for each of `nextLibrary` a file of materials, or that it is missing; `needPictures`; `finish` with the pictures. A step that is
-/// false has refused the file, in one line, `refusal`. Then `surface` has the triangles, and `losses` what is not shown of the file.
-/// Numbers of rows and of corners are bounded by the bytes of the file, whatever its header states.
+/// A reader takes the bytes of a file in four steps, so that its caller may read and decode other files as it does,
+/// also later: `begin`; for each of `nextLibrary` a file of materials, or that it is missing; `needPictures`; `finish`
+/// with the pictures. A step that is false has refused the file, in one line, `refusal`. Then `surface` has the
+/// triangles, and `losses` what is not shown of the file. Numbers of rows and of corners are bounded by the bytes of
+/// the file, whatever its header states.
 #pragma once
 
 #include <memory>
@@ -27,7 +28,8 @@ public:
     /// `pictures`: of each that is needed its number among those that are read, -1 if it is not.
     virtual bool finish(const std::vector<std::int32_t>& pictures) = 0;
 
-    /// The name of the next file of materials that the mesh names, all that a statement has, then each word of it; false if there is none.
+    /// The name of the next file of materials that the mesh names, all that a statement has, then each word of it;
+    /// false if there is none.
     bool nextLibrary(std::string& name) {
         for (; library_ < libraries_.size(); ++library_, word_ = missing_ = 0) {
             if (word_ == 0) words_ = wordsOf(libraries_[library_]);

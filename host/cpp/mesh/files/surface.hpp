@@ -30,7 +30,9 @@ struct FileMaterial {
     std::int32_t texture = -1;
 
     bool operator<(const FileMaterial& other) const {
-        const auto values = [](const FileMaterial& one) { return std::tie(one.kind, one.albedo, one.ior, one.roughness, one.emission, one.alpha, one.texture); };
+        const auto values = [](const FileMaterial& one) {
+            return std::tie(one.kind, one.albedo, one.ior, one.roughness, one.emission, one.alpha, one.texture);
+        };
         return values(*this) < values(other);
     }
 };
@@ -56,15 +58,16 @@ struct FileSurface {
 struct Polygons {
     std::vector<std::int64_t> sizes;
     std::vector<std::int32_t> corners;           ///< vertices, each one of the surface's
-    std::vector<Vector> normals;                 ///< of the vertices, of which `cornerNormals` are the corners'; empty: none
-    std::vector<std::int32_t> cornerNormals;     ///< -1: none; empty: those of the vertices
-    std::vector<Vector> vertexColours;           ///< linear; empty: none
-    std::vector<Vector> colours;                 ///< of the polygons, before those of vertices, NaN for none; empty: none
-    std::vector<std::int32_t> materials;         ///< of the polygons; empty: all have the first
-    std::vector<Pair> uvs;                       ///< of the corners; empty: none
+    std::vector<Vector> normals; ///< of the vertices, of which `cornerNormals` are the corners'; empty: none
+    std::vector<std::int32_t> cornerNormals; ///< -1: none; empty: those of the vertices
+    std::vector<Vector> vertexColours; ///< linear; empty: none
+    std::vector<Vector> colours; ///< of the polygons, before those of vertices, NaN for none; empty: none
+    std::vector<std::int32_t> materials; ///< of the polygons; empty: all have the first
+    std::vector<Pair> uvs; ///< of the corners; empty: none
 };
 
-/// Linear colours of sRGB ones; what is clipped, or no number, is counted. `white`: their largest value; nothing: 255 if one of them is above 2, else 1.
+/// Linear colours of sRGB ones; what is clipped, or no number, is counted. `white`: their largest value; nothing: 255
+/// if one of them is above 2, else 1.
 inline void makeLinear(std::vector<Vector>& colours, std::optional<double> white, Losses& losses) {
     if (!white) {
         white = 1.0;
@@ -97,8 +100,9 @@ inline void makeLinear(std::vector<Vector>& colours, std::optional<double> white
 
 /// Gives a surface, which has vertices, materials and textures, the triangles of polygons; an error, or none.
 inline std::string addPolygons(FileSurface& surface, const Polygons& from, Losses& losses) {
-    const Triangles split = triangulate(
-        from.sizes, [&](std::int64_t corner) -> const Vector& { return surface.vertices[static_cast<std::size_t>(from.corners[static_cast<std::size_t>(corner)])]; });
+    const Triangles split = triangulate(from.sizes, [&](std::int64_t corner) -> const Vector& {
+        return surface.vertices[static_cast<std::size_t>(from.corners[static_cast<std::size_t>(corner)])];
+    });
     if (!split.error.empty()) return split.error;
     losses.add(lost::shortFaces, split.shorts);
     losses.add(lost::crossed, split.crossed);
@@ -120,7 +124,8 @@ inline std::string addPolygons(FileSurface& surface, const Polygons& from, Losse
             const auto vertex = static_cast<std::size_t>(from.corners[corner]);
             surface.faces[i][k] = from.corners[corner];
             if (!from.normals.empty()) {
-                const std::int32_t normal = from.cornerNormals.empty() ? from.corners[corner] : from.cornerNormals[corner];
+                const std::int32_t normal =
+                    from.cornerNormals.empty() ? from.corners[corner] : from.cornerNormals[corner];
                 if (normal >= 0) surface.normals[i][k] = from.normals[static_cast<std::size_t>(normal)];
             }
             if (!from.uvs.empty()) surface.uvs[i][k] = from.uvs[corner];

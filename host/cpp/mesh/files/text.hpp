@@ -20,7 +20,9 @@ inline bool isEnd(char one) { return one == '\n' || one == '\r'; }
 inline bool isDigit(char one) { return one >= '0' && one <= '9'; }
 inline char lower(char one) { return one >= 'A' && one <= 'Z' ? static_cast<char>(one + 'a' - 'A') : one; }
 /// Whether a character is a letter, also beyond ASCII, a digit or an underscore.
-inline bool isOfWord(char one) { return isDigit(one) || one == '_' || (lower(one) >= 'a' && lower(one) <= 'z') || (one & 0x80); }
+inline bool isOfWord(char one) {
+    return isDigit(one) || one == '_' || (lower(one) >= 'a' && lower(one) <= 'z') || (one & 0x80);
+}
 inline std::string lowered(Text text) {
     std::string found(text);
     std::transform(found.begin(), found.end(), found.begin(), lower);
@@ -68,7 +70,8 @@ template <class Range> std::string joined(const Range& words, Text between = " "
     return found;
 }
 
-/// Lines one after the other, whose ends are those of any system; with `joins` a backslash before its end continues one.
+/// Lines one after the other, whose ends are those of any system; with `joins` a backslash before its end continues
+/// one.
 class Lines {
 public:
     explicit Lines(Text text, bool joins = false) : text_(text), joins_(joins) {}
@@ -93,7 +96,8 @@ private:
     bool joins_;
 };
 
-/// The text of a file, UTF-16 if it begins with a mark of it; of others a mark of UTF-8 is left out. `buffer` holds a text that is translated.
+/// The text of a file, UTF-16 if it begins with a mark of it; of others a mark of UTF-8 is left out. `buffer` holds a
+/// text that is translated.
 inline Text textOf(Text bytes, std::string& buffer) {
     if (startsWith(bytes, "\xef\xbb\xbf")) return bytes.substr(3);
     const bool isBig = startsWith(bytes, "\xfe\xff");
@@ -111,7 +115,8 @@ inline Text textOf(Text bytes, std::string& buffer) {
         } else if (code >> 11 == 0x1b) code = 0xfffd;
         const int more = code < 0x80 ? 0 : code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
         buffer += static_cast<char>(more == 0 ? code : (0xf0 << (3 - more) & 0xff) | code >> 6 * more);
-        for (int shift = 6 * (more - 1); shift >= 0; shift -= 6) buffer += static_cast<char>(0x80 | (code >> shift & 0x3f));
+        for (int shift = 6 * (more - 1); shift >= 0; shift -= 6)
+            buffer += static_cast<char>(0x80 | (code >> shift & 0x3f));
     }
     return buffer;
 }
@@ -218,7 +223,8 @@ inline double slow(Text digits, std::int64_t exponent) {
     return rounded(quotient, isMore || !value.isZero(), -shift);
 }
 
-inline constexpr double tens[]{1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+inline constexpr double tens[]{1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
+                               1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
 /// A number of at most 19 digits times 10^exponent, from -19 to 19.
 inline double middle(std::uint64_t value, int exponent) {
@@ -276,7 +282,8 @@ inline std::optional<double> numberOf(Text word) {
     if (at != end) return {};
     if (value == 0) found = 0;
     else if (isWhole && value <= std::uint64_t{1} << 53 && std::abs(exponent) <= 22)
-        found = exponent < 0 ? static_cast<double>(value) / decimal::tens[-exponent] : static_cast<double>(value) * decimal::tens[exponent];
+        found = exponent < 0 ? static_cast<double>(value) / decimal::tens[-exponent]
+                             : static_cast<double>(value) * decimal::tens[exponent];
     else if (isWhole && std::abs(exponent) <= 19) found = decimal::middle(value, static_cast<int>(exponent));
     else {
         std::string digits;

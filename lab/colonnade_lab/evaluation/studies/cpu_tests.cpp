@@ -1,5 +1,6 @@
 // Every ray tests every triangle, after Möller and Trumbore, in double: CPU seconds and rays that hit.
-// Usage: cpu_tests FILE TRIANGLES RAYS; FILE has triangles double[9]: corner, edges from it; rays double[6]: origin, direction
+// Usage: cpu_tests FILE TRIANGLES RAYS; FILE has triangles double[9]: corner, edges from it; rays double[6]: origin,
+// direction
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,7 +12,9 @@ struct Vector {
 };
 
 static Vector operator-(const Vector &a, const Vector &b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-static Vector cross(const Vector &a, const Vector &b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+static Vector cross(const Vector &a, const Vector &b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 static double dot(const Vector &a, const Vector &b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 struct Triangle {

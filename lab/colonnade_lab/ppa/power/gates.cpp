@@ -11,10 +11,12 @@
 //   gate NET DELAY TABLE NET…
 //   register NET DELAY INITIAL TABLE NET…   loads the table's value at each clock edge
 //   memory DEPTH WIDTH       the following ports belong to it
-//   port ADDRESS ENABLE WRITES DATA_IN DATA_OUT   comma-separated bits "n5", "0" or "1", least significant first, or "-"
+//   port ADDRESS ENABLE WRITES DATA_IN DATA_OUT   comma-separated bits "n5", "0" or "1", least significant first, or
+//       "-"
 // STIMULUS holds the inputs of each cycle in whole bytes, least significant first. OUTPUTS receives the outputs before
-// each clock edge in the same form. COUNTS receives "memory READS WRITES" for each memory and "net CHANGES SETTLED HIGH"
-// for each net, over the cycles from BEGIN on: all transitions, cycles with a changed final value, cycles that end high.
+// each clock edge in the same form. COUNTS receives "memory READS WRITES" for each memory and "net CHANGES SETTLED
+// HIGH" for each net, over the cycles from BEGIN on: all transitions, cycles with a changed final value, cycles that
+// end high.
 //
 // Delays are inertial: a gate suppresses pulses shorter than its delay. In each cycle registers change first, then
 // inputs. The netlist settles before the next edge, without a time limit of the clock. All nets start at zero.
@@ -87,24 +89,28 @@ public:
         std::ofstream sink(outputs, std::ios::binary);
         std::vector<char> bytes((inputs_.size() + 7) / 8);
         for (std::uint64_t cycle = 0; cycle < cycles; ++cycle) {
-            if (!source.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) throw std::runtime_error("too few inputs");
+            if (!source.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
+                throw std::runtime_error("too few inputs");
             for (std::size_t i = 0; i < inputs_.size(); ++i) {
                 const char value = static_cast<char>(bytes[i / 8] >> (i % 8) & 1);
-                if (inputs_[i] >= 0 && values_[static_cast<unsigned>(inputs_[i])] != value) schedule(inputDelay, {static_cast<unsigned>(inputs_[i]), -1, 0, value});
+                if (inputs_[i] >= 0 && values_[static_cast<unsigned>(inputs_[i])] != value)
+                    schedule(inputDelay, {static_cast<unsigned>(inputs_[i]), -1, 0, value});
             }
             settle();
             write(sink);
             endCycle();
             isCounting_ = cycle + 1 >= first;
             if (cycle + 1 < cycles) edge();
-            if (cycle % 64 == 0) std::cerr << "progress " << static_cast<double>(cycle) / static_cast<double>(cycles) << std::endl;
+            if (cycle % 64 == 0)
+                std::cerr << "progress " << static_cast<double>(cycle) / static_cast<double>(cycles) << std::endl;
         }
     }
 
     void report(const std::string& file) const {
         std::ofstream stream(file);
         for (const Memory& memory : memories_) stream << "memory " << memory.reads << ' ' << memory.writes << '\n';
-        for (const Count& count : counts_) stream << "net " << count.changes << ' ' << count.settled << ' ' << count.high << '\n';
+        for (const Count& count : counts_)
+            stream << "net " << count.changes << ' ' << count.settled << ' ' << count.high << '\n';
     }
 
 private:
@@ -283,11 +289,14 @@ private:
         for (const Port& port : memory.ports)
             for (std::size_t i = 0; i < port.dataOut.size(); ++i) {
                 const char bit = port.isRead ? memory.words.at(port.readAddress)[i] : static_cast<char>(0);
-                if (port.dataOut[i].net >= 0 && value(port.dataOut[i]) != bit) schedule(memoryDelay, {static_cast<unsigned>(port.dataOut[i].net), -1, 0, bit});
+                if (port.dataOut[i].net >= 0 && value(port.dataOut[i]) != bit)
+                    schedule(memoryDelay, {static_cast<unsigned>(port.dataOut[i].net), -1, 0, bit});
             }
     }
 
-    char value(const Bit& bit) const { return bit.net >= 0 ? values_[static_cast<unsigned>(bit.net)] : static_cast<char>(bit.constant); }
+    char value(const Bit& bit) const {
+        return bit.net >= 0 ? values_[static_cast<unsigned>(bit.net)] : static_cast<char>(bit.constant);
+    }
 
     std::uint64_t number(const std::vector<Bit>& bits) const {
         std::uint64_t sum = 0;
@@ -303,12 +312,14 @@ private:
         }
         changed_.clear();
         if (isCounting_)
-            for (std::size_t net = 0; net < values_.size(); ++net) counts_[net].high += static_cast<unsigned char>(values_[net]);
+            for (std::size_t net = 0; net < values_.size(); ++net)
+                counts_[net].high += static_cast<unsigned char>(values_[net]);
     }
 
     void write(std::ostream& sink) const {
         std::vector<char> bytes((outputs_.size() + 7) / 8, 0);
-        for (std::size_t i = 0; i < outputs_.size(); ++i) bytes[i / 8] = static_cast<char>(bytes[i / 8] | value(outputs_[i]) << (i % 8));
+        for (std::size_t i = 0; i < outputs_.size(); ++i)
+            bytes[i / 8] = static_cast<char>(bytes[i / 8] | value(outputs_[i]) << (i % 8));
         sink.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     }
 
