@@ -196,6 +196,12 @@ def test_figures_of_another_study_or_scene_are_refused(
             'module A;$error("failed\\n    at A.scala:8 assume");',
         ),
         (
+            "hpp",
+            '#define CALL(x) \\\n    f(x, "one ")\nconst char* t = "a b";\n',
+            '#define CALL(x) f(x, \\\n               "one ")\nconst char* t = "a "\n                "b";\n',
+            '#define CALL(x) f(x, "one ")\nconst char* t = "a c";\n',
+        ),
+        (
             "py",
             'from a import (\n    b,\n)\nimport c\n\ndef f():\n    """Text."""\n    return "# 1"  # why\n',
             'from c import b\ndef f():\n    """Other\n\n    text."""\n    # why\n    return "# 1"\n',
