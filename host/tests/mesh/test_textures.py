@@ -164,7 +164,7 @@ def test_the_note_on_a_picture_says_what_is_wrong_with_it(tmp_path: Path) -> Non
     assert mesh.textures == () and [note.partition(": ")[2] for note in mesh.notes] == [
         "1 picture of a texture is truncated or damaged (0.png): surfaces have their base colour",
         "1 picture of a texture is too large (1.png): a picture may have 33,554,432 pixels",
-        "1 picture of a texture is not readable (2.png): pictures must be PNG, JPEG, WebP or TGA",
+        "1 picture of a texture is not readable (2.png): pictures must be PNG, JPEG or WebP, or TGA outside a browser",
     ]
     assert "truncated" in load_mesh(painted(tmp_path, png(random)[:20])).notes[0]
 

@@ -70,7 +70,7 @@ inline constexpr Loss noValues{"value of a material is not read", "values of mat
                                "a colour has three numbers, others have one"};
 inline constexpr Loss noPictures{"picture of a texture is missing", "pictures of textures are missing", isPlain};
 inline constexpr Loss pictureFormats{"picture of a texture is not readable", "pictures of textures are not readable",
-                                     "pictures must be PNG, JPEG, WebP or TGA"};
+                                     "pictures must be PNG, JPEG or WebP, or TGA outside a browser"};
 inline constexpr Loss damagedPictures{"picture of a texture is truncated or damaged",
                                       "pictures of textures are truncated or damaged", isPlain};
 
