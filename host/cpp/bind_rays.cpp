@@ -76,21 +76,27 @@ private:
 
     int submit(const colonnade_rays_batch& batch) {
         const auto* const rays = reinterpret_cast<const char*>(batch.rays);
-        const nb::tuple found = nb::cast<nb::tuple>(device_.attr("submit")(
-            nb::bytes(&batch, sizeof batch), nb::bytes(rays, rays::rayBytes(batch)), rays::responseBytes(batch)));
-        const auto hits = nb::cast<nb::bytes>(found[1]);
+        const nb::object found = device_.attr("submit")(
+            nb::bytes(&batch, sizeof batch), nb::bytes(rays, rays::rayBytes(batch)), rays::responseBytes(batch));
+        std::uint32_t tag = 0;
+        if (!nb::isinstance<nb::tuple>(found) || nb::len(found) != 2 || !nb::try_cast(nb::object(found[0]), tag) ||
+            !nb::isinstance<nb::bytes>(found[1]))
+            throw std::invalid_argument("the device must answer a batch with a tag of 32 bits and bytes");
+        const nb::bytes hits(found[1]);
         if (hits.size() != rays::responseBytes(batch))
             throw std::invalid_argument("the device answers " + std::to_string(hits.size()) + " bytes in place of " +
                                         std::to_string(rays::responseBytes(batch)));
         std::memcpy(reinterpret_cast<void*>(batch.hits), hits.data(), hits.size());
-        const auto tag = nb::cast<std::uint32_t>(found[0]);
         if (batch.done != 0) *reinterpret_cast<std::uint32_t*>(batch.done) = tag;
         if (tag >> 31) status_ = COLONNADE_RAYS_DEVICE;
         return COLONNADE_RAYS_OK;
     }
 
     int read(colonnade_rays_sums& sums) {
-        sums = rays::sumsOf(nb::cast<rays::RegisterValues>(device_.attr("counters")()));
+        rays::RegisterValues counters;
+        if (!nb::try_cast(nb::object(device_.attr("counters")()), counters))
+            throw std::invalid_argument("the device's counters must be numbers by name");
+        sums = rays::sumsOf(counters);
         return COLONNADE_RAYS_OK;
     }
 

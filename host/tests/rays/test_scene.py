@@ -304,6 +304,16 @@ def test_a_device_that_answers_other_bytes_than_it_is_asked_for_is_refused(size:
         Scene(*SQUARE, backend=Answers(bytes(size))).closest([DOWN])
 
 
+@pytest.mark.parametrize("answer", [None, (0,), (0, None), ("x", bytes(16)), (1 << 32, bytes(16)), (0, bytes(16), 0)])
+def test_a_device_that_answers_with_other_types_is_refused(answer: object) -> None:
+    class Device(Answers):
+        def submit(self, *batch: object) -> Any:
+            return answer
+
+    with pytest.raises(UserError, match="must answer a batch with a tag of 32 bits and bytes"):
+        Scene(*SQUARE, backend=Device(b"")).closest([DOWN])
+
+
 def test_a_device_that_asks_its_own_scene_is_told() -> None:
     device = Answers(bytes(16))
     scene = device.scene = Scene(*SQUARE, backend=device)
