@@ -2,7 +2,7 @@ package colonnade.bus
 
 import chisel3.{assert => _, _}
 import chiseltest._
-import colonnade.{Simulation, TestConfigs}
+import colonnade.{Always, Simulation, TestConfigs}
 import colonnade.axi.{AxiMemory, AxiPins}
 import colonnade.config.{ColonnadeConfig, ShellConfig}
 import org.scalatest.flatspec.AnyFlatSpec
@@ -137,26 +137,27 @@ class PhotoCompositorSpec extends AnyFlatSpec with ChiselScalatestTester {
   }
 
   for ((bus, tile) <- Seq((4, 8), (16, 8), (16, 16), (128, 8)))
-    it should s"put the photo into rows of $tile pixels over $bus bytes, whatever the timing" in {
-      val (configuration, shell) = (config(tile), ShellConfig(bus))
-      test(new CompositorHarness(configuration, shell)).withAnnotations(Simulation.verilator) { dut =>
-        val bench = new Bench(dut, configuration, shell, new Random(bus + tile))
-        for ((format, accepts, hasStrengths) <- Seq((0, 1.0, true), (1, 0.5, false), (2, 0.3, true))) {
-          bench.settings(format, 0, 16, hasStrengths)
-          val rows = Seq.fill(40)(bench.row(format))
-          for ((row, (x, y, mask, words)) <- rows.zip(bench.run(rows, accepts))) {
-            assert((x, y, mask) == ((row.tile, row.y, row.mask)))
-            for (i <- 0 until tile if mask.testBit(i)) {
-              val (at, whole) = (tile * x + i, PhotoPixel.whole)
-              val strength    = if (hasStrengths) strengthAt(at, y) else whole
-              val expected    = row.ratios(i).fold(row.words(i))(shown(photoAt(at, y), _, strength, format))
-              assert(words(i) == expected, s"pixel $i of $row in format $format")
+    it should s"put the photo into rows of $tile pixels over $bus bytes, whatever the timing" taggedAs
+      Always.unless((bus, tile) == (16, 8) || tile == 16) in {
+        val (configuration, shell) = (config(tile), ShellConfig(bus))
+        test(new CompositorHarness(configuration, shell)).withAnnotations(Simulation.verilator) { dut =>
+          val bench = new Bench(dut, configuration, shell, new Random(bus + tile))
+          for ((format, accepts, hasStrengths) <- Seq((0, 1.0, true), (1, 0.5, false), (2, 0.3, true))) {
+            bench.settings(format, 0, 16, hasStrengths)
+            val rows = Seq.fill(20)(bench.row(format))
+            for ((row, (x, y, mask, words)) <- rows.zip(bench.run(rows, accepts))) {
+              assert((x, y, mask) == ((row.tile, row.y, row.mask)))
+              for (i <- 0 until tile if mask.testBit(i)) {
+                val (at, whole) = (tile * x + i, PhotoPixel.whole)
+                val strength    = if (hasStrengths) strengthAt(at, y) else whole
+                val expected    = row.ratios(i).fold(row.words(i))(shown(photoAt(at, y), _, strength, format))
+                assert(words(i) == expected, s"pixel $i of $row in format $format")
+              }
             }
+            assert(bench.events == 0)
           }
-          assert(bench.events == 0)
         }
       }
-    }
 
   it should "read nothing outside the window, drop those pixels, and report them and failing reads" in {
     val (configuration, shell) = (config(8), ShellConfig(16))

@@ -19,7 +19,7 @@ class PathTracerSpec extends AnyFlatSpec with ChiselScalatestTester {
     it should s"give each pixel once, equal to the model's: $name" taggedAs tag in
       test(new PathTracerHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         dut.clock.setTimeout(0)
-        for ((willing, seed, shadows) <- Seq((1.0, 1, true), (0.3, 2, true), (0.6, 3, false)))
+        for ((willing, seed, shadows) <- Seq((0.3, 2, true), (1.0, 3, false)))
           withClue(s"seed $seed: ") {
             val frame  = SmallFrame(config, SmallFrame.scene(config, seed, shadows))
             val random = new Random(seed)
@@ -47,7 +47,7 @@ class PathTracerSpec extends AnyFlatSpec with ChiselScalatestTester {
     of.copy(array = of.array.copy(rows = rows), units = of.units.copy(pathContexts = 8))
 
   trace("two rows, a tree, snooping, eight paths", withRows(2))
-  trace("timing slices", TestConfigs.withExtraSlices(withRows(1)))
+  trace("timing slices", TestConfigs.withExtraSlices(withRows(1)), Matrix)
   trace("a shading pipeline", withRows(2, tiny.copy(units = tiny.units.copy(shadeInterval = 3))), Matrix)
   trace(
     "no tree, one context, one path, no snooping",

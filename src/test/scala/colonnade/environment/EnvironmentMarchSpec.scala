@@ -157,9 +157,9 @@ class EnvironmentMarchSpec extends AnyFlatSpec with ChiselScalatestTester {
     val name =
       s"${config.precision}, ${config.geometry.vertexBits}-bit vertices and a ${size.encoding.name} map of ${size.width}x${size.height}"
 
-    val isCommon = size.width == 640 || size.encoding == MapEncoding.Slic
+    val isCommon = size.width != TestConfigs.environment.width || size.encoding == MapEncoding.Slic
     // Beyond the format of the presets a part of the rays shows what depends on widths
-    val part = if (config.precision == TestConfigs.tiny.precision) 1 else 2
+    val part = if (config.precision == TestConfigs.tiny.precision) 2 else 4
     it should s"hit what the model hits, with $name" taggedAs (if (isCommon) Matrix else Always.ifExtreme(config)) in {
       val random   = new Random(seed)
       val stimulus = new MarchStimulus(config, random)

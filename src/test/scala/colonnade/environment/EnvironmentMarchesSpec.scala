@@ -8,7 +8,7 @@ import colonnade.common.Context
 import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.formats.{EnvironmentView, Load}
 import colonnade.shading.EnvironmentSurface
-import colonnade.{Model, Packed, Simulation, TestConfigs}
+import colonnade.{Model, OneSimulation, Packed, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -61,7 +61,7 @@ private class EnvironmentMarchesHarness(config: ColonnadeConfig) extends Module 
   assert(!(surface.valid && isOffered) || surface.bits === offered, "another surface than that before")
 }
 
-class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
+class EnvironmentMarchesSpec extends AnyFlatSpec with OneSimulation {
   behavior of "EnvironmentMarches"
 
   private case class Request(ray: MarchCase, isFresnelReflection: Boolean, isOcclusionTest: Boolean)
@@ -140,61 +140,60 @@ class EnvironmentMarchesSpec extends AnyFlatSpec with ChiselScalatestTester {
   private val base   = TestConfigs.withEnvironment(TestConfigs.environment)
   private val config = base.copy(units = base.units.copy(pathContexts = 12, marches = 2))
 
-  for (isMapCamera <- Seq(true, false))
-    it should s"answer each request as the model does, ${if (isMapCamera) "the maps' camera" else "any camera"}" in check(
-      isMapCamera
-    )
+  inOneSimulation(new EnvironmentMarchesHarness(config))(
+    "answer each request as the model does, the maps' camera"  -> (check(_, isMapCamera = true)),
+    "any camera"                                               -> (check(_, isMapCamera = false)),
+    "report illegal words of the maps that any march comes to" -> reportIllegal _
+  )
 
-  private def check(isMapCamera: Boolean): Unit =
-    test(new EnvironmentMarchesHarness(config)).withAnnotations(Simulation.verilator) { dut =>
-      val random   = new Random(3)
-      val stimulus = new MarchStimulus(config, random)
-      val scene    = new EnvironmentScene(config, random)
-      dut.clock.setTimeout(0)
-      dut.paths.isMapCamera.poke(isMapCamera)
-      EnvironmentImage.load(dut.load, dut.clock, config, scene.words)
-      // Frames of different cameras
-      for (from <- Seq(Seq(0.3, 0.1, -0.2), Seq(-0.4, 0.2, 0.3)))
-        checkFrame(dut, stimulus, scene, isMapCamera, from, random)
-    }
+  private def check(dut: EnvironmentMarchesHarness, isMapCamera: Boolean): Unit = {
+    val random   = new Random(3)
+    val stimulus = new MarchStimulus(config, random)
+    val scene    = new EnvironmentScene(config, random)
+    dut.clock.setTimeout(0)
+    dut.paths.isMapCamera.poke(isMapCamera)
+    EnvironmentImage.load(dut.load, dut.clock, config, scene.words)
+    // Frames of different cameras
+    for (from <- Seq(Seq(0.3, 0.1, -0.2), Seq(-0.4, 0.2, 0.3)))
+      checkFrame(dut, stimulus, scene, isMapCamera, from, random)
+  }
 
   private def model(words: Map[String, Seq[BigInt]], view: ViewCase, rays: Seq[MarchCase]) =
     Model.attributes(config, words, rays.map(view.words ++ _.words), "march").map(MarchCase.answer.zip(_).toMap)
 
-  it should "report illegal words of the maps that any march comes to" in
-    test(new EnvironmentMarchesHarness(config)).withAnnotations(Simulation.verilator) { dut =>
-      val random   = new Random(4)
-      val stimulus = new MarchStimulus(config, random)
-      val image    = new EnvironmentImage(config, random, illegal = 0.1)
-      val scene    = new EnvironmentScene(config, random)
-      val camera   = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
-      val view     = camera.view.copy(isMapCamera = false)
-      dut.clock.setTimeout(0)
-      EnvironmentImage.load(dut.load, dut.clock, config, image.words)
-      dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
-      dut.start.poke(true)
-      dut.clock.step()
-      dut.start.poke(false)
+  private def reportIllegal(dut: EnvironmentMarchesHarness): Unit = {
+    val random   = new Random(4)
+    val stimulus = new MarchStimulus(config, random)
+    val image    = new EnvironmentImage(config, random, illegal = 0.1)
+    val scene    = new EnvironmentScene(config, random)
+    val camera   = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
+    val view     = camera.view.copy(isMapCamera = false)
+    dut.clock.setTimeout(0)
+    EnvironmentImage.load(dut.load, dut.clock, config, image.words)
+    dut.view.poke(new Packed(new EnvironmentView(config.numbers)).pack(view.fields))
+    dut.start.poke(true)
+    dut.clock.step()
+    dut.start.poke(false)
 
-      // Two rays at a time, one for each march
-      val rounds = for (_ <- 0 until 40) yield {
-        val rays      = new Rays(dut.paths, config, () => stimulus.inRoom(camera), random)
-        var isIllegal = false
-        var cycles    = 0
-        while (rays.begun < 2 || !rays.isIdle) {
-          rays.step(willing = 1, asks = rays.begun < 2)
-          isIllegal ||= dut.events.illegalRecord.peekBoolean()
-          cycles += 1
-          assert(cycles < 10000)
-          dut.clock.step()
-        }
-        (rays.requests.map(_.ray), isIllegal)
+    // Two rays at a time, one for each march
+    val rounds = for (_ <- 0 until 20) yield {
+      val rays      = new Rays(dut.paths, config, () => stimulus.inRoom(camera), random)
+      var isIllegal = false
+      var cycles    = 0
+      while (rays.begun < 2 || !rays.isIdle) {
+        rays.step(willing = 1, asks = rays.begun < 2)
+        isIllegal ||= dut.events.illegalRecord.peekBoolean()
+        cycles += 1
+        assert(cycles < 10000)
+        dut.clock.step()
       }
-      val models = model(image.words, view, rounds.flatMap(_._1))
-      for ((both, (_, isIllegal)) <- models.map(_("isIllegal") == 1).grouped(2).zip(rounds))
-        assert(isIllegal == both.contains(true))
-      assert(models.map(_("isIllegal")).distinct.size == 2)
+      (rays.requests.map(_.ray), isIllegal)
     }
+    val models = model(image.words, view, rounds.flatMap(_._1))
+    for ((both, (_, isIllegal)) <- models.map(_("isIllegal") == 1).grouped(2).zip(rounds))
+      assert(isIllegal == both.contains(true))
+    assert(models.map(_("isIllegal")).distinct.size == 2)
+  }
 
   /** @param from the position of a camera that is not the maps', in that one's view space */
   private def checkFrame(

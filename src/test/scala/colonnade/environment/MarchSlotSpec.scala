@@ -27,7 +27,7 @@ class MarchSlotSpec extends AnyFlatSpec with ChiselScalatestTester {
       val scene    = new EnvironmentScene(config, random)
       val image    = new EnvironmentImage(config, random, illegal = 0.3)
       dut.clock.setTimeout(0)
-      val answers = for ((words, willing) <- Seq(scene.words -> 1.0, scene.words -> 0.001, image.words -> 0.3)) yield {
+      val answers = for ((words, willing) <- Seq(scene.words -> 1.0, scene.words -> 0.005, image.words -> 0.3)) yield {
         val camera = new stimulus.Camera(scene.focal, scene.middle, isTurned = true)
         val rays   = Seq.fill(20)(stimulus.inRoom(camera)) ++ Seq.fill(10)(stimulus.fromElsewhere(camera))
         val orders = new Orders(dut, config, camera.view.copy(isMapCamera = false), words, random)

@@ -5,7 +5,7 @@ import chisel3.util.Valid
 import chiseltest._
 import colonnade.config.{ColonnadeConfig, MapEncoding}
 import colonnade.formats.{AttributeEvents, Load}
-import colonnade.{Simulation, TestConfigs}
+import colonnade.{Always, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
@@ -43,8 +43,10 @@ class PhysicalAttributeMemorySpec extends AnyFlatSpec with ChiselScalatestTester
 
   import MapEncoding.{Slic, TwoLevel}
   for ((encoding, marches, columns) <- Seq((TwoLevel, 1, 1), (TwoLevel, 10, 1), (Slic, 3, 1), (TwoLevel, 4, 3)))
-    it should s"give each march its own responses: $marches marches, $columns columns, ${encoding.name}" in {
-      val count       = 60
+    it should s"give each march its own responses: $marches marches, $columns columns, ${encoding.name}" taggedAs Always.unless(
+      marches == 1
+    ) in {
+      val count       = 30
       val random      = new Random(marches)
       val shape       = config(encoding, marches, columns)
       val environment = new EnvironmentStimulus(shape, random)

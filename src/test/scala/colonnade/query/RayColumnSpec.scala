@@ -46,7 +46,7 @@ class RayColumnSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers
       val stimulus = new BatchStimulus(config, random)
       val bench    = new ColumnBench(dut, config, stimulus, random)
       bench.load(stimulus.scene.records)
-      val batches  = Seq.tabulate(6)(i => stimulus.batch(Seq(130, 64, 320)(i % 3), i % 3, i / 2))
+      val batches  = Seq.tabulate(6)(i => stimulus.batch(Seq(66, 20, 130)(i % 3), i % 3, i / 2))
       val expected = Model.batches(config, stimulus.image, stimulus.scene.records, batches.map(_.query))
       for ((batch, words) <- batches.zip(expected))
         withClue(s"${batch.count} rays, mode ${batch.mode.toString(16)}: ") {

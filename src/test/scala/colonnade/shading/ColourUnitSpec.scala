@@ -63,10 +63,10 @@ class ColourUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
           script.lights = if (round < 3) lights - round.min(lights) else lights
           driver.registers(values, script.lights)
           events = events.map(_ => Nil)
-          play(Seq.fill(config.units.pathContexts)(Seq.fill(12)(script.path()).flatten), Seq(0.0, 0.3, 0.9)(round % 3))
+          play(Seq.fill(config.units.pathContexts)(Seq.fill(6)(script.path()).flatten), Seq(0.0, 0.3, 0.9)(round % 3))
         }
 
-        assert(checked == 4 * 12 * config.units.pathContexts)
+        assert(checked == 4 * 6 * config.units.pathContexts)
 
         // Throughput: one shadowed pixel does not delay the others
         val contexts = config.units.pathContexts

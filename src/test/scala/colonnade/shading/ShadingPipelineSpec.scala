@@ -56,7 +56,7 @@ class ShadingPipelineSpec extends AnyFlatSpec with ChiselScalatestTester {
         dut.clock.setTimeout(0)
         val random   = new Random(seed)
         val stimulus = new ShaderStimulus(config, random)
-        for (round <- 0 until 12) {
+        for (round <- 0 until 8) {
           val light = if (round < 4) stimulus.typicalLight() else stimulus.light()
           pokeLight(dut.registers, light)
           pokeBounces(dut.registers, config, random)

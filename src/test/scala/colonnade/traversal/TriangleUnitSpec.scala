@@ -3,7 +3,7 @@ package colonnade.traversal
 import chiseltest._
 import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
-import colonnade.{Simulation, TestConfigs}
+import colonnade.{Always, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -17,7 +17,9 @@ class TriangleUnitSpec extends AnyFlatSpec with ChiselScalatestTester with Match
     s"${config.precision} with ${config.geometry.vertexBits} vertex bits"
 
   for ((config, seed) <- TestConfigs.formats.zipWithIndex)
-    it should s"answer as the model does, under bubbles and stalls, at ${name(config)}" in {
+    it should s"answer as the model does, under bubbles and stalls, at ${name(config)}" taggedAs Always.ifExtreme(
+      config
+    ) in {
       test(new TriangleUnit(config)).withAnnotations(simulation) { unit =>
         val harness = new TriangleHarness(config, new TriangleStimulus(config, seed))
         val hits    = Seq((0, 0), (3, 0), (0, 4), (3, 12)).map { case (bubbles, stalls) =>

@@ -6,82 +6,84 @@ import colonnade.TestParts._
 import colonnade.config.ColonnadeConfig
 import colonnade.numbers.FixedPorts._
 import colonnade.shading.Occlusion
-import colonnade.{Model, Simulation, TestConfigs}
+import colonnade.{Always, Model, OneSimulation, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.util.Random
 
 /** The table equals a list of all results of a ray: the least (t, id) with t < tMax. */
-class HitTableSpec extends AnyFlatSpec with ChiselScalatestTester {
+class HitTableSpec extends AnyFlatSpec with OneSimulation {
   behavior of "HitTable"
 
   private def config(contexts: Int, format: ColonnadeConfig): ColonnadeConfig =
     format.copy(array = format.array.copy(contexts = contexts))
 
-  for ((contexts, format) <- Seq((1, 0), (4, 0), (5, 2), (3, 4)))
-    it should s"hold the least hit of $contexts contexts, format $format" in {
+  for ((contexts, format) <- Seq((1, 0), (5, 2), (3, 4)))
+    it should s"hold the least hit of $contexts contexts, format $format" taggedAs Always.unless(format == 2) in {
       val shape = config(contexts, TestConfigs.formats(format))
       test(new HitTable(shape)).withAnnotations(Simulation.verilator) { dut =>
-        new HitTableDriver(dut, shape, seed = contexts).run(cycles = 600)
+        new HitTableDriver(dut, shape, seed = contexts).run(cycles = 300)
       }
     }
 
   it should "hold the least hit with extra slices" in {
     val shape = TestConfigs.withExtraSlices(config(contexts = 4, TestConfigs.formats.head))
     test(new HitTable(shape)).withAnnotations(Simulation.verilator) { dut =>
-      new HitTableDriver(dut, shape, seed = 9).run(cycles = 400)
+      new HitTableDriver(dut, shape, seed = 9).run(cycles = 300)
     }
   }
 
-  it should "prefer the smaller id of two hits at the same distance, whichever comes first" in
-    test(new HitTable(TestConfigs.tiny)) { dut =>
+  private def driver(dut: HitTable) = new HitTableDriver(dut, TestConfigs.tiny, seed = 4)
+
+  inOneSimulation(new HitTable(TestConfigs.tiny))(
+    "hold the least hit"                                                            -> (driver(_).run(cycles = 300)),
+    "prefer the smaller id of two hits at the same distance, whichever comes first" -> { dut =>
       for (ids <- Seq(Seq(7, 3, 5), Seq(3, 5, 7), Seq(5, 7, 3))) {
-        val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-        driver.begin(context = 2, tMax = 100, isShadow = false)
-        ids.foreach(id => driver.offer(2, driver.result(t = 40, id)))
-        driver.check()
-        assert(driver.best(2).get.id == 3)
+        val table = driver(dut)
+        table.begin(context = 2, tMax = 100, isShadow = false)
+        ids.foreach(id => table.offer(2, table.result(t = 40, id)))
+        table.check()
+        assert(table.best(2).get.id == 3)
       }
-    }
-
-  for (isShadow <- Seq(false, true); tMax <- Seq(BigInt(100), BigInt(2).pow(TestConfigs.tiny.numbers.gridBits - 1) - 1))
-    it should s"ignore a hit at tMax $tMax, as the model does, isShadow $isShadow" in
-      test(new HitTable(TestConfigs.tiny)) { dut =>
-        val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-        driver.begin(context = 1, tMax, isShadow)
-        driver.offer(1, driver.result(t = tMax, id = 0))
-        driver.check()
-        assert(!driver.hasHit(1))
-        driver.checkModel()
-        driver.offer(1, driver.result(t = tMax - 1, id = 9))
-        driver.check()
-        assert(driver.hasHit(1))
+    },
+    "ignore a hit at tMax, as the model does" -> { dut =>
+      for {
+        isShadow <- Seq(false, true)
+        tMax     <- Seq(BigInt(100), BigInt(2).pow(TestConfigs.tiny.numbers.gridBits - 1) - 1)
+      } {
+        val table = driver(dut)
+        table.begin(context = 1, tMax, isShadow)
+        table.offer(1, table.result(t = tMax, id = 0))
+        table.check()
+        assert(!table.hasHit(1))
+        table.checkModel()
+        table.offer(1, table.result(t = tMax - 1, id = 9))
+        table.check()
+        assert(table.hasHit(1))
       }
-
-  it should "let a shadow ray pass transmissive triangles, and record them" in
-    test(new HitTable(TestConfigs.tiny)) { dut =>
-      val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-      driver.begin(context = 1, tMax = 100, isShadow = true)
-      driver.offer(1, driver.result(t = 30, id = 0, isTransmissive = true))
-      driver.check()
-      assert(driver.occlusion(1) == Occlusion.transmissive)
-      driver.offer(1, driver.result(t = 60, id = 4))
-      driver.check()
-      assert(driver.occlusion(1) == Occlusion.opaque)
+    },
+    "let a shadow ray pass transmissive triangles, and record them" -> { dut =>
+      val table = driver(dut)
+      table.begin(context = 1, tMax = 100, isShadow = true)
+      table.offer(1, table.result(t = 30, id = 0, isTransmissive = true))
+      table.check()
+      assert(table.occlusion(1) == Occlusion.transmissive)
+      table.offer(1, table.result(t = 60, id = 4))
+      table.check()
+      assert(table.occlusion(1) == Occlusion.opaque)
+    },
+    "discard the hit of the previous ray" -> { dut =>
+      val table = driver(dut)
+      table.begin(context = 0, tMax = 100, isShadow = false)
+      table.offer(0, table.result(t = 10, id = 1))
+      table.begin(context = 0, tMax = 50, isShadow = false)
+      table.check()
+      assert(!table.hasHit(0))
+      table.offer(0, table.result(t = 20, id = 4))
+      table.check()
+      assert(table.best(0).get.id == 4)
     }
-
-  it should "discard the hit of the previous ray" in
-    test(new HitTable(TestConfigs.tiny)) { dut =>
-      val driver = new HitTableDriver(dut, TestConfigs.tiny, seed = 1)
-      driver.begin(context = 0, tMax = 100, isShadow = false)
-      driver.offer(0, driver.result(t = 10, id = 1))
-      driver.begin(context = 0, tMax = 50, isShadow = false)
-      driver.check()
-      assert(!driver.hasHit(0))
-      driver.offer(0, driver.result(t = 20, id = 4))
-      driver.check()
-      assert(driver.best(0).get.id == 4)
-    }
+  )
 }
 
 private object HitTableSpec {

@@ -8,7 +8,7 @@ import colonnade.formats.{ColoursRecord, Face, Leaf, LeafRecord, RecordFormats}
 import colonnade.ray.TracedRay
 import colonnade.shading.Occlusion
 import colonnade.traversal.TriangleHit
-import colonnade.{Model, Packed, Simulation, TestConfigs}
+import colonnade.{Always, Model, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
@@ -23,7 +23,7 @@ class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
 
   for ((contexts, colours, instances) <- Seq((5, true, 0), (40, false, 0), (12, false, 2)))
     it should s"join hits with rays and attributes, $contexts contexts${if (colours) ", colours"
-      else ""}${if (instances > 0) ", while visits read rays" else ""}" in {
+      else ""}${if (instances > 0) ", while visits read rays" else ""}" taggedAs Always.unless(contexts == 40) in {
       val tiny   = TestConfigs.tiny
       val config = tiny.copy(
         units = tiny.units.copy(pathContexts = contexts),
@@ -32,11 +32,11 @@ class PathHitsSpec extends AnyFlatSpec with ChiselScalatestTester with Matchers 
       )
       test(new PathHitsHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         val driver = new PathHitsDriver(dut, config, new Random(contexts))
-        driver.run(traces = 600)
-        driver.shaded should be > 160
-        if (colours) driver.refused should be > 4
-        driver.measured should be > 60
-        if (instances > 0) driver.visited should be > 160
+        driver.run(traces = 400)
+        driver.shaded should be > 100
+        if (colours) driver.refused should be > 2
+        driver.measured should be > 40
+        if (instances > 0) driver.visited should be > 100
       }
     }
 }

@@ -8,8 +8,7 @@ import colonnade.config.{ColonnadeConfig, PathConfig}
 import colonnade.formats.{FrameRegisters, Pixel, RecordBroadcast}
 import colonnade.ray.PreparedRay
 import colonnade.shading.Occlusion
-import colonnade.{Always, Matrix, Packed, Simulation, TestConfigs}
-import org.scalatest.Tag
+import colonnade.{Matrix, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.collection.mutable
@@ -52,15 +51,15 @@ private class PathUnitHarness(config: ColonnadeConfig) extends Module {
 }
 
 /** A path unit gives each pixel once, equal to the model's, however long its rays are under way and whichever of them ends
-  * first.
+  * first. `make test` has path units in path tracers.
   */
 class PathUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "PathUnit"
 
   private val tiny = TestConfigs.tiny
 
-  private def follow(name: String, config: ColonnadeConfig, tag: Tag = Always): Unit =
-    it should s"give each pixel once, equal to the model's: $name" taggedAs tag in
+  private def follow(name: String, config: ColonnadeConfig): Unit =
+    it should s"give each pixel once, equal to the model's: $name" taggedAs Matrix in
       test(new PathUnitHarness(config)).withAnnotations(Simulation.verilator) { dut =>
         dut.clock.setTimeout(0)
         for ((willing, seed, shadows) <- Seq((1.0, 1, true), (0.4, 2, true), (0.7, 3, false)))
@@ -93,8 +92,7 @@ class PathUnitSpec extends AnyFlatSpec with ChiselScalatestTester {
     "many paths, pipelines, corner colours and emission", {
       val coloured = TestConfigs.withPipelines(TestConfigs.withColours.head)
       coloured.copy(units = coloured.units.copy(pathContexts = 24), frame = coloured.frame.copy(emission = true))
-    },
-    Matrix
+    }
   )
 }
 

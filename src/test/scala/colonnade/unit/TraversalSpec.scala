@@ -9,7 +9,7 @@ import colonnade.numbers.Fixed
 import colonnade.numbers.FixedPorts._
 import colonnade.ray.{BoxRay, RayFormats}
 import colonnade.traversal.{SmallTree, StackReference}
-import colonnade.{Packed, Simulation, TestConfigs}
+import colonnade.{Always, Packed, Simulation, TestConfigs}
 import org.scalatest.flatspec.AnyFlatSpec
 
 import scala.collection.mutable
@@ -25,10 +25,10 @@ class TraversalSpec extends AnyFlatSpec with ChiselScalatestTester {
   )
 
   for (contexts <- Seq(5, 2))
-    it should s"walk trees with $contexts contexts like the reference" in {
+    it should s"walk trees with $contexts contexts like the reference" taggedAs Always.unless(contexts == 2) in {
       val shape = config(contexts)
       test(new TraversalHarness(shape)).withAnnotations(Simulation.verilator) { dut =>
-        for ((accepted, shrinks, seed) <- Seq((1.0, false, 1), (0.4, true, 2), (0.8, true, 3)))
+        for ((accepted, shrinks, seed) <- Seq((1.0, false, 1), (0.4, true, 2)))
           new TreeWalkers(dut, shape, seed).run(rays = 40, accepted, shrinks)
       }
     }
