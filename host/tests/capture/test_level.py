@@ -105,6 +105,13 @@ def test_walls_give_the_vertical(
     assert off(found, turn) < 1.1 * abs(roll) + 0.5
 
 
+@pytest.mark.parametrize("roll", [4.0, -10.0])
+def test_the_corner_of_two_walls_takes_the_roll_away(roll: float) -> None:
+    poses = [camera((0, 1.5, 0), yaw, 10.0, roll) for yaw in (40, 50)]
+    corner, wall = (level([frame(walls, pose) for pose in poses], None, "it") for walls in ([FRONT, SIDE], [FRONT]))
+    assert off(corner) < 0.1 * abs(roll) < off(wall)
+
+
 def test_no_surface_leaves_the_cameras() -> None:
     """A pitch of all cameras stays, for pictures alone do not tell it; a roll of one is spread over all."""
     rolls = (-6.0, 6.0, 0.0)
