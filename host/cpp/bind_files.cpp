@@ -20,16 +20,14 @@ namespace {
 nb::bytes bytesOf(const std::string& text) { return nb::bytes(text.data(), text.size()); }
 mesh::Text textOf(const nb::bytes& bytes) { return {bytes.c_str(), bytes.size()}; }
 
-/// A numpy array of rows that have the bytes of these; None for none.
-template <class T, class Row>
-nb::object rowsOf(const std::vector<Row>& rows, std::initializer_list<std::size_t> inner) {
+/// A numpy array that takes rows, which are numbers side by side; None for none.
+template <class T, class Row> nb::object rowsOf(std::vector<Row>&& rows, std::initializer_list<std::size_t> inner) {
     if (rows.empty()) return nb::none();
     std::vector<std::size_t> shape{rows.size()};
     shape.insert(shape.end(), inner.begin(), inner.end());
-    T* data = new T[rows.size() * sizeof(Row) / sizeof(T)];
-    std::memcpy(data, rows.data(), rows.size() * sizeof(Row));
-    const nb::capsule owner(data, [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
-    return nb::cast(Pixels<T>(data, shape.size(), shape.data(), owner));
+    auto* own = new std::vector<Row>(std::move(rows));
+    const nb::capsule owner(own, [](void* memory) noexcept { delete static_cast<std::vector<Row>*>(memory); });
+    return nb::cast(Pixels<T>(reinterpret_cast<T*>(own->data()), shape.size(), shape.data(), owner));
 }
 
 class MeshFile {
@@ -60,14 +58,14 @@ public:
     nb::dict finish(const std::vector<std::int32_t>& pictures) {
         if (pictures.size() != reader_->pictures.size()) throw std::invalid_argument("the number of pictures differs");
         refuse(released([&] { return reader_->finish(pictures); }));
-        const mesh::FileSurface& surface = reader_->surface;
+        mesh::FileSurface surface = std::move(reader_->surface);
         nb::dict found;
-        found["vertices"] = rowsOf<double>(surface.vertices, {3});
-        found["faces"] = rowsOf<std::int32_t>(surface.faces, {3});
-        found["normals"] = rowsOf<double>(surface.normals, {3, 3});
-        found["colours"] = rowsOf<double>(surface.colours, {3, 3});
-        found["uvs"] = rowsOf<double>(surface.uvs, {3, 2});
-        found["face_materials"] = rowsOf<std::int32_t>(surface.faceMaterials, {});
+        found["vertices"] = rowsOf<double>(std::move(surface.vertices), {3});
+        found["faces"] = rowsOf<std::int32_t>(std::move(surface.faces), {3});
+        found["normals"] = rowsOf<double>(std::move(surface.normals), {3, 3});
+        found["colours"] = rowsOf<double>(std::move(surface.colours), {3, 3});
+        found["uvs"] = rowsOf<double>(std::move(surface.uvs), {3, 2});
+        found["face_materials"] = rowsOf<std::int32_t>(std::move(surface.faceMaterials), {});
         nb::list materials, textures;
         for (const mesh::FileMaterial& one : surface.materials)
             materials.append(nb::make_tuple(static_cast<int>(one.kind), one.albedo, one.ior, one.roughness,
@@ -131,17 +129,28 @@ nb::tuple triangulate(const nb::ndarray<const double, nb::shape<-1, 3>, nb::c_co
     for (std::size_t i = 0; i < sizes.shape(0); left -= static_cast<std::size_t>(sizes.data()[i++]))
         if (sizes.data()[i] < 0 || static_cast<std::size_t>(sizes.data()[i]) > left)
             throw std::invalid_argument("a polygon has no such corners");
-    const mesh::Triangles found = released([&] {
-        return mesh::triangulate({sizes.data(), sizes.data() + sizes.shape(0)},
-                                 [&](std::int64_t corner) { return rows[corner]; });
+    std::vector<mesh::Row<std::int64_t>> corners;
+    std::vector<std::int64_t> polygons;
+    mesh::PolygonSplitter splitter;
+    released([&] {
+        std::int64_t polygon = 0, start = 0;
+        for (; polygon < static_cast<std::int64_t>(sizes.shape(0)); start += sizes.data()[polygon++]) {
+            if (!splitter.split({rows + start, rows + start + sizes.data()[polygon]})) return;
+            for (const auto& [a, b, c] : splitter.triangles) {
+                const auto at = [&](std::size_t corner) { return start + static_cast<std::int64_t>(corner); };
+                corners.push_back({at(a), at(b), at(c)});
+                polygons.push_back(polygon);
+            }
+        }
     });
-    return nb::make_tuple(rowsOf<std::int64_t>(found.corners, {3}), rowsOf<std::int64_t>(found.polygons, {}),
-                          found.shorts, found.crossed, found.tests, found.error);
+    return nb::make_tuple(rowsOf<std::int64_t>(std::move(corners), {3}), rowsOf<std::int64_t>(std::move(polygons), {}),
+                          splitter.shorts, splitter.crossed, splitter.tests, splitter.error);
 }
 
 nb::tuple teapot(int level) {
-    const mesh::RawMesh mesh = mesh::teapot(level);
-    return nb::make_tuple(rowsOf<double>(mesh.vertices, {3}), rowsOf<std::int32_t>(mesh.faces, {3}));
+    mesh::RawMesh mesh = mesh::teapot(level);
+    return nb::make_tuple(rowsOf<double>(std::move(mesh.vertices), {3}),
+                          rowsOf<std::int32_t>(std::move(mesh.faces), {3}));
 }
 
 } // namespace

@@ -12,24 +12,25 @@ from dataclasses import dataclass
 from colonnade.common.downloads import Download
 
 
-def _github(repository: str, commit: str, path: str, sha256: str) -> Download:
+def github(repository: str, commit: str, path: str, sha256: str) -> Download:
+    """A file of a repository's commit on GitHub."""
     return Download(f"https://raw.githubusercontent.com/{repository}/{commit}/{path}", sha256)
 
 
 def _common(name: str, sha256: str) -> Download:
     """A mesh of Alec Jacobson's collection."""
     commit = "8a4f8642acaf43f9cd7b67858a1502e1055ef202"
-    return _github("alecjacobson/common-3d-test-models", commit, f"data/{name}.obj", sha256)
+    return github("alecjacobson/common-3d-test-models", commit, f"data/{name}.obj", sha256)
 
 
 def _sta(path: str, sha256: str) -> Download:
     """A library that OpenSTA ships."""
-    return _github("parallaxsw/OpenSTA", "737b52f33b66e4c2ccc3e3ef22c3adfe9aec8d09", path, sha256)
+    return github("parallaxsw/OpenSTA", "737b52f33b66e4c2ccc3e3ef22c3adfe9aec8d09", path, sha256)
 
 
 #: Meshes by name.
 MESHES: Mapping[str, Download] = {
-    "armadillo": _github(
+    "armadillo": github(
         "libigl/libigl-tutorial-data",
         "c1f9ede366d02e3531ecbaec5e3769312f31cccd",
         "armadillo.obj",

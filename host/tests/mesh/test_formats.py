@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colonnade.common.errors import UserError
+from colonnade.common.limits import MAX_TRIANGLES
 from colonnade.common.srgb import linear_from_srgb
 from colonnade.mesh.geometry.normals import face_normals
 from colonnade.mesh.load import load_mesh
@@ -164,6 +165,16 @@ def test_strips_of_ply(tmp_path: Path) -> None:
     mesh = load_mesh(written(tmp_path / "a.ply", f"{header}{strips}{rows}8 0 1 2 3 -1 1 3 2\n"))
     assert mesh.source_count == 3
     np.testing.assert_allclose(face_normals(mesh.vertices, mesh.faces), [[0, 0, 1]] * 2)
+
+
+def test_a_file_of_too_many_triangles_is_refused(tmp_path: Path) -> None:
+    corners = MAX_TRIANGLES + 3
+    header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar x\nproperty uchar y\n"
+    header += "property uchar z\nelement face 1\nproperty list int uchar vertex_indices\nend_header\n"
+    file = tmp_path / "a.ply"
+    file.write_bytes(header.encode() + bytes(3) + corners.to_bytes(4, "little") + bytes(corners))
+    with pytest.raises(UserError, match=f"it has more than {MAX_TRIANGLES:,} triangles: leave some out"):
+        load_mesh(file)
 
 
 def test_colours_of_faces_and_vertices_become_albedo(tmp_path: Path) -> None:

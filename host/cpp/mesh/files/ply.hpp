@@ -70,16 +70,14 @@ public:
         if (stack(vertex, {"nx", "ny", "nz"}, normals)) polygons_.normals = std::move(normals);
         const PlyElement* face = find("face");
         if (face) {
-            const PlyProperty *plural = face->find("vertex_indices", true),
-                              *own = plural ? plural : face->find("vertex_index", true);
-            if (own) {
-                polygons_.sizes = own->column.sizes;
-                for (const double value : own->column.values) addCorner(value);
-            }
+            PlyColumn corners = take("face", "vertex_indices");
+            if (corners.sizes.empty()) corners = take("face", "vertex_index");
+            polygons_.sizes = std::move(corners.sizes);
+            polygons_.corners.reserve(corners.values.size());
+            for (const double value : corners.values) addCorner(value);
             readColours(*face, polygons_.colours);
         }
-        const PlyElement* strips = find("tristrips");
-        if (const PlyProperty* own = strips ? strips->find("vertex_indices", true) : nullptr) unroll(own->column);
+        unroll(take("tristrips", "vertex_indices"));
         if (least_ < 0 || largest_ >= static_cast<std::int64_t>(surface.vertices.size()))
             return refuse("a face names vertex " + std::to_string(least_ < 0 ? least_ : largest_) +
                           ", which does not exist: the file has " + grouped(surface.vertices.size()) +
@@ -131,6 +129,15 @@ private:
         for (std::size_t i = elements_.size(); i-- > 0;)
             if (elements_[i].name == name) return &elements_[i];
         return nullptr;
+    }
+
+    /// The numbers of a list, which has none left; none without the list.
+    PlyColumn take(Text elementName, Text name) {
+        const PlyElement* element = find(elementName);
+        const PlyProperty* own = element ? element->find(name, true) : nullptr;
+        if (!own) return {};
+        PlyElement& from = elements_[static_cast<std::size_t>(element - elements_.data())];
+        return std::move(from.properties[static_cast<std::size_t>(own - element->properties.data())].column);
     }
 
     bool readHeader(Text bytes) {
@@ -306,10 +313,13 @@ private:
                         if (property.isRead) property.column.sizes.push_back(static_cast<std::int64_t>(size));
                     }
                     if (left() / bytes[property.type] < size) return refuseShort(element);
+                    std::vector<double>& values = property.column.values;
+                    if (property.isRead && values.capacity() - values.size() < size)
+                        values.reserve(std::max(2 * values.capacity(), values.size() + size));
                     if (!property.isRead) at += size * bytes[property.type];
                     else
                         for (std::size_t i = 0; i < size; ++i, at += bytes[property.type])
-                            property.column.values.push_back(numberAt(property.type, at, isBig));
+                            values.push_back(numberAt(property.type, at, isBig));
                 }
         }
         return true;
@@ -336,8 +346,11 @@ private:
 
     /// Adds the triangles of strips, which end at -1.
     void unroll(const PlyColumn& strips) {
-        const double* at = strips.values.data();
+        if (strips.sizes.empty()) return;
         polygons_.colours.clear();
+        const double* at = strips.values.data();
+        polygons_.sizes.reserve(polygons_.sizes.size() + strips.values.size());
+        polygons_.corners.reserve(polygons_.corners.size() + 3 * strips.values.size());
         for (const std::int64_t size : strips.sizes) {
             std::size_t length = 0;
             for (std::int64_t i = 0; i < size; ++i, ++at) {

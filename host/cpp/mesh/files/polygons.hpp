@@ -22,27 +22,20 @@ constexpr double straight = 1e-9;
 /// Tests for ears of a polygon, at most, for each of its corners.
 constexpr std::size_t earTests = 20;
 
-/// The triangles of polygons; those of a polygon are consecutive.
-struct Triangles {
-    std::vector<Row<std::int64_t>> corners; ///< positions in the list of all polygons' corners
-    std::vector<std::int64_t> polygons;     ///< of each triangle
-    std::size_t shorts = 0;                 ///< polygons of fewer than three corners, which have no triangle
-    std::size_t crossed = 0;                ///< polygons whose outline crosses itself; their triangles may overlap
-    std::size_t tests = 0;                  ///< for ears
-    std::string error;                      ///< why they cannot be split; empty if they can
-};
-
 /// Splits one polygon after the other; each keeps its winding.
 class PolygonSplitter {
 public:
-    explicit PolygonSplitter(Triangles& to) : to_(to) {}
+    std::vector<Row<std::size_t>> triangles; ///< of the last polygon: numbers of its corners
+    std::size_t shorts = 0;                  ///< polygons of fewer than three corners, which have no triangle
+    std::size_t crossed = 0;                 ///< polygons whose outline crosses itself; their triangles may overlap
+    std::size_t tests = 0;                   ///< for ears
+    std::string error;                       ///< why the last one cannot be split; empty if it can
 
-    /// `points`: of its corners, of which the first is number `start` in the list of all; false if it has too many.
-    bool add(const std::vector<Vector>& points, std::int64_t start, std::int64_t polygon) {
-        start_ = start;
-        polygon_ = polygon;
+    /// False if a polygon has too many corners.
+    bool split(const std::vector<Vector>& points) {
+        triangles.clear();
         const std::size_t size = points.size();
-        if (size < 3) return ++to_.shorts;
+        if (size < 3) return ++shorts;
         std::size_t first = 0;
         bool isBent = false, crosses = false;
         if (size > 3) first = findBends(points, isBent, crosses);
@@ -50,18 +43,14 @@ public:
             if (!clipEars(points, crosses)) return false;
         } else
             for (std::size_t k = 1; k + 1 < size; ++k) emit(first, (first + k) % size, (first + k + 1) % size);
-        to_.crossed += crosses;
+        crossed += crosses;
         return true;
     }
 
 private:
     enum : std::int64_t { ear = -1, unknown = -2, notConvex = -3 };
 
-    void emit(std::size_t a, std::size_t b, std::size_t c) {
-        to_.corners.push_back({start_ + static_cast<std::int64_t>(a), start_ + static_cast<std::int64_t>(b),
-                               start_ + static_cast<std::int64_t>(c)});
-        to_.polygons.push_back(polygon_);
-    }
+    void emit(std::size_t a, std::size_t b, std::size_t c) { triangles.push_back({a, b, c}); }
 
     /// Whether a polygon has a corner that is not convex, and whether it crosses itself: the angles of all others sum
     /// to a circle. Returns the corner from which it is a fan: of a quadrilateral that is not convex the one of the
@@ -131,7 +120,7 @@ private:
     /// the corner in the triangle that is farthest from the cut: it is concave in a simple polygon, so that it remains
     /// for long.
     std::int64_t obstacleOf(std::size_t at) {
-        ++to_.tests;
+        ++tests;
         const Pair &a = flat_[before_[at]], &b = flat_[at], &c = flat_[after_[at]];
         const double low = std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]));
         const double high = std::sqrt((c[0] - b[0]) * (c[0] - b[0]) + (c[1] - b[1]) * (c[1] - b[1]));
@@ -172,8 +161,8 @@ private:
     bool clipEars(const std::vector<Vector>& points, bool& crosses) {
         const std::size_t size = points.size();
         if (size > maxPolygon) {
-            to_.error = "a concave polygon has " + grouped(size) + " corners: split it, " + grouped(maxPolygon) +
-                        " are supported";
+            error = "a concave polygon has " + grouped(size) + " corners: split it, " + grouped(maxPolygon) +
+                    " are supported";
             return false;
         }
         flatten(points);
@@ -185,7 +174,7 @@ private:
         }
         std::vector<std::int64_t> obstacles(size, unknown);
         remains_.assign(size, 1);
-        const std::size_t most = to_.tests + earTests * size;
+        const std::size_t most = tests + earTests * size;
         std::size_t at = 0, count = size, made = 0;
         for (; count > 3; --count) {
             std::size_t tries = 0;
@@ -197,7 +186,7 @@ private:
                 at = after_[at];
             }
             if (tries == count) crosses = crosses || hasArea();
-            if (to_.tests > most) {
+            if (tests > most) {
                 crosses = true;
                 break;
             }
@@ -216,25 +205,9 @@ private:
         return true;
     }
 
-    Triangles& to_;
-    std::int64_t start_ = 0, polygon_ = 0;
     std::vector<Pair> flat_;
     std::vector<std::size_t> before_, after_;
     std::vector<char> remains_;
 };
-
-/// Splits polygons of so many corners each, whose positions follow each other.
-template <class PointOf> Triangles triangulate(const std::vector<std::int64_t>& sizes, const PointOf& pointOf) {
-    Triangles found;
-    PolygonSplitter splitter(found);
-    std::vector<Vector> points;
-    std::int64_t start = 0;
-    for (std::size_t polygon = 0; polygon < sizes.size(); start += sizes[polygon++]) {
-        points.clear();
-        for (std::int64_t corner = start; corner < start + sizes[polygon]; ++corner) points.push_back(pointOf(corner));
-        if (!splitter.add(points, start, static_cast<std::int64_t>(polygon))) break;
-    }
-    return found;
-}
 
 } // namespace colonnade::mesh

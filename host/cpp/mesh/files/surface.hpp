@@ -17,6 +17,9 @@ namespace colonnade::mesh {
 /// Largest magnitude of a position in a texture: beyond it float32 holds no fractions of a picture.
 constexpr double maxUv = 1e6;
 
+/// Triangles of a mesh, at most, as MAX_TRIANGLES of host/colonnade/common/limits.py.
+constexpr std::size_t maxTriangles = 1 << 24;
+
 /// Surface kinds of the device.
 enum class Kind { diffuse, mirror, glass };
 
@@ -100,48 +103,60 @@ inline void makeLinear(std::vector<Vector>& colours, std::optional<double> white
 
 /// Gives a surface, which has vertices, materials and textures, the triangles of polygons; an error, or none.
 inline std::string addPolygons(FileSurface& surface, const Polygons& from, Losses& losses) {
-    const Triangles split = triangulate(from.sizes, [&](std::int64_t corner) -> const Vector& {
-        return surface.vertices[static_cast<std::size_t>(from.corners[static_cast<std::size_t>(corner)])];
-    });
-    if (!split.error.empty()) return split.error;
-    losses.add(lost::shortFaces, split.shorts);
-    losses.add(lost::crossed, split.crossed);
-    const std::size_t count = split.corners.size();
-    surface.faces.resize(count);
-    if (!from.normals.empty()) surface.normals.resize(count);
-    if (!from.uvs.empty()) surface.uvs.resize(count);
-    if (!from.materials.empty()) surface.faceMaterials.resize(count);
+    std::size_t most = 0;
+    for (const std::int64_t size : from.sizes) most += static_cast<std::size_t>(std::max<std::int64_t>(size - 2, 0));
+    if (most > maxTriangles) return "it has more than " + grouped(maxTriangles) + " triangles: leave some out";
     const bool hasColours = !from.colours.empty() || !from.vertexColours.empty();
-    if (hasColours) surface.colours.resize(count);
-    std::size_t hidden = 0, changed = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        const auto polygon = static_cast<std::size_t>(split.polygons[i]);
+    surface.faces.reserve(most);
+    if (!from.normals.empty()) surface.normals.reserve(most);
+    if (!from.uvs.empty()) surface.uvs.reserve(most);
+    if (!from.materials.empty()) surface.faceMaterials.reserve(most);
+    if (hasColours) surface.colours.reserve(most);
+    PolygonSplitter splitter;
+    std::vector<Vector> points;
+    std::size_t start = 0, hidden = 0, changed = 0;
+    for (std::size_t polygon = 0; polygon < from.sizes.size(); ++polygon) {
+        const std::size_t end = start + static_cast<std::size_t>(from.sizes[polygon]);
+        points.clear();
+        for (std::size_t corner = start; corner < end; ++corner)
+            points.push_back(surface.vertices[static_cast<std::size_t>(from.corners[corner])]);
+        if (!splitter.split(points)) return splitter.error;
         const std::size_t material = from.materials.empty() ? 0 : static_cast<std::size_t>(from.materials[polygon]);
         const bool isTextured = surface.materials[material].texture >= 0;
-        bool isWhite = true;
-        for (int k = 0; k < 3; ++k) {
-            const auto corner = static_cast<std::size_t>(split.corners[i][k]);
-            const auto vertex = static_cast<std::size_t>(from.corners[corner]);
-            surface.faces[i][k] = from.corners[corner];
-            if (!from.normals.empty()) {
-                const std::int32_t normal =
-                    from.cornerNormals.empty() ? from.corners[corner] : from.cornerNormals[corner];
-                if (normal >= 0) surface.normals[i][k] = from.normals[static_cast<std::size_t>(normal)];
+        for (const Row<std::size_t>& triangle : splitter.triangles) {
+            Face face;
+            Corners normals{}, colours;
+            Triangle uvs;
+            bool isWhite = true;
+            for (int k = 0; k < 3; ++k) {
+                const std::size_t corner = start + triangle[k];
+                const auto vertex = static_cast<std::size_t>(from.corners[corner]);
+                face[k] = from.corners[corner];
+                if (!from.normals.empty()) {
+                    const std::int32_t normal = from.cornerNormals.empty() ? face[k] : from.cornerNormals[corner];
+                    if (normal >= 0) normals[k] = from.normals[static_cast<std::size_t>(normal)];
+                }
+                if (!from.uvs.empty()) uvs[k] = from.uvs[corner];
+                if (hasColours) {
+                    colours[k] = from.colours.empty() ? from.vertexColours[vertex] : from.colours[polygon];
+                    isWhite &= colours[k] == Vector{1, 1, 1};
+                    if (isTextured) colours[k].fill(std::numeric_limits<double>::quiet_NaN());
+                }
             }
-            if (!from.uvs.empty()) surface.uvs[i][k] = from.uvs[corner];
-            if (hasColours) {
-                Vector& colour = surface.colours[i][k];
-                colour = from.colours.empty() ? from.vertexColours[vertex] : from.colours[polygon];
-                isWhite &= colour == Vector{1, 1, 1};
-                if (isTextured) colour.fill(std::numeric_limits<double>::quiet_NaN());
-            }
+            surface.faces.push_back(face);
+            if (!from.normals.empty()) surface.normals.push_back(normals);
+            if (!from.uvs.empty()) surface.uvs.push_back(uvs);
+            if (hasColours) surface.colours.push_back(colours);
+            if (!from.materials.empty()) surface.faceMaterials.push_back(from.materials[polygon]);
+            hidden += isTextured;
+            changed += isTextured && !isWhite;
         }
-        if (!from.materials.empty()) surface.faceMaterials[i] = from.materials[polygon];
-        hidden += isTextured;
-        changed += isTextured && !isWhite;
+        start = end;
     }
+    losses.add(lost::shortFaces, splitter.shorts);
+    losses.add(lost::crossed, splitter.crossed);
     if (hasColours) losses.add(lost::texturedColours, changed);
-    if (hidden == count) surface.colours.clear();
+    if (hidden == surface.faces.size()) surface.colours.clear();
     return "";
 }
 
