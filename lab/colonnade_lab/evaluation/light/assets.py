@@ -7,19 +7,18 @@ above 1.
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from colonnade.common.atomic_files import replacing
+from colonnade.common.downloads import fetched
 from colonnade.common.errors import UserError
 from colonnade.common.image_io import encode_srgb
+from colonnade.common.published import github
 from colonnade.common.types import Floats
-from colonnade.mesh.files.catalog import VARIABLE
 from colonnade.mesh.load import load_mesh
 from colonnade.render.frames import render
 from colonnade.render.request import RenderRequest
@@ -36,16 +35,18 @@ SIZE, SAMPLES = (320, 240), 64
 _AROUND, _LAMP, _OFFSET = (0.35, 0.38, 0.42), (0.7, 0.65, 0.6), (1.2, 1.6, 1.5)
 #: The preset that renders.
 _CONFIG = "small"
-#: Files of Khronos that are measured for the pages: repository, commit, and git's name of each file's folder.
-REPOSITORY, COMMIT = "KhronosGroup/glTF-Sample-Models", "29355d2374f829c8f238b3c55ce06981455aa389"
+#: The repository, its commit and the files that are measured for the pages.
+REPOSITORY, COMMIT = "BabylonJS/MeshesLibrary", "1e0c5cdbdfec7b632b9aa1f498f7016b0d210779"
 FILES = {
-    "Avocado": "650b42c9c148b5c5ef238ac5d49e8f7e3ceea669",
-    "BoomBoxWithAxes": "6827953582ab21780ac6402181039fd88b054355",
-    "CesiumMilkTruck": "d598dc2ba906d645ce25c95eeb194cd4d0813543",
-    "DamagedHelmet": "e4deff4578509b6f86bd0984357d11c58a39c46b",
-    "Duck": "f779188bec0572f8356f0a3ebd197a1b36a18f8e",
-    "Suzanne": "bbe5bf53dbd6e1db795e3c8c0cc59578e3ab0e9c",
-    "WaterBottle": "2a3b7efb0b6546cbddf87007f7fc3d0afb871483",
+    "Demos/UnderWaterScene/fish/greySnapper_vertColor": (
+        "4d81d3846ad368202edfaba094a0302353d8414035b2238a29e8cd1e5717e452"
+    ),
+    "Demos/weaponsDemo/meshes/runeSword": "6bc75eab6bc24995a1e51b4bf22d57616cd958da2c7dd468b5ea7b3312421986",
+    "ExplodingBarrel": "2e46b67ce14853e840d09b612f60920ff30a2719fccb561d7bd641a9054f26eb",
+    "PBR_Spheres": "5a9f82359ca247cca3b145dae69e4151486c2f53e8e06e841c624ca6003d8cb8",
+    "clothFolds": "324c555fe47670cd822a87e948ed70cbd0f9e1a2896e80211f71ff13119a235b",
+    "shaderBall": "f85c3d1a3db3c9b375493ffb6871c9cb7129b64ebe2e62f282a6fcfac20bd8ae",
+    "target": "30de81bde77c8061d5975826288d37a614b858c290ce9c95fa38a0de0b46700d",
 }
 
 
@@ -65,34 +66,13 @@ class AssetResult:
 
 
 def sample_files() -> list[Path]:
-    """The files of `FILES` in the folders of COLONNADE_MESHES.
+    """The files of `FILES`.
 
     Raises:
-        UserError: One is missing, or is not of `COMMIT`.
+        UserError: One is not at hand and cannot be fetched.
     """
-    folders = [Path(folder) for folder in os.environ.get(VARIABLE, "").split(os.pathsep) if folder]
-    found = []
-    for name, tree in FILES.items():
-        path = Path(name) / "glTF" / f"{name}.gltf"
-        file = next((folder / path for folder in folders if (folder / path).is_file()), None)
-        if file is None:
-            raise UserError(f"no folder of {VARIABLE} has {path}: add the folder 2.0 of {REPOSITORY}, commit {COMMIT}")
-        if _tree(file.parent) != tree:
-            raise UserError(f"{file.parent} is not that of {REPOSITORY}, commit {COMMIT}: check this commit out")
-        found.append(file)
-    return found
-
-
-def _tree(folder: Path) -> str:
-    """The name that git gives a folder of files."""
-    entries = b""
-    for file in sorted(folder.iterdir()):
-        entries += b"100644 " + file.name.encode() + b"\0" + _object(b"blob", file.read_bytes())
-    return _object(b"tree", entries).hex()
-
-
-def _object(kind: bytes, content: bytes) -> bytes:
-    return hashlib.sha1(kind + b" %d\0" % len(content) + content, usedforsecurity=False).digest()
+    files = {path: github(REPOSITORY, COMMIT, f"{path}.glb", digest) for path, digest in FILES.items()}
+    return [fetched(file, f"the glTF file {path}") for path, file in files.items()]
 
 
 def write_jobs(folder: Path, files: list[Path]) -> None:
