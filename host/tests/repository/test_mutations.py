@@ -66,3 +66,21 @@ def test_the_curve_puts_suites_with_most_faults_a_second_first(tool: dict[str, A
 def test_kills_and_seconds_are_summed_by_suite(tool: dict[str, Any]) -> None:
     rows = tool["kills"]([("B", True, 2.0), ("A", True, 1.5), ("B", False, 4.0)]).splitlines()
     assert [row.split() for row in rows[1:]] == [["1", "1", "1.5", "A"], ["1", "2", "6.0", "B"]]
+
+
+def test_a_cover_takes_the_tests_with_most_new_random_faults_a_second(tool: dict[str, Any]) -> None:
+    tests = {"slow": (4.0, False), "fast": (1.0, False), "idle": (1.0, False), "late": (4.0, True)}
+    found = {"slow": "abcd", "fast": "ab", "late": "e"}
+    lines: list[dict[str, Any]] = [
+        {"suite": "S", "test": name, "seconds": seconds, "matrix": matrix} for name, (seconds, matrix) in tests.items()
+    ]
+    lines += [
+        {"suite": "S", "test": test, "mutant": f"X.scala {name}", "killed": name in found.get(test, "")}
+        for test in tests
+        for name in "abcdef"
+    ]
+    rows = tool["cover"]([*lines, {"end": "S"}]).splitlines()
+    assert [row.split()[-1] for row in rows[1:5]] == ["fast", "slow", "late", "idle"]
+    assert rows[2].split() == ["6", "4", "4.0", "66.7%", "50.0%", "slow"]
+    assert "6 faults of 1 files: 4 by tests of `make test`, 5 with those of" in rows[5]
+    assert rows[6:] == ["not found: X.scala f"]

@@ -49,7 +49,15 @@ object KeptSimulators extends Simulator {
   override def supportsCoverage: Boolean     = verilator.supportsCoverage
   override def supportsLiveCoverage: Boolean = verilator.supportsLiveCoverage
 
-  override def createContext(state: CircuitState): SimulatorContext = {
+  override def createContext(state: CircuitState): SimulatorContext = Mutants.choice.fold(keep(state)) { choice =>
+    val (circuit, mutants) = Mutants.insert(state.circuit, choice)
+    Mutants.present ++= mutants
+    val context = keep(state.copy(circuit = circuit))
+    context.poke(Mutants.port, Mutants.active)
+    new MutatedContext(context)
+  }
+
+  private def keep(state: CircuitState): SimulatorContext = {
     val folder = os.pwd / os.RelPath(state.annotations.collectFirst { case TargetDirAnnotation(name) => name }.get)
     val key    = keyOf(state)
     // Without keys, what a build leaves that does not end is never used
@@ -78,4 +86,23 @@ object KeptSimulators extends Simulator {
     val jars   = System.getProperty("java.class.path").split(":").map(_.split("/").last).filter(_.endsWith(".jar"))
     versions.map(_.toString) ++ Seq(script, sys.env.getOrElse("MAKEFLAGS", "")) ++ java ++ jars.sorted
   }
+}
+
+/** Counts cycles, as a fault may keep a test from its end. */
+private class MutatedContext(context: SimulatorContext) extends SimulatorContext {
+  override def sim: Simulator = context.sim
+
+  override def step(cycles: Int): StepResult = {
+    Mutants.cycles += cycles
+    if (Mutants.cycles > Mutants.limit) throw new IllegalStateException("no end")
+    context.step(cycles)
+  }
+
+  override def peek(signal:     String): BigInt                           = context.peek(signal)
+  override def poke(signal:     String, value: BigInt): Unit              = context.poke(signal, value)
+  override def peekMemory(name: String, at:    Long): BigInt              = context.peekMemory(name, at)
+  override def pokeMemory(name: String, at:    Long, value: BigInt): Unit = context.pokeMemory(name, at, value)
+  override def finish(): Unit                                             = context.finish()
+  override def getCoverage(): List[(String, Long)]                        = context.getCoverage()
+  override def resetCoverage(): Unit                                      = context.resetCoverage()
 }

@@ -1,0 +1,128 @@
+package colonnade
+
+import firrtl2._
+import firrtl2.ir._
+
+import java.nio.charset.StandardCharsets.UTF_8
+import java.security.MessageDigest
+import scala.collection.mutable
+
+/** Random faults in the circuits of [[KeptSimulators]], all in one simulator: an input of each module chooses one by its
+  * number, and 0 none. A fault is another operation, the other way of a multiplexer, or an inverted bit, at a place in the
+  * sources of the hardware; so it is the same in every shape of a module, and in every test that simulates the module.
+  */
+object Mutants {
+
+  /** The faults to build in: at most so many of a file, those with the least digests of the seed. */
+  final case class Choice(seed: Int, perFile: Int)
+
+  /** A fault, with its number: `file line:column operation index`. */
+  final case class Mutant(name: String, number: BigInt)
+
+  /** None: simulators are built without faults. */
+  var choice: Option[Choice] = None
+
+  /** The fault of the simulations to come; 0 is none. */
+  var active: BigInt = 0
+
+  /** Those in the simulations of the last test. */
+  val present: mutable.Set[Mutant] = mutable.Set.empty
+
+  /** Cycles of the last test, and how many it may take. */
+  var cycles = 0L
+  var limit  = Long.MaxValue
+
+  val port          = "mutant"
+  private val width = 31
+  private val kind  = UIntType(IntWidth(width))
+  private val one   = UIntType(IntWidth(1))
+  private val at    = "src/main/scala/colonnade/"
+
+  private val others: Map[PrimOp, PrimOp] = {
+    import PrimOps._
+    val pairs = Seq(And -> Or, Add -> Sub, Eq -> Neq, Lt -> Geq, Leq -> Gt)
+    (pairs ++ pairs.map(_.swap)).toMap
+  }
+
+  /** The circuit with the faults of the choice, and these. */
+  def insert(circuit: Circuit, choice: Choice): (Circuit, Seq[Mutant]) = {
+    val found = circuit.modules.collect { case module: Module =>
+      new Finder(module, choice.seed).found
+    }.flatten.distinct
+    val byFile   = found.groupBy(_.name.takeWhile(_ != ' ')).toSeq.sortBy(_._1)
+    val selected = byFile.flatMap(_._2.sortBy(_.number).take(choice.perFile))
+    val names    = selected.toSet
+    val result   = circuit.copy(modules = circuit.modules.map {
+      case module: Module => new Finder(module, choice.seed, names).changed(circuit)
+      case other          => other
+    })
+    (result, selected)
+  }
+
+  /** Finds the faults of a module, and puts in those of `selected`. */
+  private class Finder(module: Module, seed: Int, selected: Set[Mutant] = Set.empty) {
+    private val all    = mutable.Buffer.empty[Mutant]
+    private val counts = mutable.Map.empty[String, Int].withDefaultValue(0)
+    private val input  = Reference(port, kind, PortKind, SourceFlow)
+
+    lazy val found: Seq[Mutant] = { statement(module.body); all.toSeq }
+
+    def changed(circuit: Circuit): Module = {
+      val inner                                 = circuit.modules.collect { case inner: Module => inner.name }.toSet
+      def withPorts(body: Statement): Statement = body match {
+        case instance @ DefInstance(_, name, of, tpe: BundleType) if inner(of) =>
+          val wide = tpe.copy(fields = tpe.fields :+ Field(port, Flip, kind))
+          val to   = SubField(Reference(name, wide, InstanceKind, SourceFlow), port, kind, SinkFlow)
+          Block(Seq(instance.copy(tpe = wide), Connect(NoInfo, to, input)))
+        case other => other.mapStmt(withPorts)
+      }
+      module.copy(
+        ports = module.ports :+ Port(NoInfo, port, Input, kind),
+        body = withPorts(statement(module.body))
+      )
+    }
+
+    private def statement(body: Statement): Statement = body match {
+      case node: DefNode => node.copy(value = expression(node.info, node.value))
+      case to: Connect   => to.copy(expr = expression(to.info, to.expr))
+      case other         => other.mapStmt(statement)
+    }
+
+    private def expression(info: Info, value: Expression): Expression =
+      if (!info.serialize.contains(at)) value
+      else {
+        val where = info.serialize.split(at).last.takeWhile(letter => letter != ',' && letter != ']').trim
+        changes(value).foldLeft(value) { case (good, (name, bad)) =>
+          val label = s"$where $name"
+          val count = counts(label)
+          counts(label) += 1
+          val mutant = of(s"$label $count", seed)
+          all += mutant
+          val isActive = DoPrim(PrimOps.Eq, Seq(input, UIntLiteral(mutant.number, IntWidth(width))), Nil, one)
+          if (selected(mutant)) Mux(isActive, bad, good, value.tpe) else good
+        }
+      }
+
+    /** Other values of the same type, by name. */
+    private def changes(value: Expression): Seq[(String, Expression)] = value match {
+      case prim @ DoPrim(op, _, _, _) if others.contains(op) =>
+        Seq(s"$op→${others(op)}" -> prim.copy(op = others(op)))
+      case prim @ DoPrim(PrimOps.Not, args, _, tpe) if args.head.tpe == tpe => Seq("not" -> args.head)
+      case mux @ Mux(_, yes, no, _) => Seq("mux" -> mux.copy(tval = no, fval = yes))
+      case other                    => other.tpe match {
+          case UIntType(IntWidth(bits)) if bits > 0 => Seq("bit" -> flipped(other, bits.toInt))
+          case _                                    => Nil
+        }
+    }
+
+    private def flipped(value: Expression, bits: Int): Expression = {
+      val bit = BigInt(1) << (digest(s"$seed ${bits}") % bits).toInt
+      DoPrim(PrimOps.Xor, Seq(value, UIntLiteral(bit, IntWidth(bits))), Nil, value.tpe)
+    }
+  }
+
+  private def of(name: String, seed: Int): Mutant = Mutant(name, digest(s"$seed $name") % (BigInt(1) << width).-(1) + 1)
+
+  private def digest(text: String): BigInt =
+    BigInt(1, MessageDigest.getInstance("SHA-256").digest(text.getBytes(UTF_8)).take(8))
+}
