@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import json
+import random
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -115,6 +118,39 @@ def test_axes_of_the_scatter_plot_can_be_chosen(open_report: Any) -> None:
     assert page.locator("#chart-scatter .mark-symbol path[aria-label$='d']").count() == 6
     page.locator("#chart-scatter path[aria-label='32b32s64d']").hover()
     expect(page.locator("#vg-tooltip-element")).to_contain_text("geometry.triangleBits = –")
+    assert report.is_quiet()
+
+
+def decades(content: dict[str, Any]) -> None:
+    """More points than labels have space for, whose energy spans three decades."""
+    draws = random.Random(3)
+    for number in range(60):
+        point = json.loads(json.dumps(content["points"][number % 5]))
+        point["name"] = f"point {number} of the grid"
+        for key in point["figures"]:
+            if isinstance(point["figures"][key], float):
+                point["figures"][key] *= 10 ** draws.uniform(-1, 1)
+        content["points"].append(point)
+
+
+def test_labels_of_the_scatter_plot_are_apart_and_the_selected_point_has_one(open_report: Any) -> None:
+    report = open_report(decades)
+    page = report.page
+    page.select_option("#panel-point", "point 17 of the grid")
+    page.select_option("#scatter-y", label="energy per ray, sky130, nJ")
+    shown = "#chart-scatter g.mark-text.role-mark text"
+    expect(page.locator(shown).filter(has_text="point 17 of the grid")).to_have_attribute("opacity", "1")
+    boxes = page.locator(shown).evaluate_all(
+        """texts => texts.filter((text) => text.getAttribute("opacity") !== "0").map((text) => {
+          const box = text.getBoundingClientRect();
+          return [box.left, box.right, box.top + 2, box.bottom - 2];
+        })"""
+    )
+    assert 20 <= len(boxes) < 60
+    for one, other in itertools.combinations(boxes, 2):
+        assert one[1] <= other[0] or other[1] <= one[0] or one[3] <= other[2] or other[3] <= one[2]
+    ticks = page.locator("#chart-scatter .role-axis-label text").all_text_contents()
+    assert any(float(tick) < 0.02 for tick in ticks if tick.replace(".", "").isdigit()), "a logarithmic axis"
     assert report.is_quiet()
 
 

@@ -9,17 +9,34 @@ const embedOptions = {
   tooltip: { theme: matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light" },
 };
 
-async function draw(name, spec) {
+async function draw(name, spec, options) {
   const container = byId(`chart-${name}`);
   if (!container) return null;
   views[name]?.finalize();
   const file = { downloadFileName: `${name}` };
-  const drawn = await window.vegaEmbed(container, spec, { ...embedOptions, ...file });
+  const drawn = await window.vegaEmbed(container, spec, { ...embedOptions, ...file, ...options });
   views[name] = drawn;
   return drawn.view;
 }
 
-/** The scatter plot of the chosen columns. Titles of axes are no parameters of Vega-Lite, so it is drawn anew. */
+/** Leaves each label of the scatter plot that has a place beside its point, by a transform that Vega-Lite lacks. */
+function withLabelsApart(vega) {
+  const [shapes, labels] = vega.marks;
+  const places = ["top", "right", "bottom", "left", "top-right", "top-left", "bottom-right", "bottom-left"];
+  labels.transform = [
+    {
+      type: "label",
+      size: { signal: "[width, height]" },
+      sort: { field: "datum.rank" },
+      anchor: [...places, ...places],
+      offset: [...places.map(() => 8), ...places.map(() => 14)], // also beside the large shape of the selected point
+      avoidMarks: [shapes.name],
+    },
+  ];
+  return vega;
+}
+
+/** The scatter plot of the chosen columns. Axes are no parameters of Vega-Lite, so it is drawn anew. */
 async function drawScatter() {
   const spec = structuredClone(study.charts.scatter);
   const keys = { x: byId("scatter-x").value, y: byId("scatter-y").value };
@@ -28,12 +45,16 @@ async function drawScatter() {
     if (parameter.name === "selected") parameter.value = selectedPoint;
   }
   for (const layer of spec.layer) {
-    for (const [axis, key] of Object.entries(keys)) layer.encoding[axis].title = study.axisTitles[key];
+    for (const [axis, key] of Object.entries(keys)) {
+      const { padding } = layer.encoding[axis].scale;
+      layer.encoding[axis].title = study.axes[key].title;
+      layer.encoding[axis].scale = { ...study.axes[key].scale, padding };
+    }
   }
   const isDrawn = (row) => row.numbers[keys.x] !== null && row.numbers[keys.y] !== null;
   const missing = spec.data.values.filter((row) => !isDrawn(row)).length;
   byId("scatter-note").textContent = missing ? `${missing} of ${points.size} points lack one of these figures.` : "";
-  const view = await draw("scatter", spec);
+  const view = await draw("scatter", spec, { patch: withLabelsApart });
   view.addEventListener("click", (_, item) => {
     if (item?.datum?.name) selectPoint(item.datum.name);
   });

@@ -14,7 +14,7 @@ from typing import Any
 
 import altair as alt
 
-from colonnade_lab.report.explorer.rows import OFF_FRONT, ON_FRONT, Row
+from colonnade_lab.report.explorer.rows import OFF_FRONT, ON_FRONT, Row, scale_of
 from colonnade_lab.report.explorer.study import Column, axis_title_of
 from colonnade_lab.report.stages import STAGES
 from colonnade_lab.report.style import COLOURS
@@ -38,14 +38,21 @@ _FONT = "system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', Arial, sans-se
 
 
 def scatter(rows: Sequence[Row], x: Column, y: Column, fields: int, *, has_front: bool) -> Spec:
-    """Two figures of all points; parameters ``x``, ``y`` (keys of columns) and ``selected`` (a name)."""
+    """Two figures of all points; parameters ``x``, ``y`` (keys of columns) and ``selected`` (a name).
+
+    Every point has a label, above it unless its row has ``label``, ``dx`` and ``dy`` of `labels.placed`. The page
+    leaves out those without a place.
+    """
     base = (
         alt.Chart(_data(rows), height=SCATTER_HEIGHT)
         .add_params(_param("x", x["key"]), _param("y", y["key"]), _param("selected", ""))
         .transform_calculate(x="datum.numbers[x]", y="datum.numbers[y]", xText="datum.texts[x]", yText="datum.texts[y]")
         .transform_filter("isValid(datum.x) && isValid(datum.y)")
     )
-    wide, high = (alt.Scale(zero=False, nice=False, padding=padding) for padding in SCATTER_PADDING)
+    wide, high = (
+        alt.Scale(padding=padding, **scale_of(rows, column["key"]))
+        for column, padding in zip((x, y), SCATTER_PADDING, strict=True)
+    )
     horizontal, vertical = (
         alt.X("x:Q", title=axis_title_of(x), scale=wide),
         alt.Y("y:Q", title=axis_title_of(y), scale=high),
@@ -71,8 +78,17 @@ def scatter(rows: Sequence[Row], x: Column, y: Column, fields: int, *, has_front
         ],
     )
     labels = (
-        base.transform_calculate(text="datum.name === selected ? datum.name : datum.label")
-        .mark_text(fontSize=11, color=INK, limit=220, dx=alt.expr("datum.dx"), dy=alt.expr("datum.dy"))
+        base.transform_calculate(
+            text="isValid(datum.label) ? datum.label : datum.name",
+            rank="datum.name === selected ? -1 : datum.rank",
+        )
+        .mark_text(
+            fontSize=11,
+            color=INK,
+            limit=220,
+            dx=alt.expr("isValid(datum.dx) ? datum.dx : 0"),
+            dy=alt.expr("isValid(datum.dy) ? datum.dy : 0"),
+        )
         .encode(x=horizontal, y=vertical, text="text:N")
     )
     return _spec(points + labels)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from colonnade_lab.report.explorer.rows import Row
+from colonnade_lab.report.explorer.rows import Row, scale_of
 
 #: Of a label in the font of the charts: width of a character, height, distance from the centre of its point; pixels.
 _CHARACTER, _HEIGHT, _DISTANCE = 6.3, 12.0, 13.0
@@ -37,8 +38,8 @@ def placed(rows: Sequence[Row], x: str, y: str, area: tuple[float, float], paddi
         padding: Between the plot's edges and its outermost points, pixels.
     """
     drawn = [row for row in rows if row["numbers"][x] is not None and row["numbers"][y] is not None]
-    across = _pixels([row["numbers"][x] for row in drawn], area[0], padding[0])
-    down = [area[1] - value for value in _pixels([row["numbers"][y] for row in drawn], area[1], padding[1])]
+    across = _pixels(drawn, x, area[0], padding[0])
+    down = [area[1] - value for value in _pixels(drawn, y, area[1], padding[1])]
     points = [_Box(*centre, _POINT, _POINT) for centre in zip(across, down, strict=True)]
     taken, labels = list(points), dict[str, Row]()
     for row, point in sorted(zip(drawn, points, strict=True), key=lambda each: each[0]["rank"]):
@@ -53,8 +54,11 @@ def placed(rows: Sequence[Row], x: str, y: str, area: tuple[float, float], paddi
     return [row | labels.get(row["name"], {}) for row in rows]
 
 
-def _pixels(values: Sequence[float], size: float, padding: float) -> list[float]:
-    """Pixels of values on an axis that spans them."""
+def _pixels(rows: Sequence[Row], key: str, size: float, padding: float) -> list[float]:
+    """Pixels of a figure on an axis that spans all of them."""
+    values = [row["numbers"][key] for row in rows]
+    if scale_of(rows, key)["type"] == "log":
+        values = [math.log(value) for value in values]
     low, high = min(values, default=0.0), max(values, default=0.0)
     share = [(value - low) / (high - low) if high > low else 0.5 for value in values]
     return [padding + each * (size - 2 * padding) for each in share]

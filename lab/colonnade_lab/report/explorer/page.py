@@ -18,7 +18,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from colonnade_lab.report.explorer import pictures, tables
-from colonnade_lab.report.explorer.rows import LEVELS
+from colonnade_lab.report.explorer.rows import LEVELS, scale_of, scatter_rows
 from colonnade_lab.report.explorer.sections import bar_charts, scatter_axes, scatter_chart, search_text
 from colonnade_lab.report.explorer.study import (
     Column,
@@ -151,6 +151,7 @@ def _data(
     specs = {name: chart.spec for name, chart in charts.items()}
     if axes:
         specs["scatter"] = scatter_chart(study, *axes)
+    rows = scatter_rows(study)
     return {
         "title": study["title"],
         "baseline": study["baseline"],
@@ -158,7 +159,10 @@ def _data(
         "workloads": [
             {"name": each["name"], "reference": _key(each["reference"], encoded)} for each in study["workloads"]
         ],
-        "axisTitles": {column["key"]: axis_title_of(column) for column in scatter_columns(study)},
+        "axes": {
+            column["key"]: {"title": axis_title_of(column), "scale": scale_of(rows, column["key"])}
+            for column in scatter_columns(study)
+        },
         "charts": specs,
         "pictures": {picture.key: picture.as_json() for picture in encoded.values()},
     }

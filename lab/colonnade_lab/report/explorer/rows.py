@@ -25,32 +25,37 @@ LEVELS = {"traversal_unit": "one traversal unit", "column": "one column", "array
 MAX_UNITS = 12
 OTHER_UNITS = "other units"
 
-#: Front points that are labelled on the page, whose axes change; in files labels have places of their own (`labels`).
-MAX_LABELS = 12
+#: Figures of a scatter plot whose largest one is so many times the least have a logarithmic axis.
+LOGARITHMIC_SPAN = 30
 
 ON_FRONT = "on the front"
 OFF_FRONT = "not on the front"
 
 
 def scatter_rows(study: Study) -> list[Row]:
-    """A row for each point: name, kind, configuration, label with offset and rank, each figure as number and text."""
+    """A row for each point: name, kind, configuration, rank of its label, each figure as number and text."""
     columns = scatter_columns(study)
     ranks = [0 if each["name"] == study["baseline"] else 1 if each["on_front"] else 2 for each in study["points"]]
-    has_labels = ranks.count(1) <= MAX_LABELS
     return [
         {
             "name": point["name"],
             "kind": ON_FRONT if point["on_front"] else OFF_FRONT,
             "configuration": configuration_text(point),
-            "label": point["name"] if rank == 0 or (has_labels and rank == 1) else "",
-            "dx": 0.0,
-            "dy": -13.0,
             "rank": rank,
             "numbers": {column["key"]: _number(point, column["key"]) for column in columns},
             "texts": {column["key"]: _text(point, column) for column in columns},
         }
         for point, rank in zip(study["points"], ranks, strict=True)
     ]
+
+
+def scale_of(rows: Iterable[Row], key: str) -> dict[str, Any]:
+    """The scale of a figure's axis in a scatter plot, for Vega-Lite: its ``type`` is ``log`` or ``linear``."""
+    values = [value for row in rows if (value := row["numbers"][key]) is not None]
+    low, high = min(values, default=0.0), max(values, default=0.0)
+    if low > 0 and high >= LOGARITHMIC_SPAN * low:
+        return {"type": "log", "nice": False}
+    return {"type": "linear", "nice": False, "zero": False}
 
 
 def _number(point: Point, key: str) -> float | None:
