@@ -32,12 +32,14 @@ public:
 
     /// Of a cosine whose quotient need not be shifted, so at least half; each halving takes a cycle more.
     BounceCycles cycles() const {
-        const Cycle check = from(hemisphereCheck, checkHemisphere);
+        const Cycle request = 1, check = from(hemisphereCheck, checkHemisphere);
+        // A mirror's jump leaves the discriminant's first product, in the same step, without its second digit
+        const Cycle reflection = from(0, shiftInReflection) - (digits - 1);
         // Steps that wait for root and quotient have begun before
         const Cycle root = std::max<Cycle>(0, rootCycles_ - from(startRoot, subtractRoot - 1));
         const Cycle cosine = rootCycles_ + quotientCycles_ - from(cosineRoot, quotient - 1);
-        const Cycle behind = from(0, shiftInOrigin) + root;
-        return {from(0, shiftInReflection) + check, from(0, checkTotal) + check, behind,
+        const Cycle behind = request + from(0, shiftInOrigin) + root;
+        return {request + reflection + check, request + from(0, checkTotal) + check, behind,
                 behind + from(squareAgain, last) + cosine};
     }
 
