@@ -61,7 +61,13 @@ enum colonnade_error {
 };
 
 /* Bits of `interrupt.status` and `interrupt.enable`. A device for rays ends batches in place of frames. */
-enum { COLONNADE_FRAME_DONE = 1, COLONNADE_BATCH_DONE = 1, COLONNADE_IMAGE_DONE = 2, COLONNADE_ERROR = 4 };
+enum {
+    COLONNADE_FRAME_DONE = 1,
+    COLONNADE_BATCH_DONE = 1,
+    COLONNADE_IMAGE_DONE = 2,
+    COLONNADE_ERROR = 4,
+    COLONNADE_REFIT_DONE = 8 /* of a shell that refits, from version 1.4 on */
+};
 
 enum { COLONNADE_MAX_MAPS = 10 };
 
@@ -106,6 +112,7 @@ struct colonnade {
     const struct colonnade_bus *bus;
     const struct colonnade_design *design;
     uint32_t capabilities;
+    uint32_t events; /* that the shell has */
     uint32_t max_width, max_height;
     uint32_t width, height; /* of the frame that is set; 0: none */
     uint32_t space;         /* writes to the device's registers that the shell still takes while this frame runs */
@@ -195,10 +202,11 @@ enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, u
 /* Whether the last frame that ended is valid, and if not, why: its framebuffer's errors first, then the device's. */
 enum colonnade_error colonnade_result(struct colonnade *device);
 
-/* Clears events in `interrupt.status`; other bits are left out. */
+/* Clears events in `interrupt.status`; bits that the shell lacks are left out. */
 void colonnade_acknowledge(struct colonnade *device, uint32_t events);
 
-/* Chooses the events that raise the interrupt while the driver does not wait; other bits are left out. */
+/* Chooses the events that raise the interrupt while the driver does not wait; bits that the shell lacks are left
+ * out. */
 void colonnade_enable_interrupts(struct colonnade *device, uint32_t events);
 
 /* Resets the device in any state, and polls until it is idle, `attempts` times at most; the frame registers are 0 then.

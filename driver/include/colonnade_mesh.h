@@ -107,11 +107,13 @@ struct colonnade_refit_job {
     uint32_t root;                /* the root's address in the scene */
 };
 
-/* Starts a refit, also while a frame runs that does not read this copy. With an error nothing is written. */
+/* Starts a refit, also while a frame runs that does not read this copy. With an error nothing is written. Acknowledges
+ * refitDone. */
 enum colonnade_error colonnade_refit_start(struct colonnade *device, const struct colonnade_refit_job *job);
 
-/* Waits for its end, `attempts` polls at most: the unit has no interrupt. `result` has no cost. After an error of the
- * unit, COLONNADE_BUS_RESPONSE or, of a plan, COLONNADE_OTHER_RECORDS, the copy may be written in part. */
+/* Waits for its end, as colonnade_wait does for refitDone; polls if the shell lacks this event. `result` has no cost.
+ * After an error of the unit, COLONNADE_BUS_RESPONSE or, of a plan, COLONNADE_OTHER_RECORDS, the copy may be written in
+ * part. */
 enum colonnade_error colonnade_refit_wait(struct colonnade *device, uint32_t attempts, struct colonnade_refit *result);
 
 /* A triangle of the program's own. */

@@ -15,6 +15,11 @@ enum colonnade_error colonnade_probe(struct colonnade *device, const struct colo
     for (uint32_t i = 0; i < 8; ++i)
         if (get(&found, REGISTER(formatHash_0) + 4 * i) != design->format_hash[i]) return COLONNADE_OTHER_FORMAT;
     found.capabilities = get(&found, REGISTER(capabilities));
+    found.events = EVENTS;
+    /* Shells before 1.4 lack it */
+    const bool has_refit = (found.capabilities & COLONNADE_SHELL__CAPABILITIES__REFIT_bm) != 0;
+    if (has_refit && (get(&found, REGISTER(version)) & COLONNADE_SHELL__VERSION__MINOR_bm) >= 4)
+        found.events |= COLONNADE_REFIT_DONE;
     uint32_t size = get(&found, REGISTER(frameSize));
     found.max_width = size & COLONNADE_SHELL__FRAMESIZE__WIDTH_bm;
     found.max_height = size >> COLONNADE_SHELL__FRAMESIZE__HEIGHT_bp;
@@ -164,14 +169,15 @@ enum colonnade_error colonnade_start(struct colonnade *device, const struct colo
     return COLONNADE_OK;
 }
 
-enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, uint32_t attempts) {
+enum colonnade_error colonnade_wait_for(struct colonnade *device, uint32_t address, uint32_t mask, bool is_set,
+                                        uint32_t events, uint32_t attempts) {
     const struct colonnade_bus *bus = device->bus;
     enum colonnade_error error = COLONNADE_OK;
     bool has_slept = false;
     uint32_t enabled = 0;
-    while (error == COLONNADE_OK && (get(device, REGISTER(interrupt_status)) & events) == 0) {
+    while (error == COLONNADE_OK && ((get(device, address) & mask) != 0) != is_set) {
         if (attempts-- == 0) error = COLONNADE_TIMEOUT;
-        else if (bus->wait != NULL) {
+        else if (bus->wait != NULL && (events & device->events) != 0) {
             if (!has_slept) enabled = get(device, REGISTER(interrupt_enable));
             has_slept = true;
             /* Before each sleep, since a handler may have cleared it. Another event that stays would end all sleeps */
@@ -182,6 +188,10 @@ enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, u
     if (has_slept) colonnade_enable_interrupts(device, enabled);
     __sync_synchronize();
     return error;
+}
+
+enum colonnade_error colonnade_wait(struct colonnade *device, uint32_t events, uint32_t attempts) {
+    return colonnade_wait_for(device, REGISTER(interrupt_status), events, true, events, attempts);
 }
 
 enum colonnade_error colonnade_result(struct colonnade *device) {
@@ -198,11 +208,11 @@ enum colonnade_error colonnade_result(struct colonnade *device) {
 }
 
 void colonnade_acknowledge(struct colonnade *device, uint32_t events) {
-    set(device, REGISTER(interrupt_status), events & EVENTS);
+    set(device, REGISTER(interrupt_status), events & device->events);
 }
 
 void colonnade_enable_interrupts(struct colonnade *device, uint32_t events) {
-    set(device, REGISTER(interrupt_enable), events & EVENTS);
+    set(device, REGISTER(interrupt_enable), events & device->events);
 }
 
 enum colonnade_error colonnade_reset(struct colonnade *device, uint32_t attempts) {

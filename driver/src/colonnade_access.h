@@ -22,6 +22,11 @@ static inline void set_wide(const struct colonnade *device, uint32_t address, ui
     set(device, address + 4, (uint32_t)(value >> 32));
 }
 
+/* Until a bit of `mask` in a register is set, or all are clear: colonnade_wait. `events` end its sleeps; without one it
+ * polls. */
+enum colonnade_error colonnade_wait_for(struct colonnade *device, uint32_t address, uint32_t mask, bool is_set,
+                                        uint32_t events, uint32_t attempts);
+
 /* Whether `bytes` bytes at `address` lie in a window of bus addresses. No sum overflows. */
 static inline bool contains(const struct colonnade_window *window, uint64_t address, uint64_t bytes) {
     return window->end >> 40 == 0 && address >= window->base && address <= window->end &&

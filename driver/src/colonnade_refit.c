@@ -29,6 +29,7 @@ enum colonnade_error colonnade_refit_start(struct colonnade *device, const struc
     set(device, REGISTER(refit_lines), lines);
     set(device, REGISTER(refit_count), job->count);
     set(device, REGISTER(refit_root), job->root);
+    if (device->events & COLONNADE_REFIT_DONE) colonnade_acknowledge(device, COLONNADE_REFIT_DONE);
     __sync_synchronize();
     set(device, REGISTER(refit_control), COLONNADE_SHELL__REFIT_CONTROL__VALUE_bm);
     return COLONNADE_OK;
@@ -36,9 +37,9 @@ enum colonnade_error colonnade_refit_start(struct colonnade *device, const struc
 
 enum colonnade_error colonnade_refit_wait(struct colonnade *device, uint32_t attempts, struct colonnade_refit *result) {
     if ((device->capabilities & COLONNADE_SHELL__CAPABILITIES__REFIT_bm) == 0) return COLONNADE_NO_REFIT;
-    while (get(device, REGISTER(refit_status)) != 0)
-        if (attempts-- == 0) return COLONNADE_TIMEOUT;
-    __sync_synchronize();
+    const enum colonnade_error error = colonnade_wait_for(
+        device, REGISTER(refit_status), COLONNADE_SHELL__REFIT_STATUS__VALUE_bm, false, COLONNADE_REFIT_DONE, attempts);
+    if (error != COLONNADE_OK) return error;
     const uint32_t errors = get(device, REGISTER(refit_errors));
     if (errors & COLONNADE_SHELL__REFIT_ERRORS__RESPONSE_bm) return COLONNADE_BUS_RESPONSE;
     if (errors & COLONNADE_SHELL__REFIT_ERRORS__ALIGNMENT_bm) return COLONNADE_MISALIGNED;

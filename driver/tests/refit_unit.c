@@ -4,20 +4,26 @@
 #include "colonnade_mesh.h"
 #include "shell.h"
 
-enum { HAS_REFIT = COLONNADE_SHELL__CAPABILITIES__REFIT_bm, RESETTING = 8 };
+enum { HAS_REFIT = COLONNADE_SHELL__CAPABILITIES__REFIT_bm, RESETTING = 8, FRAME_ENDS = 1, REFIT_ENDS = 8 };
 
 #define END ((uint64_t)1 << 40)
 static const struct colonnade_design design = {.device_end = DEVICE_BASE + 4};
 static struct shell shell;
-static uint32_t polls, ends_after, errors;
+static uint32_t polls, ends_after, errors, sleeps;
 
 /* The unit ends after so many reads of its status. */
 static uint32_t poll(void *context, uint32_t address) {
-    if (address == 4 * AT(refit_status) && shell.registers[AT(refit_status)] != 0 && polls++ == ends_after) {
-        shell.registers[AT(refit_status)] = 0;
-        shell.registers[AT(refit_errors)] = errors;
-    }
+    if (address == 4 * AT(refit_status) && shell.registers[AT(refit_status)] != 0 && polls++ == ends_after)
+        shell_step(&shell, REFIT_ENDS | errors << 8);
     return shell_read(context, address);
+}
+
+/* Until the interrupt, when the unit has ended; the frame that runs has ended before. */
+static void sleep_until_interrupt(void *context) {
+    ++sleeps;
+    shell_step(context, FRAME_ENDS);
+    CHECK(shell.registers[AT(interrupt_enable)] == COLONNADE_REFIT_DONE);
+    shell_step(context, REFIT_ENDS);
 }
 
 static enum colonnade_error refit(struct colonnade *device, const struct colonnade_refit_job *job, uint32_t attempts,
@@ -98,5 +104,23 @@ int main(void) {
         result.cost = 77;
         CHECK(refit(&device, &job, 1, &result) == found[i] && result.cost == 77);
     }
+    errors = 0;
+
+    /* Shells before 1.4 lack the event, which would end no sleep */
+    const struct colonnade_bus waiting = {poll, shell_write, sleep_until_interrupt, &shell};
+    CHECK(colonnade_probe(&device, &waiting, &design) == COLONNADE_OK);
+    ends_after = 3;
+    CHECK(refit(&device, &job, 3, &result) == COLONNADE_OK && sleeps == 0);
+
+    /* A sleep that the event ends, and not an older one. It stays, and the interrupts are those of before */
+    shell.registers[AT(version)] = 1u << 16 | 4;
+    CHECK(colonnade_probe(&device, &waiting, &design) == COLONNADE_OK);
+    colonnade_enable_interrupts(&device, COLONNADE_FRAME_DONE);
+    shell.registers[AT(interrupt_status)] = COLONNADE_REFIT_DONE;
+    ends_after = UINT32_MAX;
+    CHECK(refit(&device, &job, 1, &result) == COLONNADE_OK && sleeps == 1);
+    CHECK(shell.registers[AT(interrupt_status)] == (COLONNADE_FRAME_DONE | COLONNADE_REFIT_DONE));
+    CHECK(shell.registers[AT(interrupt_enable)] == COLONNADE_FRAME_DONE);
+    CHECK(colonnade_refit_wait(&device, 0, &result) == COLONNADE_OK && sleeps == 1);
     return 0;
 }

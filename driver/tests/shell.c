@@ -8,7 +8,7 @@ enum { RUNNING = 1, QUEUED = 2, LOADING = 4, RESETTING = 8 };
 enum { START = 1, LOAD = 2, RESET = 4 };
 
 /* When a register can be written. */
-enum access { READ_ONLY, WRITE_ONLY, ALWAYS, NOT_LOADING, NOT_QUEUED, WITH_ENVIRONMENT, IDLE, NOT_REFITTING };
+enum access { READ_ONLY, WRITE_ONLY, EVENTS, NOT_LOADING, NOT_QUEUED, WITH_ENVIRONMENT, IDLE, NOT_REFITTING };
 
 #define WORD(name, bits, access) {offsetof(colonnade_shell_t, name), bits, access}
 #define WIDE(name, access) WORD(name##_low, 32, access), WORD(name##_high, 8, access)
@@ -32,9 +32,9 @@ static const struct {
     WORD(formatHash_7, 32, READ_ONLY),
     WORD(control, 3, WRITE_ONLY),
     WORD(status, 4, READ_ONLY),
-    WORD(interrupt_status, 3, ALWAYS),
-    WORD(interrupt_enable, 3, ALWAYS),
-    WORD(interrupt_test, 3, WRITE_ONLY),
+    WORD(interrupt_status, 4, EVENTS),
+    WORD(interrupt_enable, 4, EVENTS),
+    WORD(interrupt_test, 4, WRITE_ONLY),
     WORD(framebuffer_errors, 6, READ_ONLY),
     WORD(image_errors, 7, READ_ONLY),
     WIDE(framebuffer_base, NOT_QUEUED),
@@ -158,6 +158,11 @@ static void require_no_refit(const struct shell *shell, uint32_t address, uint32
     require(has_unit && is_idle, "a register of a refit", shell, address, value);
 }
 
+static bool has_refit_event(const struct shell *shell) {
+    return (shell->registers[AT(capabilities)] & COLONNADE_SHELL__CAPABILITIES__REFIT_bm) != 0 &&
+           (shell->registers[AT(version)] & 0xFFFF) >= 4;
+}
+
 void shell_write(void *context, uint32_t address, uint32_t value) {
     struct shell *shell = context;
     ++shell->accesses;
@@ -174,6 +179,9 @@ void shell_write(void *context, uint32_t address, uint32_t value) {
     require(words[i].bits == 32 || value >> words[i].bits == 0, "the value does not fit", shell, address, value);
     switch (words[i].access) {
     case READ_ONLY: require(false, "a write to a read-only register", shell, address, value); break;
+    case EVENTS:
+        require((value & COLONNADE_REFIT_DONE) == 0 || has_refit_event(shell), "no event", shell, address, value);
+        break;
     case NOT_LOADING: require((status & LOADING) == 0, "a register of the image", shell, address, value); break;
     case WITH_ENVIRONMENT:
         require((shell->registers[AT(capabilities)] & COLONNADE_SHELL__CAPABILITIES__ENVIRONMENT_bm) != 0,
@@ -208,6 +216,11 @@ void shell_step(struct shell *shell, uint32_t events) {
     if ((events & 2) != 0 && (*status & LOADING) != 0)
         end(shell, LOADING, COLONNADE_IMAGE_DONE, &shell->registers[AT(image_errors)], events >> 8 & 0x7F);
     if ((events & 4) != 0) *status &= ~(uint32_t)RESETTING;
+    if ((events & 8) != 0 && shell->registers[AT(refit_status)] != 0) {
+        shell->registers[AT(refit_status)] = 0;
+        shell->registers[AT(refit_errors)] = events >> 8 & 7;
+        if (has_refit_event(shell)) shell->registers[AT(interrupt_status)] |= COLONNADE_REFIT_DONE;
+    }
     if ((*status & RUNNING) == 0 && shell->posted > 0) --shell->posted;
     if (*status == QUEUED && shell->posted == 0) *status = RUNNING;
 }

@@ -28,8 +28,8 @@ struct shell shell_of(const struct colonnade_design *design, uint32_t minor);
 uint32_t shell_read(void *context, uint32_t address);
 void shell_write(void *context, uint32_t address, uint32_t value);
 
-/* What may happen between two accesses, bit by bit of `events`: 0: a frame ends, 1: a load ends, 2: a reset ends;
- * 8 to 14: with these errors. A word that waits arrives, unless a frame runs. */
+/* What may happen between two accesses, bit by bit of `events`: 0: a frame ends, 1: a load ends, 2: a reset ends, 3: a
+ * refit ends; 8 to 14: with these errors. A word that waits arrives, unless a frame runs. */
 void shell_step(struct shell *shell, uint32_t events);
 
 #endif

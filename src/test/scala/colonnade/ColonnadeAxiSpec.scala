@@ -62,6 +62,7 @@ class ColonnadeAxiSpec extends AnyFlatSpec with OneSimulation {
     assert(!host.write(ShellMap.deviceBase + 4, 1))        // status.busy
     assert(!host.write(0x40, 3))                           // two commands
     assert(!host.write(0x100, 1))                          // no pixel stream
+    assert(!host.write(0x4c, 8))                           // no unit that refits
     bench.write("lights[0].position.x", 0x12345678)
     assert(bench.read("lights[0].position.x") == 0x12345678)
     assert(host("status") == 0)
@@ -208,25 +209,41 @@ class ColonnadeAxiSpec extends AnyFlatSpec with OneSimulation {
       for ((name, value) <- mesh.settings) host.set(s"refit.$name", value)
       host.set("refit.control", 1)
     }
+    def ends(errors: Int): Unit = {
+      assert(bench.until("refitDone") == Set("refitDone"))
+      assert(host("refit.status") == 0 && host("refit.errors") == errors)
+      for (_ <- 0 until 20) bench.cycle()
+      assert(host("interrupt.status") == 0, "a refit ends once")
+    }
     assert(host("capabilities") == (4 << 8 | 4 | 64) && host("refit.status") == 0)
     memory.isSilent = true
     run()
     assert(host("refit.status") == 1 && !host.write(0x120, 1) && !host.write(0x150, 0))
+    assert(host("interrupt.status") == 0)
     memory.isSilent = false
-    while (host("refit.status") == 1) {}
-    assert(mesh.wrong(memory) == Nil && host("refit.errors") == 0 && host("refit.flatPairs") == mesh.flatPairs)
+    ends(errors = 0)
+    assert(mesh.wrong(memory) == Nil && host("refit.flatPairs") == mesh.flatPairs)
     assert((0 until 6).map(i => host(s"refit.bounds[$i]")) == mesh.bounds)
 
-    // A soft reset ends its bursts
+    // One that is refused ends, and one whose plan is wrong
+    for ((name, value, errors) <- Seq(("refit.plan", 32, 1), ("refit.lines", 0, 4))) {
+      host.set(name, value)
+      host.set("refit.control", 1)
+      ends(errors)
+      run()
+      ends(errors = 0)
+    }
+
+    // A soft reset ends its bursts, and is no end of a refit
     for (cycles <- Seq(10, 40, 90, 200)) {
       run()
       for (_ <- 0 until cycles) bench.cycle()
       host.set("control", 4)
       while (host("status") != 0) {}
-      assert(memory.isIdle && host("refit.status") == 0)
+      assert(memory.isIdle && host("refit.status") == 0 && host("interrupt.status") == 0)
     }
     run()
-    while (host("refit.status") == 1) {}
+    ends(errors = 0)
     assert(mesh.wrong(memory) == Nil && memory.written.size == 32 * mesh.records.size)
   }
 

@@ -2,11 +2,15 @@ package colonnade.bus
 
 import chisel3._
 import colonnade.axi.Axi
+import colonnade.config.ShellConfig
 
 /** The sources of the interrupt, in the order of their bits. */
 object Interrupts {
-  val names: Seq[String] = Seq("frameDone", "imageDone", "error")
-  def count: Int = names.size
+  val ofFrames: Seq[String] = Seq("frameDone", "imageDone", "error") // and of batches
+  val names:    Seq[String] = ofFrames :+ "refitDone"
+
+  /** Those of a shell. */
+  def of(shell: ShellConfig): Seq[String] = if (shell.refit) names else ofFrames
 }
 
 /** Errors of a frame's way to memory, bit 0 last. */

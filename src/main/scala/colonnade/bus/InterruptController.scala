@@ -2,8 +2,8 @@ package colonnade.bus
 
 import chisel3._
 
-final class InterruptControllerIO extends Bundle {
-  private def bits = UInt(Interrupts.count.W)
+final class InterruptControllerIO(sources: Int) extends Bundle {
+  private def bits = UInt(sources.W)
 
   val events = Input(bits) // pulses of the sources
 
@@ -17,10 +17,10 @@ final class InterruptControllerIO extends Bundle {
 }
 
 /** A level interrupt. A status bit stays until the host clears it; an event in the same cycle wins. */
-final class InterruptController extends Module {
-  val io = IO(new InterruptControllerIO)
+final class InterruptController(sources: Int) extends Module {
+  val io = IO(new InterruptControllerIO(sources))
 
-  private val status = RegInit(0.U(Interrupts.count.W))
+  private val status = RegInit(0.U(sources.W))
   status       := (status & ~io.clear) | io.events | io.test
   io.status    := status
   io.interrupt := RegNext((status & io.enable).orR, false.B)

@@ -10,7 +10,7 @@ final class ShellControlIO extends Bundle {
   val settings      = Input(new FramebufferSettings)
   val writesAreDone = Input(Bool()) // the device has all of its registers
   val status        = Output(new ShellStatus)
-  val events        = Output(UInt(Interrupts.count.W))
+  val events        = Output(UInt(Interrupts.ofFrames.size.W))
 
   /** Of the frame that runs, constant until its end; of the last frame that has ended. */
   val framebuffer = Output(new FramebufferSettings)

@@ -36,7 +36,7 @@ object ShellMap {
   val identity:    BigInt = 0x434c4e44 // "CLND"
 
   /** Major and minor version of these registers. A driver refuses another major version. */
-  val version: BigInt = 0x00010003
+  val version: BigInt = 0x00010004
 
   private val byteAddress = 40 // bits
 
@@ -105,14 +105,17 @@ object ShellMap {
     val ofFrames = Seq("framebuffer", "photo", "stream")
     val absent   =
       (if (config.frame.rays) ofFrames else Seq("rays")) ++ Option.unless(shell.refit)("refit")
-    registers.filterNot(register => absent.contains(register.name.takeWhile(_ != '.')))
+    registers.filterNot(register => absent.contains(register.name.takeWhile(_ != '.'))).map {
+      case register if register.name.startsWith("interrupt.") => register.copy(width = Interrupts.of(shell).size)
+      case register                                           => register
+    }
   }
 
   /** Names of a register's parts, the lowest first. */
   def bitsOf(register: String): Seq[String] = registers.filter(_.name == register).flatMap(_.fields).map(_.name)
 
   private def interrupt(name: String, address: Int, access: Access, description: String): ShellRegister =
-    ShellRegister(s"interrupt.$name", address, Interrupts.count, access, description, bits(Interrupts.names))
+    ShellRegister(s"interrupt.$name", address, Interrupts.names.size, access, description, bits(Interrupts.names))
 
   private def errors(of: String, address: Int, bits: Bundle, description: String): ShellRegister =
     ShellRegister(s"$of.errors", address, bits.getWidth, ReadOnly, description, fieldsOf(bits))

@@ -63,8 +63,8 @@ final class ShellRegistersIO(config: ColonnadeConfig, shell: ShellConfig) extend
   val framebufferErrors = Option.unless(config.frame.rays)(Input(new FramebufferError))
   val imageErrors       = Input(new ImageError)
 
-  /** Pulses, see [[Interrupts]]. */
-  val events    = Input(UInt(Interrupts.count.W))
+  /** Pulses, see [[Interrupts]]; of refits they are made here. */
+  val events    = Input(UInt(Interrupts.ofFrames.size.W))
   val interrupt = Output(Bool())
 }
 
@@ -145,20 +145,24 @@ final class ShellRegisters(config: ColonnadeConfig, shell: ShellConfig) extends 
   private def writtenBits(name: String, bits: Int)     = Mux(written(name), request.data(bits - 1, 0), 0.U)
   for ((name, words) <- values; (word, index) <- words.zipWithIndex) when(written(name, index)) { word := request.data }
 
-  // Refits
-  for (refit <- io.refit) {
+  // Refits: one that is refused ends in the cycle after its start
+  private val refitDone = io.refit.map { refit =>
     startsRefit := RegNext(written("refit.control") && request.data(0), false.B)
     refit.start := startsRefit
     refit.settings.elements.foreach { case (name, setting) => setting := value(s"refit.$name") }
+    val runs = RegInit(false.B)
+    runs := (startsRefit || (runs && !refit.isIdle)) && !io.status.isResetting
+    runs && refit.isIdle
   }
 
   // Before the answer
   io.commands := RegNext(writtenBits("control", 3), 0.U).asTypeOf(io.commands)
 
-  private val interrupts = Module(new InterruptController)
-  interrupts.io.events := io.events
-  interrupts.io.clear  := writtenBits("interrupt.status", Interrupts.count)
-  interrupts.io.test   := writtenBits("interrupt.test", Interrupts.count)
+  private val sources    = Interrupts.of(shell).size
+  private val interrupts = Module(new InterruptController(sources))
+  interrupts.io.events := refitDone.fold(io.events)(_ ## io.events)
+  interrupts.io.clear  := writtenBits("interrupt.status", sources)
+  interrupts.io.test   := writtenBits("interrupt.test", sources)
   interrupts.io.enable := value("interrupt.enable")
   io.interrupt         := interrupts.io.interrupt
 

@@ -26,12 +26,12 @@ class ShellControlSpec extends AnyFlatSpec with ChiselScalatestTester {
   behavior of "InterruptController"
 
   it should "keep an event until it is cleared, also one in the cycle of the clear, and interrupt while it is enabled" in
-    test(new InterruptController) { dut =>
+    test(new InterruptController(Interrupts.names.size)) { dut =>
       val random        = new Random(4)
       var status, level = 0
       for (_ <- 0 until 2000) {
         val Seq(events, clear, set, enable) = Seq(dut.io.events, dut.io.clear, dut.io.test, dut.io.enable).map { port =>
-          val bits = if (random.nextBoolean()) 0 else random.nextInt(1 << Interrupts.count)
+          val bits = if (random.nextBoolean()) 0 else random.nextInt(1 << Interrupts.names.size)
           port.poke(bits)
           bits
         }
