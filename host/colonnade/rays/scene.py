@@ -211,6 +211,8 @@ class Scene:
         """Hand over a batch as it is: `records` in memory, of `count` rays or a sensor; the bytes of its hits."""
         places: Any = [origin]
         start = [float(value) for value in _array("origin", places, np.float64, 3)[0].astype(np.float32)]
+        if records.dtype.hasobject:
+            raise UserError("records are Python objects: give an array of numbers or bytes")
         data = np.ascontiguousarray(records).view(np.uint8).ravel()
         result: NDArray[np.uint8] = self._query(
             "submit", data, _word("count", count), _word("mode", mode), start, near, far

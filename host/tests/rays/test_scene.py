@@ -210,6 +210,8 @@ def test_batches_that_are_none_are_refused() -> None:
     for records, mode in (((1, 8), MASKS | 3), ((1, 8), MASKS | 1 << 6), ((0, 8), MASKS)):
         with pytest.raises(UserError, match="unknown mode"):
             scene.submit(np.zeros(records, np.float32), records[0], mode)
+    with pytest.raises(UserError, match="Python objects"):
+        scene.submit(np.zeros((1, 8), object), 1, MASKS)
 
 
 def test_a_sensor_makes_the_rays_of_a_fan() -> None:

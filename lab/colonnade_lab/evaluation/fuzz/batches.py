@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,7 +14,7 @@ from colonnade.rays.scene import FAN, SENSOR
 from colonnade.scene_image.device_image import device_image
 from colonnade.scene_image.dram_image import PAGE_BYTES, dram_image
 
-from colonnade_lab.evaluation.fuzz.bench import Bench, Planned, Result
+from colonnade_lab.evaluation.fuzz.bench import Planned, Result
 from colonnade_lab.evaluation.fuzz.rays import (
     KNOWN,
     MAX_COUNT,
@@ -27,7 +26,7 @@ from colonnade_lab.evaluation.fuzz.rays import (
     any_floats,
     ray_bytes,
 )
-from colonnade_lab.evaluation.fuzz.shell import FuzzedShell, any_bus, differing
+from colonnade_lab.evaluation.fuzz.shell import FuzzedShell, ShellBench, any_bus, differing
 
 #: The memory: image, scene, and the window: what wrong batches may name, the ring, tags, and the rays
 #: and hits of each batch of a case.
@@ -101,17 +100,15 @@ class PlannedBatches(Planned):
     counters: dict[str, int]
 
 
-class BatchBench(Bench[PlannedBatches]):
+class BatchBench(ShellBench[PlannedBatches]):
     """Batches of a device for rays."""
 
     kinds = ("rays", "batches", "bus")
+    memory = _MEMORY
 
     def __init__(self, design: GeneratedDesign, progress: Progress) -> None:
-        self.manifest = design.manifest
+        super().__init__(design, progress)
         self.scene = RayScene(design.manifest)
-        self._design, self._progress = design, progress
-        self._shell: FuzzedShell | None = None
-        self._sums = Counter[str]()
 
     def plan(self, seed: int, kind: str) -> PlannedBatches:
         """See `Bench`: legal batches; some with wrong fields; at a memory that fails, or ended by a soft reset."""
@@ -134,18 +131,6 @@ class BatchBench(Bench[PlannedBatches]):
         bus = any_bus(random, errors or 0)
         legal, _ = self._placed(random, 0, 0.0)
         return PlannedBatches(seed, kind, "; ".join(changes), bus, reset, tuple(batches), legal, counters)
-
-    def run(self, planned: Sequence[PlannedBatches]) -> list[Result]:
-        """See `Bench`."""
-        results = []
-        for plan in planned:
-            try:
-                results.append(self._run(plan))
-            except RuntimeError as error:
-                results.append(Result.of("", (str(error),), ()))
-                self._close()
-        self._close()
-        return results
 
     def sums(self) -> dict[str, int]:
         """See `Bench`."""
@@ -178,18 +163,7 @@ class BatchBench(Bench[PlannedBatches]):
             batch, place, None if fails else hits, fails
         ), f"{change} with {', '.join(wrong) or 'no fault'}"
 
-    def _opened(self) -> FuzzedShell:
-        if self._shell is None:
-            self._shell = FuzzedShell(self._design, _MEMORY, self._progress)
-            self._set_scene(self._shell)
-        return self._shell
-
-    def _close(self) -> None:
-        shell, self._shell = self._shell, None
-        if shell is not None:
-            shell.close()
-
-    def _set_scene(self, shell: FuzzedShell) -> None:
+    def _set_up(self, shell: FuzzedShell) -> None:
         """Load the records, and set all registers."""
         values = dict(self.scene.values)
         shell.load(_IMAGE, device_image(self.scene.image, self.manifest))
@@ -199,8 +173,7 @@ class BatchBench(Bench[PlannedBatches]):
         window = {"rays.windowBase": _WINDOW, "rays.windowEnd": _WINDOW_END, "interrupt.enable": 0}
         shell.write(values | window | {"ring.base": _RING, "ring.sizeLog": _RING_LOG, "control.start": 1})
 
-    def _run(self, plan: PlannedBatches) -> Result:
-        shell = self._opened()
+    def _run(self, shell: FuzzedShell, plan: PlannedBatches) -> Result:
         shell.transport.set_bus(plan.bus)
         found, outcome = self._batches(shell, plan.batches, plan.reset, plan.bus.errors > 0)
         if plan.kind == "rays":
@@ -212,7 +185,7 @@ class BatchBench(Bench[PlannedBatches]):
         if plan.reset is None:
             shell.write({"control.start": 1})
         else:
-            self._set_scene(shell)
+            self._set_up(shell)
         shell.transport.set_bus(replace(plan.bus, errors=0))
         legal, _ = self._batches(shell, (plan.legal,), None, False)
         shell.write({"control.start": 1})

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -13,7 +12,7 @@ from colonnade.common.progress import Progress
 from colonnade.design.generator import GeneratedDesign
 from colonnade.device.shell_simulator import Bus
 
-from colonnade_lab.evaluation.fuzz.bench import Bench, Planned, Result
+from colonnade_lab.evaluation.fuzz.bench import Planned, Result
 from colonnade_lab.evaluation.fuzz.plans import (
     LINE_BYTES,
     LINE_VERTICES,
@@ -25,7 +24,7 @@ from colonnade_lab.evaluation.fuzz.plans import (
     effect_of,
     vertex_words,
 )
-from colonnade_lab.evaluation.fuzz.shell import FuzzedShell, any_bus, differing
+from colonnade_lab.evaluation.fuzz.shell import FuzzedShell, ShellBench, any_bus, differing
 
 _MEMORY = 1 << 18
 #: Parts of the memory for plan, vertices and records, in any order. No refit reads or writes beyond its own.
@@ -82,17 +81,15 @@ class PlannedRefit(Planned):
     legal: Refit
 
 
-class RefitBench(Bench[PlannedRefit]):
+class RefitBench(ShellBench[PlannedRefit]):
     """Refits by a shell with the unit."""
 
     kinds = ("vertices", "plans", "bus")
+    memory = _MEMORY
 
     def __init__(self, design: GeneratedDesign, progress: Progress) -> None:
-        self.manifest = design.manifest
+        super().__init__(design, progress)
         self.meshes = bent_meshes(design.manifest)
-        self._design, self._progress = design, progress
-        self._shell: FuzzedShell | None = None
-        self._sums = Counter[str]()
 
     def plan(self, seed: int, kind: str) -> PlannedRefit:
         """See `Bench`: a mesh of any vertices; any plan and registers; a memory that fails, or a soft reset."""
@@ -110,18 +107,6 @@ class RefitBench(Bench[PlannedRefit]):
             change += f"; {errors} of 1024 answers are errors"
         bus = any_bus(random, errors)
         return PlannedRefit(seed, kind, change, bus, reset, refit, self._legal(random)[0])
-
-    def run(self, planned: Sequence[PlannedRefit]) -> list[Result]:
-        """See `Bench`."""
-        results = []
-        for plan in planned:
-            try:
-                results.append(self._run(plan))
-            except RuntimeError as error:
-                results.append(Result.of("", (str(error),), ()))
-                self._close()
-        self._close()
-        return results
 
     def sums(self) -> dict[str, int]:
         """See `Bench`."""
@@ -201,19 +186,10 @@ class RefitBench(Bench[PlannedRefit]):
         effect = effect_of(plan, settings["refit.lines"], count, self.manifest)
         return Refit(settings, plan, lines, records, result, effect)
 
-    def _opened(self) -> FuzzedShell:
-        if self._shell is None:
-            self._shell = FuzzedShell(self._design, _MEMORY, self._progress)
-            self._shell.write({"interrupt.enable": 0})
-        return self._shell
+    def _set_up(self, shell: FuzzedShell) -> None:
+        shell.write({"interrupt.enable": 0})
 
-    def _close(self) -> None:
-        shell, self._shell = self._shell, None
-        if shell is not None:
-            shell.close()
-
-    def _run(self, plan: PlannedRefit) -> Result:
-        shell = self._opened()
+    def _run(self, shell: FuzzedShell, plan: PlannedRefit) -> Result:
         shell.transport.set_bus(plan.bus)
         found, outcome = self._refit(shell, plan.refit, plan.reset, plan.bus.errors > 0)
         shell.transport.set_bus(replace(plan.bus, errors=0))
@@ -234,6 +210,7 @@ class RefitBench(Bench[PlannedRefit]):
             transport.run(reset)
             shell.reset()
         shell.until_zero("refit.status")
+        events = shell.events()
         errors, after = shell.read("refit.errors"), shell.content()
         wanted = _ALIGNMENT if not refit.is_aligned else _PLAN if refit.effect.names_nothing else 0
         first, expected, opened = settings["refit.records"], before.copy(), np.zeros(len(before), bool)
@@ -254,6 +231,8 @@ class RefitBench(Bench[PlannedRefit]):
             found.append(f"refit.errors {errors} instead of {wanted}")
         if reset is not None:
             return found, "changed"
+        if events != {"refitDone"}:
+            found.append(f"events {sorted(events)} instead of refitDone")
         if not errors:
             found += [
                 f"{name} {value} instead of {wanted}"

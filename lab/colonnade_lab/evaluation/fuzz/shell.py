@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 from colonnade.common.progress import Progress
@@ -10,6 +13,8 @@ from colonnade.common.types import Bytes
 from colonnade.design.generator import GeneratedDesign
 from colonnade.device.shell_simulator import Bus, SimulatedTransport
 from colonnade.integration.register_table import WORD, read_shell
+
+from colonnade_lab.evaluation.fuzz.bench import Bench, P, Result
 
 #: Values of `control` and bits of `status`.
 LOAD, RESET = 2, 4
@@ -35,6 +40,7 @@ class FuzzedShell:
         base = int(shell["deviceBase"])
         self._places |= {name: (base + 4 * r.address, r.width) for name, r in design.manifest.registers.items()}
         self.errors = [name for name in design.manifest.registers if name.startswith("errors.")]
+        self._interrupts: list[str] = shell["interrupts"]
 
     def read(self, name: str) -> int:
         """The value of a register."""
@@ -59,6 +65,12 @@ class FuzzedShell:
             total += self.transport.run(cycles)
             cycles = min(2 * cycles, 20_000)
 
+    def events(self) -> set[str]:
+        """The events of `interrupt.status`, which are cleared."""
+        bits = self.read("interrupt.status")
+        self.write({"interrupt.status": bits})
+        return {name for bit, name in enumerate(self._interrupts) if bits >> bit & 1}
+
     def load(self, base: int, content: bytes) -> None:
         """Load a device image."""
         self.transport.store(base, content)
@@ -76,6 +88,48 @@ class FuzzedShell:
     def content(self) -> Bytes:
         """The whole memory."""
         return np.frombuffer(self.transport.fetch(0, self.transport.size), np.uint8)
+
+
+class ShellBench(Bench[P]):
+    """Cases that run one after the other on a shell, which is opened again after one at which it hangs or stops.
+
+    Attributes:
+        memory: Bytes of the memory.
+    """
+
+    memory: ClassVar[int]
+
+    def __init__(self, design: GeneratedDesign, progress: Progress) -> None:
+        self.manifest = design.manifest
+        self._design, self._progress = design, progress
+        self._sums = Counter[str]()
+
+    @abstractmethod
+    def _set_up(self, shell: FuzzedShell) -> None:
+        """What a shell needs before its first case."""
+
+    @abstractmethod
+    def _run(self, shell: FuzzedShell, plan: P) -> Result:
+        """Run a case, and the legal work after it."""
+
+    def run(self, planned: Sequence[P]) -> list[Result]:
+        """See `Bench`."""
+        results: list[Result] = []
+        shell: FuzzedShell | None = None
+        for plan in planned:
+            try:
+                if shell is None:
+                    shell = FuzzedShell(self._design, self.memory, self._progress)
+                    self._set_up(shell)
+                results.append(self._run(shell, plan))
+            except RuntimeError as error:
+                results.append(Result.of("", (str(error),), ()))
+                if shell is not None:
+                    shell.close()
+                shell = None
+        if shell is not None:
+            shell.close()
+        return results
 
 
 def any_bus(random: np.random.Generator, errors: int = 0) -> Bus:
