@@ -138,9 +138,9 @@ def test_labels_of_the_scatter_plot_are_apart_and_the_selected_point_has_one(ope
     page = report.page
     page.select_option("#panel-point", "point 17 of the grid")
     page.select_option("#scatter-y", label="energy per ray, sky130, nJ")
-    shown = "#chart-scatter g.mark-text.role-mark text"
-    expect(page.locator(shown).filter(has_text="point 17 of the grid")).to_have_attribute("opacity", "1")
-    boxes = page.locator(shown).evaluate_all(
+    labels = "#chart-scatter g.mark-text.role-mark text"
+    expect(page.locator(labels).filter(has_text="point 17 of the grid")).to_have_attribute("opacity", "1")
+    boxes = page.locator(labels).evaluate_all(
         """texts => texts.filter((text) => text.getAttribute("opacity") !== "0").map((text) => {
           const box = text.getBoundingClientRect();
           return [box.left, box.right, box.top + 2, box.bottom - 2];
