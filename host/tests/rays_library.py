@@ -12,6 +12,13 @@ from colonnade.rays.library import compile_library
 OPTIONS = os.environ.get("COLONNADE_SANITIZER", "-Wall -Wextra -Werror").split()
 
 
+def preloaded(*libraries: Path) -> dict[str, str]:
+    """Variables of a Python in a process of its own that needs these libraries, and those of a sanitizer, first."""
+    names = [*os.environ.get("COLONNADE_SANITIZER_LIBRARIES", "").split(), *map(str, libraries)]
+    variables = {name: value for name, value in os.environ.items() if name in ("ASAN_OPTIONS", "TSAN_OPTIONS")}
+    return variables | ({"LD_PRELOAD": " ".join(names)} if names else {})
+
+
 def compiled_library(folder: Path) -> Path:
     """A shared library in a folder, in place of `libembree4`."""
     return compile_library(folder, "-O1", *OPTIONS)

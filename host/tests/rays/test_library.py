@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from c_programs import DRIVER_FOLDER, WARNINGS
+from rays_library import preloaded
 
 from colonnade import _core
 from colonnade.design.generator import manifest_for
@@ -52,7 +53,7 @@ def test_rays_are_traced_where_no_thread_starts(tmp_path: Path) -> None:
     shim = tmp_path / "none.so"
     subprocess.run(["gcc", "-shared", "-fPIC", tmp_path / "none.c", "-o", shim], check=True)
     outputs = []
-    for more in ({}, {"LD_PRELOAD": str(shim)}):
+    for more in (preloaded(), preloaded(shim)):
         variables = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"} | more
         command = [sys.executable, "-c", _MANY_RAYS]
         outputs.append(subprocess.run(command, env=variables, cwd=tmp_path, stdout=subprocess.PIPE, check=True).stdout)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from exact_rays import mesh_of, outside_rays
-from rays_library import compiled_library
+from rays_library import compiled_library, preloaded
 
 from colonnade.design.generator import manifest_for
 from colonnade.rays import Scene
@@ -111,8 +111,7 @@ def test_a_failure_is_one_line(
     program.chmod(0o755)
     registers = registers_text(manifest_for(*DESIGN).manifest.registers)
     variables = environment(tmp_path, None if device is None else device.format(program, registers=registers))
-    done = subprocess.run(
-        [sys.executable, "-c", _COMMITS, library], env=variables, capture_output=True, text=True, check=True
-    )
+    command = [sys.executable, "-c", _COMMITS, library]
+    done = subprocess.run(command, env=variables | preloaded(), capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == statuses
     assert done.stderr == (f"colonnade: error: {error.format(program)}\n" if error else "")
