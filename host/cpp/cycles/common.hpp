@@ -9,7 +9,7 @@ namespace colonnade::cycles {
 
 using Cycle = std::int64_t;
 
-/// common/RoundRobin.scala.
+/// common/Arbitration.scala.
 class RoundRobin {
 public:
     /// The bit of the request that is granted, or -1.
@@ -87,7 +87,7 @@ private:
     std::array<std::uint64_t, 4> words_{};
 };
 
-/// A claim that is served next (common/First.scala): of many, chosen a cycle early.
+/// A claim that is served next (common/Arbitration.scala): of many, chosen a cycle early.
 class Choice {
 public:
     explicit Choice(bool isRegistered) : isRegistered_(isRegistered) {}

@@ -94,7 +94,7 @@ struct Design {
                   cosine = root + 1 + 3 * intervals(take("cosineFraction")) + 1;
         shadeLight = cosine + (hasGather ? 11 : 0) + 7;
 
-        // ray/EntryControl.scala, SequentialRaySetup.scala
+        // ray/EntryControl.scala, RaySetup.scala
         const int slices = (take("shearFraction") + take("reciprocalFraction") + 3) / (take("reciprocalFraction") + 2),
                   late = extraSlices ? 1 : 0;
         entryCycles = 10 + 2 * slices + 6 * late, missCycles = 12 + 5 * late;
@@ -109,7 +109,7 @@ struct Design {
         bounceCycles =
             BounceProgram(take("gridBits"), take("rootBits"), take("radicandBits"), take("cosineFraction")).cycles();
 
-        // traversal/DistanceStage.scala: radix 4, two digits a cycle
+        // traversal/WeightStage.scala: radix 4, two digits a cycle
         divisionSteps = take("distanceDigits") / 4 + 1;
     }
 

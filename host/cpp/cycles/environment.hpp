@@ -9,7 +9,7 @@
 
 namespace colonnade::cycles {
 
-/// The channel for tiles and cells of the maps that some columns share: environment/AttributeArbiter.scala,
+/// The channel for tiles and cells of the maps that some columns share: environment/PhysicalAttributeMemory.scala,
 /// CellLookup.scala. A cell of a tile of several planes takes two cycles.
 class CellChannel {
 public:

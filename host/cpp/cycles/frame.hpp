@@ -13,7 +13,7 @@ namespace colonnade::cycles {
 /// The kinds of tiles, and of pixels.
 enum class PixelKind : std::uint8_t { background, environment, object };
 
-/// frame/MortonScan.scala: the cells of a grid in Morton order.
+/// frame/TileScan.scala: the cells of a grid in Morton order.
 class MortonScan {
 public:
     explicit MortonScan(int levels) : levels_(levels) {}
@@ -60,7 +60,7 @@ struct TilePosition {
 /// frame/TileScheduler.scala: the tiles of a kind in Morton order, to the columns in turn.
 class TileScheduler {
 public:
-    /// `size`: of a tile, pixels; `divides`: tiles are handed out as sixteenths (frame/TileDivider.scala).
+    /// `size`: of a tile, pixels; `divides`: tiles are handed out as sixteenths (frame/TileScheduler.scala).
     TileScheduler(PixelKind kind, int levels, unsigned size, bool divides)
         : kind_(kind), divides_(divides), size_(size), scan_(levels) {}
 
@@ -269,7 +269,7 @@ private:
                kindAt(environmentQueue_.front()) == PixelKind::background;
     }
 
-    /// frame/TileWalker.scala, EnvironmentWalker.scala, PixelMixer.scala and BackgroundWalker.scala.
+    /// frame/Walkers.scala and PixelCollector.scala.
     void walk(bool accepts, bool rejectedLeaves, bool backgroundLeaves, bool environmentLeaves, const Tiles& tiles) {
         // Pixels of the environment go first while few of them are in flight
         const bool isOpen = !hasPosition_ || accepts;

@@ -1,4 +1,4 @@
-// ray/RaySetupPipeline.scala and SequentialRaySetup.scala: how long a ray takes to the traversal units.
+// ray/RaySetup.scala and SequentialRaySetup.scala: how long a ray takes to the traversal units.
 #pragma once
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace colonnade::cycles {
 
-/// ray/RaySetupPipeline.scala: a ray a cycle, all stages in step; or SequentialRaySetup.scala: up to three rays, in a
+/// ray/RaySetup.scala: a ray a cycle, all stages in step; or SequentialRaySetup.scala: up to three rays, in a
 /// normaliser, dividers and the entry.
 class RaySetup {
 public:

@@ -7,7 +7,7 @@
 
 namespace colonnade::cycles {
 
-/// The lines that a bank of a cache holds: memory/TagStore.scala, Replacement.scala.
+/// The lines that a bank of a cache holds: memory/TagStore.scala.
 class TagStore {
 public:
     TagStore(int sets, int ways)
@@ -68,7 +68,7 @@ struct Announcement {
     bool isValid = false;
 };
 
-/// One bank of a column: column/BankReader.scala with memory/ColumnCache.scala, or with a memory of the whole scene.
+/// One bank of a column: column/ColumnBvhController.scala with memory/ColumnCache.scala, or with a memory of the whole scene.
 class ColumnBank {
 public:
     ColumnBank(const Design& design, int bank)

@@ -179,7 +179,7 @@ public:
             readyNext |= units_[i].step(now, static_cast<int>(i) == taken, static_cast<int>(i) == to ? &sent : nullptr);
         }
 
-        // Choose a row for the next cycle (column/TriangleGrants.scala)
+        // Choose a row for the next cycle (column/TriangleGroup.scala)
         if (!isShared_) {
             grantedRow_ = readyNext ? 0 : -1;
             return end;

@@ -1,15 +1,17 @@
 package colonnade
 
 import chisel3._
-import colonnade.Scratch.names
-import colonnade.config.{ColonnadeConfig, ConfigIO, MapEncoding, PrecisionConfig}
+import colonnade.config.{ColonnadeConfig, ConfigIO, MapEncoding, PathConfig, PrecisionConfig}
 import colonnade.numbers.Divider
-import org.scalacheck.Prop.propBoolean
+import colonnade.Scratch.names
 import org.scalacheck.{Gen, Prop}
+import org.scalacheck.Prop.propBoolean
 import org.scalatest.flatspec.AnyFlatSpec
 import org.scalatest.matchers.should.Matchers
 
+import java.nio.charset.StandardCharsets.UTF_8
 import java.nio.file.{Files, Path, Paths}
+import java.security.MessageDigest
 import scala.sys.process.{Process, ProcessLogger}
 import scala.util.Try
 
@@ -96,4 +98,42 @@ private class EmitSpecMemory extends Module {
   private val memory = SyncReadMem(64, UInt(20.W))
   when(write)(memory.write(writeAddress, data))
   read := memory.read(readAddress)
+}
+
+class ProgramGraphsSpec extends AnyFlatSpec {
+  behavior of "ProgramGraphs"
+
+  private def inDocs(name: String): Path = Paths.get("docs", "diagrams", "programs", name)
+
+  it should "be the graphs in docs/diagrams/programs" in {
+    for ((name, graph) <- ProgramGraphs(PathConfig(ConfigIO.load("small"))))
+      withClue(s"$name has changed; run tools/regenerate: ") {
+        assert(Files.readString(inDocs(name)) == graph)
+        val hash = MessageDigest.getInstance("SHA-256").digest(graph.getBytes(UTF_8)).map(byte => f"$byte%02x").mkString
+        assert(Files.readString(inDocs(name.replace(".dot", ".svg"))).contains(s"$name, sha256 $hash "))
+      }
+  }
+}
+
+/** Tests the C++ compiler of the simulators with a pattern that g++ 12.2 miscompiles. */
+class CompilerSpec extends AnyFlatSpec with Matchers {
+  behavior of "The C++ compiler"
+
+  private val canary: Path = Paths.get("host/colonnade/device/harness/canary.cpp")
+
+  it should "count right with the flags of the specs' simulators" in {
+    assume(Try(Process("g++ --version").!!(ProcessLogger(_ => ()))).isSuccess, "g++ is not installed")
+    val folder = Files.createTempDirectory("colonnade-canary")
+    try
+      for (optimisation <- Seq("-O1", "-O2", "-O3")) {
+        val program = folder.resolve("canary").toString
+        val flags   = Seq("-std=c++17", optimisation) ++ Simulation.safeFlags
+        Process(Seq("g++") ++ flags ++ Seq("-o", program, canary.toString)).! shouldBe 0
+        withClue(s"with $optimisation: ")(Process(Seq(program)).! shouldBe 0)
+      }
+    finally {
+      Files.deleteIfExists(folder.resolve("canary"))
+      Files.deleteIfExists(folder)
+    }
+  }
 }

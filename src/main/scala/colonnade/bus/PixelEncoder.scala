@@ -6,6 +6,31 @@ import colonnade.common.TimingSlice
 import colonnade.config.{ColonnadeConfig, NumberFormats}
 import colonnade.formats.Pixel
 
+import scala.collection.concurrent.TrieMap
+
+/** Formats of a framebuffer; docs/bus-shell.md. Code 3 is illegal. */
+object PixelFormat extends ChiselEnum {
+  val xrgb8888, rgb565, linear16 = Value
+
+  val maxBytes: Int = 8
+
+  /** The base-2 logarithm of a pixel's bytes. */
+  def bytesLog(format: UInt): UInt =
+    Mux(format === rgb565.litValue.U, 1.U, Mux(format === linear16.litValue.U, 3.U, 2.U(2.W)))
+
+  /** A pixel in a format: its sRGB codes, its linear channels in 16 bits, and whether it shows the object. */
+  def packed(format: UInt, codes: Seq[UInt], linear: Seq[UInt], isObject: Bool): UInt = {
+    val Seq(r, g, b) = codes
+    val xrgb         = 255.U(8.W) ## r ## g ## b
+    val rgb565       = r(7, 3) ## g(7, 2) ## b(7, 3)
+    val linear16     = Fill(16, isObject) ## linear(2) ## linear(1) ## linear(0)
+    MuxLookup(format, xrgb)(Seq(this.rgb565.litValue.U -> rgb565, this.linear16.litValue.U -> linear16))
+      .pad(8 * maxBytes)
+  }
+
+  def isLegal(format: UInt): Bool = format <= linear16.litValue.U
+}
+
 /** A pixel as it lies in memory, or the shadow ratio of a pixel that will show the photo. */
 final class EncodedPixel(config: ColonnadeConfig) extends Bundle {
   val x    = UInt(config.numbers.coordinateBits.W)
@@ -65,4 +90,63 @@ final class PixelEncoder(config: ColonnadeConfig) extends Module {
   }
   out :<>= TimingSlice.queue(encoded)
   isIdle := !valids.drop(1).reduce(_ || _) && !out.valid
+}
+
+/** Encodes a linear channel as 8 bits of sRGB (IEC 61966-2-1), rounded to the nearest code.
+  *
+  * A search by halves in the table of the least linear values of all codes, two bits of the code in each of four cycles in
+  * which `enable` lets values move.
+  *
+  * @param linearBits width of a linear value; all ones is 1.0
+  */
+final class SrgbEncoder(linearBits: Int = NumberFormats.colourBits) extends Module {
+  val linear = IO(Input(UInt(linearBits.W)))
+  val enable = IO(Input(Bool()))
+  val code   = IO(Output(UInt(SrgbEncoder.codeBits.W)))
+
+  /** The code's next bit, below the bits that are known. */
+  private def next(known: Option[UInt], value: UInt): UInt = {
+    val bit    = SrgbEncoder.codeBits - 1 - known.fold(0)(_.getWidth)
+    val tables =
+      VecInit(SrgbEncoder.leastLinear(linearBits).grouped(2 << bit).map(_(1 << bit).U(value.getWidth.W)).toSeq)
+    val least = known.fold(tables.head)(tables(_))
+    known.fold((value >= least).asUInt)(Cat(_, value >= least))
+  }
+  private def part(known: Option[UInt], value: UInt): UInt =
+    (0 until SrgbEncoder.codeBits / SrgbEncoder.latency).foldLeft(known)((bits, _) => Some(next(bits, value))).get
+
+  private val (_, found) = (0 until SrgbEncoder.latency).foldLeft((linear, Option.empty[UInt])) {
+    case ((value, known), _) =>
+      (RegEnable(value, enable), Some(RegEnable(part(known, value), enable)))
+  }
+  code := found.get
+}
+
+object SrgbEncoder {
+  val codeBits: Int = 8
+  val latency:  Int = 4
+
+  /** The code of a linear value. */
+  def apply(linear: Int, linearBits: Int = NumberFormats.colourBits): Int = {
+    val value   = linear.toDouble / ((1 << linearBits) - 1)
+    val encoded = if (value <= 0.0031308) 12.92 * value else 1.055 * math.pow(value, 1 / 2.4) - 0.055
+    math.rint(255 * encoded).toInt
+  }
+
+  /** The linear value of a code, rounded to the nearest. */
+  def decoded(code: Int, linearBits: Int): Int = {
+    val value  = code / 255.0
+    val linear = if (value <= 0.04045) value / 12.92 else math.pow((value + 0.055) / 1.055, 2.4)
+    math.rint(linear * ((1 << linearBits) - 1)).toInt
+  }
+
+  private val tables = TrieMap.empty[Int, IndexedSeq[Int]]
+
+  /** The least linear value of each code, or of a higher one. */
+  private def leastLinear(linearBits: Int): IndexedSeq[Int] = tables.getOrElseUpdate(
+    linearBits, {
+      val codes = (0 until 1 << linearBits).map(apply(_, linearBits))
+      (0 until 1 << codeBits).map(code => codes.indexWhere(_ >= code))
+    }
+  )
 }

@@ -2,10 +2,47 @@ package colonnade.environment
 
 import chisel3._
 import chisel3.util.{Decoupled, Valid}
+import colonnade.common.Context
 import colonnade.config.{AttributeLayout, PathConfig}
 import colonnade.formats.{AlbedoEntry, BoundingPlaneEntry, EnvironmentView, NormalEntry, PixelPosition, Vec3}
 import colonnade.numbers.Fixed
 import colonnade.ray.RayFormats
+import colonnade.shading.EnvironmentSurface
+
+/** A ray for a march, and what its path wants to know. */
+final class MarchOrder(config: PathConfig) extends Bundle {
+  val request     = new EnvironmentRequest(config)
+  val ray         = new EnvironmentRay(config)
+  val hitDistance = HitDistance(config) // for an occlusion test: the distance of its hit
+}
+
+/** What a ray has met. */
+final class MarchAnswer(config: PathConfig) extends Bundle {
+  val isHit           = Bool() // there is a point to shade; if the request was an occlusion test, it hides the hit
+  val isOcclusionTest = Bool()
+  val surface = new EnvironmentSurface(config) // the request's context; the point, if there is one
+}
+
+/** The path unit's port to the marches of its column. */
+final class MarchPort(config: PathConfig) extends Bundle {
+
+  /** For the pipeline of directly seen pixels; for the marches. At most one is accepted in a cycle. */
+  val direct = Decoupled(new EnvironmentRequest(config))
+  val march  = Decoupled(new EnvironmentRequest(config))
+
+  val order = Output(new MarchOrder(config)) // the order, in the cycle after its request is accepted, and only then
+  val answer = Flipped(Decoupled(new MarchAnswer(config))) // in any order
+
+  /** Ties off a port without a requester. */
+  def tieOff(): Unit = {
+    for (req <- Seq(direct, march)) {
+      req.valid := false.B
+      req.bits  := DontCare
+    }
+    order        := DontCare
+    answer.ready := true.B
+  }
+}
 
 /** A ray that misses the object. Its direction is scaled: the largest component fills `f` bits. */
 final class EnvironmentRay(config: PathConfig) extends Bundle {
@@ -80,4 +117,18 @@ final class EnvironmentMarchIO(config: PathConfig) extends Bundle {
   val maps    = new MarchMaps(AttributeLayout.of(config.device))
   val test    = Valid(new ClipTest(config))                // a ray from the camera is tested against a plane, 0 to 4
   val events  = Output(new MarchEvents)
+}
+
+/** A context whose ray is to be traced to the environment. */
+final class EnvironmentRequest(config: PathConfig) extends Bundle {
+  val context             = Context(config)
+  val isDirectView        = Bool() // the ray is the pixel's primary ray
+  val isFresnelReflection = Bool() // the ray is the deferred Fresnel reflection of a path
+  val isOcclusionTest     = Bool() // the ray has hit the object: does the environment hide the hit?
+}
+
+/** Which requests are accepted in this cycle: rays from the camera, and others. So one kind does not wait for the other. */
+final class EnvironmentAccepts extends Bundle {
+  val directView = Bool()
+  val march      = Bool()
 }

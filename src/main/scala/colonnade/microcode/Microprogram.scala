@@ -173,3 +173,54 @@ final class Microprogram[L <: Label](encoding: StepEncoding) {
     }
   }
 }
+
+/** A step that a program can jump to. A program's labels are the case objects of one sealed trait, so a jump into another
+  * program does not compile.
+  */
+trait Label {
+
+  /** A jump to this step.
+    *
+    * @param reason the condition in words, for the program's graph
+    */
+  def when(condition: Bool, reason: String): Exit[this.type] = Exit(Some(this), Some(condition), reason)
+
+  /** A jump to this step that is always taken. */
+  def otherwise: Exit[this.type] = Exit(Some(this), None, "")
+}
+
+/** One way out of a step.
+  *
+  * @param target    the next step; none repeats the step that it leaves
+  * @param condition none always holds
+  * @param reason    the condition in words; of a repetition, what it waits for
+  */
+final case class Exit[+L <: Label](target: Option[L], condition: Option[Bool], reason: String)
+
+/** A step that waits. */
+object Repeat {
+
+  /** Repeats the step until the condition holds.
+    *
+    * @param reason what the step waits for
+    */
+  def until(condition: Bool, reason: String): Exit[Nothing] = Exit(None, Some(!condition), reason)
+}
+
+/** Parts of consecutive steps, see [[Microprogram.overlap]]. */
+final class Overlap[L <: Label] {
+  private val parts  = mutable.ArrayBuffer.empty[(Int, () => Unit)]
+  private val placed = mutable.ArrayBuffer.empty[(Int, L)]
+
+  /** Adds a part to the step of this cycle. */
+  def apply(cycle: Int)(part: => Unit): Unit = parts += cycle -> (() => part)
+
+  /** Labels the step of this cycle. */
+  def label(cycle: Int, label: L): Unit = placed += cycle -> label
+
+  private[microcode] def labels: Seq[(Int, L)] = placed.toSeq
+
+  /** The parts of each cycle up to the last. */
+  private[microcode] def byCycle: Seq[Seq[() => Unit]] =
+    (0 to parts.map(_._1).max).map(cycle => parts.toSeq.collect { case (`cycle`, part) => part })
+}

@@ -81,3 +81,32 @@ final class RootDivider(radicandBits: Int, mantissaBits: Int, digits: Int) exten
 object RootDivider {
   def resultBits(radicandBits: Int, digits: Int): Int = SquareRoot.rootBits(radicandBits).max(digits + 1)
 }
+
+/** A step of restoring division or square root: subtract, and keep the difference unless it is negative. */
+object DigitRecurrence {
+
+  /** The difference, and whether it is not negative. Operands that are padded more than the difference needs would make
+    * firtool take the borrow for a constant.
+    */
+  def subtract(minuend: UInt, subtrahend: UInt): (Bool, UInt) = {
+    val difference = minuend -& subtrahend
+    (!difference.head(1).asBool, difference)
+  }
+
+  /** The digit, and what is left of the minuend, in `bits` bits. */
+  def step(minuend: UInt, subtrahend: UInt, bits: Int): (Bool, UInt) = {
+    val (fits, difference) = subtract(minuend, subtrahend)
+    (fits, Mux(fits, difference, minuend)(bits - 1, 0))
+  }
+}
+
+/** Adds without carrying: three terms become two with the same sum, modulo 2^width. */
+object CarrySave {
+
+  /** The sums and the carries of the bits of three terms of one width; `carryIn` is also added. */
+  def apply(a: UInt, b: UInt, c: UInt, carryIn: Bool = false.B): (UInt, UInt) = {
+    val width = a.getWidth
+    require(b.getWidth == width && c.getWidth == width, s"terms of $width, ${b.getWidth} and ${c.getWidth} bits")
+    (a ^ b ^ c, ((a & b) | (a & c) | (b & c))(width - 2, 0) ## carryIn)
+  }
+}

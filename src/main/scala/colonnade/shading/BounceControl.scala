@@ -3,6 +3,7 @@ package colonnade.shading
 import chisel3._
 import chisel3.util.log2Ceil
 import colonnade.config.PathConfig
+import colonnade.microcode.Label
 
 /** The product of a step: at most one of these. n is the normal, d the ray's direction, c = −n·d the cosine up to a
   * factor. A product takes as many cycles as a factor has digits.
@@ -127,4 +128,22 @@ final class BounceDatapathIO(config: PathConfig) extends Bundle {
   val isRefraction = Input(Bool())                    // the ray enters the material that it hits
   val status       = Output(new BounceStatus)
   val result       = Output(new BounceResult(config)) // constant from the program's last step on
+}
+
+/** Labels of [[BounceProgram]]. */
+sealed trait BounceLabel extends Label
+
+object BounceLabel {
+  case object Idle            extends BounceLabel // waits for a hit
+  case object GeometricNormal extends BounceLabel // normalises the geometric normal, which replaces the smooth one
+  case object DotProducts     extends BounceLabel // computes the lengths of normal and ray, and their angle
+  case object Reflect         extends BounceLabel // computes the reflected direction
+  case object Discriminant    extends BounceLabel // computes Snell's discriminant
+  case object Root            extends BounceLabel // takes the discriminant's root
+  case object Refract         extends BounceLabel // computes the refracted direction
+  case object HemisphereCheck extends BounceLabel // checks on which side of the surface the ray goes on
+  case object Offset          extends BounceLabel // moves the origin to the other side of the surface
+  case object Cosine          extends BounceLabel // computes the cosine for Schlick's approximation
+  case object Fresnel         extends BounceLabel // computes Schlick's approximation of the Fresnel term
+  case object Done            extends BounceLabel // offers the result
 }

@@ -82,3 +82,10 @@ final class PathColour(config: PathConfig) extends Bundle {
   /** Of a directly visible surface of the environment: its shadow ratio. */
   val ratio = if (config.device.hasEnvironment) Some(Rgb(FrameRegisters.weight)) else None
 }
+
+/** The outcome of a shadow ray. */
+object Occlusion extends ChiselEnum {
+  val none         = Value // the ray hits nothing, or no ray was sent
+  val transmissive = Value // the ray hits transmissive triangles only
+  val opaque       = Value
+}

@@ -1,8 +1,11 @@
 package colonnade.query
 
-import colonnade.config.{ArrayConfig, ColonnadeConfig, UnitsConfig}
-import colonnade.formats.{RayPlacement, RayRegisters}
+import chisel3._
+import chisel3.util.Queue
 import colonnade.{Model, Packed, TestConfigs}
+import colonnade.axi.{AxiPins, AxiReadPort, AxiWritePort}
+import colonnade.config.{ArrayConfig, ColonnadeConfig, UnitsConfig}
+import colonnade.formats.{NodeRecord, RayBatch, RayPlacement, RayRegisters, RecordFormats}
 
 /** Designs for rays of applications. */
 object RayConfigs {
@@ -55,4 +58,50 @@ object RayConfigs {
 
   def nameOf(config: ColonnadeConfig): String =
     s"${config.geometry.vertexBits}-bit vertices, ${config.numbers.gridBits}-bit triangle tests"
+}
+
+/** A unit whose ports are the pins of a memory. */
+abstract class MemoryUnit(idBits: Int = 1) extends Module {
+  val pins: AxiPins = IO(AxiPins.readsAndWrites(idBits, RayBatch.bytes)).suggestName("m_axi")
+
+  /** Connects them; a port that the unit lacks sends nothing. */
+  protected def attach(read: Option[AxiReadPort] = None, write: Option[AxiWritePort] = None): Unit = {
+    val reads  = read.getOrElse(WireInit(0.U.asTypeOf(new AxiReadPort(idBits, RayBatch.bytes))))
+    val writes = write.getOrElse(WireInit(0.U.asTypeOf(new AxiWritePort(idBits, RayBatch.bytes))))
+    Seq("aw" -> writes.aw, "w" -> writes.w, "ar" -> reads.ar).foreach { case (channel, from) =>
+      pins.drive(channel, from)
+    }
+    pins.receive("b", writes.b)
+    pins.receive("r", reads.r)
+  }
+
+  /** The same behind registers, which hold the addresses that the unit chooses among several. */
+  protected def attachHeld(read: AxiReadPort, write: AxiWritePort): Unit = {
+    val reads  = Wire(chiselTypeOf(read))
+    val writes = Wire(chiselTypeOf(write))
+    reads :<>= read
+    writes :<>= write
+    reads.ar :<>= Queue(read.ar, 1)
+    writes.aw :<>= Queue(write.aw, 1)
+    attach(Some(reads), Some(writes))
+  }
+}
+
+object DeepTree {
+
+  /** Records of a tree without leaves, in whose cube every ray overflows its stack: each box is the whole cube. */
+  def records(config: ColonnadeConfig): Seq[BigInt] = {
+    val most     = NodeRecord.most
+    val levels   = config.columnBvhMemory.stackDepth / (most - 1) + 1
+    val exponent = config.numbers.vertexBits - config.numbers.boxBits + 1
+    val node     = new Packed(new RecordFormats(config).node)
+    val whole    = for (axis <- "xyz"; child <- 0 until most)
+      yield s"children[$child].high.$axis" -> (BigInt(1) << (config.numbers.boxBits - 1))
+    val corner                        = "xyz".map(axis => s"corner.$axis" -> (BigInt(1) << exponent))
+    def parent(first: BigInt): BigInt =
+      node.pack((whole ++ corner).toMap ++ Map("first" -> first, "nodes" -> BigInt(most)))
+    parent(1) +: (1 to levels).flatMap(level =>
+      Seq.fill(most)(if (level == levels) node.pack(Map.empty) else parent(1 + most * level))
+    )
+  }
 }

@@ -1,9 +1,9 @@
 package colonnade.unit
 
 import chiseltest._
-import colonnade.TestParts._
+import colonnade.{Always, Matrix, Proofs, Simulation, TestConfigs}
 import colonnade.config.ColonnadeConfig
-import colonnade.{Always, Simulation, TestConfigs}
+import colonnade.TestParts._
 import org.scalatest.flatspec.AnyFlatSpec
 
 /** A context changes its state on the events of its stage, and only then. */
@@ -78,4 +78,23 @@ class RtControllerSpec extends AnyFlatSpec with ChiselScalatestTester {
       rounds.cycle(_.retire = true)
       dut.io.idleCount.expect(3)
     }
+}
+
+class RtControllerProofSpec extends AnyFlatSpec with ChiselScalatestTester with Proofs {
+  behavior of "RtController"
+
+  private val environment = TestConfigs.withEnvironment(TestConfigs.environment)
+
+  private def config(contexts: Int, base: ColonnadeConfig): ColonnadeConfig =
+    base.copy(units = base.units.copy(pathContexts = contexts))
+
+  for ((name, base) <- Seq("without" -> TestConfigs.tiny, "with" -> environment))
+    it should s"give each path to its stages, once and in order, $name an environment" taggedAs Always.unless(
+      !base.hasEnvironment
+    ) in
+      prove(new RtControllerProof(config(contexts = 2, base)))
+
+  for ((name, base, cycles) <- Seq(("without", TestConfigs.tiny, 13), ("with", environment, 10)))
+    it should s"give each of 17 paths to its stages, $name an environment" taggedAs Matrix in
+      proveUntil(cycles)(new RtControllerProof(config(contexts = 17, base)))
 }
