@@ -72,6 +72,7 @@ lock: setup ## make host/locks and project/dependencies.sha256 again
 format: setup ## let the formatters rewrite the sources
 	@tools/environment lint
 	@git ls-files '*.c' '*.h' '*.cpp' '*.hpp' | xargs .cache/lint-environment/bin/clang-format -i
+	@.cache/lint-environment/node_modules/.bin/biome format --write .
 	@tools/sbt scalafmtAll
 	@$(venv)/ruff check --fix --select I host lab
 	@$(venv)/ruff format host lab

@@ -5,7 +5,10 @@ const MOST_TRIANGLES = 4_000_000;
 
 /** Refuses a mesh of too many triangles. */
 export function checkTriangles(count) {
-  if (count > MOST_TRIANGLES) throw new Error(`the mesh has more than ${MOST_TRIANGLES.toLocaleString("en")} triangles: the command line reads larger ones`);
+  if (count > MOST_TRIANGLES)
+    throw new Error(
+      `the mesh has more than ${MOST_TRIANGLES.toLocaleString("en")} triangles: the command line reads larger ones`,
+    );
 }
 
 /** Collects the triangles of glTF primitives. */
@@ -27,7 +30,10 @@ export class Corners {
     this.notes = new Set();
   }
 
-  /** `material`: a number; `uvs`, `metalUvs`, `emissiveUvs`: positions in its textures; null for none, as of normals and colours, of `relief` and of `alphas`. */
+  /**
+   * `material`: a number; `uvs`, `metalUvs`, `emissiveUvs`: positions in its textures; null for none, as of normals and
+   * colours, of `relief` and of `alphas`.
+   */
   add(vertices, normals, colours, material, uvs, metalUvs, emissiveUvs, relief, alphas) {
     this.materials.push(material);
     this.reliefs.push(relief);
@@ -50,7 +56,11 @@ export class Corners {
   relief() {
     const none = { map: -1, uvs: Array(3).fill([0, 0]), tangents: Array(3).fill([0, 0, 0, 0]) };
     const own = this.reliefs.map((relief) => relief ?? none);
-    return { mapOf: Int32Array.from(own, ({ map }) => map), uvs: Float64Array.from(own.flatMap(({ uvs }) => uvs.flat())), tangents: Float64Array.from(own.flatMap(({ tangents }) => tangents.flat())) };
+    return {
+      mapOf: Int32Array.from(own, ({ map }) => map),
+      uvs: Float64Array.from(own.flatMap(({ uvs }) => uvs.flat())),
+      tangents: Float64Array.from(own.flatMap(({ tangents }) => tangents.flat())),
+    };
   }
 
   mesh(vertices) {

@@ -1,11 +1,16 @@
-// Prepares the faces of a file as the host does: metal and emission by maps, then without what alpha hides (host/colonnade/mesh/materials/
-// coverage.py), then swatches at the corners of faces (swatches.py).
+// Prepares the faces of a file as the host does: metal and emission by maps, then without what alpha hides
+// (host/colonnade/mesh/materials/ coverage.py), then swatches at the corners of faces (swatches.py).
 
 import { areasOf, MIRROR_ROUGHNESS, shownEmission } from "./surfaces.js";
 
-/** As host/colonnade/mesh/geometry/topology.py: faces of a mesh that is split, and edges that are not, as part of the mesh. */
+/**
+ * As host/colonnade/mesh/geometry/topology.py: faces of a mesh that is split, and edges that are not, as part of the
+ * mesh.
+ */
 const [MOST_SPLIT_FACES, SMALLEST_SPLIT] = [49152, 1 / 400];
-/** As host/colonnade/mesh/files/gltf_emission.py: the part of the faces that a mesh may have more which emission takes. */
+/**
+ * As host/colonnade/mesh/files/gltf_emission.py: the part of the faces that a mesh may have more which emission takes.
+ */
 const EMISSION_SHARE = 4;
 /** As host/colonnade/mesh/files/gltf_metal.py: metal that emits at least so much has this roughness. */
 const [GLOW, GLOWING_ROUGHNESS] = [1 / 8, 3 / 8];
@@ -20,7 +25,8 @@ const valuesOf = (values, faces, width) => {
   return found;
 };
 
-const facesOf = (mesh, ...numbers) => [...mesh.materialOf.keys()].filter((face) => numbers.includes(mesh.materialOf[face]));
+const facesOf = (mesh, ...numbers) =>
+  [...mesh.materialOf.keys()].filter((face) => numbers.includes(mesh.materialOf[face]));
 
 /** The mesh of a file with materials, prepared for surfacesOf; another one is left. */
 export function prepared(library, mesh) {
@@ -30,20 +36,37 @@ export function prepared(library, mesh) {
   return { ...found, notes: [...new Set(found.notes)] };
 }
 
-/** A mesh whose vertices are where its clip binds them, in its rest pose; `parts`: the faces of the file, and what each face is of one (Library.pack). */
+/**
+ * A mesh whose vertices are where its clip binds them, in its rest pose; `parts`: the faces of the file, and what each
+ * face is of one (Library.pack).
+ */
 function atRest(library, mesh) {
   const { vertices, normals, isMirrored } = library.rest(mesh);
   /** Values of corners, so many each, backwards on mirrored faces. */
   const ordered = (values, width) =>
     values?.map((value, at) => {
       const [corner, part] = [Math.floor(at / width), at % width];
-      return isMirrored[Math.floor(corner / 3)] ? values[width * (3 * Math.floor(corner / 3) + 2 - (corner % 3)) + part] : value;
+      return isMirrored[Math.floor(corner / 3)]
+        ? values[width * (3 * Math.floor(corner / 3) + 2 - (corner % 3)) + part]
+        : value;
     });
   const widths = { faces: 1, normals: 3, colours: 3, alphas: 1, uvs: 2, emissiveUvs: 2 };
-  const found = Object.fromEntries(Object.entries(widths).map(([name, width]) => [name, ordered(name === "normals" ? normals : mesh[name], width)]));
+  const found = Object.fromEntries(
+    Object.entries(widths).map(([name, width]) => [name, ordered(name === "normals" ? normals : mesh[name], width)]),
+  );
   const { faces } = found;
-  const parts = { faces, owners: Int32Array.from(mesh.materialOf.keys()), weights: Float64Array.from({ length: 3 * faces.length }, (_, at) => WHOLE_FACE[at % 9]) };
-  return { ...mesh, ...found, vertices, parts, relief: mesh.relief && { ...mesh.relief, uvs: ordered(mesh.relief.uvs, 2) } };
+  const parts = {
+    faces,
+    owners: Int32Array.from(mesh.materialOf.keys()),
+    weights: Float64Array.from({ length: 3 * faces.length }, (_, at) => WHOLE_FACE[at % 9]),
+  };
+  return {
+    ...mesh,
+    ...found,
+    vertices,
+    parts,
+    relief: mesh.relief && { ...mesh.relief, uvs: ordered(mesh.relief.uvs, 2) },
+  };
 }
 
 /** The mesh with `isMetal` and `roughness` of the faces that a map makes metal or not. */
@@ -68,8 +91,20 @@ function bisected(library, mesh) {
     if (!emitsByMap(material) || !found.materialOf.includes(number)) return;
     const shows = Uint8Array.from(found.materialOf, (own) => Number(own === number));
     const budget = Math.floor((MOST_SPLIT_FACES - shows.length) / EMISSION_SHARE);
-    const { owners, weights } = library.emissionPieces(mesh.textures[material.emissive.texture], material.emission, found, shows, found.emissiveUvs, budget);
-    if (owners.length > shows.length) found = split(found, cornersOf(found), [...owners].map((owner, i) => ({ owner, weights: weights.subarray(9 * i, 9 * i + 9) })));
+    const { owners, weights } = library.emissionPieces(
+      mesh.textures[material.emissive.texture],
+      material.emission,
+      found,
+      shows,
+      found.emissiveUvs,
+      budget,
+    );
+    if (owners.length > shows.length)
+      found = split(
+        found,
+        cornersOf(found),
+        [...owners].map((owner, i) => ({ owner, weights: weights.subarray(9 * i, 9 * i + 9) })),
+      );
   });
   return found;
 }
@@ -81,7 +116,9 @@ function cornersOf({ vertices, faces }) {
   return corners;
 }
 
-/** The mesh with the materials that metallic-roughness and emission maps make of its faces, numbered as the host does. */
+/**
+ * The mesh with the materials that metallic-roughness and emission maps make of its faces, numbered as the host does.
+ */
 function withMaps(library, mesh) {
   const { materials, isMetal, roughness, emissiveUvs, textures } = mesh;
   const found = [...materials];
@@ -92,11 +129,19 @@ function withMaps(library, mesh) {
     const emits = emitsByMap(material);
     if (!hasMetal && !emits) return;
     const own = facesOf(mesh, number);
-    const shares = emits && library.emission(textures[material.emissive.texture], valuesOf(emissiveUvs, own, 6), valuesOf(areas, own, 1));
-    const emissionOf = (i) => shownEmission(material.emission.map((value, channel) => value * (shares ? shares[3 * i + channel] : 1)));
+    const shares =
+      emits &&
+      library.emission(textures[material.emissive.texture], valuesOf(emissiveUvs, own, 6), valuesOf(areas, own, 1));
+    const emissionOf = (i) =>
+      shownEmission(material.emission.map((value, channel) => value * (shares ? shares[3 * i + channel] : 1)));
     if (emits) found[number] = { ...material, emissive: null, emission: [0, 0, 0] };
-    const rows = own.map((_, i) => [...(hasMetal ? [isMetal[own[i]], roughness[own[i]]] : []), ...(shares ? emissionOf(i) : [])]);
-    const order = [...own.keys()].sort((a, b) => rows[a].map((value, column) => value - rows[b][column]).find(Boolean) ?? 0);
+    const rows = own.map((_, i) => [
+      ...(hasMetal ? [isMetal[own[i]], roughness[own[i]]] : []),
+      ...(shares ? emissionOf(i) : []),
+    ]);
+    const order = [...own.keys()].sort(
+      (a, b) => rows[a].map((value, column) => value - rows[b][column]).find(Boolean) ?? 0,
+    );
     const numbers = new Map();
     for (const i of order) {
       const isOfMetal = hasMetal && isMetal[own[i]] === 1;
@@ -105,7 +150,11 @@ function withMaps(library, mesh) {
       const emission = isOfMetal && rough <= MIRROR_ROUGHNESS ? [0, 0, 0] : emissionOf(i);
       if (!isOfMetal && !emission.some((value, channel) => value !== found[number].emission[channel])) continue;
       const key = [rough, ...emission].join();
-      if (!numbers.has(key)) numbers.set(key, found.push({ ...found[number], emission, ...(isOfMetal ? { kind: "mirror", roughness: rough } : {}) }) - 1);
+      if (!numbers.has(key))
+        numbers.set(
+          key,
+          found.push({ ...found[number], emission, ...(isOfMetal ? { kind: "mirror", roughness: rough } : {}) }) - 1,
+        );
       materialOf[own[i]] = numbers.get(key);
     }
   });
@@ -146,12 +195,22 @@ function withoutAlpha(library, mesh) {
       continue;
     }
     const values = [isCovering ? 1 : alpha.factor, alpha.cutoff, alpha.blends ? alpha.factor : -1, edge];
-    const cut = library.cut({ corners: valuesOf(corners, faces, 9), uvs: valuesOf(mesh.uvs, faces, 6), alphas, texture, values, budget: Math.max(0, budget) });
+    const cut = library.cut({
+      corners: valuesOf(corners, faces, 9),
+      uvs: valuesOf(mesh.uvs, faces, 6),
+      alphas,
+      texture,
+      values,
+      budget: Math.max(0, budget),
+    });
     faces.forEach((face, i) => {
       if (cut.kinds[i] > 0) whole.push(face);
-      if (cut.kinds[i] < 0 && alpha.blends && cut.panes[4 * i] >= THIN) panes.push({ face, alpha: cut.panes[4 * i], colour: cut.panes.subarray(4 * i + 1, 4 * i + 4) });
+      if (cut.kinds[i] < 0 && alpha.blends && cut.panes[4 * i] >= THIN)
+        panes.push({ face, alpha: cut.panes[4 * i], colour: cut.panes.subarray(4 * i + 1, 4 * i + 4) });
     });
-    cut.owners.forEach((owner, i) => parts.push({ owner: faces[owner], weights: cut.weights.subarray(9 * i, 9 * i + 9) }));
+    cut.owners.forEach((owner, i) =>
+      parts.push({ owner: faces[owner], weights: cut.weights.subarray(9 * i, 9 * i + 9) }),
+    );
     budget -= cut.owners.length - cut.kinds.filter((kind) => kind === 0).length;
     if (cut.isCoarse) notes.push("outlines of alpha have more detail than faces");
     if (cut.isBlended) notes.push("blended alpha is rounded: from one half on it is opaque");
@@ -164,20 +223,33 @@ function withoutAlpha(library, mesh) {
   const tints = new Map();
   for (const { face, alpha, colour } of panes) {
     const { albedo } = mesh.materials[mesh.materialOf[face]];
-    const own = mesh.colours && mesh.hasOwnColours[face] ? [0, 1, 2].map((channel) => [0, 1, 2].reduce((sum, corner) => sum + mesh.colours[9 * face + 3 * corner + channel], 0) / 3) : [...colour];
+    const own =
+      mesh.colours && mesh.hasOwnColours[face]
+        ? [0, 1, 2].map(
+            (channel) => [0, 1, 2].reduce((sum, corner) => sum + mesh.colours[9 * face + 3 * corner + channel], 0) / 3,
+          )
+        : [...colour];
     const tint = own.map((value, channel) => Math.round(1000 * (1 - alpha + alpha * value * albedo[channel])) / 1000);
-    if (!tints.has(tint.join())) tints.set(tint.join(), materials.push({ kind: "glass", albedo: tint, ior: 1, roughness: 0, emission: [0, 0, 0], coverage: 1 }) - 1);
+    if (!tints.has(tint.join()))
+      tints.set(
+        tint.join(),
+        materials.push({ kind: "glass", albedo: tint, ior: 1, roughness: 0, emission: [0, 0, 0], coverage: 1 }) - 1,
+      );
     found.materialOf[face] = tints.get(tint.join());
     whole.push(face);
   }
-  const pieces = [...whole.sort((a, b) => a - b).map((owner) => ({ owner, weights: WHOLE_FACE })), ...parts].sort((a, b) => a.owner - b.owner);
-  if (!pieces.length) throw new Error(`mesh ${mesh.name}: all its faces are transparent by their alpha: export it with alphaMode OPAQUE`);
+  const pieces = [...whole.sort((a, b) => a - b).map((owner) => ({ owner, weights: WHOLE_FACE })), ...parts].sort(
+    (a, b) => a.owner - b.owner,
+  );
+  if (!pieces.length)
+    throw new Error(`mesh ${mesh.name}: all its faces are transparent by their alpha: export it with alphaMode OPAQUE`);
   return { ...split(found, corners, pieces), alphas: null };
 }
 
 function extent(vertices, axis) {
   let [low, high] = [Infinity, -Infinity];
-  for (let i = axis; i < vertices.length; i += 3) [low, high] = [Math.min(low, vertices[i]), Math.max(high, vertices[i])];
+  for (let i = axis; i < vertices.length; i += 3)
+    [low, high] = [Math.min(low, vertices[i]), Math.max(high, vertices[i])];
   return high - low;
 }
 
@@ -191,7 +263,10 @@ function split(mesh, corners, pieces) {
       const from = 3 * width * owner;
       for (let at = 0; at < 3 * width; ++at) {
         const [corner, part] = [Math.floor(at / width), at % width];
-        found[3 * width * i + at] = weights[3 * corner] * values[from + part] + weights[3 * corner + 1] * values[from + width + part] + weights[3 * corner + 2] * values[from + 2 * width + part];
+        found[3 * width * i + at] =
+          weights[3 * corner] * values[from + part] +
+          weights[3 * corner + 1] * values[from + width + part] +
+          weights[3 * corner + 2] * values[from + 2 * width + part];
       }
     });
     return found;
@@ -203,7 +278,9 @@ function split(mesh, corners, pieces) {
     const { owner, weights } = pieces[Math.floor(at / 3)];
     const kept = [0, 1, 2].find((corner) => weights[3 * (at % 3) + corner] === 1);
     // Corners that are kept keep their vertex
-    return kept === undefined ? vertices.push(...positions.subarray(3 * at, 3 * at + 3)) / 3 - 1 : mesh.faces[3 * owner + kept];
+    return kept === undefined
+      ? vertices.push(...positions.subarray(3 * at, 3 * at + 3)) / 3 - 1
+      : mesh.faces[3 * owner + kept];
   });
   const { relief } = mesh;
   return {
@@ -219,8 +296,17 @@ function split(mesh, corners, pieces) {
     alphas: interpolated(mesh.alphas, 1),
     materialOf: ofOwners(mesh.materialOf),
     hasOwnColours: ofOwners(mesh.hasOwnColours),
-    relief: relief && { ...relief, mapOf: ofOwners(relief.mapOf), uvs: interpolated(relief.uvs, 2), tangents: interpolated(relief.tangents, 4) },
-    parts: mesh.parts && { ...mesh.parts, owners: ofOwners(mesh.parts.owners), weights: interpolated(mesh.parts.weights, 3) },
+    relief: relief && {
+      ...relief,
+      mapOf: ofOwners(relief.mapOf),
+      uvs: interpolated(relief.uvs, 2),
+      tangents: interpolated(relief.tangents, 4),
+    },
+    parts: mesh.parts && {
+      ...mesh.parts,
+      owners: ofOwners(mesh.parts.owners),
+      weights: interpolated(mesh.parts.weights, 3),
+    },
   };
 }
 
@@ -232,10 +318,16 @@ function swatched(library, mesh) {
   let hasSwatches = false;
   mesh.materials.forEach((material, number) => {
     // Metal that emits has no second entry of the material table
-    const faces = material.base && !(material.kind === "mirror" && material.emission.some(Boolean)) ? facesOf(mesh, number) : [];
+    const faces =
+      material.base && !(material.kind === "mirror" && material.emission.some(Boolean)) ? facesOf(mesh, number) : [];
     if (!faces.length) return;
-    const { isPlain, colours: found } = library.swatches(mesh.textures[material.base.texture], valuesOf(mesh.uvs, faces, 6));
-    const own = isPlain.includes(1) ? materials.push({ ...material, base: null, albedo: [1, 1, 1], ofTexture: material }) - 1 : -1;
+    const { isPlain, colours: found } = library.swatches(
+      mesh.textures[material.base.texture],
+      valuesOf(mesh.uvs, faces, 6),
+    );
+    const own = isPlain.includes(1)
+      ? materials.push({ ...material, base: null, albedo: [1, 1, 1], ofTexture: material }) - 1
+      : -1;
     faces.forEach((face, i) => {
       if (!isPlain[i]) return;
       hasSwatches = true;

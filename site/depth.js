@@ -23,7 +23,8 @@ export async function readDepth(name, bytes, step) {
 class Refusal extends Error {}
 
 function checkSize(width, height) {
-  if (!(width >= 16 && height >= 16 && width <= MOST_EDGE && height <= MOST_EDGE)) throw new Refusal(`is ${width} × ${height}: a depth map has 16 to ${MOST_EDGE} pixels a side`);
+  if (!(width >= 16 && height >= 16 && width <= MOST_EDGE && height <= MOST_EDGE))
+    throw new Refusal(`is ${width} × ${height}: a depth map has 16 to ${MOST_EDGE} pixels a side`);
 }
 
 async function readPng(bytes, step) {
@@ -33,16 +34,26 @@ async function readPng(bytes, step) {
   for (let at = 8; at + 12 <= bytes.length; ) {
     const length = view.getUint32(at);
     const kind = String.fromCharCode(...bytes.subarray(at + 4, at + 8));
-    if (kind === "IHDR") head = { width: view.getUint32(at + 8), height: view.getUint32(at + 12), bits: bytes[at + 16], colour: bytes[at + 17], interlace: bytes[at + 20] };
+    if (kind === "IHDR")
+      head = {
+        width: view.getUint32(at + 8),
+        height: view.getUint32(at + 12),
+        bits: bytes[at + 16],
+        colour: bytes[at + 17],
+        interlace: bytes[at + 20],
+      };
     if (kind === "IDAT") parts.push(bytes.subarray(at + 8, at + 8 + length));
     at += 12 + length;
   }
   const { width, height, bits, colour, interlace } = head;
-  if (colour !== 0 || bits !== 16) throw new Refusal(`has ${colour === 0 ? "grey" : "colours"} of ${bits} bits: depth is grey of 16 bits`);
+  if (colour !== 0 || bits !== 16)
+    throw new Refusal(`has ${colour === 0 ? "grey" : "colours"} of ${bits} bits: depth is grey of 16 bits`);
   if (interlace !== 0) throw new Refusal("is interlaced: save it without interlacing");
   checkSize(width, height);
   const stride = 2 * width;
-  const lines = new Uint8Array(await new Response(new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer());
+  const lines = new Uint8Array(
+    await new Response(new Blob(parts).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer(),
+  );
   if (lines.length < height * (stride + 1)) throw new Error("truncated");
   const values = new Float64Array(width * height);
   let above = new Uint8Array(stride);
@@ -93,7 +104,10 @@ export function cropOf(photo, width, height) {
 export function fillHoles(library, depth, width) {
   const holes = Uint8Array.from(depth, (value) => Number(!(value > 0)));
   const count = holes.reduce((sum, hole) => sum + hole, 0);
-  if (count > MOST_HOLES * depth.length) throw new Error(`${Math.round((100 * count) / depth.length)} % of the depth map have no depth: it needs half of the pixels`);
+  if (count > MOST_HOLES * depth.length)
+    throw new Error(
+      `${Math.round((100 * count) / depth.length)} % of the depth map have no depth: it needs half of the pixels`,
+    );
   library.nearest(holes, width).forEach((from, to) => (depth[to] = depth[from]));
   return { holes, count };
 }

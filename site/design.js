@@ -1,7 +1,8 @@
 // A design as its manifest describes it: the lines that colonnade_model_open reads, and writes of registers.
 
 /** The hash of a design's formats. */
-export const hashWords = ({ formatHash }) => Array.from({ length: 8 }, (_, i) => parseInt(formatHash.slice(8 * i, 8 * i + 8), 16));
+export const hashWords = ({ formatHash }) =>
+  Array.from({ length: 8 }, (_, i) => parseInt(formatHash.slice(8 * i, 8 * i + 8), 16));
 
 /** The lines of host/cpp/library/colonnade_model.h for a manifest. */
 export function designLines(manifest) {
@@ -16,16 +17,22 @@ export function designLines(manifest) {
   };
   const lines = Object.entries(numbers).map(([name, value]) => `number ${name} ${value}`);
   for (const [record, fields] of Object.entries(manifest.records.layouts))
-    for (const field of fields) lines.push(`layout ${record} ${field.name} ${field.offset} ${field.width} ${Number(field.signed)}`);
+    for (const field of fields)
+      lines.push(`layout ${record} ${field.name} ${field.offset} ${field.width} ${Number(field.signed)}`);
   for (const register of manifest.registers.fields)
     if (register.access === "rw")
       lines.push(
-        `register ${register.name} ${register.address} ${register.words} ${register.width} ${Number(register.signed)} ${register.limit ?? -1}`,
+        `register ${register.name} ${register.address} ${register.words} ${register.width} ` +
+          `${Number(register.signed)} ${register.limit ?? -1}`,
       );
-  for (const [kinds, memory] of [[["size", "map"], manifest.attributes], [["textureSize", "textureMap"], manifest.texture]]) {
+  for (const [kinds, memory] of [
+    [["size", "map"], manifest.attributes],
+    [["textureSize", "textureMap"], manifest.texture],
+  ]) {
     for (const [name, value] of Object.entries(memory?.sizes ?? {})) lines.push(`${kinds[0]} ${name} ${value}`);
     for (const [record, fields] of Object.entries(memory?.layouts ?? {}))
-      for (const field of fields) lines.push(`${kinds[1]} ${record} ${field.name} ${field.offset} ${field.width} ${Number(field.signed)}`);
+      for (const field of fields)
+        lines.push(`${kinds[1]} ${record} ${field.name} ${field.offset} ${field.width} ${Number(field.signed)}`);
   }
   return lines.join("\n");
 }

@@ -1,5 +1,5 @@
-// Reads glTF as host/colonnade/mesh/files/gltf.py does, with its errors: the triangles of the default scene with normals,
-// colours and materials. Draco is not read.
+// Reads glTF as host/colonnade/mesh/files/gltf.py does, with its errors: the triangles of the default scene with
+// normals, colours and materials. Draco is not read.
 
 import { Corners } from "./corners.js";
 import { DRACO, INSTANCING, READ_EXTENSIONS } from "./gltfchecks.js";
@@ -18,7 +18,8 @@ const MOST_COPIES = 1 << 16;
 
 /**
  * A mesh, as of readMesh; `files` has the other dropped files by name. `chosen` is the number of the animation that
- * moves it, null for none, the first that can unless given. Vertices of a mesh with a clip are where they are bound, until they are at rest (coverage.js).
+ * moves it, null for none, the first that can unless given. Vertices of a mesh with a clip are where they are bound,
+ * until they are at rest (coverage.js).
  */
 export function readGltf(bytes, name, files, chosen) {
   const document = new GltfDocument(bytes, name, files);
@@ -26,7 +27,8 @@ export function readGltf(bytes, name, files, chosen) {
   const animation = chosen === undefined ? firstAnimation(json) : chosen;
   for (const extension of json.extensionsRequired ?? []) {
     if (COMPRESSION.includes(extension)) throw document.compressed(extension);
-    if (!READ_EXTENSIONS.includes(extension)) throw document.error(`it requires the glTF extension ${extension}, which is not supported: export it without`);
+    if (!READ_EXTENSIONS.includes(extension))
+      throw document.error(`it requires the glTF extension ${extension}, which is not supported: export it without`);
   }
   const corners = new Corners();
   const materials = new GltfMaterials(document, corners.notes);
@@ -37,36 +39,71 @@ export function readGltf(bytes, name, files, chosen) {
   for (const { index, node, matrix } of nodesOf(document, clip && corners.notes))
     for (const primitive of document.entry("meshes", node.mesh).primitives ?? []) {
       const before = vertices.length / 3;
-      if (addPrimitive(document, primitive, clip ? EYE : matrix, { corners, materials, vertices, left, isBent: Boolean(clip) })) clip?.add(index, primitive, vertices.length / 3 - before);
+      if (
+        addPrimitive(document, primitive, clip ? EYE : matrix, {
+          corners,
+          materials,
+          vertices,
+          left,
+          isBent: Boolean(clip),
+        })
+      )
+        clip?.add(index, primitive, vertices.length / 3 - before);
     }
-  for (const [noun, count] of Object.entries(left)) if (count > 0) corners.notes.add(`${grouped(count)} ${noun}${count > 1 ? "s are" : " is"} not shown: only faces are rendered`);
+  for (const [noun, count] of Object.entries(left))
+    if (count > 0)
+      corners.notes.add(`${grouped(count)} ${noun}${count > 1 ? "s are" : " is"} not shown: only faces are rendered`);
   if (!clip && (animations.length > 0 || json.skins)) corners.notes.add("animations and skins are left out");
   const mesh = corners.mesh(vertices);
-  const moved = clip && mesh.faces.length > 0 ? clip.clip(mesh.vertices, (node, index) => partsOf(document, node, index), (node, index) => matrixOf(document, node, index)) : null;
-  return { ...mesh, animations, animation, clip: moved, relief: mesh.relief && { ...mesh.relief, maps: materials.maps }, materials: materials.materials, textures: materials.textures };
+  const moved =
+    clip && mesh.faces.length > 0
+      ? clip.clip(
+          mesh.vertices,
+          (node, index) => partsOf(document, node, index),
+          (node, index) => matrixOf(document, node, index),
+        )
+      : null;
+  return {
+    ...mesh,
+    animations,
+    animation,
+    clip: moved,
+    relief: mesh.relief && { ...mesh.relief, maps: materials.maps },
+    materials: materials.materials,
+    textures: materials.textures,
+  };
 }
 
-/** The nodes with a mesh of the default scene, and their transforms to the scene; with `notes`, which take the loss, none of its copies. */
+/**
+ * The nodes with a mesh of the default scene, and their transforms to the scene; with `notes`, which take the loss,
+ * none of its copies.
+ */
 function* nodesOf(document, notes) {
   const { scenes = [], nodes = [], scene = 0 } = document.json;
   const children = new Set(nodes.flatMap((node) => node.children ?? []));
-  const roots = scenes.length > 0 ? (document.entry("scenes", scene).nodes ?? []) : [...nodes.keys()].filter((index) => !children.has(index));
+  const roots =
+    scenes.length > 0
+      ? (document.entry("scenes", scene).nodes ?? [])
+      : [...nodes.keys()].filter((index) => !children.has(index));
   const pending = roots.map((index) => ({ index, parent: EYE })).reverse();
   let count = 0;
   while (pending.length > 0) {
     const { index, parent } = pending.pop();
     const node = document.entry("nodes", index);
     const finite = (matrix) => {
-      if (!matrix.every((value) => Math.abs(value) < MOST_TRANSFORM)) throw document.error(`the transform of node ${index} is not finite, or too large: export it again`);
+      if (!matrix.every((value) => Math.abs(value) < MOST_TRANSFORM))
+        throw document.error(`the transform of node ${index} is not finite, or too large: export it again`);
       return matrix;
     };
     const matrix = finite(multiply(parent, matrixOf(document, node, index)));
     for (const child of [...(node.children ?? [])].reverse()) pending.push({ index: child, parent: matrix });
     count += node.mesh === undefined ? 0 : copyCount(document, node);
-    if (count > MOST_COPIES) throw document.error(`it has more than ${grouped(MOST_COPIES)} copies of meshes: leave some out, or join them`);
+    if (count > MOST_COPIES)
+      throw document.error(`it has more than ${grouped(MOST_COPIES)} copies of meshes: leave some out, or join them`);
     const copies = node.mesh === undefined ? [] : copiesOf(document, node, index);
     if (notes && copies.length > 1) notes.add("copies of an animated mesh are not shown: its node has one");
-    for (const copy of notes ? copies.slice(0, 1).map(() => null) : copies) yield { index, node, matrix: copy ? finite(multiply(matrix, copy)) : matrix };
+    for (const copy of notes ? copies.slice(0, 1).map(() => null) : copies)
+      yield { index, node, matrix: copy ? finite(multiply(matrix, copy)) : matrix };
   }
 }
 
@@ -83,7 +120,8 @@ function copiesOf(document, node, index) {
   const extension = node.extensions?.[INSTANCING];
   if (!extension) return [null];
   const given = {};
-  for (const name in OF_COPIES) if (name in (extension.attributes ?? {})) given[name] = document.array(extension.attributes[name]);
+  for (const name in OF_COPIES)
+    if (name in (extension.attributes ?? {})) given[name] = document.array(extension.attributes[name]);
   const arrays = Object.entries(given);
   const count = arrays.reduce((largest, [, array]) => Math.max(largest, array.count), 0);
   if (count === 0 || !arrays.every(([name, array]) => array.count === count && array.width === OF_COPIES[name].length))
@@ -92,12 +130,15 @@ function copiesOf(document, node, index) {
     const width = OF_COPIES[name].length;
     return given[name] ? [...given[name].values.subarray(width * copy, width * (copy + 1))] : OF_COPIES[name];
   };
-  return Array.from({ length: count }, (_, copy) => composed(part("TRANSLATION", copy), unit(part("ROTATION", copy)), part("SCALE", copy)));
+  return Array.from({ length: count }, (_, copy) =>
+    composed(part("TRANSLATION", copy), unit(part("ROTATION", copy)), part("SCALE", copy)),
+  );
 }
 
 /** The triangles of a primitive's corners. */
 function trianglesOf(indices, mode) {
-  if (mode === TRIANGLES) return Array.from({ length: Math.floor(indices.length / 3) }, (_, i) => [...indices.subarray(3 * i, 3 * i + 3)]);
+  if (mode === TRIANGLES)
+    return Array.from({ length: Math.floor(indices.length / 3) }, (_, i) => [...indices.subarray(3 * i, 3 * i + 3)]);
   const corner = (i) => (mode === FAN ? [i + 1, i + 2, 0] : [i, i + 1 + (i % 2), i + 2 - (i % 2)]);
   return Array.from({ length: Math.max(0, indices.length - 2) }, (_, i) => corner(i).map((at) => indices[at]));
 }
@@ -111,7 +152,8 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
   }
   if (mode > FAN) throw document.error(`a primitive has the unknown mode ${mode}`);
   for (const name of COMPRESSION)
-    if (name in extensions && document.entry("accessors", attributes.POSITION).bufferView === undefined) throw document.compressed(name);
+    if (name in extensions && document.entry("accessors", attributes.POSITION).bufferView === undefined)
+      throw document.compressed(name);
   if (attributes.POSITION === undefined) throw document.error("a primitive has no positions");
   if (DRACO in extensions && document.entry("accessors", attributes.POSITION).bufferView === undefined)
     throw document.error(`its meshes are compressed (${DRACO}), which the tab does not read: the command line does`);
@@ -122,49 +164,85 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
   const attribute = (name, least = 3) => {
     if (attributes[name] === undefined) return null;
     const { count: own, width, values } = document.array(attributes[name]);
-    if (own !== count || width < least) throw document.error(`a primitive has ${grouped(own)} of ${name} for ${grouped(count)} positions`);
+    if (own !== count || width < least)
+      throw document.error(`a primitive has ${grouped(own)} of ${name} for ${grouped(count)} positions`);
     return (vertex) => values.subarray(width * vertex, width * (vertex + 1));
   };
-  const indices = primitive.indices === undefined ? { isWhole: true, width: 1, values: Float64Array.from({ length: count }, (_, i) => i) } : document.array(primitive.indices);
+  const indices =
+    primitive.indices === undefined
+      ? { isWhole: true, width: 1, values: Float64Array.from({ length: count }, (_, i) => i) }
+      : document.array(primitive.indices);
   if (indices.width !== 1 || !indices.isWhole) throw document.error("the indices of a primitive are not whole numbers");
   const last = indices.values.reduce((most, index) => Math.max(most, index), 0);
-  if (last >= count) throw document.error(`a face names vertex ${last}, which does not exist: its primitive has ${grouped(count)} vertices, numbered from 0`);
+  if (last >= count)
+    throw document.error(
+      `a face names vertex ${last}, which does not exist: ` +
+        `its primitive has ${grouped(count)} vertices, numbered from 0`,
+    );
   const own = attribute("COLOR_0");
-  for (let vertex = 0; own && vertex < count; ++vertex) if (!own(vertex).every(Number.isFinite)) throw document.error("a primitive has a COLOR_0 that is not a finite number: export it again");
+  for (let vertex = 0; own && vertex < count; ++vertex)
+    if (!own(vertex).every(Number.isFinite))
+      throw document.error("a primitive has a COLOR_0 that is not a finite number: export it again");
   const normalAt = attribute("NORMAL");
   const material = materials.numberOf(primitive.material);
   /** The positions of vertices in a texture. */
   const positionsIn = (use) => {
     const uvs = use && attribute(use.coordinates, 2);
     const found = uvs && Array.from({ length: count }, (_, vertex) => use.place(uvs(vertex)));
-    if (found?.some((uv) => !uv.every((value) => Math.abs(value) <= MOST_UV))) throw document.error(`a primitive has texture coordinates beyond ${grouped(MOST_UV)}, or not finite: export it again`);
+    if (found?.some((uv) => !uv.every((value) => Math.abs(value) <= MOST_UV)))
+      throw document.error(
+        `a primitive has texture coordinates beyond ${grouped(MOST_UV)}, or not finite: export it again`,
+      );
     return found;
   };
   const { base, metal, emissive, relief, alpha } = materials.materials[material];
   const [uvs, metalUvs, emissiveUvs] = [base, metal, emissive].map(positionsIn);
   const reliefUvs = relief && attribute(relief.coordinates, 2);
-  if (relief && !reliefUvs) corners.notes.add("faces with a normal map are smooth: they have no texture coordinates of the map");
+  if (relief && !reliefUvs)
+    corners.notes.add("faces with a normal map are smooth: they have no texture coordinates of the map");
   if (base && !uvs) corners.notes.add("faces without texture coordinates show no texture");
 
   const first = vertices.length / 3;
-  for (let vertex = 0; vertex < count; ++vertex) vertices.push(...transform(matrix, positions.values.subarray(3 * vertex, 3 * vertex + 3), 1));
+  for (let vertex = 0; vertex < count; ++vertex)
+    vertices.push(...transform(matrix, positions.values.subarray(3 * vertex, 3 * vertex + 3), 1));
   const normalMatrix = cofactors(matrix);
   const isMirrored = determinant(matrix) < 0;
-  const normalOf = (vertex) => transform(normalMatrix, normalAt(vertex), 0).map((value) => (isMirrored ? -value : value));
+  const normalOf = (vertex) =>
+    transform(normalMatrix, normalAt(vertex), 0).map((value) => (isMirrored ? -value : value));
   const side = isMirrored ? -1 : 1;
   // Tangents of a mesh that bends are those of its surface
   const tangentAt = reliefUvs && !isBent && attribute("TANGENT", 4);
-  const tangentOf = (vertex) => (tangentAt ? [...transform(matrix, tangentAt(vertex), 0), side * Math.sign(tangentAt(vertex)[3])] : [0, 0, 0, 0]);
-  const reliefOf = (face) => ({ map: relief.map, uvs: face.map((vertex) => relief.place(reliefUvs(vertex))), tangents: face.map(tangentOf) });
+  const tangentOf = (vertex) =>
+    tangentAt ? [...transform(matrix, tangentAt(vertex), 0), side * Math.sign(tangentAt(vertex)[3])] : [0, 0, 0, 0];
+  const reliefOf = (face) => ({
+    map: relief.map,
+    uvs: face.map((vertex) => relief.place(reliefUvs(vertex))),
+    tangents: face.map(tangentOf),
+  });
   // A face without positions has its plain colour, a textured one none of its vertices
   const missing = [base && !uvs, metal && !metalUvs, emissive && !emissiveUvs];
   const number = missing.some(Boolean) ? materials.without(material, ...missing) : material;
   const colourOf = (vertex) => [...own(vertex).subarray(0, 3)].map((value) => Math.max(0, Math.min(1, value)));
-  const alphas = alpha && own?.(0).length === 4 && Array.from({ length: count }, (_, vertex) => Math.max(0, Math.min(1, own(vertex)[3])));
+  const alphas =
+    alpha &&
+    own?.(0).length === 4 &&
+    Array.from({ length: count }, (_, vertex) => Math.max(0, Math.min(1, own(vertex)[3])));
   for (const face of trianglesOf(indices.values, mode)) {
     if (isMirrored) face.reverse();
-    const [inBase, inMetal, inEmissive] = [uvs, metalUvs, emissiveUvs].map((all) => all && face.map((vertex) => all[vertex]));
-    corners.add(face.map((vertex) => first + vertex), normalAt && face.map(normalOf), own && !uvs && face.map(colourOf), number, inBase, inMetal, inEmissive, reliefUvs && reliefOf(face), alphas && face.map((vertex) => alphas[vertex]));
+    const [inBase, inMetal, inEmissive] = [uvs, metalUvs, emissiveUvs].map(
+      (all) => all && face.map((vertex) => all[vertex]),
+    );
+    corners.add(
+      face.map((vertex) => first + vertex),
+      normalAt && face.map(normalOf),
+      own && !uvs && face.map(colourOf),
+      number,
+      inBase,
+      inMetal,
+      inEmissive,
+      reliefUvs && reliefOf(face),
+      alphas && face.map((vertex) => alphas[vertex]),
+    );
   }
   return true;
 }
@@ -174,14 +252,23 @@ function addPrimitive(document, primitive, matrix, { corners, materials, vertice
 /** Numbers of a node, or those that stand for them. */
 function numbersOf(document, node, index, name, otherwise) {
   const values = node[name] === undefined ? otherwise : node[name];
-  if (!Array.isArray(values) || values.length !== otherwise.length || !values.every((value) => typeof value === "number")) throw document.error(`the transform of node ${index} is not valid: export it again`);
+  if (
+    !Array.isArray(values) ||
+    values.length !== otherwise.length ||
+    !values.every((value) => typeof value === "number")
+  )
+    throw document.error(`the transform of node ${index} is not valid: export it again`);
   return values;
 }
 
 /** The parts of a node's transform to its parent. */
 function partsOf(document, node, index) {
   const part = (name, otherwise) => numbersOf(document, node, index, name, otherwise);
-  return { translation: part("translation", [0, 0, 0]), rotation: unit(part("rotation", [0, 0, 0, 1])), scale: part("scale", [1, 1, 1]) };
+  return {
+    translation: part("translation", [0, 0, 0]),
+    rotation: unit(part("rotation", [0, 0, 0, 1])),
+    scale: part("scale", [1, 1, 1]),
+  };
 }
 
 /** A node's transform to its parent. */
@@ -208,9 +295,12 @@ function composed(translation, [x, y, z, w], scale) {
 }
 
 const multiply = (a, b) =>
-  Array.from({ length: 16 }, (_, i) => [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + (i % 4)] * b[4 * (i >> 2) + k], 0));
+  Array.from({ length: 16 }, (_, i) =>
+    [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + (i % 4)] * b[4 * (i >> 2) + k], 0),
+  );
 
-const transform = (m, [x, y, z], w) => [0, 1, 2].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row] * w);
+const transform = (m, [x, y, z], w) =>
+  [0, 1, 2].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row] * w);
 
 function cofactors(m) {
   const minor = (row, column) => {

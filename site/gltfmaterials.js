@@ -1,17 +1,25 @@
-// The materials of a glTF document, as host/colonnade/mesh/materials/materials.py and files/gltf_textures.py read them, with the
-// pictures of their textures, which decodePictures (surfaces.js) decodes.
+// The materials of a glTF document, as host/colonnade/mesh/materials/materials.py and files/gltf_textures.py read them,
+// with the pictures of their textures, which decodePictures (surfaces.js) decodes.
 
 import { MIRROR_ROUGHNESS, shownEmission } from "./surfaces.js";
 
 const [IOR, MOST_IOR, BRIGHTEST] = [1.5, 4, 1e6];
 const METAL = 0.5;
-const WRAPS = new Map([[33648, 1], [33071, 2]]);
+const WRAPS = new Map([
+  [33648, 1],
+  [33071, 2],
+]);
 const NEAREST = 9728;
-const USED = ["transmission", "ior", "emissive_strength", "pbrSpecularGlossiness", "unlit"].map((name) => `KHR_materials_${name}`);
+const USED = ["transmission", "ior", "emissive_strength", "pbrSpecularGlossiness", "unlit"].map(
+  (name) => `KHR_materials_${name}`,
+);
 
 const clamped = (value, most = 1) => Math.max(0, Math.min(most, value));
 const number = (value, otherwise) => (Number.isFinite(value) ? value : otherwise);
-const colour = (values, otherwise, most = 1) => (Array.isArray(values) && values.length >= 3 ? otherwise.map((value, i) => clamped(number(values[i], value), most)) : otherwise);
+const colour = (values, otherwise, most = 1) =>
+  Array.isArray(values) && values.length >= 3
+    ? otherwise.map((value, i) => clamped(number(values[i], value), most))
+    : otherwise;
 
 export class GltfMaterials {
   /** `notes`: a set that takes what pictures do not show. */
@@ -31,18 +39,30 @@ export class GltfMaterials {
   numberOf(index) {
     if (!this.numbers.has(index)) {
       this.numbers.set(index, this.materials.length);
-      this.materials.push(index === undefined ? { kind: "diffuse", albedo: [0.8, 0.8, 0.8], roughness: 0, ior: IOR, emission: [0, 0, 0] } : this.read(this.document.entry("materials", index)));
+      this.materials.push(
+        index === undefined
+          ? { kind: "diffuse", albedo: [0.8, 0.8, 0.8], roughness: 0, ior: IOR, emission: [0, 0, 0] }
+          : this.read(this.document.entry("materials", index)),
+      );
     }
     return this.numbers.get(index);
   }
 
   /** The number of a material without the textures for which a primitive has no positions. */
   without(number, base, metal, emissive) {
-    const found = { ...this.materials[number], ...(base ? { base: null } : {}), ...(metal ? { metal: null } : {}), ...(emissive ? { emitsMean: true } : {}) };
+    const found = {
+      ...this.materials[number],
+      ...(base ? { base: null } : {}),
+      ...(metal ? { metal: null } : {}),
+      ...(emissive ? { emitsMean: true } : {}),
+    };
     return this.materials.push(found) - 1;
   }
 
-  /** A material; `base`, `metal`, `emissive` and `relief` are the uses of its textures, or null; `factors` those of metal and roughness. */
+  /**
+   * A material; `base`, `metal`, `emissive` and `relief` are the uses of its textures, or null; `factors` those of
+   * metal and roughness.
+   */
   read(material) {
     const { extensions = {} } = material;
     const extension = (name) => extensions[`KHR_materials_${name}`] ?? {};
@@ -82,15 +102,33 @@ export class GltfMaterials {
   alphaOf({ alphaMode, alphaCutoff }, { baseColorFactor }) {
     if (!["MASK", "BLEND"].includes(alphaMode)) return null;
     const cutoff = alphaMode === "MASK" ? number(alphaCutoff, 0.5) : 0.5;
-    return { factor: clamped(number(baseColorFactor?.[3], 1)), cutoff: Math.max(0, Math.min(2, cutoff)), blends: alphaMode === "BLEND" };
+    return {
+      factor: clamped(number(baseColorFactor?.[3], 1)),
+      cutoff: Math.max(0, Math.min(2, cutoff)),
+      blends: alphaMode === "BLEND",
+    };
   }
 
   /** The metallic-roughness part of a material, or what stands for it. @param {any} material @returns {any} */
-  surfaceOf({ pbrMetallicRoughness: surface = { metallicFactor: 0 } }, { KHR_materials_unlit: unlit, KHR_materials_pbrSpecularGlossiness: older }) {
-    if (unlit) return { baseColorFactor: surface.baseColorFactor, baseColorTexture: surface.baseColorTexture, metallicFactor: 0, roughnessFactor: 1 };
+  surfaceOf(
+    { pbrMetallicRoughness: surface = { metallicFactor: 0 } },
+    { KHR_materials_unlit: unlit, KHR_materials_pbrSpecularGlossiness: older },
+  ) {
+    if (unlit)
+      return {
+        baseColorFactor: surface.baseColorFactor,
+        baseColorTexture: surface.baseColorTexture,
+        metallicFactor: 0,
+        roughnessFactor: 1,
+      };
     if (!older) return surface;
     const { glossinessFactor, diffuseFactor, diffuseTexture } = older;
-    return { metallicFactor: 0, roughnessFactor: 1 - number(glossinessFactor, 1), baseColorFactor: diffuseFactor, baseColorTexture: diffuseTexture };
+    return {
+      metallicFactor: 0,
+      roughnessFactor: 1 - number(glossinessFactor, 1),
+      baseColorFactor: diffuseFactor,
+      baseColorTexture: diffuseTexture,
+    };
   }
 
   /** The use of a normal map, with its number in `maps`; or null. */
@@ -99,7 +137,10 @@ export class GltfMaterials {
     return found && { ...found, map: this.maps.push({ texture: found.texture, scale: number(info.scale, 1) }) - 1 };
   }
 
-  /** The use of a texture: its number in `textures`, the name of the positions in it, and a function from the file's; or null. */
+  /**
+   * The use of a texture: its number in `textures`, the name of the positions in it, and a function from the file's; or
+   * null.
+   */
   use(info) {
     if (!info) return null;
     const { document } = this;
@@ -117,9 +158,13 @@ export class GltfMaterials {
       this.textures.push({ picture: this.picture(source), wrapU, wrapV, isNearest });
     }
     const { texCoord, offset = [0, 0], rotation = 0, scale = [1, 1] } = info.extensions?.KHR_texture_transform ?? {};
-    if (![...offset, rotation, ...scale].every(Number.isFinite)) throw document.error("the transform of a texture is not valid: export it again");
+    if (![...offset, rotation, ...scale].every(Number.isFinite))
+      throw document.error("the transform of a texture is not valid: export it again");
     const [cosine, sine] = [Math.cos(rotation), Math.sin(rotation)];
-    const place = ([u, v]) => [cosine * scale[0] * u + sine * scale[1] * v + offset[0], -sine * scale[0] * u + cosine * scale[1] * v + offset[1]];
+    const place = ([u, v]) => [
+      cosine * scale[0] * u + sine * scale[1] * v + offset[0],
+      -sine * scale[0] * u + cosine * scale[1] * v + offset[1],
+    ];
     return { texture: this.places.get(key), coordinates: `TEXCOORD_${texCoord ?? info.texCoord ?? 0}`, place };
   }
 

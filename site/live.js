@@ -29,7 +29,8 @@ const page = (globalThis.colonnade = { frames: 0, version: 0 });
 
 const add = (a, b, scale = 1) => a.map((value, axis) => value + scale * b[axis]);
 const dot = (a, b) => a.reduce((sum, value, axis) => sum + value * b[axis], 0);
-const cross = (a, b) => [0, 1, 2].map((axis) => a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3]);
+const cross = (a, b) =>
+  [0, 1, 2].map((axis) => a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3]);
 const unit = (a) => a.map((value) => value / (Math.hypot(...a) || 1));
 
 /** The camera's place from its target: distance, unit vectors up and away over the ground, and elevation. */
@@ -38,7 +39,8 @@ function orbitOf({ position, target }) {
   const away = add(position, target, -1);
   const distance = Math.hypot(...away);
   const flat = add(away, up, -dot(away, up));
-  const ground = Math.hypot(...flat) > 1e-6 * distance ? unit(flat) : unit(cross(up, Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
+  const ground =
+    Math.hypot(...flat) > 1e-6 * distance ? unit(flat) : unit(cross(up, Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
   return { up, ground, distance, elevation: Math.asin(Math.max(-1, Math.min(1, dot(away, up) / distance))) };
 }
 
@@ -53,8 +55,16 @@ const actions = {
     moved(({ target }, { up, ground, distance, elevation: before }) => {
       const [turn, most] = [(azimuth * Math.PI) / 180, (89 * Math.PI) / 180];
       const after = Math.max(-most, Math.min(most, before + (elevation * Math.PI) / 180));
-      const way = add(ground.map((value) => Math.cos(turn) * value), cross(up, ground), Math.sin(turn));
-      const away = add(way.map((value) => Math.cos(after) * value), up, Math.sin(after));
+      const way = add(
+        ground.map((value) => Math.cos(turn) * value),
+        cross(up, ground),
+        Math.sin(turn),
+      );
+      const away = add(
+        way.map((value) => Math.cos(after) * value),
+        up,
+        Math.sin(after),
+      );
       return { target, position: add(target, away, distance) };
     });
   },
@@ -66,7 +76,11 @@ const actions = {
       const back = unit(add(position, target, -1));
       const right = unit(cross(up, back));
       const height = state.camera.span * distance;
-      const shift = add(right.map((value) => x * height * value), cross(back, right), y * height);
+      const shift = add(
+        right.map((value) => x * height * value),
+        cross(back, right),
+        y * height,
+      );
       return { position: add(position, shift), target: add(target, shift) };
     });
   },
@@ -101,12 +115,17 @@ async function draw() {
 async function accumulate(before = 0) {
   if (isBusy) return;
   const figures = await frame(true).catch(() => null);
-  if (figures && !isBusy && figures.samples > before && figures.samples < figures.final) rest = setTimeout(accumulate, 0, figures.samples);
+  if (figures && !isBusy && figures.samples > before && figures.samples < figures.final)
+    rest = setTimeout(accumulate, 0, figures.samples);
 }
 
 /** Shows a picture, of the first sample or of those so far; returns its figures, or nothing if it came too late. */
 async function frame(isStill = false) {
-  const address = new URLSearchParams({ ...(camera && { camera: [...camera.position, ...camera.target].join() }), ...(at !== null && { at }), ...(isStill && { still: "1" }) });
+  const address = new URLSearchParams({
+    ...(camera && { camera: [...camera.position, ...camera.target].join() }),
+    ...(at !== null && { at }),
+    ...(isStill && { still: "1" }),
+  });
   const response = await fetch(`frame?${address}`);
   if (!response.ok) {
     pause();
@@ -139,7 +158,9 @@ function showFigures({ width, height, milliseconds, rays, samples, final }) {
     ["frames in the last second", times.length],
     ["time of packing", state && `${state.milliseconds.toFixed(0)} ms`],
     ["camera", position],
-    ...(at === null || !state?.seconds ? [] : [["moment", `${(at * state.seconds).toFixed(2)} of ${state.seconds.toFixed(2)} s`]]),
+    ...(at === null || !state?.seconds
+      ? []
+      : [["moment", `${(at * state.seconds).toFixed(2)} of ${state.seconds.toFixed(2)} s`]]),
   ];
   element("figures").tBodies[0].replaceChildren(
     ...rows.map((cells) => {
@@ -170,14 +191,20 @@ function receive(now) {
   } else if (isFirst && state.plays) play();
   element("play").hidden = !state.seconds;
   element("scene").textContent = document.title = now.scene;
-  element("notes").replaceChildren(...now.notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })));
+  element("notes").replaceChildren(
+    ...now.notes.map((note) => Object.assign(document.createElement("li"), { textContent: note })),
+  );
   fail(now.error);
   if (!now.error) draw();
 }
 
 async function save() {
   const { position, target } = camera ?? state.camera;
-  const response = await fetch("camera", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ position, target }) });
+  const response = await fetch("camera", {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ position, target }),
+  });
   if (!response.ok) return fail(await response.text());
   element("status").textContent = `The camera is in ${state.scene}.`;
 }

@@ -21,9 +21,13 @@ export function zoomBy(state, room, factor) {
 
 /** By heights of the stage, right and up. */
 export function panBy(state, room, x, y) {
-  const [names, height] = room ? [["roomX", "roomY"], roomHeight(state, room)] : [["x", "y"], 2 * state.distance * Math.tan((20 * Math.PI) / 180)];
+  const [names, height] = room
+    ? [["roomX", "roomY"], roomHeight(state, room)]
+    : [["x", "y"], 2 * state.distance * Math.tan((20 * Math.PI) / 180)];
   [x, y].forEach((value, index) => (state[names[index]] = within(names[index], state[names[index]] + value * height)));
 }
 
 /** The height of the stage at the object, metres. */
-const roomHeight = (state, { camera, object }) => (state.roomDistance * Math.hypot(...camera.position.map((value, axis) => value - object.position[axis]))) / camera.lens[0];
+const roomHeight = (state, { camera, object }) =>
+  (state.roomDistance * Math.hypot(...camera.position.map((value, axis) => value - object.position[axis]))) /
+  camera.lens[0];

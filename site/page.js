@@ -26,8 +26,13 @@ const stage = element("stage");
 let data, renderer, picture, state, manifest, packed;
 /** What the link is of, and the page does not have. */
 let linkNotes = [];
-/** The design and room that the workers have, and those with which they have the mesh, too; the replaced workers that have all of it. */
-let opened = null, shown = null, restored = 0;
+/**
+ * The design and room that the workers have, and those with which they have the mesh, too; the replaced workers that
+ * have all of it.
+ */
+let opened = null,
+  shown = null,
+  restored = 0;
 const isWhole = () => shown === opened && restored === (renderer?.replaced ?? 0);
 /** What tests read: the last whole frame, the light of its room, and its last pass. @type {any} */
 const page = (globalThis.colonnade = { frames: 0, picture: null });
@@ -48,7 +53,11 @@ function fail(text) {
 }
 
 function showNotes() {
-  element("notes").replaceChildren(...[...linkNotes, ...notesOf(scene(), roomOf())].map((note) => Object.assign(document.createElement("li"), { textContent: note })));
+  element("notes").replaceChildren(
+    ...[...linkNotes, ...notesOf(scene(), roomOf())].map((note) =>
+      Object.assign(document.createElement("li"), { textContent: note }),
+    ),
+  );
 }
 
 // Meshes and designs
@@ -128,7 +137,10 @@ function failWhenIdle(error) {
   });
 }
 
-/** Reads and packs a file, with one of its animations, the first unless given; if it cannot be, the mesh stays what it was. */
+/**
+ * Reads and packs a file, with one of its animations, the first unless given; if it cannot be, the mesh stays what it
+ * was.
+ */
 async function readFile(name, bytes, files, animation = undefined) {
   const [{ mesh }, { material }] = [page, state];
   const file = { name, bytes, files, animation };
@@ -168,7 +180,12 @@ stage.addEventListener("dblclick", (event) => {
   const room = roomOf();
   if (!room?.files || !isAtMaps(state)) return;
   const box = picture.canvas.getBoundingClientRect();
-  const place = placeOf(room, ((event.clientX - box.left) / box.width) * room.width, ((event.clientY - box.top) / box.height) * room.height, STAND_WITHIN);
+  const place = placeOf(
+    room,
+    ((event.clientX - box.left) / box.width) * room.width,
+    ((event.clientY - box.top) / box.height) * room.height,
+    STAND_WITHIN,
+  );
   queue.add("Moving the object", async () => {
     const own = data.rooms[state.room];
     Object.assign(own, await placedRoom(renderer, own, templateFor(data.rooms, state.design).template, place));
@@ -176,11 +193,20 @@ stage.addEventListener("dblclick", (event) => {
   });
 });
 
-/** Opens files: a mesh with what it names, or a photo with its depth; a promise of them shows at once that it is awaited. */
+/**
+ * Opens files: a mesh with what it names, or a photo with its depth; a promise of them shows at once that it is
+ * awaited.
+ */
 function openFiles(promise) {
   promise.catch(() => {}); // the work says it
   queue.add("Reading the files", async () => {
-    const files = new Map(await Promise.all([...(await promise)].map(async (file) => /** @type {const} */ ([file.name, new Uint8Array(await file.arrayBuffer())]))));
+    const files = new Map(
+      await Promise.all(
+        [...(await promise)].map(
+          async (file) => /** @type {const} */ ([file.name, new Uint8Array(await file.arrayBuffer())]),
+        ),
+      ),
+    );
     const names = [...files.keys()];
     const mesh = names.find((name) => /\.(obj|ply|stl|off|glb|gltf)$/i.test(name));
     if (!mesh && names.some((name) => /\.(jpe?g|png|webp|npy)$/i.test(name))) return openRoom(roomFiles(files), files);
@@ -194,18 +220,21 @@ const openTeapot = () => readFile("teapot.ply", null, new Map());
 // Controls, and the link
 
 function fill() {
-  for (const name of ["design", "room", "material", "light", "bounces", "pixel"]) form.elements[name].value = state[name];
+  for (const name of ["design", "room", "material", "light", "bounces", "pixel"])
+    form.elements[name].value = state[name];
   for (const name of ["colour", "background"]) form.elements[name].value = `#${state[name]}`;
   for (const name of ["shadows", "photo", "gather"]) form.elements[name].checked = Boolean(state[name]);
   form.elements.photo.disabled = roomOf() === null || !isAtMaps(state);
   form.elements.drag.disabled = roomOf() === null;
   form.elements.gather.disabled = !roomOf()?.light;
   element("home").hidden = roomOf() === null || isAtMaps(state);
-  for (const label of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".lens"))) label.hidden = !roomOf()?.files;
+  for (const label of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".lens")))
+    label.hidden = !roomOf()?.files;
   showCosts(data, state.design);
   for (const name of ["background", "light"]) form.elements[name].disabled = roomOf() !== null;
   element("mesh").textContent = state.mesh;
-  for (const option of form.elements.material.options) if (option.value === "file") option.disabled = !page.mesh?.hasMaterials;
+  for (const option of form.elements.material.options)
+    if (option.value === "file") option.disabled = !page.mesh?.hasMaterials;
   form.elements.colour.disabled = Boolean(packed?.entries);
 }
 
@@ -228,14 +257,23 @@ function moved() {
 
 form.addEventListener("input", ({ target }) => {
   if (target.name === "drag" || target.id === "moment") return;
-  if (target.name === "animation") return void queue.add("Reading the animation", () => readFile(page.file.name, page.file.bytes, page.file.files, target.value === "" ? null : Number(target.value)));
-  if (target.name === "degrees" || target.name === "step") return void queue.add("Making the maps", () => openRoom(roomOf().files.found, roomOf().files.files));
+  if (target.name === "animation")
+    return void queue.add("Reading the animation", () =>
+      readFile(page.file.name, page.file.bytes, page.file.files, target.value === "" ? null : Number(target.value)),
+    );
+  if (target.name === "degrees" || target.name === "step")
+    return void queue.add("Making the maps", () => openRoom(roomOf().files.found, roomOf().files.files));
   if (target.name in data.sliders) {
     state.design = data.sliders[target.name][target.value].design;
     showCosts(data, state.design);
     return void queue.add(`Opening ${state.design}`, changeDesign);
   }
-  const value = target.type === "checkbox" ? Number(target.checked) : target.type === "color" ? target.value.slice(1) : target.value;
+  const value =
+    target.type === "checkbox"
+      ? Number(target.checked)
+      : target.type === "color"
+        ? target.value.slice(1)
+        : target.value;
   state[target.name] = ["light", "bounces", "pixel"].includes(target.name) ? Number(value) : value;
   if (target.name === "design" || target.name === "room") queue.add(`Opening ${value || "no room"}`, changeDesign);
   else if (["material", "gather"].includes(target.name)) queue.add("Packing the mesh", pack);
@@ -293,7 +331,14 @@ function linkedState() {
 // Orbit
 
 listen(stage, {
-  orbit: (azimuth, elevation, event) => orbitBy(state, roomOf(), form.elements.drag.value === "camera" || event?.altKey || event?.ctrlKey, azimuth, elevation),
+  orbit: (azimuth, elevation, event) =>
+    orbitBy(
+      state,
+      roomOf(),
+      form.elements.drag.value === "camera" || event?.altKey || event?.ctrlKey,
+      azimuth,
+      elevation,
+    ),
   zoom: (factor) => zoomBy(state, roomOf(), factor),
   pan: (x, y) => panBy(state, roomOf(), x, y),
   click(event) {
@@ -343,13 +388,24 @@ async function start() {
   for (const name of Object.keys(data.rooms)) form.elements.room.add(new Option(name));
   for (const name of ["light", "bounces"]) [form.elements[name].min, form.elements[name].max] = RANGES[name];
   listDesigns(data);
-  element("about").textContent = `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
-  renderer = page.renderer = new Renderer(element("worker").textContent, Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)));
-  const now = () => ({ scene: scene(), room: roomOf(), samples: data.samples, isPlaying: player.isPlaying, isReady: Boolean(packed) && !queue.isBusy && isWhole() });
+  element("about").textContent =
+    `Colonnade ${data.version}. The page asks no other host for anything; a dropped file stays in the tab.`;
+  renderer = page.renderer = new Renderer(
+    element("worker").textContent,
+    Math.max(1, Math.min(MOST_WORKERS, navigator.hardwareConcurrency || 1)),
+  );
+  const now = () => ({
+    scene: scene(),
+    room: roomOf(),
+    samples: data.samples,
+    isPlaying: player.isPlaying,
+    isReady: Boolean(packed) && !queue.isBusy && isWhole(),
+  });
   picture = new Picture({ renderer, page, now, drawn, fail: failWhenIdle });
   state = linkedState();
   const { mesh, follow: followed } = state;
-  if (mesh !== DEFAULTS.mesh) linkNotes.push(`the link is of ${mesh}, which a link does not hold: drop the file; this is the teapot`);
+  if (mesh !== DEFAULTS.mesh)
+    linkNotes.push(`the link is of ${mesh}, which a link does not hold: drop the file; this is the teapot`);
   const notes = linkNotes;
   await openDesign();
   await openTeapot();

@@ -7,14 +7,26 @@ export const element = (id) => document.getElementById(id);
 
 /** Counters of the register map, in words. */
 const NAMES = {
-  raysPrimary: "primary rays", raysShadow: "shadow rays", raysReflection: "reflected rays", raysRefraction: "refracted rays",
-  raysGather: "gathered rays",  raysInBox: "rays in the box", nodeReads: "nodes read", boxTests: "boxes tested", triangleTests: "triangles tested",
-  hits: "hits", deepestStack: "deepest stack",
+  raysPrimary: "primary rays",
+  raysShadow: "shadow rays",
+  raysReflection: "reflected rays",
+  raysRefraction: "refracted rays",
+  raysGather: "gathered rays",
+  raysInBox: "rays in the box",
+  nodeReads: "nodes read",
+  boxTests: "boxes tested",
+  triangleTests: "triangles tested",
+  hits: "hits",
+  deepestStack: "deepest stack",
 };
 /** Where the cycles of a pixel alone go: counters of `tiny` that count each context's cycles in a state. */
 const STATES = {
-  contextsRaySetup: "ray set-up", waitRecord: "waits for a record", waitUnit: "waits for a unit", contextsBox: "box tests",
-  contextsTriangles: "triangle tests", contextsShading: "shading",
+  contextsRaySetup: "ray set-up",
+  waitRecord: "waits for a record",
+  waitUnit: "waits for a unit",
+  contextsBox: "box tests",
+  contextsTriangles: "triangle tests",
+  contextsShading: "shading",
 };
 
 const grouped = (value) => (typeof value === "number" ? value.toLocaleString("en") : value);
@@ -68,7 +80,10 @@ function sliderValues({ precision: { mac, sqrt, div }, geometry, array }) {
   return { precision: `${mac}b${sqrt}s${div}d`, vertexBits: geometry.vertexBits, contexts: array.contexts };
 }
 
-/** The sliders, with their values of the hardware if it is one of their points, else of `edge`; folded when other hardware is chosen. */
+/**
+ * The sliders, with their values of the hardware if it is one of their points, else of `edge`; folded when other
+ * hardware is chosen.
+ */
 function showSliders({ sliders, manifests }, chosen) {
   const isPoint = Object.values(sliders).some((points) => points.some(({ design }) => design === chosen));
   const values = sliderValues(manifests[isPoint ? chosen : "edge"].config);
@@ -91,7 +106,13 @@ export function showCosts(data, chosen) {
   if (!study) return;
   const { figures } = study.points.find(({ design }) => design === chosen);
   const known = study.columns.filter(({ key }) => figures[key] !== null);
-  fillTable("costs", known.map(({ key, label, unit, format }) => [label, `${figures[key].toFixed(Number(/[.](\d)/.exec(format)[1]))} ${unit}`]));
+  fillTable(
+    "costs",
+    known.map(({ key, label, unit, format }) => [
+      label,
+      `${figures[key].toFixed(Number(/[.](\d)/.exec(format)[1]))} ${unit}`,
+    ]),
+  );
   element("study").textContent = `${study.title}: ${study.command}`;
 }
 
@@ -99,7 +120,11 @@ export function showCosts(data, chosen) {
 export function showTimes(frames, caption) {
   const states = Object.entries(STATES).filter(([name]) => frames.every(({ counters }) => name in counters));
   const row = (name, label) => [label, ...frames.map(({ counters }) => counters[name])];
-  fillTable("times", [["", ...frames.map(({ of }) => of)], row("cycles", "cycles of the frame"), ...states.map(([name, label]) => row(name, label))]);
+  fillTable("times", [
+    ["", ...frames.map(({ of }) => of)],
+    row("cycles", "cycles of the frame"),
+    ...states.map(([name, label]) => row(name, label)),
+  ]);
   element("times").caption.textContent = caption;
   element("times").hidden = false;
 }
@@ -108,7 +133,16 @@ export function showTimes(frames, caption) {
 export function showRays(rays, chosen, choose) {
   const cellsOf = ({ kind, nodes, boxes, entered, triangles, records, lines, hit, blocker }) => {
     const met = hit ?? (kind === "shadow" && blocker ? blocker.value : null);
-    return [kind, nodes, boxes, entered, triangles, records, ...(lines === null ? [] : [lines]), met === null ? "–" : String(met)];
+    return [
+      kind,
+      nodes,
+      boxes,
+      entered,
+      triangles,
+      records,
+      ...(lines === null ? [] : [lines]),
+      met === null ? "–" : String(met),
+    ];
   };
   fillTable("rays", rays.map(cellsOf));
   [...element("rays").tBodies[0].rows].forEach((line, index) => {

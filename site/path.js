@@ -9,7 +9,14 @@ const KINDS = ["primary", "shadow", "reflection", "refraction", "gathered"];
 export function raysOf(steps, line) {
   const rays = [];
   for (const step of steps) {
-    if (step.kind === RAY) rays.push({ kind: KINDS[step.value], origin: step.values.slice(0, 3), direction: step.values.slice(3, 6), steps: [], hit: null });
+    if (step.kind === RAY)
+      rays.push({
+        kind: KINDS[step.value],
+        origin: step.values.slice(0, 3),
+        direction: step.values.slice(3, 6),
+        steps: [],
+        hit: null,
+      });
     else if (step.kind === HIT) rays.at(-1).hit = step.value;
     else rays.at(-1).steps.push(step);
   }
@@ -43,7 +50,8 @@ function endOf({ origin, direction, blocker }) {
 /** One line for a step. */
 export function lineOf(step) {
   if (step.kind === NODE) return `node ${step.value}`;
-  if (step.kind === CHILD) return `${step.isHit ? "enters" : "misses"} the box of ${step.isLeaf ? "triangles" : "node"} ${step.value}`;
+  if (step.kind === CHILD)
+    return `${step.isHit ? "enters" : "misses"} the box of ${step.isLeaf ? "triangles" : "node"} ${step.value}`;
   if (step.kind === RECORD) return `triangles at ${step.value}`;
   return `triangle ${step.value}: ${step.isHit ? "hit, the closest so far" : "no closer hit"}`;
 }
@@ -52,7 +60,13 @@ export function lineOf(step) {
 export function draw(context, camera, pose, rays, units, chosen = null) {
   const scale = context.canvas.width / camera.width;
   const onto = (place) => {
-    const { x, y, depth } = project(camera, toWorld(pose, place.map((value) => (2 * value) / units - 1)));
+    const { x, y, depth } = project(
+      camera,
+      toWorld(
+        pose,
+        place.map((value) => (2 * value) / units - 1),
+      ),
+    );
     return depth > 0.05 * pose.scale ? [x * scale, y * scale] : null;
   };
   const stroke = (corners, colour, width, isClosed = false) => {
@@ -70,14 +84,22 @@ export function draw(context, camera, pose, rays, units, chosen = null) {
     for (let from = 0; from < 8; ++from)
       for (const bit of [1, 2, 4]) if (!(from & bit)) stroke([corner(from), corner(from | bit)], colour, width);
   };
-  const triangle = ({ values }, colour, width) => stroke([0, 3, 6].map((at) => values.slice(at, at + 3)), colour, width, true);
+  const triangle = ({ values }, colour, width) =>
+    stroke(
+      [0, 3, 6].map((at) => values.slice(at, at + 3)),
+      colour,
+      width,
+      true,
+    );
 
   context.clearRect(0, 0, context.canvas.width, context.canvas.height);
   context.lineJoin = "round";
   rays.forEach((ray, index) => {
     if (chosen !== null && chosen !== index) return;
     const isFirst = index === 0 || chosen !== null;
-    for (const step of ray.steps) if (isFirst && step.kind === CHILD && step.isHit) box(step, step.isLeaf ? "#5fd08acc" : "#59a8ff99", step.isLeaf ? 1.25 : 1);
+    for (const step of ray.steps)
+      if (isFirst && step.kind === CHILD && step.isHit)
+        box(step, step.isLeaf ? "#5fd08acc" : "#59a8ff99", step.isLeaf ? 1.25 : 1);
     for (const step of ray.steps) if (isFirst && step.kind === TRIANGLE) triangle(step, "#ffd166", 1);
   });
   rays.forEach((ray, index) => {

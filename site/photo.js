@@ -1,7 +1,8 @@
 // sRGB, and a room's photo in the size of a frame.
 
 export const decode = (code) => (code <= 0.04045 * 255 ? code / 255 / 12.92 : ((code / 255 + 0.055) / 1.055) ** 2.4);
-export const encode = (value) => Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
+export const encode = (value) =>
+  Math.round(255 * (value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055));
 
 /** The sRGB bytes of a photo, red, green and blue of each pixel, in the size of a frame: means of its pixels. */
 export function resizedPhoto({ data, width, height }, factor) {

@@ -8,11 +8,16 @@ const COARSE = 4;
 const [SLOW, FAST] = [150, 35];
 
 /**
- * `now()` gives what is to be shown: the scene (view.js), its room or null, `samples` of passes (viewOf), `isPlaying`: the mesh moves, and `isReady`:
- * design, room and mesh are those of the state. `page` has what tests read. `drawn()` is called after each frame, `fail(error)` for errors.
+ * `now()` gives what is to be shown: the scene (view.js), its room or null, `samples` of passes (viewOf), `isPlaying`:
+ * the mesh moves, and `isReady`: design, room and mesh are those of the state. `page` has what tests read. `drawn()` is
+ * called after each frame, `fail(error)` for errors.
  */
 export class Picture {
-  renderer; page; now; drawn; fail;
+  renderer;
+  page;
+  now;
+  drawn;
+  fail;
 
   constructor({ renderer, page, now, drawn, fail }) {
     Object.assign(this, { renderer, page, now, drawn, fail });
@@ -50,7 +55,10 @@ export class Picture {
     return width >= 8 && height >= 8 && width <= maxWidth && height <= maxHeight;
   }
 
-  /** Renders until the picture is that of the state: coarse at once, then whole, band by band, then the sums of passes; of an animation frames that are coarse if whole ones are slow. */
+  /**
+   * Renders until the picture is that of the state: coarse at once, then whole, band by band, then the sums of passes;
+   * of an animation frames that are coarse if whole ones are slow.
+   */
   async update() {
     if (!this.now().isReady) return;
     this.isChanged = true;
@@ -62,7 +70,8 @@ export class Picture {
         const { room, scene, isPlaying } = this.now();
         const { pixel } = scene.state;
         if (isPlaying) await this.play(room ? COARSE : COARSE * pixel, pixel);
-        else if ((await this.render(room ? COARSE : COARSE * pixel, true)) && (await this.render(pixel, false))) await this.rest();
+        else if ((await this.render(room ? COARSE : COARSE * pixel, true)) && (await this.render(pixel, false)))
+          await this.rest();
       }
     } catch (error) {
       this.fail(error);
@@ -114,11 +123,19 @@ export class Picture {
   async render(pixel, isCoarse) {
     const { page, renderer, context } = this;
     const box = this.box();
-    for (const id of ["picture", "overlay"]) for (const [name, value] of Object.entries(box)) element(id).style[name] = `${value}px`;
+    for (const id of ["picture", "overlay"])
+      for (const [name, value] of Object.entries(box)) element(id).style[name] = `${value}px`;
     const [width, height] = this.size(pixel);
     const view = this.view(width, height);
     const target = new OffscreenCanvas(width, height).getContext("2d");
-    const whole = { width, height, view, colours: new Uint16Array(3 * width * height), ratios: new Uint16Array(3 * width * height), triangles: new Int32Array(width * height) };
+    const whole = {
+      width,
+      height,
+      view,
+      colours: new Uint16Array(3 * width * height),
+      ratios: new Uint16Array(3 * width * height),
+      triangles: new Int32Array(width * height),
+    };
     if (!isCoarse) this.resize(width, height);
     const frame = await renderer.frame(view, ({ first, last, pixels, colours, ratios, triangles }) => {
       const rows = new ImageData(pixels, width, last - first);
@@ -129,7 +146,10 @@ export class Picture {
       whole.triangles.set(triangles, width * first);
     });
     if (frame === null) return false;
-    showFigures({ width, height, workers: renderer.workers.length, packed: this.now().scene.packed, packTime: page.packTime }, frame);
+    showFigures(
+      { width, height, workers: renderer.workers.length, packed: this.now().scene.packed, packTime: page.packTime },
+      frame,
+    );
     element("samples").textContent = "one sample a pixel";
     if (isCoarse) {
       this.resize(width, height);

@@ -6,7 +6,11 @@ import { element } from "./panels.js";
 const TICKS = 2 ** 16;
 
 export class Player {
-  changed; isPlaying; duration; seconds; started;
+  changed;
+  isPlaying;
+  duration;
+  seconds;
+  started;
 
   /** `changed()` is called after another time is chosen, or the clip stops or goes on. */
   constructor(changed) {

@@ -1,9 +1,17 @@
 // Works one after the other, with a sign of what is being done.
 
 export class Queue {
-  sign; before; done; failed; waiting; last;
+  sign;
+  before;
+  done;
+  failed;
+  waiting;
+  last;
 
-  /** `sign`: an element. `before()` comes before each work, `failed(error)` after one that did not go well, and then `done(isWell)`; none of them throws. */
+  /**
+   * `sign`: an element. `before()` comes before each work, `failed(error)` after one that did not go well, and then
+   * `done(isWell)`; none of them throws.
+   */
   constructor(sign, { before, done, failed }) {
     Object.assign(this, { sign, before, done, failed, waiting: [], last: Promise.resolve() });
   }
@@ -20,7 +28,10 @@ export class Queue {
     this.last = this.last.catch(() => {}).then(() => this.run(work));
   }
 
-  /** Does something after the works that wait, unless others have come by then; `failed(error)` is called after an error. */
+  /**
+   * Does something after the works that wait, unless others have come by then; `failed(error)` is called after an
+   * error.
+   */
   addIdle(work, failed) {
     this.last = this.last.then(() => (this.isBusy ? null : work())).catch(failed);
   }

@@ -1,4 +1,5 @@
-// Rays through meshes of three.js with the interface of three-mesh-bvh, by the bit-exact model in WebAssembly (docs/rays.md).
+// Rays through meshes of three.js with the interface of three-mesh-bvh, by the bit-exact model in WebAssembly
+// (docs/rays.md).
 
 import { Library } from "./library.js";
 
@@ -32,20 +33,28 @@ class RayLibrary extends Library {
 
 /** A class as three-mesh-bvh's `MeshBVH`: code is that of rays.wasm. */
 export async function meshTrees(code) {
-  const library = /** @type {RayLibrary} */ (await RayLibrary.from(code)), { wasm } = library;
+  const library = /** @type {RayLibrary} */ (await RayLibrary.from(code)),
+    { wasm } = library;
   const device = library.word([], (out) => wasm.colonnade_rays_open(0, 0, out));
 
   return class MeshBVH {
     /** Packs a geometry: its `position` and `index`, or three vertices a face without one. */
     constructor(geometry) {
       this.geometry = geometry;
-      const { index, attributes: { position } } = geometry;
+      const {
+        index,
+        attributes: { position },
+      } = geometry;
       const count = index ? index.count : position.count;
-      const vertices = Float64Array.from({ length: 3 * position.count }, (_, i) => [position.getX, position.getY, position.getZ][i % 3].call(position, Math.floor(i / 3)));
+      const vertices = Float64Array.from({ length: 3 * position.count }, (_, i) =>
+        [position.getX, position.getY, position.getZ][i % 3].call(position, Math.floor(i / 3)),
+      );
       this.corners = Uint32Array.from({ length: count }, (_, i) => (index ? index.getX(i) : i));
       this.scene = library.word([], (out) => wasm.colonnade_rays_scene_new(device, out));
       try {
-        library.word([vertices, this.corners], (v, f, mesh) => wasm.colonnade_rays_mesh_add(this.scene, v, position.count, f, Math.floor(count / 3), mesh));
+        library.word([vertices, this.corners], (v, f, mesh) =>
+          wasm.colonnade_rays_mesh_add(this.scene, v, position.count, f, Math.floor(count / 3), mesh),
+        );
         library.refusing(() => wasm.colonnade_rays_commit(this.scene));
       } catch (error) {
         this.dispose();
@@ -62,13 +71,16 @@ export async function meshTrees(code) {
     /** All hits from near to far; `near` and `far` are distances, a side is three's number or a material with it. */
     raycast(ray, side = 0, near = 0, far = Infinity) {
       return this.hits(ray, side, near, far, 64, (rays, mode, hits, capacity) =>
-        library.word([], (found) => wasm.colonnade_rays_all(this.scene, rays, 1, mode, ALL_MASKS, MISS, hits, capacity, found)),
+        library.word([], (found) =>
+          wasm.colonnade_rays_all(this.scene, rays, 1, mode, ALL_MASKS, MISS, hits, capacity, found),
+        ),
       );
     }
 
     /** The nearest hit, or null. */
     raycastFirst(ray, side = 0, near = 0, far = Infinity) {
-      const closest = (rays, mode, hits) => library.refusing(() => wasm.colonnade_rays_closest(this.scene, rays, 1, mode, ALL_MASKS, hits)) + 1;
+      const closest = (rays, mode, hits) =>
+        library.refusing(() => wasm.colonnade_rays_closest(this.scene, rays, 1, mode, ALL_MASKS, hits)) + 1;
       return this.hits(ray, side, near, far, 1, closest)[0] ?? null;
     }
 
@@ -77,13 +89,27 @@ export async function meshTrees(code) {
       const mode = SIDES[side.side ?? side];
       if (mode === undefined) throw new Error("the side is none of 0, 1, 2: give that of one material");
       const length = Math.hypot(direction.x, direction.y, direction.z);
-      const ray = Float64Array.of(origin.x, origin.y, origin.z, near / length, direction.x, direction.y, direction.z, far / length);
+      const ray = Float64Array.of(
+        origin.x,
+        origin.y,
+        origin.z,
+        near / length,
+        direction.x,
+        direction.y,
+        direction.z,
+        far / length,
+      );
       for (;;) {
         const found = library.withArrays([ray, new Uint8Array(HIT_BYTES * capacity)], (rays, hits) => {
           const count = call(rays, mode, hits, capacity);
           if (count > capacity) return count;
           const view = new DataView(wasm.memory.buffer, hits, HIT_BYTES * capacity);
-          const read = (i) => ({ t: view.getFloat64(HIT_BYTES * i, true), u: view.getFloat64(HIT_BYTES * i + 8, true), v: view.getFloat64(HIT_BYTES * i + 16, true), face: view.getUint32(HIT_BYTES * i + FACE_BYTE, true) });
+          const read = (i) => ({
+            t: view.getFloat64(HIT_BYTES * i, true),
+            u: view.getFloat64(HIT_BYTES * i + 8, true),
+            v: view.getFloat64(HIT_BYTES * i + 16, true),
+            face: view.getUint32(HIT_BYTES * i + FACE_BYTE, true),
+          });
           return Array.from({ length: count }, (_, i) => read(i)).filter((hit) => hit.face !== MISS);
         });
         if (typeof found !== "number") return found.map((hit) => this.intersection(origin, direction, length, hit));
@@ -97,8 +123,11 @@ export async function meshTrees(code) {
       const vector = (x, y, z) => (origin.clone ? origin.clone().set(x, y, z) : { x, y, z });
       const [a, b, c] = this.corners.subarray(3 * face, 3 * face + 3);
       const [p, q, r] = [a, b, c].map((i) => [position.getX(i), position.getY(i), position.getZ(i)]);
-      const edge = (to) => to.map((value, axis) => value - p[axis]), [e, f] = [edge(q), edge(r)];
-      const normal = [0, 1, 2].map((axis) => e[(axis + 1) % 3] * f[(axis + 2) % 3] - e[(axis + 2) % 3] * f[(axis + 1) % 3]);
+      const edge = (to) => to.map((value, axis) => value - p[axis]),
+        [e, f] = [edge(q), edge(r)];
+      const normal = [0, 1, 2].map(
+        (axis) => e[(axis + 1) % 3] * f[(axis + 2) % 3] - e[(axis + 2) % 3] * f[(axis + 1) % 3],
+      );
       const size = Math.hypot(...normal);
       const at = (get) => (1 - u - v) * get.call(uv, a) + u * get.call(uv, b) + v * get.call(uv, c);
       return {

@@ -7,7 +7,10 @@ import { followOf } from "./state.js";
 import { poseIn, viewOf } from "./view.js";
 
 export class RayPanel {
-  page; context; rays; chosen;
+  page;
+  context;
+  rays;
+  chosen;
 
   /** `page` takes what tests read, `context` gives renderer, picture, scene and room of now. */
   constructor(page, context) {
@@ -30,7 +33,8 @@ export class RayPanel {
     element("times").hidden = true;
     element("time").hidden = room !== null;
     element("pixel").textContent = `${x}, ${y}`;
-    for (const head of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".lines"))) head.hidden = !line;
+    for (const head of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".lines")))
+      head.hidden = !line;
     this.list();
   }
 
@@ -49,8 +53,17 @@ export class RayPanel {
     canvas.width = Math.round(box.width * devicePixelRatio);
     canvas.height = Math.round(box.height * devicePixelRatio);
     if (!this.rays) return;
-    const camera = room ? roomCamera(room, box.width, box.height, scene.state) : cameraOf(scene.state, box.width, box.height);
-    draw(this.overlay, camera, poseIn(scene, room, scene.state), this.rays, 2 ** scene.manifest.config.geometry.vertexBits - 1, this.chosen);
+    const camera = room
+      ? roomCamera(room, box.width, box.height, scene.state)
+      : cameraOf(scene.state, box.width, box.height);
+    draw(
+      this.overlay,
+      camera,
+      poseIn(scene, room, scene.state),
+      this.rays,
+      2 ** scene.manifest.config.geometry.vertexBits - 1,
+      this.chosen,
+    );
   }
 
   forget() {

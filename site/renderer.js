@@ -8,14 +8,22 @@ export async function unpack(text) {
 }
 
 /** Bytes, or those of base64. */
-export const bytesOf = (text) => (typeof text === "string" ? Uint8Array.from(atob(text), (character) => character.charCodeAt(0)) : text);
+export const bytesOf = (text) =>
+  typeof text === "string" ? Uint8Array.from(atob(text), (character) => character.charCodeAt(0)) : text;
 
 /** A worker that has something to do and sends nothing for so long is ended, seconds. */
 const MOST_SILENCE = 20;
 /** What a worker does, for messages. */
 const DOING = {
-  open: "opening the hardware", read: "reading the file", pack: "packing the mesh", load: "taking the mesh", room: "making the maps of the room", light: "finding the light of the room",
-  frame: "rendering", trace: "following the ray", rtl: "running the RTL",
+  open: "opening the hardware",
+  read: "reading the file",
+  pack: "packing the mesh",
+  load: "taking the mesh",
+  room: "making the maps of the room",
+  light: "finding the light of the room",
+  frame: "rendering",
+  trace: "following the ray",
+  rtl: "running the RTL",
 };
 
 export class Renderer {
@@ -39,7 +47,12 @@ export class Renderer {
   watch() {
     for (const worker of new Set([...this.waiting.values()].map((each) => each.worker))) {
       const { call } = [...this.waiting.values()].find((each) => each.worker === worker);
-      if (++worker.silence > MOST_SILENCE) this.replace(worker, `a worker has not answered for ${MOST_SILENCE} s while ${DOING[call] ?? "answering"}: it is replaced, and the page goes on with what it had`);
+      if (++worker.silence > MOST_SILENCE)
+        this.replace(
+          worker,
+          `a worker has not answered for ${MOST_SILENCE} s while ${DOING[call] ?? "answering"}: ` +
+            `it is replaced, and the page goes on with what it had`,
+        );
     }
   }
 
@@ -63,7 +76,11 @@ export class Renderer {
     if (!asked) return;
     worker.silence = 0;
     if (band) return asked.onBand(band);
-    if (isBroken) return this.replace(worker, `the model has stopped while ${DOING[asked.call]} (${error}): the page goes on with what it had`);
+    if (isBroken)
+      return this.replace(
+        worker,
+        `the model has stopped while ${DOING[asked.call]} (${error}): the page goes on with what it had`,
+      );
     this.waiting.delete(id);
     if (error === undefined) asked.resolve(answer);
     else asked.reject(new Error(error));
@@ -102,12 +119,19 @@ export class Renderer {
   /** Renders a frame; null if another one has begun. Counters are sums, the stack's the largest. */
   async frame(view, onBand) {
     const parts = this.workers.length;
-    const answers = await Promise.all(this.workers.map((worker, part) => this.ask(worker, "frame", { view, part, parts }, onBand)));
+    const answers = await Promise.all(
+      this.workers.map((worker, part) => this.ask(worker, "frame", { view, part, parts }, onBand)),
+    );
     if (answers.some(({ isStopped }) => isStopped)) return null;
     const counters = {};
     for (const { counters: own } of answers)
-      for (const [name, value] of Object.entries(own)) counters[name] = name === "deepestStack" ? Math.max(counters[name] ?? 0, value) : (counters[name] ?? 0) + value;
-    return { counters, flatPairs: answers[0].flatPairs, milliseconds: Math.max(...answers.map(({ milliseconds }) => milliseconds)) };
+      for (const [name, value] of Object.entries(own))
+        counters[name] = name === "deepestStack" ? Math.max(counters[name] ?? 0, value) : (counters[name] ?? 0) + value;
+    return {
+      counters,
+      flatPairs: answers[0].flatPairs,
+      milliseconds: Math.max(...answers.map(({ milliseconds }) => milliseconds)),
+    };
   }
 
   stop() {

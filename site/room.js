@@ -27,16 +27,24 @@ function quantile(values, share) {
 }
 
 /**
- * What the device and the page need of a room. `photo` has the pixels of the maps' part, RGBA, `whole` the photo's size;
- * `lens` is that of the photo; `pose` from view space to the world, or null: it is that of the floor. The
- * room's lights have the scale of the photo, whose light is gathered.
+ * What the device and the page need of a room. `photo` has the pixels of the maps' part, RGBA, `whole` the photo's
+ * size; `lens` is that of the photo; `pose` from view space to the world, or null: it is that of the floor. The room's
+ * lights have the scale of the photo, whose light is gathered.
  */
 export function prepareRoom(/** @type {any} */ library, /** @type {any} */ { photo, whole, depth, lens, pose }) {
   const { width, height } = photo;
   if (Math.abs(depth.width * whole.height - depth.height * whole.width) > 0.03 * depth.width * whole.height)
-    throw new Error(`the depth map is ${depth.width} × ${depth.height}, the photo ${whole.width} × ${whole.height}: both have to show the same part of the room`);
+    throw new Error(
+      `the depth map is ${depth.width} × ${depth.height}, the photo ${whole.width} × ${whole.height}: ` +
+        `both have to show the same part of the room`,
+    );
   const crop = cropOf(whole, width, height);
-  const own = { fx: lens.fx / crop.scale, fy: lens.fy / crop.scale, cx: (lens.cx - crop.left) / crop.scale, cy: (lens.cy - crop.top) / crop.scale };
+  const own = {
+    fx: lens.fx / crop.scale,
+    fy: lens.fy / crop.scale,
+    cx: (lens.cx - crop.left) / crop.scale,
+    cy: (lens.cy - crop.top) / crop.scale,
+  };
   const filled = library.fittedDepth(depth, whole, crop, width, height);
   const { holes, count } = fillHoles(library, filled, width);
   const { normals, noise } = library.normals(filled, holes, own, width, height);
@@ -53,7 +61,20 @@ export function prepareRoom(/** @type {any} */ library, /** @type {any} */ { pho
   const rays = raysOfLens(own, width, height);
   const albedo = photoColours(colours, filled, normals, rays, found, light);
   const seen = seenOf(filled, normals, colours, rays, found, width, height);
-  return { width, height, lens: own, pose: found, depth: filled, normals, albedo, fittedLight: light, noise, surface: world, seen, notes };
+  return {
+    width,
+    height,
+    lens: own,
+    pose: found,
+    depth: filled,
+    normals,
+    albedo,
+    fittedLight: light,
+    noise,
+    surface: world,
+    seen,
+    notes,
+  };
 }
 
 /** View rays of the pixels, with z = 1: three of each. */
@@ -66,14 +87,23 @@ function raysOfLens({ fx, fy, cx, cy }, width, height) {
   return rays;
 }
 
-/** Points, normals and colours of every second pixel across and down, in the world, for the light of an object (library.js). */
+/**
+ * Points, normals and colours of every second pixel across and down, in the world, for the light of an object
+ * (library.js).
+ */
 function seenOf(depth, normals, colours, rays, pose, width, height) {
   const [points, turnedNormals, seenColours] = range(3).map(() => new Float64Array(3 * (width >> 1) * (height >> 1)));
   let at = 0;
   for (let y = 0; y + 1 < height; y += 2)
     for (let x = 0; x + 1 < width; x += 2, at += 3) {
       const pixel = 3 * (y * width + x);
-      points.set(turned(pose.rotation, range(3).map((axis) => rays[pixel + axis] * depth[pixel / 3])).map((value, axis) => value + pose.position[axis]), at);
+      points.set(
+        turned(
+          pose.rotation,
+          range(3).map((axis) => rays[pixel + axis] * depth[pixel / 3]),
+        ).map((value, axis) => value + pose.position[axis]),
+        at,
+      );
       turnedNormals.set(turned(pose.rotation, normals.subarray(pixel, pixel + 3)), at);
       seenColours.set(colours.subarray(pixel, pixel + 3), at);
     }
@@ -87,7 +117,12 @@ function surfaceOf(depth, normals, rays, width, height) {
     for (let x = STEP >> 1; x < width; x += STEP) {
       const pixel = y * width + x;
       const point = range(3).map((axis) => rays[3 * pixel + axis] * depth[pixel]);
-      points.push({ pixel, point, normal: range(3).map((axis) => normals[3 * pixel + axis]), distance: Math.hypot(...point) });
+      points.push({
+        pixel,
+        point,
+        normal: range(3).map((axis) => normals[3 * pixel + axis]),
+        distance: Math.hypot(...point),
+      });
     }
   return points;
 }
@@ -104,20 +139,38 @@ function levelled(library, surface, notes) {
     for (const other of surface) {
       const over = dot(normal, other.point) - height;
       if (over < -DEPTH_BELOW) ++below;
-      if (Math.abs(over) < Math.max(THICKNESS * other.distance, LEAST_THICKNESS) && dot(normal, other.normal) > PARALLEL) ++count;
+      if (
+        Math.abs(over) < Math.max(THICKNESS * other.distance, LEAST_THICKNESS) &&
+        dot(normal, other.normal) > PARALLEL
+      )
+        ++count;
     }
-    if (below <= BELOW * surface.length && count >= LEAST_SHARE * surface.length && count > best.count) best = { count, height, normal };
+    if (below <= BELOW * surface.length && count >= LEAST_SHARE * surface.length && count > best.count)
+      best = { count, height, normal };
   }
   let [up, height] = [best.normal ?? towards, best.height];
   for (let round = 0; best.normal && round < 3; ++round) {
-    const on = surface.filter((each) => Math.abs(dot(up, each.point) - height) < Math.max(THICKNESS * each.distance, LEAST_THICKNESS) && dot(up, each.normal) > PARALLEL);
+    const on = surface.filter(
+      (each) =>
+        Math.abs(dot(up, each.point) - height) < Math.max(THICKNESS * each.distance, LEAST_THICKNESS) &&
+        dot(up, each.normal) > PARALLEL,
+    );
     if (on.length < 3) break;
-    const plane = library.plane(Float64Array.from(on.flatMap(({ point }) => point))); // m · p = 1, below the eye: height < 0
+    // m · p = 1, below the eye: height < 0
+    const plane = library.plane(Float64Array.from(on.flatMap(({ point }) => point)));
     const length = Math.hypot(...plane);
     [up, height] = [Array.from(plane, (value) => -value / length), -1 / length];
   }
-  if (!best.normal) height = quantile(surface.map(({ point }) => dot(up, point)), LOWEST);
-  notes.push(best.normal ? `the vertical is that of the floor, ${Math.round((100 * best.count) / surface.length)} % of the picture` : "no floor was found: the photo is taken as level, its lowest point as the floor");
+  if (!best.normal)
+    height = quantile(
+      surface.map(({ point }) => dot(up, point)),
+      LOWEST,
+    );
+  notes.push(
+    best.normal
+      ? `the vertical is that of the floor, ${Math.round((100 * best.count) / surface.length)} % of the picture`
+      : "no floor was found: the photo is taken as level, its lowest point as the floor",
+  );
   return { rotation: toUp(up), position: [0, -height, 0] };
 }
 
@@ -125,11 +178,16 @@ function levelled(library, surface, notes) {
 function toUp(up) {
   const [x, y, z] = [up[0], -up[1], -up[2]];
   const f = 1 / (1 + y);
-  const least = [[1 - x * x * f, -x, -x * z * f], [x, y, z], [-x * z * f, -z, 1 - z * z * f]];
+  const least = [
+    [1 - x * x * f, -x, -x * z * f],
+    [x, y, z],
+    [-x * z * f, -z, 1 - z * z * f],
+  ];
   return least.map(([a, b, c]) => [a, -b, -c]);
 }
 
-const linearOf = (data) => Float64Array.from({ length: (3 * data.length) / 4 }, (_, i) => decode(data[4 * Math.floor(i / 3) + (i % 3)]));
+const linearOf = (data) =>
+  Float64Array.from({ length: (3 * data.length) / 4 }, (_, i) => decode(data[4 * Math.floor(i / 3) + (i % 3)]));
 
 /** Light of intensity 1 on an unshadowed surface. */
 function exposure(point, normal, position, reach) {
@@ -139,26 +197,39 @@ function exposure(point, normal, position, reach) {
   return reach === 0 ? cosine : cosine * Math.min(MOST_FALLOFF, reach ** 2 / squared);
 }
 
-/** The corners of the box around a room: what its camera sees, and around; its lowest level is that of the floor. `points`: three numbers each. */
+/**
+ * The corners of the box around a room: what its camera sees, and around; its lowest level is that of the floor.
+ * `points`: three numbers each.
+ */
 export function roomBox(points, eye) {
   const along = range(3).map((axis) => points.filter((_, index) => index % 3 === axis));
   const floor = quantile(along[1], 0.02);
-  const low = along.map((values, axis) => (axis === 1 ? floor : Math.min(quantile(values, 0.02), eye[axis]) - MARGIN[axis]));
+  const low = along.map((values, axis) =>
+    axis === 1 ? floor : Math.min(quantile(values, 0.02), eye[axis]) - MARGIN[axis],
+  );
   return [low, along.map((values, axis) => Math.max(quantile(values, 0.98), eye[axis]) + MARGIN[axis])];
 }
 
 /** Ambient light and one lamp that explain the brightness of the photo best, if its mean albedo is 0.5. */
 function fitLight(world, colours, eye, notes) {
   const samples = world
-    .map(({ pixel, point, normal }) => ({ point, normal, value: (colours[3 * pixel] + colours[3 * pixel + 1] + colours[3 * pixel + 2]) / 3 }))
+    .map(({ pixel, point, normal }) => ({
+      point,
+      normal,
+      value: (colours[3 * pixel] + colours[3 * pixel + 1] + colours[3 * pixel + 2]) / 3,
+    }))
     .filter(({ value }) => value > 0.001 && value < 0.9);
-  if (samples.length < world.length / 20) throw new Error("the photo is nearly all black or saturated: its light cannot be found");
+  if (samples.length < world.length / 20)
+    throw new Error("the photo is nearly all black or saturated: its light cannot be found");
   const target = Float64Array.from(samples, ({ value }) => value / BRIGHTNESS);
   const weights = target.map((value) => 1 / (value + 0.05));
   const sum = (f) => target.reduce((total, _, i) => total + weights[i] ** 2 * f(i), 0);
   const [ones, targets] = [sum(() => 1), sum((i) => target[i])];
   const least = targets / ones / 2;
-  const [low, high] = roomBox(world.flatMap(({ point }) => point), eye);
+  const [low, high] = roomBox(
+    world.flatMap(({ point }) => point),
+    eye,
+  );
   low[1] += LEAST_HEIGHT;
   let best = /** @type {any} */ ({ error: Infinity });
   for (const place of range(GRID[0] * GRID[1] * GRID[2])) {
@@ -172,11 +243,19 @@ function fitLight(world, colours, eye, notes) {
       ambient = Math.max(least, ambient);
       const colour = squares > 0 ? (both - ambient * lit) / squares : 0;
       const error = sum((i) => (ambient + colour * shine[i] - target[i]) ** 2);
-      if (colour > 0 && colour <= 15 && error < best.error) best = { error, ambient, lamp: { position, colour, reach } };
+      if (colour > 0 && colour <= 15 && error < best.error)
+        best = { error, ambient, lamp: { position, colour, reach } };
     }
   }
-  if (!best.lamp) best = { ambient: least, lamp: { position: [eye[0], Math.max(eye[1], low[1]) + 1, eye[2]], colour: 2 * least, reach: 0 } };
-  notes.push("the light is simplified: ambient light and one white lamp, fitted to the photo's brightness by least squares; the host fits colours and two lamps");
+  if (!best.lamp)
+    best = {
+      ambient: least,
+      lamp: { position: [eye[0], Math.max(eye[1], low[1]) + 1, eye[2]], colour: 2 * least, reach: 0 },
+    };
+  notes.push(
+    "the light is simplified: ambient light and one white lamp, fitted to the photo's brightness " +
+      "by least squares; the host fits colours and two lamps",
+  );
   return { ambient: best.ambient, lamp: best.lamp };
 }
 
@@ -184,8 +263,16 @@ function fitLight(world, colours, eye, notes) {
 function photoColours(colours, depth, normals, rays, pose, { ambient, lamp }) {
   const result = new Float64Array(colours.length);
   for (let i = 0; i < depth.length; ++i) {
-    const point = turned(pose.rotation, range(3).map((axis) => rays[3 * i + axis] * depth[i])).map((value, axis) => value + pose.position[axis]);
-    const light = Math.max(DARK, ambient + lamp.colour * exposure(point, turned(pose.rotation, normals.subarray(3 * i, 3 * i + 3)), lamp.position, lamp.reach));
+    const point = turned(
+      pose.rotation,
+      range(3).map((axis) => rays[3 * i + axis] * depth[i]),
+    ).map((value, axis) => value + pose.position[axis]);
+    const light = Math.max(
+      DARK,
+      ambient +
+        lamp.colour *
+          exposure(point, turned(pose.rotation, normals.subarray(3 * i, 3 * i + 3)), lamp.position, lamp.reach),
+    );
     for (let channel = 0; channel < 3; ++channel) result[3 * i + channel] = colours[3 * i + channel] / light;
   }
   return Uint8Array.from(result, (value) => encode(Math.min(1, value)));

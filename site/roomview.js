@@ -38,7 +38,10 @@ class Words {
   }
 
   setRotation(word, rows) {
-    this.set(word, rows.flat().map((value) => Math.round(value * 2 ** 30)));
+    this.set(
+      word,
+      rows.flat().map((value) => Math.round(value * 2 ** 30)),
+    );
   }
 }
 
@@ -50,7 +53,8 @@ export function lensOf(degrees, { width, height }) {
 
 /**
  * The view file of a room of a visitor. `template`: that of a room of the page, of the same design and size of a frame,
- * whose object has `templateScale`; `room` as of prepareRoom, with `encoded` and `lamp`, its light in the device's numbers; `object` has position and scale, metres.
+ * whose object has `templateScale`; `room` as of prepareRoom, with `encoded` and `lamp`, its light in the device's
+ * numbers; `object` has position and scale, metres.
  */
 export function roomView(template, templateScale, room, object, factor) {
   const bytes = template.slice();
@@ -59,13 +63,23 @@ export function roomView(template, templateScale, room, object, factor) {
   const ratio = templateScale / object.scale;
   words.setFactor(GRID, words.getFactor(GRID) * ratio);
   words.setWide(OBJECT, object.position);
-  words.setRotation(OBJECT + 6, [[1, 0, 0], [0, 1, 0], [0, 0, 1]]);
+  words.setRotation(OBJECT + 6, [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+  ]);
   words.setWide(CAMERA, pose.position);
   words.setRotation(CAMERA + 6, pose.rotation);
   const own = [lens.fx, lens.fy, lens.cx, lens.cy];
-  words.setWide(CAMERA + 15, own.map((value) => value / factor));
+  words.setWide(
+    CAMERA + 15,
+    own.map((value) => value / factor),
+  );
   words.setWide(FIRST_LIGHT, lamp.position);
-  words.set(FIRST_LIGHT + 6, lamp.colour.map((value) => Math.round(value * 2 ** 16)));
+  words.set(
+    FIRST_LIGHT + 6,
+    lamp.colour.map((value) => Math.round(value * 2 ** 16)),
+  );
   words.setWide(FIRST_LIGHT + 9, [lamp.reach]);
   const at = FIRST_LIGHT + LIGHT_WORDS * words.get(LIGHTS);
   const metres = words.getFactor(at + METRES) / ratio;
@@ -77,13 +91,22 @@ export function roomView(template, templateScale, room, object, factor) {
   words.setRotation(at + POSE + 6, pose.rotation);
   const points = room.surface.map(({ point }) => point);
   const limits = [0, 1, 2].map((axis) => points.map((point) => point[axis]));
-  words.setWide(at + BOX, limits.map((values) => Math.min(...values)));
-  words.setWide(at + BOX + 6, limits.map((values) => Math.max(...values)));
+  words.setWide(
+    at + BOX,
+    limits.map((values) => Math.min(...values)),
+  );
+  words.setWide(
+    at + BOX + 6,
+    limits.map((values) => Math.max(...values)),
+  );
   const { error, nearest, furthest } = encoded.tiles;
   error.forEach((value, tile) => {
     const depth = (metres, round) => Math.min(0xffff, round(Math.min(metres * 2 ** 10, 0xffff)));
     const limits = depth(nearest[tile], Math.floor) + 2 ** 16 * depth(furthest[tile], Math.ceil);
-    words.set(at + TILES + 2 * tile, [limits, Math.min(2 ** 24 - 1, Math.ceil((Number.isFinite(value) ? value : 1e6) * 2 ** 16))]);
+    words.set(at + TILES + 2 * tile, [
+      limits,
+      Math.min(2 ** 24 - 1, Math.ceil((Number.isFinite(value) ? value : 1e6) * 2 ** 16)),
+    ]);
   });
   return bytes;
 }
@@ -91,6 +114,8 @@ export function roomView(template, templateScale, room, object, factor) {
 /** Registers that the view file has as constants, and that are the visitor's room's. */
 export function roomRegisters({ encoded, ambient, light }, { numbers }) {
   const code = Math.min(2 ** numbers.lightBits - 1, Math.round(ambient * 2 ** numbers.lightFraction));
-  const gathered = light ? { "gather.parallax": light.parallax, "environment.boundingPlanes": 0 } : { "environment.boundingPlanes": encoded.boundingPlanes };
+  const gathered = light
+    ? { "gather.parallax": light.parallax, "environment.boundingPlanes": 0 }
+    : { "environment.boundingPlanes": encoded.boundingPlanes };
   return { "ambient.r": code, "ambient.g": code, "ambient.b": code, "shading.lights": 1, ...gathered };
 }

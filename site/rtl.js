@@ -24,6 +24,7 @@ export async function renderRtl(code, manifest, { records, writes, width, height
   }
   const counters = {};
   for (const { name, address, words } of registers.values())
-    if (name.startsWith("counters.")) counters[name.slice(9)] = rtl.rtl_read(address) + (words > 1 ? 2 ** 32 * rtl.rtl_read(address + 1) : 0);
+    if (name.startsWith("counters."))
+      counters[name.slice(9)] = rtl.rtl_read(address) + (words > 1 ? 2 ** 32 * rtl.rtl_read(address + 1) : 0);
   return { colours: colours().slice(), triangles: triangles().slice(), counters };
 }

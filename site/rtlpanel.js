@@ -9,7 +9,9 @@ import { viewOf } from "./view.js";
 const RTL = { design: "tiny", width: 64, height: 48 };
 
 export class RtlPanel {
-  page; fail; context;
+  page;
+  fail;
+  context;
 
   /** `page` takes what tests read, `fail` shows an error, `context` gives data, renderer, state and scene of now. */
   constructor(page, fail, context) {
@@ -30,9 +32,17 @@ export class RtlPanel {
       const recording = data.cycles[state.design];
       const isKnown = recording && isRecorded(state, orbit);
       const frames = [{ of: RTL.design, counters }];
-      if (isKnown) frames.push({ of: `${state.design}, recorded`, counters: nearestPixel(recording, { x, y, width, height }) });
-      const other = isKnown ? `; the recording is of the RTL of ${state.design}, for the nearest of ${recording.pixels.length} pixels of this view` : "";
-      showTimes(frames, `A frame of this pixel by the RTL of ${RTL.design}; its colour ${isEqual ? "is" : "is not"} the model's${other}`);
+      if (isKnown)
+        frames.push({ of: `${state.design}, recorded`, counters: nearestPixel(recording, { x, y, width, height }) });
+      const other = isKnown
+        ? `; the recording is of the RTL of ${state.design}, ` +
+          `for the nearest of ${recording.pixels.length} pixels of this view`
+        : "";
+      showTimes(
+        frames,
+        `A frame of this pixel by the RTL of ${RTL.design}; ` +
+          `its colour ${isEqual ? "is" : "is not"} the model's${other}`,
+      );
     } catch (error) {
       this.fail(error.message);
     } finally {
@@ -46,7 +56,13 @@ export class RtlPanel {
     const { data, renderer, scene } = this.context();
     const manifest = data.manifests[RTL.design];
     const rtl = await unpack(JSON.parse(element("data").textContent).rtl);
-    const opened = { module: page.module, manifest, views: { plain: bytesOf(data.views[RTL.design]) }, maps: [], photo: null };
+    const opened = {
+      module: page.module,
+      manifest,
+      views: { plain: bytesOf(data.views[RTL.design]) },
+      maps: [],
+      photo: null,
+    };
     return renderer.aside(opened, page.file, (worker, { packed }) =>
       renderer.ask(worker, "rtl", { rtl, packed, view: viewFor({ ...scene, manifest, packed }) }, onSlice),
     );
@@ -64,7 +80,9 @@ export class RtlPanel {
       const viewFor = (scene) => viewOf(scene, null, width, height, scene.state);
       const answer = await this.byRtl(viewFor, ({ cycles, pixels }) => {
         own.putImageData(new ImageData(pixels, width, height), 0, 0);
-        status.textContent = `${cycles.toLocaleString("en")} cycles, ${Math.round(cycles / (performance.now() - begin))} thousand a second`;
+        status.textContent =
+          `${cycles.toLocaleString("en")} cycles, ` +
+          `${Math.round(cycles / (performance.now() - begin))} thousand a second`;
       });
       await this.show(answer, own, models);
     } catch (error) {
@@ -84,13 +102,20 @@ export class RtlPanel {
     this.page.rtl = { hashes, different, counters: frame.counters };
     const isEqual = hashes[0] === hashes[1] && different.length === 0;
     element("rtl-status").textContent = isEqual
-      ? `Equal: ${width * height} pixels with their triangles, ${counters.length} counters. SHA-256 of both: ${hashes[0].slice(0, 16)}…`
-      : `Different: ${hashes.map((hash) => hash.slice(0, 16)).join(" and ")}; counters: ${different.join(", ") || "none"}`;
-    fillTable("rtl-counters", Object.entries(frame.counters).map(([name, value]) => [name, value, model.counters[name] ?? "–"]));
+      ? `Equal: ${width * height} pixels with their triangles, ${counters.length} counters. ` +
+        `SHA-256 of both: ${hashes[0].slice(0, 16)}…`
+      : `Different: ${hashes.map((hash) => hash.slice(0, 16)).join(" and ")}; ` +
+        `counters: ${different.join(", ") || "none"}`;
+    fillTable(
+      "rtl-counters",
+      Object.entries(frame.counters).map(([name, value]) => [name, value, model.counters[name] ?? "–"]),
+    );
   }
 }
 
 async function hashOf({ colours, triangles }) {
   const bytes = await new Blob([colours, triangles]).arrayBuffer();
-  return [...new Uint8Array(await crypto.subtle.digest("SHA-256", bytes))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  return [...new Uint8Array(await crypto.subtle.digest("SHA-256", bytes))]
+    .map((byte) => byte.toString(16).padStart(2, "0"))
+    .join("");
 }

@@ -12,9 +12,14 @@ const photoLinear = Float64Array.from({ length: 256 }, (_, code) => decode(code)
 export const codeOf = (value) => sRgb[Math.min(STEPS, Math.round(STEPS * value))];
 
 export class Sums {
-  white; photo; samples;
+  white;
+  photo;
+  samples;
 
-  /** Of a frame of so many pixels; `white` is the device's number for the colour 1.0. `photo`: sRGB, three bytes a pixel, or null. */
+  /**
+   * Of a frame of so many pixels; `white` is the device's number for the colour 1.0. `photo`: sRGB, three bytes a
+   * pixel, or null.
+   */
   constructor(pixels, white, photo) {
     Object.assign(this, { white, photo, samples: 0 });
     this.objects = new Uint32Array(3 * pixels);

@@ -14,7 +14,10 @@ import { surfacesOf } from "./surfaces.js";
 /** A band has this many rows, or fewer: a worker listens again after so many pixels. */
 const [BAND, BAND_PIXELS] = [4, 2560];
 
-/** Answers messages {id, call, …} with {id, …}; of a frame, with its bands, until another frame begins. After isBroken it is of no use. */
+/**
+ * Answers messages {id, call, …} with {id, …}; of a frame, with its bands, until another frame begins. After isBroken
+ * it is of no use.
+ */
 export function serve(scope) {
   let library;
   let white;
@@ -37,14 +40,19 @@ export function serve(scope) {
   const pause = () => new Promise((resolve) => (waiting.push(resolve), channel.port2.postMessage(null)));
 
   const calls = {
-    /** `views`: view files by name; `maps`, `photo` and `light`: those of a room, the photo as RGBA, the light as radiance or words. */
+    /**
+     * `views`: view files by name; `maps`, `photo` and `light`: those of a room, the photo as RGBA, the light as
+     * radiance or words.
+     */
     async open({ module, manifest, views, maps, photo, light }) {
       library ??= await Library.from(module);
       library.open(manifest);
       library.loadMemories(maps);
       files = views;
       opened = null;
-      photos = photo ? Object.fromEntries(Object.keys(views).map((factor) => [factor, resizedPhoto(photo, Number(factor))])) : {};
+      photos = photo
+        ? Object.fromEntries(Object.keys(views).map((factor) => [factor, resizedPhoto(photo, Number(factor))]))
+        : {};
       white = 2 ** manifest.numbers.colourBits - 1;
       radiance = light instanceof Uint8Array ? library.radianceOf(light) : light;
       lit = null;
@@ -54,20 +62,41 @@ export function serve(scope) {
     async read({ name, bytes, files, animation }) {
       read = prepared(library, await readMesh(library, name, bytes, files, animation));
       const { vertices, faces, colours, materials, animations, animation: own, notes } = read;
-      return { name, vertices: vertices.length / 3, faces: faces.length / 3, hasColours: colours !== null, hasMaterials: Boolean(materials), animations, animation: own, notes };
+      return {
+        name,
+        vertices: vertices.length / 3,
+        faces: faces.length / 3,
+        hasColours: colours !== null,
+        hasMaterials: Boolean(materials),
+        animations,
+        animation: own,
+        notes,
+      };
     },
-    /** `material`: "file", of the mesh's own materials, or one for all of it; `gathers` and `headroom` are those of frames. */
+    /**
+     * `material`: "file", of the mesh's own materials, or one for all of it; `gathers` and `headroom` are those of
+     * frames.
+     */
     pack({ material, gathers, headroom }) {
       const begin = performance.now();
       const mesh = read ?? raw;
       read = null;
       const { manifest } = library;
       const own = material === "file" ? surfacesOf(library, mesh, { manifest, gathers, headroom }) : null;
-      const surfaces = own ?? { surfaces: [plainSurface(mesh, material === "glass", 1 / headroom)], surfaceOf: new Int32Array(mesh.faces.length / 3) };
+      const surfaces = own ?? {
+        surfaces: [plainSurface(mesh, material === "glass", 1 / headroom)],
+        surfaceOf: new Int32Array(mesh.faces.length / 3),
+      };
       const packed = { ...library.pack(mesh, surfaces), entries: own?.entries ?? null, notes: own?.notes ?? [] };
       raw = mesh;
       posed = null;
-      return { packed, records: library.records(packed), clip: library.clipFile(), textures: library.textureMemories(), milliseconds: performance.now() - begin };
+      return {
+        packed,
+        records: library.records(packed),
+        clip: library.clipFile(),
+        textures: library.textureMemories(),
+        milliseconds: performance.now() - begin,
+      };
     },
     load({ records, clip, textures }) {
       library.load(records, clip);
@@ -78,7 +107,12 @@ export function serve(scope) {
     /** Encodes the room of a photo and its depth, for the maps of a design (room.js). */
     async room({ manifest, depth, step, ...photo }) {
       const begin = performance.now();
-      const { depth: filled, normals, albedo, ...room } = prepareRoom(library, { ...photo, depth: await readDepth(depth.name, depth.bytes, step) });
+      const {
+        depth: filled,
+        normals,
+        albedo,
+        ...room
+      } = prepareRoom(library, { ...photo, depth: await readDepth(depth.name, depth.bytes, step) });
       const prepared = performance.now();
       const encoded = encodeStill(library.wasm, manifest, codesOf({ ...room, albedo, normals, depth: filled }));
       const milliseconds = [prepared - begin, performance.now() - prepared];
@@ -98,7 +132,8 @@ export function serve(scope) {
       const begin = performance.now();
       const { camera, sample } = view;
       start(view);
-      if (!sample?.index) sums = new Sums(camera.width * camera.height, white * view.exposure, view.inPhoto ? photos[view.file] : null);
+      if (!sample?.index)
+        sums = new Sums(camera.width * camera.height, white * view.exposure, view.inPhoto ? photos[view.file] : null);
       ++sums.samples;
       const band = Math.max(1, Math.min(BAND, Math.floor(BAND_PIXELS / camera.width)));
       for (let first = band * part; first < camera.height; first += band * parts) {
@@ -138,7 +173,8 @@ export function serve(scope) {
   /** Linear colours as a browser draws them. */
   function shown(colours) {
     const pixels = new Uint8ClampedArray((4 * colours.length) / 3).fill(255);
-    for (let i = 0; i < pixels.length / 4; ++i) for (let channel = 0; channel < 3; ++channel) pixels[4 * i + channel] = codeOf(colours[3 * i + channel] / white);
+    for (let i = 0; i < pixels.length / 4; ++i)
+      for (let channel = 0; channel < 3; ++channel) pixels[4 * i + channel] = codeOf(colours[3 * i + channel] / white);
     return pixels;
   }
 
@@ -169,7 +205,11 @@ export function serve(scope) {
       const answer = await calls[call](parameters, (band) => scope.postMessage({ id, band }));
       scope.postMessage({ id, answer });
     } catch (error) {
-      scope.postMessage({ id, error: String(error.message ?? error), isBroken: error instanceof WebAssembly.RuntimeError });
+      scope.postMessage({
+        id,
+        error: String(error.message ?? error),
+        isBroken: error instanceof WebAssembly.RuntimeError,
+      });
     }
   };
 }

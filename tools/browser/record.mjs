@@ -1,5 +1,5 @@
-// The registers of frames of one pixel of the page's first view, for a design: node record.mjs JOB, whose arrays and module
-// are files. It prints a list of pairs of word address and value for each pixel.
+// The registers of frames of one pixel of the page's first view, for a design: node record.mjs JOB, whose arrays and
+// module are files. It prints a list of pairs of word address and value for each pixel.
 
 import { readFileSync } from "node:fs";
 import { START } from "../../site/camera.js";
@@ -14,7 +14,12 @@ const { width, height, manifest } = job;
 const library = await Library.from(readFileSync(job.module));
 library.open(manifest);
 const packed = library.pack({ vertices: read(job.vertices, Float64Array), faces: read(job.faces, Int32Array) });
-const scene = { state: { ...DEFAULTS, design: job.design }, mesh: { hasColours: false }, manifest, packed: { ...packed, entries: null, notes: [] } };
+const scene = {
+  state: { ...DEFAULTS, design: job.design },
+  mesh: { hasColours: false },
+  manifest,
+  packed: { ...packed, entries: null, notes: [] },
+};
 library.openView(new Uint8Array(readFileSync(job.view)));
 const frames = job.pixels.map(([x, y]) => {
   const { camera, lights, registers } = ofPixel(viewOf(scene, null, width, height, START), { x, y, width, height });

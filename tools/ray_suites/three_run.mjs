@@ -10,8 +10,10 @@ Math.random = () => {
 };
 
 const [file, every] = process.argv.slice(2);
-const results = { passed: 0, failed: [] }, names = [];
-let before = [], tests = [];
+const results = { passed: 0, failed: [] },
+  names = [];
+let before = [],
+  tests = [];
 
 globalThis.beforeAll = (call) => before.push(call);
 globalThis.it = (name, call) => tests.push([name, call]);

@@ -1,6 +1,7 @@
-// Reads and packs mesh files with their materials, as the page does: node files.mjs FOLDER, which has job.json: of each file its path and
-// the folder of the files beside it. It writes result.json: of each the refusal, or digests of its records and texture memories, and notes of
-// the file. A picture, named by its digest, is written there until it is there decoded, as KEY.json and KEY.bin.
+// Reads and packs mesh files with their materials, as the page does: node files.mjs FOLDER, which has job.json: of each
+// file its path and the folder of the files beside it. It writes result.json: of each the refusal, or digests of its
+// records and texture memories, and notes of the file. A picture, named by its digest, is written there until it is
+// there decoded, as KEY.json and KEY.bin.
 
 import { createHash } from "node:crypto";
 import { existsSync, readFileSync, readdirSync, statSync, writeFileSync } from "node:fs";
@@ -29,7 +30,11 @@ async function decode(bytes) {
   const { width, height, hasAlpha } = JSON.parse(readFileSync(`${key}.json`, "utf8"));
   if (!width) throw new Error("no picture");
   const rgba = read(`${key}.bin`);
-  const channels = (first, count) => Uint8Array.from({ length: count * width * height }, (_, i) => rgba[4 * Math.floor(i / count) + first + (i % count)]);
+  const channels = (first, count) =>
+    Uint8Array.from(
+      { length: count * width * height },
+      (_, i) => rgba[4 * Math.floor(i / count) + first + (i % count)],
+    );
   return { width, height, pixels: channels(0, 3), alpha: hasAlpha ? channels(3, 1) : null };
 }
 
@@ -44,10 +49,19 @@ function beside(path, found = new Map()) {
 }
 
 async function pack({ path, folder: place }) {
-  const found = await readMesh(library, path.split("/").pop(), read(path), place ? beside(place) : new Map(), null, decode);
+  const found = await readMesh(
+    library,
+    path.split("/").pop(),
+    read(path),
+    place ? beside(place) : new Map(),
+    null,
+    decode,
+  );
   const mesh = prepared(library, found);
   const plain = { surfaces: [plainSurface(mesh)], surfaceOf: new Int32Array(mesh.faces.length / 3) };
-  const surfaces = mesh.materials ? surfacesOf(library, mesh, { manifest: job.manifest, gathers: false, headroom: 1 }) : plain;
+  const surfaces = mesh.materials
+    ? surfacesOf(library, mesh, { manifest: job.manifest, gathers: false, headroom: 1 })
+    : plain;
   const packed = library.pack(mesh, surfaces);
   const memories = Object.fromEntries(library.textureMemories().map(({ memory, words }) => [memory, digest(words)]));
   return { records: digest(library.records(packed)), memories, triangles: found.faces.length / 3, notes: mesh.notes };

@@ -10,14 +10,30 @@ const read = (name, Array) => new Array(Uint8Array.from(readFileSync(`${folder}/
 const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
 const library = await Library.from(readFileSync(job.module));
 library.open(job.manifest);
-const mesh = { vertices: read("vertices.bin", Float64Array), faces: read("faces.bin", Int32Array), normals: read("normals.bin", Float64Array) };
-const packed = library.pack(mesh, { surfaces: [plainSurface(mesh, job.isGlass)], surfaceOf: new Int32Array(mesh.faces.length / 3) });
+const mesh = {
+  vertices: read("vertices.bin", Float64Array),
+  faces: read("faces.bin", Int32Array),
+  normals: read("normals.bin", Float64Array),
+};
+const packed = library.pack(mesh, {
+  surfaces: [plainSurface(mesh, job.isGlass)],
+  surfaceOf: new Int32Array(mesh.faces.length / 3),
+});
 writeFileSync(`${folder}/records.bin`, library.records(packed));
 writeFileSync(`${folder}/packed.json`, JSON.stringify(packed));
 const { writes, width, height } = job.frame;
 library.start(writes);
 write("model", { ...library.rows(0, height, width), counters: library.counters() });
-if (job.rtl) write("rtl", await renderRtl(readFileSync(job.rtl), job.manifest, { records: library.records(packed), writes, width, height }, () => {}));
+if (job.rtl)
+  write(
+    "rtl",
+    await renderRtl(
+      readFileSync(job.rtl),
+      job.manifest,
+      { records: library.records(packed), writes, width, height },
+      () => {},
+    ),
+  );
 
 function write(name, { colours, triangles, counters }) {
   writeFileSync(`${folder}/${name}-colours.bin`, new Uint8Array(colours.buffer));

@@ -1,5 +1,5 @@
-// Sums of passes and the light cube, as the page makes them: node light.mjs FOLDER, which has job.json. It writes the words
-// of the cube, and what sums show with a photo and without one.
+// Sums of passes and the light cube, as the page makes them: node light.mjs FOLDER, which has job.json. It writes the
+// words of the cube, and what sums show with a photo and without one.
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { Library } from "../../../site/library.js";
@@ -10,7 +10,10 @@ const read = (name) => Uint8Array.from(readFileSync(`${folder}/${name}`));
 const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
 const library = await Library.from(readFileSync(job.module));
 const numbers = (name) => new Float64Array(read(name).buffer);
-const { radiance, share } = library.lightAt({ points: numbers("points.bin"), normals: numbers("normals.bin"), colours: numbers("colours.bin") }, job.point);
+const { radiance, share } = library.lightAt(
+  { points: numbers("points.bin"), normals: numbers("normals.bin"), colours: numbers("colours.bin") },
+  job.point,
+);
 writeFileSync(`${folder}/radiance.bin`, new Uint8Array(radiance.buffer));
 writeFileSync(`${folder}/result.json`, JSON.stringify({ share }));
 writeFileSync(`${folder}/words.bin`, library.cubeWords(library.radianceOf(read("fine.bin")), job.rotation));

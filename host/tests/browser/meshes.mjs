@@ -1,5 +1,5 @@
-// Reads and packs mesh files, as the page does: node meshes.mjs FOLDER, which has job.json and the files. It writes result.json:
-// of each file the error, or the corners of its triangles, one after the other, with normals and colours.
+// Reads and packs mesh files, as the page does: node meshes.mjs FOLDER, which has job.json and the files. It writes
+// result.json: of each file the error, or the corners of its triangles, one after the other, with normals and colours.
 
 import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { Library } from "../../../site/library.js";

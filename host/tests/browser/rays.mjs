@@ -2,7 +2,8 @@
 import { readFileSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
-const folder = process.argv[2], file = (name) => readFileSync(`${folder}/${name}`);
+const folder = process.argv[2],
+  file = (name) => readFileSync(`${folder}/${name}`);
 const job = JSON.parse(file("job.json").toString());
 const { MeshBVH } = await import(pathToFileURL(job.module).href);
 
@@ -13,9 +14,13 @@ const attribute = (values, width) => ({
   getZ: (i) => values[width * i + 2],
 });
 const vector = (values) => ({ x: values[0], y: values[1], z: values[2] });
-const floats = new Float64Array(new Uint8Array(file("vertices.bin")).buffer), rays = new Float64Array(new Uint8Array(file("rays.bin")).buffer);
+const floats = new Float64Array(new Uint8Array(file("vertices.bin")).buffer),
+  rays = new Float64Array(new Uint8Array(file("rays.bin")).buffer);
 const faces = new Uint32Array(new Uint8Array(file("faces.bin")).buffer);
-const tree = new MeshBVH({ attributes: { position: attribute(floats, 3), uv: attribute(floats, 3) }, index: attribute(faces, 1) });
+const tree = new MeshBVH({
+  attributes: { position: attribute(floats, 3), uv: attribute(floats, 3) },
+  index: attribute(faces, 1),
+});
 
 const found = job.sides.map((side) =>
   Array.from({ length: rays.length / 8 }, (_, i) => {
@@ -35,6 +40,9 @@ for (const run of [
     refusals.push(error.message);
   }
 // After a refusal the others go on
-const again = tree.raycastFirst({ origin: vector(rays.subarray(0, 3)), direction: vector(rays.subarray(4, 7)) }, { side: 2 });
+const again = tree.raycastFirst(
+  { origin: vector(rays.subarray(0, 3)), direction: vector(rays.subarray(4, 7)) },
+  { side: 2 },
+);
 tree.dispose();
 writeFileSync(`${folder}/hits.json`, JSON.stringify({ found, refusals, again }));

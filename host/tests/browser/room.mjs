@@ -11,10 +11,16 @@ const folder = process.argv[2];
 const bytes = (name) => Uint8Array.from(readFileSync(`${folder}/${name}`));
 const job = JSON.parse(readFileSync(`${folder}/job.json`, "utf8"));
 const library = await Library.from(readFileSync(job.module));
-const codes = { ...job.codes, albedo: bytes("albedo.bin"), normals: bytes("normals.bin"), depth: new Uint32Array(bytes("depth.bin").buffer) };
+const codes = {
+  ...job.codes,
+  albedo: bytes("albedo.bin"),
+  normals: bytes("normals.bin"),
+  depth: new Uint32Array(bytes("depth.bin").buffer),
+};
 const { maps, tiles, ...rest } = encodeStill(library.wasm, job.manifest, codes);
 for (const { memory, words } of maps) writeFileSync(`${folder}/${memory}`, words);
-for (const [name, values] of Object.entries(tiles)) writeFileSync(`${folder}/tiles.${name}`, new Uint8Array(values.buffer));
+for (const [name, values] of Object.entries(tiles))
+  writeFileSync(`${folder}/tiles.${name}`, new Uint8Array(values.buffer));
 
 const slic = structuredClone(job.manifest);
 slic.config.physicalAttributeMemory.encoding = "slic";

@@ -1,6 +1,7 @@
-// Reads and packs a glTF file with its materials, as the page does: node surfaces.mjs FOLDER, which has job.json and the file. The
-// first time it writes the pictures of textures, picture-N; then it reads them decoded, N.bin, and writes records.bin, clip.bin, the memories
-// of textures, entries.json, of the material table and with the kinds of faces, and the colours of the job's frame.
+// Reads and packs a glTF file with its materials, as the page does: node surfaces.mjs FOLDER, which has job.json and
+// the file. The first time it writes the pictures of textures, picture-N; then it reads them decoded, N.bin, and writes
+// records.bin, clip.bin, the memories of textures, entries.json, of the material table and with the kinds of faces, and
+// the colours of the job's frame.
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { prepared } from "../../../site/coverage.js";
@@ -21,7 +22,11 @@ const decode = async (bytes) => {
   if (!job.pictures) return void writeFileSync(`${folder}/picture-${number}`, bytes);
   const { width, height, hasAlpha } = job.pictures[number];
   const rgba = read(`${folder}/${number}.bin`);
-  const channels = (first, count) => Uint8Array.from({ length: count * width * height }, (_, i) => rgba[4 * Math.floor(i / count) + first + (i % count)]);
+  const channels = (first, count) =>
+    Uint8Array.from(
+      { length: count * width * height },
+      (_, i) => rgba[4 * Math.floor(i / count) + first + (i % count)],
+    );
   return { width, height, pixels: channels(0, 3), alpha: hasAlpha ? channels(3, 1) : null };
 };
 const files = new Map(job.files.map((name) => [name, read(`${job.beside}/${name}`)]));
@@ -34,12 +39,27 @@ function render(mesh) {
   writeFileSync(`${folder}/records.bin`, library.records(packed));
   writeFileSync(`${folder}/clip.bin`, library.clipFile());
   for (const { memory, words } of library.textureMemories()) writeFileSync(`${folder}/${memory}`, words);
-  writeFileSync(`${folder}/entries.json`, JSON.stringify({ entries: surfaces.entries, kinds: [...mesh.materialOf].map((number) => mesh.materials[number].kind), packed, notes: [...mesh.notes, ...surfaces.notes] }));
+  writeFileSync(
+    `${folder}/entries.json`,
+    JSON.stringify({
+      entries: surfaces.entries,
+      kinds: [...mesh.materialOf].map((number) => mesh.materials[number].kind),
+      packed,
+      notes: [...mesh.notes, ...surfaces.notes],
+    }),
+  );
   if (!job.frame) return;
   const { writes, width, height, threshold } = job.frame;
   const frame = { headroom: job.headroom, exposure: 1, numbers: job.manifest.numbers };
-  const of = { "scene.recordCount": packed.recordCount, "scene.hasColours": packed.hasColours, "shading.offset": packed.shadingOffset };
-  library.start([...writes, ...registerWrites(job.manifest, { ...tableRegisters(surfaces.entries, frame, threshold), ...of })]);
+  const of = {
+    "scene.recordCount": packed.recordCount,
+    "scene.hasColours": packed.hasColours,
+    "shading.offset": packed.shadingOffset,
+  };
+  library.start([
+    ...writes,
+    ...registerWrites(job.manifest, { ...tableRegisters(surfaces.entries, frame, threshold), ...of }),
+  ]);
   const { colours, triangles } = library.rows(0, height, width);
   writeFileSync(`${folder}/colours.bin`, new Uint8Array(colours.buffer));
   writeFileSync(`${folder}/triangles.bin`, new Uint8Array(triangles.buffer));

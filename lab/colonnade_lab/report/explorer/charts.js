@@ -72,7 +72,11 @@ function drawPanel(name) {
   if (pictures.length) {
     const choice = element("select", { id: "panel-workload", "aria-label": "workload" });
     const shown = element("div");
-    setOptions(choice, pictures.map(([workload]) => [workload, workload]), panelWorkload);
+    setOptions(
+      choice,
+      pictures.map(([workload]) => [workload, workload]),
+      panelWorkload,
+    );
     const show = () => {
       panelWorkload = choice.value;
       const figures = point.workloads[choice.value];

@@ -27,7 +27,10 @@ function chosenPicture(side) {
 }
 
 function caption(picture) {
-  const figures = picture.figures.slice(0, 4).map(([label, text]) => `${label} ${text}`).join(", ");
+  const figures = picture.figures
+    .slice(0, 4)
+    .map(([label, text]) => `${label} ${text}`)
+    .join(", ");
   return [element("strong", null, picture.label), element("span", null, figures ? ` – ${figures}` : "")];
 }
 
@@ -106,7 +109,10 @@ function showPictures() {
   const right = chosenPicture("right");
   const mode = document.querySelector("input[name=mode]:checked").value;
   for (const view of ["beside", "slider", "difference"]) byId(`view-${view}`).hidden = view !== mode;
-  for (const [side, picture] of [["left", left], ["right", right]]) {
+  for (const [side, picture] of [
+    ["left", left],
+    ["right", right],
+  ]) {
     showImage(`beside-${side}`, picture);
     showImage(`slider-${side}`, picture);
     byId(`caption-${side}`).replaceChildren(...caption(picture));
@@ -125,7 +131,10 @@ function showWorkload() {
 
 if (byId("picture-workload")) {
   const workloads = study.workloads.map((each) => each.name).filter((name) => picturesOf(name).length);
-  setOptions(byId("picture-workload"), workloads.map((name) => [name, name]));
+  setOptions(
+    byId("picture-workload"),
+    workloads.map((name) => [name, name]),
+  );
   byId("picture-workload").addEventListener("change", showWorkload);
   for (const id of ["picture-left", "picture-right", "picture-mode"]) byId(id).addEventListener("change", showPictures);
   byId("divider").addEventListener("input", moveDivider);

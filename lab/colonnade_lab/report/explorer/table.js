@@ -39,7 +39,9 @@ function filterRows() {
   let count = 0;
   for (const row of body.rows) {
     const text = row.querySelectorAll(".name").length
-      ? Array.from(row.querySelectorAll(".name"), (cell) => cell.textContent).join(" ").toLowerCase()
+      ? Array.from(row.querySelectorAll(".name"), (cell) => cell.textContent)
+          .join(" ")
+          .toLowerCase()
       : "";
     let isShown = words.every((word) => text.includes(word)) && (!frontOnly || row.classList.contains("front"));
     if (isShown && column !== "" && limit !== "") {
